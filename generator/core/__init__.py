@@ -1,0 +1,1 @@
+"""The nouns: frozen data and small pure functions, on numpy and the standard library only."""

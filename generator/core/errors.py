@@ -1,0 +1,113 @@
+"""Every error a user can meet, each with the exit code of the process.
+
+GenDataError                        1  should not be raised itself
++-- ConfigError                     2  configuration or usage
++-- AssetError                      3  a mesh, texture or robot cannot be used
++-- StorageError                    4  disk full, no permission, foreign folder; resumable
++-- DeterminismError                5  the same shard came out with other bytes
++-- SampleError                     6  a sample cannot be made
+|   +-- SceneRejected               6  no valid layout in a bounded number of attempts
+|   +-- WorkerLost                  6  a worker process died again and again on one shard
++-- VerificationError               7  a data set is not what its manifest says
++-- Interrupted                   130  Ctrl-C
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+class GenDataError(Exception):
+    """Base of all errors that are shown to a user as one message, without a traceback."""
+
+    exit_code = 1
+
+
+class ConfigError(GenDataError):
+    """The configuration or the command line is wrong."""
+
+    exit_code = 2
+
+
+class AssetError(GenDataError):
+    """An asset is missing, unreadable or unfit."""
+
+    exit_code = 3
+
+
+class StorageError(GenDataError):
+    """The output folder cannot be written or does not belong to this run."""
+
+    exit_code = 4
+
+
+class DeterminismError(GenDataError):
+    """The same work produced different bytes."""
+
+    exit_code = 5
+
+
+class SampleError(GenDataError):
+    """A sample cannot be made."""
+
+    exit_code = 6
+
+
+class WorkerLost(SampleError):
+    """A worker process died repeatedly on the same shard."""
+
+
+class VerificationError(GenDataError):
+    """A data set differs from what its manifest declares."""
+
+    exit_code = 7
+
+
+class Interrupted(GenDataError):
+    """The user asked to stop; what was committed stays and the run can be resumed."""
+
+    exit_code = 130
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """Why one attempt at a scene was refused, and what a user can change.
+
+    Attributes:
+        reason: A short noun phrase that equal rejections share, such as ``object fell off``.
+        remedy: What to change, naming a field of the configuration.
+    """
+
+    reason: str
+    remedy: str
+
+
+class SceneRejected(SampleError):
+    """No valid layout of a scene was found within the bounded number of attempts."""
+
+    def __init__(self, scene_index: int, rejections: tuple[Rejection, ...]) -> None:
+        self.scene_index = scene_index
+        self.rejections = rejections
+        counts: dict[str, int] = {}
+        remedies: dict[str, None] = {}
+        for rejection in rejections:
+            counts[rejection.reason] = counts.get(rejection.reason, 0) + 1
+            remedies[rejection.remedy] = None
+        tally = ", ".join(f"{count} x {reason}" for reason, count in counts.items())
+        tries = " ".join(f"{i}. {remedy}" for i, remedy in enumerate(remedies, 1))
+        super().__init__(
+            f"scene {scene_index}: no valid layout in {len(rejections)} attempts ({tally}).\n"
+            f"  Try: {tries}"
+        )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by the constructor's arguments, so that it crosses process borders."""
+        return (type(self), (self.scene_index, self.rejections))
+
+
+def did_you_mean(wrong: str, known: Iterable[str]) -> str:
+    """`` (did you mean 'x'?)`` when something known is near, else the empty string."""
+    near = difflib.get_close_matches(wrong, list(known), n=1, cutoff=0.6)
+    return f" (did you mean '{near[0]}'?)" if near else ""

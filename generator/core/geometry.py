@@ -1,0 +1,197 @@
+"""Geometry and images as plain arrays: what assets hand to physics and to renderers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.se3 import SE3, Vec3
+
+Float32 = NDArray[np.float32]
+Int32 = NDArray[np.int32]
+UInt8 = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Metallic-roughness surface of one mesh slot (Burley 2012, as in glTF 2.0).
+
+    Attributes:
+        base_color: Linear RGB in [0, 1]; multiplies the texture where there is one.
+        roughness: Perceptual roughness in [0, 1]; GGX alpha is its square.
+        metallic: 0 dielectric, 1 metal.
+        specular: Dielectric reflectance at normal incidence is ``0.08 * specular``.
+        texture: Texture id of the library; empty = none.
+        texture_scale_m: Length of one texture repeat [m] under triplanar mapping; 0 = use the
+            mesh's own UVs.
+        emission_cd_m2: Emitted luminance, linear RGB [cd/m^2].
+        printed: The texture is part of what the object *is* (a label, a book cover);
+            randomizers leave colour and texture alone.
+    """
+
+    base_color: Vec3 = (0.6, 0.6, 0.6)
+    roughness: float = 0.5
+    metallic: float = 0.0
+    specular: float = 0.5
+    texture: str = ""
+    texture_scale_m: float = 0.0
+    emission_cd_m2: Vec3 = (0.0, 0.0, 0.0)
+    printed: bool = False
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MeshData:
+    """A triangle mesh in its body's frame: metres, Z up, counter-clockwise outward.
+
+    Attributes:
+        vertices_m: float32 [n, 3].
+        faces: int32 [m, 3], indices into the vertices.
+        normals: float32 [n, 3], unit; vertices are split along creases.
+        uvs: float32 [n, 2], (0, 0) at the image's bottom left; all zero where there are none.
+        face_slots: int32 [m], the material slot of each face.
+        materials: The mesh's own materials, one per slot.
+    """
+
+    vertices_m: Float32
+    faces: Int32
+    normals: Float32
+    uvs: Float32
+    face_slots: Int32
+    materials: tuple[Material, ...]
+
+    def bounds_m(self) -> tuple[Vec3, Vec3]:
+        """Smallest and largest coordinates."""
+        low, high = self.vertices_m.min(axis=0), self.vertices_m.max(axis=0)
+        return (
+            (float(low[0]), float(low[1]), float(low[2])),
+            (float(high[0]), float(high[1]), float(high[2])),
+        )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TextureData:
+    """The images of one texture; all have the same size and tile in both directions.
+
+    Attributes:
+        albedo: sRGB colour, uint8 [height, width, 3].
+        roughness: Factor on the material's roughness, 255 = 1, uint8 [height, width]; None = 1.
+        normal: Tangent-space normal (OpenGL convention, +Y up), uint8 [height, width, 3]; or None.
+    """
+
+    albedo: UInt8
+    roughness: UInt8 | None = None
+    normal: UInt8 | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ConvexParts:
+    """Collision geometry: a union of convex hulls in the body's frame.
+
+    Attributes:
+        parts_m: One float64 [n, 3] array of hull vertices per part.
+    """
+
+    parts_m: tuple[NDArray[np.float64], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One joint of a robot; the child link's frame is the joint frame (as in URDF).
+
+    Attributes:
+        kind: ``fixed``, ``revolute`` (bounded), ``continuous`` or ``prismatic``.
+        T_parent_joint: Pose of the joint frame in the parent link at position 0.
+        axis: Unit axis in the joint frame.
+        lower, upper: Limits [rad or m].
+        mimic: Name of the joint this one follows, or empty.
+    """
+
+    name: str
+    kind: Literal["fixed", "revolute", "continuous", "prismatic"]
+    parent: str
+    child: str
+    T_parent_joint: SE3
+    axis: Vec3
+    lower: float
+    upper: float
+    mimic: str = ""
+
+    @property
+    def movable(self) -> bool:
+        """Whether a position belongs to it."""
+        return self.kind != "fixed"
+
+
+@dataclass(frozen=True, slots=True)
+class Gripper:
+    """How a robot holds things.
+
+    Attributes:
+        link: Link whose frame carries the grasp frame.
+        T_link_grasp: Grasp frame: origin between the finger tips, Z out of the hand,
+            Y the direction in which the fingers open.
+        finger_joints: Joints that open the gripper, with equal positions.
+        stroke_m: Distance between the fingers when fully open; 0 is closed.
+    """
+
+    link: str
+    T_link_grasp: SE3
+    finger_joints: tuple[str, ...]
+    stroke_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class RobotModel:
+    """Kinematics of a robot, from its URDF.
+
+    Attributes:
+        links: Link names, root first, each after its parent.
+        joints: All joints, in the order of their child links.
+        visuals: ``{link: mesh asset id}``; links without geometry are absent.
+        collisions: ``{link: asset id whose convex parts collide}``.
+        home: A nominal, collision-free position per movable joint, in the order of ``joints``.
+        gripper: Present when the robot can hold things.
+        no_collide: Link pairs that may touch (neighbours, and pairs that touch by design).
+    """
+
+    links: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    visuals: dict[str, str]
+    collisions: dict[str, str]
+    home: tuple[float, ...]
+    gripper: Gripper | None
+    no_collide: frozenset[tuple[str, str]]
+
+    @property
+    def movable(self) -> tuple[Joint, ...]:
+        """Joints that have a position, in order."""
+        return tuple(j for j in self.joints if j.movable)
+
+
+@dataclass(frozen=True, slots=True)
+class Asset:
+    """One entry of the library.
+
+    Attributes:
+        asset_id: What YAML and scenes name it by: ``mug?seed=3``, ``pybullet/teddy``.
+        kind: ``object`` (a mesh), ``robot``, ``texture`` or ``environment``.
+        category: What it is called in labels.
+        tags: What YAML selects by, sorted.
+        mass_kg: Nominal mass; 0 = unknown.
+        sha256: Content hash of the files or of the generator's version and parameters.
+        stackable: Flat above and below: may be stacked.
+    """
+
+    asset_id: str
+    kind: Literal["object", "robot", "texture", "environment"]
+    category: str
+    tags: tuple[str, ...]
+    licence: str
+    author: str
+    source: str
+    sha256: str
+    mass_kg: float = 0.0
+    stackable: bool = False

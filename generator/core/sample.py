@@ -1,0 +1,115 @@
+"""Sample ``i`` of a data set: a Capture, the truth about it, and where it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.boxes import BoxPx, OrientedBox
+from generator.core.capture import Capture
+from generator.core.scene import Camera, Instance, Scene
+from generator.core.se3 import SE3
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MaskPx:
+    """A binary mask, stored tight: the box it fills and the pixels inside that box.
+
+    Attributes:
+        x_px, y_px: Where ``pixels[0, 0]`` lies in the image (may be negative when amodal).
+        pixels: bool [h, w].
+    """
+
+    x_px: int
+    y_px: int
+    pixels: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ObjectTruth:
+    """Everything that is known about one instance in one image.
+
+    A field is None when its annotator was not asked for.
+
+    Attributes:
+        visible_px: Pixels of the instance in the image.
+        box: Tight box of the visible pixels.
+        amodal_box: Tight box of the whole silhouette, hidden parts and parts outside the image
+            included (boxes2d).
+        box3d_world, box3d_camera: The oriented box in both frames (boxes3d).
+        T_camera_object: Pose of the instance frame in the camera frame (poses).
+        mask: Visible pixels (instance_masks).
+        amodal_mask: The whole silhouette, clipped to the image (amodal_masks).
+        visible_fraction: Visible pixels / pixels of the whole silhouette, in or out of the image
+            (BOP's visib_fract) (visibility).
+        occlusion: Share of the silhouette inside the image that other things hide (visibility).
+        truncation: Share of the silhouette that lies outside the image (visibility).
+        part_px: Visible pixels per part name, for instances with parts (part_masks).
+    """
+
+    instance: Instance
+    visible_px: int
+    box: BoxPx | None
+    amodal_box: BoxPx | None = None
+    box3d_world: OrientedBox | None = None
+    box3d_camera: OrientedBox | None = None
+    T_camera_object: SE3 | None = None
+    mask: MaskPx | None = None
+    amodal_mask: MaskPx | None = None
+    visible_fraction: float | None = None
+    occlusion: float | None = None
+    truncation: float | None = None
+    part_px: Mapping[str, int] | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ImageTruth:
+    """The annotations of one camera image, in order of instance id."""
+
+    camera: Camera
+    objects: tuple[ObjectTruth, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sample:
+    """One element of the data set.
+
+    Attributes:
+        index: Number in the data set, from 0; ``divmod(index, views_per_scene)`` names scene and
+            view.
+        split: ``train``, ``val`` or ``test``: the same for all views of a scene.
+        scene: The final world; rendering it again needs no randomizer and no physics.
+        truth: Annotations by sensor name.
+        attempts: How many layouts were drawn before this one was accepted.
+        timings_s: Seconds of CPU by stage. Never written to a data file.
+    """
+
+    index: int
+    scene_index: int
+    view_index: int
+    split: str
+    scene: Scene
+    capture: Capture
+    truth: Mapping[str, ImageTruth]
+    attempts: int = 1
+    timings_s: Mapping[str, float] = field(default_factory=dict)
+
+    def image_id(self, sensor: str) -> int:
+        """Number of one image of the sample, from 1, unique in the data set."""
+        names = sorted(self.truth)
+        return self.index * len(names) + names.index(sensor) + 1
+
+    def annotation_id(self, sensor: str, instance_id: int) -> int:
+        """Number of one annotation, from 1, unique in the data set.
+
+        A fixed stride per image makes it a pure function of (sample, sensor, instance): no
+        counting, so shards can be written in any order.
+        """
+        return (self.image_id(sensor) - 1) * ANNOTATION_STRIDE + instance_id
+
+
+ANNOTATION_STRIDE = 65_536
+"""Instance ids are 16-bit, so each image owns this many annotation ids."""

@@ -1,0 +1,285 @@
+"""Scene: the complete, frozen description of one world.
+
+No engine handle, no distribution, nothing unresolved. World frame: right-handed, Z up, metres,
+seconds, radians. Every template element becomes bodies, lights and labels here; nothing downstream
+knows the element types.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol, TypeVar
+
+from generator.core.geometry import Material
+from generator.core.intrinsics import Intrinsics
+from generator.core.se3 import IDENTITY, SE3, Vec3
+
+Motion = Literal["static", "dynamic", "kinematic"]
+Placement = Literal["drop", "scatter", "grid", "stack"]
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """One labelled thing: what an instance id stands for.
+
+    Attributes:
+        instance_id: From 1; 0 means nothing.
+        category_id: From 1, index into the data set's sorted category names; 0 = no category.
+        annotated: Whether labels are written for it. Distractors and furniture keep their
+            instance id in the masks and have no annotation.
+        parts: Names of its parts; part id ``k`` is ``parts[k - 1]``. Robots: their links.
+        T_world_instance: Pose of the instance frame (a body's own frame; a robot's base).
+        box_min_m, box_max_m: Tight bounds of the visual geometry in the instance frame [m].
+    """
+
+    instance_id: int
+    name: str
+    category: str
+    category_id: int
+    asset: str
+    annotated: bool = True
+    parts: tuple[str, ...] = ()
+    T_world_instance: SE3 = IDENTITY
+    box_min_m: Vec3 = (0.0, 0.0, 0.0)
+    box_max_m: Vec3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """One rigid piece of geometry.
+
+    Attributes:
+        name: Unique in the scene: ``table``, ``clutter/3``, ``arm/panda_link4``.
+        asset: Mesh asset id.
+        scale: Uniform factor on the mesh.
+        instance_id: The instance it belongs to; 0 = unlabelled background.
+        part_id: From 1 within its instance; 0 = the whole.
+        group: Name of the object group it was placed by; empty = none.
+        motion: ``dynamic`` bodies fall; ``kinematic`` ones are placed by a robot.
+        collides: Whether physics sees it.
+        materials: One per mesh slot; empty = the asset's own.
+    """
+
+    name: str
+    asset: str
+    T_world_body: SE3 = IDENTITY
+    scale: float = 1.0
+    instance_id: int = 0
+    part_id: int = 0
+    group: str = ""
+    motion: Motion = "static"
+    collides: bool = True
+    mass_kg: float = 0.0
+    friction: float = 0.6
+    restitution: float = 0.05
+    materials: tuple[Material, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """A horizontal rectangle that things can stand on.
+
+    Attributes:
+        body: Name of the body it belongs to.
+        T_world_surface: Centre of the rectangle, Z = its normal.
+        size_m: Extent along the surface's X and Y.
+        clearance_m: Free height above it.
+        walled: Enclosed at the sides: things dropped in it cannot leave it.
+    """
+
+    name: str
+    body: str
+    T_world_surface: SE3
+    size_m: tuple[float, float]
+    clearance_m: float
+    walled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectGroup:
+    """What a template asked to be placed on surfaces.
+
+    Attributes:
+        surfaces: Names of the surfaces it is spread over.
+        assets: Ids of the assets it may draw from, sorted.
+        keep_out: Discs ``(x, y, radius)`` [m], world, where nothing is put (the arm's base).
+    """
+
+    name: str
+    surfaces: tuple[str, ...]
+    assets: tuple[str, ...]
+    count: int
+    placement: Placement
+    annotated: bool = True
+    keep_out: tuple[Vec3, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ArmGoal:
+    """What the arm should do; drawn by a randomizer, made true by physics.
+
+    Physics takes the first candidate that is within limits and free of collision.
+
+    Attributes:
+        kind: ``joints``: candidates are joint positions. ``reach``: candidates are poses of the
+            grasp frame in the world. ``hold``: like reach, with ``held`` between the fingers.
+        joint_candidates: One tuple per candidate [rad or m], arm joints in order.
+        pose_candidates: ``T_world_grasp`` per candidate.
+        opening: Gripper opening in [0, 1]; ignored for ``hold``.
+        held: Name of the body that is held.
+    """
+
+    kind: Literal["joints", "reach", "hold"]
+    joint_candidates: tuple[tuple[float, ...], ...] = ()
+    pose_candidates: tuple[SE3, ...] = ()
+    opening: float = 1.0
+    held: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Articulation:
+    """A robot: its link bodies are ``<name>/<link>`` and move with its joints.
+
+    Attributes:
+        joint_positions: One per movable joint, in the robot model's order [rad or m].
+        workspace_m: Low and high corner [m], world, where its hand may be sent.
+    """
+
+    name: str
+    asset: str
+    instance_id: int
+    T_world_base: SE3
+    joint_positions: tuple[float, ...]
+    goal: ArmGoal | None = None
+    workspace_m: tuple[Vec3, Vec3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """A light source.
+
+    Attributes:
+        kind: ``sphere`` radiates evenly from a ball; ``spot`` does so within a cone; ``sun`` is
+            at infinity.
+        position_m: Centre, world [m] (sphere, spot).
+        direction: Unit vector in which the light travels (spot, sun).
+        color: Linear RGB with luminance 1.
+        intensity_cd: Luminous intensity [cd] (sphere, spot).
+        illuminance_lux: On a surface that faces it [lx] (sun).
+        radius_m: Of the ball: its softness (sphere, spot).
+        angular_radius_rad: Of the disc in the sky (sun).
+        cone_rad: Half angle at which a spot has faded to nothing; fades from 0.8 of it.
+    """
+
+    name: str
+    kind: Literal["sphere", "spot", "sun"]
+    position_m: Vec3 = (0.0, 0.0, 2.0)
+    direction: Vec3 = (0.0, 0.0, -1.0)
+    color: Vec3 = (1.0, 1.0, 1.0)
+    intensity_cd: float = 0.0
+    illuminance_lux: float = 0.0
+    radius_m: float = 0.05
+    angular_radius_rad: float = 0.00465
+    cone_rad: float = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """Light from all around: an equirectangular image of relative luminance (mean 1).
+
+    Attributes:
+        image: Environment id of the library.
+        luminance_cd_m2: Mean luminance over the sphere.
+        yaw_rad: Rotation about world Z.
+        visible: Whether pixels that hit nothing show it; else they are black.
+    """
+
+    image: str = "environment/neutral?seed=0"
+    luminance_cd_m2: float = 100.0
+    yaw_rad: float = 0.0
+    visible: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A camera mounted in the world.
+
+    Attributes:
+        name: The sensor's name in the YAML.
+        T_world_camera: Camera frame: X right, Y down, Z forward.
+        ev100: Fixed exposure value at ISO 100; None = exposed automatically.
+    """
+
+    name: str
+    T_world_camera: SE3
+    intrinsics: Intrinsics
+    ev100: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """What cameras look at: a box in the world around the things of interest."""
+
+    center_m: Vec3 = (0.0, 0.0, 0.0)
+    size_m: Vec3 = (1.0, 1.0, 0.4)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One world. Change it with ``dataclasses.replace``.
+
+    Attributes:
+        interior_m: Low and high corner of the space in which cameras and lights may be; a room's
+            inner walls.
+    """
+
+    template: str
+    bodies: tuple[Body, ...] = ()
+    instances: tuple[Instance, ...] = ()
+    surfaces: tuple[Surface, ...] = ()
+    groups: tuple[ObjectGroup, ...] = ()
+    articulations: tuple[Articulation, ...] = ()
+    lights: tuple[Light, ...] = ()
+    environment: Environment = field(default_factory=Environment)
+    cameras: tuple[Camera, ...] = ()
+    focus: Region = field(default_factory=Region)
+    interior_m: tuple[Vec3, Vec3] = ((-50.0, -50.0, 0.0), (50.0, 50.0, 50.0))
+
+    def body(self, name: str) -> Body:
+        """The body of that name; KeyError if there is none."""
+        return _named(self.bodies, name)
+
+    def surface(self, name: str) -> Surface:
+        """The surface of that name; KeyError if there is none."""
+        return _named(self.surfaces, name)
+
+    def camera(self, name: str) -> Camera:
+        """The camera of that name; KeyError if there is none."""
+        return _named(self.cameras, name)
+
+    def instance(self, instance_id: int) -> Instance:
+        """The instance with that id; KeyError if there is none."""
+        for instance in self.instances:
+            if instance.instance_id == instance_id:
+                return instance
+        raise KeyError(instance_id)
+
+    def with_bodies(self, *changed: Body) -> Scene:
+        """The scene with bodies of the same names exchanged."""
+        by_name = {body.name: body for body in changed}
+        return replace(self, bodies=tuple(by_name.get(b.name, b) for b in self.bodies))
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+_N = TypeVar("_N", bound=_Named)
+
+
+def _named(items: tuple[_N, ...], name: str) -> _N:
+    for item in items:
+        if item.name == name:
+            return item
+    raise KeyError(name)

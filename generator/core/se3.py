@@ -1,0 +1,174 @@
+"""Rigid poses in three dimensions.
+
+Composition and application use only ``+ - * / sqrt``, so that a pose has the same bits on every
+processor. ``T_world_body`` maps body coordinates to world coordinates.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vec3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class SE3:
+    """A rotation followed by a translation.
+
+    Attributes:
+        translation_m: Origin of the inner frame in the outer frame [m].
+        quaternion_wxyz: Unit quaternion, scalar first.
+    """
+
+    translation_m: Vec3 = (0.0, 0.0, 0.0)
+    quaternion_wxyz: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    @classmethod
+    def from_matrix(cls, matrix: Array) -> SE3:
+        """Pose of a homogeneous matrix, shape [4, 4] or [3, 4]."""
+        x, y, z = (float(v) for v in matrix[:3, 3])
+        return cls((x, y, z), quaternion_of_rotation(matrix[:3, :3]))
+
+    @classmethod
+    def about_z(cls, yaw_rad: float, translation_m: Vec3 = (0.0, 0.0, 0.0)) -> SE3:
+        """Rotation by ``yaw_rad`` about Z, then a translation."""
+        half = 0.5 * yaw_rad
+        return cls(translation_m, (math.cos(half), 0.0, 0.0, math.sin(half)))
+
+    def rotation(self) -> Array:
+        """Rotation matrix, shape [3, 3]."""
+        w, x, y, z = self.quaternion_wxyz
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    def matrix(self) -> Array:
+        """Homogeneous matrix, shape [4, 4]."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.rotation()
+        matrix[:3, 3] = self.translation_m
+        return matrix
+
+    def inverse(self) -> SE3:
+        """The pose that undoes this one."""
+        w, x, y, z = self.quaternion_wxyz
+        conjugate = (w, -x, -y, -z)
+        tx, ty, tz = self.translation_m
+        return SE3(rotate_by_quaternion(conjugate, (-tx, -ty, -tz)), conjugate)
+
+    def __matmul__(self, other: SE3) -> SE3:
+        """``T_a_c = T_a_b @ T_b_c``."""
+        rx, ry, rz = rotate_by_quaternion(self.quaternion_wxyz, other.translation_m)
+        tx, ty, tz = self.translation_m
+        product = multiply_quaternions(self.quaternion_wxyz, other.quaternion_wxyz)
+        return SE3((tx + rx, ty + ry, tz + rz), product)
+
+    def apply(self, points_m: Array) -> Array:
+        """Points mapped to the outer frame [m], shape [..., 3]."""
+        moved: Array = self.rotate(points_m) + np.asarray(self.translation_m)
+        return moved
+
+    def rotate(self, vectors: Array) -> Array:
+        """Directions mapped to the outer frame, shape [..., 3]."""
+        # einsum keeps one order of summation; BLAS may not (its bits depend on the core type).
+        rotated: Array = np.einsum(
+            "ij,...j->...i", self.rotation(), np.asarray(vectors, dtype=np.float64), optimize=False
+        )
+        return rotated
+
+    def rounded(self, decimals: int = 6) -> SE3:
+        """The same pose on a decimal grid, re-normalised: what crosses from physics to labels."""
+        x, y, z = (round(v, decimals) + 0.0 for v in self.translation_m)
+        return SE3((x, y, z), _normalised([round(v, decimals + 2) for v in self.quaternion_wxyz]))
+
+
+IDENTITY = SE3()
+
+
+def rotate_by_quaternion(q: Quaternion, v: Vec3) -> Vec3:
+    """``v`` rotated by the unit quaternion ``q`` (scalar first)."""
+    w, x, y, z = q
+    vx, vy, vz = v
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
+
+
+def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Hamilton product, scalar first, re-normalised."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return _normalised(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ]
+    )
+
+
+def quaternion_of_rotation(rotation: Array) -> Quaternion:
+    """Unit quaternion (scalar first, scalar >= 0) of a rotation matrix, shape [3, 3].
+
+    Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978.
+    """
+    m = [[float(rotation[i, j]) for j in range(3)] for i in range(3)]
+    trace = m[0][0] + m[1][1] + m[2][2]
+    k = max(range(4), key=lambda i: trace if i == 0 else m[i - 1][i - 1])
+    if k == 0:
+        q = [1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]]
+    else:
+        i, j, l = k - 1, k % 3, (k + 1) % 3  # noqa: E741
+        q = [0.0] * 4
+        q[0] = m[l][j] - m[j][l]
+        q[1 + i] = 1 + m[i][i] - m[j][j] - m[l][l]
+        q[1 + j] = m[j][i] + m[i][j]
+        q[1 + l] = m[l][i] + m[i][l]
+    return _normalised(q if q[0] >= 0 else [-v for v in q])
+
+
+def look_at(eye_m: Vec3, target_m: Vec3, roll_rad: float = 0.0) -> SE3:
+    """``T_world_camera`` of a camera at ``eye_m`` whose Z axis points at ``target_m``.
+
+    The camera's X axis is level when ``roll_rad`` is 0; a positive roll turns the camera
+    clockwise about its viewing direction. World is Z up; camera is X right, Y down, Z forward.
+
+    Raises:
+        ValueError: if eye and target coincide.
+    """
+    forward = np.asarray(target_m, dtype=np.float64) - np.asarray(eye_m, dtype=np.float64)
+    length = math.sqrt(float((forward * forward).sum()))
+    if length < 1e-9:
+        raise ValueError("look_at needs a target that differs from the eye")
+    forward = forward / length
+    # Looking straight up or down leaves "level" undefined: fall back to the world's Y as up.
+    up = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999999 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(forward, up)
+    right = right / math.sqrt(float((right * right).sum()))
+    down = np.cross(forward, right)
+    c, s = math.cos(roll_rad), math.sin(roll_rad)
+    matrix = np.eye(4)
+    matrix[:3, 0] = c * right + s * down
+    matrix[:3, 1] = c * down - s * right
+    matrix[:3, 2] = forward
+    matrix[:3, 3] = eye_m
+    return SE3.from_matrix(matrix)
+
+
+def _normalised(q: list[float]) -> Quaternion:
+    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return (q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm)
