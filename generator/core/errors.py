@@ -84,6 +84,17 @@ class Rejection:
     remedy: str
 
 
+class LayoutRejected(Exception):
+    """A randomizer found no valid draw; the scene is tried again with the next attempt's streams.
+
+    Never reaches a user: the pipeline counts it among the attempts of a scene.
+    """
+
+    def __init__(self, rejection: Rejection) -> None:
+        self.rejection = rejection
+        super().__init__(rejection.reason)
+
+
 class SceneRejected(SampleError):
     """No valid layout of a scene was found within the bounded number of attempts."""
 

@@ -7,7 +7,7 @@ Counter-based generator: Salmon et al., "Parallel random numbers: as easy as 1, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import blake2b
 
 import numpy as np
@@ -49,7 +49,3 @@ class Streams:
         rng = Rng(np.random.Philox(key=int.from_bytes(key, "little")))
         rng.index = self.index
         return rng
-
-    def of_view(self, view: int, sample_index: int) -> Streams:
-        """The streams of one view of the same scene and attempt."""
-        return replace(self, view=view, index=sample_index)

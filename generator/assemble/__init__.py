@@ -1,0 +1,1 @@
+"""Composition root: a configuration becomes a Pipeline. The one package that knows every table."""

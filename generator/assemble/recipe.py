@@ -1,0 +1,131 @@
+"""From a Spec to a running Pipeline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from generator.annotations.truth import image_truth
+from generator.assemble.spec import Spec
+from generator.assemble.tables import TABLES
+from generator.assets.library import Library, open_library
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.interfaces import Annotator, AssetIndex, DatasetInfo, Exporter
+from generator.core.scene import Scene
+from generator.physics import open_engine
+from generator.pipeline import Pipeline
+from generator.pipeline.pipeline import Recipe
+from generator.renderers import open_renderer
+from scene_templates.builder import build
+
+
+@dataclass(frozen=True)
+class PipelineFactory:
+    """Makes the same Pipeline in any process; picklable.
+
+    Attributes:
+        n: Number of samples of the data set, as exporters are told.
+        extra_channels: Channels to render beyond what sensors and annotators need.
+    """
+
+    spec: Spec
+    n: int
+    extra_channels: frozenset[Channel] = frozenset()
+
+    def __call__(self) -> Pipeline:
+        """A pipeline, to be used as a context manager."""
+        spec = self.spec
+        library = open_library(spec.asset_folders)
+        recipe = recipe_of(spec, library, self.n, self.extra_channels)
+        return Pipeline(
+            recipe,
+            library,
+            open_physics=partial(open_engine, library, spec.physics),
+            renderer=open_renderer(library, spec.render),
+        )
+
+
+def open_pipeline(spec: Spec, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
+    """A pipeline to look at samples with, outside any data set."""
+    return PipelineFactory(spec, n=1, extra_channels=extra_channels)()
+
+
+def recipe_of(
+    spec: Spec, library: Library, n: int, extra_channels: frozenset[Channel] = frozenset()
+) -> Recipe:
+    """Everything that samples depend on, resolved.
+
+    Raises:
+        ConfigError: when parts do not fit together, such as an exporter whose images no sensor
+            writes.
+    """
+    nominal = nominal_scene(spec, library)
+    annotators = _annotators(spec)
+    info = DatasetInfo(
+        name=spec.name,
+        seed=spec.seed,
+        n=n,
+        views_per_scene=spec.views_per_scene,
+        categories=categories_of(nominal, library),
+        sensors=tuple(sorted(sensor.name for sensor in spec.sensors)),
+        media={sensor.name: tuple(sensor.media) for sensor in spec.sensors},
+        depth_scale_m=spec.depth_scale_m,
+    )
+    exporters = _exporters(spec, info)
+    needed = frozenset().union(*(a.channels for a in annotators), extra_channels)
+    return Recipe(
+        seed=spec.seed,
+        views_per_scene=spec.views_per_scene,
+        nominal=nominal,
+        randomizers=spec.randomizers,
+        sensors=spec.sensors,
+        channels=needed,
+        image_truth=partial(image_truth, annotators=annotators, thresholds=spec.labels),
+        split_shares=spec.splits,
+        layout_attempts_max=spec.physics.layout_attempts_max,
+        info=info,
+        exporters=exporters,
+    )
+
+
+def nominal_scene(spec: Spec, assets: AssetIndex) -> Scene:
+    """The template's scene with every sensor mounted."""
+    scene = build(spec.template, spec.elements, assets)
+    for sensor in spec.sensors:
+        scene = sensor.mount(scene)
+    return scene
+
+
+def categories_of(scene: Scene, assets: AssetIndex) -> tuple[str, ...]:
+    """Sorted names of all categories that a sample may contain."""
+    placed = {i.category for i in scene.instances if i.annotated}
+    possible = {
+        assets.get(asset_id).category
+        for group in scene.groups
+        if group.annotated
+        for asset_id in group.assets
+    }
+    return tuple(sorted(placed | possible))
+
+
+def _annotators(spec: Spec) -> Sequence[Annotator]:
+    """Those that were asked for, then those that exporters read besides."""
+    names = list(spec.annotations)
+    for exporter in spec.exporters:
+        names += sorted(exporter.needs - set(names))
+    return [TABLES["annotation"].load(name)() for name in names]
+
+
+def _exporters(spec: Spec, info: DatasetInfo) -> dict[str, Exporter]:
+    exporters: dict[str, Exporter] = {}
+    for exporter in spec.exporters:
+        name = exporter.type
+        if name in exporters:
+            raise ConfigError(f"exporters: '{name}' is listed twice")
+        exporter.check(info)
+        exporters[name] = exporter
+    return exporters
+
+

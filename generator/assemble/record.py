@@ -1,0 +1,78 @@
+"""What a data set records about itself: its plan and its assets' licences."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+
+from generator import __version__
+from generator.assemble.recipe import PipelineFactory, nominal_scene
+from generator.assets.library import Library, open_library
+from generator.core.geometry import Asset
+from generator.core.scene import Scene
+from generator.runner.plan import Plan
+
+BYTES_DEPEND_ON = (
+    "numpy",
+    "opencv-python-headless",
+    "pybullet",
+    "pycocotools",
+    "warp-lang",
+)
+"""Packages whose release can change the bytes of a data set."""
+
+
+def plan_of(factory: PipelineFactory) -> Plan:
+    """The identity of the data set that a factory makes."""
+    spec = factory.spec
+    return Plan(
+        config=spec.resolved,
+        name=spec.name,
+        seed=spec.seed,
+        n=factory.n,
+        shard_size=spec.shard_size,
+        versions={"gen-data": __version__, **{name: _release(name) for name in BYTES_DEPEND_ON}},
+        assets={asset.asset_id: asset.sha256 for asset in possible_assets(factory)},
+    )
+
+
+def licences_text(factory: PipelineFactory) -> str:
+    """Markdown table of the assets that may appear, grouped by where they come from."""
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for asset in possible_assets(factory):
+        family = asset.asset_id.partition("?")[0]
+        members = groups.setdefault((asset.source, asset.licence, asset.author), [])
+        if family not in members:
+            members.append(family)
+    lines = ["# Assets of this data set", "", "| source | licence | author | assets |"]
+    lines += ["|---|---|---|---|"]
+    for (source, licence, author), members in sorted(groups.items()):
+        lines.append(f"| {source} | {licence} | {author} | {_listed(members)} |")
+    return "\n".join(lines) + "\n"
+
+
+def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
+    """Every object and robot that a sample may contain, sorted by id."""
+    library = open_library(factory.spec.asset_folders)
+    scene = nominal_scene(factory.spec, library)
+    return tuple(library.get(asset_id) for asset_id in sorted(_ids(scene, library)))
+
+
+def _ids(scene: Scene, library: Library) -> set[str]:
+    placed = {instance.asset for instance in scene.instances if instance.asset}
+    robots = {articulation.asset for articulation in scene.articulations}
+    links = {f"{a.name}/" for a in scene.articulations}
+    bodies = {b.asset for b in scene.bodies if not any(b.name.startswith(p) for p in links)}
+    drawn = {asset_id for group in scene.groups for asset_id in group.assets}
+    return placed | robots | bodies | drawn
+
+
+def _listed(members: list[str], most: int = 12) -> str:
+    shown = ", ".join(members[:most])
+    return shown if len(members) <= most else f"{shown} and {len(members) - most} more"
+
+
+def _release(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "absent"

@@ -1,0 +1,98 @@
+"""The main job: from a configuration to a data set, with progress and a summary."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from generator.assemble.recipe import PipelineFactory
+from generator.assemble.record import licences_text, plan_of
+from generator.assemble.spec import load_spec
+from generator.core.errors import ConfigError
+from generator.runner.run import RunProgress, Summary, run
+
+
+def generate(
+    config: str,
+    n: int,
+    *,
+    out: Path | None,
+    seed: int | None,
+    workers: int | None,
+    overrides: tuple[str, ...],
+    without: tuple[str, ...],
+) -> None:
+    """Make samples 0 to n - 1, or what is missing of them, and print a summary.
+
+    Raises:
+        GenDataError: of the kind that fits; see ``generator.core.errors``.
+    """
+    if n < 1:
+        raise ConfigError(f"--n: {n} samples cannot be made; expected at least 1")
+    workers = _core_count() if workers is None else workers
+    if workers < 0:
+        raise ConfigError(f"--workers: {workers}; expected at least 1, or 0 to run in this process")
+    spec = load_spec(config, seed=seed, overrides=overrides, without=without)
+    factory = PipelineFactory(spec, n)
+    folder = out if out is not None else Path("out") / spec.name
+    console = Console(stderr=True)
+    with _progress_bar(console, n) as show:
+        summary = run(
+            plan_of(factory),
+            factory,
+            folder,
+            workers=workers,
+            progress=show,
+            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
+            licences=licences_text(factory),
+        )
+    _print_summary(console, folder, summary)
+
+
+def _core_count() -> int:
+    return len(os.sched_getaffinity(0))
+
+
+@contextmanager
+def _progress_bar(console: Console, n: int) -> Iterator[Callable[[RunProgress], None]]:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[rejections]} rejected"),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("samples", total=n, rate="", rejections=0)
+
+        def show(progress: RunProgress) -> None:
+            bar.update(
+                task,
+                completed=progress.done,
+                rate=f"{progress.samples_per_s:.1f}/s",
+                rejections=progress.rejections,
+            )
+
+        yield show
+
+
+def _print_summary(console: Console, folder: Path, summary: Summary) -> None:
+    table = Table(title=str(folder), show_header=False)
+    for name, value in summary.rows():
+        table.add_row(name, value)
+    console.print(table)

@@ -1,0 +1,122 @@
+"""Commands that show samples: ``preview`` and ``contact-sheet``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.sample import Sample
+
+SOURCE_HELP = "A configuration (a path or a shipped name), or the folder of a data set."
+
+
+@click.command()
+@click.argument("source")
+@click.option("--n", "-n", type=int, default=8, show_default=True, help="Number of samples.")
+@click.option("--first", type=int, default=0, show_default=True, help="Index of the first sample.")
+@click.option("--save", type=click.Path(path_type=Path), help="Write a .rrd file instead.")
+@click.option("--web", is_flag=True, help="Serve to a browser instead of the desktop viewer.")
+@click.option("--seed", type=int, help="Overrides the configuration's seed.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override one field.")
+@click.option("--without", multiple=True, metavar="NAME", help="Leave a randomizer out.")
+def preview(
+    source: str,
+    n: int,
+    first: int,
+    save: Path | None,
+    web: bool,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    without: tuple[str, ...],
+) -> None:
+    """Show samples in Rerun: the 3D scene, camera images, boxes; one timeline step per sample.
+
+    SOURCE is a configuration (a path or a shipped name), or the folder of a data set, whose
+    samples are made again from its plan.
+    """
+    from generator.assemble.recipe import open_pipeline
+    from generator.assemble.spec import spec_of_source
+    from generator.preview.recording import save_recording, show_samples
+
+    spec = spec_of_source(source, seed=seed, overrides=overrides, without=without)
+    with open_pipeline(spec) as pipeline:
+        samples = _samples(pipeline.sample, first, n)
+        info = pipeline.info
+        about = {"categories": info.categories, "sensors": info.sensors}
+        if save is not None:
+            save_recording(save, samples, pipeline.assets, **about)
+            click.echo(f"{save}: {n} samples; open it with: rerun {save}")
+            return
+        where = show_samples(samples, pipeline.assets, **about, web=web)
+        if web:
+            click.echo(f"serving {where}; open http://localhost:9090 (Ctrl-C ends)")
+            click.pause("press any key to end ...")
+
+
+@click.command("contact-sheet")
+@click.argument("source")
+@click.option("--n", "-n", type=int, default=48, show_default=True, help="Number of samples.")
+@click.option("--first", type=int, default=0, show_default=True, help="Index of the first sample.")
+@click.option("--step", type=int, default=1, show_default=True, help="Distance between samples.")
+@click.option(
+    "--out",
+    "-o",
+    type=click.Path(path_type=Path),
+    default=Path("contact-sheet.png"),
+    show_default=True,
+    help="The PNG to write.",
+)
+@click.option("--columns", type=int, default=8, show_default=True)
+@click.option("--tile-px", type=int, default=320, show_default=True, help="Width of a tile.")
+@click.option("--channels", default="rgb", show_default=True, help="Comma-separated channels.")
+@click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")
+@click.option("--seed", type=int, help="Overrides the configuration's seed.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override one field.")
+@click.option("--without", multiple=True, metavar="NAME", help="Leave a randomizer out.")
+def contact_sheet(
+    source: str,
+    n: int,
+    first: int,
+    step: int,
+    out: Path,
+    columns: int,
+    tile_px: int,
+    channels: str,
+    labels: bool,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    without: tuple[str, ...],
+) -> None:
+    """Draw samples with their labels on one PNG.
+
+    SOURCE is a configuration (a path or a shipped name), or the folder of a data set.
+    """
+    from generator.assemble.recipe import open_pipeline
+    from generator.assemble.spec import spec_of_source
+    from generator.preview.sheet import arranged, tiles, write_sheet
+
+    wanted = [_channel(name.strip()) for name in channels.split(",")]
+    spec = spec_of_source(source, seed=seed, overrides=overrides, without=without)
+    with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
+        samples = _samples(pipeline.sample, first, n, step)
+        images = tiles(samples, wanted, labels=labels, width_px=tile_px)
+    write_sheet(arranged(images, columns), out)
+    click.echo(f"{out}: {len(images)} tiles")
+
+
+def _samples(sample_at, first: int, n: int, step: int = 1) -> Iterator[Sample]:  # type: ignore[no-untyped-def]
+    if n < 1 or first < 0 or step < 1:
+        raise ConfigError("--n and --step must be at least 1, --first at least 0")
+    for index in range(first, first + n * step, step):
+        yield sample_at(index)
+
+
+def _channel(name: str) -> Channel:
+    shown = [c.value for c in Channel if c is not Channel.AMODAL]
+    if name not in shown:
+        raise ConfigError(f"--channels: unknown channel '{name}'; expected one of {', '.join(shown)}")
+    return Channel(name)

@@ -1,0 +1,141 @@
+"""``gen-data``: the group of commands and the exit codes.
+
+Imports stay light here: each command imports what it needs when it runs.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import click
+
+from generator import __version__
+from generator.core.errors import ConfigError, GenDataError, Interrupted
+
+SINGLE_THREADED = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+"""Worker processes fill the cores; one thread each keeps every sum in one order."""
+
+
+class LateCommands(click.Group):
+    """A group whose commands are imported when they are asked for."""
+
+    modules = {  # noqa: RUF012
+        "preview": "generator.cli.look:preview",
+        "contact-sheet": "generator.cli.look:contact_sheet",
+        "verify": "generator.cli.inform:verify",
+        "describe": "generator.cli.inform:describe",
+        "schema": "generator.cli.inform:schema",
+        "doctor": "generator.cli.inform:doctor",
+    }
+    summaries = {  # noqa: RUF012
+        "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
+        "contact-sheet": "Draw samples with their labels on one PNG.",
+        "verify": "Check a data set against its manifest.",
+        "describe": "Explain a plug-in: what it does, its fields, an example.",
+        "schema": "Print the JSON Schema of configurations.",
+        "doctor": "Check this machine: renderer, physics, cache, disk.",
+    }
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of all commands, in the order in which a user meets them."""
+        del ctx
+        return list(self.modules)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command, imported now; None if unknown."""
+        del ctx
+        if cmd_name not in self.modules:
+            return None
+        import importlib
+
+        module, _, attribute = self.modules[cmd_name].partition(":")
+        command: click.Command = getattr(importlib.import_module(module), attribute)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands, from the table above, without importing one."""
+        del ctx
+        with formatter.section("Commands"):
+            formatter.write_dl(list(self.summaries.items()))
+
+
+@click.group(cls=LateCommands, invoke_without_command=True)
+@click.version_option(__version__, prog_name="gen-data")
+@click.option("--config", "-c", metavar="FILE", help="Configuration: a path, or a shipped name.")
+@click.option("--n", "-n", type=int, help="Number of samples.")
+@click.option("--out", "-o", type=click.Path(path_type=Path), help="Folder [default: out/<config>].")
+@click.option("--seed", type=int, help="Seed of the data set; overrides the configuration's.")
+@click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override one field.")
+@click.option("--without", multiple=True, metavar="NAME", help="Leave a randomizer out.")
+@click.pass_context
+def cli(
+    context: click.Context,
+    config: str | None,
+    n: int | None,
+    out: Path | None,
+    seed: int | None,
+    workers: int | None,
+    overrides: tuple[str, ...],
+    without: tuple[str, ...],
+) -> None:
+    """Generate a labelled synthetic data set.
+
+    \b
+    gen-data --config tabletop.yaml --n 1000
+    gen-data --config tabletop.yaml --n 1000 --set elements.clutter.count=20 --without colors
+
+    An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configuration or
+    usage, 3 asset, 4 storage (resumable), 5 determinism, 6 sample, 7 verification, 130 interrupted.
+    """
+    if context.invoked_subcommand is not None:
+        if config is not None:
+            raise ConfigError(
+                f"--config belongs after the command: gen-data {context.invoked_subcommand} {config}"
+            )
+        return
+    if config is None:
+        click.echo(context.get_help())
+        return
+    if n is None:
+        raise ConfigError("--n is missing: how many samples?")
+    from generator.cli.generate import generate
+
+    generate(config, n, out=out, seed=seed, workers=workers, overrides=overrides, without=without)
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code."""
+    for name in SINGLE_THREADED:
+        os.environ[name] = "1"
+    sys.exit(_exit_code())
+
+
+def _exit_code() -> int:
+    try:
+        cli.main(standalone_mode=False)
+    except click.exceptions.Exit as leave:
+        return leave.exit_code
+    except click.ClickException as usage:
+        click.echo(f"gen-data: {usage.format_message()}", err=True)
+        return ConfigError.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("gen-data: interrupted", err=True)
+        return Interrupted.exit_code
+    except BrokenPipeError:
+        # The reader of our output left (`| head`): there is nobody to tell.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except GenDataError as error:
+        if os.environ.get("GEN_DATA_DEBUG"):
+            raise
+        click.echo(f"gen-data: {error}", err=True)
+        return error.exit_code
+    return 0

@@ -1,0 +1,293 @@
+"""Distributions over intervals of numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from generator.config.distributions.base import (
+    Kind,
+    Malformed,
+    Numeric,
+    in_order,
+    inside,
+    read_fields,
+    read_number,
+    read_range,
+    read_whole_number,
+    stable,
+)
+from generator.config.scalars import number
+
+if TYPE_CHECKING:
+    from generator.core.streams import Rng
+
+_STANDARD = NormalDist()
+_RANGE_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+
+
+@dataclass(frozen=True)
+class Uniform(Numeric[float]):
+    """Every number between low and high is equally likely."""
+
+    low: float
+    high: float
+
+    name: ClassVar[str] = "uniform"
+    kinds: ClassVar[frozenset[str]] = frozenset({"number"})
+
+    def __post_init__(self) -> None:
+        """Refuse a reversed range."""
+        _set_finite(self, "low", "high")
+        in_order(self.name, self.low, self.high)
+        if math.isinf(self.high - self.low):
+            raise Malformed(f"uniform needs a finite range, got {self.argument()}")
+
+    def draw(self, rng: Rng) -> float:
+        """One value."""
+        return min(self.low + (self.high - self.low) * rng.random(), self.high)
+
+    def mean(self) -> float:
+        """Expected value."""
+        return self.low + 0.5 * (self.high - self.low)
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest value."""
+        return self.low, self.high
+
+    @classmethod
+    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Uniform:  # noqa: ARG003
+        """Read ``[low, high]``."""
+        return cls(*read_range(argument, cls.name, read_number))
+
+    def argument(self) -> list[float]:
+        """``[low, high]``."""
+        return [self.low, self.high]
+
+    @classmethod
+    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
+        """Two numbers."""
+        return {**_RANGE_SCHEMA, "description": "[low, high]"}
+
+
+@dataclass(frozen=True)
+class LogUniform(Numeric[float]):
+    """Every ratio is equally likely: 1 to 2 as often as 10 to 20. For scales and intensities."""
+
+    low: float
+    high: float
+
+    name: ClassVar[str] = "log_uniform"
+    kinds: ClassVar[frozenset[str]] = frozenset({"number"})
+
+    def __post_init__(self) -> None:
+        """Refuse a reversed range and one that touches zero."""
+        _set_finite(self, "low", "high")
+        if not self.low > 0 or not self.high > 0:
+            raise Malformed(
+                f"log_uniform needs low > 0 and high > 0, "
+                f"got [{number(self.low)}, {number(self.high)}]"
+            )
+        in_order(self.name, self.low, self.high)
+
+    def draw(self, rng: Rng) -> float:
+        """One value."""
+        u = rng.random()
+        if self.low == self.high:
+            return self.low
+        log_low = math.log(self.low)
+        value = stable(math.exp(log_low + (math.log(self.high) - log_low) * u))
+        return min(max(value, self.low), self.high)
+
+    def mean(self) -> float:
+        """Expected value: (high - low) / ln(high / low)."""
+        width = math.log(self.high) - math.log(self.low)
+        return self.low if width == 0 else (self.high - self.low) / width
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest value."""
+        return self.low, self.high
+
+    @classmethod
+    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> LogUniform:  # noqa: ARG003
+        """Read ``[low, high]``."""
+        return cls(*read_range(argument, cls.name, read_number))
+
+    def argument(self) -> list[float]:
+        """``[low, high]``."""
+        return [self.low, self.high]
+
+    @classmethod
+    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
+        """Two positive numbers."""
+        items = {"type": "number", "exclusiveMinimum": 0}
+        return {**_RANGE_SCHEMA, "items": items, "description": "[low, high], both above 0"}
+
+
+@dataclass(frozen=True)
+class Normal(Numeric[float]):
+    """Gaussian; with ``clip`` it is truncated: values outside are not drawn, none pile up.
+
+    Drawn by inverting the cumulative distribution, so that each value costs exactly one random
+    number. Inverse: Wichura, "Algorithm AS 241", Applied Statistics 37(3), 1988.
+
+    Attributes:
+        clip: ``(low, high)``, or None.
+    """
+
+    mean_: float
+    stddev: float
+    clip: tuple[float, float] | None = None
+
+    name: ClassVar[str] = "normal"
+    kinds: ClassVar[frozenset[str]] = frozenset({"number"})
+
+    def __post_init__(self) -> None:
+        """Refuse a negative deviation, and a clip range that holds no probability."""
+        _set_finite(self, "mean_", "stddev")
+        if self.stddev < 0:
+            raise Malformed(f"normal needs stddev >= 0, got {number(self.stddev)}")
+        if self.clip is None:
+            return
+        low, high = (read_number(v) for v in self.clip)
+        object.__setattr__(self, "clip", (low, high))
+        in_order("normal clip", low, high)
+        if low < high and self.stddev > 0:
+            below, above, _ = self._tail()
+            empty = not above > below
+        else:
+            empty = self.stddev == 0 and not low <= self.mean_ <= high
+        if empty:
+            raise Malformed(
+                f"normal with mean {number(self.mean_)} and stddev {number(self.stddev)} never "
+                f"falls into clip [{number(low)}, {number(high)}]"
+            )
+
+    def draw(self, rng: Rng) -> float:
+        """One value."""
+        # The middle of one of 2^53 equal cells: never 0, whose inverse would be -inf.
+        u = rng.random() + 2.0**-54
+        low, high = self.support()
+        if self.stddev == 0 or low == high:
+            return min(max(self.mean_, low), high)
+        below, above, sign = self._tail()
+        z = sign * _STANDARD.inv_cdf(min(below + (above - below) * u, 1 - 2.0**-53))
+        return min(max(stable(self.mean_ + self.stddev * z), low), high)
+
+    def mean(self) -> float:
+        """Expected value, that of the truncated distribution where there is a clip."""
+        low, high = self.support()
+        if self.clip is None or self.stddev == 0 or low == high:
+            return min(max(self.mean_, low), high)
+        below, above, _ = self._tail()
+        a, b = ((v - self.mean_) / self.stddev for v in self.clip)
+        shift = (_STANDARD.pdf(a) - _STANDARD.pdf(b)) / (above - below)
+        return min(max(self.mean_ + self.stddev * shift, low), high)
+
+    def support(self) -> tuple[float, float]:
+        """The clip range; without one, all numbers."""
+        if self.clip is not None:
+            return self.clip
+        return (self.mean_, self.mean_) if self.stddev == 0 else (-math.inf, math.inf)
+
+    def _tail(self) -> tuple[float, float, int]:
+        """Cumulative probability at both ends, measured in the tail where it keeps its digits.
+
+        The last value is -1 where the axis had to be mirrored for that.
+        """
+        if self.clip is None:
+            return 0.0, 1.0, 1
+        a, b = ((v - self.mean_) / self.stddev for v in self.clip)
+        if a > 0:
+            return _cumulative(-b), _cumulative(-a), -1
+        return _cumulative(a), _cumulative(b), 1
+
+    @classmethod
+    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Normal:  # noqa: ARG003
+        """Read ``{mean, stddev, clip}``; clip may be missing."""
+        fields = read_fields(argument, cls.name, ("mean", "stddev"), ("clip",))
+        with inside("mean"):
+            mean = read_number(fields["mean"])
+        with inside("stddev"):
+            stddev = read_number(fields["stddev"])
+        clip = None
+        if "clip" in fields:
+            with inside("clip"):
+                clip = read_range(fields["clip"], "clip", read_number)
+        return cls(mean, stddev, clip)
+
+    def argument(self) -> dict[str, Any]:
+        """``{mean, stddev, clip}``."""
+        clip = {} if self.clip is None else {"clip": list(self.clip)}
+        return {"mean": self.mean_, "stddev": self.stddev, **clip}
+
+    @classmethod
+    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
+        """A mapping of three."""
+        return {
+            "type": "object",
+            "properties": {
+                "mean": {"type": "number"},
+                "stddev": {"type": "number", "minimum": 0},
+                "clip": {**_RANGE_SCHEMA, "description": "[low, high]: truncated to it"},
+            },
+            "required": ["mean", "stddev"],
+            "additionalProperties": False,
+        }
+
+
+@dataclass(frozen=True)
+class UniformInteger(Numeric[int]):
+    """Every whole number from low to high, both included, is equally likely."""
+
+    low: int
+    high: int
+
+    name: ClassVar[str] = "uniform_integer"
+    kinds: ClassVar[frozenset[str]] = frozenset({"number", "whole number"})
+
+    def __post_init__(self) -> None:
+        """Refuse a reversed range."""
+        read_whole_number(self.low)
+        read_whole_number(self.high)
+        in_order(self.name, self.low, self.high)
+
+    def draw(self, rng: Rng) -> int:
+        """One value."""
+        return int(rng.integers(self.low, self.high, endpoint=True))
+
+    def mean(self) -> float:
+        """Expected value."""
+        return 0.5 * (self.low + self.high)
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest value."""
+        return self.low, self.high
+
+    @classmethod
+    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> UniformInteger:  # noqa: ARG003
+        """Read ``[low, high]``."""
+        return cls(*read_range(argument, cls.name, read_whole_number))
+
+    def argument(self) -> list[int]:
+        """``[low, high]``."""
+        return [self.low, self.high]
+
+    @classmethod
+    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
+        """Two whole numbers."""
+        items = {"type": "integer"}
+        return {**_RANGE_SCHEMA, "items": items, "description": "[low, high], both included"}
+
+
+def _cumulative(z: float) -> float:
+    """Standard normal cumulative distribution, with all its digits in the lower tail."""
+    return 0.5 * math.erfc(-z / math.sqrt(2.0))
+
+
+def _set_finite(distribution: Numeric[Any], *names: str) -> None:
+    for name in names:
+        object.__setattr__(distribution, name, read_number(getattr(distribution, name)))

@@ -1,0 +1,79 @@
+"""From a settled scene to the scene that labels refer to: ids, instance frames, boxes, rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from generator.core.interfaces import AssetLibrary
+from generator.core.scene import Body, Instance, Scene
+from generator.core.se3 import SE3, Array, Vec3
+
+
+def frozen_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
+    """The scene with every instance's category id, frame and tight box filled in.
+
+    An instance of one body has that body's frame. An instance of several bodies (a robot) has
+    the frame of its articulation's base, and the box around all its bodies' vertices.
+    """
+    members: dict[int, list[Body]] = {}
+    for body in scene.bodies:
+        members.setdefault(body.instance_id, []).append(body)
+    bases = {a.instance_id: a.T_world_base for a in scene.articulations}
+    instances = tuple(
+        _measured(
+            replace(instance, category_id=category_ids.get(instance.category, 0)),
+            members.get(instance.instance_id, []),
+            bases.get(instance.instance_id),
+            assets,
+        )
+        for instance in scene.instances
+    )
+    return replace(scene, instances=instances)
+
+
+def with_rounded_cameras(scene: Scene) -> Scene:
+    """The scene with camera poses on the decimal grid that files are written with."""
+    cameras = tuple(replace(c, T_world_camera=c.T_world_camera.rounded()) for c in scene.cameras)
+    return replace(scene, cameras=cameras)
+
+
+def _measured(
+    instance: Instance, bodies: list[Body], T_world_base: SE3 | None, assets: AssetLibrary
+) -> Instance:
+    if not bodies:
+        return instance
+    if T_world_base is None and len(bodies) == 1:
+        body = bodies[0]
+        low, high = assets.bounds_m(body.asset)
+        return replace(
+            instance,
+            T_world_instance=body.T_world_body,
+            box_min_m=_scaled(low, body.scale),
+            box_max_m=_scaled(high, body.scale),
+        )
+    T_world_instance = bodies[0].T_world_body if T_world_base is None else T_world_base
+    T_instance_world = T_world_instance.inverse()
+    lows, highs = [], []
+    for body in bodies:
+        vertices_m = assets.mesh(body.asset).vertices_m.astype(np.float64) * body.scale
+        placed = (T_instance_world @ body.T_world_body).apply(vertices_m)
+        lows.append(placed.min(axis=0))
+        highs.append(placed.max(axis=0))
+    return replace(
+        instance,
+        T_world_instance=T_world_instance,
+        box_min_m=_rounded(np.min(lows, axis=0)),
+        box_max_m=_rounded(np.max(highs, axis=0)),
+    )
+
+
+def _scaled(corner_m: Vec3, scale: float) -> Vec3:
+    return _rounded(np.asarray(corner_m) * scale)
+
+
+def _rounded(corner_m: Array) -> Vec3:
+    x, y, z = (round(float(v), 6) for v in corner_m)
+    return (x, y, z)

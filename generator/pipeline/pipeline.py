@@ -1,0 +1,223 @@
+"""One sample from one index."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from generator.core.capture import Capture, Channel, Reading
+from generator.core.errors import LayoutRejected, Rejection, SceneRejected
+from generator.core.interfaces import (
+    AssetLibrary,
+    DatasetInfo,
+    Exporter,
+    PhysicsEngine,
+    Randomizer,
+    Renderer,
+    Sensor,
+    Stage,
+)
+from generator.core.sample import ImageTruth, Sample
+from generator.core.scene import Scene
+from generator.core.streams import Streams
+from generator.pipeline.freeze import frozen_scene, with_rounded_cameras
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """What a pipeline does, as data and pure functions.
+
+    Attributes:
+        nominal: The template's scene, with the sensors mounted.
+        channels: What the annotators need to have been rendered.
+        image_truth: Annotates one reading.
+        split_shares: ``{split: share}`` in order; shares sum to 1.
+        layout_attempts_max: Bound on the attempts at one scene.
+        info: The data set as its exporters see it.
+    """
+
+    seed: int
+    views_per_scene: int
+    nominal: Scene
+    randomizers: Sequence[Randomizer]
+    sensors: Sequence[Sensor]
+    channels: frozenset[Channel]
+    image_truth: Callable[[Scene, Reading], ImageTruth]
+    split_shares: Mapping[str, float]
+    layout_attempts_max: int
+    info: DatasetInfo
+    exporters: Mapping[str, Exporter]
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedScene:
+    """A scene at rest, and how it came to be.
+
+    Attributes:
+        attempt: Number of the attempt that was accepted, from 0.
+        timings_s: CPU seconds by stage, all attempts together.
+    """
+
+    index: int
+    scene: Scene
+    attempt: int
+    timings_s: Mapping[str, float]
+
+
+class Pipeline:
+    """Owns the engines; ``sample(index)`` depends on nothing but the recipe and the index.
+
+    The last accepted scene is kept, because the next index is usually another view of it: an
+    optimisation, never a state.
+    """
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        assets: AssetLibrary,
+        open_physics: Callable[[], PhysicsEngine],
+        renderer: Renderer,
+    ) -> None:
+        self.recipe = recipe
+        self.assets = assets
+        self._open_physics = open_physics
+        self._renderer = renderer
+        self._physics: PhysicsEngine | None = None
+        self._resources = ExitStack()
+        self._latest: AcceptedScene | None = None
+        self._category_ids = {name: i for i, name in enumerate(recipe.info.categories, 1)}
+
+    @property
+    def info(self) -> DatasetInfo:
+        """The data set as its exporters see it."""
+        return self.recipe.info
+
+    @property
+    def exporters(self) -> Mapping[str, Exporter]:
+        """Exporters by name."""
+        return self.recipe.exporters
+
+    def __enter__(self) -> Pipeline:
+        """Start the physics engine."""
+        engine = self._open_physics()
+        if hasattr(engine, "__enter__"):
+            engine = self._resources.enter_context(engine)  # type: ignore[arg-type]
+        self._physics = engine
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop the physics engine."""
+        self._physics = None
+        self._resources.close()
+
+    def sample(self, index: int) -> Sample:
+        """Sample number ``index``, from 0.
+
+        Raises:
+            SceneRejected: no valid layout within the bounded number of attempts.
+            SampleError: the labels contradict each other.
+        """
+        scene_index, view_index = divmod(index, self.recipe.views_per_scene)
+        accepted = self.accepted_scene(scene_index)
+        timings: dict[str, float] = dict(accepted.timings_s) if view_index == 0 else {}
+        with _timed(timings, "randomize"):
+            scene, streams = self._view(accepted, view_index, index)
+        readings: dict[str, Reading] = {}
+        truth: dict[str, ImageTruth] = {}
+        for sensor in self.recipe.sensors:
+            rng = streams.rng(f"sensor/{sensor.name}")
+            with _timed(timings, "render"):
+                reading = sensor.capture(scene, self._renderer, self.recipe.channels, rng)
+            with _timed(timings, "annotate"):
+                truth[sensor.name] = self.recipe.image_truth(scene, reading)
+            readings[sensor.name] = reading
+        return Sample(
+            index=index,
+            scene_index=scene_index,
+            view_index=view_index,
+            split=self.split(scene_index),
+            scene=scene,
+            capture=Capture(readings),
+            truth=truth,
+            attempts=accepted.attempt + 1,
+            timings_s=timings,
+        )
+
+    def accepted_scene(self, scene_index: int) -> AcceptedScene:
+        """The scene at rest that all views of it share."""
+        if self._latest is None or self._latest.index != scene_index:
+            self._latest = self._accept(scene_index)
+        return self._latest
+
+    def split(self, scene_index: int) -> str:
+        """The split that all views of a scene belong to."""
+        draw = Streams(self.recipe.seed, scene_index).rng("split").uniform()
+        for name, share in self.recipe.split_shares.items():
+            if draw < share:
+                return name
+            draw -= share
+        return next(reversed(list(self.recipe.split_shares)))
+
+    def _accept(self, scene_index: int) -> AcceptedScene:
+        assert self._physics is not None, "use the pipeline as a context manager"
+        timings: dict[str, float] = {}
+        rejections: list[Rejection] = []
+        for attempt in range(self.recipe.layout_attempts_max):
+            streams = Streams(self.recipe.seed, scene_index, attempt=attempt, index=scene_index)
+            try:
+                with _timed(timings, "randomize"):
+                    scene = self._randomized(self.recipe.nominal, Stage.BUILD, streams)
+            except LayoutRejected as refused:
+                rejections.append(refused.rejection)
+                continue
+            with _timed(timings, "physics"):
+                settled = self._physics.settle(scene)
+            if settled.rejection is None:
+                scene = frozen_scene(settled.scene, self.assets, self._category_ids)
+                return AcceptedScene(scene_index, scene, attempt, timings)
+            rejections.append(settled.rejection)
+        raise SceneRejected(scene_index, tuple(rejections))
+
+    def _view(self, accepted: AcceptedScene, view_index: int, index: int) -> tuple[Scene, Streams]:
+        """The scene as one view sees it; a view that cannot be drawn is tried again."""
+        rejections: list[Rejection] = []
+        for attempt in range(self.recipe.layout_attempts_max):
+            streams = Streams(
+                self.recipe.seed, accepted.index, view=view_index, attempt=attempt, index=index
+            )
+            try:
+                scene = self._randomized(accepted.scene, Stage.VIEW, streams)
+            except LayoutRejected as refused:
+                rejections.append(refused.rejection)
+                continue
+            return with_rounded_cameras(scene), streams
+        raise SceneRejected(accepted.index, tuple(rejections))
+
+    def _randomized(self, scene: Scene, stage: Stage, streams: Streams) -> Scene:
+        for randomizer in self.recipe.randomizers:
+            if randomizer.stage is stage:
+                rng = streams.rng(f"randomizer/{randomizer.name}")
+                scene = randomizer(scene, self.assets, rng)
+        return scene
+
+
+@contextmanager
+def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
+    """Adds the CPU time of a block to a stage. Timings go to logs, never into a data file."""
+    started_s = time.process_time()
+    try:
+        yield
+    finally:
+        timings_s[stage] = timings_s.get(stage, 0.0) + time.process_time() - started_s

@@ -1,0 +1,1 @@
+"""Looking at samples: contact sheets (PNG) and Rerun recordings."""

@@ -1,0 +1,97 @@
+"""Labels drawn on their image: masks tinted, boxes outlined, names written."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.boxes import OrientedBox
+from generator.core.capture import Channel, Reading
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import ImageTruth, ObjectTruth
+from generator.preview.palette import Rgb, color_of, colored_depth, colored_ids
+
+Image = NDArray[np.uint8]
+
+BOX_EDGES = (
+    (0, 1), (0, 2), (0, 4), (3, 1), (3, 2), (3, 7), (5, 1), (5, 4), (5, 7), (6, 2), (6, 4), (6, 7),
+)  # fmt: skip
+"""Pairs of ``OrientedBox.corners`` that share an edge."""
+
+NEAR_M = 0.01
+"""Edges are cut where they come closer to the camera plane than this."""
+
+
+def labelled_image(reading: Reading, truth: ImageTruth) -> Image:
+    """The RGB image with every label drawn on it, uint8 [h, w, 3]."""
+    image: Image = np.array(reading.channels[Channel.RGB], np.uint8, order="C")
+    for item in truth.objects:
+        _tint(image, item)
+    for item in truth.objects:
+        color = color_of(item.instance.instance_id)
+        if item.box3d_camera is not None:
+            draw_box3d(image, item.box3d_camera, truth.camera.intrinsics, color)
+        if item.box is not None:
+            b = item.box
+            cv2.rectangle(image, (b.x_min, b.y_min), (b.x_max - 1, b.y_max - 1), color, 1)
+            _write(image, item.instance.category, (b.x_min, b.y_min), color)
+    return image
+
+
+def channel_image(reading: Reading, channel: Channel) -> Image:
+    """Any channel as something to look at, uint8 [h, w, 3].
+
+    Raises:
+        KeyError: if the reading does not have the channel.
+    """
+    data = reading.channels[channel]
+    if channel is Channel.RGB:
+        return np.asarray(data, np.uint8)
+    if channel in (Channel.Z_DEPTH, Channel.RANGE):
+        return colored_depth(data)
+    if channel is Channel.NORMALS:
+        return np.round((data + 1.0) * 127.5).astype(np.uint8)
+    if channel is Channel.OBJECT_COORDINATES:
+        return np.round(data * 255.0).astype(np.uint8)
+    return colored_ids(data)
+
+
+def draw_box3d(image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rgb) -> None:
+    """Draw the edges of a box given in the camera frame into ``image``, in place."""
+    corners = box.corners()
+    for a, b in BOX_EDGES:
+        segment = _in_front(corners[a], corners[b])
+        if segment is not None:
+            (ua, va), (ub, vb) = np.clip(intrinsics.project(segment), -1e4, 1e4)
+            start, end = (round(ua), round(va)), (round(ub), round(vb))
+            cv2.line(image, start, end, color, 1, cv2.LINE_AA)
+
+
+def _in_front(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any] | None:
+    """The part of a segment that lies in front of the camera, shape [2, 3]; None if none does."""
+    if a[2] < NEAR_M and b[2] < NEAR_M:
+        return None
+    if a[2] < NEAR_M:
+        a = a + (b - a) * ((NEAR_M - a[2]) / (b[2] - a[2]))
+    elif b[2] < NEAR_M:
+        b = b + (a - b) * ((NEAR_M - b[2]) / (a[2] - b[2]))
+    return np.stack([a, b])
+
+
+def _tint(image: Image, item: ObjectTruth) -> None:
+    if item.mask is None:
+        return
+    height, width = item.mask.pixels.shape
+    window = image[item.mask.y_px :, item.mask.x_px :][:height, :width]
+    color = np.array(color_of(item.instance.instance_id), np.float32)
+    tinted = 0.65 * window[item.mask.pixels] + 0.35 * color
+    window[item.mask.pixels] = tinted.astype(np.uint8)
+
+
+def _write(image: Image, text: str, corner: tuple[int, int], color: Rgb) -> None:
+    x, y = corner[0], max(corner[1] - 3, 10)
+    cv2.putText(image, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0), 3, cv2.LINE_AA)
+    cv2.putText(image, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.4, color, 1, cv2.LINE_AA)

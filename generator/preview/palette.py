@@ -1,0 +1,39 @@
+"""Colours for ids: far apart for neighbours, the same in every picture."""
+
+from __future__ import annotations
+
+import colorsys
+
+import numpy as np
+from numpy.typing import NDArray
+
+Rgb = tuple[int, int, int]
+GOLDEN_RATIO_CONJUGATE = 0.618033988749895
+"""Steps of this around the hue circle never come close to each other early on."""
+
+
+def color_of(number: int) -> Rgb:
+    """SRGB colour of an id; black for 0."""
+    if number == 0:
+        return (0, 0, 0)
+    hue = (number * GOLDEN_RATIO_CONJUGATE) % 1.0
+    red, green, blue = colorsys.hsv_to_rgb(hue, 0.62 + 0.3 * (number % 2), 0.98)
+    return (round(255 * red), round(255 * green), round(255 * blue))
+
+
+def colored_ids(ids: NDArray[np.integer]) -> NDArray[np.uint8]:
+    """An id image [h, w] as colours, uint8 [h, w, 3]."""
+    table = np.array([color_of(i) for i in range(int(ids.max(initial=0)) + 1)], np.uint8)
+    colored: NDArray[np.uint8] = table[ids]
+    return colored
+
+
+def colored_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """A depth image [h, w] as grey, near = bright, uint8 [h, w, 3]; black = nothing."""
+    seen = np.isfinite(z_depth_m)
+    grey = np.zeros(z_depth_m.shape, np.uint8)
+    if seen.any():
+        near, far = np.quantile(z_depth_m[seen], [0.01, 0.99])
+        scale = (far - z_depth_m[seen]) / max(float(far - near), 1e-6)
+        grey[seen] = np.clip(40 + 215 * scale, 40, 255).astype(np.uint8)
+    return np.repeat(grey[..., None], 3, axis=2)
