@@ -127,7 +127,7 @@ class LogUniform(Numeric[float]):
         return {**_RANGE_SCHEMA, "items": items, "description": "[low, high], both above 0"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Normal(Numeric[float]):
     """Gaussian; with ``clip`` it is truncated: values outside are not drawn, none pile up.
 
@@ -135,34 +135,39 @@ class Normal(Numeric[float]):
     number. Inverse: Wichura, "Algorithm AS 241", Applied Statistics 37(3), 1988.
 
     Attributes:
+        center: Where the density peaks; the mean, unless a clip range lies off-centre.
         clip: ``(low, high)``, or None.
     """
 
-    mean_: float
+    center: float
     stddev: float
-    clip: tuple[float, float] | None = None
+    clip: tuple[float, float] | None
 
     name: ClassVar[str] = "normal"
     kinds: ClassVar[frozenset[str]] = frozenset({"number"})
 
-    def __post_init__(self) -> None:
+    def __init__(self, mean: float, stddev: float, clip: tuple[float, float] | None = None) -> None:
         """Refuse a negative deviation, and a clip range that holds no probability."""
-        _set_finite(self, "mean_", "stddev")
+        object.__setattr__(self, "center", read_number(mean))
+        object.__setattr__(self, "stddev", read_number(stddev))
+        object.__setattr__(self, "clip", clip)
         if self.stddev < 0:
             raise Malformed(f"normal needs stddev >= 0, got {number(self.stddev)}")
-        if self.clip is None:
-            return
-        low, high = (read_number(v) for v in self.clip)
-        object.__setattr__(self, "clip", (low, high))
+        if clip is not None:
+            low, high = (read_number(v) for v in clip)
+            object.__setattr__(self, "clip", (low, high))
+            self._refuse_empty(low, high)
+
+    def _refuse_empty(self, low: float, high: float) -> None:
         in_order("normal clip", low, high)
         if low < high and self.stddev > 0:
             below, above, _ = self._tail()
             empty = not above > below
         else:
-            empty = self.stddev == 0 and not low <= self.mean_ <= high
+            empty = self.stddev == 0 and not low <= self.center <= high
         if empty:
             raise Malformed(
-                f"normal with mean {number(self.mean_)} and stddev {number(self.stddev)} never "
+                f"normal with mean {number(self.center)} and stddev {number(self.stddev)} never "
                 f"falls into clip [{number(low)}, {number(high)}]"
             )
 
@@ -172,26 +177,26 @@ class Normal(Numeric[float]):
         u = rng.random() + 2.0**-54
         low, high = self.support()
         if self.stddev == 0 or low == high:
-            return min(max(self.mean_, low), high)
+            return min(max(self.center, low), high)
         below, above, sign = self._tail()
         z = sign * _STANDARD.inv_cdf(min(below + (above - below) * u, 1 - 2.0**-53))
-        return min(max(stable(self.mean_ + self.stddev * z), low), high)
+        return min(max(stable(self.center + self.stddev * z), low), high)
 
     def mean(self) -> float:
         """Expected value, that of the truncated distribution where there is a clip."""
         low, high = self.support()
         if self.clip is None or self.stddev == 0 or low == high:
-            return min(max(self.mean_, low), high)
+            return min(max(self.center, low), high)
         below, above, _ = self._tail()
-        a, b = ((v - self.mean_) / self.stddev for v in self.clip)
+        a, b = ((v - self.center) / self.stddev for v in self.clip)
         shift = (_STANDARD.pdf(a) - _STANDARD.pdf(b)) / (above - below)
-        return min(max(self.mean_ + self.stddev * shift, low), high)
+        return min(max(self.center + self.stddev * shift, low), high)
 
     def support(self) -> tuple[float, float]:
         """The clip range; without one, all numbers."""
         if self.clip is not None:
             return self.clip
-        return (self.mean_, self.mean_) if self.stddev == 0 else (-math.inf, math.inf)
+        return (self.center, self.center) if self.stddev == 0 else (-math.inf, math.inf)
 
     def _tail(self) -> tuple[float, float, int]:
         """Cumulative probability at both ends, measured in the tail where it keeps its digits.
@@ -200,7 +205,7 @@ class Normal(Numeric[float]):
         """
         if self.clip is None:
             return 0.0, 1.0, 1
-        a, b = ((v - self.mean_) / self.stddev for v in self.clip)
+        a, b = ((v - self.center) / self.stddev for v in self.clip)
         if a > 0:
             return _cumulative(-b), _cumulative(-a), -1
         return _cumulative(a), _cumulative(b), 1
@@ -222,7 +227,7 @@ class Normal(Numeric[float]):
     def argument(self) -> dict[str, Any]:
         """``{mean, stddev, clip}``."""
         clip = {} if self.clip is None else {"clip": list(self.clip)}
-        return {"mean": self.mean_, "stddev": self.stddev, **clip}
+        return {"mean": self.center, "stddev": self.stddev, **clip}
 
     @classmethod
     def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003

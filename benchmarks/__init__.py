@@ -1,0 +1,1 @@
+"""Benchmarks: ``python -m benchmarks.bench_tabletop`` and its neighbours."""

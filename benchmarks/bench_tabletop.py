@@ -1,0 +1,194 @@
+"""Labelled samples per second to disk: ``python -m benchmarks.bench_tabletop``.
+
+640x480, the shipped tabletop with the arm and exactly ten objects, two soft-shadow lights and
+environment light; RGB, depth, instance and category PNGs and COCO and KITTI labels on disk. The same
+scenes are drawn by PyBullet's TinyRenderer in the same run, for a ratio.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from generator.assemble.recipe import PipelineFactory, open_pipeline
+from generator.assemble.record import licences_text, plan_of
+from generator.assemble.spec import Spec, load_spec
+from generator.runner.run import RunProgress, Summary, run
+
+OVERRIDES = (
+    "randomizers.clutter.count=10",
+    "randomizers.lamps.count=2",
+)
+
+
+@dataclass
+class Peak:
+    """Largest resident memory of any worker seen while a run reports progress [MB]."""
+
+    worker_mb: float = 0.0
+
+    def __call__(self, progress: RunProgress) -> None:
+        """Look at all child processes."""
+        import psutil
+
+        del progress
+        for child in psutil.Process().children(recursive=True):
+            try:
+                self.worker_mb = max(self.worker_mb, child.memory_info().rss / 1e6)
+            except psutil.Error:
+                continue
+
+
+def spec_of(views_per_scene: int) -> Spec:
+    """The benchmark's scene."""
+    overrides = (*OVERRIDES, f"views_per_scene={views_per_scene}")
+    return load_spec("tabletop.yaml", seed=1, overrides=overrides)
+
+
+def measured_run(views_per_scene: int, n: int, workers: int) -> tuple[Summary, Peak]:
+    """A whole run into a temporary folder."""
+    factory = PipelineFactory(spec_of(views_per_scene), n)
+    peak = Peak()
+    with tempfile.TemporaryDirectory() as folder:
+        summary = run(
+            plan_of(factory),
+            factory,
+            Path(folder) / "out",
+            workers=workers,
+            progress=peak,
+            resume_command="",
+            licences=licences_text(factory),
+        )
+    return summary, peak
+
+
+def first_sample_s() -> float:
+    """Seconds from nothing to the first sample in this process."""
+    started_s = time.perf_counter()
+    with open_pipeline(spec_of(5)) as pipeline:
+        pipeline.sample(0)
+    return time.perf_counter() - started_s
+
+
+def tiny_renderer_s(samples: int) -> float:
+    """CPU seconds per sample of PyBullet's TinyRenderer on the same scenes and cameras.
+
+    One light, hard shadow, no materials; RGB, depth and id PNGs are encoded and written, as ours.
+    """
+    import pybullet
+
+    with open_pipeline(spec_of(1)) as pipeline, tempfile.TemporaryDirectory() as folder:
+        taken = [pipeline.sample(i) for i in range(samples)]
+        client = pybullet.connect(pybullet.DIRECT)
+        spent_s = 0.0
+        for sample in taken:
+            _load_bodies(pybullet, client, sample.scene.bodies, pipeline.assets, Path(folder))
+            started_s = time.process_time()
+            _draw(pybullet, client, sample.scene.cameras[0], Path(folder))
+            spent_s += time.process_time() - started_s
+            pybullet.resetSimulation(physicsClientId=client)
+        pybullet.disconnect(client)
+    return spent_s / samples
+
+
+def _load_bodies(pybullet: Any, client: int, bodies: Any, assets: Any, folder: Path) -> None:
+    """Make every body of a scene in the engine, from our own meshes; not part of the timing."""
+    for body in bodies:
+        path = folder / (body.asset.replace("/", "_").replace("?", "_") + ".obj")
+        if not path.exists():
+            mesh = assets.mesh(body.asset)
+            lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices_m]
+            lines += [f"vn {x} {y} {z}" for x, y, z in mesh.normals]
+            lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in mesh.faces + 1]
+            path.write_text("\n".join(lines))
+        shape = pybullet.createVisualShape(
+            pybullet.GEOM_MESH,
+            fileName=str(path),
+            meshScale=[body.scale] * 3,
+            rgbaColor=[0.7, 0.6, 0.5, 1],
+            physicsClientId=client,
+        )
+        w, x, y, z = body.T_world_body.quaternion_wxyz
+        pybullet.createMultiBody(
+            baseVisualShapeIndex=shape,
+            basePosition=body.T_world_body.translation_m,
+            baseOrientation=[x, y, z, w],
+            physicsClientId=client,
+        )
+
+
+def _draw(pybullet: Any, client: int, camera: Any, folder: Path) -> None:
+    import cv2
+
+    k = camera.intrinsics
+    T_camera_world = camera.T_world_camera.inverse().matrix()
+    view = np.diag([1.0, -1.0, -1.0, 1.0]) @ T_camera_world
+    near_m, far_m = 0.05, 20.0
+    projection = np.zeros((4, 4))
+    projection[0, 0], projection[1, 1] = 2 * k.fx_px / k.width_px, 2 * k.fy_px / k.height_px
+    projection[2, 2] = -(far_m + near_m) / (far_m - near_m)
+    projection[2, 3] = -2 * far_m * near_m / (far_m - near_m)
+    projection[3, 2] = -1
+    _, _, rgba, depth, ids = pybullet.getCameraImage(
+        k.width_px,
+        k.height_px,
+        viewMatrix=view.T.ravel().tolist(),
+        projectionMatrix=projection.T.ravel().tolist(),
+        shadow=1,
+        renderer=pybullet.ER_TINY_RENDERER,
+        physicsClientId=client,
+    )
+    shape = (k.height_px, k.width_px)
+    images = {
+        "rgb": np.reshape(rgba, (*shape, 4)).astype(np.uint8)[..., 2::-1],
+        "depth": (np.reshape(depth, shape) * 65535).astype(np.uint16),
+        "ids": (np.reshape(ids, shape) + 1).astype(np.uint16),
+    }
+    for name, image in images.items():
+        _, encoded = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        (folder / f"{name}.png").write_bytes(encoded.tobytes())
+
+
+def main() -> None:
+    """Print the table that the README records."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--n", type=int, default=200)
+    parser.add_argument("--workers", type=int, default=2)
+    arguments = parser.parse_args()
+
+    print(f"{platform.machine()}, {_processor()}, {arguments.workers} workers, {arguments.n} samples")
+    print(f"first sample in this process: {first_sample_s():.1f} s")
+    ours_s = {}
+    for views_per_scene in (5, 1):
+        summary, peak = measured_run(views_per_scene, arguments.n, arguments.workers)
+        stages = summary.stage_ms_per_sample
+        ours_s[views_per_scene] = sum(stages.values()) / 1e3
+        print(
+            f"views_per_scene {views_per_scene}: {summary.samples_per_s:.1f} samples/s,"
+            f" {sum(stages.values()):.0f} CPU ms/sample, worker peak {peak.worker_mb:.0f} MB"
+        )
+        for stage, ms in stages.items():
+            print(f"    {stage:<10} {ms:7.1f} CPU ms")
+    tiny_s = tiny_renderer_s(20)
+    print(
+        f"TinyRenderer, same scenes: {1e3 * tiny_s:.0f} CPU ms/sample (render, encode, write; no"
+        f" physics, no annotation); ours, everything: {1e3 * ours_s[5]:.0f} CPU ms/sample"
+    )
+
+
+def _processor() -> str:
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.processor()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,11 @@
+"""Output formats: each is one file and one line in this table.
+
+An exporter adds labels to a shard whose images are already written (``exporters.images``) and, in
+the end, merges all shards into the format's own layout; images are hard-linked, never copied twice.
+"""
+
+from __future__ import annotations
+
+from generator.core.plugins import PluginTable
+
+TABLE = PluginTable("exporter", {"coco": "exporters.coco:Coco", "kitti": "exporters.kitti:Kitti"})

@@ -1,0 +1,258 @@
+"""COCO instances: boxes and run-length masks, with 3D boxes, poses and visibility as extra keys.
+
+::
+
+    annotations/instances_<split>.json      a split without images has no file
+    <split>/000000012_color.png             images{file_name}; one name per sample and sensor
+    <channel>/<split>/000000012_color.png   the other images of the data set: depth, instance, ...
+
+Every annotation has COCO's own keys. Further keys appear as far as their annotations are made:
+
+``amodal_bbox``, ``amodal_segmentation``
+    The whole silhouette. The box may leave the image, the mask is clipped to it.
+``visible_fraction``, ``occlusion``, ``truncation``
+    Shares in [0, 1]: visible pixels of the silhouette; hidden ones of what is inside the image;
+    silhouette pixels outside the image.
+``box3d``
+    Camera frame: ``center_m``, full ``size_m``, ``quaternion_wxyz``.
+``T_camera_object``
+    Pose of the object's own frame, 4 x 4, rows first.
+``part_px``
+    Visible pixels by part.
+
+Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
+covers ``[i, i + 1)``, as COCO's boxes do; OpenCV's principal point is 0.5 px less.
+
+References: https://cocodataset.org/#format-data and pycocotools, whose COCOeval reads annotation
+id 0 as "no match": ids begin at 1.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, TextIO
+
+from pydantic import Field
+
+from exporters.images import link_or_copy
+from exporters.rle import encoded
+from generator.config.strict import Strict
+from generator.core.boxes import BoxPx, OrientedBox
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.interfaces import DatasetInfo, media_path
+from generator.core.sample import ImageTruth, ObjectTruth, Sample
+from generator.core.se3 import Array
+from generator.core.serial import canonical_json
+
+DECIMALS = 9
+"""Of metres, matrices and shares: far below what anyone can measure, and short to write."""
+
+
+class Coco(Strict):
+    """COCO instances, one JSON file per split; images of all sensors with the rgb channel."""
+
+    type: Literal["coco"] = "coco"
+    name: str = Field("coco", pattern=r"^[A-Za-z0-9_-]+$")
+    """Folder of the data set that this exporter fills."""
+    segmentation: Literal["rle", "none"] = "rle"
+    """Visible masks, run-length encoded; or boxes only."""
+    amodal: bool = True
+    """Also write box and, where the annotation amodal_masks is made, mask of the silhouette."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it cannot do without."""
+        wanted = {"instance_masks": self.segmentation == "rle", "boxes2d": self.amodal}
+        return frozenset(name for name, asked in wanted.items() if asked)
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set that this format cannot hold.
+
+        Raises:
+            ConfigError: if no sensor writes the rgb channel.
+        """
+        if not _sensors(info):
+            raise ConfigError(
+                f"exporter '{self.name}': no sensor of {', '.join(info.sensors)} writes the rgb "
+                "channel; add an rgb_camera"
+            )
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write one JSON line per image and per annotation, by split.
+
+        Raises:
+            ConfigError: if no sensor writes the rgb channel.
+        """
+        self.check(info)
+        rows: dict[str, list[dict[str, Any]]] = {}
+        for sample in samples:
+            for sensor in _sensors(info):
+                truth = sample.truth[sensor]
+                images = rows.setdefault(f"{sample.split}.images", [])
+                annotations = rows.setdefault(f"{sample.split}.annotations", [])
+                images.append(_image(info, sample, sensor))
+                annotations += (
+                    self._annotation(sample, sensor, truth, thing)
+                    for thing in truth.objects
+                    if thing.box is not None
+                )
+        folder = shard_dir / self.name
+        folder.mkdir(parents=True, exist_ok=True)
+        for stem, lines in rows.items():
+            text = "".join(canonical_json(line) + "\n" for line in lines)
+            (folder / f"{stem}.jsonl").write_text(text, encoding="utf-8", newline="\n")
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Join the lines of all shards, given in index order, and link the images."""
+        fragments = [shard_dir / self.name for shard_dir in shard_dirs]
+        splits = {p.name.split(".")[0] for f in fragments for p in f.glob("*.images.jsonl")}
+        (dataset_dir / "annotations").mkdir(parents=True, exist_ok=True)
+        for split in sorted(splits):
+            path = dataset_dir / "annotations" / f"instances_{split}.json"
+            with path.open("w", encoding="utf-8", newline="\n") as file:
+                _write_dataset(file, _header(info), fragments, split)
+        for shard_dir in shard_dirs:
+            for split in sorted(splits):
+                for line in _lines(shard_dir / self.name / f"{split}.images.jsonl"):
+                    _link_images(json.loads(line), split, shard_dir, dataset_dir)
+
+    def _annotation(
+        self, sample: Sample, sensor: str, truth: ImageTruth, thing: ObjectTruth
+    ) -> dict[str, Any]:
+        assert thing.box is not None, "invisible objects are not listed"
+        camera = truth.camera.intrinsics
+        instance = thing.instance
+        row: dict[str, Any] = {
+            "id": sample.annotation_id(sensor, instance.instance_id),
+            "image_id": sample.image_id(sensor),
+            "category_id": instance.category_id,
+            "bbox": _xywh(thing.box),
+            "area": thing.visible_px,
+            "iscrowd": 0,
+            "segmentation": [],
+            "instance_id": instance.instance_id,
+            "attributes": {"name": instance.name, "asset": instance.asset},
+        }
+        if self.segmentation == "rle":
+            assert thing.mask is not None, "the annotation instance_masks is in `needs`"
+            row["segmentation"] = encoded(thing.mask, camera.height_px, camera.width_px)
+        if self.amodal and thing.amodal_box is not None:
+            row["amodal_bbox"] = _xywh(thing.amodal_box)
+        if self.amodal and thing.amodal_mask is not None:
+            mask = thing.amodal_mask
+            row["amodal_segmentation"] = encoded(mask, camera.height_px, camera.width_px)
+        return row | _optional(thing)
+
+
+def _optional(thing: ObjectTruth) -> dict[str, Any]:
+    """The keys of annotations that were made; none for the others."""
+    keys: dict[str, Any] = {
+        name: round(share, DECIMALS)
+        for name in ("visible_fraction", "occlusion", "truncation")
+        if (share := getattr(thing, name)) is not None
+    }
+    if thing.box3d_camera is not None:
+        keys["box3d"] = _box3d(thing.box3d_camera)
+    if thing.T_camera_object is not None:
+        keys["T_camera_object"] = _rows(thing.T_camera_object.matrix())
+    if thing.part_px is not None:
+        keys["part_px"] = thing.part_px
+    return keys
+
+
+def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+    camera = sample.truth[sensor].camera
+    file_name = f"{sample.index:09d}_{sensor}.png"
+    others = [c for c in info.media[sensor] if c is not Channel.RGB]
+    return {
+        "id": sample.image_id(sensor),
+        "file_name": file_name,
+        "width": camera.intrinsics.width_px,
+        "height": camera.intrinsics.height_px,
+        "files": {c.value: f"{c.value}/{sample.split}/{file_name}" for c in others},
+        "sample": sample.index,
+        "scene": sample.scene_index,
+        "view": sample.view_index,
+        "sensor": sensor,
+        "K": _rows(camera.intrinsics.matrix()),
+        "T_world_camera": _rows(camera.T_world_camera.matrix()),
+    }
+
+
+def _header(info: DatasetInfo) -> dict[str, Any]:
+    return {
+        "info": {
+            "description": info.name,
+            "version": "1.0",
+            "seed": info.seed,
+            "depth_scale_m": info.depth_scale_m,
+            "camera_frame": "X right, Y down, Z forward; metres",
+            "pixel_centre": 0.5,
+        },
+        "licenses": [],
+        "categories": [
+            {"id": k, "name": name, "supercategory": "object"}
+            for k, name in enumerate(info.categories, 1)
+        ],
+    }
+
+
+def _write_dataset(
+    file: TextIO, header: Mapping[str, Any], fragments: Sequence[Path], split: str
+) -> None:
+    """One JSON document, streamed: annotations of all images are never in memory together."""
+    file.write(canonical_json(header)[:-1])
+    for section in ("images", "annotations"):
+        file.write(f',\n"{section}":[')
+        separator = "\n"
+        for fragment in fragments:
+            for line in _lines(fragment / f"{split}.{section}.jsonl"):
+                file.write(separator + line)
+                separator = ",\n"
+        file.write("\n]")
+    file.write("}\n")
+
+
+def _link_images(
+    image: Mapping[str, Any], split: str, shard_dir: Path, dataset_dir: Path
+) -> None:
+    targets = {Channel.RGB.value: f"{split}/{image['file_name']}", **image["files"]}
+    for channel, target in targets.items():
+        source = media_path(shard_dir, image["sensor"], Channel(channel), image["sample"])
+        link_or_copy(source, dataset_dir / target)
+
+
+def _lines(path: Path) -> Iterator[str]:
+    """Lines of a fragment without their line ends; none where a shard has no such split."""
+    if path.exists():
+        with path.open(encoding="utf-8", newline="\n") as file:
+            for line in file:
+                yield line.rstrip("\n")
+
+
+def _sensors(info: DatasetInfo) -> tuple[str, ...]:
+    return tuple(s for s in info.sensors if Channel.RGB in info.media[s])
+
+
+def _xywh(box: BoxPx) -> list[int]:
+    return [box.x_min, box.y_min, box.width_px, box.height_px]
+
+
+def _box3d(box: OrientedBox) -> dict[str, list[float]]:
+    return {
+        "center_m": _rounded(box.T_frame_box.translation_m),
+        "size_m": _rounded(box.size_m),
+        "quaternion_wxyz": _rounded(box.T_frame_box.quaternion_wxyz),
+    }
+
+
+def _rows(matrix: Array) -> list[list[float]]:
+    return [_rounded(row) for row in matrix.tolist()]
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    # Adding 0.0 turns -0.0 into 0.0.
+    return [round(value, DECIMALS) + 0.0 for value in values]

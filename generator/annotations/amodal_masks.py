@@ -1,0 +1,40 @@
+"""Masks of whole silhouettes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from generator.annotations.pixels import silhouette_box, silhouette_crop, silhouette_of
+from generator.core.boxes import tight_box
+from generator.core.capture import Channel, Reading, Silhouette
+from generator.core.sample import MaskPx, ObjectTruth
+from generator.core.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class AmodalMasks:
+    """The instance's pixels as if nothing stood before it; masks of instances may overlap."""
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
+
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+        """Fill in ``amodal_mask``, clipped to the image and tight; [0, 0] if nothing is inside."""
+        camera = reading.camera.intrinsics
+        silhouette = silhouette_of(reading, truth.instance)
+        return replace(
+            truth, amodal_mask=clipped_mask(silhouette, camera.width_px, camera.height_px)
+        )
+
+
+def clipped_mask(silhouette: Silhouette, width_px: int, height_px: int) -> MaskPx:
+    """The part of a silhouette inside an image, tight; shape [0, 0] when there is none."""
+    outer = silhouette_box(silhouette)
+    inner = outer.clipped(width_px, height_px) if outer else None
+    # Clipping an outline can leave empty margins: what is inside may be smaller than the clip.
+    box = tight_box(silhouette_crop(silhouette, inner), inner.x_min, inner.y_min) if inner else None
+    if box is None:
+        return MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
+    return MaskPx(box.x_min, box.y_min, silhouette_crop(silhouette, box))

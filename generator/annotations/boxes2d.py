@@ -1,0 +1,26 @@
+"""Image boxes of the visible pixels and of the whole silhouette."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from generator.annotations.pixels import silhouette_box, silhouette_of
+from generator.core.capture import Channel, Reading
+from generator.core.sample import ObjectTruth
+from generator.core.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Boxes2d:
+    """Tight boxes [px]: ``box`` of what is visible, ``amodal_box`` of the silhouette.
+
+    The amodal box counts hidden parts and parts outside the image; None for an instance that is
+    wholly outside the renderer's canvas (three images wide and high).
+    """
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
+
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+        """Fill in ``amodal_box``; ``box`` is part of every truth."""
+        return replace(truth, amodal_box=silhouette_box(silhouette_of(reading, truth.instance)))

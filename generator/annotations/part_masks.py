@@ -1,0 +1,45 @@
+"""Visible pixels of the parts of articulated things."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from generator.annotations.pixels import crop, visible_mask
+from generator.core.capture import Channel, Reading
+from generator.core.errors import SampleError
+from generator.core.sample import ObjectTruth
+from generator.core.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class PartMasks:
+    """How many pixels show each part; the masks themselves are the part image.
+
+    Pixels with part id 0 belong to the instance as a whole and to none of its parts.
+    """
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.PART})
+
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+        """Fill in ``part_px`` for an instance with parts, every part named; else None.
+
+        Raises:
+            SampleError: if a pixel shows a part that the instance does not have.
+        """
+        instance = truth.instance
+        if not instance.parts:
+            return truth
+        counts = np.zeros(len(instance.parts) + 1, dtype=np.intp)
+        if truth.box is not None:
+            shown = crop(reading.channels[Channel.PART], truth.box)[visible_mask(reading, truth)]
+            counts = np.bincount(shown, minlength=len(counts))
+        if len(counts) > len(instance.parts) + 1:
+            raise SampleError(
+                f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': "
+                f"the part image shows part {len(counts) - 1}; it has {len(instance.parts)} parts"
+            )
+        names = instance.parts
+        return replace(truth, part_px={name: int(counts[k]) for k, name in enumerate(names, 1)})

@@ -1,0 +1,36 @@
+"""Category images."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from generator.annotations.pixels import crop, visible_mask
+from generator.core.capture import Channel, Reading
+from generator.core.errors import SampleError
+from generator.core.sample import ObjectTruth
+from generator.core.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class SemanticMasks:
+    """The category id of every pixel, written as an image; nothing is added to single objects."""
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.CATEGORY})
+
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+        """The truth as it is, once the category image is known to agree with it.
+
+        Raises:
+            SampleError: if a visible pixel of the instance shows another category.
+        """
+        if truth.box is not None:
+            instance = truth.instance
+            shown = crop(reading.channels[Channel.CATEGORY], truth.box)
+            if (shown[visible_mask(reading, truth)] != instance.category_id).any():
+                raise SampleError(
+                    f"sensor '{reading.sensor}', instance {instance.instance_id} "
+                    f"'{instance.name}': the category image shows another category than "
+                    f"{instance.category_id} '{instance.category}' on its pixels"
+                )
+        return truth

@@ -1,0 +1,84 @@
+"""The truth about one image: which instances are in it, and what the annotators say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydantic import Field
+
+from generator.annotations.pixels import extents
+from generator.annotations.validity import check_truth
+from generator.config.strict import Strict
+from generator.core.capture import Channel, Reading
+from generator.core.errors import ConfigError
+from generator.core.interfaces import Annotator
+from generator.core.sample import ImageTruth, ObjectTruth
+from generator.core.scene import Scene
+
+BASE_CHANNELS = frozenset({Channel.INSTANCE})
+"""What ``image_truth`` itself needs to have been rendered."""
+
+
+class Thresholds(Strict):
+    """Which instances are annotated in an image; the others stay in the id images.
+
+    Instances without a visible pixel are never annotated, unless ``include_invisible``.
+    """
+
+    min_visible_px: int = Field(16, ge=1)
+    """Fewest visible pixels."""
+    min_visible_fraction: float = Field(0.0, ge=0.0, le=1.0)
+    """Smallest visible share of the silhouette; above 0 it needs the annotation visibility."""
+    min_box_px: int = Field(3, ge=1)
+    """Shortest side of the visible box."""
+    include_invisible: bool = False
+    """Annotate every instance, hidden ones too; the other thresholds then do not apply."""
+
+
+def image_truth(
+    scene: Scene, reading: Reading, annotators: Sequence[Annotator], thresholds: Thresholds
+) -> ImageTruth:
+    """Annotations of one reading, in order of instance id.
+
+    Raises:
+        SampleError: if the labels of an instance contradict each other or the images.
+        ConfigError: if a threshold needs an annotation that is not made.
+    """
+    seen = extents(reading.channels[Channel.INSTANCE])
+    instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
+    objects = []
+    for instance in instances:
+        extent = seen.get(instance.instance_id)
+        if extent is None and not thresholds.include_invisible:
+            continue
+        truth = ObjectTruth(
+            instance,
+            visible_px=extent.visible_px if extent else 0,
+            box=extent.box if extent else None,
+        )
+        for annotator in annotators:
+            truth = annotator.annotate(scene, reading, truth)
+        check_truth(reading, truth)
+        if is_listed(truth, thresholds):
+            objects.append(truth)
+    return ImageTruth(reading.camera, tuple(objects))
+
+
+def is_listed(truth: ObjectTruth, thresholds: Thresholds) -> bool:
+    """Whether an object shows enough of itself to be annotated.
+
+    Raises:
+        ConfigError: if ``min_visible_fraction`` is set and the visible fraction is not known.
+    """
+    if thresholds.include_invisible:
+        return True
+    if truth.box is None or truth.visible_px < thresholds.min_visible_px:
+        return False
+    if min(truth.box.width_px, truth.box.height_px) < thresholds.min_box_px:
+        return False
+    if thresholds.min_visible_fraction > 0 and truth.visible_fraction is None:
+        raise ConfigError(
+            "min_visible_fraction: the visible share of objects is not known; "
+            "add 'visibility' to annotations or set it to 0"
+        )
+    return (truth.visible_fraction or 0.0) >= thresholds.min_visible_fraction

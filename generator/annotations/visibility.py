@@ -1,0 +1,42 @@
+"""How much of an instance is seen, hidden, and cut off by the image border."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from generator.annotations.pixels import silhouette_box, silhouette_crop, silhouette_of
+from generator.core.capture import Channel, Reading
+from generator.core.sample import ObjectTruth
+from generator.core.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Visibility:
+    """Three shares in [0, 1], all ratios of pixel counts.
+
+    ``visible_fraction`` is BOP's ``visib_fract``: the silhouette it refers to is counted outside
+    the image too, so a truncated object is below 1 even if nothing hides it (Hodan et al., "BOP
+    Challenge 2020", section 2). An instance without a silhouette is wholly truncated.
+    """
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
+
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+        """Fill in ``visible_fraction``, ``occlusion`` and ``truncation``."""
+        silhouette = silhouette_of(reading, truth.instance)
+        outer = silhouette_box(silhouette)
+        if outer is None:
+            return replace(truth, visible_fraction=0.0, occlusion=0.0, truncation=1.0)
+        camera = reading.camera.intrinsics
+        inner = outer.clipped(camera.width_px, camera.height_px)
+        whole_px = int(np.count_nonzero(silhouette.mask))
+        inside_px = int(np.count_nonzero(silhouette_crop(silhouette, inner))) if inner else 0
+        return replace(
+            truth,
+            visible_fraction=truth.visible_px / whole_px,
+            occlusion=(inside_px - truth.visible_px) / inside_px if inside_px else 0.0,
+            truncation=(whole_px - inside_px) / whole_px,
+        )

@@ -1,0 +1,284 @@
+"""Distributions over a few given values: numbers, names, flags or positions."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence as Items
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any, ClassVar, cast
+
+from generator.config.distributions.base import (
+    Kind,
+    Malformed,
+    Numeric,
+    T_co,
+    inside,
+    read_number,
+)
+from generator.config.scalars import flow, number, shown
+
+if TYPE_CHECKING:
+    from generator.core.streams import Rng
+
+EVERY_KIND = frozenset(
+    {"number", "whole number", "name", "flag", "rotation", "direction", "position"}
+)
+
+
+@dataclass(frozen=True)
+class Constant(Numeric[T_co]):
+    """Always the same value. A plain value in YAML means this."""
+
+    value: T_co
+
+    name: ClassVar[str] = "constant"
+    kinds: ClassVar[frozenset[str]] = EVERY_KIND
+
+    def draw(self, rng: Rng) -> T_co:  # noqa: ARG002
+        """The value; uses no random number."""
+        return self.value
+
+    def mean(self) -> float:
+        """The value."""
+        return _as_number(self.value)
+
+    def support(self) -> tuple[float, float]:
+        """The value, twice."""
+        return self.mean(), self.mean()
+
+    def outcomes(self) -> tuple[T_co, ...]:
+        """The value alone."""
+        return (self.value,)
+
+    @classmethod
+    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Constant[Any]:
+        """Read a value of the field."""
+        return cls(kind.read(argument))
+
+    def argument(self) -> Any:
+        """The value."""
+        return _plain(self.value)
+
+    def to_yaml(self) -> Any:
+        """The value itself: constants need no name."""
+        return _plain(self.value)
+
+    @classmethod
+    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:
+        """One value."""
+        return dict(constant)
+
+
+@dataclass(frozen=True, init=False, repr=False)
+class Choice(Numeric[T_co]):
+    """One of the given values, equally likely or in proportion to weights.
+
+    Attributes:
+        values: What can be drawn.
+        weights: Relative frequency of each value, >= 0; they need not add up to 1.
+    """
+
+    values: tuple[T_co, ...]
+    weights: tuple[float, ...]
+    _cumulative: tuple[float, ...] = field(compare=False)
+
+    name: ClassVar[str] = "choice"
+    kinds: ClassVar[frozenset[str]] = EVERY_KIND
+
+    def __init__(self, values: Items[T_co] | Mapping[T_co, float]) -> None:
+        """Accept a sequence (equal weights) or ``{value: weight}``."""
+        weighted = isinstance(values, Mapping)
+        weights = values.values() if isinstance(values, Mapping) else [1.0] * len(values)
+        object.__setattr__(self, "values", tuple(_plain_frozen(v) for v in values))
+        object.__setattr__(self, "weights", tuple(read_number(w) for w in weights))
+        object.__setattr__(self, "_cumulative", tuple(accumulate(self.weights)))
+        if not self.values:
+            raise Malformed("choice needs at least one value")
+        for value, weight in zip(self.values, self.weights, strict=True):
+            if weight < 0:
+                raise Malformed(
+                    f"choice needs weights >= 0, got {number(weight)} for {shown(value)}",
+                    (str(value),) if weighted else (),
+                )
+        if not self._cumulative[-1] > 0:
+            raise Malformed("choice needs at least one weight > 0")
+
+    def draw(self, rng: Rng) -> T_co:
+        """One value."""
+        total = self._cumulative[-1]
+        index = bisect_right(self._cumulative, rng.random() * total)
+        # A product that rounds up to the total itself belongs to the last value that has weight.
+        return self.values[min(index, bisect_right(self._cumulative, total * (1 - 2.0**-53)))]
+
+    def mean(self) -> float:
+        """Expected value."""
+        pairs = zip(self.values, self.weights, strict=True)
+        return sum(_as_number(v) * w for v, w in pairs) / self._cumulative[-1]
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest value that has weight."""
+        numbers = [_as_number(v) for v in self.outcomes()]
+        return min(numbers), max(numbers)
+
+    def outcomes(self) -> tuple[T_co, ...]:
+        """The values that have weight."""
+        return tuple(v for v, w in zip(self.values, self.weights, strict=True) if w > 0)
+
+    @classmethod
+    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Choice[Any]:
+        """Read a list of values, or ``{value: weight}``."""
+        if isinstance(argument, Mapping):
+            weighted: dict[Any, float] = {}
+            for key, weight in argument.items():
+                with inside(key):
+                    weighted[kind.read_key(key)] = read_number(weight)
+            return cls(weighted)
+        return cls(_read_items(argument, cls.name, kind))
+
+    def argument(self) -> Any:
+        """A list of values; a mapping where weights differ."""
+        if len(set(self.weights)) == 1:
+            return [_plain(v) for v in self.values]
+        return {
+            v if isinstance(v, str) else flow(v): w
+            for v, w in zip(self.values, self.weights, strict=True)
+        }
+
+    def __repr__(self) -> str:
+        """As it is constructed."""
+        if len(set(self.weights)) == 1:
+            return f"Choice({self.values!r})"
+        return f"Choice({dict(zip(self.values, self.weights, strict=True))!r})"
+
+    @classmethod
+    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:
+        """A list of values, or a mapping of weights."""
+        return {
+            "anyOf": [
+                {"type": "array", "items": dict(constant), "minItems": 1},
+                {
+                    "type": "object",
+                    "additionalProperties": {"type": "number", "minimum": 0},
+                    "minProperties": 1,
+                    "description": "{value: weight}",
+                },
+            ]
+        }
+
+
+@dataclass(frozen=True)
+class Sequence(Numeric[T_co]):
+    """The given values in turn, by the number of the scene or sample; uses no random number."""
+
+    values: tuple[T_co, ...]
+
+    name: ClassVar[str] = "sequence"
+    kinds: ClassVar[frozenset[str]] = EVERY_KIND
+
+    def __post_init__(self) -> None:
+        """Refuse an empty list."""
+        object.__setattr__(self, "values", tuple(_plain_frozen(v) for v in self.values))
+        if not self.values:
+            raise Malformed("sequence needs at least one value")
+
+    def draw(self, rng: Rng) -> T_co:
+        """The value of this scene's or sample's turn."""
+        return self.values[rng.index % len(self.values)]
+
+    def mean(self) -> float:
+        """Mean over one round."""
+        return sum(_as_number(v) for v in self.values) / len(self.values)
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest value."""
+        numbers = [_as_number(v) for v in self.values]
+        return min(numbers), max(numbers)
+
+    def outcomes(self) -> tuple[T_co, ...]:
+        """All values."""
+        return self.values
+
+    @classmethod
+    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Sequence[Any]:
+        """Read a list of values."""
+        return cls(tuple(_read_items(argument, cls.name, kind)))
+
+    def argument(self) -> list[Any]:
+        """A list of values."""
+        return [_plain(v) for v in self.values]
+
+    @classmethod
+    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:
+        """A list of values."""
+        return {"type": "array", "items": dict(constant), "minItems": 1}
+
+
+@dataclass(frozen=True)
+class Probability(Numeric[bool]):
+    """True with the given probability, else false."""
+
+    p: float
+
+    name: ClassVar[str] = "probability"
+    kinds: ClassVar[frozenset[str]] = frozenset({"flag"})
+
+    def __post_init__(self) -> None:
+        """Refuse what is no probability."""
+        object.__setattr__(self, "p", read_number(self.p))
+        if not 0 <= self.p <= 1:
+            raise Malformed(f"probability needs a number in [0, 1], got {number(self.p)}")
+
+    def draw(self, rng: Rng) -> bool:
+        """One value."""
+        return rng.random() < self.p
+
+    def mean(self) -> float:
+        """The probability itself."""
+        return self.p
+
+    def support(self) -> tuple[float, float]:
+        """False as 0 and true as 1, where they can be drawn."""
+        return float(self.p == 1), float(self.p > 0)
+
+    def outcomes(self) -> tuple[bool, ...]:
+        """What can be drawn."""
+        return tuple(v for v, share in ((False, 1 - self.p), (True, self.p)) if share > 0)
+
+    @classmethod
+    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Probability:  # noqa: ARG003
+        """Read one number."""
+        return cls(read_number(argument))
+
+    def argument(self) -> float:
+        """The probability."""
+        return self.p
+
+    @classmethod
+    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
+        """A number in [0, 1]."""
+        return {"type": "number", "minimum": 0, "maximum": 1}
+
+
+def _read_items(argument: Any, name: str, kind: Kind[Any]) -> list[Any]:
+    if not isinstance(argument, (list, tuple)):
+        raise Malformed(f"{name} needs a list of values, got {shown(argument)}")
+    items = []
+    for i, item in enumerate(argument):
+        with inside(i):
+            items.append(kind.read(item))
+    return items
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _plain_frozen(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _as_number(value: object) -> float:
+    if not isinstance(value, (int, float)):
+        raise TypeError(f"{value!r} is no number: it has no mean and no range")
+    return cast("float", value)

@@ -1,0 +1,263 @@
+"""Field types for models: ``roughness: Scalar = Uniform(0.1, 0.9)``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic_core import PydanticCustomError, core_schema
+
+from generator.config.distributions.base import (
+    Distribution,
+    Kind,
+    Malformed,
+    Numeric,
+    distribution,
+    names_of,
+    read,
+    read_number,
+    read_vector,
+    read_whole_number,
+)
+from generator.config.distributions.space import read_direction, read_quaternion
+from generator.config.scalars import number, resolve, shown
+from generator.core.se3 import Quaternion, Vec3
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+
+
+@dataclass(frozen=True)
+class FieldOf:
+    """Marks a field that holds a distribution over one kind of value."""
+
+    kind: Kind[Any]
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Read plain data or a distribution; write plain data."""
+        del source, handler
+        return core_schema.no_info_plain_validator_function(
+            self._read,
+            serialization=core_schema.plain_serializer_function_ser_schema(Distribution.to_yaml),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """A constant, or any one-key mapping of a distribution that fits."""
+        del schema, handler
+        return json_schema_of(self.kind)
+
+    def _read(self, value: Any) -> Distribution[Any]:
+        try:
+            return read(value, self.kind)
+        except Malformed as error:
+            raise custom_error(error) from None
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Every value that can be drawn must lie between two numbers.
+
+    ``Annotated[Scalar, Bounds(1, 170)]``; also fits plain ``int`` and ``float`` fields.
+
+    Attributes:
+        open_low, open_high: The end itself is excluded.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    open_low: bool = False
+    open_high: bool = False
+
+    def __contains__(self, value: float) -> bool:
+        """Whether the number lies within."""
+        above = self.low < value if self.open_low else self.low <= value
+        below = value < self.high if self.open_high else value <= self.high
+        return above and below
+
+    def __str__(self) -> str:
+        """Interval notation, or a comparison where one end is free: ``(1, 170)``, ``>= 0``."""
+        if math.isinf(self.high):
+            return f"{'>' if self.open_low else '>='} {number(self.low)}"
+        if math.isinf(self.low):
+            return f"{'<' if self.open_high else '<='} {number(self.high)}"
+        left, right = "(" if self.open_low else "[", ")" if self.open_high else "]"
+        return f"{left}{number(self.low)}, {number(self.high)}{right}"
+
+    def check(self, value: Any) -> Any:
+        """The value itself. Raises Malformed unless all it can be lies within."""
+        if not isinstance(value, Numeric):
+            low = high = value
+        else:
+            low, high = value.support()
+        if low in self and high in self:
+            return value
+        if low == high:
+            raise Malformed(f"{number(low)} is not {self._within()}")
+        outside = low if low not in self else high
+        reach = "has no limit" if math.isinf(outside) else f"can be {number(outside)}"
+        remedy = "; give it a clip range" if math.isinf(outside) else ""
+        raise Malformed(f"{value.name} {reach}, which is not {self._within()}{remedy}")
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Check after reading."""
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """The same schema, with the limits on its constant."""
+        inner = handler(schema)
+        target = next((o for o in inner.get("anyOf", ()) if "type" in o), inner)
+        if not math.isinf(self.low):
+            target["exclusiveMinimum" if self.open_low else "minimum"] = self.low
+        if not math.isinf(self.high):
+            target["exclusiveMaximum" if self.open_high else "maximum"] = self.high
+        return inner
+
+    def _check(self, value: Any) -> Any:
+        try:
+            return self.check(value)
+        except Malformed as error:
+            raise custom_error(error) from None
+
+    def _within(self) -> str:
+        return str(self) if math.isinf(self.low) or math.isinf(self.high) else f"in {self}"
+
+
+def custom_error(error: Malformed) -> PydanticCustomError:
+    """What carries our own words, and the path to the fault, through pydantic."""
+    return PydanticCustomError("fact", "{fact}", {"fact": error.fact, "path": error.path})
+
+
+def json_schema_of(kind: Kind[Any]) -> dict[str, Any]:
+    """JSON Schema of a field that holds a distribution over ``kind``."""
+    options: list[dict[str, Any]] = [{**kind.schema, "description": f"constant: {kind.expected}"}]
+    names = names_of(kind.name)
+    bare = [name for name in names if distribution(name).bare]
+    if bare and kind.name != "name":
+        options.append({"enum": bare, "description": "a distribution without argument"})
+    for name in names:
+        found = distribution(name)
+        options.append(
+            {
+                "type": "object",
+                "description": (found.__doc__ or name).partition("\n")[0],
+                "properties": {name: found.schema(kind.schema)},
+                "required": [name],
+                "additionalProperties": False,
+            }
+        )
+    return {"anyOf": options}
+
+
+def _read_number_or_hint(value: Any) -> float:
+    if isinstance(value, (list, tuple)) and len(value) == 2:
+        raise Malformed(
+            f"expected a number or a distribution, got {shown(value)}"
+            f" (did you mean {{uniform: {shown(value)}}}?)"
+        )
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise Malformed(f"expected a number or a distribution, got {shown(value)}")
+    return read_number(value)
+
+
+def _read_count(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        hint = ""
+        if isinstance(value, (list, tuple)) and len(value) == 2:
+            hint = f" (did you mean {{uniform_integer: {shown(value)}}}?)"
+        raise Malformed(f"expected a whole number or a distribution, got {shown(value)}{hint}")
+    return read_whole_number(value)
+
+
+def _read_name(value: Any) -> str:
+    if not isinstance(value, str):
+        hint = "; put it in quotes" if isinstance(value, (bool, int, float)) else ""
+        raise Malformed(f"expected a name or a distribution, got {shown(value)}{hint}")
+    return value
+
+
+def _read_flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        hint = {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(str(value).lower())
+        raise Malformed(
+            f"expected true, false or {{probability: p}}, got {shown(value)}"
+            f"{f' (did you mean {hint}?)' if hint else ''}"
+        )
+    return value
+
+
+def _as_key(kind_read: Any) -> Any:
+    def read_key(text: str) -> Any:
+        try:
+            value = resolve(text)
+        except ValueError as error:
+            raise Malformed(str(error)) from None
+        return kind_read(value)
+
+    return read_key
+
+
+def _no_key(text: str) -> Any:
+    raise Malformed(f"weights by value need a number or a name, got {shown(text)}; use a list")
+
+
+_VECTOR: Mapping[str, Any] = {
+    "type": "array",
+    "items": {"type": "number"},
+    "minItems": 3,
+    "maxItems": 3,
+}
+
+NUMBER = Kind(
+    "number", "a number", _read_number_or_hint, _as_key(_read_number_or_hint), {"type": "number"}
+)
+WHOLE_NUMBER = Kind(
+    "whole number", "a whole number", _read_count, _as_key(_read_count), {"type": "integer"}
+)
+NAME = Kind("name", "a name", _read_name, _read_name, {"type": "string"})
+FLAG = Kind("flag", "true or false", _read_flag, _as_key(_read_flag), {"type": "boolean"})
+ROTATION = Kind(
+    "rotation",
+    "a rotation: [w, x, y, z]",
+    read_quaternion,
+    _no_key,
+    {**_VECTOR, "minItems": 4, "maxItems": 4},
+)
+DIRECTION = Kind("direction", "a direction: [x, y, z]", read_direction, _no_key, _VECTOR)
+POSITION = Kind("position", "a position: [x, y, z] in metres", read_vector, _no_key, _VECTOR)
+
+Scalar = Annotated[Numeric[float], FieldOf(NUMBER)]
+"""A number, or a distribution over numbers."""
+Count = Annotated[Numeric[int], FieldOf(WHOLE_NUMBER), Bounds(low=0)]
+"""A whole number >= 0, or a distribution over such."""
+Name = Annotated[Distribution[str], FieldOf(NAME)]
+"""A name, or a distribution over names."""
+Flag = Annotated[Numeric[bool], FieldOf(FLAG)]
+"""True, false, or a distribution over both."""
+Rotation = Annotated[Distribution[Quaternion], FieldOf(ROTATION)]
+"""A unit quaternion (scalar first), or a distribution over rotations."""
+Direction = Annotated[Distribution[Vec3], FieldOf(DIRECTION)]
+"""A unit vector, or a distribution over directions."""
+Position = Annotated[Distribution[Vec3], FieldOf(POSITION)]
+"""A position [m], or a distribution over positions."""
+
+UnitInterval = Annotated[Scalar, Bounds(0, 1)]
+"""A Scalar that stays in [0, 1]."""
+NonNegative = Annotated[Scalar, Bounds(low=0)]
+"""A Scalar that stays >= 0."""
+Positive = Annotated[Scalar, Bounds(low=0, open_low=True)]
+"""A Scalar that stays > 0."""
+
+
+def bounded(field: Any, low: float, high: float) -> Any:
+    """``Annotated[field, Bounds(low, high)]``, for types that are made at run time."""
+    return Annotated[field, Bounds(low, high)]

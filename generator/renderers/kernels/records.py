@@ -1,0 +1,176 @@
+"""What the host hands to kernels."""
+
+from __future__ import annotations
+
+import warp as wp
+
+NOTHING = wp.constant(-1)
+
+
+@wp.struct
+class View:
+    """A pinhole camera; image coordinates have pixel centres at i + 0.5.
+
+    Attributes:
+        inverse_fx, inverse_fy: Reciprocal focal lengths [1/px].
+        R_world_camera: Camera X right, Y down, Z forward.
+        eye_m: Camera centre in the world.
+        pixel_rad: Angle one pixel covers at the image centre.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    inverse_fx: float
+    inverse_fy: float
+    R_world_camera: wp.mat33
+    eye_m: wp.vec3
+    pixel_rad: float
+
+
+@wp.struct
+class Geometry:
+    """One mesh in its own frame.
+
+    Attributes:
+        faces: Three vertex indices per face, flat.
+        convex: 1 where the mesh is a convex solid: seen from outside it never shades itself.
+    """
+
+    mesh: wp.uint64
+    vertices_m: wp.array(dtype=wp.vec3)
+    normals: wp.array(dtype=wp.vec3)
+    uvs: wp.array(dtype=wp.vec2)
+    faces: wp.array(dtype=wp.int32)
+    face_slots: wp.array(dtype=wp.int32)
+    low_m: wp.vec3
+    high_m: wp.vec3
+    convex: int
+
+
+@wp.struct
+class Body:
+    """One placed mesh. "mesh" is the frame of the unscaled vertices.
+
+    Attributes:
+        geometry: Index into the geometries.
+        first_vertex: Where its vertices begin in per-view vertex buffers.
+        first_material: Where its slots begin in the materials.
+        A_camera_mesh, t_camera_mesh: Mesh to camera, scale included.
+        B_mesh_camera: Camera direction to mesh direction, scale included.
+        eye_mesh: The camera's centre in the mesh frame.
+        R_world_mesh, t_world_mesh: Rotation without scale, and position.
+    """
+
+    geometry: int
+    first_vertex: int
+    first_material: int
+    scale: float
+    A_camera_mesh: wp.mat33
+    t_camera_mesh: wp.vec3
+    B_mesh_camera: wp.mat33
+    eye_mesh: wp.vec3
+    R_world_mesh: wp.mat33
+    t_world_mesh: wp.vec3
+
+
+@wp.struct
+class Surface:
+    """A metallic-roughness material; ``texture`` is -1 where there is none."""
+
+    base_color: wp.vec3
+    roughness: float
+    metallic: float
+    specular: float
+    texture: int
+    texture_scale_m: float
+    emission_cd_m2: wp.vec3
+
+
+@wp.struct
+class Texture:
+    """Mip chains of one texture, levels one after the other, rows from the top.
+
+    Attributes:
+        texels: Albedo as square roots of linear values and roughness factor, 8 bits each
+            (red lowest).
+        bumps: Tangent-space normals, 8 bits each; empty where there are none.
+        offsets: First texel of each level.
+    """
+
+    texels: wp.array(dtype=wp.uint32)
+    bumps: wp.array(dtype=wp.uint32)
+    offsets: wp.array(dtype=wp.int32)
+    width: int
+    height: int
+    levels: int
+    has_bumps: int
+
+
+@wp.struct
+class Lamp:
+    """A light. ``kind``: 0 sphere, 1 spot, 2 sun.
+
+    Attributes:
+        power: Colour times intensity [cd] (sphere, spot) or illuminance [lx] (sun).
+        radius: Of the ball [m], or tangent of the sun's angular radius.
+        cos_outer, cos_inner: Where a spot has faded to nothing, and where it begins to fade.
+    """
+
+    kind: int
+    position_m: wp.vec3
+    direction: wp.vec3
+    power: wp.vec3
+    radius: float
+    cos_outer: float
+    cos_inner: float
+
+
+@wp.struct
+class Sky:
+    """Light from all around.
+
+    Attributes:
+        irradiance: Nine coefficients of irradiance / pi in the world frame, basis of
+            Ramamoorthi and Hanrahan 2001.
+        glossy: Radiance convolved with GGX lobes on octahedral maps [level, row, column]; level
+            ``k`` has perceptual roughness ``k / (levels - 1)``.
+        image: Equirectangular radiance for pixels that see no body.
+        cos_yaw, sin_yaw: Rotation of the image about world Z.
+        visible: Whether such pixels show the image.
+    """
+
+    irradiance: wp.array(dtype=wp.vec3)
+    glossy: wp.array(dtype=wp.vec3, ndim=3)
+    image: wp.array(dtype=wp.vec3, ndim=2)
+    luminance: float
+    cos_yaw: float
+    sin_yaw: float
+    visible: int
+
+
+@wp.func
+def pixel_direction(view: View, x_px: float, y_px: float):
+    """Direction in the camera frame, with z = 1, so that a ray's parameter is its z-depth."""
+    return wp.vec3((x_px - view.cx) * view.inverse_fx, (y_px - view.cy) * view.inverse_fy, 1.0)
+
+
+@wp.func
+def to_mesh_point(body: Body, p_world: wp.vec3):
+    """World point to mesh frame."""
+    return (wp.transpose(body.R_world_mesh) @ (p_world - body.t_world_mesh)) / body.scale
+
+
+@wp.func
+def to_mesh_vector(body: Body, v_world: wp.vec3):
+    """World displacement to mesh frame."""
+    return (wp.transpose(body.R_world_mesh) @ v_world) / body.scale
+
+
+@wp.func
+def to_world_point(body: Body, p_mesh: wp.vec3):
+    """Mesh point to world frame."""
+    return body.R_world_mesh @ (p_mesh * body.scale) + body.t_world_mesh

@@ -1,0 +1,115 @@
+"""Plan: everything a data set's bytes depend on. Its file is the first one in the folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from generator.core.errors import StorageError
+from generator.core.serial import canonical_json, from_plain, to_plain
+from generator.runner.files import write_durably
+
+FORMAT_VERSION = 1
+"""Version of the folder layout, the shard records and the manifest."""
+
+PLAN_NAME = "plan.json"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The identity of a data set: equal plans give equal bytes.
+
+    Attributes:
+        config: The resolved configuration as plain JSON values.
+        n: Number of samples, >= 1.
+        shard_size: Samples per shard, >= 1; the last shard may hold fewer.
+        versions: ``{package: release}`` of everything that can change a byte.
+        assets: ``{asset id: sha256}``.
+    """
+
+    config: Any
+    name: str
+    seed: int
+    n: int
+    shard_size: int
+    versions: Mapping[str, str]
+    assets: Mapping[str, str]
+    format_version: int = FORMAT_VERSION
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be cut into shards."""
+        if self.n < 1 or self.shard_size < 1:
+            raise ValueError(f"n and shard_size must be >= 1, got {self.n} and {self.shard_size}")
+
+    @property
+    def shard_count(self) -> int:
+        """Number of shards."""
+        return -(-self.n // self.shard_size)
+
+    def samples_of(self, shard: int) -> range:
+        """Indices of the samples of a shard: ``[k * S, min(n, (k + 1) * S))``."""
+        first = shard * self.shard_size
+        return range(first, min(self.n, first + self.shard_size))
+
+
+def plan_bytes(plan: Plan) -> bytes:
+    """What ``plan.json`` holds: one line of canonical JSON."""
+    return (canonical_json(plan) + "\n").encode()
+
+
+def write_plan(plan: Plan, folder: Path, scratch: Path) -> None:
+    """Put ``plan.json`` into a data set's folder, whole or not at all.
+
+    ``scratch`` is a folder on the same file system for the unfinished file.
+    """
+    write_durably(folder / PLAN_NAME, plan_bytes(plan), scratch)
+
+
+def load_plan(folder: Path) -> Plan:
+    """The plan of a data set.
+
+    Raises:
+        StorageError: missing, or not a plan.
+    """
+    path = folder / PLAN_NAME
+    try:
+        return from_plain(Plan, json.loads(path.read_bytes()))
+    except FileNotFoundError:
+        raise StorageError(f"{path}: missing; {folder} is not a gen-data data set") from None
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise StorageError(
+            f"{path}: not a plan of this version of gen-data ({error}); choose another folder"
+        ) from None
+
+
+def compare(old: Plan, new: Plan) -> list[str]:
+    """What differs, one line per field: ``camera.fov_deg: was 50, now 60``; empty when equal.
+
+    Fields of the configuration are named as in the YAML file, all others by their place in Plan.
+    """
+    was, now = to_plain(old), to_plain(new)
+    lines = list(_differences("", was.pop("config"), now.pop("config")))
+    return lines + list(_differences("", was, now))
+
+
+def _differences(place: str, was: Any, now: Any) -> Iterator[str]:
+    if isinstance(was, dict) and isinstance(now, dict):
+        for key in sorted({*was, *now}):
+            inner = f"{place}.{key}" if place else str(key)
+            yield from _differences(inner, was.get(key, _ABSENT), now.get(key, _ABSENT))
+    elif isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
+        for i, (left, right) in enumerate(zip(was, now, strict=True)):
+            yield from _differences(f"{place}[{i}]", left, right)
+    elif canonical_json(was) != canonical_json(now):
+        yield f"{place}: was {_shown(was)}, now {_shown(now)}"
+
+
+_ABSENT = "(absent)"
+
+
+def _shown(value: Any, most: int = 120) -> str:
+    text = value if value is _ABSENT else canonical_json(value)
+    return text if len(text) <= most else text[: most - 3] + "..."

@@ -1,0 +1,147 @@
+"""Making one shard: samples, images, labels, provenance, commit."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from generator.core.capture import Capture, Reading
+from generator.core.interfaces import DatasetInfo, Exporter
+from generator.core.sample import Sample
+from generator.core.serial import canonical_json
+from generator.runner.plan import Plan
+from generator.runner.record import ShardRecord, describe_shard
+from generator.runner.store import LocalStore
+
+SCENES_NAME = "scenes.jsonl"
+"""One line per sample: where it came from, and its final scene."""
+
+MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
+
+
+class PipelineLike(Protocol):
+    """What the runner needs of a pipeline.
+
+    ``info`` and ``exporters`` can be read without entering it; ``sample`` is called inside a
+    ``with`` block only.
+    """
+
+    @property
+    def info(self) -> DatasetInfo:
+        """The data set as its exporters see it."""
+        ...
+
+    @property
+    def exporters(self) -> Mapping[str, Exporter]:
+        """Exporters by name; an exporter's results go to the folder of that name."""
+        ...
+
+    def sample(self, index: int) -> Sample:
+        """Sample number ``index``: a pure function of the plan and the index."""
+        ...
+
+
+class EnteredPipeline(PipelineLike, Protocol):
+    """A pipeline that is also a context manager."""
+
+    def __enter__(self) -> PipelineLike:
+        """Start the engines."""
+        ...
+
+    def __exit__(self, *exception: Any) -> bool | None:
+        """Stop them."""
+        ...
+
+
+def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
+    """Encode a sample's images to where exporters expect them."""
+    from exporters.images import write_media  # noqa: PLC0415  (imports OpenCV: workers only)
+
+    write_media(info, sample, shard_dir)
+
+
+@dataclass(frozen=True)
+class Job:
+    """Everything that making a shard takes, except its number; picklable.
+
+    Attributes:
+        make_pipeline: Makes the same pipeline in any process.
+        write_media: Writes the images of one sample.
+    """
+
+    plan: Plan
+    store: LocalStore
+    make_pipeline: Callable[[], EnteredPipeline]
+    write_media: MediaWriter = write_images
+
+
+def make_shard(
+    job: Job, pipeline: PipelineLike, shard: int, on_sample: Callable[[Sample], None]
+) -> ShardRecord:
+    """Make and commit one shard.
+
+    A sample's images are written and dropped as soon as it is made; exporters then see the whole
+    shard as a list of samples whose readings have cameras and no pixels. Truth masks are tight
+    crops, so memory stays within one sample's images and one shard's labels.
+
+    Raises:
+        GenDataError: a sample cannot be made, or its files cannot be written.
+    """
+    indices = job.plan.samples_of(shard)
+    with job.store.errors():
+        folder = job.store.scratch_dir()
+    try:
+        samples = [_written(job, pipeline, index, folder, on_sample) for index in indices]
+        with job.store.errors():
+            for name in sorted(pipeline.exporters):
+                pipeline.exporters[name].write_shard(pipeline.info, samples, folder)
+            record = describe_shard(shard, indices, samples, folder)
+            job.store.commit(folder, record)
+    finally:
+        # After a failure, give the space back; after a commit there is nothing left here.
+        shutil.rmtree(folder, ignore_errors=True)
+    return record
+
+
+def _written(
+    job: Job,
+    pipeline: PipelineLike,
+    index: int,
+    folder: Path,
+    on_sample: Callable[[Sample], None],
+) -> Sample:
+    """One sample without its pixels, after they and its scene are in files."""
+    sample = pipeline.sample(index)
+    with job.store.errors():
+        job.write_media(pipeline.info, sample, folder)
+        with (folder / SCENES_NAME).open("a", encoding="utf-8") as scenes:
+            scenes.write(scene_line(sample) + "\n")
+    on_sample(sample)
+    return without_pixels(sample)
+
+
+def scene_line(sample: Sample) -> str:
+    """The provenance of a sample: rendering this scene again gives its images."""
+    return canonical_json(
+        {
+            "index": sample.index,
+            "scene_index": sample.scene_index,
+            "view_index": sample.view_index,
+            "split": sample.split,
+            "attempts": sample.attempts,
+            "scene": sample.scene,
+        }
+    )
+
+
+def without_pixels(sample: Sample) -> Sample:
+    """The sample with its cameras and labels, and no image."""
+    readings = {
+        name: Reading(sensor=reading.sensor, camera=reading.camera, channels={})
+        for name, reading in sample.capture.readings.items()
+    }
+    return replace(sample, capture=Capture(readings))

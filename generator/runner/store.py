@@ -1,0 +1,307 @@
+"""LocalStore: how shards get into a folder, and what a folder says about itself.
+
+    plan.json               identity of the data set; written first
+    shards/000042/          files of one shard, renamed into place when all are on disk
+    shards/000042.json      its record; from here on the shard is committed
+    coco/ kitti/ ...        what exporters merged
+    SHA256SUMS              every file but run/ and itself, for ``sha256sum -c``
+    manifest.json           last: its presence says that the data set is finished
+    run/                    lock, log, unfinished and quarantined files; no part of the data set
+
+Nothing is inferred from what lies in a folder: a shard is what its record says, or it is made again.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+import socket
+from array import array
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from generator.core.errors import DeterminismError, StorageError
+from generator.runner.files import (
+    make_folder,
+    move_durably,
+    sha256_of_file,
+    storage_errors,
+    sync,
+    sync_tree,
+    tree_sizes,
+    write_durably,
+)
+from generator.runner.plan import PLAN_NAME, Plan, compare, load_plan, write_plan
+from generator.runner.record import ShardRecord, parse_record
+
+MANIFEST_NAME = "manifest.json"
+SUMS_NAME = "SHA256SUMS"
+LICENCES_NAME = "LICENSES-ASSETS.md"
+RUN_NAME = "run"
+SHARDS_NAME = "shards"
+SCRATCH_FOLDERS_MAX = 1_000_000
+
+
+class FolderState(Enum):
+    """What an output folder holds."""
+
+    NEW = "nothing yet"
+    STARTED = "an unfinished data set of this plan"
+    FINISHED = "a finished data set of this plan"
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What a look at all records found.
+
+    Attributes:
+        missing: Shards to make, ascending. A ``range`` while nothing is there, so that planning
+            costs no memory.
+        samples, bytes, rejections: Sums over the committed shards.
+    """
+
+    missing: Sequence[int]
+    samples: int = 0
+    bytes: int = 0
+    rejections: int = 0
+
+
+@dataclass(frozen=True)
+class LocalStore:
+    """A data set's folder on a local file system. Only data: every process may have one.
+
+    Attributes:
+        root: The folder.
+        resume_command: What a user types to go on after a storage fault; part of messages.
+    """
+
+    root: Path
+    resume_command: str = ""
+
+    @property
+    def run_dir(self) -> Path:
+        """Everything that is no part of the data set."""
+        return self.root / RUN_NAME
+
+    @property
+    def manifest_path(self) -> Path:
+        """The manifest of a finished data set."""
+        return self.root / MANIFEST_NAME
+
+    @property
+    def _shards_dir(self) -> Path:
+        return self.root / SHARDS_NAME
+
+    @property
+    def _scratch_root(self) -> Path:
+        return self.run_dir / "tmp"
+
+    def shard_dir(self, shard: int) -> Path:
+        """The folder of a committed shard."""
+        return self._shards_dir / f"{shard:06d}"
+
+    def record_path(self, shard: int) -> Path:
+        """The record of a committed shard."""
+        return self._shards_dir / f"{shard:06d}.json"
+
+    def errors(self) -> AbstractContextManager[None]:
+        """OSErrors of the block become StorageErrors that name the resume command."""
+        return storage_errors(self.root, self.resume_command)
+
+    def state(self, plan: Plan) -> FolderState:
+        """What the folder holds; changes nothing.
+
+        Raises:
+            StorageError: the folder belongs to something else, or to another plan.
+        """
+        if not self.root.exists():
+            return FolderState.NEW
+        if not self.root.is_dir():
+            raise StorageError(f"{self.root}: is not a folder; choose another one with --out")
+        names = {path.name for path in self.root.iterdir()}
+        if PLAN_NAME in names:
+            self._refuse_another(plan)
+            return FolderState.FINISHED if MANIFEST_NAME in names else FolderState.STARTED
+        if names - {RUN_NAME} or not _is_run_dir(self.run_dir):
+            raise StorageError(
+                f"{self.root}: not empty and not a gen-data data set; "
+                "nothing was changed. Choose another folder with --out, or empty this one."
+            )
+        return FolderState.NEW
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Own the folder; the lock dies with the process, however that dies.
+
+        Raises:
+            StorageError: another process has it; names host and pid.
+        """
+        with self.errors():
+            make_folder(self.run_dir)
+            descriptor = os.open(self.run_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            with self.errors():
+                self._lock(descriptor)
+            yield
+        finally:
+            os.close(descriptor)
+
+    def prepare(self, plan: Plan) -> None:
+        """Make the folder ready for shards: no remains of earlier runs, plan written.
+
+        A manifest that is there is withdrawn: call this only when there is something to do.
+        """
+        with self.errors():
+            self.clear_scratch()
+            make_folder(self._scratch_root)
+            if not (self.root / PLAN_NAME).exists():
+                write_plan(plan, self.root, self._scratch_root)
+            make_folder(self._shards_dir)
+            if self.manifest_path.exists():
+                self.manifest_path.unlink()
+                sync(self.root)
+
+    def clear_scratch(self) -> None:
+        """Remove unfinished files. The folder moves away first, so that no late writer finds it."""
+        if self._scratch_root.exists():
+            doomed = self.run_dir / "tmp-doomed"
+            shutil.rmtree(doomed, ignore_errors=True)
+            self._scratch_root.rename(doomed)
+            shutil.rmtree(doomed, ignore_errors=True)
+
+    def scratch_dir(self) -> Path:
+        """A new empty folder for unfinished files, on the data set's own file system."""
+        for number in range(SCRATCH_FOLDERS_MAX):
+            folder = self._scratch_root / f"{os.getpid()}-{number}"
+            try:
+                folder.mkdir()
+            except FileExistsError:
+                continue
+            return folder
+        raise StorageError(f"{self._scratch_root}: {SCRATCH_FOLDERS_MAX} unfinished folders")
+
+    def commit(self, folder: Path, record: ShardRecord) -> None:
+        """Publish a finished shard: files, then folder, then record, each synced before the next.
+
+        Publishing the same bytes twice is no error and changes nothing.
+
+        Raises:
+            DeterminismError: the shard was committed before, with other bytes.
+        """
+        committed = self.record(record.shard)
+        if committed is not None:
+            self._expect_equal(committed, record, folder)
+            return
+        sync_tree(folder)
+        # A folder without a record is what a kill between the two steps below leaves.
+        self.quarantine(record.shard)
+        move_durably(folder, self.shard_dir(record.shard))
+        write_durably(self.record_path(record.shard), record.to_bytes(), self._scratch_root)
+
+    def record(self, shard: int) -> ShardRecord | None:
+        """The record of a shard, or None if it is missing or damaged."""
+        try:
+            data = self.record_path(shard).read_bytes()
+        except FileNotFoundError:
+            return None
+        return parse_record(data)
+
+    def scan(self, plan: Plan, full: bool = False) -> Scan:
+        """Check every record and the sizes of its files, or their digests when ``full``.
+
+        What is damaged goes to ``run/quarantine`` and counts as missing.
+        """
+        with self.errors():
+            if next(self._shards_dir.iterdir(), None) is None:
+                return Scan(missing=range(plan.shard_count))
+            missing = array("q")
+            samples, size, rejections = 0, 0, 0
+            for shard in range(plan.shard_count):
+                record = self._intact(plan, shard, full)
+                if record is None:
+                    self.quarantine(shard)
+                    missing.append(shard)
+                else:
+                    samples += record.end - record.first
+                    size += record.bytes
+                    rejections += record.rejections
+            return Scan(missing, samples, size, rejections)
+
+    def quarantine(self, shard: int) -> None:
+        """Move a shard's folder and record out of the data set, where there are any."""
+        # The record goes first: without it the folder is no shard any more.
+        for path in (self.record_path(shard), self.shard_dir(shard)):
+            if path.exists():
+                self._quarantine(path)
+
+    def _quarantine(self, path: Path) -> Path:
+        folder = self.run_dir / "quarantine"
+        make_folder(folder)
+        taken = {entry.name for entry in folder.iterdir()}
+        number = next(i for i in range(len(taken) + 1) if f"{i}-{path.name}" not in taken)
+        kept = folder / f"{number}-{path.name}"
+        move_durably(path, kept)
+        return kept
+
+    def _intact(self, plan: Plan, shard: int, full: bool) -> ShardRecord | None:
+        record = self.record(shard)
+        if record is None:
+            return None
+        folder, indices = self.shard_dir(shard), plan.samples_of(shard)
+        if (record.shard, record.first, record.end) != (shard, indices.start, indices.stop):
+            return None
+        if tree_sizes(folder) != {file.path: file.bytes for file in record.files}:
+            return None
+        if full and any(sha256_of_file(folder / f.path) != f.sha256 for f in record.files):
+            return None
+        return record
+
+    def _expect_equal(self, committed: ShardRecord, again: ShardRecord, folder: Path) -> None:
+        if committed == again:
+            shutil.rmtree(folder)
+            return
+        kept = self._quarantine(folder)
+        first = {file.path: file.sha256 for file in committed.files}
+        second = {file.path: file.sha256 for file in again.files}
+        paths = sorted(p for p in {*first, *second} if first.get(p) != second.get(p))
+        raise DeterminismError(
+            f"shard {committed.shard} came out differently the second time: "
+            f"{', '.join(paths[:3]) or 'its record'}{' ...' if len(paths) > 3 else ''}.\n"
+            f"  Compare {self.shard_dir(committed.shard)} with {kept}"
+        )
+
+    def _refuse_another(self, plan: Plan) -> None:
+        differences = compare(load_plan(self.root), plan)
+        if differences:
+            listed = "\n".join(f"  {line}" for line in differences[:20])
+            more = f"\n  and {len(differences) - 20} more" if len(differences) > 20 else ""
+            raise StorageError(
+                f"{self.root}: holds a data set of another plan; nothing was changed:\n"
+                f"{listed}{more}\n"
+                "  Choose another folder with --out, or go on with the old configuration."
+            )
+
+    def _lock(self, descriptor: int) -> None:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            owner = os.read(descriptor, 4096).decode(errors="replace").strip() or "(starting)"
+            raise StorageError(
+                f"{self.root}: another run is writing here: {owner}. "
+                "Wait for it, stop it, or choose another folder with --out."
+            ) from None
+        os.ftruncate(descriptor, 0)
+        owner = json.dumps({"host": socket.gethostname(), "pid": os.getpid()})
+        os.write(descriptor, f"{owner}\n".encode())
+
+
+def _is_run_dir(folder: Path) -> bool:
+    """Whether a folder is absent, or one that a run killed before its plan was written left."""
+    if not folder.exists():
+        return True
+    return folder.is_dir() and {p.name for p in folder.iterdir()} <= {"lock", "tmp", "tmp-doomed"}

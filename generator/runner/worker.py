@@ -1,0 +1,136 @@
+"""A worker process: starts its engines once, makes shards until there are none.
+
+The module is light, so that a new process can tie its life to its parent's before it imports
+anything slow.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import os
+import pickle
+import resource
+import signal
+import sys
+import traceback
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from generator.core.errors import GenDataError, SampleError
+from generator.runner.events import Failed, Ready, SampleDone, ShardDone
+
+if TYPE_CHECKING:
+    from generator.core.sample import Sample
+    from generator.runner.shard import Job, PipelineLike
+
+PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
+
+ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "NUMEXPR_NUM_THREADS": "1",
+    "VECLIB_MAXIMUM_THREADS": "1",
+    "PYTHONHASHSEED": "0",
+}
+"""Must be set before the process starts. Sums in BLAS and OpenMP depend on the number of threads,
+and many workers with many threads each only disturb one another."""
+
+
+def worker_main(
+    number: int, connection: Connection, parent_pid: int, payload: bytes, log: Path
+) -> None:
+    """Entry of the process. ``payload`` is a pickled Job; None on the connection ends it."""
+    _die_with(parent_pid)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    _redirect_output(log)
+    try:
+        _work(number, connection, pickle.loads(payload))
+    except (EOFError, BrokenPipeError):
+        # The supervisor is gone, and with it whoever would read a report.
+        sys.exit(1)
+    except Exception as error:
+        traceback.print_exc()
+        with suppress(BrokenPipeError):
+            connection.send(Failed(number, sendable(error)))
+        sys.exit(1)
+
+
+def sendable(error: Exception) -> GenDataError:
+    """The error as one that survives the way to another process and has a message for users."""
+    if not isinstance(error, GenDataError):
+        return unexpected(error)
+    try:
+        same = type(pickle.loads(pickle.dumps(error))) is type(error)
+    except Exception as refusal:
+        error.__notes__ = [str(refusal)]
+        same = False
+    if same:
+        return error
+    known = next(kind for kind in type(error).__mro__ if kind.__module__ == GenDataError.__module__)
+    plain: GenDataError = known(str(error))
+    return plain
+
+
+def unexpected(error: Exception) -> SampleError:
+    """A SampleError that carries the traceback of an error nobody foresaw."""
+    trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+    place = "\n".join(f"  {line}" for line in trace.rstrip().splitlines()[-12:])
+    return SampleError(f"{type(error).__name__}: {error}\n{place}")
+
+
+def _work(number: int, connection: Connection, job: Job) -> None:
+    from generator.runner.shard import make_shard  # noqa: PLC0415  (slow: numpy)
+
+    with job.make_pipeline() as pipeline:
+        connection.send(Ready(number))
+        for _ in range(job.plan.shard_count * 2):
+            shard = connection.recv()
+            if shard is None:
+                return
+            _make(number, connection, job, pipeline, shard)
+
+
+def _make(
+    number: int, connection: Connection, job: Job, pipeline: PipelineLike, shard: int
+) -> None:
+    def report(sample: Sample) -> None:
+        connection.send(SampleDone(number, shard, sample.index, dict(sample.timings_s)))
+
+    record = make_shard(job, pipeline, shard, report)
+    samples = record.end - record.first
+    connection.send(
+        ShardDone(number, shard, samples, record.bytes, record.rejections, resident_bytes())
+    )
+
+
+def resident_bytes() -> int:
+    """Memory that this process occupies now; 0 where Linux's procfs is missing."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except OSError:
+        return 0
+    return pages * resource.getpagesize()
+
+
+def _die_with(parent_pid: int) -> None:
+    """Have the kernel kill this process when its parent ends, however that ends."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent_pid:
+        # The parent ended before the kernel was asked.
+        os._exit(1)
+
+
+def _redirect_output(log: Path) -> None:
+    """Send what libraries print, and the stack of a crash, to a file of the run folder."""
+    descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
+    os.dup2(descriptor, 1)
+    os.dup2(descriptor, 2)
+    os.close(descriptor)
+    faulthandler.enable()
