@@ -34,8 +34,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TextIO
 
-from pydantic import Field
-
 from exporters.images import link_or_copy
 from exporters.rle import encoded
 from generator.config.strict import Strict
@@ -55,8 +53,6 @@ class Coco(Strict):
     """COCO instances, one JSON file per split; images of all sensors with the rgb channel."""
 
     type: Literal["coco"] = "coco"
-    name: str = Field("coco", pattern=r"^[A-Za-z0-9_-]+$")
-    """Folder of the data set that this exporter fills."""
     segmentation: Literal["rle", "none"] = "rle"
     """Visible masks, run-length encoded; or boxes only."""
     amodal: bool = True
@@ -65,8 +61,7 @@ class Coco(Strict):
     @property
     def needs(self) -> frozenset[str]:
         """Annotators whose fields it cannot do without."""
-        wanted = {"instance_masks": self.segmentation == "rle", "boxes2d": self.amodal}
-        return frozenset(name for name, asked in wanted.items() if asked)
+        return frozenset({"instance_masks", "boxes2d"} if self.amodal else {"instance_masks"})
 
     def check(self, info: DatasetInfo) -> None:
         """Refuse a data set that this format cannot hold.
@@ -76,7 +71,7 @@ class Coco(Strict):
         """
         if not _sensors(info):
             raise ConfigError(
-                f"exporter '{self.name}': no sensor of {', '.join(info.sensors)} writes the rgb "
+                f"exporter '{self.type}': no sensor of {', '.join(info.sensors)} writes the rgb "
                 "channel; add an rgb_camera"
             )
 
@@ -99,7 +94,7 @@ class Coco(Strict):
                     for thing in truth.objects
                     if thing.box is not None
                 )
-        folder = shard_dir / self.name
+        folder = shard_dir / self.type
         folder.mkdir(parents=True, exist_ok=True)
         for stem, lines in rows.items():
             text = "".join(canonical_json(line) + "\n" for line in lines)
@@ -107,7 +102,7 @@ class Coco(Strict):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the lines of all shards, given in index order, and link the images."""
-        fragments = [shard_dir / self.name for shard_dir in shard_dirs]
+        fragments = [shard_dir / self.type for shard_dir in shard_dirs]
         splits = {p.name.split(".")[0] for f in fragments for p in f.glob("*.images.jsonl")}
         (dataset_dir / "annotations").mkdir(parents=True, exist_ok=True)
         for split in sorted(splits):
@@ -116,7 +111,7 @@ class Coco(Strict):
                 _write_dataset(file, _header(info), fragments, split)
         for shard_dir in shard_dirs:
             for split in sorted(splits):
-                for line in _lines(shard_dir / self.name / f"{split}.images.jsonl"):
+                for line in _lines(shard_dir / self.type / f"{split}.images.jsonl"):
                     _link_images(json.loads(line), split, shard_dir, dataset_dir)
 
     def _annotation(
@@ -216,9 +211,7 @@ def _write_dataset(
     file.write("}\n")
 
 
-def _link_images(
-    image: Mapping[str, Any], split: str, shard_dir: Path, dataset_dir: Path
-) -> None:
+def _link_images(image: Mapping[str, Any], split: str, shard_dir: Path, dataset_dir: Path) -> None:
     targets = {Channel.RGB.value: f"{split}/{image['file_name']}", **image["files"]}
     for channel, target in targets.items():
         source = media_path(shard_dir, image["sensor"], Channel(channel), image["sample"])

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError, StorageError
+from generator.core.errors import ConfigError, SampleError, StorageError
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.sample import Sample
 
@@ -57,6 +57,7 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
 
     Raises:
         ConfigError: if a channel is no image.
+        SampleError: if a depth is negative or NaN.
     """
     for sensor in info.sensors:
         reading = sample.capture.readings[sensor]
@@ -70,11 +71,13 @@ def png(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:
     """The PNG file of one channel, as the table at the top of this module says.
 
     Args:
+        channel: What the image shows.
         image: As listed at ``Channel``.
         depth_scale_m: Metres per unit of depth and range images.
 
     Raises:
         ConfigError: if the channel is no image.
+        SampleError: if a depth is negative or NaN.
     """
     if channel not in FILTERS:
         known = ", ".join(c.value for c in FILTERS)
@@ -83,9 +86,15 @@ def png(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:
 
 
 def depth_units(depth_m: NDArray[np.floating], depth_scale_m: float) -> UInt16:
-    """Depth in units of ``depth_scale_m``, half to even; 0 = nothing or out of range."""
+    """Depth in units of ``depth_scale_m``, half to even; 0 = nothing or out of range.
+
+    Raises:
+        SampleError: if a depth is negative or NaN.
+    """
+    if not (depth_m >= 0).all():
+        raise SampleError("a depth image holds a negative number or NaN; 'nothing' must be inf")
     units = np.rint(depth_m.astype(np.float64) / depth_scale_m)
-    units[~(units <= DEPTH_UNITS_MAX)] = 0
+    units[units > DEPTH_UNITS_MAX] = 0
     return units.astype(np.uint16)
 
 

@@ -15,9 +15,6 @@ from generator.core.interfaces import Annotator
 from generator.core.sample import ImageTruth, ObjectTruth
 from generator.core.scene import Scene
 
-BASE_CHANNELS = frozenset({Channel.INSTANCE})
-"""What ``image_truth`` itself needs to have been rendered."""
-
 
 class Thresholds(Strict):
     """Which instances are annotated in an image; the others stay in the id images.
@@ -38,12 +35,14 @@ class Thresholds(Strict):
 def image_truth(
     scene: Scene, reading: Reading, annotators: Sequence[Annotator], thresholds: Thresholds
 ) -> ImageTruth:
-    """Annotations of one reading, in order of instance id.
+    """Annotations of one reading, in order of instance id; none where nothing annotates.
 
     Raises:
         SampleError: if the labels of an instance contradict each other or the images.
         ConfigError: if a threshold needs an annotation that is not made.
     """
+    if not annotators:
+        return ImageTruth(reading.camera, ())
     seen = extents(reading.channels[Channel.INSTANCE])
     instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     objects = []

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from scene_templates.builder import build
+
 from generator.annotations.truth import image_truth
 from generator.assemble.spec import Spec
 from generator.assemble.tables import TABLES
@@ -18,7 +20,6 @@ from generator.physics import open_engine
 from generator.pipeline import Pipeline
 from generator.pipeline.pipeline import Recipe
 from generator.renderers import open_renderer
-from scene_templates.builder import build
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ class PipelineFactory:
         return Pipeline(
             recipe,
             library,
-            open_physics=partial(open_engine, library, spec.physics),
-            renderer=open_renderer(library, spec.render),
+            open_physics=partial(open_engine, library, spec.head.physics),
+            renderer=open_renderer(library, spec.head.render.device, spec.head.render.settings),
         )
 
 
@@ -65,26 +66,26 @@ def recipe_of(
     annotators = _annotators(spec)
     info = DatasetInfo(
         name=spec.name,
-        seed=spec.seed,
+        seed=spec.head.seed,
         n=n,
-        views_per_scene=spec.views_per_scene,
+        views_per_scene=spec.head.views_per_scene,
         categories=categories_of(nominal, library),
         sensors=tuple(sorted(sensor.name for sensor in spec.sensors)),
         media={sensor.name: tuple(sensor.media) for sensor in spec.sensors},
-        depth_scale_m=spec.depth_scale_m,
+        depth_scale_m=spec.head.depth_scale_m,
     )
     exporters = _exporters(spec, info)
     needed = frozenset().union(*(a.channels for a in annotators), extra_channels)
     return Recipe(
-        seed=spec.seed,
-        views_per_scene=spec.views_per_scene,
+        seed=spec.head.seed,
+        views_per_scene=spec.head.views_per_scene,
         nominal=nominal,
         randomizers=spec.randomizers,
         sensors=spec.sensors,
         channels=needed,
-        image_truth=partial(image_truth, annotators=annotators, thresholds=spec.labels),
-        split_shares=spec.splits,
-        layout_attempts_max=spec.physics.layout_attempts_max,
+        image_truth=partial(image_truth, annotators=annotators, thresholds=spec.head.labels),
+        split_shares=spec.split_shares,
+        layout_attempts_max=spec.head.physics.layout_attempts_max,
         info=info,
         exporters=exporters,
     )
@@ -92,7 +93,7 @@ def recipe_of(
 
 def nominal_scene(spec: Spec, assets: AssetIndex) -> Scene:
     """The template's scene with every sensor mounted."""
-    scene = build(spec.template, spec.elements, assets)
+    scene = build(spec.head.template or spec.name, spec.elements, assets)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
     return scene
@@ -127,5 +128,3 @@ def _exporters(spec: Spec, info: DatasetInfo) -> dict[str, Exporter]:
         exporter.check(info)
         exporters[name] = exporter
     return exporters
-
-

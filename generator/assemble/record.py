@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from generator import __version__
 from generator.assemble.recipe import PipelineFactory, nominal_scene
-from generator.assets.library import Library, open_library
+from generator.assets.library import open_library
 from generator.core.geometry import Asset
 from generator.core.scene import Scene
 from generator.runner.plan import Plan
@@ -27,9 +27,9 @@ def plan_of(factory: PipelineFactory) -> Plan:
     return Plan(
         config=spec.resolved,
         name=spec.name,
-        seed=spec.seed,
+        seed=spec.head.seed,
         n=factory.n,
-        shard_size=spec.shard_size,
+        shard_size=spec.head.shard_size,
         versions={"gen-data": __version__, **{name: _release(name) for name in BYTES_DEPEND_ON}},
         assets={asset.asset_id: asset.sha256 for asset in possible_assets(factory)},
     )
@@ -54,10 +54,10 @@ def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
     """Every object and robot that a sample may contain, sorted by id."""
     library = open_library(factory.spec.asset_folders)
     scene = nominal_scene(factory.spec, library)
-    return tuple(library.get(asset_id) for asset_id in sorted(_ids(scene, library)))
+    return tuple(library.get(asset_id) for asset_id in sorted(_ids(scene)))
 
 
-def _ids(scene: Scene, library: Library) -> set[str]:
+def _ids(scene: Scene) -> set[str]:
     placed = {instance.asset for instance in scene.instances if instance.asset}
     robots = {articulation.asset for articulation in scene.articulations}
     links = {f"{a.name}/" for a in scene.articulations}

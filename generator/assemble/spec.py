@@ -1,34 +1,237 @@
-"""Spec: a whole configuration, read, merged with its template, and validated.
-
-A configuration names a template and overrides its elements; the resolved document has both, so it
-says everything about a data set and is what ``plan.json`` keeps.
-"""
+"""Spec: a whole configuration, read, merged with its template, and validated."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import Field, model_validator
 
 from generator.annotations.truth import Thresholds
+from generator.assemble.documents import config_document, resolved_document
 from generator.assemble.tables import TABLES
-from generator.config.document import (
-    MappingNode,
-    Node,
-    ScalarNode,
-    SequenceNode,
-    load,
-    merge,
-    parse,
-    with_override,
-)
+from generator.config.document import Node, parse
 from generator.config.problems import Problems
 from generator.config.strict import Strict
 from generator.config.validation import validate
 from generator.core.errors import ConfigError, did_you_mean
 from generator.physics import PhysicsConfig
-from generator.renderers import RenderSettings
+from generator.renderers.settings import RenderSettings
+
+SHARD_SIZE = 20
+"""Small enough that few samples are redone after a crash and that all workers stay busy."""
+
+
+class Render(RenderSettings):
+    """How images are made, and on what."""
+
+    device: str = Field(
+        "auto",
+        pattern=r"^(auto|cpu|cuda(:[0-9]+)?)$",
+        description="auto, cpu or cuda:N; auto takes a CUDA GPU where there is one.",
+    )
+
+    @property
+    def settings(self) -> RenderSettings:
+        """What the renderer itself needs to know."""
+        return RenderSettings(**self.model_dump(exclude={"device"}))
+
+
+class Splits(Strict):
+    """Shares of the scenes; all views of a scene are in one split."""
+
+    train: float = Field(0.8, ge=0, le=1)
+    val: float = Field(0.1, ge=0, le=1)
+    test: float = Field(0.1, ge=0, le=1)
+
+    @model_validator(mode="after")
+    def _sums_to_one(self) -> Splits:
+        total = self.train + self.val + self.test
+        if abs(total - 1.0) > 1e-9:
+            raise ValueError(f"shares must sum to 1, got {total:g}")
+        return self
+
+
+class AssetFolders(Strict):
+    """Assets besides those that come with the dependencies."""
+
+    folders: tuple[str, ...] = Field((), description="Folders of OBJ, GLB, PLY, STL or URDF files.")
+
+
+class Head(Strict):
+    """A configuration without its plug-ins."""
+
+    seed: int = Field(0, ge=0, lt=2**63, description="Seed of the data set; 0 is a seed.")
+    views_per_scene: int = Field(
+        1, ge=1, le=10_000, description="Views that share one settled scene."
+    )
+    shard_size: int = Field(
+        SHARD_SIZE, ge=1, le=100_000, description="Samples that are committed together."
+    )
+    depth_scale_m: float = Field(
+        0.0001, gt=0, le=1, description="Metres per unit of 16-bit depth images."
+    )
+    template: str = Field("", description="Name of a scene template.")
+    render: Render = Render()
+    physics: PhysicsConfig = PhysicsConfig()
+    labels: Thresholds = Thresholds()
+    splits: Splits = Splits()
+    assets: AssetFolders = AssetFolders()
+
+
+PLUGIN_LISTS = {
+    "elements": "element",
+    "randomizers": "randomizer",
+    "sensors": "sensor",
+    "exporters": "exporter",
+}
+"""Lists of a configuration and the kind of plug-in they hold."""
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A validated configuration; picklable.
+
+    Attributes:
+        name: Of the configuration; names the default output folder.
+        resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
+            the same Spec again.
+        elements, randomizers, sensors, exporters: Plug-ins, in order.
+        annotations: Names of annotators.
+    """
+
+    name: str
+    resolved: Mapping[str, Any]
+    head: Head
+    elements: tuple[Any, ...]
+    randomizers: tuple[Any, ...]
+    sensors: tuple[Any, ...]
+    annotations: tuple[str, ...]
+    exporters: tuple[Any, ...]
+
+    @property
+    def asset_folders(self) -> tuple[Path, ...]:
+        """Where the user keeps assets."""
+        return tuple(Path(folder).expanduser() for folder in self.head.assets.folders)
+
+    @property
+    def split_shares(self) -> dict[str, float]:
+        """Share of each split that has one, in order."""
+        splits = self.head.splits
+        shares = {"train": splits.train, "val": splits.val, "test": splits.test}
+        return {name: share for name, share in shares.items() if share > 0}
+
+
+def load_spec(
+    source: str,
+    *,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    without: Sequence[str] = (),
+) -> Spec:
+    """The configuration of that path or shipped name.
+
+    Raises:
+        ConfigError: telling everything that is wrong, each with its place.
+    """
+    if seed is not None and seed < 0:
+        raise ConfigError(f"--seed: {seed} is negative; expected 0 or more")
+    document = resolved_document(
+        config_document(source), seed=seed, overrides=overrides, without=without
+    )
+    return _spec(document, Path(source).stem)
+
+
+def spec_of_source(
+    source: str,
+    *,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    without: Sequence[str] = (),
+) -> Spec:
+    """Like ``load_spec``; a data set's folder stands for the configuration it was made with."""
+    plan = Path(source) / "plan.json"
+    if not plan.is_file():
+        return load_spec(source, seed=seed, overrides=overrides, without=without)
+    try:
+        kept = json.loads(plan.read_bytes())
+        text, name = json.dumps(kept["config"]), str(kept["name"])
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
+    document = parse(text, str(plan))
+    return _spec(resolved_document(document, seed=seed, overrides=overrides, without=without), name)
+
+
+def _spec(document: Node, name: str) -> Spec:
+    assert isinstance(document.content, Mapping)
+    problems = Problems()
+    apart = {*PLUGIN_LISTS, "annotations"}
+    head_node = Node(
+        document.position,
+        {key: node for key, node in document.content.items() if key not in apart},
+        document.key_positions,
+    )
+    head = validate(head_node, Head, problems)
+    plugins = {
+        key: _plugins(document.content[key], key, kind, problems)
+        for key, kind in PLUGIN_LISTS.items()
+    }
+    annotations = _annotations(document.content["annotations"], problems)
+    if not plugins["sensors"] and not len(problems):
+        problems.add(document.position, "sensors", "at least one sensor is needed")
+    problems.raise_if_any()
+    assert head is not None
+    return Spec(name, document.plain(), head, annotations=annotations, **plugins)
+
+
+def _plugins(listed: Node, key: str, kind: str, problems: Problems) -> tuple[Any, ...]:
+    """Each item read as the plug-in that its ``type`` names; names must be unique."""
+    if not isinstance(listed.content, tuple):
+        problems.add(listed.position, key, f"expected a list of {kind}s")
+        return ()
+    made: list[Any] = []
+    for number, node in enumerate(listed.content):
+        plugin = _plugin(node, f"{key}[{number}]", kind, problems)
+        if plugin is None:
+            continue
+        name = getattr(plugin, "name", "")
+        if name and name in {getattr(other, "name", "") for other in made}:
+            where = node.get("name") or node
+            fact = f"the name '{name}' is taken; expected a name of its own"
+            problems.add(where.position, f"{key}[{number}].name", fact)
+        made.append(plugin)
+    return tuple(made)
+
+
+def _plugin(node: Node, field: str, kind: str, problems: Problems) -> Any:
+    table = TABLES[kind]
+    kind_node = node.get("type")
+    if kind_node is None or not isinstance(kind_node.content, str):
+        where = node.position if kind_node is None else kind_node.position
+        fact = f"expected a {kind}: one of {', '.join(table)}"
+        problems.add(where, f"{field}.type", fact)
+        return None
+    try:
+        plugin = table.load(kind_node.content)
+    except ConfigError as unknown:
+        problems.add(kind_node.position, f"{field}.type", str(unknown))
+        return None
+    return validate(node, plugin, problems, field)
+
+
+def _annotations(listed: Node, problems: Problems) -> tuple[str, ...]:
+    table = TABLES["annotation"]
+    items = listed.content if isinstance(listed.content, tuple) else (listed,)
+    names = []
+    for number, node in enumerate(items):
+        name = node.content
+        if not isinstance(name, str) or name not in table:
+            fact = f"unknown annotation {name!r}; expected one of {', '.join(table)}"
+            fact += did_you_mean(str(name), table)
+            problems.add(node.position, f"annotations[{number}]", fact)
+        elif name not in names:
+            names.append(name)
+    return tuple(names)

@@ -30,6 +30,10 @@ def find_plugin(name: str) -> tuple[str, type]:
     if len(hits) == 1:
         return hits[0], TABLES[hits[0]].load(short)
     if hits:
-        raise ConfigError(f"'{name}' is a name of several: " + ", ".join(f"{k}/{short}" for k in hits))
+        raise ConfigError(
+            f"'{name}' is a name of several: " + ", ".join(f"{k}/{short}" for k in hits)
+        )
     known = [n for t in TABLES.values() for n in t]
-    raise ConfigError(f"unknown plug-in '{name}'{did_you_mean(short, known)}; see gen-data describe")
+    raise ConfigError(
+        f"unknown plug-in '{name}'{did_you_mean(short, known)}; see gen-data describe"
+    )

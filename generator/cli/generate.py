@@ -21,21 +21,12 @@ from rich.table import Table
 
 from generator.assemble.recipe import PipelineFactory
 from generator.assemble.record import licences_text, plan_of
-from generator.assemble.spec import load_spec
+from generator.cli.options import Choice
 from generator.core.errors import ConfigError
 from generator.runner.run import RunProgress, Summary, run
 
 
-def generate(
-    config: str,
-    n: int,
-    *,
-    out: Path | None,
-    seed: int | None,
-    workers: int | None,
-    overrides: tuple[str, ...],
-    without: tuple[str, ...],
-) -> None:
+def generate(choice: Choice, n: int, *, out: Path | None, workers: int | None) -> None:
     """Make samples 0 to n - 1, or what is missing of them, and print a summary.
 
     Raises:
@@ -46,7 +37,7 @@ def generate(
     workers = _core_count() if workers is None else workers
     if workers < 0:
         raise ConfigError(f"--workers: {workers}; expected at least 1, or 0 to run in this process")
-    spec = load_spec(config, seed=seed, overrides=overrides, without=without)
+    spec = choice.spec()
     factory = PipelineFactory(spec, n)
     folder = out if out is not None else Path("out") / spec.name
     console = Console(stderr=True)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
 
+from generator.cli.options import Choice, configuration_options
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.sample import Sample
-
-SOURCE_HELP = "A configuration (a path or a shipped name), or the folder of a data set."
 
 
 @click.command()
@@ -20,9 +19,7 @@ SOURCE_HELP = "A configuration (a path or a shipped name), or the folder of a da
 @click.option("--first", type=int, default=0, show_default=True, help="Index of the first sample.")
 @click.option("--save", type=click.Path(path_type=Path), help="Write a .rrd file instead.")
 @click.option("--web", is_flag=True, help="Serve to a browser instead of the desktop viewer.")
-@click.option("--seed", type=int, help="Overrides the configuration's seed.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override one field.")
-@click.option("--without", multiple=True, metavar="NAME", help="Leave a randomizer out.")
+@configuration_options
 def preview(
     source: str,
     n: int,
@@ -39,10 +36,9 @@ def preview(
     samples are made again from its plan.
     """
     from generator.assemble.recipe import open_pipeline
-    from generator.assemble.spec import spec_of_source
     from generator.preview.recording import save_recording, show_samples
 
-    spec = spec_of_source(source, seed=seed, overrides=overrides, without=without)
+    spec = Choice(source, seed, overrides, without).spec()
     with open_pipeline(spec) as pipeline:
         samples = _samples(pipeline.sample, first, n)
         info = pipeline.info
@@ -74,9 +70,7 @@ def preview(
 @click.option("--tile-px", type=int, default=320, show_default=True, help="Width of a tile.")
 @click.option("--channels", default="rgb", show_default=True, help="Comma-separated channels.")
 @click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")
-@click.option("--seed", type=int, help="Overrides the configuration's seed.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override one field.")
-@click.option("--without", multiple=True, metavar="NAME", help="Leave a randomizer out.")
+@configuration_options
 def contact_sheet(
     source: str,
     n: int,
@@ -96,11 +90,10 @@ def contact_sheet(
     SOURCE is a configuration (a path or a shipped name), or the folder of a data set.
     """
     from generator.assemble.recipe import open_pipeline
-    from generator.assemble.spec import spec_of_source
     from generator.preview.sheet import arranged, tiles, write_sheet
 
     wanted = [_channel(name.strip()) for name in channels.split(",")]
-    spec = spec_of_source(source, seed=seed, overrides=overrides, without=without)
+    spec = Choice(source, seed, overrides, without).spec()
     with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
         samples = _samples(pipeline.sample, first, n, step)
         images = tiles(samples, wanted, labels=labels, width_px=tile_px)
@@ -108,7 +101,9 @@ def contact_sheet(
     click.echo(f"{out}: {len(images)} tiles")
 
 
-def _samples(sample_at, first: int, n: int, step: int = 1) -> Iterator[Sample]:  # type: ignore[no-untyped-def]
+def _samples(
+    sample_at: Callable[[int], Sample], first: int, n: int, step: int = 1
+) -> Iterator[Sample]:
     if n < 1 or first < 0 or step < 1:
         raise ConfigError("--n and --step must be at least 1, --first at least 0")
     for index in range(first, first + n * step, step):
@@ -118,5 +113,7 @@ def _samples(sample_at, first: int, n: int, step: int = 1) -> Iterator[Sample]: 
 def _channel(name: str) -> Channel:
     shown = [c.value for c in Channel if c is not Channel.AMODAL]
     if name not in shown:
-        raise ConfigError(f"--channels: unknown channel '{name}'; expected one of {', '.join(shown)}")
+        raise ConfigError(
+            f"--channels: unknown channel '{name}'; expected one of {', '.join(shown)}"
+        )
     return Channel(name)

@@ -12,6 +12,7 @@ from pathlib import Path
 import click
 
 from generator import __version__
+from generator.cli.options import Choice, configuration_options
 from generator.core.errors import ConfigError, GenDataError, Interrupted
 
 SINGLE_THREADED = (
@@ -70,11 +71,11 @@ class LateCommands(click.Group):
 @click.version_option(__version__, prog_name="gen-data")
 @click.option("--config", "-c", metavar="FILE", help="Configuration: a path, or a shipped name.")
 @click.option("--n", "-n", type=int, help="Number of samples.")
-@click.option("--out", "-o", type=click.Path(path_type=Path), help="Folder [default: out/<config>].")
-@click.option("--seed", type=int, help="Seed of the data set; overrides the configuration's.")
+@click.option(
+    "--out", "-o", type=click.Path(path_type=Path), help="Folder [default: out/<config>]."
+)
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override one field.")
-@click.option("--without", multiple=True, metavar="NAME", help="Leave a randomizer out.")
+@configuration_options
 @click.pass_context
 def cli(
     context: click.Context,
@@ -86,7 +87,7 @@ def cli(
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
-    """Generate a labelled synthetic data set.
+    r"""Generate a labelled synthetic data set.
 
     \b
     gen-data --config tabletop.yaml --n 1000
@@ -98,7 +99,8 @@ def cli(
     if context.invoked_subcommand is not None:
         if config is not None:
             raise ConfigError(
-                f"--config belongs after the command: gen-data {context.invoked_subcommand} {config}"
+                f"--config goes without a command; expected: "
+                f"gen-data {context.invoked_subcommand} {config}"
             )
         return
     if config is None:
@@ -108,7 +110,8 @@ def cli(
         raise ConfigError("--n is missing: how many samples?")
     from generator.cli.generate import generate
 
-    generate(config, n, out=out, seed=seed, workers=workers, overrides=overrides, without=without)
+    choice = Choice(config, seed, overrides, without)
+    generate(choice, n, out=out, workers=workers)
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import entry_points
 from typing import Any
 
@@ -54,5 +55,10 @@ class PluginTable:
         return getattr(importlib.import_module(module), attribute)
 
     def _all(self) -> dict[str, str]:
-        third_party = {e.name: e.value for e in entry_points(group=f"gen_data.{self.kind}")}
-        return {**third_party, **self.entries}
+        return {**_third_party(self.kind), **self.entries}
+
+
+@cache
+def _third_party(kind: str) -> dict[str, str]:
+    # Reading the metadata of every installed package takes milliseconds; it cannot change.
+    return {e.name: e.value for e in entry_points(group=f"gen_data.{kind}")}

@@ -16,6 +16,7 @@ from generator.core.serial import canonical_json
 from generator.runner.plan import Plan
 from generator.runner.record import ShardRecord, describe_shard
 from generator.runner.store import LocalStore
+from generator.runner.unforeseen import explaining
 
 SCENES_NAME = "scenes.jsonl"
 """One line per sample: where it came from, and its final scene."""
@@ -96,9 +97,10 @@ def make_shard(
         folder = job.store.scratch_dir()
     try:
         samples = [_written(job, pipeline, index, folder, on_sample) for index in indices]
-        with job.store.errors():
-            for name in sorted(pipeline.exporters):
+        for name in sorted(pipeline.exporters):
+            with explaining(f"shard {shard}, exporter {name}"), job.store.errors():
                 pipeline.exporters[name].write_shard(pipeline.info, samples, folder)
+        with job.store.errors():
             record = describe_shard(shard, indices, samples, folder)
             job.store.commit(folder, record)
     finally:
@@ -115,8 +117,10 @@ def _written(
     on_sample: Callable[[Sample], None],
 ) -> Sample:
     """One sample without its pixels, after they and its scene are in files."""
-    sample = pipeline.sample(index)
-    with job.store.errors():
+    explained = explaining(f"sample {index}", job.store.reproduce_command(index))
+    with explained:
+        sample = pipeline.sample(index)
+    with explained, job.store.errors():
         job.write_media(pipeline.info, sample, folder)
         with (folder / SCENES_NAME).open("a", encoding="utf-8") as scenes:
             scenes.write(scene_line(sample) + "\n")

@@ -16,6 +16,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shlex
 import shutil
 import socket
 from array import array
@@ -108,6 +109,10 @@ class LocalStore:
     def record_path(self, shard: int) -> Path:
         """The record of a committed shard."""
         return self._shards_dir / f"{shard:06d}.json"
+
+    def reproduce_command(self, index: int) -> str:
+        """What a user types to make one sample of this data set alone."""
+        return f"gen-data contact-sheet {shlex.quote(str(self.root))} --first {index} --n 1"
 
     def errors(self) -> AbstractContextManager[None]:
         """OSErrors of the block become StorageErrors that name the resume command."""

@@ -19,8 +19,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from generator.core.errors import GenDataError, SampleError
+from generator.core.errors import GenDataError
 from generator.runner.events import Failed, Ready, SampleDone, ShardDone
+from generator.runner.unforeseen import unforeseen
 
 if TYPE_CHECKING:
     from generator.core.sample import Sample
@@ -64,24 +65,23 @@ def worker_main(
 def sendable(error: Exception) -> GenDataError:
     """The error as one that survives the way to another process and has a message for users."""
     if not isinstance(error, GenDataError):
-        return unexpected(error)
+        return unforeseen(error, "a worker could not start")
     try:
-        same = type(pickle.loads(pickle.dumps(error))) is type(error)
-    except Exception as refusal:
-        error.__notes__ = [str(refusal)]
-        same = False
-    if same:
-        return error
-    known = next(kind for kind in type(error).__mro__ if kind.__module__ == GenDataError.__module__)
-    plain: GenDataError = known(str(error))
-    return plain
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        # Whatever a plug-in's error class does wrong, its kind and its text still count.
+        plain: GenDataError = _ancestor_of_message(type(error))(str(error))
+        return plain
+    return error
 
 
-def unexpected(error: Exception) -> SampleError:
-    """A SampleError that carries the traceback of an error nobody foresaw."""
-    trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
-    place = "\n".join(f"  {line}" for line in trace.rstrip().splitlines()[-12:])
-    return SampleError(f"{type(error).__name__}: {error}\n{place}")
+def _ancestor_of_message(kind: type[GenDataError]) -> type[GenDataError]:
+    """The nearest of our own error classes that is made of nothing but a message."""
+    return next(
+        base
+        for base in kind.__mro__
+        if base.__module__ == GenDataError.__module__ and base.__init__ is Exception.__init__
+    )
 
 
 def _work(number: int, connection: Connection, job: Job) -> None:
@@ -89,10 +89,7 @@ def _work(number: int, connection: Connection, job: Job) -> None:
 
     with job.make_pipeline() as pipeline:
         connection.send(Ready(number))
-        for _ in range(job.plan.shard_count * 2):
-            shard = connection.recv()
-            if shard is None:
-                return
+        while (shard := connection.recv()) is not None:
             _make(number, connection, job, pipeline, shard)
 
 

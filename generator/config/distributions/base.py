@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
-from generator.config.scalars import flow, number, shown
+from generator.config.scalars import abbreviated, number, shown
 from generator.core.errors import did_you_mean
 from generator.core.plugins import PluginTable
 
@@ -54,12 +54,16 @@ class Malformed(ValueError):
     Attributes:
         fact: What is wrong and what was expected.
         path: Keys and indices from the value of the field down to the fault.
+        at_key: The last key of the path is at fault, not its value.
     """
 
-    def __init__(self, fact: str, path: tuple[str | int, ...] = ()) -> None:
+    def __init__(
+        self, fact: str, path: tuple[str | int, ...] = (), *, at_key: bool = False
+    ) -> None:
         super().__init__(fact)
         self.fact = fact
         self.path = path
+        self.at_key = at_key
 
 
 @contextmanager
@@ -68,7 +72,7 @@ def inside(*path: str | int) -> Iterator[None]:
     try:
         yield
     except Malformed as error:
-        raise Malformed(error.fact, (*path, *error.path)) from None
+        raise Malformed(error.fact, (*path, *error.path), at_key=error.at_key) from None
 
 
 @dataclass(frozen=True)
@@ -150,8 +154,12 @@ def read(value: Any, kind: Kind[T]) -> Distribution[T]:
         return read(value.to_yaml(), kind)
     if isinstance(value, Mapping):
         return _read_mapping(value, kind)
-    if isinstance(value, str) and value in names_of(kind.name) and distribution(value).bare:
-        return distribution(value).from_yaml(None, kind)
+    if isinstance(value, str) and kind.name != "name":
+        known = names_of(kind.name)
+        if value in known and distribution(value).bare:
+            return distribution(value).from_yaml(None, kind)
+        if did_you_mean(value, known):
+            raise _unknown(value, kind)
     return distribution("constant").from_yaml(value, kind)
 
 
@@ -163,15 +171,24 @@ def _read_mapping(value: Mapping[str, Any], kind: Kind[T]) -> Distribution[T]:
             f"expected one of {', '.join(known)}"
         )
     ((name, argument),) = value.items()
+    if name not in known:
+        raise _unknown(name, kind, (name,))
+    with inside(name):
+        return distribution(name).from_yaml(argument, kind)
+
+
+def _unknown(name: str, kind: Kind[Any], path: tuple[str, ...] = ()) -> Malformed:
+    known = names_of(kind.name)
     if name in known:
-        with inside(name):
-            return distribution(name).from_yaml(argument, kind)
-    fact = "does not fit here" if name in DISTRIBUTIONS.entries else "unknown"
-    raise Malformed(
-        f"{'unknown distribution' if fact == 'unknown' else 'distribution'} '{name}'"
-        f"{'' if fact == 'unknown' else f' does not give {kind.expected}'}; "
-        f"expected one of {', '.join(known)}{did_you_mean(name, known)}",
-        (name,),
+        return Malformed(f"'{name}' needs an argument; write {{{name}: ...}}")
+    if name in DISTRIBUTIONS:
+        fact = f"distribution '{name}' does not give {kind.expected}"
+    else:
+        fact = f"unknown distribution '{abbreviated(name)}'"
+    return Malformed(
+        f"{fact}; expected one of {', '.join(known)}{did_you_mean(name, known)}",
+        path,
+        at_key=bool(path),
     )
 
 
@@ -185,11 +202,11 @@ def distribution(name: str) -> type[Distribution[Any]]:
 @cache
 def names_of(kind: str) -> tuple[str, ...]:
     """Names of the distributions over one kind of value, in the order of the table."""
-    ordered = (*DISTRIBUTIONS.entries, *(n for n in DISTRIBUTIONS if n not in DISTRIBUTIONS.entries))
+    ordered = (
+        *DISTRIBUTIONS.entries,
+        *(n for n in DISTRIBUTIONS if n not in DISTRIBUTIONS.entries),
+    )
     return tuple(name for name in ordered if kind in distribution(name).kinds)
-
-
-# --- reading arguments -----------------------------------------------------------------------
 
 
 def read_number(value: Any) -> float:
@@ -230,7 +247,9 @@ def read_vector(value: Any, what: str = "three numbers [x, y, z]") -> tuple[floa
     return parts[0], parts[1], parts[2]
 
 
-def read_fields(value: Any, name: str, required: tuple[str, ...], optional: tuple[str, ...] = ()) -> Mapping[str, Any]:
+def read_fields(
+    value: Any, name: str, required: tuple[str, ...], optional: tuple[str, ...] = ()
+) -> Mapping[str, Any]:
     """A mapping that has all required keys and no others than the optional ones."""
     known = (*required, *optional)
     if not isinstance(value, Mapping):
@@ -241,6 +260,7 @@ def read_fields(value: Any, name: str, required: tuple[str, ...], optional: tupl
                 f"unknown key '{key}' of {name}; expected {', '.join(known)}"
                 f"{did_you_mean(str(key), known)}",
                 (str(key),),
+                at_key=True,
             )
     for key in required:
         if key not in value:
@@ -261,25 +281,3 @@ def stable(value: float) -> float:
     grid they agree.
     """
     return float(f"{value:.12g}")
-
-
-__all__ = [
-    "DISTRIBUTIONS",
-    "Distribution",
-    "Kind",
-    "Malformed",
-    "Numeric",
-    "distribution",
-    "flow",
-    "in_order",
-    "inside",
-    "names_of",
-    "read",
-    "read_fields",
-    "read_number",
-    "read_range",
-    "read_vector",
-    "read_whole_number",
-    "shown",
-    "stable",
-]

@@ -42,7 +42,7 @@ class FieldOf:
         del source, handler
         return core_schema.no_info_plain_validator_function(
             self._read,
-            serialization=core_schema.plain_serializer_function_ser_schema(Distribution.to_yaml),
+            serialization=core_schema.plain_serializer_function_ser_schema(_to_yaml),
         )
 
     def __get_pydantic_json_schema__(
@@ -98,11 +98,15 @@ class Bounds:
         if low in self and high in self:
             return value
         if low == high:
-            raise Malformed(f"{number(low)} is not {self._within()}")
+            raise Malformed(f"{number(low)} is not {self.within()}")
         outside = low if low not in self else high
-        reach = "has no limit" if math.isinf(outside) else f"can be {number(outside)}"
-        remedy = "; give it a clip range" if math.isinf(outside) else ""
-        raise Malformed(f"{value.name} {reach}, which is not {self._within()}{remedy}")
+        if math.isinf(outside):
+            raise Malformed(
+                f"{value.name} has no limits, but every value must be {self.within()}; add a clip"
+            )
+        raise Malformed(
+            f"{value.name} can give {number(outside)}, but every value must be {self.within()}"
+        )
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
@@ -128,13 +132,19 @@ class Bounds:
         except Malformed as error:
             raise custom_error(error) from None
 
-    def _within(self) -> str:
+    def within(self) -> str:
+        """The limits as part of a sentence: ``in (1, 170)``, ``>= 0``."""
         return str(self) if math.isinf(self.low) or math.isinf(self.high) else f"in {self}"
+
+
+def _to_yaml(value: Distribution[Any]) -> Any:
+    return value.to_yaml()
 
 
 def custom_error(error: Malformed) -> PydanticCustomError:
     """What carries our own words, and the path to the fault, through pydantic."""
-    return PydanticCustomError("fact", "{fact}", {"fact": error.fact, "path": error.path})
+    context = {"fact": error.fact, "path": error.path, "at_key": error.at_key}
+    return PydanticCustomError("fact", "{fact}", context)
 
 
 def json_schema_of(kind: Kind[Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.records import Body, Geometry, View
+from generator.renderers.kernels.records import View, World
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -94,15 +94,14 @@ def guard_distance(view: View, p: wp.vec3, plane: int):
 @wp.kernel
 def project_vertices(
     view: View,
-    geometries: wp.array(dtype=Geometry),
-    bodies: wp.array(dtype=Body),
+    world: World,
     p_camera: wp.array(dtype=wp.vec3),
     xy: wp.array(dtype=wp.vec2i),
 ):
     """Vertices in the camera frame and on the snapped image plane, one body per thread."""
     b = wp.tid()
-    body = bodies[b]
-    geometry = geometries[body.geometry]
+    body = world.bodies[b]
+    geometry = world.geometries[body.geometry]
     for i in range(geometry.vertices_m.shape[0]):
         p = body.A_camera_mesh @ geometry.vertices_m[i] + body.t_camera_mesh
         q = wp.vec2i(UNSNAPPED, UNSNAPPED)
@@ -339,8 +338,7 @@ def beyond_guard(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
 def draw_bodies(
     view: View,
     window: Window,
-    geometries: wp.array(dtype=Geometry),
-    bodies: wp.array(dtype=Body),
+    world: World,
     p_camera: wp.array(dtype=wp.vec3),
     xy: wp.array(dtype=wp.vec2i),
     nearness: wp.array(dtype=float),
@@ -353,8 +351,8 @@ def draw_bodies(
         hits: Unchanged where nothing is hit.
     """
     b = wp.tid()
-    body = bodies[b]
-    geometry = geometries[body.geometry]
+    body = world.bodies[b]
+    geometry = world.geometries[body.geometry]
     for f in range(geometry.face_slots.shape[0]):
         i = body.first_vertex + geometry.faces[3 * f]
         j = body.first_vertex + geometry.faces[3 * f + 1]

@@ -174,3 +174,20 @@ def to_mesh_vector(body: Body, v_world: wp.vec3):
 def to_world_point(body: Body, p_mesh: wp.vec3):
     """Mesh point to world frame."""
     return body.R_world_mesh @ (p_mesh * body.scale) + body.t_world_mesh
+
+
+@wp.struct
+class World:
+    """Everything that is not the camera.
+
+    Attributes:
+        tree: Top-level hierarchy over the bodies' boxes.
+    """
+
+    tree: wp.uint64
+    geometries: wp.array(dtype=Geometry)
+    bodies: wp.array(dtype=Body)
+    surfaces: wp.array(dtype=Surface)
+    textures: wp.array(dtype=Texture)
+    lamps: wp.array(dtype=Lamp)
+    sky: Sky

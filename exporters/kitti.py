@@ -1,0 +1,375 @@
+"""KITTI object detection: images, calibration, labels and a pseudo-LiDAR, one frame per sample.
+
+::
+
+    training/image_2/000012.png     RGB                    training/label_2/000012.txt
+    training/depth_2/000012.png     16-bit z-depth         training/calib/000012.txt
+    training/velodyne/000012.bin    float32 x y z 0
+    ImageSets/{train,val,test}.txt  frame names            README.txt
+
+Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitti, object devkit):
+
+* **Pixel centres** are whole numbers: the principal point of ``P2`` is ours minus 0.5, and image
+  boxes hold the first and the *last* pixel.
+* **Boxes turn about the camera's y axis only.** A label is the smallest such box, with the heading
+  of the object's x axis, that encloses the object's own oriented box; both are equal when the
+  object stands upright before a level camera. Exact poses are in the COCO export.
+* **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
+  which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
+
+Readers take ``calib`` by line number and need all printed digits of a rotation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from exporters.images import depth_units, link_or_copy, read_depth_units
+from generator.config.strict import Strict
+from generator.core.boxes import BoxPx, OrientedBox
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.interfaces import DatasetInfo, media_path
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import ImageTruth, ObjectTruth, Sample
+from generator.core.se3 import Array, Vec3
+
+OFFICIAL_TYPES = {
+    "car": "Car",
+    "van": "Van",
+    "truck": "Truck",
+    "pedestrian": "Pedestrian",
+    "person": "Pedestrian",
+    "person_sitting": "Person_sitting",
+    "cyclist": "Cyclist",
+    "tram": "Tram",
+}
+"""KITTI's types by our category names; every other category is ``Misc``."""
+
+SPLITS = ("train", "val", "test")
+FRAMES_MAX = 1_000_000
+"""Frame names have six digits."""
+
+LIDAR_HEIGHT_M = 0.30
+"""Of the virtual scanner above camera 0, axes parallel to the camera's."""
+R_CAMERA_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+"""Scanner axes (X forward, Y left, Z up) in the camera frame (X right, Y down, Z forward)."""
+T_CAMERA_LIDAR_M = np.array([0.0, -LIDAR_HEIGHT_M, 0.0])
+
+PARTLY_OCCLUDED = 0.1
+"""Hidden share of the silhouette above which ``occluded`` is 1."""
+LARGELY_OCCLUDED = 0.5
+"""Hidden share of the silhouette above which ``occluded`` is 2."""
+
+
+class Kitti(Strict):
+    """KITTI object detection: the images of one camera, with labels in its frame."""
+
+    type: Literal["kitti"] = "kitti"
+    camera: str = ""
+    """Sensor that becomes camera 2; empty = the first one, by name, with the rgb channel."""
+    types: Literal["official", "category"] = "official"
+    """KITTI's own eight types, or category names as they are (blanks become underscores)."""
+    velodyne_stride_px: int = Field(8, ge=0)
+    """Every how many pixels a depth pixel becomes a LiDAR point; 0 = no velodyne folder."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it reads."""
+        return frozenset({"boxes3d", "visibility"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set that this format cannot hold.
+
+        Raises:
+            ConfigError: no such camera, it does not write the images that are needed, or too many
+                samples for six digits.
+        """
+        media = info.media[self._camera(info)]
+        if self.velodyne_stride_px and Channel.Z_DEPTH not in media:
+            raise ConfigError(
+                f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
+                "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
+            )
+        if info.n > FRAMES_MAX:
+            raise ConfigError(
+                f"exporter 'kitti': frame names have six digits, {info.n} samples do not fit; "
+                f"make at most {FRAMES_MAX} samples"
+            )
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write label, calibration and points of each sample, and which split it belongs to.
+
+        Raises:
+            ConfigError: see ``check``.
+        """
+        self.check(info)
+        camera = self._camera(info)
+        folder = shard_dir / self.type
+        frames = []
+        for sample in samples:
+            truth = sample.truth[camera]
+            frame = _frame(sample.index)
+            _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self.types))
+            _write_text(folder / f"calib/{frame}.txt", calib_text(truth.camera.intrinsics))
+            if self.velodyne_stride_px:
+                points = self._points(info, sample, shard_dir)
+                path = folder / f"velodyne/{frame}.bin"
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(points.astype("<f4").tobytes())
+            frames.append(f"{sample.index} {sample.split}\n")
+        _write_text(folder / "frames.txt", "".join(frames))
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link all files of the shards into one tree and list the frames of each split."""
+        camera = self._camera(info)
+        frames_of: dict[str, list[str]] = {split: [] for split in SPLITS}
+        for shard_dir in shard_dirs:
+            for line in (shard_dir / self.type / "frames.txt").read_text("utf-8").splitlines():
+                index, split = line.split(" ", 1)
+                frames_of.setdefault(split, []).append(_frame(int(index)))
+                for source, target in self._links(info, camera, shard_dir, int(index)):
+                    link_or_copy(source, dataset_dir / "training" / target)
+        for split, frames in frames_of.items():
+            listing = "".join(f"{frame}\n" for frame in frames)
+            _write_text(dataset_dir / "ImageSets" / f"{split}.txt", listing)
+        _write_text(dataset_dir / "README.txt", self._readme(info, camera))
+
+    def _camera(self, info: DatasetInfo) -> str:
+        with_rgb = [s for s in info.sensors if Channel.RGB in info.media[s]]
+        if not self.camera and with_rgb:
+            return with_rgb[0]
+        if self.camera in with_rgb:
+            return self.camera
+        known = ", ".join(with_rgb) or "none"
+        raise ConfigError(
+            f"exporter 'kitti': camera '{self.camera}' is no sensor that writes the rgb channel; "
+            f"expected one of: {known}{did_you_mean(self.camera, with_rgb)}"
+        )
+
+    def _points(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> Array:
+        # The file's decimal grid, whether the array is still here or not: equal bytes both ways.
+        camera = self._camera(info)
+        reading = sample.capture.readings.get(camera)
+        stride_px = self.velodyne_stride_px
+        first_px = stride_px // 2
+        if reading is not None and Channel.Z_DEPTH in reading.channels:
+            z_m = reading.channels[Channel.Z_DEPTH][first_px::stride_px, first_px::stride_px]
+            units = depth_units(z_m, info.depth_scale_m)
+        else:
+            path = media_path(shard_dir, camera, Channel.Z_DEPTH, sample.index)
+            units = read_depth_units(path)[first_px::stride_px, first_px::stride_px]
+        z_depth_m = units * info.depth_scale_m
+        return lidar_points(sample.truth[camera].camera.intrinsics, z_depth_m, stride_px)
+
+    def _links(
+        self, info: DatasetInfo, camera: str, shard_dir: Path, index: int
+    ) -> list[tuple[Path, str]]:
+        """Files of one frame, each with its place under ``training``."""
+        frame = _frame(index)
+        names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
+        if self.velodyne_stride_px:
+            names.append(f"velodyne/{frame}.bin")
+        links = [(shard_dir / self.type / name, name) for name in names]
+        rgb = media_path(shard_dir, camera, Channel.RGB, index)
+        links.append((rgb, f"image_2/{frame}.png"))
+        if Channel.Z_DEPTH in info.media[camera]:
+            depth = media_path(shard_dir, camera, Channel.Z_DEPTH, index)
+            links.append((depth, f"depth_2/{frame}.png"))
+        return links
+
+    def _readme(self, info: DatasetInfo, camera: str) -> str:
+        return _README.format(
+            name=info.name,
+            camera=camera,
+            scale=info.depth_scale_m,
+            height=LIDAR_HEIGHT_M,
+            stride=self.velodyne_stride_px,
+            partly=PARTLY_OCCLUDED,
+            largely=LARGELY_OCCLUDED,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class UprightBox:
+    """A box whose height is along the camera's y axis: what a KITTI label can say.
+
+    Attributes:
+        size_hwl_m: Extent along y, along the box's z, along the box's x.
+        bottom_m: Centre of the face with the largest y, camera frame.
+        heading_rad: Rotation about +y of the box's x axis; 0 = along the camera's x.
+    """
+
+    size_hwl_m: Vec3
+    bottom_m: Vec3
+    heading_rad: float
+
+
+def upright_box(box: OrientedBox) -> UprightBox:
+    """The smallest upright box, headed like the object's x axis, around an oriented box.
+
+    Where that axis is vertical, the heading is that of the y axis less a quarter turn.
+    """
+    corners = box.corners()
+    rotation = box.T_frame_box.rotation()
+    x, z = float(rotation[0, 0]), float(rotation[2, 0])
+    if x * x + z * z < 1e-12:
+        x, z = float(rotation[2, 1]), -float(rotation[0, 1])
+    norm = math.sqrt(x * x + z * z)
+    x, z = x / norm, z / norm
+    along = corners[:, 0] * x + corners[:, 2] * z
+    across = corners[:, 2] * x - corners[:, 0] * z
+    middle_along = 0.5 * float(along.min() + along.max())
+    middle_across = 0.5 * float(across.min() + across.max())
+    return UprightBox(
+        size_hwl_m=(
+            float(np.ptp(corners[:, 1])),
+            float(np.ptp(across)),
+            float(np.ptp(along)),
+        ),
+        bottom_m=(
+            middle_along * x - middle_across * z,
+            float(corners[:, 1].max()),
+            middle_along * z + middle_across * x,
+        ),
+        heading_rad=math.atan2(-z, x),
+    )
+
+
+def label_text(truth: ImageTruth, types: Literal["official", "category"]) -> str:
+    """The lines of one label file; DontCare rows last, as readers expect."""
+    rows = [label_row(thing, truth, types) for thing in truth.objects if thing.box is not None]
+    rows.sort(key=lambda row: row.startswith("DontCare"))
+    return "".join(f"{row}\n" for row in rows)
+
+
+def label_row(thing: ObjectTruth, truth: ImageTruth, types: Literal["official", "category"]) -> str:
+    """The fifteen columns of one visible object.
+
+    A DontCare row where the box is less than two pixels wide or high, or its location is not
+    before the camera: KITTI cannot say either.
+    """
+    assert thing.box is not None, "invisible objects are not listed"
+    assert thing.box3d_camera is not None, "the annotation boxes3d is in `needs`"
+    assert thing.occlusion is not None, "the annotation visibility is in `needs`"
+    assert thing.truncation is not None, "the annotation visibility is in `needs`"
+    box = upright_box(thing.box3d_camera)
+    x, y, z = box.bottom_m
+    if min(thing.box.width_px, thing.box.height_px) < 2 or z <= 0:
+        corners = _inclusive(_widened(thing.box, truth.camera.intrinsics))
+        return f"DontCare -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
+    name = thing.instance.category
+    kind = OFFICIAL_TYPES.get(name.lower(), "Misc") if types == "official" else _one_word(name)
+    alpha_rad = _wrapped(box.heading_rad - math.atan2(x, z))
+    metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
+    return " ".join(
+        (
+            kind,
+            f"{thing.truncation:.2f}",
+            str(occlusion_level(thing.occlusion)),
+            _decimal(alpha_rad),
+            _inclusive(thing.box),
+            *map(_decimal, metric),
+        )
+    )
+
+
+def occlusion_level(occlusion: float) -> int:
+    """KITTI's 0 visible, 1 partly and 2 largely occluded, by hidden share."""
+    return int(occlusion > PARTLY_OCCLUDED) + int(occlusion > LARGELY_OCCLUDED)
+
+
+def calib_text(camera: Intrinsics) -> str:
+    """The seven lines of a calibration file, in the order in which readers count them."""
+    projection = np.zeros((3, 4))
+    projection[:, :3] = camera.matrix()
+    projection[:2, 2] -= 0.5
+    rows = {f"P{k}": projection for k in range(4)}
+    rows["R0_rect"] = np.eye(3)
+    rows["Tr_velo_to_cam"] = np.column_stack([R_CAMERA_LIDAR, T_CAMERA_LIDAR_M])
+    rows["Tr_imu_to_velo"] = np.eye(3, 4)
+    return "".join(
+        f"{name}: " + " ".join(f"{value:.12e}" for value in matrix.ravel()) + "\n"
+        for name, matrix in rows.items()
+    )
+
+
+def lidar_points(camera: Intrinsics, z_depth_m: NDArray[np.floating], stride_px: int) -> Array:
+    """Points of a thinned depth image in the scanner frame, row by row.
+
+    Args:
+        camera: Of the full image.
+        z_depth_m: Depth [m] of every ``stride_px``-th pixel, beginning with ``stride_px // 2``;
+            0 = nothing.
+        stride_px: Distance of the pixels.
+
+    Returns:
+        [n, 4]: x forward, y left, z up [m], reflectance 0.
+    """
+    rows, columns = np.nonzero(z_depth_m > 0)
+    z = z_depth_m[rows, columns]
+    centre_px = stride_px // 2 + 0.5
+    x = (columns * stride_px + centre_px - camera.cx_px) / camera.fx_px * z
+    y = (rows * stride_px + centre_px - camera.cy_px) / camera.fy_px * z
+    return np.column_stack([z, -x, -y - LIDAR_HEIGHT_M, np.zeros_like(z)])
+
+
+def _widened(box: BoxPx, camera: Intrinsics) -> BoxPx:
+    """At least two pixels wide and high, inside the image."""
+    x_min = max(min(box.x_min, camera.width_px - 2), 0)
+    y_min = max(min(box.y_min, camera.height_px - 2), 0)
+    return BoxPx(x_min, y_min, max(box.x_max, x_min + 2), max(box.y_max, y_min + 2))
+
+
+def _inclusive(box: BoxPx) -> str:
+    return f"{box.x_min:.2f} {box.y_min:.2f} {box.x_max - 1:.2f} {box.y_max - 1:.2f}"
+
+
+def _decimal(value: float) -> str:
+    # Micrometres: KITTI's own two decimals would be a fifth of a small object. No "-0.000000".
+    return f"{round(value, 6) + 0.0:.6f}"
+
+
+def _wrapped(angle_rad: float) -> float:
+    return math.remainder(angle_rad, 2.0 * math.pi)
+
+
+def _one_word(name: str) -> str:
+    return "_".join(name.split())
+
+
+def _frame(index: int) -> str:
+    return f"{index:06d}"
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+_README = """\
+{name}: KITTI object detection format, sensor '{camera}'
+
+training/   All frames; ImageSets/*.txt say which split each belongs to.
+image_2     RGB.
+depth_2     z-depth, 16-bit: metres = value * {scale}; 0 = nothing or out of range. Present when
+            the data set keeps depth images.
+calib       P0 = P1 = P2 = P3, pixel centres at whole numbers; R0_rect = identity, so the rectified
+            frame is the camera's: X right, Y down, Z forward. The virtual IMU is at the scanner.
+velodyne    Points of the depth image, one per {stride} x {stride} pixels (0: not written), as seen
+            from {height:.2f} m above the camera; float32 x y z reflectance; reflectance is 0.
+label_2     type truncated occluded alpha left top right bottom h w l x y z rotation_y
+            Boxes turn about the camera's y axis only: each is the smallest such box, headed like
+            the object's x axis, around the object's own oriented box.
+            truncated: share of the silhouette outside the image. occluded, by the hidden share of
+            the silhouette inside the image: 0 up to {partly}, 1 up to {largely}, 2 above.
+            Metres and radians have six decimals.
+"""

@@ -1,0 +1,140 @@
+"""Where configurations and templates are found, and how the two become one document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from types import ModuleType
+
+import configs
+import scene_templates
+from generator.config.document import Node, load, merge, with_override
+from generator.config.problems import Position, Problems
+from generator.core.errors import ConfigError, did_you_mean
+
+SECTIONS = ("render", "physics", "labels", "splits", "assets")
+"""Optional mappings of a configuration; a resolved document has them all."""
+
+LISTS = ("randomizers", "sensors", "annotations", "exporters")
+
+
+def found_file(name: str, shipped: ModuleType, kind: str) -> Path:
+    """The file a user means: the path as given, else one that comes with the package.
+
+    Raises:
+        ConfigError: if there is neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    folder = Path(str(files(shipped)))
+    ours = sorted(p.name for p in folder.glob("*.yaml"))
+    for candidate in (name, f"{name}.yaml"):
+        if candidate in ours:
+            return folder / candidate
+    raise ConfigError(
+        f"{name}: there is no such {kind}; shipped are {', '.join(ours)}{did_you_mean(name, ours)}"
+    )
+
+
+def resolved_document(
+    document: Node, *, seed: int | None, overrides: Sequence[str], without: Sequence[str]
+) -> Node:
+    """A configuration with its template's elements in it and the command line laid over it.
+
+    In the result ``elements`` is a list, ``template`` is its name only, and every section is there.
+
+    Raises:
+        ConfigError: naming the place of what is wrong.
+    """
+    content = dict(_mapping(document))
+    content["elements"] = _elements(document)
+    for key in SECTIONS:
+        content.setdefault(key, _made({}))
+    for key in LISTS:
+        content.setdefault(key, _made(()))
+    if seed is not None:
+        content["seed"] = _made(seed)
+    resolved = Node(document.position, content, document.key_positions)
+    for text in overrides:
+        path, separator, value = text.partition("=")
+        if not separator:
+            raise ConfigError(f"--set {text}: expected KEY=VALUE")
+        resolved = with_override(resolved, path.strip(), value.strip())
+    return _without_randomizers(resolved, without)
+
+
+def config_document(name: str) -> Node:
+    """The document of a configuration, by path or shipped name."""
+    return load(found_file(name, configs, "configuration"))
+
+
+def _elements(document: Node) -> Node:
+    """The template's elements, each with the configuration's overrides merged in."""
+    given = document.get("elements")
+    template = document.get("template")
+    if given is not None and isinstance(given.content, tuple):
+        return given
+    if template is None or not isinstance(template.content, str):
+        problems = Problems()
+        where = document.position if template is None else template.position
+        problems.add(where, "template", "expected the name of a template, or a list of elements")
+        problems.raise_if_any()
+        raise AssertionError("unreachable")
+    elements = load(found_file(template.content, scene_templates, "template")).get("elements")
+    if elements is None or not isinstance(elements.content, tuple):
+        raise ConfigError(f"{template.content}: a template needs a list of elements")
+    if given is None:
+        return elements
+    return _overridden(elements, given)
+
+
+def _overridden(elements: Node, overrides: Node) -> Node:
+    assert isinstance(elements.content, tuple)
+    by_name = {str(_scalar(node, "name")): node for node in elements.content}
+    problems = Problems()
+    if not isinstance(overrides.content, Mapping):
+        problems.add(overrides.position, "elements", "expected overrides by element name")
+    else:
+        for name, node in overrides.content.items():
+            if name not in by_name:
+                fact = f"the template has no element '{name}'; expected one of "
+                fact += ", ".join(by_name) + did_you_mean(name, by_name)
+                problems.add(overrides.key_position(name), f"elements.{name}", fact)
+            else:
+                by_name[name] = merge(by_name[name], node)
+    problems.raise_if_any()
+    return Node(elements.position, tuple(by_name.values()))
+
+
+def _without_randomizers(document: Node, names: Sequence[str]) -> Node:
+    listed = document.get("randomizers")
+    if not names or listed is None or not isinstance(listed.content, tuple):
+        return document
+    known = [str(_scalar(node, "name") or _scalar(node, "type")) for node in listed.content]
+    for name in names:
+        if name not in known:
+            raise ConfigError(
+                f"--without {name}: there is no such randomizer; expected one of "
+                f"{', '.join(known)}{did_you_mean(name, known)}"
+            )
+    kept = tuple(n for n, name in zip(listed.content, known, strict=True) if name not in names)
+    content = {**_mapping(document), "randomizers": Node(listed.position, kept)}
+    return Node(document.position, content, document.key_positions)
+
+
+def _scalar(node: Node, key: str) -> object:
+    found = node.get(key)
+    return None if found is None else found.content
+
+
+def _mapping(node: Node) -> Mapping[str, Node]:
+    if not isinstance(node.content, Mapping):
+        raise ConfigError(f"{node.position}: expected a mapping of settings")
+    return node.content
+
+
+def _made(content: dict[str, Node] | tuple[Node, ...] | int) -> Node:
+    """A value that no file holds."""
+    return Node(Position("(default)", 1, 1), content)

@@ -1,0 +1,1 @@
+"""Meshes, textures, environments and robots: one library, one normal form, one cache."""

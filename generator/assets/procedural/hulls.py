@@ -1,0 +1,88 @@
+"""Convex collision parts: few, small, and hollow where things must fall in.
+
+Every function returns float64 [n, 3] arrays of hull vertices [m], at most 48 per part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from generator.assets.procedural.mesh import Array
+from generator.core.se3 import Vec3
+
+
+def box(low: Vec3, high: Vec3) -> Array:
+    """The eight corners of an axis-aligned box."""
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
+                     for z in (low[2], high[2])], dtype=np.float64)
+
+
+def frustum(low: tuple[float, float], high: tuple[float, float], sides: int = 20) -> Array:
+    """A slice of a body of revolution between two (radius, z)."""
+    return np.concatenate([_ring(radius, z, sides) for radius, z in (low, high)])
+
+
+def stack(profile: Sequence[tuple[float, float]], sides: int = 20) -> list[Array]:
+    """One frustum per segment of a profile of (radius, z), from bottom to top."""
+    return [frustum(a, b, sides) for a, b in zip(profile[:-1], profile[1:])]
+
+
+def ring(
+    low: tuple[float, float, float], high: tuple[float, float, float], count: int
+) -> list[Array]:
+    """A wall of revolution as ``count`` wedges, between two (inner radius, outer radius, z).
+
+    The inner faces are flat: they lie half outside and half inside the true inner surface.
+    """
+    half = math.pi / count
+    inner_factor = 2.0 / (1.0 + math.cos(half))
+    wedges = []
+    for i in range(count):
+        middle = 2.0 * math.pi * i / count
+        points = [
+            (radius * math.cos(middle + turn), radius * math.sin(middle + turn), z)
+            for inner, outer, z in (low, high)
+            for radius, turns in ((min(inner * inner_factor, outer), (-half, half)),
+                                  (outer, (-half, 0.0, half)))
+            for turn in turns
+        ]
+        wedges.append(np.array(points))
+    return wedges
+
+
+def extreme(points: Array, count: int = 48) -> Array:
+    """The points that lie furthest along ``count`` even directions: a small hull of a cloud."""
+    i = np.arange(count) + 0.5
+    z = 1.0 - 2.0 * i / count
+    turn = math.pi * (3.0 - math.sqrt(5.0)) * i
+    radius = np.sqrt(1.0 - z * z)
+    directions = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
+    reach = np.einsum("dk,nk->dn", directions, points.reshape(-1, 3), optimize=False)
+    chosen = np.unique(np.argmax(np.round(reach, 9), axis=1))
+    return np.array(points.reshape(-1, 3)[chosen], dtype=np.float64)
+
+
+def tube(path: Array, radius: float) -> list[Array]:
+    """A box along each segment of a path, shape [n, 3]; the path lies in a plane of constant y.
+
+    The boxes are as thick as the tube: half width ``radius``.
+    """
+    boxes = []
+    for a, b in zip(path[:-1], path[1:]):
+        along = b - a
+        length = math.sqrt(float((along * along).sum()))
+        across = np.array([-along[2], 0.0, along[0]]) / length * radius
+        side = np.array([0.0, radius, 0.0])
+        boxes.append(np.array([p + s * across + t * side for p in (a, b)
+                               for s in (-1.0, 1.0) for t in (-1.0, 1.0)]))
+    return boxes
+
+
+def _ring(radius: float, z: float, sides: int) -> Array:
+    if radius <= 0.0:
+        return np.array([[0.0, 0.0, z]])
+    turn = 2.0 * math.pi * np.arange(sides) / sides
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), np.full(sides, z)], axis=1)

@@ -1,0 +1,197 @@
+"""Mugs, cups, bowls and plates: bodies of revolution with a real wall, hollow in physics too."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, chance, pick, rng_of
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.materials import (
+    GLAZES,
+    PLASTICS,
+    ceramic,
+    jittered,
+    lighter,
+    linear,
+    plastic,
+)
+from generator.assets.procedural.mesh import Array, Patch, centred
+from generator.assets.procedural.shapes import Point2, circle, fillet, lathe, spline, sweep
+from generator.core.geometry import Material
+from generator.core.streams import Rng
+
+
+def mug(seed: int) -> Solid:
+    """A mug with its handle towards +X. Slots: outside, inside, handle."""
+    rng = rng_of("mug", seed)
+    height, top = between(0.085, 0.108, rng), between(0.037, 0.044, rng)
+    bottom = top * pick((1.0, 1.0, 0.94, 0.84), rng)
+    wall = between(0.0035, 0.0048, rng)
+    bulge = pick((0.0, 0.0, 0.0, 0.004), rng)
+    profile = _cup_profile(top, bottom, height, wall, bulge)
+    path = _handle_path(top, bottom, height, wall, bulge, rng)
+    across = between(0.0045, 0.006, rng), between(0.0065, 0.0095, rng)
+    section = circle(1.0, 12) * np.array(across)
+    handle = sweep(path, section, scale=_flared(len(path)), slot=2)
+    outside = ceramic(rng)
+    inside = Material(lighter(outside.base_color, between(0.5, 0.95, rng)), outside.roughness)
+    grip = inside if chance(0.15, rng) else outside
+    rings = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    if bulge > 0:
+        middle = 0.5 * (top + bottom) + bulge
+        rings = [
+            *hulls.ring((bottom - wall, bottom, wall), (middle - wall, middle, 0.5 * height), 8),
+            *hulls.ring((middle - wall, middle, 0.5 * height), (top - wall, top, height), 9),
+        ]
+    base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
+    grip_hulls = hulls.tube(path[:: (len(path) - 1) // 5], 0.8 * across[1])
+    return centred(
+        [*_two_sided(profile, 32), handle], (outside, inside, grip), [base, *rings, *grip_hulls]
+    )
+
+
+def cup(seed: int) -> Solid:
+    """A tumbler of opaque plastic. Slots: outside, inside."""
+    rng = rng_of("cup", seed)
+    height, top = between(0.08, 0.13, rng), between(0.034, 0.042, rng)
+    bottom, wall = top * between(0.72, 0.9, rng), between(0.0018, 0.0028, rng)
+    profile = _cup_profile(top, bottom, height, wall, 0.0)
+    outside = plastic(rng)
+    inside = outside if chance(0.6, rng) else plastic(rng, ("#f0f0ec", "#e8e4da"))
+    walls = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
+    return centred(_two_sided(profile, 32), (outside, inside), [base, *walls])
+
+
+def bowl(seed: int) -> Solid:
+    """A bowl on a foot ring. Slots: outside, inside."""
+    rng = rng_of("bowl", seed)
+    radius = between(0.06, 0.125, rng)
+    height = radius * between(0.75, 1.0, rng) * (0.85 if radius > 0.1 else 1.0)
+    foot, lift = radius * between(0.45, 0.55, rng), between(0.004, 0.009, rng)
+    wall, fullness = between(0.003, 0.005, rng), between(0.55, 0.85, rng)
+    outer = _bowl_curve(foot, radius, lift, height, fullness)
+    inner = _offset(outer, wall)
+    profile = [
+        (0.0, 0.6 * lift), (foot - 0.005, 0.6 * lift), (foot - 0.004, 0.0), (foot, 0.0),
+        *((float(r), float(z)) for r, z in outer),
+        (radius - 0.5 * wall, height + 0.5 * wall),
+        *((float(r), float(z)) for r, z in inner[::-1]),
+        (0.0, float(inner[0, 1])),
+    ]
+    outside = ceramic(rng)
+    inside = outside if chance(0.5, rng) else ceramic(rng, ("#f4f1ea", "#e9e4d8", "#d9dfe2"))
+    k = len(outer) // 2
+    floor = float(inner[0, 1])
+    levels = [(float(inner[i, 0]), float(outer[i, 0]), z) for i, z in
+              ((0, floor - 0.5 * wall), (k, float(outer[k, 1])), (-1, height))]
+    parts = [
+        hulls.frustum((foot, 0.0), (max(foot, levels[0][0]), floor)),
+        *hulls.ring(levels[0], levels[1], 8),
+        *hulls.ring(levels[1], levels[2], 14),
+    ]
+    return centred(_two_sided(profile, 40), (outside, inside), parts)
+
+
+def plate(seed: int) -> Solid:
+    """A flat plate with a raised rim. Slots: outside, inside."""
+    rng = rng_of("plate", seed)
+    radius = pick((0.085, 0.105, 0.13, 0.14), rng) * between(0.97, 1.03, rng)
+    rise, wall = between(0.016, 0.026, rng), between(0.0035, 0.005, rng)
+    well, foot = radius * between(0.6, 0.72, rng), radius * between(0.5, 0.58, rng)
+    step = rise * between(0.45, 0.7, rng)
+    upper = fillet(
+        [(radius, rise), (well + 0.35 * (radius - well), step + 0.002), (well, 0.002 + wall),
+         (0.0, 0.002 + wall)], 0.014, 3,
+    )
+    lower = fillet(
+        [(0.0, 0.002), (foot - 0.004, 0.002), (foot - 0.003, 0.0), (foot, 0.0), (foot + 0.002, 0.002),
+         (well, 0.0025), (well + 0.35 * (radius - well), step + 0.002 - wall),
+         (radius, rise - 0.8 * wall)], [0.0] * 5 + [0.012, 0.012, 0.0], 3,
+    )
+    profile = [*lower, (radius + 0.4 * wall, rise - 0.4 * wall), *upper]
+    outside = ceramic(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
+    inside = outside if chance(0.7, rng) else Material(
+        jittered(linear(pick(GLAZES, rng)), 0.08, rng), outside.roughness
+    )
+    walls = hulls.ring(
+        (well - 0.004, well + 0.006, 0.001), (radius - 0.003, radius + 0.4 * wall, rise), 20
+    )
+    base = hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
+    return centred(_two_sided(profile, 48), (outside, inside), [base, *walls])
+
+
+def _two_sided(profile: list[Point2], segments: int) -> list[Patch]:
+    """The profile turned about Z: slot 0 up to the highest point, slot 1 from there inward."""
+    k = max(range(len(profile)), key=lambda i: profile[i][1])
+    return [lathe(profile[: k + 1], segments, 0), lathe(profile[k:], segments, 1)]
+
+
+def _cup_profile(
+    top: float, bottom: float, height: float, wall: float, bulge: float
+) -> list[Point2]:
+    """Closed profile of a beaker: foot, outer wall, rounded rim, inner wall."""
+    middle = 0.5 * (top + bottom) + bulge
+    waist = [(middle, 0.5 * height)] if bulge > 0 else []
+    inner_waist = [(middle - wall, 0.5 * height)] if bulge > 0 else []
+    points = [
+        (0.0, 0.0015), (0.78 * bottom, 0.0015), (0.8 * bottom, 0.0), (bottom, 0.0), *waist,
+        (top, height), (top - wall, height), *inner_waist, (bottom - wall, wall), (0.0, wall),
+    ]
+    rim = 0.45 * wall
+    radii = [0.0, 0.0, 0.0, 0.007, *([0.12] if waist else []), rim, rim,
+             *([0.12] if waist else []), 0.006, 0.0]
+    return fillet(points, radii, 4)
+
+
+def _handle_path(
+    top: float, bottom: float, height: float, wall: float, bulge: float, rng: Rng
+) -> Array:
+    """Centre line of a handle in the plane y = 0; its ends are inside the wall."""
+    high, low = height * between(0.78, 0.86, rng), height * between(0.16, 0.26, rng)
+    reach = between(0.026, 0.036, rng)
+
+    def wall_at(z: float) -> float:
+        t = z / height
+        bow = bulge * (1.0 - abs(2.0 * t - 1.0))
+        return bottom + (top - bottom) * t + bow - 0.5 * wall
+
+    belly = between(0.75, 1.0, rng)
+    points = [
+        (wall_at(high), 0.0, high),
+        (wall_at(high) + 0.55 * reach, 0.0, high + 0.002),
+        (wall_at(high) + reach, 0.0, high - 0.22 * (high - low)),
+        (wall_at(low) + belly * reach, 0.0, low + 0.3 * (high - low)),
+        (wall_at(low) + 0.45 * reach, 0.0, low + 0.05 * (high - low)),
+        (wall_at(low), 0.0, low),
+    ]
+    return spline(points, 21)
+
+
+def _flared(count: int) -> Array:
+    """Section factors along a handle: wider where it joins the body."""
+    t = np.abs(np.linspace(-1.0, 1.0, count))
+    return 1.0 + 0.35 * t**6
+
+
+def _bowl_curve(
+    foot: float, radius: float, lift: float, height: float, fullness: float
+) -> Array:
+    """Outer wall from foot to rim, a superellipse arc: shape [10, 2]."""
+    t = np.linspace(0.0, 0.5 * math.pi, 10)
+    r = foot + (radius - foot) * np.sin(t) ** fullness
+    z = lift + (height - lift) * (1.0 - np.cos(t))
+    return np.stack([r, z], axis=1)
+
+
+def _offset(curve: Array, distance: float) -> Array:
+    """The curve moved to its left (inward, upward)."""
+    step = np.gradient(curve, axis=0)
+    step = step / np.sqrt((step**2).sum(axis=1, keepdims=True))
+    moved: Array = curve + distance * np.stack([-step[:, 1], step[:, 0]], axis=1)
+    return moved
+
+

@@ -1,0 +1,46 @@
+"""Mesh files to triangle soup, one reader per format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import PurePosixPath
+
+from generator.assets.folder import Folder
+from generator.assets.readers.gltf import read_gltf
+from generator.assets.readers.obj import read_obj
+from generator.assets.readers.ply import read_ply
+from generator.assets.readers.source import MAX_FACES, Source
+from generator.assets.readers.stl import read_stl
+from generator.core.errors import AssetError, did_you_mean
+
+__all__ = ["MESH_SUFFIXES", "Source", "read_mesh"]
+
+_READERS: dict[str, Callable[[Folder, str], Source]] = {
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".obj": read_obj,
+    ".ply": read_ply,
+    ".stl": read_stl,
+}
+MESH_SUFFIXES = frozenset(_READERS)
+
+
+def read_mesh(folder: Folder, relative: str) -> Source:
+    """Triangles and materials of a mesh file, chosen by its suffix.
+
+    Raises:
+        AssetError: if the file is missing, malformed, empty, or too large.
+    """
+    path = folder.root / relative
+    suffix = PurePosixPath(relative).suffix.lower()
+    if suffix not in _READERS:
+        raise AssetError(
+            f"{path}: meshes of type '{suffix}' are not read{did_you_mean(suffix, _READERS)}; "
+            f"convert it to one of {', '.join(sorted(_READERS))}"
+        )
+    source = _READERS[suffix](folder, relative)
+    if not len(source.soup):
+        raise AssetError(f"{path}: holds no triangles; export it again with its faces")
+    if len(source.soup) > MAX_FACES:
+        raise AssetError(f"{path}: {len(source.soup)} triangles, at most {MAX_FACES}; decimate it")
+    return source

@@ -1,0 +1,242 @@
+"""Wavefront OBJ and MTL.
+
+Source: Wavefront Advanced Visualizer manual, appendix B1 (polygonal elements) and MTL 5.0; the
+keys ``Pr`` and ``Pm`` (roughness, metallic) are the widespread PBR extension.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import PurePosixPath
+
+import numpy as np
+
+from generator.assets.folder import Folder
+from generator.assets.readers.source import (
+    MAX_FACES,
+    Source,
+    linear_of_srgb,
+    roughness_of_shininess,
+)
+from generator.assets.soup import Float64, Int64, Slot, Soup
+from generator.core.errors import AssetError
+from generator.core.geometry import Material
+
+
+@dataclass
+class _Statements:
+    """The lines of an OBJ file, sorted by what they say."""
+
+    positions: list[str] = field(default_factory=list)
+    texcoords: list[str] = field(default_factory=list)
+    normals: list[str] = field(default_factory=list)
+    corners: list[str] = field(default_factory=list)
+    polygon_sizes: list[int] = field(default_factory=list)
+    polygon_materials: list[int] = field(default_factory=list)
+    polygon_objects: list[int] = field(default_factory=list)
+    polygon_groups: list[int] = field(default_factory=list)
+    materials: dict[str, int] = field(default_factory=dict)
+    libraries: list[str] = field(default_factory=list)
+
+
+def read_obj(folder: Folder, relative: str) -> Source:
+    """Triangles of an OBJ file with the materials of its MTL files.
+
+    Polygons are cut into fans. Each ``o`` (or, where there is none, each ``g``) is a group.
+
+    Raises:
+        AssetError: on malformed numbers, indices out of range, or forbidden references.
+    """
+    text = folder.read(relative).decode("utf-8", errors="replace").replace("\\\n", " ")
+    try:
+        statements = _statements(text)
+        soup = _soup(statements, _slots(folder, relative, statements))
+    except ValueError as error:
+        raise AssetError(
+            f"{folder.root / relative}: malformed OBJ ({error}); export it again"
+        ) from None
+    return Source(soup)
+
+
+def _statements(text: str) -> _Statements:
+    s = _Statements()
+    material, object_count, group_count = 0, 0, 0
+    s.materials[""] = 0
+    for line in text.split("\n"):
+        key, _, rest = line.strip().partition(" ")
+        if key == "v":
+            s.positions.append(rest)
+        elif key == "vt":
+            s.texcoords.append(rest)
+        elif key == "vn":
+            s.normals.append(rest)
+        elif key == "f":
+            tokens = rest.split()
+            if "-" in rest:
+                tokens = [_absolute(token, s) for token in tokens]
+            s.corners += tokens
+            s.polygon_sizes.append(len(tokens))
+            s.polygon_materials.append(material)
+            s.polygon_objects.append(object_count)
+            s.polygon_groups.append(group_count)
+        elif key == "usemtl":
+            material = s.materials.setdefault(rest.strip(), len(s.materials))
+        elif key == "mtllib":
+            s.libraries.append(rest.strip())
+        elif key == "o":
+            object_count += 1
+        elif key == "g":
+            group_count += 1
+    return s
+
+
+def _absolute(token: str, s: _Statements) -> str:
+    """A corner whose negative indices, which count backwards, are made positive."""
+    counts = (len(s.positions), len(s.texcoords), len(s.normals))
+    parts = token.split("/")
+    for k, (part, count) in enumerate(zip(parts, counts, strict=False)):
+        if part.startswith("-"):
+            index = int(part) + count + 1
+            if index < 1:
+                raise ValueError(f"index {part[:20]} out of range")
+            parts[k] = str(index)
+    return "/".join(parts)
+
+
+def _soup(s: _Statements, slots: tuple[Slot, ...]) -> Soup:
+    sizes = np.array(s.polygon_sizes, dtype=np.int64)
+    if (sizes < 3).any():
+        raise ValueError("a face with fewer than three corners")
+    if (sizes - 2).sum() > MAX_FACES:
+        raise ValueError(f"more than {MAX_FACES} triangles")
+    fans = _fans(sizes)
+    polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
+    indices = _indices(s.corners)[fans]
+    positions = _table(s.positions, 3, "v")
+    texcoords = _table(s.texcoords, 2, "vt")
+    normals = _table(s.normals, 3, "vn")
+    groups = s.polygon_objects if max(s.polygon_objects, default=0) else s.polygon_groups
+    return Soup(
+        corners=_looked_up(positions, indices[..., 0], "vertex", required=True),
+        uvs=_looked_up(texcoords, indices[..., 1], "vt") if len(texcoords) else None,
+        normals=_looked_up(normals, indices[..., 2], "vn")
+        if len(normals) and (indices[..., 2] > 0).all()
+        else None,
+        face_slots=np.array(s.polygon_materials, dtype=np.int64)[polygon],
+        face_groups=np.array(groups, dtype=np.int64)[polygon],
+        slots=slots,
+    )
+
+
+def _fans(sizes: Int64) -> Int64:
+    """Corner numbers [m, 3] of the fan triangles of polygons with the given corner counts."""
+    starts = np.cumsum(sizes) - sizes
+    counts = sizes - 2
+    first = np.repeat(starts, counts)
+    step = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.stack([first, first + step + 1, first + step + 2], axis=1)
+
+
+def _indices(tokens: list[str]) -> Int64:
+    """Index triples [n, 3] of ``v/vt/vn`` tokens; 0 where a part is absent."""
+    rows = [(token + "//").split("/", 3)[:3] for token in tokens]
+    flat = [int(part) if part else 0 for row in rows for part in row]
+    if flat and max(flat) >= 2**31:
+        raise ValueError("index out of range")
+    return np.array(flat, dtype=np.int64).reshape(-1, 3)
+
+
+def _table(lines: list[str], width: int, name: str) -> Float64:
+    """Numbers [n, width] of the statements of one kind; further numbers on a line are ignored."""
+    rows = [line.split(None, width)[:width] for line in lines]
+    if any(len(row) < min(width, 2) for row in rows):
+        raise ValueError(f"a '{name}' with too few numbers")
+    table = np.array([float(x) for row in rows for x in row], dtype=np.float64)
+    if table.size != len(rows) * width:
+        raise ValueError(f"a '{name}' with too few numbers")
+    return table.reshape(-1, width)
+
+
+def _looked_up(table: Float64, indices: Int64, name: str, *, required: bool = False) -> Float64:
+    if (indices < 0).any() or (indices > len(table)).any() or (required and (indices < 1).any()):
+        raise ValueError(f"a face with a {name} index out of range 1..{len(table)}")
+    # Index 0 means absent: it looks up a row of zeros put in front.
+    looked_up: Float64 = np.concatenate([np.zeros((1, table.shape[1])), table])[indices]
+    return looked_up
+
+
+def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[Slot, ...]:
+    defined: dict[str, Material] = {}
+    missing = ""
+    for library in s.libraries:
+        path = folder.refer(relative, library)
+        if folder.exists(path):
+            defined |= _read_mtl(folder, path)
+        else:
+            missing = path
+    return tuple(
+        Slot(name, defined[name], from_file=True)
+        if name in defined
+        else Slot(name, missing_library=missing if name else "")
+        for name in s.materials
+    )
+
+
+def _read_mtl(folder: Folder, relative: str) -> dict[str, Material]:
+    materials: dict[str, Material] = {}
+    name = ""
+    for line in folder.read(relative).decode("utf-8", errors="replace").split("\n"):
+        key, _, rest = line.strip().partition(" ")
+        if key == "newmtl":
+            name = rest.strip()
+            materials[name] = Material()
+        elif name in materials:
+            try:
+                materials[name] = _with_key(folder, relative, materials[name], (key, rest))
+            except (ValueError, IndexError):
+                raise AssetError(
+                    f"{folder.root / relative}: material '{name}': malformed '{key}'; "
+                    "export it again"
+                ) from None
+    return {name: _unsullied(material) for name, material in materials.items()}
+
+
+def _with_key(
+    folder: Folder, relative: str, material: Material, statement: tuple[str, str]
+) -> Material:
+    key, rest = statement
+    if key == "Kd":
+        red, green, blue = (float(x) for x in (rest.split() * 3)[:3])
+        return replace(material, base_color=linear_of_srgb((red, green, blue)))
+    if key == "Ns" and float(rest) > 0.0:
+        return replace(material, roughness=roughness_of_shininess(float(rest)))
+    if key == "Pr":
+        return replace(material, roughness=min(max(float(rest.split()[0]), 0.0), 1.0))
+    if key == "Pm":
+        return replace(material, metallic=min(max(float(rest.split()[0]), 0.0), 1.0))
+    if key == "map_Kd":
+        return replace(material, texture=folder.refer(relative, _image_name(rest)))
+    return material
+
+
+def _image_name(rest: str) -> str:
+    """The file of a ``map_`` statement behind its options, each a word and numbers."""
+    tokens = rest.split()
+    while len(tokens) > 1 and tokens[0].startswith("-"):
+        tokens.pop(0)
+        while len(tokens) > 1 and (_is_number(tokens[0]) or tokens[0] in ("on", "off")):
+            tokens.pop(0)
+    return str(PurePosixPath(" ".join(tokens).replace("\\", "/")))
+
+
+def _is_number(token: str) -> bool:
+    try:
+        float(token)
+    except ValueError:
+        return False
+    return True
+
+
+def _unsullied(material: Material) -> Material:
+    """Textured materials without a tint: exporters write arbitrary greys beside an image."""
+    return replace(material, base_color=(1.0, 1.0, 1.0)) if material.texture else material

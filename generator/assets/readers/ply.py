@@ -1,0 +1,53 @@
+"""Stanford PLY, parsed by trimesh behind a check of what its header claims."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+
+import numpy as np
+
+from generator.assets.folder import Folder
+from generator.assets.readers.source import Source
+from generator.assets.soup import Soup
+from generator.core.errors import AssetError
+
+_MAX_HEADER_BYTES = 65536
+_ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)\s*$", re.MULTILINE)
+
+
+def read_ply(folder: Folder, relative: str) -> Source:
+    """Triangles of a PLY file; colours per vertex are ignored.
+
+    Raises:
+        AssetError: if the header claims more than the file can hold, or parsing fails.
+    """
+    data = folder.read(relative)
+    path = folder.root / relative
+    header, end, _ = data[:_MAX_HEADER_BYTES].partition(b"end_header")
+    counts = [count for _, count in _ELEMENT.findall(header.replace(b"\r", b""))]
+    if not header.startswith(b"ply") or not end:
+        raise AssetError(f"{path}: not a PLY file; export it again")
+    # Every element of every list takes a byte at least: a larger count is a lie.
+    if not all(c.isdigit() and len(c) < 12 and int(c) <= len(data) for c in counts):
+        raise AssetError(f"{path}: its header claims more than it holds; export it again")
+    return Source(Soup.of(_triangles(data, str(path))))
+
+
+def _triangles(data: bytes, path: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    import trimesh  # noqa: PLC0415
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            mesh = trimesh.load_mesh(io.BytesIO(data), file_type="ply", process=False)
+            vertices = np.asarray(mesh.vertices, dtype=np.float64)
+            faces = np.asarray(mesh.faces, dtype=np.int64)
+    except Exception as error:  # noqa: BLE001 - a parser of foreign bytes may raise anything
+        raise AssetError(f"{path}: malformed PLY ({type(error).__name__}); export it again") from None
+    if faces.ndim != 2 or len(faces) == 0:
+        raise AssetError(f"{path}: holds no triangles; export it again with its faces")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise AssetError(f"{path}: a face with a vertex index out of range; export it again")
+    return vertices[faces]

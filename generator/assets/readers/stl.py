@@ -1,0 +1,42 @@
+"""STL, binary and ASCII (3D Systems, "StereoLithography Interface Specification", 1989)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.assets.folder import Folder
+from generator.assets.readers.source import Source
+from generator.assets.soup import Float64, Soup
+from generator.core.errors import AssetError
+
+_HEADER_BYTES = 84
+_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def read_stl(folder: Folder, relative: str) -> Source:
+    """Triangles of an STL file; its facet normals carry no information and are ignored.
+
+    Raises:
+        AssetError: if the file is neither a whole binary nor an ASCII STL.
+    """
+    data = folder.read(relative)
+    # Binary files may also begin with "solid": only the size tells for certain.
+    count = int.from_bytes(data[80:_HEADER_BYTES], "little")
+    if len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + _RECORD.itemsize * count:
+        records = np.frombuffer(data, dtype=_RECORD, offset=_HEADER_BYTES)
+        return Source(Soup.of(records["corners"].astype(np.float64)))
+    corners = _ascii(data) if data.lstrip()[:5].lower() == b"solid" else None
+    if corners is None:
+        raise AssetError(
+            f"{folder.root / relative}: neither a whole binary STL nor an ASCII STL; export it again"
+        )
+    return Source(Soup.of(corners))
+
+
+def _ascii(data: bytes) -> Float64 | None:
+    words = [line.split() for line in data.lower().split(b"\n")]
+    try:
+        rows = [[float(x) for x in w[1:4]] for w in words if w and w[0] == b"vertex"]
+        return np.array(rows, dtype=np.float64).reshape(-1, 3, 3)
+    except ValueError:
+        return None

@@ -1,0 +1,51 @@
+"""Options that every command with a configuration has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from generator.assemble.spec import Spec
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A configuration and what the command line changes in it.
+
+    Attributes:
+        source: A path, a shipped name, or the folder of a data set.
+        overrides: ``KEY=VALUE`` texts.
+        without: Names of randomizers to leave out.
+    """
+
+    source: str
+    seed: int | None
+    overrides: tuple[str, ...]
+    without: tuple[str, ...]
+
+    def spec(self) -> Spec:
+        """The validated configuration."""
+        from generator.assemble.spec import spec_of_source
+
+        return spec_of_source(
+            self.source, seed=self.seed, overrides=self.overrides, without=self.without
+        )
+
+
+def configuration_options(command: F) -> F:
+    """Add ``--seed``, ``--set`` and ``--without`` to a command."""
+    for option in (
+        click.option("--without", multiple=True, metavar="NAME", help="Leave a randomizer out."),
+        click.option(
+            "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override one field."
+        ),
+        click.option("--seed", type=int, help="Overrides the configuration's seed."),
+    ):
+        command = option(command)
+    return command

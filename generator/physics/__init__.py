@@ -1,0 +1,20 @@
+"""Things come to rest, arms obey. A pure function of the Scene: no memory between calls."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from generator.core.interfaces import AssetLibrary
+from generator.physics.config import PhysicsConfig
+
+if TYPE_CHECKING:
+    from generator.physics.engine import BulletEngine
+
+__all__ = ["PhysicsConfig", "open_engine"]
+
+
+def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> BulletEngine:
+    """The physics engine, to be used as a context manager."""
+    from generator.physics.engine import BulletEngine  # noqa: PLC0415 - loads pybullet
+
+    return BulletEngine(assets, config)

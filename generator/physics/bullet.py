@@ -1,0 +1,221 @@
+"""The only module that knows pybullet: bodies by name, poses of their own frames, plain verbs.
+
+pybullet's conventions stay in here: quaternions with the scalar last, body numbers, and poses of
+the centre of mass.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pybullet
+
+from generator.core.se3 import SE3, Array, Vec3
+from generator.physics.shapes import CollisionShape
+
+GRAVITY_M_S2 = 9.81
+
+_ANGULAR_DAMPING = 0.5
+_ROLLING_FRICTION_SHARE = 0.1
+"""Rolling friction over an object's smallest half extent: balls and cans come to a halt within a
+few turns, and nothing can rest visibly out of balance."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Solid:
+    number: int
+    shape: CollisionShape
+    scale: float
+    T_body_center: SE3
+
+
+class World:
+    """One simulated world; owns a pybullet connection. Empty after ``reset``, whatever was before.
+
+    All bodies are single rigid bodies ("maximal coordinates"): their contact solver pushes
+    overlapping bodies apart without giving them speed.
+    """
+
+    def __init__(self, time_step_s: float, solver_iterations: int) -> None:
+        self._parameters = {
+            "fixedTimeStep": time_step_s,
+            "numSolverIterations": solver_iterations,
+            "deterministicOverlappingPairs": 1,
+            "contactBreakingThreshold": 0.02,
+            "useSplitImpulse": 1,
+        }
+        self._folder = Path(tempfile.mkdtemp(prefix="gen-data-physics-"))
+        self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._solids: dict[str, _Solid] = {}
+        self._names: dict[int, str] = {}
+        self._bounds: dict[str, tuple[Array, Array]] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all bodies, in the order in which they came."""
+        return tuple(self._solids)
+
+    def close(self) -> None:
+        """Give the connection and the scratch files back; doing it twice is allowed."""
+        if self._client >= 0:
+            pybullet.disconnect(physicsClientId=self._client)
+            shutil.rmtree(self._folder, ignore_errors=True)
+        self._client = -1
+
+    def reset(self) -> None:
+        """An empty world with the same parameters."""
+        self._solids, self._names, self._bounds = {}, {}, {}
+        pybullet.resetSimulation(physicsClientId=self._client)
+        pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(physicsClientId=self._client, **self._parameters)
+
+    def add(
+        self,
+        name: str,
+        shape: CollisionShape,
+        T_world_body: SE3,
+        *,
+        scale: float = 1.0,
+        mass_kg: float = 0.0,
+        friction: float = 0.6,
+        restitution: float = 0.05,
+    ) -> None:
+        """Put a body into the world; without mass it never moves by itself."""
+        x, y, z = shape.center_of_mass_m
+        T_body_center = SE3((x * scale, y * scale, z * scale))
+        position, orientation = _bullet_pose(T_world_body @ T_body_center)
+        number = pybullet.createMultiBody(
+            baseMass=mass_kg,
+            baseCollisionShapeIndex=self._collision_shape(shape, scale),
+            basePosition=position,
+            baseOrientation=orientation,
+            useMaximalCoordinates=1,
+            physicsClientId=self._client,
+        )
+        rolling = _ROLLING_FRICTION_SHARE * shape.radius_m * scale if mass_kg > 0.0 else 0.0
+        pybullet.changeDynamics(
+            number,
+            -1,
+            lateralFriction=friction,
+            restitution=restitution,
+            rollingFriction=rolling,
+            spinningFriction=rolling,
+            angularDamping=_ANGULAR_DAMPING,
+            collisionMargin=shape.margin_m * scale,
+            physicsClientId=self._client,
+        )
+        self._solids[name] = _Solid(number, shape, scale, T_body_center)
+        self._names[number] = name
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the world."""
+        solid = self._solids.pop(name)
+        del self._names[solid.number]
+        self._bounds.pop(name, None)
+        pybullet.removeBody(solid.number, physicsClientId=self._client)
+
+    def ignore(self, name: str, others: Iterable[str]) -> None:
+        """Let a body pass through some others."""
+        number = self._solids[name].number
+        for other in others:
+            pybullet.setCollisionFilterPair(
+                number, self._solids[other].number, -1, -1, 0, physicsClientId=self._client
+            )
+
+    def place(self, name: str, T_world_body: SE3) -> None:
+        """Put a body elsewhere, at rest."""
+        solid = self._solids[name]
+        position, orientation = _bullet_pose(T_world_body @ solid.T_body_center)
+        pybullet.resetBasePositionAndOrientation(
+            solid.number, position, orientation, physicsClientId=self._client
+        )
+        self._bounds.pop(name, None)
+
+    def pose(self, name: str) -> SE3:
+        """``T_world_body``."""
+        solid = self._solids[name]
+        return self._center(solid) @ solid.T_body_center.inverse()
+
+    def bounds_m(self, name: str) -> tuple[Array, Array]:
+        """Low and high corner of a body in the world [m]."""
+        if name not in self._bounds:
+            solid = self._solids[name]
+            self._bounds[name] = solid.shape.bounds_m(self._center(solid), solid.scale)
+        return self._bounds[name]
+
+    def gap_m(self, one: str, other: str, limit_m: float) -> float:
+        """Distance between two bodies [m]; negative where they overlap, at most ``limit_m``."""
+        (low, high), (other_low, other_high) = self.bounds_m(one), self.bounds_m(other)
+        if (low > other_high + limit_m).any() or (other_low > high + limit_m).any():
+            return limit_m
+        points = pybullet.getClosestPoints(
+            self._solids[one].number,
+            self._solids[other].number,
+            distance=limit_m,
+            physicsClientId=self._client,
+        )
+        return min((float(point[8]) for point in points), default=limit_m)
+
+    def step(self, count: int) -> None:
+        """Let time pass by ``count`` steps."""
+        for _ in range(count):
+            pybullet.stepSimulation(physicsClientId=self._client)
+        self._bounds = {}
+
+    def speed(self, name: str) -> tuple[float, float]:
+        """Speed [m/s] and spin [rad/s] of a body."""
+        linear, angular = pybullet.getBaseVelocity(
+            self._solids[name].number, physicsClientId=self._client
+        )
+        return math.dist(linear, (0.0, 0.0, 0.0)), math.dist(angular, (0.0, 0.0, 0.0))
+
+    def contacts(self) -> list[tuple[str, str, float]]:
+        """All pairs that touch, with their gap [m]: negative where they overlap."""
+        pybullet.performCollisionDetection(physicsClientId=self._client)
+        points = pybullet.getContactPoints(physicsClientId=self._client)
+        return [(self._names[p[1]], self._names[p[2]], float(p[8])) for p in points]
+
+    def _center(self, solid: _Solid) -> SE3:
+        (px, py, pz), (x, y, z, w) = pybullet.getBasePositionAndOrientation(
+            solid.number, physicsClientId=self._client
+        )
+        return SE3((px, py, pz), (w, x, y, z))
+
+    def _collision_shape(self, shape: CollisionShape, scale: float) -> int:
+        if shape.boxes:
+            return int(
+                pybullet.createCollisionShapeArray(
+                    shapeTypes=[pybullet.GEOM_BOX] * len(shape.boxes),
+                    halfExtents=[_scaled(half, scale) for _, half in shape.boxes],
+                    collisionFramePositions=[_scaled(center, scale) for center, _ in shape.boxes],
+                    physicsClientId=self._client,
+                )
+            )
+        # Several hulls in one body can only be handed over as a file. The engine remembers files
+        # by name for the life of the process: the name is the content.
+        path = self._folder / f"{shape.key}.obj"
+        if not path.exists():
+            path.write_text(shape.obj)
+        return int(
+            pybullet.createCollisionShape(
+                pybullet.GEOM_MESH,
+                fileName=str(path),
+                meshScale=[scale, scale, scale],
+                physicsClientId=self._client,
+            )
+        )
+
+
+def _bullet_pose(pose: SE3) -> tuple[Vec3, tuple[float, float, float, float]]:
+    w, x, y, z = pose.quaternion_wxyz
+    return pose.translation_m, (x, y, z, w)
+
+
+def _scaled(vector: Vec3, scale: float) -> Vec3:
+    x, y, z = vector
+    return (x * scale, y * scale, z * scale)

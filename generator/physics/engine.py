@@ -1,0 +1,152 @@
+"""BulletEngine: a Scene in, the same Scene at rest out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import TracebackType
+
+from generator.core.errors import Rejection
+from generator.core.interfaces import AssetLibrary, Settled
+from generator.core.scene import Articulation, Body, Scene
+from generator.physics.bullet import World
+from generator.physics.config import PhysicsConfig
+from generator.physics.dropping import Drop
+from generator.physics.goals import Arm, Stance
+from generator.physics.kinematics import link_bodies
+from generator.physics.shapes import CollisionShape, collision_shape
+from generator.physics.support import surfaces_of
+
+_DENSITY_KG_M3 = 300.0
+"""Of the bounding box of a thing whose mass is unknown: household things are mostly hollow."""
+
+
+class BulletEngine:
+    """Settles scenes. What it keeps between calls are assets, never a world.
+
+    Args:
+        assets: Where collision geometry and robots come from.
+        config: Times, thresholds and accuracy.
+    """
+
+    def __init__(self, assets: AssetLibrary, config: PhysicsConfig) -> None:
+        self._assets = assets
+        self._config = config
+        self._world = World(config.time_step_s, config.solver_iterations)
+        self._shapes: dict[str, CollisionShape] = {}
+
+    def __enter__(self) -> BulletEngine:
+        """Ready to settle."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give the engine's connection back."""
+        self._world.close()
+
+    def settle(self, scene: Scene) -> Settled:
+        """The scene at rest; a refused scene comes back as it was.
+
+        Goals stay in the scene as the record of what was asked; joint positions and poses tell
+        what was done. Objects fall after the arms have taken their stances, around them.
+
+        Raises:
+            AssetError: an asset has no collision geometry, or is no robot.
+        """
+        self._world.reset()
+        held = {a.goal.held for a in scene.articulations if a.goal and a.goal.kind == "hold"}
+        falling = [b for b in _solids(scene) if b.motion == "dynamic" and b.name not in held]
+        fixed = [b.name for b in _solids(scene) if b.motion != "dynamic" and b.name not in held]
+        for body in _solids(scene):
+            self._add(body, body in falling)
+
+        stances = self._obeyed(scene, fixed, _placed(scene, falling))
+        if isinstance(stances, Rejection):
+            return Settled(scene, stances)
+        surfaces = {body.name: surfaces_of(scene, body) for body in falling}
+        arms = [name for name in self._world.names if name not in fixed and name not in surfaces]
+        rejection = Drop(self._world, falling, surfaces, self._config).settle(fixed, arms)
+        if rejection is not None:
+            return Settled(scene, rejection)
+        return Settled(self._frozen(scene, falling, stances))
+
+    def _add(self, body: Body, falls: bool) -> None:
+        shape = self._shape(body.asset)
+        guess_kg = _DENSITY_KG_M3 * shape.volume_m3 * body.scale**3
+        self._world.add(
+            body.name,
+            shape,
+            body.T_world_body,
+            scale=body.scale,
+            mass_kg=(body.mass_kg or guess_kg) if falls else 0.0,
+            friction=body.friction,
+            restitution=body.restitution,
+        )
+
+    def _shape(self, asset_id: str) -> CollisionShape:
+        if asset_id not in self._shapes:
+            self._shapes[asset_id] = collision_shape(self._assets.convex_parts(asset_id))
+        return self._shapes[asset_id]
+
+    def _obeyed(
+        self, scene: Scene, fixed: list[str], placed: list[str]
+    ) -> tuple[Stance, ...] | Rejection:
+        """What each arm does; arms avoid those before them."""
+        stances: list[Stance] = []
+        obstacles = list(fixed)
+        for articulation in scene.articulations:
+            robot = self._assets.robot(articulation.asset)
+            shapes = {link: self._shape(asset) for link, asset in robot.collisions.items()}
+            arm = Arm(articulation, robot, shapes, self._world)
+            stance = arm.obey(obstacles, placed)
+            if isinstance(stance, Rejection):
+                return stance
+            stances.append(stance)
+            obstacles += arm.bodies
+            if articulation.goal and stance.T_world_held is not None:
+                obstacles.append(articulation.goal.held)
+        return tuple(stances)
+
+    def _frozen(self, scene: Scene, fallen: list[Body], stances: tuple[Stance, ...]) -> Scene:
+        """The scene with what the world and the arms came to."""
+        poses = {body.name: self._world.pose(body.name).rounded() for body in fallen}
+        bodies = {
+            body.name: replace(body, T_world_body=poses[body.name]) if body.name in poses else body
+            for body in scene.bodies
+        }
+        articulations = []
+        for articulation, stance in zip(scene.articulations, stances, strict=True):
+            moved = replace(articulation, joint_positions=stance.positions)
+            articulations.append(moved)
+            for link in self._links(scene, moved):
+                shown = bodies.get(link.name, link)
+                bodies[link.name] = replace(
+                    shown, T_world_body=link.T_world_body, motion="kinematic", collides=False
+                )
+            if articulation.goal and stance.T_world_held is not None:
+                name = articulation.goal.held
+                bodies[name] = replace(
+                    bodies[name], T_world_body=stance.T_world_held, motion="kinematic"
+                )
+        return replace(scene, bodies=tuple(bodies.values()), articulations=tuple(articulations))
+
+    def _links(self, scene: Scene, articulation: Articulation) -> tuple[Body, ...]:
+        parts = next(
+            (i.parts for i in scene.instances if i.instance_id == articulation.instance_id), ()
+        )
+        return link_bodies(articulation, self._assets.robot(articulation.asset), parts)
+
+
+def _solids(scene: Scene) -> list[Body]:
+    """Bodies that physics sees; a robot's links take part by their robot's own geometry."""
+    prefixes = tuple(f"{articulation.name}/" for articulation in scene.articulations)
+    return [b for b in scene.bodies if b.collides and not b.name.startswith(prefixes)]
+
+
+def _placed(scene: Scene, falling: list[Body]) -> list[str]:
+    """Dynamic bodies that already lie about where they will rest: an arm must avoid them."""
+    dropped = {group.name for group in scene.groups if group.placement == "drop"}
+    return [body.name for body in falling if body.group not in dropped]

@@ -1,0 +1,110 @@
+"""Environment images on the device: irradiance, blurred reflections and the image itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from generator.core.geometry import Float32
+from generator.core.se3 import Array
+from generator.renderers.kernels.sky import prefilter
+
+_GLOSSY_LEVELS = 4
+_GLOSSY_SIZE = 32
+# Lobes of the sharpest level are wider than the texels of a 128 x 64 image.
+_SOURCE_HEIGHTS = (64, 32, 32, 32)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DeviceEnvironment:
+    """One environment of mean luminance 1; the attributes are those of a Sky record."""
+
+    irradiance: wp.array
+    glossy: wp.array
+    image: wp.array
+    nbytes: int
+
+
+def upload_environment(image: Float32, device: wp.Device) -> DeviceEnvironment:
+    """An equirectangular image, shape [h, 2h, 3], ready for kernels."""
+    maps = np.stack(
+        [
+            bordered(_smoothed(image, level, device).numpy())
+            for level in range(1, _GLOSSY_LEVELS + 1)
+        ]
+    )
+    return DeviceEnvironment(
+        wp.array(irradiance_coefficients(image), dtype=wp.vec3, device=device),
+        wp.array(maps, dtype=wp.vec3, device=device),
+        wp.array(image, dtype=wp.vec3, device=device),
+        maps.nbytes + image.nbytes,
+    )
+
+
+def texel_directions(height: int) -> tuple[Array, Array]:
+    """Unit directions [h, 2h, 3] and solid angles [h, 2h] of an equirectangular image.
+
+    Row 0 is the zenith; column 0 is -X, the centre is +X, columns grow clockwise from above.
+    """
+    width = 2 * height
+    edges = np.cos(np.pi * np.arange(height + 1) / height)
+    polar = np.pi * (np.arange(height) + 0.5) / height
+    azimuth = np.pi - 2.0 * np.pi * (np.arange(width) + 0.5) / width
+    x = np.sin(polar)[:, None] * np.cos(azimuth)[None]
+    y = np.sin(polar)[:, None] * np.sin(azimuth)[None]
+    z = np.broadcast_to(np.cos(polar)[:, None], x.shape)
+    solid = np.broadcast_to((edges[:-1] - edges[1:])[:, None] * 2.0 * np.pi / width, x.shape)
+    return np.stack([x, y, z], axis=-1), solid
+
+
+def irradiance_coefficients(image: Float32) -> Array:
+    """Nine RGB coefficients of irradiance over pi, with the basis' constants folded in.
+
+    Source: Ramamoorthi and Hanrahan 2001, equations 3, 8 and 10.
+    """
+    directions, solid = texel_directions(image.shape[0])
+    x, y, z = np.moveaxis(directions, -1, 0)
+    one = np.ones_like(x)
+    basis = np.stack([one, y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y])
+    norm = np.array([0.282095, *[0.488603] * 3, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274])
+    transfer = np.array([1.0, *[2.0 / 3.0] * 3, *[0.25] * 5])
+    moments = np.einsum("khw,hw,hwc->kc", basis, solid, image.astype(np.float64), optimize=False)
+    return moments * (norm * norm * transfer)[:, None]
+
+
+def bordered(maps: Float32) -> Float32:
+    """An octahedral map [n, n, 3] with the texels that continue it all around, [n + 2, n + 2, 3]."""
+    wide = np.pad(maps, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    wide[0, 1:-1], wide[-1, 1:-1] = maps[0, ::-1], maps[-1, ::-1]
+    wide[1:-1, 0], wide[1:-1, -1] = maps[::-1, 0], maps[::-1, -1]
+    wide[0, 0], wide[-1, -1] = maps[-1, -1], maps[0, 0]
+    wide[0, -1], wide[-1, 0] = maps[-1, 0], maps[0, -1]
+    return wide
+
+
+def _smoothed(image: Float32, level: int, device: wp.Device) -> wp.array:
+    source = _shrunk(image, _SOURCE_HEIGHTS[level - 1])
+    directions, solid = texel_directions(source.shape[0])
+    roughness = level / _GLOSSY_LEVELS
+    smoothed = wp.zeros((_GLOSSY_SIZE, _GLOSSY_SIZE), dtype=wp.vec3, device=device)
+    inputs = [
+        wp.array(directions.reshape(-1, 3), dtype=wp.vec3, device=device),
+        wp.array(source.reshape(-1, 3), dtype=wp.vec3, device=device),
+        wp.array(solid.reshape(-1), dtype=float, device=device),
+        roughness * roughness,
+        _GLOSSY_SIZE,
+    ]
+    wp.launch(prefilter, smoothed.shape, inputs, [smoothed], device=device)
+    return smoothed
+
+
+def _shrunk(image: Float32, height: int) -> NDArray[np.float32]:
+    factor = image.shape[0] // height
+    if factor < 2:
+        return image
+    rows, columns = height * factor, 2 * height * factor
+    blocks = image[:rows, :columns].reshape(height, factor, 2 * height, factor, 3)
+    return blocks.mean(axis=(1, 3))

@@ -1,0 +1,147 @@
+"""Light from all around.
+
+Sources: Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps",
+SIGGRAPH 2001; Karis, "Real shading in Unreal Engine 4", 2013 (prefiltered reflections); Cigolle et
+al., "A survey of efficient representations for independent unit vectors", JCGT 2014 (octahedral).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from generator.renderers.kernels.records import Sky
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.func
+def to_sky(sky: Sky, d: wp.vec3):
+    """World direction to the frame of the image."""
+    return wp.vec3(
+        sky.cos_yaw * d[0] + sky.sin_yaw * d[1], sky.cos_yaw * d[1] - sky.sin_yaw * d[0], d[2]
+    )
+
+
+@wp.func
+def sky_irradiance(sky: Sky, n_world: wp.vec3):
+    """Irradiance over pi from the hemisphere around a normal."""
+    n = to_sky(sky, n_world)
+    c = sky.irradiance
+    e = c[0] + c[1] * n[1] + c[2] * n[2] + c[3] * n[0]
+    e += c[4] * (n[0] * n[1]) + c[5] * (n[1] * n[2]) + c[6] * (3.0 * n[2] * n[2] - 1.0)
+    e += c[7] * (n[0] * n[2]) + c[8] * (n[0] * n[0] - n[1] * n[1])
+    return wp.max(e, wp.vec3(0.0, 0.0, 0.0)) * sky.luminance
+
+
+@wp.func
+def sky_image(sky: Sky, d_world: wp.vec3):
+    """The image in one direction, bilinear; any length."""
+    d = wp.normalize(to_sky(sky, d_world))
+    height = sky.image.shape[0]
+    width = sky.image.shape[1]
+    x = (0.5 - wp.atan2(d[1], d[0]) * (0.5 / wp.pi)) * float(width) - 0.5
+    y = wp.acos(wp.clamp(d[2], -1.0, 1.0)) / wp.pi * float(height) - 0.5
+    x0 = int(wp.floor(x))
+    y0 = int(wp.floor(y))
+    fx = x - float(x0)
+    fy = y - float(y0)
+    xa = (x0 + width) % width
+    xb = (x0 + 1 + width) % width
+    ya = wp.clamp(y0, 0, height - 1)
+    yb = wp.clamp(y0 + 1, 0, height - 1)
+    top = sky.image[ya, xa] * (1.0 - fx) + sky.image[ya, xb] * fx
+    bottom = sky.image[yb, xa] * (1.0 - fx) + sky.image[yb, xb] * fx
+    return (top * (1.0 - fy) + bottom * fy) * sky.luminance
+
+
+@wp.func
+def octahedral(d: wp.vec3):
+    """Direction to the square [-1, 1] x [-1, 1]."""
+    s = 1.0 / (wp.abs(d[0]) + wp.abs(d[1]) + wp.abs(d[2]))
+    x = d[0] * s
+    y = d[1] * s
+    if d[2] < 0.0:
+        fold_x = (1.0 - wp.abs(y)) * wp.where(x >= 0.0, 1.0, -1.0)
+        y = (1.0 - wp.abs(x)) * wp.where(y >= 0.0, 1.0, -1.0)
+        x = fold_x
+    return wp.vec2(x, y)
+
+
+@wp.func
+def glossy_level(sky: Sky, level: int, p: wp.vec2):
+    """One prefiltered map at a point of the square; maps have a border of one texel."""
+    inner = float(sky.glossy.shape[1] - 2)
+    x = (p[0] * 0.5 + 0.5) * inner + 0.5
+    y = (p[1] * 0.5 + 0.5) * inner + 0.5
+    x0 = int(x)
+    y0 = int(y)
+    fx = x - float(x0)
+    fy = y - float(y0)
+    top = sky.glossy[level, y0, x0] * (1.0 - fx) + sky.glossy[level, y0, x0 + 1] * fx
+    bottom = sky.glossy[level, y0 + 1, x0] * (1.0 - fx) + sky.glossy[level, y0 + 1, x0 + 1] * fx
+    return top * (1.0 - fy) + bottom * fy
+
+
+@wp.func
+def sky_reflection(sky: Sky, d_world: wp.vec3, roughness: float):
+    """Radiance around a mirrored direction, averaged over the lobe of that roughness."""
+    levels = sky.glossy.shape[0]
+    level = roughness * float(levels) - 1.0
+    p = octahedral(to_sky(sky, d_world))
+    lower = wp.clamp(int(wp.floor(level)), 0, levels - 1)
+    upper = wp.min(lower + 1, levels - 1)
+    part = wp.clamp(level - float(lower), 0.0, 1.0)
+    rough = glossy_level(sky, lower, p)
+    if part > 0.0:
+        rough = rough * (1.0 - part) + glossy_level(sky, upper, p) * part
+    rough = rough * sky.luminance
+    if level < 0.0:
+        # Below the first map, towards the image itself.
+        rough = sky_image(sky, d_world) * (-level) + rough * (1.0 + level)
+    return rough
+
+
+@wp.func
+def octahedral_direction(x: float, y: float):
+    """The inverse of ``octahedral``, unit length."""
+    z = 1.0 - wp.abs(x) - wp.abs(y)
+    if z < 0.0:
+        fold_x = (1.0 - wp.abs(y)) * wp.where(x >= 0.0, 1.0, -1.0)
+        y = (1.0 - wp.abs(x)) * wp.where(y >= 0.0, 1.0, -1.0)
+        x = fold_x
+    return wp.normalize(wp.vec3(x, y, z))
+
+
+@wp.kernel
+def prefilter(
+    directions: wp.array(dtype=wp.vec3),
+    radiance: wp.array(dtype=wp.vec3),
+    solid_angles: wp.array(dtype=float),
+    alpha: float,
+    size: int,
+    smoothed: wp.array(dtype=wp.vec3, ndim=2),
+):
+    """Average an environment over the GGX lobe around each direction of an octahedral map.
+
+    The lobe is that of a surface seen head-on, weighted by the cosine to the light as by Karis.
+
+    Args:
+        directions, radiance, solid_angles: Of the environment's texels.
+        size: Texels along the map's edge, without its border.
+    """
+    row, column = wp.tid()
+    x = float(column) + 0.5
+    y = float(row) + 0.5
+    n = octahedral_direction(x / float(size) * 2.0 - 1.0, y / float(size) * 2.0 - 1.0)
+    total = wp.vec3(0.0)
+    weight = float(0.0)
+    a2 = alpha * alpha
+    for i in range(directions.shape[0]):
+        c = wp.dot(n, directions[i])
+        if c > 0.0:
+            # With the viewer along n, cos^2 of the half angle is (1 + c) / 2.
+            q = 0.5 * (1.0 + c) * (a2 - 1.0) + 1.0
+            w = c / (q * q) * solid_angles[i]
+            total += radiance[i] * w
+            weight += w
+    smoothed[row, column] = total / weight

@@ -1,0 +1,72 @@
+"""Meshes on the device, one hierarchy each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from generator.core.geometry import MeshData
+from generator.core.se3 import Array
+from generator.renderers.kernels.records import Geometry
+
+# Above this, asking every vertex about every face costs more than the answer saves.
+_CONVEXITY_FACES_MAX = 2000
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DeviceMesh:
+    """One asset's geometry on the device.
+
+    Attributes:
+        record: Value of a Geometry record, to be stacked.
+        keep: The device arrays and the hierarchy that the record points to.
+        low_m, high_m: Bounds in the mesh frame.
+    """
+
+    record: object
+    keep: tuple[object, ...]
+    low_m: Array
+    high_m: Array
+    vertex_count: int
+    nbytes: int
+
+
+def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
+    """A mesh with its hierarchy, ready for kernels."""
+    vertices = wp.array(data.vertices_m, dtype=wp.vec3, device=device)
+    normals = wp.array(data.normals, dtype=wp.vec3, device=device)
+    uvs = wp.array(data.uvs, dtype=wp.vec2, device=device)
+    faces = wp.array(data.faces.reshape(-1), dtype=wp.int32, device=device)
+    slots = wp.array(data.face_slots, dtype=wp.int32, device=device)
+    # Measured: leaves of two triangles trace 5 % faster than Warp's default of four.
+    mesh = wp.Mesh(points=vertices, indices=faces, bvh_leaf_size=2)
+    low, high = (np.asarray(bound, dtype=np.float64) for bound in data.bounds_m())
+    record = Geometry()
+    record.mesh = mesh.id
+    record.vertices_m, record.normals, record.uvs = vertices, normals, uvs
+    record.faces, record.face_slots = faces, slots
+    record.low_m, record.high_m = wp.vec3(*low), wp.vec3(*high)
+    record.convex = int(is_convex_solid(data.vertices_m, data.faces))
+    # The hierarchy holds two 16-byte nodes per triangle, built from 24-byte boxes.
+    nbytes = 32 * len(data.vertices_m) + (16 + 64 + 24) * len(data.faces)
+    keep = (vertices, normals, uvs, faces, slots, mesh)
+    return DeviceMesh(record, keep, low, high, len(data.vertices_m), nbytes)
+
+
+def is_convex_solid(vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -> bool:
+    """Whether no vertex lies outside the plane of any face; False for large meshes."""
+    if len(faces) > _CONVEXITY_FACES_MAX:
+        return False
+    vertices = vertices_m.astype(np.float64)
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.sqrt((normals * normals).sum(axis=1))
+    solid = lengths > 0.0
+    normals = normals[solid] / lengths[solid, None]
+    offsets = (normals * corners[solid, 0]).sum(axis=1)
+    heights = np.einsum("fk,vk->fv", normals, vertices, optimize=False) - offsets[:, None]
+    tolerance = 1e-5 * float(np.ptp(vertices, axis=0).max())
+    return bool(solid.any() and (heights <= tolerance).all())

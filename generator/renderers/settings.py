@@ -1,0 +1,31 @@
+"""What a user can choose about rendering."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from generator.config.strict import Strict
+
+
+class RenderSettings(Strict):
+    """How images are made. Labels do not depend on it.
+
+    Attributes:
+        antialias: Samples per pixel on edges; 1 switches anti-aliasing off.
+        shadows: ``soft`` follows the size of every light, ``hard`` takes lights for points.
+        ambient_occlusion_radius_m: How far away a surface still darkens its neighbourhood; 0
+            switches ambient occlusion off.
+        exposure_compensation_ev: Added to the exposure, in stops; positive is brighter.
+        tone: ``filmic`` has a soft shoulder and toe; ``srgb`` clips at white.
+        visibility: How the surface at a pixel centre is found: ``raster`` (CPU only), ``rays``,
+            or the faster one on the device.
+    """
+
+    antialias: Literal[1, 2, 4, 8] = 4
+    shadows: Literal["none", "hard", "soft"] = "soft"
+    ambient_occlusion_radius_m: float = Field(0.25, ge=0.0)
+    exposure_compensation_ev: float = Field(0.0, ge=-10.0, le=10.0)
+    tone: Literal["filmic", "srgb"] = "filmic"
+    visibility: Literal["auto", "raster", "rays"] = "auto"

@@ -1,0 +1,281 @@
+"""The supervisor's decisions, as a state machine: events in, actions out.
+
+It starts no process, reads no clock and touches no file, so that a simulation with a virtual
+clock and seeded faults drives exactly the code that runs in production.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from generator.core.errors import DeterminismError, GenDataError, StorageError, WorkerLost
+from generator.runner.events import (
+    Abort,
+    Action,
+    Assign,
+    Dismiss,
+    Event,
+    Exited,
+    Failed,
+    Kill,
+    Note,
+    Ready,
+    SampleDone,
+    ShardDone,
+    Spawn,
+    Tick,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Bounds on what the supervisor puts up with.
+
+    Attributes:
+        silence_s: A worker that says nothing for so long hangs and is killed. Covers the start of
+            its engines, too.
+        farewell_s: How long a dismissed worker may take to end.
+        shard_attempts: Deaths on one shard before it is given up.
+        lost_shards: Shards given up before the whole run is; the others are still made until then.
+        failed_starts: Deaths in a row before a worker was ever ready, before the run is given up.
+        rss_bytes: Memory at which a worker is replaced after its shard; None = never.
+    """
+
+    silence_s: float = 300.0
+    farewell_s: float = 10.0
+    shard_attempts: int = 3
+    lost_shards: int = 3
+    failed_starts: int = 3
+    rss_bytes: int | None = None
+
+
+class State(Enum):
+    """What a worker is doing."""
+
+    STARTING = "starting"
+    IDLE = "idle"
+    BUSY = "busy"
+    LEAVING = "leaving"
+
+
+@dataclass
+class _Worker:
+    state: State
+    heard_s: float
+    shard: int = -1
+    done: int = 0
+    killed: str = ""
+
+
+@dataclass
+class Supervisor:
+    """Keeps up to ``workers`` processes busy until every shard is made or given up.
+
+    Attributes:
+        shards: Shards to make, in this order.
+        samples_of: Sample indices of a shard.
+        describe_sample: The command that makes one sample alone; for messages.
+        error: The first error that ends the run, or None.
+        given_up: Shards that killed their workers too often.
+    """
+
+    shards: Sequence[int]
+    samples_of: Callable[[int], range]
+    workers: int
+    describe_sample: Callable[[int], str]
+    limits: Limits = field(default_factory=Limits)
+    error: GenDataError | None = None
+    given_up: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Begin with no process."""
+        if self.workers < 1:
+            raise ValueError(f"at least one worker is needed, got {self.workers}")
+        self._alive: dict[int, _Worker] = {}
+        self._next_number = 0
+        self._cursor = 0
+        self._again: deque[int] = deque()
+        self._deaths: dict[int, int] = {}
+        self._failed_starts = 0
+        self._draining = False
+
+    @property
+    def finished(self) -> bool:
+        """Whether no process is left and none will be started."""
+        return not self._alive and (self._draining or self._waiting == 0)
+
+    @property
+    def _waiting(self) -> int:
+        """Shards that no worker has yet."""
+        return len(self.shards) - self._cursor + len(self._again)
+
+    def start(self, now_s: float) -> list[Action]:
+        """The first actions."""
+        return self._dispatch(now_s)
+
+    def handle(self, event: Event, now_s: float) -> list[Action]:
+        """What to do about an event. Events of processes that are gone are ignored."""
+        actions = self._react(event, now_s)
+        return actions + self._dispatch(now_s)
+
+    def _react(self, event: Event, now_s: float) -> list[Action]:
+        if isinstance(event, Tick):
+            return self._kill_silent(now_s)
+        if isinstance(event, Abort):
+            return self._abort(event.error)
+        worker = self._alive.get(event.worker)
+        if worker is None:
+            return []
+        worker.heard_s = now_s
+        if isinstance(event, Exited):
+            return self._bury(event, self._alive.pop(event.worker))
+        if isinstance(event, Failed):
+            return self._report(event.error, worker)
+        if isinstance(event, SampleDone):
+            worker.done += 1
+        elif worker.state is not State.LEAVING:
+            worker.state = State.LEAVING if worker.killed else State.IDLE
+            self._failed_starts = 0
+        if isinstance(event, ShardDone):
+            return self._recycle(event, worker)
+        return []
+
+    def _dispatch(self, now_s: float) -> list[Action]:
+        """Give idle workers shards, start missing workers, send superfluous ones home."""
+        actions: list[Action] = []
+        for number, worker in self._of(State.IDLE):
+            if self._draining or self._waiting == 0:
+                break
+            worker.state, worker.shard, worker.done = State.BUSY, self._take(), 0
+            worker.heard_s = now_s
+            actions.append(Assign(number, worker.shard))
+        open_shards = 0 if self._draining else self._waiting + len(self._of(State.BUSY))
+        if open_shards == 0:
+            return actions + self._send_home(now_s)
+        staff = sum(worker.state is not State.LEAVING for worker in self._alive.values())
+        for _ in range(min(self.workers, open_shards) - staff):
+            actions.append(Spawn(self._next_number))
+            self._alive[self._next_number] = _Worker(State.STARTING, now_s)
+            self._next_number += 1
+        return actions
+
+    def _send_home(self, now_s: float) -> list[Action]:
+        actions: list[Action] = []
+        for number, worker in self._of(State.IDLE):
+            worker.state, worker.heard_s = State.LEAVING, now_s
+            actions.append(Dismiss(number))
+        for number, worker in self._of(State.STARTING):
+            worker.state, worker.killed = State.LEAVING, "no longer needed"
+            actions.append(Kill(number))
+        return actions
+
+    def _of(self, state: State) -> list[tuple[int, _Worker]]:
+        return [(n, w) for n, w in sorted(self._alive.items()) if w.state is state]
+
+    def _take(self) -> int:
+        if self._again:
+            return self._again.popleft()
+        self._cursor += 1
+        return self.shards[self._cursor - 1]
+
+    def _kill_silent(self, now_s: float) -> list[Action]:
+        actions: list[Action] = []
+        for number, worker in sorted(self._alive.items()):
+            leaving = worker.state is State.LEAVING
+            patience_s = self.limits.farewell_s if leaving else self.limits.silence_s
+            waits = worker.state is State.IDLE
+            if not waits and not worker.killed and now_s - worker.heard_s > patience_s:
+                worker.killed = f"no sign of life for {patience_s:g} s"
+                actions += [Note(f"worker {number}: {worker.killed}"), Kill(number)]
+        return actions
+
+    def _abort(self, error: GenDataError) -> list[Action]:
+        self._drain(error)
+        actions: list[Action] = []
+        for number, worker in sorted(self._alive.items()):
+            worker.state, worker.killed = State.LEAVING, "stopped"
+            actions.append(Kill(number))
+        return actions
+
+    def _report(self, error: GenDataError, worker: _Worker) -> list[Action]:
+        worker.state = State.LEAVING
+        if isinstance(error, (StorageError, DeterminismError)):
+            # The others would only fail in the same way, after much work.
+            return self._abort(error)
+        return self._drain(error)
+
+    def _drain(self, error: GenDataError) -> list[Action]:
+        """Hand out no more shards; those in work are finished."""
+        self.error = self.error or error
+        self._draining = True
+        return []
+
+    def _bury(self, event: Exited, worker: _Worker) -> list[Action]:
+        if worker.state is State.LEAVING:
+            return []
+        cause = worker.killed or describe_exit(event)
+        if event.out_of_memory and self.workers > 1:
+            self.workers -= 1
+            cause += f"; going on with {self.workers} worker(s)"
+        if worker.state is State.BUSY:
+            return self._shard_died(event.worker, worker, cause)
+        if worker.state is State.STARTING:
+            self._failed_starts += 1
+            if self._failed_starts >= self.limits.failed_starts:
+                self._drain(WorkerLost(f"worker processes end while they start: {cause}"))
+        return [Note(f"worker {event.worker} {cause} while {worker.state.value}")]
+
+    def _shard_died(self, number: int, worker: _Worker, cause: str) -> list[Action]:
+        shard = worker.shard
+        self._deaths[shard] = self._deaths.get(shard, 0) + 1
+        place = self._in_flight(worker)
+        note = Note(f"worker {number} {cause}; shard {shard}, {place}")
+        if self._deaths[shard] < self.limits.shard_attempts:
+            self._again.append(shard)
+            return [note]
+        self.given_up.append(shard)
+        lost = WorkerLost(
+            f"shard {shard}: its worker process died {self._deaths[shard]} times, "
+            f"at last in {place}: {cause}.\n"
+            f"  Reproduce: {self.describe_sample(self._suspect(worker))}"
+        )
+        self.error = self.error or lost
+        if len(self.given_up) >= self.limits.lost_shards:
+            self._drain(lost)
+        return [note]
+
+    def _suspect(self, worker: _Worker) -> int:
+        indices = self.samples_of(worker.shard)
+        return indices[min(worker.done, len(indices) - 1)]
+
+    def _in_flight(self, worker: _Worker) -> str:
+        if worker.done < len(self.samples_of(worker.shard)):
+            return f"sample {self._suspect(worker)}"
+        return "writing its files"
+
+    def _recycle(self, event: ShardDone, worker: _Worker) -> list[Action]:
+        cap = self.limits.rss_bytes
+        if cap is None or event.rss_bytes <= cap or worker.state is State.LEAVING:
+            return []
+        worker.state = State.LEAVING
+        text = f"worker {event.worker} holds {event.rss_bytes / 1e6:.0f} MB and is replaced"
+        return [Note(text), Dismiss(event.worker)]
+
+
+def describe_exit(event: Exited) -> str:
+    """How a process ended, in words."""
+    if event.exit_code >= 0:
+        return f"exited with status {event.exit_code}"
+    number = -event.exit_code
+    try:
+        name = signal.Signals(number).name
+    except ValueError:
+        name = "unknown"
+    text = f"killed by signal {number} ({name})"
+    if event.out_of_memory:
+        return f"{text}; the kernel was out of memory"
+    return f"{text}; out of memory?" if number == signal.SIGKILL else text

@@ -1,0 +1,219 @@
+"""A hand-made data set: boxes and ellipsoids on a ground plane, ray-cast in a few lines of numpy.
+
+Independent of every renderer of the project, so that what exporters write can be held against
+geometry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from exporters.images import write_media
+from generator import annotations
+from generator.annotations.truth import Thresholds, image_truth
+from generator.core.boxes import BoxPx, tight_box
+from generator.core.capture import Capture, Channel, Reading, Silhouette
+from generator.core.interfaces import DatasetInfo, Exporter
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import Sample
+from generator.core.scene import Camera, Instance, Scene
+from generator.core.se3 import SE3, Array, look_at
+
+CATEGORIES = ("car", "crate", "pedestrian")
+MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
+SIZES_M = {"car": (4.0, 1.8, 1.5), "pedestrian": (0.5, 0.6, 1.8), "crate": (1.0, 1.4, 0.9)}
+
+
+def instance(
+    number: int, category: str, x_m: float, y_m: float, yaw_rad: float, shape: str = "box"
+) -> Instance:
+    """A thing that stands on the ground at (x, y); ``shape`` is ``box`` or ``ellipsoid``."""
+    length, width, height = SIZES_M[category]
+    return Instance(
+        instance_id=number,
+        name=f"{category}/{number}",
+        category=category,
+        category_id=CATEGORIES.index(category) + 1,
+        asset=f"primitive/{shape}",
+        T_world_instance=SE3.about_z(yaw_rad, (x_m, y_m, 0.0)),
+        box_min_m=(-0.5 * length, -0.5 * width, 0.0),
+        box_max_m=(0.5 * length, 0.5 * width, height),
+    )
+
+
+def level_camera(name: str = "color", size_px: tuple[int, int] = (160, 120)) -> Camera:
+    """A camera 1.6 m above the origin that looks along world X, level."""
+    intrinsics = Intrinsics.from_hfov(*size_px, hfov_rad=1.2)
+    return Camera(name, look_at((0.0, 0.0, 1.6), (10.0, 0.0, 1.6)), intrinsics)
+
+
+def ray_cast(scene: Scene, camera: Camera) -> Reading:
+    """Every channel, and silhouettes on a canvas three images wide and high."""
+    k = camera.intrinsics
+    w, h = k.width_px, k.height_px
+    u = (np.arange(-w, 2 * w) + 0.5 - k.cx_px) / k.fx_px
+    v = (np.arange(-h, 2 * h) + 0.5 - k.cy_px) / k.fy_px
+    rays = np.stack([*np.meshgrid(u, v), np.ones((3 * h, 3 * w))], axis=-1)
+    inside = (slice(h, 2 * h), slice(w, 2 * w))
+
+    depth = _ground_depth(rays[inside], camera)
+    ids = np.zeros((h, w), np.uint16)
+    categories = np.zeros((h, w), np.uint16)
+    silhouettes = {}
+    for thing in scene.instances:
+        hit = _hit(rays, thing, camera)
+        silhouettes[thing.instance_id] = _silhouette(thing.instance_id, np.isfinite(hit), w, h)
+        nearer = hit[inside] < depth
+        depth = np.where(nearer, hit[inside], depth)
+        ids[nearer] = thing.instance_id
+        categories[nearer] = thing.category_id
+    shade = np.where(np.isfinite(depth), 255.0 / (1.0 + 0.1 * depth), 0.0)
+    rgb = np.stack([shade, 20.0 * ids, 60.0 * categories], axis=-1).astype(np.uint8)
+    channels: dict[Channel, NDArray[Any]] = {
+        Channel.RGB: rgb,
+        Channel.Z_DEPTH: depth.astype(np.float32),
+        Channel.INSTANCE: ids,
+        Channel.CATEGORY: categories,
+        Channel.PART: np.zeros_like(ids),
+    }
+    return Reading(camera.name, camera, channels, silhouettes)
+
+
+def _ground_depth(rays: Array, camera: Camera) -> Array:
+    down = camera.T_world_camera.rotate(rays)[..., 2]
+    height_m = camera.T_world_camera.translation_m[2]
+    return np.where(down < -1e-9, height_m / np.maximum(-down, 1e-9), np.inf)
+
+
+def _hit(rays: Array, thing: Instance, camera: Camera) -> Array:
+    """Depth at which each ray enters the thing; inf where it misses."""
+    low, high = np.array(thing.box_min_m), np.array(thing.box_max_m)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    T_instance_camera = thing.T_world_instance.inverse() @ camera.T_world_camera
+    origin = (np.array(T_instance_camera.translation_m) - middle) / half
+    direction = T_instance_camera.rotate(rays) / half
+    if thing.asset.endswith("ellipsoid"):
+        a = (direction**2).sum(-1)
+        b = (direction * origin).sum(-1)
+        discriminant = b * b - a * ((origin**2).sum() - 1.0)
+        near = (-b - np.sqrt(np.maximum(discriminant, 0.0))) / a
+        return np.where((discriminant > 0) & (near > 0), near, np.inf)
+    direction = np.where(np.abs(direction) < 1e-12, 1e-12, direction)
+    slabs = np.stack([(-1.0 - origin) / direction, (1.0 - origin) / direction])
+    enter, leave = slabs.min(0).max(-1), slabs.max(0).min(-1)
+    return np.where((enter < leave) & (enter > 0), enter, np.inf)
+
+
+def _silhouette(number: int, canvas: NDArray[np.bool_], w: int, h: int) -> Silhouette:
+    box = tight_box(canvas)
+    if box is None:
+        return Silhouette(number, 0, 0, np.zeros((0, 0), dtype=bool))
+    mask = canvas[box.y_min : box.y_max, box.x_min : box.x_max]
+    return Silhouette(number, box.x_min - w, box.y_min - h, mask)
+
+
+def street(index: int) -> tuple[Instance, ...]:
+    """Things of frame ``index``; every fourth frame is empty."""
+    if index % 4 == 3:
+        return ()
+    turn = 0.7 * index
+    return (
+        instance(1, "car", 14.0, 3.0 - 0.4 * index, turn),
+        instance(2, "pedestrian", 9.0, -2.0, 1.0 + turn),
+        instance(3, "crate", 8.0, 1.6, -turn, shape="ellipsoid"),
+        instance(4, "crate", 12.0, 2.2, 0.3),
+        instance(7, "pedestrian", 7.0, -4.6 + 0.1 * index, turn),
+    )
+
+
+def make_sample(
+    index: int,
+    instances: Sequence[Instance],
+    cameras: Sequence[Camera],
+    split: str = "train",
+    thresholds: Thresholds | None = None,
+) -> Sample:
+    """A sample with every annotation."""
+    scene = Scene("street", instances=tuple(instances), cameras=tuple(cameras))
+    readings = {camera.name: ray_cast(scene, camera) for camera in cameras}
+    annotators = [annotations.TABLE.load(name)() for name in annotations.TABLE]
+    truth = {
+        name: image_truth(scene, reading, annotators, thresholds or Thresholds())
+        for name, reading in readings.items()
+    }
+    return Sample(index, index, 0, split, scene, Capture(readings), truth)
+
+
+def make_info(n: int, sensors: Sequence[str] = ("color",), **changes: Any) -> DatasetInfo:
+    """A data set of ``n`` samples whose sensors write ``MEDIA``."""
+    info = DatasetInfo(
+        name="street",
+        seed=7,
+        n=n,
+        views_per_scene=1,
+        categories=CATEGORIES,
+        sensors=tuple(sensors),
+        media=dict.fromkeys(sensors, MEDIA),
+        depth_scale_m=0.001,
+    )
+    return replace(info, **changes)
+
+
+def without_arrays(sample: Sample) -> Sample:
+    """The sample after its images were written and dropped."""
+    return replace(sample, capture=Capture({}))
+
+
+def export(
+    exporter: Exporter,
+    info: DatasetInfo,
+    samples: Sequence[Sample],
+    folder: Path,
+    *,
+    shard_size: int = 3,
+    backwards: bool = False,
+    keep_arrays: bool = False,
+) -> Path:
+    """Write samples shard by shard, merge the shards, and return the data set's folder."""
+    shards = [list(samples[i : i + shard_size]) for i in range(0, len(samples), shard_size)]
+    shard_dirs = [folder / f"shards/{k:06d}" for k in range(len(shards))]
+    work = list(zip(shards, shard_dirs, strict=True))
+    for shard, shard_dir in reversed(work) if backwards else work:
+        for sample in shard:
+            write_media(info, sample, shard_dir)
+        exporter.write_shard(
+            info, shard if keep_arrays else map(without_arrays, shard), shard_dir
+        )
+    exporter.finalize(info, shard_dirs, folder / "dataset")
+    return folder / "dataset"
+
+
+class World:
+    """What tests of exporters build with; handed out by the fixture ``world``."""
+
+    categories = CATEGORIES
+    box = BoxPx
+    instance = staticmethod(instance)
+    camera = staticmethod(level_camera)
+    info = staticmethod(make_info)
+    sample = staticmethod(make_sample)
+    export = staticmethod(export)
+
+    def __init__(self) -> None:
+        splits = ("train", "train", "val", "train", "val", "train", "train")
+        self.samples = [
+            make_sample(i, street(i), [level_camera()], split) for i, split in enumerate(splits)
+        ]
+
+
+@pytest.fixture(scope="session")
+def world() -> World:
+    """Seven frames of a street in three shards; two splits; frame 3 is empty."""
+    return World()
