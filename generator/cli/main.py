@@ -67,7 +67,19 @@ class LateCommands(click.Group):
             formatter.write_dl(list(self.summaries.items()))
 
 
-@click.group(cls=LateCommands, invoke_without_command=True)
+HELP = """Generate a labelled synthetic data set.
+
+\b
+gen-data --config tabletop.yaml --n 1000
+gen-data --config tabletop.yaml --n 1000 --set randomizers.clutter.count=20
+gen-data --config tabletop.yaml --n 1000 --without colors --out ablation
+
+An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configuration or usage,
+3 asset, 4 storage (resumable), 5 determinism, 6 sample, 7 verification, 130 interrupted.
+"""
+
+
+@click.group(cls=LateCommands, invoke_without_command=True, help=HELP)
 @click.version_option(__version__, prog_name="gen-data")
 @click.option("--config", "-c", metavar="FILE", help="Configuration: a path, or a shipped name.")
 @click.option("--n", "-n", type=int, help="Number of samples.")
@@ -87,15 +99,7 @@ def cli(
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
-    r"""Generate a labelled synthetic data set.
-
-    \b
-    gen-data --config tabletop.yaml --n 1000
-    gen-data --config tabletop.yaml --n 1000 --set elements.clutter.count=20 --without colors
-
-    An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configuration or
-    usage, 3 asset, 4 storage (resumable), 5 determinism, 6 sample, 7 verification, 130 interrupted.
-    """
+    """Generate, or hand over to the command that was named."""
     if context.invoked_subcommand is not None:
         if config is not None:
             raise ConfigError(

@@ -15,6 +15,6 @@ __all__ = ["PhysicsConfig", "open_engine"]
 
 def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> BulletEngine:
     """The physics engine, to be used as a context manager."""
-    from generator.physics.engine import BulletEngine  # noqa: PLC0415 - loads pybullet
+    from generator.physics.engine import BulletEngine
 
     return BulletEngine(assets, config)

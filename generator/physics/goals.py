@@ -86,13 +86,13 @@ class Arm:
             return self._rejection(COLLIDES, goal) if hit else stance
         obstacles = [name for name in (*fixed, *placed) if name != goal.held]
         failures = {CANNOT_REACH}
-        for stance in self._stances(goal):
-            if isinstance(stance, str):
-                failures.add(stance)
+        for candidate in self._stances(goal):
+            if isinstance(candidate, str):
+                failures.add(candidate)
                 continue
-            self._take(stance, goal.held)
+            self._take(candidate, goal.held)
             if not self._collides(obstacles, goal.held):
-                return stance
+                return candidate
             failures.add(COLLIDES)
         furthest = next(f for f in (COLLIDES, DOES_NOT_FIT, CANNOT_REACH) if f in failures)
         return self._rejection(furthest, goal)

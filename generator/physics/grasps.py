@@ -119,7 +119,8 @@ def _between_fingers(low_m: Array, high_m: Array, up: Vec3, palm_z_m: float) -> 
     """``T_grasp_held``: narrow side along Y, centre at the origin or just clear of the palm.
 
     Args:
-        low_m, high_m: Bounds of the object in its own frame.
+        low_m: Low corner of the object in its own frame.
+        high_m: High corner.
         up: The object's Z in the grasp frame.
         palm_z_m: Where the hand ends, along the grasp frame's Z.
     """

@@ -99,7 +99,7 @@ def collision_shape(parts: ConvexParts) -> CollisionShape:
 
 def _center_of_mass(parts_m: tuple[Array, ...]) -> Vec3:
     """Of solid hulls; where parts overlap, matter counts twice."""
-    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415 - slow to load
+    from scipy.spatial import ConvexHull, QhullError
 
     total, moment = 0.0, np.zeros(3)
     for part in parts_m:

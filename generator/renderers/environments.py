@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
@@ -102,9 +103,6 @@ def _smoothed(image: Float32, level: int, device: wp.Device) -> wp.array:
 
 
 def _shrunk(image: Float32, height: int) -> NDArray[np.float32]:
-    factor = image.shape[0] // height
-    if factor < 2:
+    if image.shape[0] <= height:
         return image
-    rows, columns = height * factor, 2 * height * factor
-    blocks = image[:rows, :columns].reshape(height, factor, 2 * height, factor, 3)
-    return blocks.mean(axis=(1, 3))
+    return cv2.resize(image, (2 * height, height), interpolation=cv2.INTER_AREA)

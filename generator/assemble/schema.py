@@ -1,0 +1,53 @@
+"""JSON Schema of a configuration: what editors complete and check against."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from generator.assemble.spec import PLUGIN_LISTS, Head
+from generator.assemble.tables import TABLES
+from generator.config.schema import json_schema
+
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def config_schema() -> dict[str, Any]:
+    """Schema of a whole configuration, every plug-in of every table included."""
+    definitions: dict[str, Any] = {}
+    schema = _hoisted(json_schema(Head), definitions)
+    properties = schema["properties"]
+    for key, kind in PLUGIN_LISTS.items():
+        properties[key] = {
+            "type": "array",
+            "items": {"oneOf": [_plugin(kind, name, definitions) for name in TABLES[kind]]},
+        }
+    # A configuration overrides its template's elements by name; a template lists them.
+    properties["elements"] = {
+        "description": "Overrides by element name, or the whole list of elements.",
+        "anyOf": [{"type": "object"}, properties["elements"]],
+    }
+    properties["annotations"] = {
+        "type": "array",
+        "items": {"enum": list(TABLES["annotation"])},
+        "description": "What is computed about every object.",
+    }
+    return {
+        "$schema": DRAFT,
+        **schema,
+        "title": "gen-data configuration",
+        "$defs": dict(sorted(definitions.items())),
+    }
+
+
+def _plugin(kind: str, name: str, definitions: dict[str, Any]) -> dict[str, str]:
+    schema = _hoisted(json_schema(TABLES[kind].load(name)), definitions)
+    # ``type`` chooses the plug-in, so it has to be written even where a default exists.
+    schema["required"] = sorted({"type", *schema.get("required", ())})
+    definitions[f"{kind}.{name}"] = schema
+    return {"$ref": f"#/$defs/{kind}.{name}"}
+
+
+def _hoisted(schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
+    """The schema with its own definitions moved to the common ones."""
+    definitions.update(schema.pop("$defs", {}))
+    return schema

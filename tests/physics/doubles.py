@@ -1,0 +1,195 @@
+"""Stand-ins for the asset library: solids of known size, and small scenes made of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from generator.core.errors import AssetError
+from generator.core.geometry import ConvexParts, Gripper, Joint, RobotModel
+from generator.core.scene import Body, ObjectGroup, Scene, Surface
+from generator.core.se3 import SE3
+from tests.physics.panda import mesh_vertices, panda
+
+TABLE_TOP_Z_M = 0.75
+TABLE_SIZE_M = (1.2, 0.8)
+
+
+class Solids:
+    """An asset library whose ids are sizes: ``box 0.1 0.2 0.3``, ``cylinder 0.03 0.12``."""
+
+    def convex_parts(self, asset_id: str) -> ConvexParts:
+        """Collision geometry of an id."""
+        return _parts(asset_id)
+
+    def robot(self, asset_id: str) -> RobotModel:
+        """``panda`` or ``planar``."""
+        if asset_id not in ROBOTS:
+            raise AssetError(f"no robot '{asset_id}'")
+        return ROBOTS[asset_id]()
+
+    def __getattr__(self, name: str) -> Any:
+        raise AssertionError(f"physics must not ask the library for '{name}'")
+
+
+@cache
+def _parts(asset_id: str) -> ConvexParts:
+    kind, *rest = asset_id.replace("/", " ").split()
+    if kind == "panda":
+        return ConvexParts((_thinned(mesh_vertices(rest[0])),))
+    sizes = [float(word) for word in rest]
+    makers = {
+        "box": lambda x, y, z: (box(x, y, z),),
+        "cylinder": lambda r, h: (cylinder(r, h),),
+        "cone": lambda r, h: (cylinder(r, h, top_radius_m=1e-4),),
+        "ball": lambda r: (ball(r),),
+        "mug": mug,
+        "bin": lambda x, y, z: tray(x, y, z, wall_m=0.01),
+        "table": lambda x, y, z: (box(x, y, z),),
+    }
+    return ConvexParts(tuple(makers[kind](*sizes)))
+
+
+def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
+    """Corners of a box with these edges [m] around a point."""
+    signs = [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
+    return 0.5 * np.array(signs) * (x, y, z) + at
+
+
+def cylinder(
+    radius_m: float, height_m: float, top_radius_m: float | None = None, z_m: float = 0.0
+) -> np.ndarray:
+    """A prism of 24 sides around Z."""
+    angle = np.arange(24) * 2 * math.pi / 24
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=1)
+    top = radius_m if top_radius_m is None else top_radius_m
+    return np.concatenate(
+        [
+            ring * radius_m + [0, 0, z_m - height_m / 2],
+            ring * top + [0, 0, z_m + height_m / 2],
+        ]
+    )
+
+
+def ball(radius_m: float) -> np.ndarray:
+    """200 points on a sphere (Fibonacci lattice)."""
+    i = np.arange(200) + 0.5
+    z, turn = 1 - 2 * i / 200, math.pi * (1 + math.sqrt(5)) * i
+    r = np.sqrt(1 - z * z)
+    return radius_m * np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+
+
+def mug(radius_m: float, height_m: float) -> tuple[np.ndarray, ...]:
+    """A floor, ten staves and a handle; the centre of the bounding box is the origin."""
+    floor = cylinder(radius_m, 0.008, z_m=-height_m / 2 + 0.004)
+    staves = []
+    for k in range(10):
+        points = [
+            (r * math.cos(a), r * math.sin(a), z)
+            for a in (2 * math.pi * (k + t) / 10 for t in (0, 0.5, 1))
+            for r in (radius_m - 0.005, radius_m)
+            for z in (-height_m / 2 + 0.008, height_m / 2)
+        ]
+        staves.append(np.array(points))
+    handle = box(0.03, 0.01, 0.6 * height_m, at=(radius_m + 0.015, 0, 0))
+    return tuple(part - (0.015, 0, 0) for part in (floor, *staves, handle))
+
+
+def tray(x: float, y: float, z: float, wall_m: float) -> tuple[np.ndarray, ...]:
+    """An open bin: floor and four walls of one thickness, outer size x, y, z."""
+    side = (x - wall_m) / 2, (y - wall_m) / 2
+    return (
+        box(x, y, wall_m, at=(0, 0, (wall_m - z) / 2)),
+        box(wall_m, y, z, at=(side[0], 0, 0)),
+        box(wall_m, y, z, at=(-side[0], 0, 0)),
+        box(x, wall_m, z, at=(0, side[1], 0)),
+        box(x, wall_m, z, at=(0, -side[1], 0)),
+    )
+
+
+def _thinned(points: np.ndarray) -> np.ndarray:
+    """The hull's vertices."""
+    from scipy.spatial import ConvexHull
+
+    return points[np.sort(ConvexHull(points).vertices)]
+
+
+def planar() -> RobotModel:
+    """A post, two bars of 0.3 m that turn about Z, and two fingers without bodies of the arm."""
+
+    def bar(name: str, parent: str, child: str, x: float) -> Joint:
+        return Joint(name, "revolute", parent, child, SE3((x, 0, 0)), (0, 0, 1), -2.5, 2.5)
+
+    return RobotModel(
+        links=("post", "upper", "fore"),
+        joints=(bar("shoulder", "post", "upper", 0.0), bar("elbow", "upper", "fore", 0.3)),
+        visuals={"upper": "box 0.3 0.04 0.04", "fore": "box 0.3 0.04 0.04"},
+        collisions={},
+        home=(0.0, 0.5),
+        gripper=Gripper("fore", SE3((0.3, 0, 0)), (), 0.0),
+        no_collide=frozenset(),
+    )
+
+
+ROBOTS = {"panda": cache(panda), "planar": planar}
+
+
+def table_scene(*bodies: Body, placement: str = "drop", walled: bool = False) -> Scene:
+    """A table of 1.2 m by 0.8 m, 0.75 m high, on a floor, and bodies of a group ``things``."""
+    x, y = TABLE_SIZE_M
+    surface = Surface(
+        "table", "table", SE3((0, 0, TABLE_TOP_Z_M)), TABLE_SIZE_M, clearance_m=2.0, walled=walled
+    )
+    furniture = (
+        Body("floor", "box 6 6 0.1", SE3((0, 0, -0.05))),
+        Body("table", f"table {x} {y} 0.04", SE3((0, 0, TABLE_TOP_Z_M - 0.02))),
+    )
+    group = ObjectGroup("things", ("table",), (), len(bodies), placement)  # type: ignore[arg-type]
+    things = tuple(replace(body, group="things", motion="dynamic") for body in bodies)
+    return Scene("test", bodies=furniture + things, surfaces=(surface,), groups=(group,))
+
+
+def thing(
+    name: str, asset: str, x: float = 0.0, y: float = 0.0, above_m: float = 0.2, **more: Any
+) -> Body:
+    """A body whose origin is some height above the table's top."""
+    return Body(name, asset, SE3((x, y, TABLE_TOP_Z_M + above_m)), mass_kg=0.3, **more)
+
+
+HOUSEHOLD = (
+    "box 0.19 0.06 0.28",
+    "box 0.15 0.22 0.025",
+    "cylinder 0.033 0.12",
+    "mug 0.04 0.10",
+    "ball 0.035",
+    "cone 0.04 0.12",
+    "box 0.05 0.05 0.05",
+    "cylinder 0.08 0.02",
+)
+
+
+def dropped_clutter(seed: int, count: int = 10) -> Scene:
+    """Household things in any orientation, each 2 to 10 cm above the one before."""
+    rng = np.random.Generator(np.random.Philox(key=seed))
+    bodies, top = [], 0.0
+    for k in range(count):
+        asset = HOUSEHOLD[int(rng.integers(len(HOUSEHOLD)))]
+        w, x, y, z = (float(v) for v in rng.normal(size=4))
+        norm = math.sqrt(w * w + x * x + y * y + z * z)
+        turn = SE3(quaternion_wxyz=(w / norm, x / norm, y / norm, z / norm))
+        points = turn.apply(np.concatenate(_parts(asset).parts_m))
+        low, high = points.min(axis=0), points.max(axis=0)
+        above = top + float(rng.uniform(0.02, 0.10)) - float(low[2])
+        top = above + float(high[2])
+        at = [
+            float(rng.uniform(-s / 2 - lo, s / 2 - hi))
+            for s, lo, hi in zip(TABLE_SIZE_M, low, high, strict=False)
+        ]
+        body = thing(f"things/{k}", asset, at[0], at[1], above)
+        pose = SE3(body.T_world_body.translation_m, turn.quaternion_wxyz)
+        bodies.append(replace(body, T_world_body=pose))
+    return table_scene(*bodies)
