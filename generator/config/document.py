@@ -162,9 +162,6 @@ def with_override(node: Node, path: str, value: str, origin: str = "--set") -> N
     return _exchanged(node, steps, replacement, ())
 
 
-# --- reading ---------------------------------------------------------------------------------
-
-
 @dataclass
 class _Open:
     """A list or mapping whose end has not been read yet."""
@@ -417,9 +414,6 @@ def _noun(node: Node) -> str:
     if isinstance(node.content, tuple):
         return "a list"
     return "a mapping" if isinstance(node.content, Mapping) else shown(node.content)
-
-
-# --- overrides -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

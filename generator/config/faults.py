@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel
 
+from generator.config.distributions.fields import FieldOf
 from generator.config.problems import FieldPath
 from generator.config.words import branches, is_union, unwrapped
 
@@ -145,11 +146,16 @@ def _without_none(owner: Owner) -> Owner:
 
 def _branch(union: Any, label: str) -> Any:
     """The alternative of a union that a part of ``loc`` names: by its type, or by its tag."""
-    for candidate in branches(union):
-        annotation, _ = unwrapped(candidate)
-        name = getattr(annotation, "__name__", str(annotation))
-        if label == name or label.startswith(f"{name}[") or f"[{name}" in label:
-            return candidate
-        if label in tags_of(annotation):
-            return candidate
-    return branches(union)[0]
+    candidates = branches(union)
+    scores = [_likeness(label, *unwrapped(candidate)) for candidate in candidates]
+    return candidates[scores.index(max(scores))]
+
+
+def _likeness(label: str, annotation: Any, metadata: tuple[Any, ...]) -> int:
+    """How surely pydantic's label of a union's alternative means a type."""
+    name = getattr(annotation, "__name__", str(annotation))
+    if label == name or label.startswith(f"{name}[") or label in tags_of(annotation):
+        return 3
+    if label.startswith("function-plain") and any(isinstance(m, FieldOf) for m in metadata):
+        return 2
+    return int(label.endswith((f"-{name}", f"{name}]")))

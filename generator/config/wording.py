@@ -5,6 +5,7 @@ from __future__ import annotations
 import typing
 from collections.abc import Callable
 from enum import Enum
+from typing import Any
 
 from generator.config.faults import Fault, child_of, tags_of
 from generator.config.scalars import flow, shown
@@ -86,9 +87,10 @@ def _unknown(wrong: object, known: list[str]) -> str:
 
 def _wrong_length(fault: Fault) -> str:
     unit = "character" if fault.kind.startswith("string") else "item"
-    value, annotation = fault.detail["input"], fault.owner[0]
+    value: Any = fault.detail["input"]
+    annotation: Any = fault.owner[0]
     count = _counted(len(value), unit) if isinstance(value, (str, list, dict)) else shown(value)
-    if typing.get_origin(annotation) is tuple and Ellipsis not in typing.get_args(annotation):
+    if _has_fixed_length(annotation):
         return f"expected {in_words(*fault.owner)}, got {count}"
     least, most = fault.context.get("min_length"), fault.context.get("max_length")
     if least == 1:
@@ -96,6 +98,10 @@ def _wrong_length(fault: Fault) -> str:
     if least is not None:
         return f"expected at least {_counted(least, unit)}, got {count}"
     return f"expected at most {_counted(most, unit)}, got {count}"
+
+
+def _has_fixed_length(annotation: Any) -> bool:
+    return typing.get_origin(annotation) is tuple and Ellipsis not in typing.get_args(annotation)
 
 
 def _wrong_pattern(fault: Fault) -> str:

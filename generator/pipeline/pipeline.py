@@ -88,7 +88,7 @@ class Pipeline:
         self.recipe = recipe
         self.assets = assets
         self._open_physics = open_physics
-        self._renderer = renderer
+        self.renderer = renderer
         self._physics: PhysicsEngine | None = None
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
@@ -139,7 +139,7 @@ class Pipeline:
         for sensor in self.recipe.sensors:
             rng = streams.rng(f"sensor/{sensor.name}")
             with _timed(timings, "render"):
-                reading = sensor.capture(scene, self._renderer, self.recipe.channels, rng)
+                reading = sensor.capture(scene, self.renderer, self.recipe.channels, rng)
             with _timed(timings, "annotate"):
                 truth[sensor.name] = self.recipe.image_truth(scene, reading)
             readings[sensor.name] = reading

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from generator.core.geometry import MeshData
+from generator.core.geometry import Material, MeshData
 from generator.core.se3 import Array
 from generator.renderers.kernels.records import Geometry
 
@@ -31,6 +31,7 @@ class DeviceMesh:
     low_m: Array
     high_m: Array
     vertex_count: int
+    materials: tuple[Material, ...]
     nbytes: int
 
 
@@ -53,7 +54,7 @@ def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
     # The hierarchy holds two 16-byte nodes per triangle, built from 24-byte boxes.
     nbytes = 32 * len(data.vertices_m) + (16 + 64 + 24) * len(data.faces)
     keep = (vertices, normals, uvs, faces, slots, mesh)
-    return DeviceMesh(record, keep, low, high, len(data.vertices_m), nbytes)
+    return DeviceMesh(record, keep, low, high, len(data.vertices_m), data.materials, nbytes)
 
 
 def is_convex_solid(vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -> bool:

@@ -5,34 +5,72 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from generator.core.geometry import Material
-from generator.core.scene import Body as SceneBody
-from generator.core.scene import Camera, Light
-from generator.core.se3 import Array
+from generator.core.scene import Body, Camera, Environment, Light, Scene
+from generator.renderers.environments import DeviceEnvironment
 from generator.renderers.kernels import records
 from generator.renderers.meshes import DeviceMesh
+from generator.renderers.stock import AssetStock
 
 _LAMP_KINDS = {"sphere": 0, "spot": 1, "sun": 2}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class PlacedBodies:
-    """Body records of one view.
+class PackedWorld:
+    """One scene on the device.
 
     Attributes:
-        values: Structured array of Body records.
+        record: The World record.
+        keep: Everything on the device that the record points to.
+        placed: Body records on the host, structured array [n].
         vertex_count: Of all bodies together.
-        low_m, high_m: World boxes, float32 [n, 3].
     """
 
-    values: np.ndarray
+    record: records.World
+    keep: tuple[object, ...]
+    placed: NDArray[np.void]
     vertex_count: int
-    low_m: np.ndarray
-    high_m: np.ndarray
+
+
+def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
+    """The scene as one camera sees it. Cheap enough to be done for every frame."""
+    asset_ids = sorted({body.asset for body in scene.bodies})
+    place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
+    meshes = [stock.mesh(asset_id) for asset_id in asset_ids]
+    own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
+    materials = [material for group in own for material in group]
+    texture_ids = sorted({m.texture for m in materials if m.texture})
+    textures = [stock.texture(texture_id) for texture_id in texture_ids]
+    environment = stock.environment(scene.environment.image)
+    placed = np.zeros(len(scene.bodies), dtype=records.Body.numpy_dtype())
+    placed["geometry"] = [place[body.asset] for body in scene.bodies]
+    counts = np.array([len(group) for group in own], dtype=np.int64)
+    placed["first_material"] = np.cumsum(counts) - counts
+    body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
+    vertex_count = _place(placed, scene.bodies, body_meshes, camera)
+    low, high = _world_boxes(placed, body_meshes)
+
+    def upload(values: NDArray[np.void] | list[object], dtype: Any) -> wp.array:
+        return wp.array(values, dtype=dtype, device=stock.device)
+
+    tree = wp.Bvh(upload(low, wp.vec3), upload(high, wp.vec3))
+    world = records.World()
+    world.tree = tree.id
+    world.geometries = upload(_stacked(meshes, records.Geometry), records.Geometry)
+    world.bodies = upload(placed, records.Body)
+    world.surfaces = upload(
+        _surfaces(materials, {t: k for k, t in enumerate(texture_ids)}), records.Surface
+    )
+    world.textures = upload(_stacked(textures, records.Texture), records.Texture)
+    world.lamps = upload(_lamps(scene.lights), records.Lamp)
+    world.sky = _sky(scene.environment, environment)
+    return PackedWorld(world, (tree, meshes, textures, environment), placed, vertex_count)
 
 
 def pack_view(camera: Camera) -> records.View:
@@ -48,55 +86,67 @@ def pack_view(camera: Camera) -> records.View:
     return view
 
 
-def pack_bodies(
-    bodies: Sequence[SceneBody],
-    meshes: Sequence[DeviceMesh],
-    geometry_indices: Sequence[int],
-    first_materials: Sequence[int],
-    camera: Camera,
-) -> PlacedBodies:
-    """Records of all bodies, as seen by a camera.
+def _place(
+    values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh], camera: Camera
+) -> int:
+    """Fill in poses and vertex ranges; returns the number of vertices.
 
     Products are taken in float64, so that a camera far from the world's origin loses nothing.
     """
-    n = len(bodies)
-    values = np.zeros(n, dtype=records.Body.numpy_dtype())
-    R_cw = camera.T_world_camera.rotation().T
+    if not bodies:
+        return 0
+    R_camera_world = camera.T_world_camera.rotation().T
     eye = np.asarray(camera.T_world_camera.translation_m)
-    if n == 0:
-        return PlacedBodies(values, 0, np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32))
     R = np.stack([body.T_world_body.rotation() for body in bodies])
     t = np.array([body.T_world_body.translation_m for body in bodies])
     scale = np.array([body.scale for body in bodies])
     counts = np.array([mesh.vertex_count for mesh in meshes])
-    A = np.einsum("ij,njk->nik", R_cw, R, optimize=False)
-    values["geometry"] = geometry_indices
+    A = np.einsum("ij,njk->nik", R_camera_world, R, optimize=False)
     values["first_vertex"] = np.cumsum(counts) - counts
-    values["first_material"] = first_materials
     values["scale"] = scale
     values["A_camera_mesh"] = A * scale[:, None, None]
-    values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_cw, t - eye, optimize=False)
+    values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_camera_world, t - eye, optimize=False)
     values["B_mesh_camera"] = A.transpose(0, 2, 1) / scale[:, None, None]
     values["eye_mesh"] = np.einsum("nji,nj->ni", R, eye - t, optimize=False) / scale[:, None]
     values["R_world_mesh"] = R
     values["t_world_mesh"] = t
-    low, high = _world_boxes(R, t, scale, meshes)
-    return PlacedBodies(values, int(counts.sum()), low, high)
+    return int(counts.sum())
 
 
 def _world_boxes(
-    R: Array, t: Array, scale: Array, meshes: Sequence[DeviceMesh]
-) -> tuple[np.ndarray, np.ndarray]:
-    low = np.stack([mesh.low_m for mesh in meshes]) * scale[:, None]
-    high = np.stack([mesh.high_m for mesh in meshes]) * scale[:, None]
-    centre = t + np.einsum("nij,nj->ni", R, 0.5 * (low + high), optimize=False)
-    half = np.einsum("nij,nj->ni", np.abs(R), 0.5 * (high - low), optimize=False)
+    placed: NDArray[np.void], meshes: Sequence[DeviceMesh]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    if not meshes:
+        # A hierarchy needs a box; rays never meet this one.
+        return np.full((1, 3), 1e9, np.float32), np.full((1, 3), 1e9, np.float32)
+    scale = placed["scale"].astype(np.float64)[:, None]
+    R = placed["R_world_mesh"].astype(np.float64)
+    low = np.stack([mesh.low_m for mesh in meshes]) * scale
+    high = np.stack([mesh.high_m for mesh in meshes]) * scale
+    centre = placed["t_world_mesh"] + np.einsum("nij,nj->ni", R, (low + high) / 2, optimize=False)
+    half = np.einsum("nij,nj->ni", np.abs(R), (high - low) / 2, optimize=False)
     # A hair of slack keeps flat boxes traversable after rounding to float32.
     half = half + 1e-6 * (1.0 + np.abs(centre))
     return (centre - half).astype(np.float32), (centre + half).astype(np.float32)
 
 
-def pack_surfaces(materials: Sequence[Material], textures: dict[str, int]) -> np.ndarray:
+def _stacked(items: Sequence[Any], kind: Any) -> NDArray[np.void]:
+    values = np.zeros(max(len(items), 1), dtype=kind.numpy_dtype())
+    for k, item in enumerate(items):
+        values[k] = item.record.numpy_value()
+    return values
+
+
+def _sky(environment: Environment, light: DeviceEnvironment) -> records.Sky:
+    sky = records.Sky()
+    sky.irradiance, sky.glossy, sky.image = light.irradiance, light.glossy, light.image
+    sky.luminance = environment.luminance_cd_m2
+    sky.cos_yaw, sky.sin_yaw = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
+    sky.visible = int(environment.visible)
+    return sky
+
+
+def _surfaces(materials: Sequence[Material], textures: dict[str, int]) -> NDArray[np.void]:
     """Surface records; ``textures`` maps texture ids to their place among the textures."""
     values = np.zeros(max(len(materials), 1), dtype=records.Surface.numpy_dtype())
     for value, material in zip(values, materials, strict=False):
@@ -110,7 +160,7 @@ def pack_surfaces(materials: Sequence[Material], textures: dict[str, int]) -> np
     return values
 
 
-def pack_lamps(lights: Sequence[Light]) -> np.ndarray:
+def _lamps(lights: Sequence[Light]) -> NDArray[np.void]:
     """Lamp records."""
     values = np.zeros(len(lights), dtype=records.Lamp.numpy_dtype())
     for value, light in zip(values, lights, strict=True):

@@ -6,14 +6,13 @@ Done again after a kill it gives the same bytes: nothing here is taken from an e
 from __future__ import annotations
 
 import hashlib
-import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from generator.core.errors import StorageError
 from generator.core.interfaces import DatasetInfo
-from generator.core.serial import canonical_json, to_plain
+from generator.core.serial import canonical_json
 from generator.runner.files import (
     Inode,
     inode_of,
@@ -59,14 +58,13 @@ def finalize(plan: Plan, store: LocalStore, pipeline: PipelineLike, licences: st
             with explaining(f"exporter {name}, merging"), store.errors():
                 _merge(plan, store, pipeline, name, known)
         scratch = store.scratch_dir()
-        _remove_other_exports(store, names)
         if licences:
             write_durably(store.root / LICENCES_NAME, licences.encode(), scratch)
-        entries = sorted(_entries(plan, store, records, known), key=lambda entry: entry.path)
+        entries = sorted(_entries(plan, store, records, names, known), key=_by_path)
         sums = sums_text(entries)
         manifest = _manifest(plan, pipeline.info, records, entries)
         sealed = [*entries, _entry_of_bytes(MANIFEST_NAME, manifest)]
-        lines = sums_text(sorted(sealed, key=lambda entry: entry.path))
+        lines = sums_text(sorted(sealed, key=_by_path))
         write_durably(store.root / SUMS_NAME, lines.encode(), scratch)
         write_durably(store.manifest_path, manifest, scratch)
     return dataset_id(sums)
@@ -113,36 +111,63 @@ def _merge(
     pipeline.exporters[name].finalize(pipeline.info, shard_dirs, staging)
     sync_tree(staging, synced=known)
     target = store.root / name
+    if not any(staging.iterdir()):
+        return
     if target.exists():
         move_durably(target, store.scratch_dir() / name)
     move_durably(staging, target)
 
 
-def _remove_other_exports(store: LocalStore, names: list[str]) -> None:
-    """Take away what an earlier release's exporter may have left: it would be an extra file."""
-    ours = {*names, "run", SHARDS_NAME}
-    for path in sorted(store.root.iterdir()):
-        if path.is_dir() and path.name not in ours:
-            shutil.rmtree(path)
-
-
 def _entries(
-    plan: Plan, store: LocalStore, records: list[ShardRecord], known: Mapping[Inode, str]
+    plan: Plan,
+    store: LocalStore,
+    records: list[ShardRecord],
+    exporters: list[str],
+    known: Mapping[Inode, str],
 ) -> Iterator[Entry]:
+    """Every file but the manifest and the sums, in no particular order."""
     yield _entry_of_bytes(PLAN_NAME, plan_bytes(plan))
-    if (store.root / LICENCES_NAME).exists():
-        yield _entry_of_bytes(LICENCES_NAME, (store.root / LICENCES_NAME).read_bytes())
+    licences = store.root / LICENCES_NAME
+    if licences.exists():
+        yield _entry_of_bytes(LICENCES_NAME, licences.read_bytes())
     for record in records:
-        prefix = store.shard_dir(record.shard).relative_to(store.root).as_posix()
-        yield _entry_of_bytes(f"{prefix}.json", record.to_bytes())
+        folder = f"{SHARDS_NAME}/{store.shard_dir(record.shard).name}"
+        yield _entry_of_bytes(f"{folder}.json", record.to_bytes())
         for file in record.files:
-            yield Entry(f"{prefix}/{file.path}", file.bytes, file.sha256)
-    for folder in sorted(store.root.iterdir()):
-        if folder.is_dir() and folder.name not in ("run", SHARDS_NAME):
-            for name, size in tree_sizes(folder).items():
-                path = folder / name
-                digest = known.get(inode_of(path)) or sha256_of_file(path)
-                yield Entry(f"{folder.name}/{name}", size, digest)
+            yield Entry(f"{folder}/{file.path}", file.bytes, file.sha256)
+    for name in exporters:
+        for inner, size in tree_sizes(store.root / name).items():
+            path = store.root / name / inner
+            digest = known.get(inode_of(path)) or sha256_of_file(path)
+            yield Entry(f"{name}/{inner}", size, digest)
+
+
+def _manifest(
+    plan: Plan, info: DatasetInfo, records: list[ShardRecord], entries: list[Entry]
+) -> bytes:
+    """The manifest: what the data set holds. No time, host, path or number of workers."""
+    sized_by_records = {file.sha256 for record in records for file in record.files}
+    manifest = {
+        "format_version": plan.format_version,
+        "dataset_id": dataset_id(sums_text(entries)),
+        "name": plan.name,
+        "seed": plan.seed,
+        "n": plan.n,
+        "shard_size": plan.shard_size,
+        "info": info,
+        "splits": summed(count for record in records for count in record.splits),
+        "scenes": sum(record.scenes for record in records),
+        "rejections": sum(record.rejections for record in records),
+        "shards": [hashlib.sha256(record.to_bytes()).hexdigest() for record in records],
+        # Sizes of all files whose bytes no shard has.
+        "files": {e.path: e.bytes for e in entries if e.sha256 not in sized_by_records},
+        "versions": plan.versions,
+    }
+    return (canonical_json(manifest) + "\n").encode()
+
+
+def _by_path(entry: Entry) -> str:
+    return entry.path
 
 
 def _entry_of_bytes(path: str, data: bytes) -> Entry:

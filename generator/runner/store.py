@@ -37,7 +37,7 @@ from generator.runner.files import (
     tree_sizes,
     write_durably,
 )
-from generator.runner.plan import PLAN_NAME, Plan, compare, load_plan, write_plan
+from generator.runner.plan import PLAN_NAME, Plan, compare, load_plan, plan_bytes, write_plan
 from generator.runner.record import ShardRecord, parse_record
 
 MANIFEST_NAME = "manifest.json"
@@ -164,7 +164,8 @@ class LocalStore:
         with self.errors():
             self.clear_scratch()
             make_folder(self._scratch_root)
-            if not (self.root / PLAN_NAME).exists():
+            path = self.root / PLAN_NAME
+            if not path.exists() or path.read_bytes() != plan_bytes(plan):
                 write_plan(plan, self.root, self._scratch_root)
             make_folder(self._shards_dir)
             if self.manifest_path.exists():

@@ -188,9 +188,7 @@ def export(
     for shard, shard_dir in reversed(work) if backwards else work:
         for sample in shard:
             write_media(info, sample, shard_dir)
-        exporter.write_shard(
-            info, shard if keep_arrays else map(without_arrays, shard), shard_dir
-        )
+        exporter.write_shard(info, shard if keep_arrays else map(without_arrays, shard), shard_dir)
     exporter.finalize(info, shard_dirs, folder / "dataset")
     return folder / "dataset"
 

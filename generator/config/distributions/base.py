@@ -85,6 +85,7 @@ class Kind(Generic[T]):
         read: The value a plain constant stands for; raises Malformed.
         read_key: The same for a key of a mapping, which is always text.
         schema: JSON Schema of a constant.
+        example: A constant, as plain data.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Kind(Generic[T]):
     read: Callable[[Any], T]
     read_key: Callable[[str], T]
     schema: Mapping[str, Any]
+    example: Any
 
 
 class Distribution(ABC, Generic[T_co]):

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 
 
+DISTRIBUTION_TITLE = "distribution of "
+"""What titles of distributions begin with in JSON Schema."""
+
+
 @dataclass(frozen=True)
 class FieldOf:
     """Marks a field that holds a distribution over one kind of value."""
@@ -149,10 +153,10 @@ def custom_error(error: Malformed) -> PydanticCustomError:
 
 def json_schema_of(kind: Kind[Any]) -> dict[str, Any]:
     """JSON Schema of a field that holds a distribution over ``kind``."""
-    options: list[dict[str, Any]] = [{**kind.schema, "description": f"constant: {kind.expected}"}]
     names = names_of(kind.name)
+    options: list[dict[str, Any]] = []
     bare = [name for name in names if distribution(name).bare]
-    if bare and kind.name != "name":
+    if bare:
         options.append({"enum": bare, "description": "a distribution without argument"})
     for name in names:
         found = distribution(name)
@@ -165,10 +169,11 @@ def json_schema_of(kind: Kind[Any]) -> dict[str, Any]:
                 "additionalProperties": False,
             }
         )
-    return {"anyOf": options}
+    distributions = {"title": f"{DISTRIBUTION_TITLE}{kind.name}", "anyOf": options}
+    return {"anyOf": [{**kind.schema, "description": kind.expected}, distributions]}
 
 
-def _read_number_or_hint(value: Any) -> float:
+def _read_scalar(value: Any) -> float:
     if isinstance(value, (list, tuple)) and len(value) == 2:
         raise Malformed(
             f"expected a number or a distribution, got {shown(value)}"
@@ -227,23 +232,24 @@ _VECTOR: Mapping[str, Any] = {
     "maxItems": 3,
 }
 
-NUMBER = Kind(
-    "number", "a number", _read_number_or_hint, _as_key(_read_number_or_hint), {"type": "number"}
-)
+_QUATERNION: Mapping[str, Any] = {**_VECTOR, "minItems": 4, "maxItems": 4}
+
+NUMBER = Kind("number", "a number", _read_scalar, _as_key(_read_scalar), {"type": "number"}, 1)
 WHOLE_NUMBER = Kind(
-    "whole number", "a whole number", _read_count, _as_key(_read_count), {"type": "integer"}
+    "whole number", "a whole number", _read_count, _as_key(_read_count), {"type": "integer"}, 1
 )
-NAME = Kind("name", "a name", _read_name, _read_name, {"type": "string"})
-FLAG = Kind("flag", "true or false", _read_flag, _as_key(_read_flag), {"type": "boolean"})
+NAME = Kind("name", "a name", _read_name, _read_name, {"type": "string"}, "example")
+FLAG = Kind("flag", "true or false", _read_flag, _as_key(_read_flag), {"type": "boolean"}, True)
 ROTATION = Kind(
     "rotation",
-    "a rotation: [w, x, y, z]",
+    "a rotation [w, x, y, z]",
     read_quaternion,
     _no_key,
-    {**_VECTOR, "minItems": 4, "maxItems": 4},
+    _QUATERNION,
+    [1, 0, 0, 0],
 )
-DIRECTION = Kind("direction", "a direction: [x, y, z]", read_direction, _no_key, _VECTOR)
-POSITION = Kind("position", "a position: [x, y, z] in metres", read_vector, _no_key, _VECTOR)
+DIRECTION = Kind("direction", "a direction [x, y, z]", read_direction, _no_key, _VECTOR, [0, 0, 1])
+POSITION = Kind("position", "a position [x, y, z]", read_vector, _no_key, _VECTOR, [0, 0, 1])
 
 Scalar = Annotated[Numeric[float], FieldOf(NUMBER)]
 """A number, or a distribution over numbers."""
