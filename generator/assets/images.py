@@ -1,0 +1,100 @@
+"""Image files to arrays, with limits that are checked before anything is decoded."""
+
+from __future__ import annotations
+
+import io
+import math
+import warnings
+
+import numpy as np
+
+from generator.core.errors import AssetError
+from generator.core.geometry import Float32, UInt8
+
+MAX_SIDE_PX = 16_384
+MAX_PIXELS = 64_000_000
+_FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
+
+
+def decode(data: bytes, place: str) -> UInt8:
+    """sRGB image, uint8 [height, width, 3]; transparency is dropped.
+
+    Args:
+        data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA.
+        place: What error messages call it.
+
+    Raises:
+        AssetError: if it is unreadable, or larger than 16,384 pixels a side or 64 megapixels.
+    """
+    from PIL import Image  # noqa: PLC0415
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
+                _check_size(*image.size, place)
+                return np.array(image.convert("RGB"), dtype=np.uint8)
+    except AssetError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a decoder of foreign bytes may raise anything
+        raise AssetError(
+            f"{place}: unreadable image ({type(error).__name__}); save it again as PNG or JPEG"
+        ) from None
+
+
+def decode_radiance(data: bytes, place: str) -> Float32:
+    """Equirectangular panorama as ``AssetLibrary.environment`` promises it: mean luminance 1.
+
+    Args:
+        data: A Radiance .hdr file, twice as wide as high.
+        place: What error messages call it.
+
+    Raises:
+        AssetError: if it is unreadable, too large, of another shape, dark or not finite.
+    """
+    import cv2  # noqa: PLC0415
+
+    width, height = _radiance_size(data, place)
+    _check_size(width, height, place)
+    if width != 2 * height:
+        raise AssetError(f"{place}: {width} x {height} px; a panorama is twice as wide as high")
+    try:
+        bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        bgr = None
+    if bgr is None or bgr.ndim != 3 or bgr.shape[2] != 3 or bgr.dtype != np.float32:
+        raise AssetError(f"{place}: unreadable panorama; save it again as Radiance .hdr")
+    # A panorama's centre column is its front; ours is +X, with the left half to the left of it.
+    rgb = np.maximum(bgr[..., ::-1].astype(np.float64), 0.0)
+    mean = _mean_luminance(rgb)
+    if not np.isfinite(rgb).all() or mean <= 0.0:
+        raise AssetError(f"{place}: black or not finite; save it again from its source")
+    return (rgb / mean).astype(np.float32)
+
+
+def _radiance_size(data: bytes, place: str) -> tuple[int, int]:
+    """Width and height that a Radiance header claims."""
+    lines = data[:4096].split(b"\n")
+    for line in lines if data[:2] == b"#?" else ():
+        words = line.split()
+        if len(words) == 4 and words[0] == b"-Y" and words[2] == b"+X":
+            if words[1].isdigit() and words[3].isdigit():
+                return int(words[3]), int(words[1])
+            break
+    raise AssetError(f"{place}: not a Radiance panorama; save it as .hdr")
+
+
+def _mean_luminance(rgb: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
+    """Mean over the sphere of the luminance (Rec. 709) of an equirectangular image."""
+    height = rgb.shape[0]
+    edges = np.array([math.cos(math.pi * k / height) for k in range(height + 1)])
+    rows = (rgb * np.array([0.2126, 0.7152, 0.0722])).sum(axis=2).mean(axis=1)
+    return float((rows * 0.5 * (edges[:-1] - edges[1:])).sum())
+
+
+def _check_size(width: int, height: int, place: str) -> None:
+    if max(width, height) > MAX_SIDE_PX or width * height > MAX_PIXELS or min(width, height) < 1:
+        raise AssetError(
+            f"{place}: {width} x {height} px; at most {MAX_SIDE_PX} a side and "
+            f"{MAX_PIXELS // 1_000_000} megapixels are read, scale it down"
+        )

@@ -1,0 +1,302 @@
+"""glTF 2.0, text and binary (Khronos, "glTF 2.0 specification", 2021).
+
+Read are triangles, the first UV set, base colour, metallic and roughness. Morph targets, skins,
+animations, cameras and lights are ignored; compressed geometry is refused.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.assets.folder import Folder
+from generator.assets.images import decode
+from generator.assets.readers.source import MAX_FACES, Source
+from generator.assets.soup import Float64, Int64, Slot, Soup, joined
+from generator.core.errors import AssetError
+from generator.core.geometry import Material
+
+_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_HARMLESS = ("KHR_materials_", "KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_")
+
+
+@dataclass
+class _Document:
+    """A parsed file, with the bytes of its buffers and embedded images once they were asked for."""
+
+    folder: Folder
+    relative: str
+    tree: dict[str, Any]
+    binary: bytes
+    buffers: dict[int, bytes] = field(default_factory=dict)
+    images: dict[str, bytes] = field(default_factory=dict)
+
+
+def read_gltf(folder: Folder, relative: str) -> Source:
+    """Triangles of the default scene of a glTF file, in its own axes (Y up).
+
+    Raises:
+        AssetError: if it is malformed, claims more than it holds, or needs an extension.
+    """
+    data = folder.read(relative)
+    try:
+        document = _document(folder, relative, data)
+        slots = (*(_slot(document, m) for m in _list(document, "materials")), Slot())
+        parts = [
+            part
+            for matrix, mesh in _placed_meshes(document)
+            for part in _primitives(document, mesh, matrix, slots)
+        ]
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
+        reason = f"missing {error}" if isinstance(error, KeyError) else str(error)[:120]
+        raise AssetError(
+            f"{folder.root / relative}: malformed glTF ({reason}); export it again"
+        ) from None
+    if not parts:
+        raise AssetError(f"{folder.root / relative}: holds no triangles; export it with its mesh")
+    return Source(joined(parts), document.images)
+
+
+def _document(folder: Folder, relative: str, data: bytes) -> _Document:
+    text, binary = _chunks(data) if data[:4] == b"glTF" else (data, b"")
+    tree = json.loads(text.decode("utf-8"))
+    if not isinstance(tree, dict):
+        raise ValueError("no JSON object")
+    for extension in tree.get("extensionsRequired", []):
+        if not str(extension).startswith(_HARMLESS):
+            raise ValueError(f"it needs {extension}, which is not read")
+    return _Document(folder, relative, tree, binary)
+
+
+def _chunks(data: bytes) -> tuple[bytes, bytes]:
+    _, version, length = struct.unpack_from("<4sII", data.ljust(12, b"\0"))
+    if version != 2 or length != len(data):
+        raise ValueError(f"its header says version {version}, {length} of {len(data)} bytes")
+    chunks: dict[int, bytes] = {}
+    offset = 12
+    while offset + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, offset)
+        if offset + 8 + size > length:
+            raise ValueError("a chunk is longer than the file")
+        chunks.setdefault(kind, data[offset + 8 : offset + 8 + size])
+        offset += 8 + size
+    return chunks[_JSON_CHUNK], chunks.get(_BINARY_CHUNK, b"")
+
+
+def _list(document: _Document, key: str) -> list[Any]:
+    value = document.tree.get(key, [])
+    if not isinstance(value, list):
+        raise TypeError(f"'{key}' is no list")
+    return value
+
+
+def _at(items: Sequence[Any], index: Any, what: str) -> Any:
+    if not isinstance(index, int) or not 0 <= index < len(items):
+        raise ValueError(f"{what} {index} does not exist")
+    return items[index]
+
+
+def _placed_meshes(document: _Document) -> list[tuple[Float64, Mapping[str, Any]]]:
+    """``(matrix [4, 4], mesh)`` of every node of the default scene, in document order."""
+    nodes, meshes = _list(document, "nodes"), _list(document, "meshes")
+    scenes = _list(document, "scenes")
+    if scenes:
+        roots = list(_at(scenes, document.tree.get("scene", 0), "scene").get("nodes", []))
+    else:
+        children = {c for node in nodes for c in node.get("children", [])}
+        roots = [k for k in range(len(nodes)) if k not in children]
+    placed: list[tuple[Float64, Mapping[str, Any]]] = []
+    visited: set[int] = set()
+    pending = [(index, np.eye(4)) for index in reversed(roots)]
+    while pending:
+        index, parent = pending.pop()
+        node = _at(nodes, index, "node")
+        if index in visited:
+            raise ValueError(f"node {index} has two parents or is its own ancestor")
+        visited.add(index)
+        matrix = _product(parent, _local_matrix(node))
+        if "mesh" in node:
+            placed.append((matrix, _at(meshes, node["mesh"], "mesh")))
+        pending += [(child, matrix) for child in reversed(node.get("children", []))]
+    return placed
+
+
+def _local_matrix(node: Mapping[str, Any]) -> Float64:
+    if "matrix" in node:
+        columns: Float64 = np.array(node["matrix"], dtype=np.float64).reshape(4, 4)
+        return columns.T
+    x, y, z, w = (float(v) for v in node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)
+    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    return matrix
+
+
+def _product(a: Float64, b: Float64) -> Float64:
+    product: Float64 = np.einsum("ij,jk->ik", a, b, optimize=False)
+    return product
+
+
+def _primitives(
+    document: _Document, mesh: Mapping[str, Any], matrix: Float64, slots: tuple[Slot, ...]
+) -> list[Soup]:
+    soups = []
+    for primitive in mesh["primitives"]:
+        if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
+            continue
+        slot = _at(slots, primitive.get("material", len(slots) - 1), "material")
+        soups.append(_primitive(document, primitive, slot).transformed(matrix[:3]))
+    return soups
+
+
+def _primitive(document: _Document, primitive: Mapping[str, Any], slot: Slot) -> Soup:
+    attributes = primitive["attributes"]
+    positions = _accessor(document, attributes["POSITION"], 3).astype(np.float64)
+    if "indices" in primitive:
+        indices = _accessor(document, primitive["indices"], 1).astype(np.int64)[:, 0]
+    else:
+        indices = np.arange(len(positions))
+    faces = _faces(indices, primitive.get("mode", _TRIANGLES))
+    if len(faces) > MAX_FACES:
+        raise ValueError(f"more than {MAX_FACES} triangles")
+    if len(faces) and (faces.max() >= len(positions) or faces.min() < 0):
+        raise ValueError("an index out of range")
+    uvs = _optional(document, attributes, "TEXCOORD_0", 2, len(positions))
+    normals = _optional(document, attributes, "NORMAL", 3, len(positions))
+    if uvs is not None:
+        # glTF counts rows of the image from the top.
+        uvs = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1)
+    zeros = np.zeros(len(faces), dtype=np.int64)
+    return Soup(
+        corners=positions[faces],
+        uvs=None if uvs is None else uvs[faces],
+        normals=None if normals is None else normals[faces],
+        face_slots=zeros,
+        face_groups=zeros,
+        slots=(slot,),
+    )
+
+
+def _faces(indices: Int64, mode: int) -> Int64:
+    if mode == _TRIANGLES:
+        return indices[: len(indices) // 3 * 3].reshape(-1, 3)
+    if mode == _FAN:
+        first = np.repeat(indices[:1], max(len(indices) - 2, 0))
+        return np.stack([first, indices[1:-1], indices[2:]], axis=1)
+    faces = np.stack([indices[:-2], indices[1:-1], indices[2:]], axis=1)
+    faces[1::2] = faces[1::2, [1, 0, 2]]
+    return faces
+
+
+def _optional(
+    document: _Document, attributes: Mapping[str, Any], name: str, width: int, count: int
+) -> Float64 | None:
+    if name not in attributes:
+        return None
+    values = _accessor(document, attributes[name], width).astype(np.float64)
+    if len(values) != count:
+        raise ValueError(f"{name} has {len(values)} entries for {count} positions")
+    return values
+
+
+def _accessor(document: _Document, index: Any, width: int) -> NDArray[np.generic]:
+    """The values of an accessor, shape [count, width]; integers marked normalized become floats."""
+    accessor = _at(_list(document, "accessors"), index, "accessor")
+    if "sparse" in accessor or "bufferView" not in accessor:
+        raise ValueError(f"accessor {index} is sparse or empty, which is not read")
+    view = _at(_list(document, "bufferViews"), accessor["bufferView"], "buffer view")
+    data = _view(document, view)
+    dtype = np.dtype(_COMPONENTS[accessor["componentType"]])
+    if _WIDTHS.get(accessor["type"]) != width:
+        raise ValueError(f"accessor {index} has type {accessor['type']}")
+    offset, count = int(accessor.get("byteOffset", 0)), int(accessor["count"])
+    item = dtype.itemsize * width
+    stride = int(view.get("byteStride", 0)) or item
+    if count < 1 or offset < 0 or stride < item or offset + stride * (count - 1) + item > len(data):
+        raise ValueError(f"accessor {index} claims more than its buffer holds")
+    values = np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
+    if accessor.get("normalized") and dtype.kind in "iu":
+        return np.maximum(values / np.iinfo(dtype).max, -1.0)
+    return values
+
+
+def _view(document: _Document, view: Mapping[str, Any]) -> bytes:
+    number = view["buffer"]
+    if number not in document.buffers:
+        buffer = _at(_list(document, "buffers"), number, "buffer")
+        document.buffers[number] = (
+            _from_uri(document, buffer["uri"]) if "uri" in buffer else document.binary
+        )
+    data = document.buffers[number]
+    offset, length = int(view.get("byteOffset", 0)), int(view["byteLength"])
+    if offset < 0 or length < 0 or offset + length > len(data):
+        raise ValueError("a buffer view claims more than its buffer holds")
+    return data[offset : offset + length]
+
+
+def _from_uri(document: _Document, uri: str) -> bytes:
+    if not uri.startswith("data:"):
+        relative = document.folder.refer(document.relative, unquote(uri))
+        return document.folder.read(relative)
+    try:
+        return base64.b64decode(uri.partition(",")[2], validate=True)
+    except binascii.Error:
+        raise ValueError("a data URI that is not base64") from None
+
+
+def _slot(document: _Document, description: Mapping[str, Any]) -> Slot:
+    pbr = description.get("pbrMetallicRoughness", {})
+    red, green, blue, _ = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
+    roughness, metallic = float(pbr.get("roughnessFactor", 1)), float(pbr.get("metallicFactor", 1))
+    if "metallicRoughnessTexture" in pbr:
+        # The surface has one roughness and one metalness: the means of what the image says.
+        name = _image(document, pbr["metallicRoughnessTexture"])
+        encoded = document.images.get(name) or document.folder.read(name)
+        means = decode(encoded, f"{document.folder.root / document.relative}").mean(axis=(0, 1))
+        roughness, metallic = roughness * means[1] / 255.0, metallic * means[2] / 255.0
+    material = Material(
+        base_color=(_unit(red), _unit(green), _unit(blue)),
+        roughness=round(_unit(roughness), 4),
+        metallic=round(_unit(metallic), 4),
+        texture=_image(document, pbr["baseColorTexture"]) if "baseColorTexture" in pbr else "",
+    )
+    return Slot(str(description.get("name", "")), material, from_file=True)
+
+
+def _unit(value: float) -> float:
+    return min(max(float(value), 0.0), 1.0)
+
+
+def _image(document: _Document, reference: Mapping[str, Any]) -> str:
+    """Name of the image of a texture reference; embedded images are named by their number."""
+    texture = _at(_list(document, "textures"), reference["index"], "texture")
+    number = texture.get("source")
+    image = _at(_list(document, "images"), number, "image")
+    if "uri" in image and not image["uri"].startswith("data:"):
+        return document.folder.refer(document.relative, unquote(image["uri"]))
+    name = str(number)
+    if "uri" in image:
+        document.images[name] = _from_uri(document, image["uri"])
+    else:
+        view = _at(_list(document, "bufferViews"), image["bufferView"], "buffer view")
+        document.images[name] = _view(document, view)
+    return name

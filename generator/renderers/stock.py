@@ -1,0 +1,75 @@
+"""What a renderer keeps between frames: assets on the device and scratch memory, never scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from generator.core.geometry import Material
+from generator.core.interfaces import AssetLibrary
+from generator.renderers.cache import ByteCache
+from generator.renderers.environments import DeviceEnvironment, upload_environment
+from generator.renderers.meshes import DeviceMesh, upload_mesh
+from generator.renderers.textures import DeviceTexture, upload_texture
+
+_MESH_BYTES = 128 << 20
+_TEXTURE_BYTES = 128 << 20
+_ENVIRONMENT_BYTES = 32 << 20
+_SCRATCH_BYTES = 96 << 20
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Scratch:
+    array: wp.array
+    nbytes: int
+
+
+class AssetStock:
+    """Meshes, textures and environments on one device, each bounded in bytes."""
+
+    def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
+        self.assets = assets
+        self.device = device
+        self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
+        self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)
+        self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)
+        self._scratch: ByteCache[_Scratch] = ByteCache(_SCRATCH_BYTES)
+
+    def mesh(self, asset_id: str) -> DeviceMesh:
+        """Geometry of an asset."""
+        return self._meshes.get(
+            asset_id, lambda: upload_mesh(self.assets.mesh(asset_id), self.device)
+        )
+
+    def materials(self, asset_id: str) -> tuple[Material, ...]:
+        """An asset's own materials, one per slot."""
+        return self.mesh(asset_id).materials
+
+    def texture(self, texture_id: str) -> DeviceTexture:
+        """Images of a texture."""
+        return self._textures.get(
+            texture_id, lambda: upload_texture(self.assets.texture(texture_id), self.device)
+        )
+
+    def environment(self, environment_id: str) -> DeviceEnvironment:
+        """Light of an environment."""
+        return self._environments.get(
+            environment_id,
+            lambda: upload_environment(self.assets.environment(environment_id), self.device),
+        )
+
+    def scratch(self, name: str, shape: int | Sequence[int], dtype: Any) -> wp.array:
+        """An array with left-over contents: touching fresh memory costs as much as filling it.
+
+        One name stands for one array per shape, valid until it is asked for again.
+        """
+
+        def make() -> _Scratch:
+            array = wp.zeros(shape, dtype=dtype, device=self.device)
+            return _Scratch(array, int(np.prod(shape)) * wp.types.type_size_in_bytes(dtype))
+
+        return self._scratch.get(f"{name} {shape}", make).array

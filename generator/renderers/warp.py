@@ -1,0 +1,55 @@
+"""The renderer: Scene and Camera in, Reading out, on NVIDIA Warp."""
+
+from __future__ import annotations
+
+from generator.core.capture import Channel, Reading
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetLibrary
+from generator.core.scene import Camera, Scene
+from generator.renderers.color import color_image
+from generator.renderers.device import open_device
+from generator.renderers.labels import label_images
+from generator.renderers.packing import pack_view, pack_world
+from generator.renderers.settings import RenderSettings
+from generator.renderers.stock import AssetStock
+from generator.renderers.visibility import see
+
+
+class WarpRenderer:
+    """Renders on the CPU or on a CUDA device with the same kernels.
+
+    A pure function of its arguments: what it keeps between calls are assets and scratch memory.
+    One call uses one core; run several processes to use more.
+
+    Args:
+        assets: Where meshes, textures and environments come from.
+        device: ``cpu``, ``cuda:N``, or ``auto`` for the first CUDA device if there is one.
+        settings: How colour images are made.
+
+    Raises:
+        ConfigError: if the device does not exist.
+    """
+
+    def __init__(
+        self, assets: AssetLibrary, device: str = "auto", settings: RenderSettings | None = None
+    ) -> None:
+        self._device = open_device(device)
+        self._settings = settings or RenderSettings()
+        if self._settings.visibility == "raster" and not self._device.is_cpu:
+            raise ConfigError(
+                f"renderer.visibility: 'raster' works on the CPU only, not on '{self._device}';"
+                " choose 'auto' or 'rays'."
+            )
+        self._stock = AssetStock(assets, self._device)
+
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+        """Every asked channel of one camera."""
+        world = pack_world(scene, camera, self._stock)
+        view = pack_view(camera)
+        seen = see(world, view, self._stock, self._settings.visibility)
+        images = label_images(scene, world, view, seen, channels)
+        if Channel.RGB in channels:
+            images[Channel.RGB] = color_image(
+                camera, world, view, seen, self._stock, self._settings
+            )
+        return Reading(camera.name, camera, images)

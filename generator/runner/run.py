@@ -1,0 +1,175 @@
+"""run(plan, ...): a finished data set, or an error that says how to go on."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from generator.core.errors import GenDataError
+from generator.core.sample import Sample
+from generator.runner.events import SampleDone, ShardDone
+from generator.runner.finalize import finalize
+from generator.runner.interruption import Interruption
+from generator.runner.plan import Plan
+from generator.runner.processes import drive
+from generator.runner.progress import Meter, RunProgress, Summary
+from generator.runner.shard import EnteredPipeline, Job, MediaWriter, make_shard, write_images
+from generator.runner.store import FolderState, LocalStore, Scan
+from generator.runner.supervisor import Limits, Supervisor
+from generator.runner.verify import findings, verify
+from generator.runner.worker import resident_bytes
+
+__all__ = ["Limits", "RunProgress", "Settings", "Summary", "run"]
+
+IN_PROCESS = -1
+"""The number of the worker that is this process."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a run works; nothing here changes a byte of the data set.
+
+    Attributes:
+        full_check: On resumption, hash what is there instead of comparing sizes. This also
+            repairs a damaged data set: damaged shards are made again.
+        limits: Bounds on silence, deaths and memory of workers.
+        write_media: Writes the images of one sample; picklable.
+    """
+
+    full_check: bool = False
+    limits: Limits = field(default_factory=Limits)
+    write_media: MediaWriter = write_images
+
+
+def _silent(progress: RunProgress) -> None:
+    del progress
+
+
+def run(  # noqa: PLR0913  (the front door: each argument is a question only the caller can answer)
+    plan: Plan,
+    make_pipeline: Callable[[], EnteredPipeline],
+    out: Path,
+    *,
+    workers: int,
+    resume_command: str,
+    progress: Callable[[RunProgress], None] = _silent,
+    licences: str = "",
+    settings: Settings | None = None,
+) -> Summary:
+    """Make a data set, or what is missing of it.
+
+    Args:
+        make_pipeline: Makes the same pipeline in any process; picklable unless ``workers`` is 0.
+        workers: Processes that make shards; 0 makes them in this process, for debugging.
+        resume_command: What a user types to go on after a fault; part of messages.
+        progress: Called at each sample and shard.
+        licences: Text of ``LICENSES-ASSETS.md``; empty = no such file.
+
+    Raises:
+        StorageError: the folder is another data set's, in use, or cannot be written.
+        SampleError: a sample cannot be made; WorkerLost, if trying kills the process.
+        DeterminismError: a shard came out differently the second time.
+        Interrupted: Ctrl-C or SIGTERM; committed shards stay.
+    """
+    settings = settings or Settings()
+    store = LocalStore(Path(os.path.abspath(out)), resume_command)  # noqa: PTH100
+    message = f"finished shards are kept; go on with:\n    {resume_command}"
+    with Interruption(message) as interruption:
+        with interruption.immediate(), store.errors():
+            store.state(plan)
+        with store.locked():
+            job = Job(plan, store, make_pipeline, settings.write_media)
+            return _Run(job, workers, progress, settings, interruption).to_the_end(licences)
+
+
+@dataclass(frozen=True)
+class _Run:
+    job: Job
+    workers: int
+    progress: Callable[[RunProgress], None]
+    settings: Settings
+    interruption: Interruption
+
+    def to_the_end(self, licences: str) -> Summary:
+        """Make what is missing, merge, seal."""
+        plan, store = self.job.plan, self.job.store
+        with self.interruption.immediate():
+            with store.errors():
+                state = store.state(plan)
+                if state is FolderState.FINISHED and self._is_whole():
+                    return self._nothing_to_do()
+            store.prepare(plan)
+            scan = store.scan(plan, self.settings.full_check)
+        meter = Meter(store, scan, plan.n, self.progress)
+        meter.show("samples")
+        try:
+            self._make(scan, meter)
+            with self.interruption.immediate():
+                meter.show("merging")
+                dataset_id = finalize(plan, store, self.job.make_pipeline(), licences)
+        finally:
+            with store.errors():
+                store.clear_scratch()
+        return self._summary(dataset_id, scan, meter)
+
+    def _make(self, scan: Scan, meter: Meter) -> None:
+        if self.workers == 0:
+            with self.interruption.immediate():
+                self._make_here(scan, meter)
+            return
+        if not scan.missing:
+            return
+        supervisor = Supervisor(
+            shards=scan.missing,
+            samples_of=self.job.plan.samples_of,
+            workers=self.workers,
+            describe_sample=self.job.store.reproduce_command,
+            limits=self.settings.limits,
+        )
+        drive(self.job, supervisor, self.interruption, meter.observe)
+        if supervisor.error is not None:
+            raise supervisor.error
+
+    def _make_here(self, scan: Scan, meter: Meter) -> None:
+        if not scan.missing:
+            return
+        with self.job.make_pipeline() as pipeline:
+            for shard in scan.missing:
+
+                def on_sample(sample: Sample, shard: int = shard) -> None:
+                    meter.observe(SampleDone(IN_PROCESS, shard, sample.index, sample.timings_s))
+
+                record = make_shard(self.job, pipeline, shard, on_sample)
+                samples = record.end - record.first
+                done = ShardDone(
+                    IN_PROCESS, shard, samples, record.bytes, record.rejections, resident_bytes()
+                )
+                objection: GenDataError | None = meter.observe(done)
+                if objection is not None:
+                    raise objection
+
+    def _is_whole(self) -> bool:
+        """Whether a finished data set still is one. Files that others put there do not matter."""
+        found = findings(self.job.store.root, self.settings.full_check)
+        return all(finding.kind == "extra" for finding in found)
+
+    def _nothing_to_do(self) -> Summary:
+        ...
+
+    def _summary(self, dataset_id: str, scan: Scan, meter: Meter) -> Summary:
+        summary = Summary(
+            dataset_id=dataset_id,
+            samples=self.job.plan.n,
+            made=meter.made,
+            seconds=meter.seconds,
+            rejections=meter.rejections,
+            bytes=scan.bytes + meter.bytes,
+            cpu_s=meter.mean_cpu_s(),
+            worker_deaths=meter.worker_deaths,
+            rss_bytes_max=meter.rss_bytes_max,
+        )
+        meter.log({"summary": summary})
+        return summary

@@ -1,0 +1,220 @@
+"""Does a finished data set hold what its manifest declares?"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from generator.core.errors import StorageError, VerificationError
+from generator.runner.files import Inode, inode_of, sha256_of_file, tree_sizes
+from generator.runner.finalize import dataset_id
+from generator.runner.plan import Plan, load_plan
+from generator.runner.record import ShardRecord, parse_record
+from generator.runner.store import MANIFEST_NAME, RUN_NAME, SHARDS_NAME, SUMS_NAME, LocalStore
+
+SUM_LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
+SAMPLE_NAME = re.compile(r"(?:^|[/_])(\d{6,9})[._]")
+SHARD_PATH = re.compile(rf"{SHARDS_NAME}/(\d+)[/.]")
+SHOWN_MAX = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One deviation.
+
+    Attributes:
+        kind: ``missing``, ``extra``, ``size``, ``digest`` or ``inconsistent``.
+        path: Relative to the data set's root.
+        text: What is wrong.
+        samples: Which samples it concerns, in words; empty = all or none.
+    """
+
+    kind: str
+    path: str
+    text: str
+    samples: str = ""
+
+    def __str__(self) -> str:
+        """One line for a user."""
+        where = f" ({self.samples})" if self.samples else ""
+        return f"{self.path}{where}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A data set without deviations.
+
+    Attributes:
+        full: Whether every byte was hashed, not only sizes compared.
+    """
+
+    dataset_id: str
+    samples: int
+    files: int
+    bytes: int
+    full: bool
+
+    def __str__(self) -> str:
+        """One line for a user."""
+        depth = "every sha256 equal" if self.full else "sizes and records equal"
+        return (
+            f"{self.samples} samples, {self.files} files, {self.bytes / 1e6:.1f} MB: {depth}; "
+            f"id {self.dataset_id[:16]}"
+        )
+
+
+def verify(folder: Path, full: bool = False) -> Report:
+    """Check a data set against its manifest.
+
+    Args:
+        full: Hash every file; else compare sizes, records and sums.
+
+    Raises:
+        VerificationError: not a finished data set, or every deviation that was found.
+    """
+    if not (folder / MANIFEST_NAME).is_file():
+        raise VerificationError(
+            f"{folder}: not a finished data set: {MANIFEST_NAME} is missing. "
+            "The command that started it finishes it."
+        )
+    found = findings(folder, full)
+    if found:
+        listed = "\n".join(f"  {finding}" for finding in found[:SHOWN_MAX])
+        more = f"\n  and {len(found) - SHOWN_MAX} more" if len(found) > SHOWN_MAX else ""
+        raise VerificationError(f"{folder}: {len(found)} deviation(s):\n{listed}{more}")
+    sizes = _actual_sizes(folder)
+    manifest = json.loads((folder / MANIFEST_NAME).read_bytes())
+    return Report(manifest["dataset_id"], manifest["n"], len(sizes), sum(sizes.values()), full)
+
+
+def findings(folder: Path, full: bool = False) -> list[Finding]:
+    """Every deviation, in order of discovery; empty if there is none."""
+    try:
+        plan = load_plan(folder)
+    except StorageError as error:
+        return [Finding("inconsistent", "plan.json", str(error))]
+    return list(_Check(folder, plan).run(full))
+
+
+class _Check:
+    """One look at a data set: what is declared, what is there."""
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        self._folder = folder
+        self._plan = plan
+        self._store = LocalStore(folder)
+        self._sums: dict[str, str] = {}
+        self._sizes: dict[str, int] = {}
+        self._hashed: dict[Inode, str] = {}
+
+    def run(self, full: bool) -> Iterator[Finding]:
+        """All findings."""
+        manifest_bytes = _bytes_of(self._folder / MANIFEST_NAME)
+        manifest = _object(manifest_bytes)
+        if manifest is None:
+            yield Finding("inconsistent", MANIFEST_NAME, "is not a manifest")
+            return
+        yield from self._read_sums(manifest, manifest_bytes)
+        yield from self._read_sizes(manifest)
+        actual = _actual_sizes(self._folder)
+        for path in sorted({*self._sums, *actual} - {SUMS_NAME}):
+            yield from self._compare(path, actual.get(path), full)
+
+    def _read_sums(self, manifest: dict[str, Any], manifest_bytes: bytes) -> Iterator[Finding]:
+        finding = partial(Finding, "inconsistent", SUMS_NAME)
+        lines = _bytes_of(self._folder / SUMS_NAME).decode(errors="replace").splitlines()
+        matches = [SUM_LINE.fullmatch(line) for line in lines]
+        self._sums = {match[2]: match[1] for match in matches if match}
+        if None in matches or len(self._sums) != len(lines):
+            yield finding("a line is damaged or double")
+        own = self._sums.get(MANIFEST_NAME)
+        if own != hashlib.sha256(manifest_bytes).hexdigest():
+            yield Finding("digest", MANIFEST_NAME, f"its sha256 is not the one in {SUMS_NAME}")
+        others = "".join(f"{line}\n" for line in lines if not line.endswith(f"  {MANIFEST_NAME}"))
+        if manifest.get("dataset_id") != dataset_id(others):
+            yield finding(f"does not belong to {MANIFEST_NAME}: its sha256 is not dataset_id")
+
+    def _read_sizes(self, manifest: dict[str, Any]) -> Iterator[Finding]:
+        """Declared sizes: from records, from the manifest, and by equal digest."""
+        by_digest: dict[str, int] = {}
+        digests = manifest.get("shards", [])
+        if len(digests) != self._plan.shard_count:
+            yield Finding("inconsistent", MANIFEST_NAME, "number of shards is not the plan's")
+        for shard, digest in enumerate(digests[: self._plan.shard_count]):
+            path = self._relative(self._store.record_path(shard))
+            data = _bytes_of(self._store.record_path(shard))
+            record = parse_record(data)
+            if record is None or hashlib.sha256(data).hexdigest() != digest:
+                text = "its sha256 is not the one in the manifest" if data else "is missing"
+                yield Finding("digest", path, text, self._samples_of(path))
+                continue
+            yield from self._compare_record(shard, record)
+            by_digest.update({file.sha256: file.bytes for file in record.files})
+        declared = manifest.get("files", {})
+        for path, digest in self._sums.items():
+            size = declared.get(path, by_digest.get(digest))
+            if size is not None:
+                self._sizes.setdefault(path, size)
+
+    def _compare_record(self, shard: int, record: ShardRecord) -> Iterator[Finding]:
+        folder = self._relative(self._store.shard_dir(shard))
+        for file in record.files:
+            path = f"{folder}/{file.path}"
+            self._sizes[path] = file.bytes
+            if self._sums.get(path) != file.sha256:
+                text = f"{SUMS_NAME} and the shard's record disagree"
+                yield Finding("inconsistent", path, text, self._samples_of(path))
+
+    def _compare(self, path: str, size: int | None, full: bool) -> Iterator[Finding]:
+        finding = partial(Finding, path=path, samples=self._samples_of(path))
+        if path not in self._sums:
+            yield finding("extra", text="does not belong to the data set")
+        elif size is None:
+            yield finding("missing", text="is missing")
+        elif size != self._sizes.get(path, size):
+            yield finding("size", text=f"has {size} bytes instead of {self._sizes[path]}")
+        elif full and self._digest(path) != self._sums[path]:
+            yield finding("digest", text="its bytes differ (sha256)")
+
+    def _digest(self, path: str) -> str:
+        """Digest of a file; hard links to one file are read once."""
+        inode = inode_of(self._folder / path)
+        if inode not in self._hashed:
+            self._hashed[inode] = sha256_of_file(self._folder / path)
+        return self._hashed[inode]
+
+    def _samples_of(self, path: str) -> str:
+        shard = SHARD_PATH.match(path)
+        named = SAMPLE_NAME.search(path[shard.end() :] if shard else path)
+        if named:
+            return f"sample {int(named[1])}"
+        if shard and int(shard[1]) < self._plan.shard_count:
+            indices = self._plan.samples_of(int(shard[1]))
+            return f"samples {indices.start} to {indices.stop - 1}"
+        return ""
+
+    def _relative(self, path: Path) -> str:
+        return path.relative_to(self._folder).as_posix()
+
+
+def _actual_sizes(folder: Path) -> dict[str, int]:
+    sizes = tree_sizes(folder)
+    return {path: size for path, size in sizes.items() if not path.startswith(f"{RUN_NAME}/")}
+
+
+def _bytes_of(path: Path) -> bytes:
+    return path.read_bytes() if path.is_file() else b""
+
+
+def _object(data: bytes) -> dict[str, Any] | None:
+    try:
+        value = json.loads(data)
+    except ValueError:
+        return None
+    return value if isinstance(value, dict) else None

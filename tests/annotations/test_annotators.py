@@ -1,0 +1,412 @@
+"""Annotators on images drawn by hand, where every number can be counted on paper."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from generator.annotations import TABLE
+from generator.annotations.truth import Thresholds, image_truth
+from generator.core.boxes import BoxPx
+from generator.core.capture import Channel, Reading, Silhouette
+from generator.core.errors import ConfigError, SampleError
+from generator.core.interfaces import Annotator
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import ObjectTruth
+from generator.core.scene import Camera, Instance, Scene
+from generator.core.se3 import SE3, look_at
+
+W, H = 20, 12
+CAMERA = Camera(
+    "color", look_at((2.0, 1.0, 0.5), (0.0, 0.0, 0.0)), Intrinsics(W, H, 15.0, 15.0, 10.0, 6.0)
+)
+ARM = Instance(
+    2,
+    "arm",
+    "robot",
+    1,
+    "franka",
+    parts=("base", "elbow", "hand"),
+    T_world_instance=SE3.about_z(0.5, (0.1, 0.2, 0.3)),
+    box_min_m=(-0.1, -0.2, 0.0),
+    box_max_m=(0.3, 0.2, 1.0),
+)
+MUG = Instance(
+    5,
+    "mug",
+    "cup",
+    2,
+    "mug",
+    T_world_instance=SE3((0.4, -0.1, 0.0), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)),
+    box_min_m=(-0.04, -0.04, 0.0),
+    box_max_m=(0.04, 0.04, 0.1),
+)
+CARPET = Instance(9, "carpet", "rug", 3, "rug", annotated=False)
+
+
+def image(rectangles: Mapping[tuple[int, int, int, int], int]) -> NDArray[np.uint16]:
+    """An image of rectangles (x_min, y_min, x_max, y_max) in order of painting."""
+    pixels = np.zeros((H, W), np.uint16)
+    for (x0, y0, x1, y1), value in rectangles.items():
+        pixels[y0:y1, x0:x1] = value
+    return pixels
+
+
+def scene_and_reading() -> tuple[Scene, Reading]:
+    """The mug stands before the arm, which leaves the image at the left; a carpet lies below.
+
+    The arm's silhouette is 10 x 8 = 80 px; 4 of its columns are outside the image and 12 of its
+    pixels are behind the mug.
+    """
+    ids = image({(0, 9, 20, 12): 9, (0, 2, 6, 10): 2, (4, 4, 8, 10): 5})
+    reading = Reading(
+        "color",
+        CAMERA,
+        {
+            Channel.INSTANCE: ids,
+            Channel.CATEGORY: np.array([0, 0, 1, 0, 0, 2, 0, 0, 0, 3], np.uint16)[ids],
+            Channel.PART: image({(0, 2, 6, 4): 3, (0, 4, 3, 10): 1, (4, 4, 8, 10): 0}),
+        },
+        {
+            2: Silhouette(2, -4, 2, np.ones((8, 10), bool)),
+            5: Silhouette(5, 4, 4, np.ones((6, 4), bool)),
+            9: Silhouette(9, 0, 9, np.ones((3, 20), bool)),
+        },
+    )
+    return Scene("hand", instances=(MUG, CARPET, ARM)), reading
+
+
+def annotators(*names: str) -> list[Annotator]:
+    """The named annotators, or all of them."""
+    return [TABLE.load(name)() for name in names or TABLE]
+
+
+@pytest.fixture
+def truths() -> tuple[ObjectTruth, ...]:
+    """Arm and mug, with everything known about them."""
+    return image_truth(*scene_and_reading(), annotators(), Thresholds()).objects
+
+
+def test_instances_come_in_order_of_id_and_the_unannotated_not_at_all(
+    truths: tuple[ObjectTruth, ...],
+) -> None:
+    """The scene lists the mug first; the carpet is seen and has no annotation."""
+    assert [truth.instance.name for truth in truths] == ["arm", "mug"]
+
+
+def test_visible_box_and_count_are_of_the_visible_pixels(truths: tuple[ObjectTruth, ...]) -> None:
+    """48 px of the arm are in the image, 12 of them behind the mug."""
+    arm, mug = truths
+
+    assert (arm.visible_px, arm.box) == (36, BoxPx(0, 2, 6, 10))
+    assert (mug.visible_px, mug.box) == (24, BoxPx(4, 4, 8, 10))
+
+
+def test_amodal_box_is_of_the_silhouette_and_may_leave_the_image(
+    truths: tuple[ObjectTruth, ...],
+) -> None:
+    """Hidden columns count, and so do those left of the image."""
+    arm, mug = truths
+
+    assert arm.amodal_box == BoxPx(-4, 2, 6, 10)
+    assert mug.amodal_box == mug.box
+
+
+def test_visibility_is_three_ratios_of_pixel_counts(truths: tuple[ObjectTruth, ...]) -> None:
+    """Arm: 36 of 80 visible, 12 of 48 hidden, 32 of 80 outside. Mug: whole."""
+    arm, mug = truths
+
+    assert (arm.visible_fraction, arm.occlusion, arm.truncation) == (36 / 80, 12 / 48, 32 / 80)
+    assert (mug.visible_fraction, mug.occlusion, mug.truncation) == (1.0, 0.0, 0.0)
+
+
+def test_masks_fill_their_boxes(truths: tuple[ObjectTruth, ...]) -> None:
+    """The arm lacks the 2 x 6 px that the mug covers; its amodal mask has them."""
+    arm, _ = truths
+    assert arm.mask is not None
+    assert arm.amodal_mask is not None
+
+    expected = np.ones((8, 6), bool)
+    expected[2:, 4:] = False
+    np.testing.assert_array_equal(arm.mask.pixels, expected)
+    assert (arm.mask.x_px, arm.mask.y_px) == (0, 2)
+    assert (arm.amodal_mask.x_px, arm.amodal_mask.y_px) == (0, 2)
+    np.testing.assert_array_equal(arm.amodal_mask.pixels, np.ones((8, 6), bool))
+
+
+def test_an_amodal_mask_is_tight_after_clipping() -> None:
+    """An L whose foot is outside the image: what is left is narrower than the clip."""
+    scene, reading = scene_and_reading()
+    outline = np.zeros((8, 10), bool)
+    outline[:, 4:] = True
+    outline[7, :] = True
+    outline[:6, 4:6] = False
+    lying = replace(reading, silhouettes={**reading.silhouettes, 2: Silhouette(2, -4, 2, outline)})
+    (annotator,) = annotators("amodal_masks")
+
+    mask = annotator.annotate(scene, lying, ObjectTruth(ARM, 1, None)).amodal_mask
+
+    assert mask is not None
+    assert (mask.x_px, mask.y_px, mask.pixels.shape) == (0, 2, (8, 6))
+    np.testing.assert_array_equal(mask.pixels, outline[:, 4:])
+    upper = replace(reading, silhouettes={2: Silhouette(2, -4, -7, outline[:, ::-1])})
+    cut = annotator.annotate(scene, upper, ObjectTruth(ARM, 1, None)).amodal_mask
+    assert cut is not None
+    assert (cut.x_px, cut.y_px, cut.pixels.shape) == (0, 0, (1, 6))
+
+
+def test_part_pixels_are_counted_by_name(truths: tuple[ObjectTruth, ...]) -> None:
+    """Hand 12, base 18; the elbow is not seen; 6 px belong to no part. Mugs have no parts."""
+    arm, mug = truths
+
+    assert arm.part_px == {"base": 18, "elbow": 0, "hand": 12}
+    assert mug.part_px is None
+
+
+def test_the_pose_in_the_camera_undoes_the_cameras_own(truths: tuple[ObjectTruth, ...]) -> None:
+    """Matrix arithmetic: inverse(T_world_camera) times T_world_object."""
+    for truth in truths:
+        assert truth.T_camera_object is not None
+        expected = np.linalg.inv(CAMERA.T_world_camera.matrix()) @ (
+            truth.instance.T_world_instance.matrix()
+        )
+        np.testing.assert_allclose(truth.T_camera_object.matrix(), expected, atol=1e-12)
+
+
+def test_boxes_in_both_frames_are_the_instances_bounds(truths: tuple[ObjectTruth, ...]) -> None:
+    """The eight combinations of bounds, carried by matrices, are the boxes' corners."""
+    for truth in truths:
+        low, high = truth.instance.box_min_m, truth.instance.box_max_m
+        local = np.array(
+            [[x, y, z, 1] for x in (low[0], high[0]) for y in (low[1], high[1])
+             for z in (low[2], high[2])]
+        )  # fmt: skip
+        world = local @ truth.instance.T_world_instance.matrix().T
+        camera = world @ np.linalg.inv(CAMERA.T_world_camera.matrix()).T
+        assert truth.box3d_world is not None
+        assert truth.box3d_camera is not None
+        np.testing.assert_allclose(truth.box3d_world.corners(), world[:, :3], atol=1e-12)
+        np.testing.assert_allclose(truth.box3d_camera.corners(), camera[:, :3], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", TABLE.names())
+def test_every_annotator_fills_only_its_own_fields(name: str) -> None:
+    """And leaves the truth it is given as it is."""
+    fields = {
+        "amodal_masks": {"amodal_mask"},
+        "boxes2d": {"amodal_box"},
+        "boxes3d": {"box3d_world", "box3d_camera"},
+        "instance_masks": {"mask"},
+        "part_masks": {"part_px"},
+        "poses": {"T_camera_object"},
+        "semantic_masks": set(),
+        "visibility": {"visible_fraction", "occlusion", "truncation"},
+    }
+    scene, reading = scene_and_reading()
+    (annotator,) = annotators(name)
+
+    (arm, _) = image_truth(scene, reading, [annotator], Thresholds()).objects
+
+    optional = set().union(*fields.values())
+    assert {f for f in optional if getattr(arm, f) is not None} == fields[name]
+
+
+@pytest.mark.parametrize("name", TABLE.names())
+def test_every_annotator_is_a_picklable_value_that_names_its_channels(name: str) -> None:
+    """The id image is always among them: no truth without it."""
+    (annotator,) = annotators(name)
+
+    assert isinstance(annotator, Annotator)
+    assert Channel.INSTANCE in annotator.channels
+    assert pickle.loads(pickle.dumps(annotator)) == annotator
+
+
+@pytest.mark.parametrize("name", TABLE.names())
+def test_every_annotator_needs_only_the_channels_it_names(name: str) -> None:
+    """Others need not have been rendered."""
+    scene, reading = scene_and_reading()
+    (annotator,) = annotators(name)
+    lean = replace(
+        reading,
+        channels={c: a for c, a in reading.channels.items() if c in annotator.channels},
+        silhouettes=reading.silhouettes if Channel.AMODAL in annotator.channels else {},
+    )
+
+    assert len(image_truth(scene, lean, [annotator], Thresholds()).objects) == 2
+
+
+@pytest.mark.parametrize(
+    ("thresholds", "listed"),
+    [
+        (Thresholds(), ["arm", "mug"]),
+        (Thresholds(min_visible_px=24), ["arm", "mug"]),
+        (Thresholds(min_visible_px=25), ["arm"]),
+        (Thresholds(min_visible_fraction=0.45), ["arm", "mug"]),
+        (Thresholds(min_visible_fraction=0.46), ["mug"]),
+        (Thresholds(min_box_px=4), ["arm", "mug"]),
+        (Thresholds(min_box_px=5), ["arm"]),
+        (Thresholds(min_visible_px=999, include_invisible=True), ["arm", "mug"]),
+    ],
+)
+def test_thresholds_are_the_smallest_values_that_are_listed(
+    thresholds: Thresholds, listed: list[str]
+) -> None:
+    """Arm: 36 px, 0.45 visible, 6 x 8 px. Mug: 24 px, whole, 4 x 6 px."""
+    truth = image_truth(*scene_and_reading(), annotators(), thresholds)
+
+    assert [t.instance.name for t in truth.objects] == listed
+
+
+def test_hidden_and_absent_instances_are_listed_only_on_request() -> None:
+    """One without a pixel has no box, an empty mask, and no visible fraction."""
+    scene, reading = scene_and_reading()
+    ghost = replace(MUG, instance_id=6, name="ghost")
+    scene = replace(scene, instances=(*scene.instances, ghost))
+    for silhouette in (
+        Silhouette(6, 0, 0, np.zeros((0, 0), bool)),
+        Silhouette(6, -30, 0, np.ones((3, 3), bool)),
+    ):
+        gone = replace(reading, silhouettes={**reading.silhouettes, 6: silhouette})
+
+        usual = image_truth(scene, gone, annotators(), Thresholds())
+        complete = image_truth(scene, gone, annotators(), Thresholds(include_invisible=True))
+
+        assert len(usual.objects) == 2
+        last = complete.objects[-1]
+        assert (last.instance, last.visible_px, last.box) == (ghost, 0, None)
+        assert (last.visible_fraction, last.occlusion, last.truncation) == (0.0, 0.0, 1.0)
+        assert last.mask is not None
+        assert last.mask.pixels.shape == (0, 0)
+
+
+def test_a_fraction_that_is_not_measured_cannot_be_a_threshold() -> None:
+    """The message says what to add."""
+    with pytest.raises(ConfigError, match="add 'visibility' to annotations"):
+        image_truth(*scene_and_reading(), annotators("poses"), Thresholds(min_visible_fraction=0.1))
+
+
+def test_without_annotators_nothing_is_annotated() -> None:
+    """A data set of images only needs no id image."""
+    scene, reading = scene_and_reading()
+
+    truth = image_truth(scene, replace(reading, channels={}), [], Thresholds())
+
+    assert truth.objects == ()
+    assert truth.camera is CAMERA
+
+
+def _moved(silhouette: Silhouette) -> Silhouette:
+    return replace(silhouette, x_px=silhouette.x_px + 1)
+
+
+def _holed(silhouette: Silhouette) -> Silhouette:
+    mask = silhouette.mask.copy()
+    mask[3, 4] = False
+    return replace(silhouette, mask=mask)
+
+
+def _padded(silhouette: Silhouette) -> Silhouette:
+    return replace(silhouette, mask=np.pad(silhouette.mask, ((0, 1), (0, 0))))
+
+
+def _emptied(silhouette: Silhouette) -> Silhouette:
+    return replace(silhouette, mask=np.zeros((0, 0), bool))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "fault"),
+    [
+        (_moved, "leaves the box"),
+        (_holed, "visible that are not in its silhouette"),
+        (_padded, "not stored tight"),
+        (_emptied, "leaves the box None"),
+    ],
+)
+def test_a_silhouette_that_contradicts_the_image_stops_the_sample(spoil: Any, fault: str) -> None:
+    """Naming sensor, instance and fault."""
+    scene, reading = scene_and_reading()
+    bad = replace(reading, silhouettes={**reading.silhouettes, 2: spoil(reading.silhouettes[2])})
+
+    with pytest.raises(SampleError, match=f"sensor 'color', instance 2 'arm': .*{fault}"):
+        image_truth(scene, bad, annotators("boxes2d"), Thresholds())
+
+
+def test_a_silhouette_that_was_not_rendered_stops_the_sample() -> None:
+    """Instead of an object without amodal labels."""
+    scene, reading = scene_and_reading()
+
+    with pytest.raises(SampleError, match="instance 2 'arm': the renderer returned no silhouette"):
+        image_truth(scene, replace(reading, silhouettes={}), annotators(), Thresholds())
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"category_id": 0}, "category 'robot' has no id"),
+        ({"T_world_instance": SE3((0.0, math.nan, 0.0))}, "no rigid pose"),
+        ({"T_world_instance": SE3((0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0))}, "no rigid pose"),
+        ({"box_max_m": (-0.2, 0.2, 1.0)}, "has the size"),
+        ({"box_max_m": (math.inf, 0.2, 1.0)}, "has the size"),
+        ({"box_min_m": (0.0, 0.0, 0.0), "box_max_m": (0.0, 0.0, 0.0)}, "has the size"),
+        ({"parts": ("base",)}, "shows part 3; it has 1 parts"),
+        ({"category_id": 2}, "another category than 2"),
+    ],
+)
+def test_an_instance_that_cannot_be_stops_the_sample(changes: dict[str, Any], fault: str) -> None:
+    """A label that contradicts another one is never written."""
+    scene, reading = scene_and_reading()
+    scene = replace(scene, instances=(replace(ARM, **changes), MUG))
+
+    with pytest.raises(SampleError, match=f"instance 2 'arm': .*{fault}"):
+        image_truth(scene, reading, annotators(), Thresholds())
+
+
+class _Liar:
+    """An annotator that changes what others found."""
+
+    channels = frozenset({Channel.INSTANCE})
+
+    def __init__(self, **changes: Any) -> None:
+        self.changes = changes
+
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+        return replace(truth, **self.changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"visible_px": 35}, "does not hold its 35 visible pixels"),
+        ({"box": BoxPx(0, 2, 7, 10)}, "not the tight box"),
+        ({"box": BoxPx(0, 2, 5, 10)}, "does not hold"),
+        ({"box": BoxPx(0, 2, 6, 13)}, "leaves the image"),
+        ({"visible_fraction": 1.01}, "visible_fraction is 1.01"),
+        ({"occlusion": -0.1}, "occlusion is -0.1"),
+        ({"truncation": math.nan}, "truncation is nan"),
+        ({"T_camera_object": SE3((0.0, 0.0, 1.0), (1.0, 0.1, 0.0, 0.0))}, "no rigid pose"),
+    ],
+)
+def test_labels_are_checked_against_the_image_whoever_made_them(
+    changes: dict[str, Any], fault: str
+) -> None:
+    """Third-party annotators are held to the same contract."""
+    with pytest.raises(SampleError, match=f"instance 2 'arm': .*{fault}"):
+        image_truth(*scene_and_reading(), [*annotators(), _Liar(**changes)], Thresholds())
+
+
+def test_a_mask_of_other_pixels_stops_the_sample() -> None:
+    """Also one of the right shape and count."""
+    scene, reading = scene_and_reading()
+    arm = image_truth(scene, reading, annotators(), Thresholds()).objects[0]
+    assert arm.mask is not None
+    turned = replace(arm.mask, pixels=arm.mask.pixels[::-1, ::-1])
+
+    with pytest.raises(SampleError, match="mask is not its visible pixels"):
+        image_truth(scene, reading, [*annotators(), _Liar(mask=turned)], Thresholds())

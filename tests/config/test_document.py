@@ -1,0 +1,456 @@
+"""Reading YAML: places, limits, and everything that is refused."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from generator.config.document import Node, load, merge, parse
+from generator.config.problems import Position
+from generator.core.errors import ConfigError
+
+TABLETOP = """\
+# a comment
+seed: 7
+camera:
+  fov_deg: 60   # degrees
+  size: [640, 480]
+randomizers:
+  - {name: clutter, count: {uniform_integer: [3, 12]}}
+  - name: "lamps"
+"""
+
+
+def message_of(text: str) -> str:
+    """What reading a text complains about."""
+    with pytest.raises(ConfigError) as caught:
+        parse(text, "x.yaml")
+    return str(caught.value)
+
+
+def test_a_document_becomes_plain_data() -> None:
+    """Comments vanish, quotes make strings, flow and block style mean the same."""
+    assert parse(TABLETOP, "t.yaml").plain() == {
+        "seed": 7,
+        "camera": {"fov_deg": 60, "size": [640, 480]},
+        "randomizers": [
+            {"name": "clutter", "count": {"uniform_integer": [3, 12]}},
+            {"name": "lamps"},
+        ],
+    }
+
+
+@pytest.mark.parametrize(
+    ("path", "line", "column"),
+    [
+        (("seed",), 2, 7),
+        (("camera",), 4, 3),
+        (("camera", "fov_deg"), 4, 12),
+        (("camera", "size", 1), 5, 15),
+        (("randomizers", 0), 7, 5),
+        (("randomizers", 0, "count", "uniform_integer", 1), 7, 50),
+        (("randomizers", 1, "name"), 8, 11),
+    ],
+)
+def test_every_value_knows_its_place(path: tuple[str | int, ...], line: int, column: int) -> None:
+    """Line and column count from 1."""
+    node = parse(TABLETOP, "t.yaml").get(*path)
+
+    assert node is not None
+    assert node.position == Position("t.yaml", line, column)
+
+
+def test_every_key_knows_its_place() -> None:
+    """Needed to point at a key that nobody expected."""
+    document = parse(TABLETOP, "t.yaml")
+    camera = document.get("camera")
+
+    assert camera is not None
+    assert str(document.key_position("camera")) == "t.yaml:3:1"
+    assert str(camera.key_position("size")) == "t.yaml:5:3"
+    assert camera.key_position("absent") == camera.position
+
+
+def test_columns_count_characters_not_bytes() -> None:
+    """Umlauts and emoji are one column each."""
+    assert message_of("ä: {ö😀: 1, ö😀: 2}").startswith("x.yaml:1:13: ")
+
+
+def test_scalars_keep_their_raw_text() -> None:
+    """``010`` is ten, and still known as ``010``."""
+    node = parse("a: 010", "x.yaml").get("a")
+
+    assert node is not None
+    assert (node.content, node.text) == (10, "010")
+
+
+def test_a_path_that_leads_nowhere_gives_none() -> None:
+    """Keys of lists, indices of mappings, and parts of scalars do not exist."""
+    document = parse(TABLETOP, "t.yaml")
+
+    for path in [("x",), ("seed", "x"), ("randomizers", 2), ("randomizers", "a"), ("camera", 0)]:
+        assert document.get(*path) is None
+    assert document.get("randomizers", -1) is None
+
+
+def test_keys_are_always_text() -> None:
+    """As in JSON: weights by number are keyed by their text."""
+    assert parse("{1: a, true: b, null: c}", "x.yaml").plain() == {
+        "1": "a",
+        "true": "b",
+        "null": "c",
+    }
+
+
+def test_aliases_are_expanded() -> None:
+    """An alias is the value of its anchor; the last anchor of a name counts."""
+    assert parse("a: &x [1, 2]\nb: *x\nc: &x 3\nd: *x\n", "x.yaml").plain() == {
+        "a": [1, 2],
+        "b": [1, 2],
+        "c": 3,
+        "d": 3,
+    }
+
+
+def test_a_byte_order_mark_is_ignored() -> None:
+    """Some editors write one."""
+    assert parse("\ufeffa: 1", "x.yaml").plain() == {"a": 1}
+
+
+def test_windows_line_ends_are_line_ends() -> None:
+    """Lines are counted right."""
+    assert message_of("a: 1\r\na: 2\r\n").startswith("x.yaml:2:1: a: duplicate key")
+
+
+REFUSED = {
+    "duplicate key": (
+        "a: 1\nb:\n  c: 1\n  d: 2\n  c: 3\n",
+        "x.yaml:5:3: b.c: duplicate key; it is first given at line 3\n"
+        "      5 |   c: 3\n"
+        "        |   ^",
+    ),
+    "two faults at once": (
+        "a: .inf\na: 1\n",
+        "x.yaml:1:4: a: .inf is not a finite number\n"
+        "      1 | a: .inf\n"
+        "        |    ^\n"
+        "x.yaml:2:1: a: duplicate key; it is first given at line 1\n"
+        "      2 | a: 1\n"
+        "        | ^",
+    ),
+    "python tag": (
+        "a: !!python/object/apply:os.system [ls]\n",
+        "x.yaml:1:4: a: tag tag:yaml.org,2002:python/object/apply:os.system is not allowed\n"
+        "      1 | a: !!python/object/apply:os.system [ls]\n"
+        "        |    ^",
+    ),
+    "second document": (
+        "a: 1\n---\nb: 2\n",
+        "x.yaml:2:1: a second document begins; expected one document per file\n"
+        "      2 | ---\n"
+        "        | ^",
+    ),
+    "list as key": (
+        "? [a]\n: 1\n",
+        "x.yaml:1:3: a key must be plain text, got a list or a mapping\n"
+        "      1 | ? [a]\n"
+        "        |   ^",
+    ),
+    "tab": (
+        "a:\n\tb: 1\n",
+        "x.yaml:2:1: a tab; indent and separate with spaces\n      2 |  b: 1\n        | ^",
+    ),
+    "merge key": (
+        "<<: {a: 1}\n",
+        "x.yaml:1:1: merge keys (<<) are not part of YAML 1.2; repeat the values\n"
+        "      1 | <<: {a: 1}\n"
+        "        | ^",
+    ),
+    "open bracket": (
+        "a: 1\nb: [1, 2\n",
+        "x.yaml:2:4: b[2]: not valid YAML: while parsing a flow sequence, "
+        "did not find expected ',' or ']'\n"
+        "      2 | b: [1, 2\n"
+        "        |    ^",
+    ),
+    "empty file": ("", "x.yaml:1:1: expected a mapping of settings, got nothing"),
+    "scalar root": (
+        "hello",
+        "x.yaml:1:1: expected a mapping of settings, got 'hello'\n      1 | hello\n        | ^",
+    ),
+    "list root": (
+        "- 1",
+        "x.yaml:1:1: expected a mapping of settings, got a list\n      1 | - 1\n        | ^",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused_documents_say_place_fact_and_remedy(case: str) -> None:
+    """The whole message, literally."""
+    text, message = REFUSED[case]
+
+    assert message_of(text) == message
+
+
+NASTY = {
+    "deep flow": ("a: " + "[" * 100_000, "nested deeper than 32 levels"),
+    "deep flow mapping": ("{a: " * 100_000, "nested deeper than 32 levels"),
+    "deep block": (
+        "\n".join(" " * i + "a:" for i in range(200)),
+        "nested deeper than 32 levels",
+    ),
+    "deep block list": ("- " * 50_000, "nested deeper than 32 levels"),
+    "5000-digit int": ("a: " + "9" * 5000, "a text longer than 4096 bytes"),
+    "4000-digit int": ("a: " + "9" * 4000, "is too large for a whole number (64 bits)"),
+    "tagged float": ("a: !!float abc", "tag tag:yaml.org,2002:float is not allowed"),
+    "tagged int": ("a: !!int 0xZZ", "tag tag:yaml.org,2002:int is not allowed"),
+    "tagged bool": ("a: !!bool maybe", "tag tag:yaml.org,2002:bool is not allowed"),
+    "bare tag": ("a: ! 1", "tag ! is not allowed"),
+    "set tag": ("a: !!set {x, y}", "tag tag:yaml.org,2002:set is not allowed"),
+    "huge float": ("a: 1e999999", "1e999999 is too large for a number"),
+    "not a number": ("a: .NaN", ".NaN is not a finite number"),
+    "surrogate in source": ("a: \ud800", "character U+D800 is not allowed"),
+    "surrogate escape": ('a: "\\ud800"', "not valid YAML"),
+    "NUL": ("a: \x00", "character U+0000 is not allowed"),
+    "NUL escape": ('a: "\\0"', "a text with the character U+0000"),
+    "escape": ("a: \x1b[31m", "character U+001B is not allowed"),
+    "next line": ("a: 1\x85b: 2", "character U+0085 is not allowed"),
+    "line separator": ("a: 1\u2028b: 2", "character U+2028 is not allowed"),
+    "mark in the middle": ("a: \ufeff1", "character U+FEFF is not allowed"),
+    "self alias": ("a: &x [*x]", "alias *x stands inside what it names"),
+    "self alias in mapping": ("a: &x {b: {c: *x}}", "alias *x stands inside what it names"),
+    "unknown alias": ("a: *x", "alias *x has no anchor &x before it"),
+    "alias as key": ("a: &x b\n*x : 1", "a key must be plain text, got an alias"),
+    "alias bomb": (
+        "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]\n"
+        + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 10)),
+        "aliases stand for more than 1000 values",
+    ),
+    "deep through aliases": (
+        "a0: &a0 [1]\n" + "".join(f"a{i}: &a{i} [*a{i - 1}]\n" for i in range(1, 40)),
+        "nested deeper than 32 levels",
+    ),
+    "merge bomb": ("a: &a {b: 1}\nc: {<<: [*a, *a]}", "merge keys (<<) are not part of YAML 1.2"),
+    "many values": ("a: [" + "1," * 60_000 + "]", "more than 50000 values in one document"),
+    "long text": ("a: " + "x" * 2_000_00, "a text longer than 4096 bytes"),
+    "2 MB text": ("a: " + "x" * 2_000_000, "larger than 1048576 bytes"),
+    "long key": ("k" * 200_000 + ": 1", "a text longer than 4096 bytes"),
+    "long quoted key": ('"' + "k" * 5000 + '": 1', "a text longer than 4096 bytes"),
+    "YAML 9.9": ("%YAML 9.9\n---\na: 1", "found incompatible YAML document"),
+    "YAML 1.1": ("%YAML 1.1\n---\na: 1", "only YAML 1.2 is read; remove the %YAML line"),
+    "tag directive": ("%TAG !e! tag:e.org,2000:\n---\na: 1", "remove the %TAG line"),
+    "empty key": ("{: 1}", "an empty key; expected a name before ':'"),
+    "missing space": ("a:1\nb: 2", "not valid YAML"),
+    "colon in value": ("a: b: c", "mapping values are not allowed in this context"),
+    "bad indent": ("a:\n   b: 1\n  c: 2", "not valid YAML"),
+    "unclosed quote": ("a: 'x", "found unexpected end of stream"),
+    "reserved": ("a: @x", "found character that cannot start any token"),
+    "binary": ("".join(chr(i) for i in range(256)), "character U+0000 is not allowed"),
+    "only a comment": ("# nothing", "expected a mapping of settings, got nothing"),
+    "only a marker": ("---", "expected a mapping of settings, got nothing"),
+}
+
+
+@pytest.mark.parametrize("case", NASTY)
+def test_nasty_documents_are_refused_at_once_with_a_message(case: str) -> None:
+    """No traceback, no crash, no waiting: one ConfigError with a place."""
+    text, fact = NASTY[case]
+
+    begun = time.perf_counter()
+    message = message_of(text)
+
+    assert fact in message
+    assert message.startswith("x.yaml:")
+    assert time.perf_counter() - begun < 5.0
+
+
+def test_bad_timestamps_are_text() -> None:
+    """The core schema has no dates, so none can be malformed."""
+    assert parse("a: 2020-99-99T99:99:99Z", "x.yaml").plain() == {"a": "2020-99-99T99:99:99Z"}
+
+
+def test_a_document_at_the_limits_is_read() -> None:
+    """32 levels, 4,096 bytes of text: the limit itself is allowed."""
+    deep = parse("a: " + "[" * 31 + "]" * 31, "x.yaml")
+    long = parse("a: " + "x" * 4096, "x.yaml")
+
+    assert deep.get("a", *[0] * 30) is not None
+    assert len(long.plain()["a"]) == 4096
+
+
+def test_a_large_document_is_read_in_a_second() -> None:
+    """45,000 values in one file."""
+    text = "a:\n" + "  - {x: 1.5, y: [1, 2]}\n" * 6_000
+
+    begun = time.perf_counter()
+    document = parse(text, "x.yaml")
+
+    assert len(document.plain()["a"]) == 6_000
+    assert time.perf_counter() - begun < 10.0
+
+
+# --- files
+
+
+def test_a_file_is_read_by_its_path(tmp_path: Path) -> None:
+    """Messages name it as the user did."""
+    path = tmp_path / "a.yaml"
+    path.write_text("a: 1\n")
+
+    document = load(path)
+
+    assert document.plain() == {"a": 1}
+    assert str(document.position) == f"{path}:1:1"
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"a: 1\nb: \xff\n", ":2:4: not UTF-8: byte 0xff; save the file as UTF-8"),
+        ("a: 1\n".encode("utf-16"), ":1:1: not UTF-8: byte 0xff; save the file as UTF-8"),
+        (b"a: \xed\xa0\x80", ":1:4: not UTF-8: byte 0xed; save the file as UTF-8"),
+        (b"#" * (1024 * 1024 + 1), ":1:1: larger than 1048576 bytes"),
+    ],
+)
+def test_files_that_are_no_text_are_refused(tmp_path: Path, data: bytes, message: str) -> None:
+    """The size is checked before anything is decoded."""
+    path = tmp_path / "a.yaml"
+    path.write_bytes(data)
+
+    with pytest.raises(ConfigError) as caught:
+        load(path)
+
+    assert str(caught.value) == f"{path}{message}"
+
+
+def test_what_is_no_readable_file_is_refused(tmp_path: Path) -> None:
+    """Missing files, folders, pipes and impossible names."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+
+    for path, fact in [
+        (tmp_path / "absent.yaml", "cannot be read: No such file or directory"),
+        (tmp_path, "is no regular file"),
+        (pipe, "is no regular file"),
+        (Path("a\0b"), "is no file name"),
+    ]:
+        with pytest.raises(ConfigError, match=fact):
+            load(path)
+
+
+# --- fuzz
+
+ALPHABET = "abc:,-[]{}&*!|>'\"%@#? \n\t\\0123456789.~\x00\x85\ufeff\ud800é😀"
+
+
+def reads_or_refuses(text: str) -> None:
+    """A tree or a ConfigError, whatever the text."""
+    try:
+        node = parse(text, "f.yaml")
+    except ConfigError as error:
+        assert str(error).startswith("f.yaml:")
+    else:
+        assert isinstance(node, Node)
+        node.plain()
+
+
+@settings(max_examples=1500, deadline=None, derandomize=True)
+@given(st.text(ALPHABET, max_size=60))
+@example("? ? ? :\n")
+@example("&a &b c: 1")
+@example("- - - \n  -")
+@example("a: |9999\n x")
+@example("{? a, ? b}")
+@example("[? a : b]")
+def test_any_text_gives_a_tree_or_an_error(text: str) -> None:
+    """No other exception leaves the reader."""
+    reads_or_refuses(text)
+
+
+@settings(max_examples=400, deadline=None, derandomize=True)
+@given(st.data())
+def test_any_mutation_of_a_valid_document_gives_a_tree_or_an_error(data: st.DataObject) -> None:
+    """Bytes exchanged, deleted and repeated in a file that was fine."""
+    mutated = bytearray(TABLETOP.encode())
+    for _ in range(data.draw(st.integers(1, 6))):
+        at = data.draw(st.integers(0, len(mutated) - 1))
+        new = data.draw(st.binary(max_size=3))
+        mutated[at : at + data.draw(st.integers(0, 3))] = new or b" "
+    try:
+        text = bytes(mutated).decode()
+    except UnicodeDecodeError:
+        text = bytes(mutated).decode("latin-1")
+
+    reads_or_refuses(text)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(data=st.binary(max_size=40))
+def test_any_bytes_in_a_file_give_a_tree_or_an_error(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    """Decoding is part of reading."""
+    path = tmp_path_factory.getbasetemp() / "fuzz.yaml"
+    path.write_bytes(data)
+    try:
+        load(path).plain()
+    except ConfigError as error:
+        assert str(error).startswith(str(path))
+
+
+# --- merging
+
+
+def test_merging_lays_mappings_over_each_other() -> None:
+    """Key by key, at every depth; lists and scalars are replaced as a whole."""
+    base = parse("{a: {x: 1, y: [1, 2]}, b: 1, c: {z: 1}}", "base.yaml")
+    override = parse("{a: {y: [3], w: 4}, b: {v: 5}, d: 6}", "over.yaml")
+
+    merged = merge(base, override)
+
+    assert merged.plain() == {
+        "a": {"x": 1, "y": [3], "w": 4},
+        "b": {"v": 5},
+        "c": {"z": 1},
+        "d": 6,
+    }
+
+
+def test_merged_values_keep_the_place_they_came_from() -> None:
+    """Messages point into the file in which the value stands."""
+    merged = merge(parse("a: {x: 1, y: 2}", "base.yaml"), parse("a: {y: 3}", "over.yaml"))
+    x, y, a = merged.get("a", "x"), merged.get("a", "y"), merged.get("a")
+
+    assert x is not None
+    assert y is not None
+    assert a is not None
+    assert (str(x.position), str(y.position)) == ("base.yaml:1:8", "over.yaml:1:8")
+    assert (a.key_position("x").file, a.key_position("y").file) == ("base.yaml", "over.yaml")
+
+
+def test_merging_replaces_a_distribution_by_another_as_a_whole() -> None:
+    """Two distributions must not end up in one mapping."""
+    base = parse("{r: {uniform: [0, 1]}, s: {uniform: [0, 1]}, t: 1}", "base.yaml")
+    override = parse("{r: {normal: {mean: 0, stddev: 1}}, t: {choice: [1, 2]}}", "over.yaml")
+
+    assert merge(base, override).plain() == {
+        "r": {"normal": {"mean": 0, "stddev": 1}},
+        "s": {"uniform": [0, 1]},
+        "t": {"choice": [1, 2]},
+    }
+
+
+def test_merging_leaves_its_arguments_alone() -> None:
+    """Trees are values."""
+    base, override = parse("a: {x: 1}", "b.yaml"), parse("a: {y: 2}", "o.yaml")
+
+    merge(base, override)
+
+    assert base.plain() == {"a": {"x": 1}}
+    assert override.plain() == {"a": {"y": 2}}

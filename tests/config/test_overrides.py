@@ -1,0 +1,165 @@
+"""``--set path=value``."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from generator.config.document import Node, parse, with_override
+from generator.core.errors import ConfigError
+
+TEXT = """\
+seed: 7
+physics:
+camera: {fov_deg: 60}
+randomizers:
+  - {name: clutter, count: 3}
+  - {name: finish, roughness: {uniform: [0, 1]}}
+  - {type: lamps}
+"""
+
+
+@pytest.fixture
+def document() -> Node:
+    """A configuration in short."""
+    return parse(TEXT, "t.yaml")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "reached", "expected"),
+    [
+        ("seed", "0", ("seed",), 0),
+        ("camera.fov_deg", "1e1", ("camera", "fov_deg"), 10.0),
+        ("camera.name", "front", ("camera", "name"), "front"),
+        ("randomizers[0].count", "5", ("randomizers", 0, "count"), 5),
+        ("randomizers.1.name", "x", ("randomizers", 1, "name"), "x"),
+        ("randomizers.clutter.count", "5", ("randomizers", 0, "count"), 5),
+        (
+            "randomizers.finish.roughness",
+            "{normal: {mean: 0, stddev: 1}}",
+            ("randomizers", 1, "roughness"),
+            {"normal": {"mean": 0, "stddev": 1}},
+        ),
+        ("randomizers.finish.roughness.uniform[1]", "2", ("randomizers", 1, "roughness"),
+         {"uniform": [0, 2]}),
+        ("physics.settle_s", "4", ("physics",), {"settle_s": 4}),
+        ("render.samples", "16", ("render",), {"samples": 16}),
+        ("randomizers", "[]", ("randomizers",), []),
+        ("camera", "", ("camera",), None),
+        ("name", "a=b", ("name",), "a=b"),
+    ],
+)  # fmt: skip
+def test_an_override_exchanges_one_value(
+    document: Node, path: str, value: str, reached: tuple[str | int, ...], expected: object
+) -> None:
+    """By keys, by index, by name; anything else stays."""
+    changed = with_override(document, path, value)
+    node = changed.get(*reached)
+
+    assert node is not None
+    assert node.plain() == expected
+    assert document.plain() == parse(TEXT, "t.yaml").plain()
+    untouched = {k: v for k, v in document.plain().items() if k != reached[0]}
+    assert {k: v for k, v in changed.plain().items() if k != reached[0]} == untouched
+
+
+def test_an_overridden_value_knows_that_it_came_from_the_command_line(document: Node) -> None:
+    """The column counts in ``path=value``."""
+    changed = with_override(document, "camera.fov_deg", "400")
+    camera = changed.get("camera")
+
+    assert camera is not None
+    assert camera.content["fov_deg"].position.source == "camera.fov_deg=400"  # type: ignore[index,call-overload]
+    assert str(camera.content["fov_deg"].position) == "--set:1:16"  # type: ignore[index,call-overload]
+    assert str(camera.key_position("fov_deg")) == "--set:1:8"
+    assert camera.position.file == "t.yaml"
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        (
+            "randomizers.cluter.count",
+            "5",
+            "--set:1:13: randomizers: no item is named 'cluter'; expected clutter, finish"
+            " (did you mean 'clutter'?)\n"
+            "      1 | randomizers.cluter.count=5\n"
+            "        |             ^",
+        ),
+        (
+            "randomizers[3].count",
+            "5",
+            "--set:1:12: randomizers: has 3 items, no [3]\n"
+            "      1 | randomizers[3].count=5\n"
+            "        |            ^",
+        ),
+        (
+            "seed.x",
+            "1",
+            "--set:1:6: seed: is 7, so it has no 'x'\n      1 | seed.x=1\n        |      ^",
+        ),
+        (
+            "a..b",
+            "1",
+            "--set:1:2: 'a..b' is no path; expected something like a.b[0].c\n"
+            "      1 | a..b=1\n"
+            "        |  ^",
+        ),
+        ("", "1", "--set:1:1: an empty path\n      1 | =1\n        | ^"),
+        (
+            "camera.fov_deg",
+            "[1, 2",
+            "--set:1:16: camera.fov_deg[2]: not valid YAML: while parsing a flow sequence, "
+            "did not find expected ',' or ']'\n"
+            "      1 | camera.fov_deg=[1, 2\n"
+            "        |                ^",
+        ),
+        (
+            "camera.fov_deg",
+            "!!float 1",
+            "--set:1:16: camera.fov_deg: tag tag:yaml.org,2002:float is not allowed\n"
+            "      1 | camera.fov_deg=!!float 1\n"
+            "        |                ^",
+        ),
+        (
+            "camera.fov_deg",
+            ".nan",
+            "--set:1:16: camera.fov_deg: .nan is not a finite number\n"
+            "      1 | camera.fov_deg=.nan\n"
+            "        |                ^",
+        ),
+    ],
+)
+def test_overrides_that_lead_nowhere_say_so(
+    document: Node, path: str, value: str, message: str
+) -> None:
+    """The whole message, literally."""
+    with pytest.raises(ConfigError) as caught:
+        with_override(document, path, value)
+
+    assert str(caught.value) == message
+
+
+def test_a_list_without_names_is_addressed_by_index() -> None:
+    """The message says how."""
+    document = parse("a: [1, 2]", "t.yaml")
+
+    with pytest.raises(ConfigError, match=r"no item is named 'x'; expected an index such as \[0\]"):
+        with_override(document, "a.x", "1")
+
+
+def test_a_path_cannot_be_used_to_nest_without_end(document: Node) -> None:
+    """A thousand dots are refused before any tree is built."""
+    with pytest.raises(ConfigError, match="a path of more than 32 parts"):
+        with_override(document, "a." * 1000 + "a", "1")
+
+
+@settings(max_examples=400, deadline=None, derandomize=True)
+@given(st.text("ab.[]0123=seed\n\x00 ", max_size=20), st.text("a1[]{}:,&*! \n'\"", max_size=20))
+def test_any_override_gives_a_tree_or_an_error(path: str, value: str) -> None:
+    """What comes from a shell may be anything."""
+    try:
+        with_override(parse(TEXT, "t.yaml"), path, value).plain()
+    except ConfigError as error:
+        assert str(error).startswith("--set:")

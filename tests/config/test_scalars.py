@@ -1,0 +1,113 @@
+"""Scalars of the YAML 1.2 core schema."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from generator.config.document import parse
+from generator.config.scalars import flow, resolve
+
+# Expected values: YAML 1.2.2, sections 10.2.1 and 10.3.2.
+CORE_SCHEMA = [
+    ("", None),
+    ("~", None),
+    ("null", None),
+    ("true", True),
+    ("FALSE", False),
+    ("no", "no"),
+    ("on", "on"),
+    ("0", 0),
+    ("-19", -19),
+    ("+12", 12),
+    ("010", 10),
+    ("0o14", 12),
+    ("0x1A", 26),
+    ("1_000", "1_000"),
+    ("1:30", "1:30"),
+    ("1.", 1.0),
+    ("-0.5", -0.5),
+    (".5", 0.5),
+    ("1e3", 1000.0),
+    ("-2E+05", -200000.0),
+    ("2020-99-99", "2020-99-99"),
+    ("2001-12-14", "2001-12-14"),
+    ("1.2.3", "1.2.3"),
+    ("0b1", "0b1"),
+    ("=", "="),
+]
+
+
+@pytest.mark.parametrize(("text", "value"), CORE_SCHEMA)
+def test_unquoted_scalars_follow_the_core_schema(text: str, value: object) -> None:
+    """What YAML 1.1 would have read as a date, a boolean or base sixty is a string."""
+    resolved = resolve(text)
+
+    assert resolved == value
+    assert type(resolved) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (".nan", ".nan is not a finite number"),
+        ("-.inf", "-.inf is not a finite number"),
+        ("1e999", "1e999 is too large for a number"),
+        (str(2**63), "9223372036854775808 is too large for a whole number (64 bits)"),
+        ("-" + "9" * 4000, "-" + "9" * 56 + "... is too large for a whole number (64 bits)"),
+        ("0x" + "f" * 17, "fffffffffffffffff is too large for a whole number (64 bits)"),
+    ],
+)
+def test_numbers_that_cannot_be_held_are_refused(text: str, message: str) -> None:
+    """Not silently rounded, wrapped or made infinite."""
+    with pytest.raises(ValueError, match=r".") as caught:
+        resolve(text)
+
+    assert str(caught.value) == message
+
+
+def test_the_largest_whole_number_is_two_to_the_63_minus_1() -> None:
+    """Leading zeros do not count."""
+    assert resolve("000" + "0" * 90 + str(2**63 - 1)) == 2**63 - 1
+    assert resolve(str(-(2**63) + 1)) == -(2**63) + 1
+
+
+PLAIN = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63) + 1, 2**63 - 1)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(min_codepoint=32, max_codepoint=0xD7FF, exclude_categories=["Cc"])),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(st.text("abcdefgh: #-", min_size=1, max_size=6), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(PLAIN)
+def test_what_is_written_in_flow_style_reads_back_equal(value: object) -> None:
+    """``flow`` is the inverse of reading: defaults can be shown as YAML and pasted."""
+    assert parse(f"value: {flow(value)}\n", "x.yaml").plain() == {"value": value}
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1.0, "1"),
+        (0.1, "0.1"),
+        (True, "true"),
+        ("no", "no"),
+        ("1:30", '"1:30"'),
+        ("true", '"true"'),
+        ("", '""'),
+        ({"uniform": [0.25, 2.0]}, "{uniform: [0.25, 2]}"),
+        ("mug?seed=3", "mug?seed=3"),
+    ],
+)
+def test_flow_style_is_what_a_person_would_write(value: object, text: str) -> None:
+    """Quotes only where needed, no trailing zeros."""
+    assert flow(value) == text

@@ -1,0 +1,147 @@
+"""One clear error, its own exit code, nothing half-written: a test per way to be wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from running import SMALL, digest, gen_data
+
+JOB = ("--n", "2", *SMALL)
+
+
+def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts: str) -> None:
+    """Exit code and message are as told; no traceback; no data set has appeared."""
+    done = gen_data(*arguments, cwd=tmp_path)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    for text in texts:
+        assert text in done.stderr, done.stderr
+    assert not list(tmp_path.rglob("manifest.json"))
+    assert not list(tmp_path.rglob("*.png"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "texts"),
+    [
+        (("--config", "tabletop.yaml", "--n", "0"), ("--n: 0",)),
+        (("--config", "tabletop.yaml", "--n", "-3"), ("--n: -3",)),
+        (("--config", "tabletop.yaml"), ("--n is missing",)),
+        (("--config", "tabletop.yaml", "--n", "x"), ("--n",)),
+        (("--config", "tabeltop.yaml", *JOB), ("did you mean 'tabletop.yaml'?",)),
+        (("--config", "tabletop.yaml", *JOB, "--seed", "-1"), ("--seed: -1 is negative",)),
+        (("--config", "tabletop.yaml", *JOB, "--workers", "-1"), ("--workers: -1",)),
+        (("--config", "tabletop.yaml", *JOB, "--without", "colour"), ("did you mean 'colors'?",)),
+        (("--config", "tabletop.yaml", *JOB, "--set", "views_per_scene"), ("KEY=VALUE",)),
+        (
+            ("--config", "tabletop.yaml", *JOB, "--set", "views_per_scen=3"),
+            ("views_per_scen", "did you mean 'views_per_scene'?"),
+        ),
+        (
+            ("--config", "tabletop.yaml", *JOB, "--set", "randomizers.clutter.count={unifrom: [1, 2]}"),
+            ("unknown distribution 'unifrom'", "did you mean 'uniform"),
+        ),
+        (
+            ("--config", "tabletop.yaml", *JOB, "--set", "randomizers.clutter.count={uniform_integer: [9, 2]}"),
+            ("[9, 2]", "low <= high"),
+        ),
+        (
+            ("--config", "tabletop.yaml", *JOB, "--set", "render.device=cuda:7"),
+            ("cuda:7",),
+        ),
+    ],
+)  # fmt: skip
+def test_wrong_usage_exits_with_2(
+    tmp_path: Path, arguments: tuple[str, ...], texts: tuple[str, ...]
+) -> None:
+    """Usage and configuration errors name the argument or field, and what was expected."""
+    assert_refused(tmp_path, arguments, 2, *texts)
+
+
+def test_all_faults_of_a_file_are_told_at_once_with_their_places(tmp_path: Path) -> None:
+    """Unknown key, wrong type, unknown plug-in, duplicate name: four faults, four lines."""
+    (tmp_path / "wrong.yaml").write_text(
+        "template: tabletop\n"
+        "views_per_scene: many\n"
+        "sed: 3\n"
+        "randomizers:\n"
+        "  - {type: lightning, name: lamps}\n"
+        "  - {type: colors, name: paint}\n"
+        "  - {type: colors, name: paint}\n"
+        "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}]\n"
+    )
+    done = gen_data("--config", "wrong.yaml", "--n", "1", cwd=tmp_path)
+
+    assert done.returncode == 2
+    for place in ("wrong.yaml:2:18:", "wrong.yaml:3:1:", "wrong.yaml:5:12:", "wrong.yaml:7:26:"):
+        assert place in done.stderr
+    assert "did you mean 'lighting'?" in done.stderr
+
+
+def test_unknown_asset_exits_with_3(tmp_path: Path) -> None:
+    """An asset id that nothing has, with the nearest that exists."""
+    arguments = ("--config", "tabletop.yaml", *JOB, "--set", "elements.arm.asset=franka_pand")
+    assert_refused(tmp_path, arguments, 3, "franka_pand", "did you mean 'franka_panda'?")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "text"),
+    [
+        ("empty.obj", "", "empty.obj"),
+        ("nan.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", "nan.obj"),
+        ("noise.stl", "\x01\x02 not a mesh at all", "noise.stl"),
+    ],
+)
+def test_unfit_mesh_exits_with_3(tmp_path: Path, name: str, content: str, text: str) -> None:
+    """An empty mesh, a NaN, a file of noise: named by their path."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / name).write_text(content)
+    arguments = (
+        "--config", "tabletop.yaml", *JOB,
+        "--set", f"assets.folders=[{folder}]",
+        "--set", "elements.clutter.assets={ids: [user/" + Path(name).stem + "]}",
+    )  # fmt: skip
+    assert_refused(tmp_path, arguments, 3, text)
+
+
+def test_template_that_cannot_be_satisfied_is_rejected_with_reasons(tmp_path: Path) -> None:
+    """Sixty objects cannot lie on a small table: a bounded number of attempts, then why."""
+    arguments = (
+        "--config", "tabletop.yaml", *JOB,
+        "--set", "elements.table.top_size_m=[0.7, 0.5]",
+        "--set", "randomizers.clutter.count=60",
+        "--set", "physics.layout_attempts_max=2",
+        "--set", "physics.settle_time_s_max=0.5",
+    )  # fmt: skip
+    assert_refused(tmp_path, arguments, 6, "scene 0: no valid layout in 2 attempts", "Try: 1.")
+
+
+def test_folder_with_other_things_in_it_exits_with_4(tmp_path: Path) -> None:
+    """A folder that is not ours is not touched."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("irreplaceable")
+    assert_refused(tmp_path, ("--config", "tabletop.yaml", *JOB, "--out", "mine"), 4, "mine")
+    assert (tmp_path / "mine" / "thesis.txt").read_text() == "irreplaceable"
+
+
+def test_dataset_of_another_configuration_exits_with_4_and_stays(
+    dataset: Path, tmp_path: Path
+) -> None:
+    """The differing field is named, and not a byte changes."""
+    before = digest(dataset)
+    done = gen_data(
+        "--config", "tabletop.yaml", "--n", "15", "--seed", "2", *SMALL, "--out", str(dataset),
+        cwd=tmp_path,
+    )  # fmt: skip
+
+    assert done.returncode == 4
+    assert "seed" in done.stderr and "1" in done.stderr and "2" in done.stderr
+    assert digest(dataset) == before
+
+
+def test_unwritable_place_exits_with_4(tmp_path: Path) -> None:
+    """A file where the folder should be."""
+    (tmp_path / "taken").write_text("a file")
+    arguments = ("--config", "tabletop.yaml", *JOB, "--out", "taken/out")
+    assert_refused(tmp_path, arguments, 4, "taken")

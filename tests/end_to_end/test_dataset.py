@@ -1,0 +1,138 @@
+"""The main job, from the command line to files that other people's readers accept."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from running import SMALL, command, digest, environment, gen_data
+
+MAIN_JOB = ("--config", "tabletop.yaml", "--n", "15", "--seed", "1", *SMALL)
+
+
+def test_dataset_is_complete_and_verifies(dataset: Path) -> None:
+    """Manifest, checksums, licences and both formats are there, and every byte is accounted for."""
+    for name in ("plan.json", "manifest.json", "SHA256SUMS", "LICENSES-ASSETS.md", "coco", "kitti"):
+        assert (dataset / name).exists(), name
+
+    done = gen_data("verify", str(dataset), "--full", cwd=dataset)
+
+    assert done.returncode == 0, done.stderr
+
+
+def test_checksums_agree_with_coreutils(dataset: Path) -> None:
+    """``sha256sum -c SHA256SUMS`` needs nothing of ours."""
+    done = subprocess.run(
+        ["sha256sum", "--check", "--quiet", "--strict", "SHA256SUMS"],
+        cwd=dataset,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_two_workers_write_the_same_bytes(dataset: Path, tmp_path: Path) -> None:
+    """Which worker makes which shard leaves no trace outside run/."""
+    done = gen_data(*MAIN_JOB, "--workers", "2", "--out", "two", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert digest(tmp_path / "two") == digest(dataset)
+
+
+def test_killed_run_resumes_to_the_same_bytes(dataset: Path, tmp_path: Path) -> None:
+    """SIGKILL to the whole process group once a shard is committed; the same command goes on."""
+    arguments = command(*MAIN_JOB, "--workers", "1", "--out", "killed")
+    process = subprocess.Popen(
+        arguments,
+        cwd=tmp_path,
+        env=environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    deadline_s = time.monotonic() + 300
+    while not list((tmp_path / "killed" / "shards").glob("*.json")):
+        assert process.poll() is None, "the run ended before it could be killed"
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (tmp_path / "killed" / "manifest.json").exists()
+
+    done = gen_data(*MAIN_JOB, "--workers", "1", "--out", "killed", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert digest(tmp_path / "killed") == digest(dataset)
+
+
+def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
+    """Pixels of sample 7, made in another process with no other sample before it."""
+    program = (
+        "import sys, numpy as np\n"
+        "from generator.assemble.recipe import open_pipeline\n"
+        "from generator.assemble.spec import spec_of_source\n"
+        "from generator.core.capture import Channel\n"
+        f"with open_pipeline(spec_of_source({str(dataset)!r})) as pipeline:\n"
+        "    reading = pipeline.sample(7).capture.readings['color']\n"
+        "np.savez('alone.npz', rgb=reading.channels[Channel.RGB],\n"
+        "         instance=reading.channels[Channel.INSTANCE])\n"
+    )
+    run_folder = dataset / "run"
+    subprocess.run([sys.executable, "-c", program], cwd=run_folder, env=environment(), check=True)
+    alone = np.load(run_folder / "alone.npz")
+    shard = dataset / "shards" / "000001" / "color"
+
+    rgb = np.asarray(Image.open(shard / "rgb" / "000000007.png"))
+    instance = np.asarray(Image.open(shard / "instance" / "000000007.png"))
+
+    assert np.array_equal(rgb, alone["rgb"])
+    assert np.array_equal(instance, alone["instance"])
+
+
+def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
+    """The Scene in scenes.jsonl is the whole provenance: no randomizer, no physics needed."""
+    from generator.assemble.recipe import PipelineFactory
+    from generator.assemble.spec import spec_of_source
+    from generator.core.capture import Channel
+    from generator.core.scene import Scene
+    from generator.core.serial import from_plain
+
+    lines = (dataset / "shards" / "000002" / "scenes.jsonl").read_text().splitlines()
+    kept = json.loads(lines[3])
+    scene = from_plain(Scene, kept["scene"])
+    pipeline = PipelineFactory(spec_of_source(str(dataset)), n=15)()
+
+    reading = pipeline.renderer.render(scene, scene.camera("color"), frozenset({Channel.RGB}))
+
+    name = f"{kept['index']:09d}.png"
+    path = dataset / "shards" / "000002" / "color" / "rgb" / name
+    assert np.array_equal(np.asarray(Image.open(path)), reading.channels[Channel.RGB])
+
+
+def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
+    """COCO boxes are the tight boxes of the instance images, and no visible object is left out."""
+    found = 0
+    for path in sorted((dataset / "coco" / "annotations").glob("instances_*.json")):
+        coco = json.loads(path.read_text())
+        for image in coco["images"]:
+            index = image["scene_index"] * 5 + image["view_index"]
+            shard = dataset / "shards" / f"{index // 5:06d}" / "color" / "instance"
+            ids = np.asarray(Image.open(shard / f"{index:09d}.png"))
+            for annotation in (a for a in coco["annotations"] if a["image_id"] == image["id"]):
+                instance_id = annotation["instance_id"]
+                rows, columns = np.nonzero(ids == instance_id)
+                x, y = int(columns.min()), int(rows.min())
+                box = [x, y, int(columns.max()) - x + 1, int(rows.max()) - y + 1]
+                assert annotation["bbox"] == box
+                assert annotation["area"] == len(rows)
+                found += 1
+    assert found > 30

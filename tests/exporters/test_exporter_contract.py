@@ -1,0 +1,72 @@
+"""What every exporter promises, whatever it writes; a new one is tested before it has tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from exporters import TABLE
+from generator import annotations
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder."""
+    found = (p for p in folder.rglob("*") if p.is_file())
+    return {str(p.relative_to(folder)): p.read_bytes() for p in found}
+
+
+@pytest.fixture(scope="module", params=TABLE.names())
+def exporter(request: pytest.FixtureRequest) -> Any:
+    """One exporter with its defaults."""
+    return TABLE.load(request.param)()
+
+
+def test_its_type_is_its_name_in_the_table(exporter: Any) -> None:
+    """And it needs only annotators that exist."""
+    assert TABLE.load(exporter.type) is type(exporter)
+    assert exporter.needs <= set(annotations.TABLE)
+
+
+def test_shards_can_be_written_in_any_order(exporter: Any, world: Any, tmp_path: Path) -> None:
+    """Ids are computed, not counted."""
+    info, samples = world.info(7), world.samples
+
+    forwards = world.export(exporter, info, samples, tmp_path / "a")
+    backwards = world.export(exporter, info, samples, tmp_path / "b", backwards=True)
+
+    assert files(forwards) == files(backwards)
+    assert len(files(forwards)) > len(samples)
+
+
+def test_the_size_of_shards_leaves_no_trace(exporter: Any, world: Any, tmp_path: Path) -> None:
+    """One shard or seven: the merged data set has the same bytes."""
+    info, samples = world.info(7), world.samples
+
+    one = world.export(exporter, info, samples, tmp_path / "a", shard_size=7)
+    seven = world.export(exporter, info, samples, tmp_path / "b", shard_size=1)
+
+    assert files(one) == files(seven)
+
+
+def test_file_names_of_a_shard_depend_on_indices_only(
+    exporter: Any, world: Any, tmp_path: Path
+) -> None:
+    """A shard written alone equals the same shard of the whole data set."""
+    info, samples = world.info(7), world.samples
+    world.export(exporter, info, samples, tmp_path / "all")
+
+    world.export(exporter, info, samples[3:6], tmp_path / "alone")
+
+    whole = files(tmp_path / "all/shards/000001")
+    assert whole == files(tmp_path / "alone/shards/000000")
+
+
+def test_text_files_are_utf8_with_unix_line_ends(exporter: Any, world: Any, tmp_path: Path) -> None:
+    """On every system."""
+    folder = world.export(exporter, world.info(7), world.samples, tmp_path)
+
+    for name, data in files(folder).items():
+        if name.endswith((".json", ".txt")):
+            assert b"\r" not in data.decode("utf-8").encode()

@@ -1,0 +1,199 @@
+"""PNG files, read back by Pillow or by hand, never by the library that wrote them."""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from exporters.images import depth_units, link_or_copy, png, read_depth_units, write_media
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError, SampleError, StorageError
+from generator.core.interfaces import media_path
+
+H, W = 37, 53
+
+
+def read(data: bytes) -> tuple[str, NDArray[Any]]:
+    """Mode and pixels of a PNG, by Pillow."""
+    with Image.open(io.BytesIO(data)) as image:
+        return image.mode, np.asarray(image)
+
+
+def read_rgb16(data: bytes) -> NDArray[np.uint16]:
+    """Pixels of a 16-bit RGB PNG, which Pillow cuts to 8 bits: the PNG specification by hand."""
+    chunks, at = {}, 8
+    while at < len(data):
+        (length,), kind = struct.unpack(">I", data[at : at + 4]), data[at + 4 : at + 8]
+        chunks[kind] = chunks.get(kind, b"") + data[at + 8 : at + 8 + length]
+        at += 12 + length
+    width, height, depth, colour = struct.unpack(">IIBB", chunks[b"IHDR"][:10])
+    assert (depth, colour) == (16, 2), "16 bits, true colour"
+    step, stride = 6, 6 * width
+    raw, above, rows = zlib.decompress(chunks[b"IDAT"]), bytes(stride), []
+    for y in range(height):
+        kind, line = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1 :][:stride])
+        for i in range(stride):
+            a, c = (line[i - step], above[i - step]) if i >= step else (0, 0)
+            line[i] = (line[i] + _predicted(kind, a, above[i], c)) % 256
+        above = bytes(line)
+        rows.append(above)
+    return np.frombuffer(b"".join(rows), ">u2").reshape(height, width, 3).astype(np.uint16)
+
+
+def _predicted(kind: int, a: int, b: int, c: int) -> int:
+    paeth = min((abs(b - c), 0, a), (abs(a - c), 1, b), (abs(a + b - 2 * c), 2, c))[2]
+    return (0, a, b, (a + b) // 2, paeth)[kind]
+
+
+def test_rgb_keeps_its_order_of_colours_and_every_value() -> None:
+    """A red image is red for every reader; OpenCV's BGR stays inside."""
+    rgb = np.random.default_rng(0).integers(0, 256, (H, W, 3), dtype=np.uint8)
+
+    mode, pixels = read(png(Channel.RGB, rgb, 1.0))
+
+    assert mode == "RGB"
+    np.testing.assert_array_equal(pixels, rgb)
+
+
+@pytest.mark.parametrize("channel", [Channel.INSTANCE, Channel.PART, Channel.CATEGORY])
+def test_ids_are_16_bit_grey_up_to_the_largest(channel: Channel) -> None:
+    """Always 16 bits, also where all ids are small, so that readers need one rule."""
+    ids = np.random.default_rng(1).integers(0, 65_536, (H, W), dtype=np.uint16)
+    ids[0, 0], ids[0, 1] = 0, 65_535
+
+    mode, pixels = read(png(channel, ids, 1.0))
+    small_mode, _ = read(png(channel, ids % 3, 1.0))
+
+    assert mode == small_mode == "I;16"
+    np.testing.assert_array_equal(pixels, ids)
+
+
+@pytest.mark.parametrize("channel", [Channel.Z_DEPTH, Channel.RANGE])
+def test_depth_is_written_in_units_of_the_scale(channel: Channel) -> None:
+    """Half to even; 0 where there is nothing and where 16 bits do not reach."""
+    depth_m = np.array([[1.0, 0.25, 0.75, 1.25], [np.inf, 32_767.5, 32_768.0, 0.0]], np.float32)
+
+    mode, pixels = read(png(channel, depth_m, 0.5))
+
+    assert mode == "I;16"
+    assert pixels.tolist() == [[2, 0, 2, 2], [0, 65_535, 0, 0]]
+
+
+def test_depth_survives_the_file_to_half_a_unit(tmp_path: Path) -> None:
+    """0.1 mm units: never more than 0.05 mm away, and equal to what the pure function says."""
+    depth_m = np.random.default_rng(2).uniform(0.3, 6.5, (H, W)).astype(np.float32)
+    (tmp_path / "depth.png").write_bytes(png(Channel.Z_DEPTH, depth_m, 0.0001))
+
+    units = read_depth_units(tmp_path / "depth.png")
+
+    assert np.abs(units * 0.0001 - depth_m).max() <= 0.00005 + 1e-9
+    np.testing.assert_array_equal(units, depth_units(depth_m, 0.0001))
+
+
+@pytest.mark.parametrize("wrong", [-0.1, np.nan])
+def test_a_depth_that_is_no_distance_is_an_error(wrong: float) -> None:
+    """16-bit integers would wrap a negative depth to a far one."""
+    with pytest.raises(SampleError, match="negative number or NaN"):
+        png(Channel.Z_DEPTH, np.array([[1.0, wrong]], np.float32), 0.001)
+
+
+def test_normals_map_minus_one_to_one_onto_a_byte() -> None:
+    """Red is the camera's x; nothing is the middle grey 128."""
+    normals = np.array([[[-1, 0, 1], [1, -1, 0], [0, 0, 0]]], np.float32)
+
+    mode, pixels = read(png(Channel.NORMALS, normals, 1.0))
+
+    assert mode == "RGB"
+    assert pixels.tolist() == [[[0, 128, 255], [255, 0, 128], [128, 128, 128]]]
+
+
+def test_object_coordinates_are_16_bit_colour() -> None:
+    """1 is 65535; every value comes back through the PNG specification."""
+    coordinates = np.random.default_rng(3).random((H, W, 3)).astype(np.float32)
+    coordinates[0, 0], coordinates[0, 1] = 0.0, 1.0
+
+    pixels = read_rgb16(png(Channel.OBJECT_COORDINATES, coordinates, 1.0))
+
+    assert pixels[0, :2].tolist() == [[0, 0, 0], [65_535, 65_535, 65_535]]
+    assert np.abs(pixels / 65_535 - coordinates).max() <= 0.5 / 65_535 + 1e-7
+
+
+def test_encoding_twice_gives_the_same_bytes() -> None:
+    """Data sets are compared by hash."""
+    rgb = np.random.default_rng(4).integers(0, 256, (H, W, 3), dtype=np.uint8)
+
+    assert png(Channel.RGB, rgb, 1.0) == png(Channel.RGB, rgb.copy(), 1.0)
+
+
+def test_silhouettes_cannot_be_written_as_an_image() -> None:
+    """The message lists what can."""
+    with pytest.raises(ConfigError, match=r"'amodal'.*rgb, depth, range, instance"):
+        png(Channel.AMODAL, np.zeros((2, 2), bool), 1.0)
+
+
+def test_every_channel_of_the_media_is_written_to_its_path(world: Any, tmp_path: Path) -> None:
+    """Of the sensor's own image, and nothing else."""
+    info, sample = world.info(7), world.samples[4]
+
+    write_media(info, sample, tmp_path)
+
+    found = sorted(p for p in tmp_path.rglob("*") if p.is_file())
+    assert found == sorted(media_path(tmp_path, "color", c, 4) for c in info.media["color"])
+    _, ids = read(media_path(tmp_path, "color", Channel.INSTANCE, 4).read_bytes())
+    np.testing.assert_array_equal(ids, sample.capture.readings["color"].channels[Channel.INSTANCE])
+
+
+def test_a_missing_depth_image_is_named(tmp_path: Path) -> None:
+    """And so is one of another kind."""
+    (tmp_path / "rgb.png").write_bytes(png(Channel.RGB, np.zeros((4, 4, 3), np.uint8), 1.0))
+
+    for name in ("none.png", "rgb.png"):
+        with pytest.raises(StorageError, match=name):
+            read_depth_units(tmp_path / name)
+
+
+def test_a_link_shares_the_file_where_links_are_possible(tmp_path: Path) -> None:
+    """No second copy of the images is stored."""
+    (tmp_path / "a").write_bytes(b"data")
+
+    link_or_copy(tmp_path / "a", tmp_path / "new/b")
+
+    assert (tmp_path / "new/b").samefile(tmp_path / "a")
+
+
+def test_a_copy_is_made_where_links_are_impossible(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another file system, FAT, or too many links."""
+
+    def refuse(*_: Any) -> None:
+        raise OSError(18, "Invalid cross-device link")
+
+    monkeypatch.setattr(os, "link", refuse)
+    (tmp_path / "a").write_bytes(b"data")
+
+    link_or_copy(tmp_path / "a", tmp_path / "b")
+
+    assert (tmp_path / "b").read_bytes() == b"data"
+    assert not (tmp_path / "b").samefile(tmp_path / "a")
+
+
+def test_a_link_never_replaces_a_file(tmp_path: Path) -> None:
+    """Nor is a missing source passed over."""
+    (tmp_path / "a").write_bytes(b"new")
+    (tmp_path / "b").write_bytes(b"old")
+
+    with pytest.raises(FileExistsError):
+        link_or_copy(tmp_path / "a", tmp_path / "b")
+    with pytest.raises(FileNotFoundError):
+        link_or_copy(tmp_path / "none", tmp_path / "c")
+    assert (tmp_path / "b").read_bytes() == b"old"

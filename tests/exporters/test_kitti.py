@@ -1,0 +1,320 @@
+"""KITTI export, judged by the arithmetic of KITTI's own development kit."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from PIL import Image
+
+from exporters.kitti import Kitti, calib_text, label_row, occlusion_level, upright_box
+from generator.annotations.truth import Thresholds
+from generator.core.boxes import BoxPx, OrientedBox
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import ImageTruth, ObjectTruth
+from generator.core.scene import Camera, Instance
+from generator.core.se3 import IDENTITY, SE3
+
+Array = NDArray[np.float64]
+CAMERA = Camera("color", IDENTITY, Intrinsics(200, 100, 150.0, 150.0, 100.0, 50.0))
+
+
+def devkit_corners(row: str) -> Array:
+    """Corners [8, 3] of a label row in the rectified frame, as ``computeBox3D.m`` has them."""
+    h, w, length, x, y, z, ry = (float(v) for v in row.split(" ")[8:])
+    c, s = math.cos(ry), math.sin(ry)
+    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    x_corners = length / 2 * np.array([1, 1, -1, -1, 1, 1, -1, -1])
+    y_corners = np.array([0, 0, 0, 0, -h, -h, -h, -h])
+    z_corners = w / 2 * np.array([1, -1, -1, 1, 1, -1, -1, 1])
+    return (rotation @ np.stack([x_corners, y_corners, z_corners])).T + np.array([x, y, z])
+
+
+def devkit_calib(path: Path) -> dict[str, Array]:
+    """Matrices by name; readers take the rows in this order."""
+    rows = [line.split(": ") for line in path.read_text().splitlines()]
+    names = ["P0", "P1", "P2", "P3", "R0_rect", "Tr_velo_to_cam", "Tr_imu_to_velo"]
+    assert [name for name, _ in rows] == names
+    return {n: np.array(v.split(" "), float).reshape(3, -1) for n, v in rows}
+
+
+def row_of(box3d_camera: OrientedBox, **changes: Any) -> str:
+    """The label row of a visible crate with the given box in the camera frame."""
+    crate = Instance(1, "crate/1", "Crate box", 1, "crate")
+    fields = {
+        "visible_px": 200,
+        "box": BoxPx(10, 20, 30, 30),
+        "box3d_camera": box3d_camera,
+        "occlusion": 0.0,
+        "truncation": 0.0,
+        **changes,
+    }
+    return label_row(ObjectTruth(crate, **fields), ImageTruth(CAMERA, ()), "category")
+
+
+@pytest.fixture(scope="module")
+def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven frames of a street, exported with all defaults."""
+    folder = tmp_path_factory.mktemp("kitti")
+    return world.export(Kitti(), world.info(7), world.samples, folder)
+
+
+unit = st.floats(-1, 1)
+side_m = st.floats(0.02, 4.0)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.tuples(unit, unit, unit, unit).filter(lambda q: sum(v * v for v in q) > 0.01),
+    st.tuples(side_m, side_m, side_m),
+    st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(6, 30)),
+)
+def test_a_label_encloses_the_oriented_box_as_tightly_as_its_heading_allows(
+    q: tuple[float, ...], size_m: tuple[float, ...], centre_m: tuple[float, ...]
+) -> None:
+    """Row -> devkit -> corners: each oriented corner is inside, and each face touches one."""
+    norm = math.sqrt(sum(v * v for v in q))
+    box = OrientedBox(SE3(centre_m, tuple(v / norm for v in q)), size_m)
+
+    row = row_of(box)
+
+    ry = float(row.split(" ")[14])
+    axes = np.array([[math.cos(ry), 0, -math.sin(ry)], [0, 1, 0], [math.sin(ry), 0, math.cos(ry)]])
+    inner, outer = box.corners() @ axes.T, devkit_corners(row) @ axes.T
+    np.testing.assert_allclose(outer.min(axis=0), inner.min(axis=0), atol=1e-4)
+    np.testing.assert_allclose(outer.max(axis=0), inner.max(axis=0), atol=1e-4)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.4, 1.6, -2.8])
+def test_an_upright_object_before_a_level_camera_keeps_its_own_box(yaw: float) -> None:
+    """Length along x, width along y, height along z of the object; heading = -yaw there."""
+    # Camera at the world's origin that looks along world X; the object stands 1 m lower.
+    T_camera_world = SE3.from_matrix(
+        np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], float)
+    )
+    T_world_box = SE3.about_z(yaw, (10.0, 2.0, -0.25))
+    box = OrientedBox(T_camera_world @ T_world_box, (4.0, 1.8, 1.5))
+
+    upright = upright_box(box)
+
+    assert upright.size_hwl_m == pytest.approx((1.5, 1.8, 4.0))
+    assert upright.bottom_m == pytest.approx((-2.0, 1.0, 10.0))
+    # World X is the camera's z, which KITTI calls a heading of -90 degrees.
+    turn = upright.heading_rad - (-yaw - math.pi / 2)
+    assert math.remainder(turn, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_heading_of_an_object_on_end_comes_from_its_y_axis() -> None:
+    """Object x is vertical, object y is the camera's z: its left, so x would head along +x."""
+    matrix = np.array([[0, 0, -1, 0], [-1, 0, 0, 0], [0, 1, 0, 5], [0, 0, 0, 1]], float)
+    box = OrientedBox(SE3.from_matrix(matrix), (1.0, 2.0, 3.0))
+
+    upright = upright_box(box)
+
+    assert upright.heading_rad == pytest.approx(0.0, abs=1e-9)
+    assert upright.size_hwl_m == pytest.approx((1.0, 2.0, 3.0))
+
+
+def test_a_row_has_fifteen_columns_with_one_blank_between() -> None:
+    """Type in one word; 0-based pixels, the last one included; bottom centre; alpha."""
+    box = OrientedBox(SE3((3.0, 0.5, 4.0)), (1.0, 0.6, 2.0))
+
+    row = row_of(box, truncation=0.256, occlusion=0.3)
+
+    assert row == (
+        "Crate_box 0.26 1 -0.643501 10.00 20.00 29.00 29.00 "
+        "0.600000 2.000000 1.000000 3.000000 0.800000 4.000000 0.000000"
+    )
+
+
+@pytest.mark.parametrize(
+    ("hidden", "level"), [(0.0, 0), (0.1, 0), (0.11, 1), (0.5, 1), (0.51, 2), (1.0, 2)]
+)
+def test_occlusion_has_three_levels(hidden: float, level: int) -> None:
+    """Visible up to a tenth hidden, partly up to a half, largely above."""
+    assert occlusion_level(hidden) == level
+
+
+@pytest.mark.parametrize(
+    ("changes", "corners"),
+    [
+        ({"box": BoxPx(10, 20, 11, 30)}, "10.00 20.00 11.00 29.00"),
+        ({"box": BoxPx(199, 99, 200, 100)}, "198.00 98.00 199.00 99.00"),
+        (
+            {"box3d_camera": OrientedBox(SE3((0.0, 0.0, -0.1)), (1, 1, 1))},
+            "10.00 20.00 29.00 29.00",
+        ),
+    ],
+)
+def test_what_kitti_cannot_say_is_dont_care(changes: dict[str, Any], corners: str) -> None:
+    """One pixel wide, or with its centre behind the camera: a valid box and KITTI's constants."""
+    fields = {"box3d_camera": OrientedBox(SE3((0, 0, 5.0)), (1, 1, 1)), **changes}
+
+    row = row_of(**fields)
+
+    assert row == f"DontCare -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
+
+
+def test_dont_care_rows_come_last_and_hidden_objects_have_none(world: Any, tmp_path: Path) -> None:
+    """A car whose centre is behind the camera is written after the pedestrian before it."""
+    beside = world.instance(1, "car", -0.2, 0.0, 0.0)
+    away = world.instance(2, "pedestrian", 9.0, 2.0, 0.0)
+    behind = world.instance(3, "car", -9.0, 0.0, 0.0)
+    sample = world.sample(
+        0, (beside, away, behind), [world.camera()], thresholds=Thresholds(include_invisible=True)
+    )
+
+    folder = world.export(Kitti(), world.info(1), [sample], tmp_path)
+
+    rows = (folder / "training/label_2/000000.txt").read_text().splitlines()
+    assert [row.split(" ")[0] for row in rows] == ["Pedestrian", "DontCare"]
+
+
+def test_every_frame_has_every_file(dataset: Path) -> None:
+    """An empty frame has an empty label file; splits list each frame once."""
+    frames = [f"{i:06d}" for i in range(7)]
+    for kind, ending in (
+        ("image_2", "png"),
+        ("depth_2", "png"),
+        ("velodyne", "bin"),
+        ("label_2", "txt"),
+        ("calib", "txt"),
+    ):
+        found = sorted(p.name for p in (dataset / "training" / kind).iterdir())
+        assert found == [f"{frame}.{ending}" for frame in frames]
+    assert (dataset / "training/label_2/000003.txt").read_bytes() == b""
+    lists = {p.stem: p.read_text().split() for p in (dataset / "ImageSets").iterdir()}
+    assert lists["val"] == ["000002", "000004"]
+    assert lists["test"] == []
+    assert sorted(lists["train"] + lists["val"]) == frames
+
+
+def test_calibration_puts_pixel_centres_at_whole_numbers() -> None:
+    """The centred camera of W pixels has cx = (W - 1) / 2 in KITTI."""
+    rows = dict(line.split(": ") for line in calib_text(CAMERA.intrinsics).splitlines())
+
+    p2 = np.array(rows["P2"].split(" "), float).reshape(3, 4)
+    np.testing.assert_array_equal(p2, [[150, 0, 99.5, 0], [0, 150, 49.5, 0], [0, 0, 1, 0]])
+    np.testing.assert_array_equal(np.array(rows["R0_rect"].split(), float), np.eye(3).ravel())
+    assert len(rows["Tr_imu_to_velo"].split(" ")) == 12
+
+
+def test_projected_labels_cover_the_image_boxes(dataset: Path) -> None:
+    """P2 R0 x: for whole, unhidden boxes both agree to about a pixel; others contain theirs."""
+    compared = 0
+    for path in sorted((dataset / "training/label_2").iterdir()):
+        calib = devkit_calib(dataset / f"training/calib/{path.stem}.txt")
+        for row in path.read_text().splitlines():
+            columns = row.split(" ")
+            corners = devkit_corners(row) @ calib["R0_rect"].T
+            projected = np.c_[corners, np.ones(8)] @ calib["P2"].T
+            uv = projected[:, :2] / projected[:, 2:]
+            left, top, right, bottom = (float(v) for v in columns[4:8])
+            assert (uv.min(axis=0) <= (left + 1, top + 1)).all()
+            assert (uv.max(axis=0) >= (right - 1, bottom - 1)).all()
+            if columns[:3] == ["Pedestrian", "0.00", "0"]:
+                np.testing.assert_allclose(uv.min(axis=0), (left, top), atol=1.0)
+                np.testing.assert_allclose(uv.max(axis=0), (right, bottom), atol=1.0)
+                compared += 1
+    assert compared >= 5
+
+
+def test_official_types_are_used_and_others_are_misc(dataset: Path) -> None:
+    """Cars and pedestrians have types of their own, crates have none."""
+    rows = (dataset / "training/label_2/000000.txt").read_text().splitlines()
+
+    assert [row.split(" ")[0] for row in rows] == [
+        "Car",
+        "Pedestrian",
+        "Misc",
+        "Misc",
+        "Pedestrian",
+    ]
+
+
+def test_lidar_points_are_the_depth_image_seen_from_above_the_camera(dataset: Path) -> None:
+    """P2 R0 Tr x lands on the middle of every eighth pixel, with that pixel's depth."""
+    calib = devkit_calib(dataset / "training/calib/000001.txt")
+    points = np.fromfile(dataset / "training/velodyne/000001.bin", "<f4").reshape(-1, 4)
+    with Image.open(dataset / "training/depth_2/000001.png") as image:
+        depth_m = np.asarray(image) * 0.001
+
+    rectified = np.c_[points[:, :3], np.ones(len(points))] @ calib["Tr_velo_to_cam"].T
+    projected = np.c_[rectified, np.ones(len(points))] @ calib["P2"].T
+    uv = projected[:, :2] / projected[:, 2:]
+
+    columns, rows = np.rint(uv).astype(int).T
+    np.testing.assert_allclose(uv, np.c_[columns, rows], atol=1e-3)
+    assert set(columns) <= set(range(4, 160, 8))
+    assert set(rows) <= set(range(4, 120, 8))
+    np.testing.assert_allclose(rectified[:, 2], depth_m[rows, columns], atol=1e-5)
+    assert len(points) == np.count_nonzero(depth_m[4::8, 4::8])
+    assert (points[:, 3] == 0).all()
+
+
+def test_lidar_points_of_a_box_lie_in_its_label(world: Any, tmp_path: Path) -> None:
+    """The points around the unhidden pedestrian of frame 0 are on its box, to rounding."""
+    exporter = Kitti(velodyne_stride_px=2)
+    dataset = world.export(exporter, world.info(7), world.samples[:1], tmp_path)
+    row = (dataset / "training/label_2/000000.txt").read_text().splitlines()[1]
+    points = np.fromfile(dataset / "training/velodyne/000000.bin", "<f4").reshape(-1, 4)
+    camera = np.c_[-points[:, 1], -points[:, 2] - 0.3, points[:, 0]]
+    corners = devkit_corners(row)
+    centre, ry = corners.mean(axis=0), float(row.split(" ")[14])
+    near = camera[np.linalg.norm(camera[:, [0, 2]] - centre[[0, 2]], axis=1) < 0.7]
+    near = near[near[:, 1] < corners[:, 1].max() - 0.05]
+
+    along = (near - centre) @ (math.cos(ry), 0, -math.sin(ry))
+    across = (near - centre) @ (math.sin(ry), 0, math.cos(ry))
+
+    assert len(near) > 30
+    assert (np.abs(along) <= 0.25 + 0.01).all()
+    assert (np.abs(across) <= 0.30 + 0.01).all()
+
+
+def test_images_in_memory_or_on_disk_give_the_same_bytes(world: Any, tmp_path: Path) -> None:
+    """The runner may drop arrays once images are written; labels must not notice."""
+    kept = world.export(Kitti(), world.info(7), world.samples, tmp_path / "kept", keep_arrays=True)
+    dropped = world.export(Kitti(), world.info(7), world.samples, tmp_path / "dropped")
+
+    for path in sorted(kept.rglob("*.bin")):
+        assert path.read_bytes() == (dropped / path.relative_to(kept)).read_bytes()
+
+
+def test_without_a_scanner_no_depth_is_needed(world: Any, tmp_path: Path) -> None:
+    """velodyne_stride_px 0 leaves the folder out; so does a data set without depth depth_2."""
+    info = world.info(7, media={"color": (Channel.RGB,)})
+
+    folder = world.export(Kitti(velodyne_stride_px=0), info, world.samples, tmp_path)
+
+    kinds = {p.name for p in (folder / "training").iterdir()}
+    assert kinds == {"image_2", "label_2", "calib"}
+
+
+@pytest.mark.parametrize(
+    ("exporter", "changes", "message"),
+    [
+        (Kitti(), {"media": {"color": (Channel.RGB,)}}, "'color' does not write the depth channel"),
+        (
+            Kitti(camera="colour"),
+            {},
+            "camera 'colour'.*expected one of: color.*did you mean 'color'",
+        ),
+        (Kitti(), {"media": {"color": (Channel.Z_DEPTH,)}}, "expected one of: none"),
+        (Kitti(), {"n": 1_000_001}, "six digits"),
+    ],
+)
+def test_what_kitti_cannot_hold_is_refused_before_rendering(
+    world: Any, exporter: Kitti, changes: dict[str, Any], message: str
+) -> None:
+    """One message, naming the option to change."""
+    with pytest.raises(ConfigError, match=message):
+        exporter.check(world.info(changes.pop("n", 7), **changes))

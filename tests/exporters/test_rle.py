@@ -1,0 +1,66 @@
+"""Run-length encoding against pycocotools, the format's own implementation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from pycocotools import mask as coco_mask
+
+from exporters.rle import encoded, run_lengths
+from generator.core.boxes import tight_box
+from generator.core.sample import MaskPx
+
+# pycocotools' decoder predates numpy 2's __array__(copy=...).
+pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
+
+
+def tight(image: NDArray[np.bool_]) -> MaskPx:
+    """The mask of an image with at least one pixel set."""
+    box = tight_box(image)
+    assert box is not None
+    crop = image[box.y_min : box.y_max, box.x_min : box.x_max]
+    return MaskPx(box.x_min, box.y_min, crop)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.integers(1, 9),
+    st.integers(1, 9),
+    st.sampled_from([0.05, 0.5, 0.95, 1.0]),
+    st.integers(0, 2**32 - 1),
+)
+def test_rle_of_a_crop_is_what_pycocotools_makes_of_the_whole_mask(
+    height: int, width: int, density: float, seed: int
+) -> None:
+    """Small images, so that masks often touch borders, fill columns and span column ends."""
+    image = np.random.default_rng(seed).random((height, width)) < density
+    if not image.any():
+        image[-1, -1] = True
+
+    ours = encoded(tight(image), height, width)
+
+    theirs = coco_mask.encode(np.asfortranarray(image.astype(np.uint8)))
+    assert ours == {"size": list(theirs["size"]), "counts": theirs["counts"].decode()}
+
+
+def test_runs_begin_with_zeros_and_go_down_columns() -> None:
+    """One pixel at row 1, column 2 of a 3 x 4 image comes after two columns and one row."""
+    mask = MaskPx(2, 1, np.ones((1, 1), dtype=bool))
+
+    assert run_lengths(mask, 3, 4) == [7, 1, 4]
+
+
+def test_runs_of_a_full_image_are_no_zeros_and_all_ones() -> None:
+    """The first run is of zeros, even where there are none; a last run of none is left out."""
+    assert run_lengths(MaskPx(0, 0, np.ones((3, 4), dtype=bool)), 3, 4) == [0, 12]
+
+
+def test_an_empty_mask_is_one_run_of_zeros() -> None:
+    """What amodal masks are of things wholly outside the image."""
+    mask = MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
+
+    assert not coco_mask.decode(dict(encoded(mask, 5, 6))).any()
+    assert run_lengths(mask, 5, 6) == [30]

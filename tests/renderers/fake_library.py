@@ -1,0 +1,135 @@
+"""A small asset library made of arithmetic: boxes, spheres, planes, checkers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from generator.core.errors import AssetError
+from generator.core.geometry import (
+    Asset,
+    ConvexParts,
+    Float32,
+    Material,
+    MeshData,
+    RobotModel,
+    TextureData,
+)
+from generator.core.se3 import Vec3
+
+
+def box_mesh(size_m: Vec3 = (1.0, 1.0, 1.0), materials: tuple[Material, ...] = (Material(),)) -> MeshData:
+    """A box around the origin with split edges, 12 triangles."""
+    corners, normals, uvs, faces = [], [], [], []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            a, b = (axis + 1) % 3, (axis + 2) % 3
+            first = len(corners)
+            for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+                p = np.zeros(3)
+                p[axis], p[a], p[b] = sign, s, t
+                corners.append(0.5 * p * np.asarray(size_m))
+                n = np.zeros(3)
+                n[axis] = sign
+                normals.append(n)
+                uvs.append(((s + 1) / 2, (t + 1) / 2))
+            quad = [(0, 1, 2), (0, 2, 3)] if sign > 0 else [(0, 2, 1), (0, 3, 2)]
+            faces += [[first + i for i in f] for f in quad]
+    return _mesh(corners, faces, normals, uvs, materials)
+
+
+def room_mesh(size_m: Vec3 = (6.0, 6.0, 3.0), materials: tuple[Material, ...] = (Material(),)) -> MeshData:
+    """A box seen from inside, floor at z = 0."""
+    box = box_mesh(size_m, materials)
+    vertices = box.vertices_m + np.array([0, 0, 0.5 * size_m[2]], np.float32)
+    return MeshData(
+        vertices, box.faces[:, ::-1].copy(), -box.normals, box.uvs, box.face_slots, materials
+    )
+
+
+def sphere_mesh(
+    radius_m: float = 0.5, rings: int = 32, materials: tuple[Material, ...] = (Material(),)
+) -> MeshData:
+    """A UV sphere with smooth normals."""
+    polar = np.linspace(0.0, np.pi, rings + 1)
+    azimuth = np.linspace(0.0, 2 * np.pi, 2 * rings + 1)
+    p, a = np.meshgrid(polar, azimuth, indexing="ij")
+    unit = np.stack([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)], axis=-1)
+    uvs = np.stack([a / (2 * np.pi), 1 - p / np.pi], axis=-1)
+    columns = 2 * rings + 1
+    faces = []
+    for i in range(rings):
+        for j in range(2 * rings):
+            q = i * columns + j
+            if i > 0:
+                faces.append((q, q + columns, q + 1))
+            if i < rings - 1:
+                faces.append((q + 1, q + columns, q + columns + 1))
+    unit = unit.reshape(-1, 3)
+    return _mesh(unit * radius_m, faces, unit, uvs.reshape(-1, 2), materials)
+
+
+def plane_mesh(size_m: float = 10.0, materials: tuple[Material, ...] = (Material(),)) -> MeshData:
+    """A square in the XY plane, facing +Z."""
+    h = 0.5 * size_m
+    corners = [(-h, -h, 0), (h, -h, 0), (h, h, 0), (-h, h, 0)]
+    uvs = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    return _mesh(corners, [(0, 1, 2), (0, 2, 3)], [(0, 0, 1)] * 4, uvs, materials)
+
+
+def _mesh(vertices, faces, normals, uvs, materials) -> MeshData:  # noqa: ANN001
+    return MeshData(
+        np.asarray(vertices, np.float32),
+        np.asarray(faces, np.int32),
+        np.asarray(normals, np.float32),
+        np.asarray(uvs, np.float32),
+        np.zeros(len(faces), np.int32),
+        materials,
+    )
+
+
+def uniform_sky(height: int = 16) -> Float32:
+    """Radiance 1 everywhere."""
+    return np.ones((height, 2 * height, 3), np.float32)
+
+
+class FakeLibrary:
+    """An AssetLibrary over dictionaries handed in by a test."""
+
+    def __init__(
+        self,
+        meshes: dict[str, MeshData],
+        textures: dict[str, TextureData] | None = None,
+        environments: dict[str, Float32] | None = None,
+    ) -> None:
+        self.meshes = meshes
+        self.textures = textures or {}
+        self.environments = {"environment/neutral?seed=0": uniform_sky(), **(environments or {})}
+
+    def get(self, asset_id: str) -> Asset:
+        raise AssetError(f"unknown asset '{asset_id}'")
+
+    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:  # noqa: ARG002
+        return ()
+
+    def materials(self, asset_id: str) -> tuple[Material, ...]:
+        return self.meshes[asset_id].materials
+
+    def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+        return self.meshes[asset_id].bounds_m()
+
+    def robot(self, asset_id: str) -> RobotModel:
+        raise AssetError(f"'{asset_id}' is no robot")
+
+    def mesh(self, asset_id: str) -> MeshData:
+        return self.meshes[asset_id]
+
+    def convex_parts(self, asset_id: str) -> ConvexParts:
+        return ConvexParts((self.meshes[asset_id].vertices_m.astype(np.float64),))
+
+    def texture(self, texture_id: str) -> TextureData:
+        return self.textures[texture_id]
+
+    def environment(self, environment_id: str) -> Float32:
+        return self.environments[environment_id]
