@@ -1,8 +1,8 @@
 """Labelled samples per second to disk: ``python -m benchmarks.bench_tabletop``.
 
 640x480, the shipped tabletop with the arm and exactly ten objects, two soft-shadow lights and
-environment light; RGB, depth, instance and category PNGs and COCO and KITTI labels on disk. The same
-scenes are drawn by PyBullet's TinyRenderer in the same run, for a ratio.
+environment light; RGB, depth, instance and category PNGs and COCO and KITTI labels on disk. The
+same scenes are drawn by PyBullet's TinyRenderer in the same run, for a ratio.
 """
 
 from __future__ import annotations
@@ -163,7 +163,9 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
 
-    print(f"{platform.machine()}, {_processor()}, {arguments.workers} workers, {arguments.n} samples")
+    print(
+        f"{platform.machine()}, {_processor()}, {arguments.workers} workers, {arguments.n} samples"
+    )
     print(f"first sample in this process: {first_sample_s():.1f} s")
     ours_s = {}
     for views_per_scene in (5, 1):

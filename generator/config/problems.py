@@ -10,7 +10,7 @@ from generator.core.errors import ConfigError
 FieldPath = tuple[str | int, ...]
 """Keys and indices from the root of a document: ``("randomizers", 0, "count")``."""
 
-_PLAIN_KEY = re.compile(r"[A-Za-z0-9_/-]{1,60}")
+_PLAIN_KEY = re.compile(r"[\w/-]{1,60}")
 _LINE_LENGTH = 100
 
 

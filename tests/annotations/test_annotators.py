@@ -303,7 +303,7 @@ def test_without_annotators_nothing_is_annotated() -> None:
 
 
 def _moved(silhouette: Silhouette) -> Silhouette:
-    return replace(silhouette, x_px=silhouette.x_px + 1)
+    return replace(silhouette, x_px=silhouette.x_px - 1)
 
 
 def _holed(silhouette: Silhouette) -> Silhouette:
@@ -349,7 +349,6 @@ def test_a_silhouette_that_was_not_rendered_stops_the_sample() -> None:
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
-        ({"category_id": 0}, "category 'robot' has no id"),
         ({"T_world_instance": SE3((0.0, math.nan, 0.0))}, "no rigid pose"),
         ({"T_world_instance": SE3((0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0))}, "no rigid pose"),
         ({"box_max_m": (-0.2, 0.2, 1.0)}, "has the size"),
@@ -366,6 +365,15 @@ def test_an_instance_that_cannot_be_stops_the_sample(changes: dict[str, Any], fa
 
     with pytest.raises(SampleError, match=f"instance 2 'arm': .*{fault}"):
         image_truth(scene, reading, annotators(), Thresholds())
+
+
+def test_an_annotated_instance_without_a_category_stops_the_sample() -> None:
+    """Category 0 means none: no format could write it."""
+    scene, reading = scene_and_reading()
+    scene = replace(scene, instances=(replace(ARM, category_id=0),))
+
+    with pytest.raises(SampleError, match="annotated and its category 'robot' has no id"):
+        image_truth(scene, reading, annotators("poses"), Thresholds())
 
 
 class _Liar:

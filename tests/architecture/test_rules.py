@@ -62,7 +62,9 @@ def test_types_are_strict() -> None:
 def test_functions_stay_short(path: Path) -> None:
     """No function is longer than 70 lines."""
     tree = ast.parse(path.read_text())
-    functions = [n for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    functions = [
+        n for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.AsyncFunctionDef))
+    ]
     too_long = [
         f"{f.name}: {length} lines"
         for f in functions

@@ -8,6 +8,7 @@ import pytest
 from running import SMALL, digest, gen_data
 
 JOB = ("--n", "2", *SMALL)
+COUNT = "randomizers.clutter.count"
 
 
 def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts: str) -> None:
@@ -38,11 +39,11 @@ def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts
             ("views_per_scen", "did you mean 'views_per_scene'?"),
         ),
         (
-            ("--config", "tabletop.yaml", *JOB, "--set", "randomizers.clutter.count={unifrom: [1, 2]}"),
+            ("--config", "tabletop.yaml", *JOB, "--set", f"{COUNT}={{unifrom: [1, 2]}}"),
             ("unknown distribution 'unifrom'", "did you mean 'uniform"),
         ),
         (
-            ("--config", "tabletop.yaml", *JOB, "--set", "randomizers.clutter.count={uniform_integer: [9, 2]}"),
+            ("--config", "tabletop.yaml", *JOB, "--set", f"{COUNT}={{uniform_integer: [9, 2]}}"),
             ("[9, 2]", "low <= high"),
         ),
         (

@@ -28,9 +28,7 @@ def test_contact_sheet_of_a_dataset_has_one_tile_per_sample(dataset: Path, tmp_p
 
 def test_recording_is_accepted_by_rerun(tmp_path: Path) -> None:
     """``rerun rrd verify`` reads what ``preview --save`` wrote."""
-    done = gen_data(
-        "preview", "tabletop.yaml", "--n", "2", "--save", "x.rrd", *SMALL, cwd=tmp_path
-    )
+    done = gen_data("preview", "tabletop.yaml", "--n", "2", "--save", "x.rrd", *SMALL, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     beside = Path(sys.executable).with_name("rerun")
     rerun = str(beside) if beside.exists() else shutil.which("rerun")

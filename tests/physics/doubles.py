@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from generator.core.errors import AssetError
-from generator.core.geometry import ConvexParts, Gripper, Joint, RobotModel
+from generator.core.geometry import ConvexParts, Joint, RobotModel
 from generator.core.scene import Body, ObjectGroup, Scene, Surface
 from generator.core.se3 import SE3
 from tests.physics.panda import mesh_vertices, panda
@@ -27,12 +27,13 @@ class Solids:
         return _parts(asset_id)
 
     def robot(self, asset_id: str) -> RobotModel:
-        """``panda`` or ``planar``."""
+        """``panda`` or ``gantry``."""
         if asset_id not in ROBOTS:
             raise AssetError(f"no robot '{asset_id}'")
         return ROBOTS[asset_id]()
 
     def __getattr__(self, name: str) -> Any:
+        """Physics gets by with collision geometry and kinematics."""
         raise AssertionError(f"physics must not ask the library for '{name}'")
 
 
@@ -49,7 +50,7 @@ def _parts(asset_id: str) -> ConvexParts:
         "ball": lambda r: (ball(r),),
         "mug": mug,
         "bin": lambda x, y, z: tray(x, y, z, wall_m=0.01),
-        "table": lambda x, y, z: (box(x, y, z),),
+        "bar": lambda: (box(0.26, 0.04, 0.04, at=(0.15, 0, 0)),),
     }
     return ConvexParts(tuple(makers[kind](*sizes)))
 
@@ -118,24 +119,28 @@ def _thinned(points: np.ndarray) -> np.ndarray:
     return points[np.sort(ConvexHull(points).vertices)]
 
 
-def planar() -> RobotModel:
-    """A post, two bars of 0.3 m that turn about Z, and two fingers without bodies of the arm."""
+def gantry() -> RobotModel:
+    """A post, two bars of 0.3 m that turn in the horizontal plane, 0.1 m up, and no gripper."""
 
-    def bar(name: str, parent: str, child: str, x: float) -> Joint:
-        return Joint(name, "revolute", parent, child, SE3((x, 0, 0)), (0, 0, 1), -2.5, 2.5)
+    def hinge(name: str, parent: str, child: str, at: tuple[float, float, float]) -> Joint:
+        return Joint(name, "revolute", parent, child, SE3(at), (0, 0, 1), -2.5, 2.5)
 
+    bars = {"upper": "bar", "fore": "bar"}
     return RobotModel(
         links=("post", "upper", "fore"),
-        joints=(bar("shoulder", "post", "upper", 0.0), bar("elbow", "upper", "fore", 0.3)),
-        visuals={"upper": "box 0.3 0.04 0.04", "fore": "box 0.3 0.04 0.04"},
-        collisions={},
+        joints=(
+            hinge("shoulder", "post", "upper", (0, 0, 0.1)),
+            hinge("elbow", "upper", "fore", (0.3, 0, 0)),
+        ),
+        visuals=bars,
+        collisions=bars,
         home=(0.0, 0.5),
-        gripper=Gripper("fore", SE3((0.3, 0, 0)), (), 0.0),
-        no_collide=frozenset(),
+        gripper=None,
+        no_collide=frozenset({("upper", "fore")}),
     )
 
 
-ROBOTS = {"panda": cache(panda), "planar": planar}
+ROBOTS = {"panda": cache(panda), "gantry": gantry}
 
 
 def table_scene(*bodies: Body, placement: str = "drop", walled: bool = False) -> Scene:
@@ -146,7 +151,7 @@ def table_scene(*bodies: Body, placement: str = "drop", walled: bool = False) ->
     )
     furniture = (
         Body("floor", "box 6 6 0.1", SE3((0, 0, -0.05))),
-        Body("table", f"table {x} {y} 0.04", SE3((0, 0, TABLE_TOP_Z_M - 0.02))),
+        Body("table", f"box {x} {y} 0.04", SE3((0, 0, TABLE_TOP_Z_M - 0.02))),
     )
     group = ObjectGroup("things", ("table",), (), len(bodies), placement)  # type: ignore[arg-type]
     things = tuple(replace(body, group="things", motion="dynamic") for body in bodies)
@@ -172,24 +177,32 @@ HOUSEHOLD = (
 )
 
 
+def random_turn(rng: np.random.Generator) -> SE3:
+    """A rotation, uniform over all orientations."""
+    w, x, y, z = (float(v) for v in rng.normal(size=4))
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    return SE3(quaternion_wxyz=(w / norm, x / norm, y / norm, z / norm))
+
+
+def world_vertices(body: Body) -> np.ndarray:
+    """Vertices of a body in the world [m], shape [n, 3]."""
+    vertices = np.concatenate(_parts(body.asset).parts_m) * body.scale
+    return body.T_world_body.apply(vertices)
+
+
 def dropped_clutter(seed: int, count: int = 10) -> Scene:
     """Household things in any orientation, each 2 to 10 cm above the one before."""
     rng = np.random.Generator(np.random.Philox(key=seed))
+    half = np.array(TABLE_SIZE_M) / 2
     bodies, top = [], 0.0
-    for k in range(count):
-        asset = HOUSEHOLD[int(rng.integers(len(HOUSEHOLD)))]
-        w, x, y, z = (float(v) for v in rng.normal(size=4))
-        norm = math.sqrt(w * w + x * x + y * y + z * z)
-        turn = SE3(quaternion_wxyz=(w / norm, x / norm, y / norm, z / norm))
-        points = turn.apply(np.concatenate(_parts(asset).parts_m))
+    for number in range(count):
+        turn = random_turn(rng)
+        body = Body(f"things/{number}", HOUSEHOLD[int(rng.integers(len(HOUSEHOLD)))], turn)
+        points = world_vertices(body)
         low, high = points.min(axis=0), points.max(axis=0)
+        x, y = (float(v) for v in rng.uniform(-half - low[:2], half - high[:2]))
         above = top + float(rng.uniform(0.02, 0.10)) - float(low[2])
         top = above + float(high[2])
-        at = [
-            float(rng.uniform(-s / 2 - lo, s / 2 - hi))
-            for s, lo, hi in zip(TABLE_SIZE_M, low, high, strict=False)
-        ]
-        body = thing(f"things/{k}", asset, at[0], at[1], above)
-        pose = SE3(body.T_world_body.translation_m, turn.quaternion_wxyz)
-        bodies.append(replace(body, T_world_body=pose))
+        placed = SE3((x, y, TABLE_TOP_Z_M + above), turn.quaternion_wxyz)
+        bodies.append(replace(body, T_world_body=placed, mass_kg=0.3))
     return table_scene(*bodies)

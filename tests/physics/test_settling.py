@@ -18,9 +18,9 @@ from tests.physics.doubles import (
     TABLE_TOP_Z_M,
     Solids,
     dropped_clutter,
-    lowest_m,
     table_scene,
     thing,
+    world_vertices,
 )
 
 HALF_A_MM = 0.0005
@@ -38,6 +38,11 @@ def settled(engine: BulletEngine, scene: Scene) -> Scene:
     outcome = engine.settle(scene)
     assert outcome.rejection is None, outcome.rejection
     return outcome.scene
+
+
+def lowest_m(body: Body) -> float:
+    """World height of a body's lowest vertex [m]."""
+    return float(world_vertices(body)[:, 2].min())
 
 
 def tilt_rad(body: Body) -> float:

@@ -75,7 +75,7 @@ def inside(*path: str | int) -> Iterator[None]:
         raise Malformed(error.fact, (*path, *error.path), at_key=error.at_key) from None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kind(Generic[T]):
     """What a field's values are.
 

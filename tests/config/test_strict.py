@@ -1,0 +1,68 @@
+"""The base of all models."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from generator.config.strict import Strict
+
+
+class Values(Strict):
+    """One field of each simple type."""
+
+    number: float = 0.5
+    whole: int = 1
+    text: str = "x"
+    flag: bool = True
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"number": "1.5"},
+        {"number": True},
+        {"number": math.nan},
+        {"number": math.inf},
+        {"whole": 1.0},
+        {"whole": "1"},
+        {"whole": True},
+        {"text": 1},
+        {"flag": 1},
+        {"flag": "true"},
+        {"unknown": 1},
+    ],
+)
+def test_nothing_is_coerced_or_ignored(wrong: dict[str, Any]) -> None:
+    """What is written must be what is meant."""
+    with pytest.raises(ValidationError):
+        Values(**wrong)
+
+
+def test_whole_numbers_are_accepted_where_fractions_are_due() -> None:
+    """The only widening that loses nothing."""
+    assert Values(number=2).number == 2.0
+
+
+def test_models_are_frozen() -> None:
+    """A configuration is a value."""
+    values = Values()
+
+    with pytest.raises(ValidationError):
+        values.number = 1.0  # type: ignore[misc]
+
+    assert values == Values()
+    assert hash(values) == hash(Values())
+
+
+def test_wrong_defaults_are_found() -> None:
+    """A default is checked like any other value."""
+
+    class Wrong(Strict):
+        number: float = "no"  # type: ignore[assignment]
+
+    with pytest.raises(ValidationError):
+        Wrong()

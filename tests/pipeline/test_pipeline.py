@@ -1,0 +1,239 @@
+"""Pipeline.sample(index) is a pure function of (recipe, index)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from generator.core.capture import Channel, Reading
+from generator.core.errors import LayoutRejected, Rejection, SceneRejected
+from generator.core.geometry import MeshData
+from generator.core.interfaces import DatasetInfo, Settled, Stage
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import ImageTruth
+from generator.core.scene import Articulation, Body, Camera, Instance, Scene
+from generator.core.se3 import SE3
+from generator.pipeline import Pipeline
+from generator.pipeline.freeze import frozen_scene
+from generator.pipeline.pipeline import Recipe
+
+CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(8, 6, 1.0))
+
+
+@dataclass(frozen=True)
+class Draws:
+    """A randomizer that writes what it drew into the environment's yaw."""
+
+    name: str
+    stage: Stage
+
+    def __call__(self, scene: Scene, assets: object, rng: Any) -> Scene:
+        """Add one uniform draw."""
+        yaw_rad = scene.environment.yaw_rad + rng.uniform()
+        return replace(scene, environment=replace(scene.environment, yaw_rad=yaw_rad))
+
+
+@dataclass(frozen=True)
+class Refuses:
+    """A randomizer that finds no valid draw in its first attempts."""
+
+    name: str
+    stage: Stage
+    threshold: float
+
+    def __call__(self, scene: Scene, assets: object, rng: Any) -> Scene:
+        """Reject unless the draw is large."""
+        if rng.uniform() < self.threshold:
+            raise LayoutRejected(Rejection("draw too small", "lower the threshold"))
+        return scene
+
+
+class AcceptingPhysics:
+    """Physics that finds every scene at rest, and counts."""
+
+    def __init__(self) -> None:
+        self.settled = 0
+
+    def settle(self, scene: Scene) -> Settled:
+        """The scene as it is."""
+        self.settled += 1
+        return Settled(scene)
+
+
+class RefusingPhysics:
+    """Physics that never finds rest."""
+
+    def settle(self, scene: Scene) -> Settled:
+        """A rejection with alternating reasons."""
+        reason = "object fell off" if scene.environment.yaw_rad % 1 < 0.5 else "still moving"
+        return Settled(scene, Rejection(reason, "fewer objects (randomizers.clutter.count)"))
+
+
+@dataclass(frozen=True)
+class OneCamera:
+    """A sensor that returns the scene's yaw as a one-pixel image."""
+
+    name: str = "color"
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with the camera in it."""
+        return replace(scene, cameras=(CAMERA,))
+
+    def capture(self, scene: Scene, renderer: Any, channels: Any, rng: Any) -> Reading:
+        """The yaw, and one draw of the sensor's own stream."""
+        values = np.array([[scene.environment.yaw_rad, rng.uniform()]])
+        return Reading(self.name, scene.cameras[0], {Channel.RGB: values})
+
+
+def pipeline(
+    *randomizers: Any,
+    physics: Any = None,
+    seed: int = 7,
+    views_per_scene: int = 3,
+    splits: Mapping[str, float] | None = None,
+) -> Pipeline:
+    """A pipeline of test doubles."""
+    sensor = OneCamera()
+    recipe = Recipe(
+        seed=seed,
+        views_per_scene=views_per_scene,
+        nominal=sensor.mount(Scene("test")),
+        randomizers=randomizers,
+        sensors=(sensor,),
+        channels=frozenset(),
+        image_truth=lambda scene, reading: ImageTruth(reading.camera, ()),
+        split_shares=splits or {"train": 0.8, "val": 0.2},
+        layout_attempts_max=5,
+        info=DatasetInfo("test", seed, 100, views_per_scene, (), ("color",), {}),
+        exporters={},
+    )
+    engine = physics or AcceptingPhysics()
+    return Pipeline(recipe, None, lambda: engine, None)  # type: ignore[arg-type]
+
+
+def seen(made: Pipeline, index: int) -> np.ndarray:
+    """What the sensor returned for one sample."""
+    return made.sample(index).capture.readings["color"].channels[Channel.RGB]
+
+
+BUILD = Draws("build", Stage.BUILD)
+VIEW = Draws("view", Stage.VIEW)
+
+
+def test_order_and_history_leave_a_sample_unchanged() -> None:
+    """Sample 4 after 0..9, and alone in a fresh pipeline."""
+    with pipeline(BUILD, VIEW) as one, pipeline(BUILD, VIEW) as other:
+        after_others = [seen(one, i) for i in (9, 0, 3, 4)][-1]
+        alone = seen(other, 4)
+
+    assert np.array_equal(after_others, alone)
+
+
+def test_views_share_a_scene_and_differ_in_what_is_drawn_per_view() -> None:
+    """Scene draws are the same in all views of a scene; view draws are not."""
+    with pipeline(BUILD) as scenes, pipeline(BUILD, VIEW) as views:
+        same = {float(seen(scenes, i)[0, 0]) for i in (3, 4, 5)}
+        different = {float(seen(views, i)[0, 0]) for i in (3, 4, 5)}
+        next_scene = float(seen(scenes, 6)[0, 0])
+
+    assert len(same) == 1
+    assert len(different) == 3
+    assert next_scene not in same
+
+
+def test_inserting_a_randomizer_leaves_other_draws_unchanged() -> None:
+    """Streams are keyed by name: another randomizer adds its own draw and moves none."""
+    new = Draws("new", Stage.BUILD)
+    with pipeline(BUILD) as alone, pipeline(new, BUILD) as both, pipeline(new) as only_new:
+        expected = seen(alone, 0)[0, 0] + seen(only_new, 0)[0, 0]
+
+        assert seen(both, 0)[0, 0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_one_settled_scene_serves_all_its_views() -> None:
+    """Physics runs once per scene, not once per view."""
+    physics = AcceptingPhysics()
+    with pipeline(BUILD, VIEW, physics=physics) as made:
+        for index in range(6):
+            made.sample(index)
+
+    assert physics.settled == 2
+
+
+def test_scene_that_is_never_valid_is_rejected_with_the_tally() -> None:
+    """Five attempts, each with other draws; the error counts the reasons and says what to try."""
+    with pipeline(BUILD, physics=RefusingPhysics()) as made, pytest.raises(SceneRejected) as error:
+        made.sample(3)
+
+    assert str(error.value).startswith("scene 1: no valid layout in 5 attempts (")
+    counts = Counter(r.reason for r in error.value.rejections)
+    assert sum(counts.values()) == 5
+    assert "Try: 1. fewer objects (randomizers.clutter.count)" in str(error.value)
+
+
+@pytest.mark.parametrize("stage", [Stage.BUILD, Stage.VIEW])
+def test_refused_draw_is_tried_again_with_other_streams(stage: Stage) -> None:
+    """A layout that a randomizer refuses costs an attempt, not the sample."""
+    attempts = set()
+    for seed in range(12):
+        with pipeline(Refuses("picky", stage, 0.5), seed=seed) as made:
+            attempts.add(made.sample(0).attempts)
+
+    assert max(attempts) > 1 or stage is Stage.VIEW
+
+
+def test_splits_have_their_shares_and_do_not_cut_scenes() -> None:
+    """Shares within four standard errors over 2,000 scenes; all views of a scene in one split."""
+    shares = {"train": 0.7, "val": 0.2, "test": 0.1}
+    with pipeline(BUILD, splits=shares) as made:
+        counts = Counter(made.split(scene) for scene in range(2000))
+        views = {made.sample(i).split for i in (30, 31, 32)}
+
+    for name, share in shares.items():
+        assert abs(counts[name] / 2000 - share) < 4 * (share * (1 - share) / 2000) ** 0.5
+    assert len(views) == 1
+
+
+class TwoBoxes:
+    """Assets of which every one is a box of 2 x 4 x 6 cm."""
+
+    def bounds_m(self, asset_id: str) -> Any:
+        """Bounds of the box."""
+        return (-0.01, -0.02, -0.03), (0.01, 0.02, 0.03)
+
+    def mesh(self, asset_id: str) -> MeshData:
+        """Its two extreme corners are all that bounds need."""
+        low, high = self.bounds_m(asset_id)
+        none = np.zeros((0, 3), np.int32)
+        corners = np.array([low, high], np.float32)
+        return MeshData(corners, none, corners, corners[:, :2], np.zeros(0, np.int32), ())
+
+
+def test_freezing_fills_ids_frames_and_boxes() -> None:
+    """One body: its own frame and scaled bounds. A robot: its base and a box around its links."""
+    quarter = SE3.about_z(np.pi / 2, (1.0, 0.0, 0.5))
+    scene = Scene(
+        "test",
+        bodies=(
+            Body("cup", "box", quarter, scale=2.0, instance_id=1),
+            Body("arm/a", "box", SE3((0.0, 0.0, 0.0)), instance_id=2, part_id=1),
+            Body("arm/b", "box", SE3((0.0, 0.0, 1.0)), instance_id=2, part_id=2),
+        ),
+        instances=(Instance(1, "cup", "mug", 0, "box"), Instance(2, "arm", "robot_arm", 0, "arm")),
+        articulations=(Articulation("arm", "arm", 2, SE3((0.0, 0.0, -1.0)), ()),),
+    )
+
+    frozen = frozen_scene(scene, TwoBoxes(), {"mug": 1, "robot_arm": 2})  # type: ignore[arg-type]
+
+    cup, arm = frozen.instances
+    assert (cup.category_id, arm.category_id) == (1, 2)
+    assert cup.T_world_instance == quarter
+    assert cup.box_max_m == pytest.approx((0.02, 0.04, 0.06))
+    assert arm.T_world_instance == SE3((0.0, 0.0, -1.0))
+    assert arm.box_min_m == pytest.approx((-0.01, -0.02, 0.97), abs=1e-6)
+    assert arm.box_max_m == pytest.approx((0.01, 0.02, 2.03), abs=1e-6)
