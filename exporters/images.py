@@ -131,7 +131,11 @@ def _pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> NDAr
         Channel.Z_DEPTH: lambda: depth_units(image, depth_scale_m),
         Channel.RANGE: lambda: depth_units(image, depth_scale_m),
         Channel.NORMALS: lambda: np.rint((image + 1.0) * 0.5 * 255.0).astype(np.uint8),
-        Channel.OBJECT_COORDINATES: lambda: np.rint(image * 65_535.0).astype(np.uint16),
+        # Boxes are rounded to a micrometre: a surface may lie that much outside [0, 1], and
+        # 65536 would wrap to 0.
+        Channel.OBJECT_COORDINATES: lambda: np.rint(np.clip(image, 0, 1) * 65_535).astype(
+            np.uint16
+        ),
     }
     return convert.get(channel, lambda: image)()
 

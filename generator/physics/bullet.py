@@ -16,7 +16,7 @@ from pathlib import Path
 import pybullet
 
 from generator.core.se3 import SE3, Array, Vec3
-from generator.physics.shapes import CollisionShape
+from generator.physics.shapes import CollisionShape, scale_step
 
 GRAVITY_M_S2 = 9.81
 
@@ -97,7 +97,11 @@ class World:
             useMaximalCoordinates=1,
             physicsClientId=self._client,
         )
-        rolling = _ROLLING_FRICTION_SHARE * shape.radius_m * scale if mass_kg > 0.0 else 0.0
+        rolling = (
+            _ROLLING_FRICTION_SHARE * float(shape.half_extents_m.min()) * scale
+            if mass_kg > 0.0
+            else 0.0
+        )
         pybullet.changeDynamics(
             number,
             -1,
@@ -106,7 +110,6 @@ class World:
             rollingFriction=rolling,
             spinningFriction=rolling,
             angularDamping=_ANGULAR_DAMPING,
-            collisionMargin=shape.margin_m * scale,
             physicsClientId=self._client,
         )
         self._solids[name] = _Solid(number, shape, scale, T_body_center)
@@ -198,9 +201,10 @@ class World:
             )
         # Several hulls in one body can only be handed over as a file. The engine remembers files
         # by name for the life of the process: the name is the content.
-        path = self._folder / f"{shape.key}.obj"
+        step = scale_step(scale)
+        path = self._folder / f"{shape.key}_{step}.obj"
         if not path.exists():
-            path.write_text(shape.obj)
+            path.write_text(shape.obj(step))
         return int(
             pybullet.createCollisionShape(
                 pybullet.GEOM_MESH,

@@ -75,7 +75,7 @@ class BulletEngine:
 
     def _add(self, body: Body, falls: bool) -> None:
         shape = self._shape(body.asset)
-        guess_kg = _DENSITY_KG_M3 * shape.volume_m3 * body.scale**3
+        guess_kg = _DENSITY_KG_M3 * 8.0 * float(shape.half_extents_m.prod()) * body.scale**3
         self._world.add(
             body.name,
             shape,

@@ -1,12 +1,13 @@
-"""Collision geometry prepared for the engine: primitives where exact, else shrunken hulls.
+"""Collision geometry prepared for the engine: boxes where exact, else hulls with room for a shell.
 
-The engine keeps a thin shell (its collision margin) around every hull, so hulls are made smaller
-by the shell's thickness: the outside of shell and hull together is where the mesh is, and nothing
+Bullet keeps a shell of fixed thickness (its collision margin) around every hull. Each hull is
+therefore made smaller by just that: shell and hull together end where the mesh does, and nothing
 floats above its support.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
@@ -16,67 +17,85 @@ import numpy as np
 from generator.core.geometry import ConvexParts
 from generator.core.se3 import SE3, Array, Vec3
 
-_MARGIN_M = 0.0005
-_MARGIN_SHARE_MAX = 0.2
+SHELL_M = 0.001
+"""Bullet's own thickness for hulls; parts of a compound cannot have another."""
+
+_SHELL_SHARE_MAX = 0.4
+"""Of a part's smallest width: a hull never shrinks to nothing."""
+_RETREAT_MAX = 4.0
+_SCALE_STEP = 1.05
+"""Hulls are shrunk for the nearest of these steps of scale: 25 micrometres at most are missing."""
 _BOXES_MAX = 16
-"""Primitives that pybullet takes in one compound shape."""
+"""Primitives that pybullet takes in one compound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """One convex part about the centre of mass of the whole.
+
+    Attributes:
+        vertices_m: float64 [n, 3].
+        retreats: How each vertex moves per metre by which all faces move inward, [n, 3].
+        width_m: Smallest distance between parallel planes on both sides, over all faces.
+    """
+
+    vertices_m: Array
+    retreats: Array
+    width_m: float
+
+    def shrunken(self, depth_m: float) -> Array:
+        """Vertices with all faces moved inward by a depth, less for thin parts."""
+        return self.vertices_m + min(depth_m, _SHELL_SHARE_MAX * self.width_m) * self.retreats
 
 
 @dataclass(frozen=True, eq=False)
 class CollisionShape:
-    """The collision geometry of one asset at scale 1, about its centre of mass.
+    """The collision geometry of one asset at scale 1.
 
     Attributes:
-        parts_m: Hull vertices per part, float64 [n, 3], relative to the centre of mass.
+        hulls: About the centre of mass.
         center_of_mass_m: In the asset's frame; of a solid of even density.
-        boxes: ``(centre, half extents)`` of every part, where all parts are upright boxes and
-            few; else empty.
+        boxes: ``(centre, half extents)`` of every part, about the centre of mass, where all
+            parts are upright boxes and few; else empty.
     """
 
-    parts_m: tuple[Array, ...]
+    hulls: tuple[Hull, ...]
     center_of_mass_m: Vec3
     boxes: tuple[tuple[Vec3, Vec3], ...]
 
     @cached_property
     def vertices_m(self) -> Array:
-        """Vertices of all parts, float64 [n, 3], relative to the centre of mass."""
-        return np.concatenate(self.parts_m)
+        """Vertices of all hulls, float64 [n, 3]."""
+        return np.concatenate([hull.vertices_m for hull in self.hulls])
 
     @cached_property
-    def margin_m(self) -> float:
-        """Thickness of the shell; thinner for thin parts."""
-        thinnest = min(float(_half_extents(part).min()) for part in self.parts_m)
-        return max(min(_MARGIN_M, _MARGIN_SHARE_MAX * thinnest), 1e-6)
+    def half_extents_m(self) -> Array:
+        """Of the bounding box, [3]."""
+        half: Array = 0.5 * (self.vertices_m.max(axis=0) - self.vertices_m.min(axis=0))
+        return half
 
     @cached_property
-    def radius_m(self) -> float:
-        """Half the smallest extent of the whole."""
-        return float(_half_extents(self.vertices_m).min())
+    def key(self) -> str:
+        """Digest of the content."""
+        digest = blake2b(digest_size=16)
+        for hull in self.hulls:
+            digest.update(hull.vertices_m.tobytes() + b"|")
+        return digest.hexdigest()
 
-    @cached_property
-    def volume_m3(self) -> float:
-        """Of the bounding box: an upper bound."""
-        return float(np.prod(2.0 * _half_extents(self.vertices_m)))
-
-    @cached_property
-    def obj(self) -> str:
-        """The shrunken parts as Wavefront OBJ, one object per part."""
+    def obj(self, step: int) -> str:
+        """Wavefront OBJ at scale 1, one object per hull, shrunk for ``scale_step(scale)``."""
         lines, first = [], 1
-        for number, part in enumerate(self.parts_m):
+        for number, hull in enumerate(self.hulls):
             lines.append(f"o part{number}")
-            lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in _shrunken(part, self.margin_m)]
-            # The engine builds the hull of what the faces name; which faces does not matter.
-            last = first + len(part) - 1
+            points = hull.shrunken(SHELL_M / _SCALE_STEP**step)
+            lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in points]
+            # The engine builds the hull of whatever points the faces name.
+            last = first + len(points) - 1
             lines += [
                 f"f {k} {min(k + 1, last)} {min(k + 2, last)}" for k in range(first, last + 1, 3)
             ]
             first = last + 1
         return "\n".join(lines) + "\n"
-
-    @cached_property
-    def key(self) -> str:
-        """Digest of the content."""
-        return blake2b(self.obj.encode(), digest_size=16).hexdigest()
 
     def bounds_m(self, T_world_center: SE3, scale: float) -> tuple[Array, Array]:
         """Low and high corner in the world [m] with the centre of mass at a pose."""
@@ -84,69 +103,75 @@ class CollisionShape:
         return points.min(axis=0), points.max(axis=0)
 
 
+def scale_step(scale: float) -> int:
+    """Number of the step of scale that is nearest to a scale; 0 for scale 1."""
+    return round(math.log(scale) / math.log(_SCALE_STEP))
+
+
 def collision_shape(parts: ConvexParts) -> CollisionShape:
     """The shape of an asset's convex parts."""
-    center = _center_of_mass(parts.parts_m)
-    offset = np.asarray(center)
-    boxes = [_as_box(part - offset) for part in parts.parts_m]
+    measured = [_measured(part) for part in parts.parts_m]
+    volume_m3 = sum(volume for _, volume, _ in measured)
+    if volume_m3 > 0.0:
+        center = sum(volume * middle for _, volume, middle in measured) / volume_m3
+    else:
+        points = np.concatenate(parts.parts_m)
+        center = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    x, y, z = (round(float(v), 9) for v in center)
+    offset = np.array([x, y, z])
+    hulls = tuple(
+        Hull(hull.vertices_m - offset, hull.retreats, hull.width_m) for hull, _, _ in measured
+    )
+    boxes = [_as_box(hull.vertices_m) for hull in hulls]
     exact = tuple(box for box in boxes if box is not None)
     return CollisionShape(
-        parts_m=tuple(part - offset for part in parts.parts_m),
-        center_of_mass_m=center,
-        boxes=exact if len(exact) == len(boxes) <= _BOXES_MAX else (),
+        hulls, (x, y, z), boxes=exact if len(exact) == len(boxes) <= _BOXES_MAX else ()
     )
 
 
-def _center_of_mass(parts_m: tuple[Array, ...]) -> Vec3:
-    """Of solid hulls; where parts overlap, matter counts twice."""
+def _measured(points: Array) -> tuple[Hull, float, Array]:
+    """The hull of some points, its volume [m^3] and its centre of mass [m]."""
     from scipy.spatial import ConvexHull, QhullError
 
-    total, moment = 0.0, np.zeros(3)
-    for part in parts_m:
-        middle = part.mean(axis=0)
-        try:
-            triangles = part[ConvexHull(part).simplices] - middle
-        except QhullError:  # a flat part has no volume and no say
-            continue
-        volumes = np.abs(np.einsum("ij,ij->i", triangles[:, 0], _normals(triangles))) / 6.0
-        centers = middle + triangles.sum(axis=1) / 4.0
-        total += float(volumes.sum())
-        moment += (volumes[:, None] * centers).sum(axis=0)
-    if total <= 0.0:
-        low, high = np.concatenate(parts_m).min(axis=0), np.concatenate(parts_m).max(axis=0)
-        total, moment = 1.0, 0.5 * (low + high)
-    x, y, z = (round(float(v), 9) for v in moment / total)
-    return (x, y, z)
+    middle = points.mean(axis=0)
+    try:
+        hull = ConvexHull(points - middle)
+    except QhullError:  # flat: nothing to shrink and no weight
+        return Hull(points, np.zeros_like(points), 0.0), 0.0, middle
+    kept = np.sort(hull.vertices)
+    triangles = hull.points[hull.simplices]
+    normals = hull.equations[:, :3]
+    volumes = np.abs(_dot(triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2]))) / 6.0
+    volume_m3 = float(volumes.sum())
+    moment = (volumes[:, None] * triangles.sum(axis=1) / 4.0).sum(axis=0)
+    depths = np.einsum("fk,nk->fn", normals, hull.points[kept], optimize=False)
+    width_m = float((depths.max(axis=1) - depths.min(axis=1)).min())
+    retreats = np.array([_retreat(normals[(hull.simplices == v).any(axis=1)]) for v in kept])
+    return Hull(points[kept], retreats, width_m), volume_m3, middle + moment / volume_m3
 
 
-def _normals(triangles: Array) -> Array:
-    return np.cross(triangles[:, 1], triangles[:, 2])
+def _retreat(normals: Array) -> Array:
+    """Where a vertex goes when its faces move inward by one: ``n . x = -1``, by least squares.
+
+    A trace of damping picks the shortest answer where all faces lie in one plane.
+    """
+    a = np.einsum("ni,nj->ij", normals, normals, optimize=False) + 1e-9 * np.eye(3)
+    cofactors = np.stack([np.cross(a[1], a[2]), np.cross(a[2], a[0]), np.cross(a[0], a[1])])
+    x: Array = -_dot(cofactors, normals.sum(axis=0)) / _dot(a[0], cofactors[0])
+    length = math.sqrt(float(_dot(x, x)))
+    return x * min(1.0, _RETREAT_MAX / length)
 
 
-def _half_extents(points: Array) -> Array:
-    extents: Array = 0.5 * (points.max(axis=0) - points.min(axis=0))
-    return extents
+def _dot(a: Array, b: Array) -> Array:
+    product: Array = (a * b).sum(axis=-1)
+    return product
 
 
-def _shrunken(part: Array, margin_m: float) -> Array:
-    """The part, smaller by the margin on every side of its bounding box."""
-    middle = 0.5 * (part.max(axis=0) + part.min(axis=0))
-    half = np.maximum(_half_extents(part), 1e-9)
-    factor = np.maximum(half - margin_m, (1.0 - _MARGIN_SHARE_MAX) * half) / half
-    shrunken: Array = middle + (part - middle) * factor
-    return shrunken
-
-
-def _as_box(part: Array) -> tuple[Vec3, Vec3] | None:
-    """Centre and half extents of a part whose vertices are the corners of an upright box."""
-    low, high = part.min(axis=0), part.max(axis=0)
-    half = 0.5 * (high - low)
-    at_corner = np.abs(np.abs(part - 0.5 * (low + high)) - half) <= 1e-6 * max(
-        float(half.max()), 1e-3
-    )
-    corners = np.unique(np.round((part - low) / np.maximum(high - low, 1e-12)), axis=0)
-    if not at_corner.all() or len(corners) != 8:
+def _as_box(points: Array) -> tuple[Vec3, Vec3] | None:
+    """Centre and half extents of a hull whose vertices are the corners of an upright box."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    center, half = 0.5 * (low + high), 0.5 * (high - low)
+    if len(points) != 8 or (np.abs(np.abs(points - center) - half) > 1e-6 * half.max()).any():
         return None
-    cx, cy, cz = (float(v) for v in 0.5 * (low + high))
-    hx, hy, hz = (float(v) for v in half)
+    (cx, cy, cz), (hx, hy, hz) = center.tolist(), half.tolist()
     return (cx, cy, cz), (hx, hy, hz)

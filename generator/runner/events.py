@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Union
+from typing import TypeAlias
 
 from generator.core.errors import GenDataError
 
@@ -77,7 +77,7 @@ class Abort:
     error: GenDataError
 
 
-Event = Union[Ready, SampleDone, ShardDone, Failed, Exited, Tick, Abort]
+Event: TypeAlias = Ready | SampleDone | ShardDone | Failed | Exited | Tick | Abort
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,4 +116,4 @@ class Note:
     text: str
 
 
-Action = Union[Spawn, Assign, Dismiss, Kill, Note]
+Action: TypeAlias = Spawn | Assign | Dismiss | Kill | Note

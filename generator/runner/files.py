@@ -140,5 +140,7 @@ def storage_error(error: OSError, folder: Path, resume_command: str) -> StorageE
         free = "free space unknown"
     lines = [f"{path}: {error.strerror or error} ({name}); {free}."]
     if resume_command:
-        lines.append(f"  What is finished stays. After the cause is gone, go on with:\n    {resume_command}")
+        lines.append(
+            f"  What is finished stays. After the cause is gone, go on with:\n    {resume_command}"
+        )
     return StorageError("\n".join(lines))

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from generator.core.errors import StorageError
 from generator.core.interfaces import DatasetInfo
@@ -41,8 +40,7 @@ class Entry:
 def finalize(plan: Plan, store: LocalStore, pipeline: PipelineLike, licences: str) -> str:
     """Merge, sum up and seal a data set whose shards are all committed.
 
-    Args:
-        licences: Text of ``LICENSES-ASSETS.md``; empty = no such file.
+    ``licences`` is the text of ``LICENSES-ASSETS.md``; empty = no such file.
 
     Returns:
         The data set's id: sha256 over its sums, of which ``dataset_id`` has the definition.
@@ -158,6 +156,7 @@ def _manifest(
         "splits": summed(count for record in records for count in record.splits),
         "scenes": sum(record.scenes for record in records),
         "rejections": sum(record.rejections for record in records),
+        "bytes": sum(record.size_bytes for record in records),
         "shards": [hashlib.sha256(record.to_bytes()).hexdigest() for record in records],
         # Sizes of all files whose bytes no shard has.
         "files": {e.path: e.bytes for e in entries if e.sha256 not in sized_by_records},

@@ -11,7 +11,7 @@ import os
 import pickle
 import signal
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
@@ -33,7 +33,7 @@ from generator.runner.events import (
 from generator.runner.interruption import Interruption
 from generator.runner.shard import Job
 from generator.runner.supervisor import Supervisor
-from generator.runner.worker import ENVIRONMENT, worker_main
+from generator.runner.worker import worker_main
 
 TICK_S = 0.5
 JOIN_S = 5.0
@@ -101,7 +101,7 @@ class Crew:
             args=(number, theirs, os.getpid(), self._payload, log),
             name=f"gen-data worker {number}",
         )
-        with _environment(ENVIRONMENT), _interrupts_blocked():
+        with _interrupts_blocked():
             process.start()
         theirs.close()
         self._children[number] = _Child(process, ours)
@@ -134,8 +134,7 @@ def drive(
 ) -> None:
     """Run the supervisor with real processes until it is finished.
 
-    Args:
-        observe: Sees every event and action; an error that it returns aborts the run.
+    ``observe`` sees every event and action; an error that it returns aborts the run.
     """
     with Crew(job) as crew:
         _do(supervisor.start(clock()), crew, observe)
@@ -165,20 +164,6 @@ def _messages(connection: Connection) -> Iterator[Event]:
             yield connection.recv()
     except (EOFError, OSError):
         return
-
-
-@contextmanager
-def _environment(values: Mapping[str, str]) -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 @contextmanager

@@ -90,7 +90,9 @@ class Summary:
         if self.rss_bytes_max:
             rows.append(("memory per worker", f"{self.rss_bytes_max / 1e6:.0f} MB"))
         if self.worker_deaths:
-            rows.append(("worker deaths", f"{self.worker_deaths} (work repeated; see run/log.jsonl)"))
+            rows.append(
+                ("worker deaths", f"{self.worker_deaths} (work repeated; see run/log.jsonl)")
+            )
         return [*rows, ("id", self.dataset_id[:16])]
 
 

@@ -53,7 +53,7 @@ class ShardRecord:
     files: tuple[FileRecord, ...]
 
     @property
-    def bytes(self) -> int:
+    def size_bytes(self) -> int:
         """Size of all its files."""
         return sum(file.bytes for file in self.files)
 

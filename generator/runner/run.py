@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import time
+import json
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from generator.runner.progress import Meter, RunProgress, Summary
 from generator.runner.shard import EnteredPipeline, Job, MediaWriter, make_shard, write_images
 from generator.runner.store import FolderState, LocalStore, Scan
 from generator.runner.supervisor import Limits, Supervisor
-from generator.runner.verify import findings, verify
+from generator.runner.verify import findings
 from generator.runner.worker import resident_bytes
 
 __all__ = ["Limits", "RunProgress", "Settings", "Summary", "run"]
@@ -62,11 +62,14 @@ def run(  # noqa: PLR0913  (the front door: each argument is a question only the
     """Make a data set, or what is missing of it.
 
     Args:
+        plan: The identity of the data set.
+        out: Its folder: absent, empty, or begun with an equal plan.
         make_pipeline: Makes the same pipeline in any process; picklable unless ``workers`` is 0.
         workers: Processes that make shards; 0 makes them in this process, for debugging.
         resume_command: What a user types to go on after a fault; part of messages.
         progress: Called at each sample and shard.
         licences: Text of ``LICENSES-ASSETS.md``; empty = no such file.
+        settings: How to work; None = the defaults.
 
     Raises:
         StorageError: the folder is another data set's, in use, or cannot be written.
@@ -75,7 +78,7 @@ def run(  # noqa: PLR0913  (the front door: each argument is a question only the
         Interrupted: Ctrl-C or SIGTERM; committed shards stay.
     """
     settings = settings or Settings()
-    store = LocalStore(Path(os.path.abspath(out)), resume_command)  # noqa: PTH100
+    store = LocalStore(Path(out).absolute(), resume_command)
     message = f"finished shards are kept; go on with:\n    {resume_command}"
     with Interruption(message) as interruption:
         with interruption.immediate(), store.errors():
@@ -111,16 +114,17 @@ class _Run:
                 meter.show("merging")
                 dataset_id = finalize(plan, store, self.job.make_pipeline(), licences)
         finally:
-            with store.errors():
+            # On a faulty disk this may fail as well; the next run begins with it.
+            with suppress(OSError):
                 store.clear_scratch()
         return self._summary(dataset_id, scan, meter)
 
     def _make(self, scan: Scan, meter: Meter) -> None:
+        if not scan.missing:
+            return
         if self.workers == 0:
             with self.interruption.immediate():
                 self._make_here(scan, meter)
-            return
-        if not scan.missing:
             return
         supervisor = Supervisor(
             shards=scan.missing,
@@ -134,8 +138,6 @@ class _Run:
             raise supervisor.error
 
     def _make_here(self, scan: Scan, meter: Meter) -> None:
-        if not scan.missing:
-            return
         with self.job.make_pipeline() as pipeline:
             for shard in scan.missing:
 
@@ -145,7 +147,12 @@ class _Run:
                 record = make_shard(self.job, pipeline, shard, on_sample)
                 samples = record.end - record.first
                 done = ShardDone(
-                    IN_PROCESS, shard, samples, record.bytes, record.rejections, resident_bytes()
+                    IN_PROCESS,
+                    shard,
+                    samples,
+                    record.size_bytes,
+                    record.rejections,
+                    resident_bytes(),
                 )
                 objection: GenDataError | None = meter.observe(done)
                 if objection is not None:
@@ -157,7 +164,16 @@ class _Run:
         return all(finding.kind == "extra" for finding in found)
 
     def _nothing_to_do(self) -> Summary:
-        ...
+        manifest = json.loads(self.job.store.manifest_path.read_bytes())
+        return Summary(
+            dataset_id=manifest["dataset_id"],
+            samples=self.job.plan.n,
+            made=0,
+            seconds=0.0,
+            rejections=manifest["rejections"],
+            bytes=manifest["bytes"],
+            already_complete=True,
+        )
 
     def _summary(self, dataset_id: str, scan: Scan, meter: Meter) -> Summary:
         summary = Summary(

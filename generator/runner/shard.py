@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -59,8 +58,8 @@ class EnteredPipeline(PipelineLike, Protocol):
 
 
 def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
-    """Encode a sample's images to where exporters expect them."""
-    from exporters.images import write_media  # noqa: PLC0415  (imports OpenCV: workers only)
+    """Encode a sample's images to where exporters expect them; imports OpenCV when first used."""
+    from exporters.images import write_media
 
     write_media(info, sample, shard_dir)
 

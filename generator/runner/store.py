@@ -8,7 +8,8 @@
     manifest.json           last: its presence says that the data set is finished
     run/                    lock, log, unfinished and quarantined files; no part of the data set
 
-Nothing is inferred from what lies in a folder: a shard is what its record says, or it is made again.
+Nothing is inferred from what lies in a folder: a shard is what its record says, or it is
+made again.
 """
 
 from __future__ import annotations
@@ -148,7 +149,9 @@ class LocalStore:
         """
         with self.errors():
             make_folder(self.run_dir)
-            descriptor = os.open(self.run_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            descriptor = os.open(
+                self.run_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644
+            )
         try:
             with self.errors():
                 self._lock(descriptor)
@@ -234,7 +237,7 @@ class LocalStore:
                     missing.append(shard)
                 else:
                     samples += record.end - record.first
-                    size += record.bytes
+                    size += record.size_bytes
                     rejections += record.rejections
             return Scan(missing, samples, size, rejections)
 

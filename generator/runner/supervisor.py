@@ -23,7 +23,6 @@ from generator.runner.events import (
     Failed,
     Kill,
     Note,
-    Ready,
     SampleDone,
     ShardDone,
     Spawn,

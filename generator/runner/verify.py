@@ -72,8 +72,7 @@ class Report:
 def verify(folder: Path, full: bool = False) -> Report:
     """Check a data set against its manifest.
 
-    Args:
-        full: Hash every file; else compare sizes, records and sums.
+    With ``full`` every file is hashed; else sizes, records and sums are compared.
 
     Raises:
         VerificationError: not a finished data set, or every deviation that was found.

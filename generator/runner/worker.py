@@ -1,7 +1,8 @@
 """A worker process: starts its engines once, makes shards until there are none.
 
 The module is light, so that a new process can tie its life to its parent's before it imports
-anything slow.
+anything slow. The environment is the parent's: the command line has pinned the thread pools of BLAS
+and OpenMP there, because their sums depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -28,17 +29,6 @@ if TYPE_CHECKING:
     from generator.runner.shard import Job, PipelineLike
 
 PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
-
-ENVIRONMENT = {
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "NUMEXPR_NUM_THREADS": "1",
-    "VECLIB_MAXIMUM_THREADS": "1",
-    "PYTHONHASHSEED": "0",
-}
-"""Must be set before the process starts. Sums in BLAS and OpenMP depend on the number of threads,
-and many workers with many threads each only disturb one another."""
 
 
 def worker_main(
@@ -80,13 +70,11 @@ def _ancestor_of_message(kind: type[GenDataError]) -> type[GenDataError]:
     return next(
         base
         for base in kind.__mro__
-        if base.__module__ == GenDataError.__module__ and base.__init__ is Exception.__init__
+        if base.__module__ == GenDataError.__module__ and "__init__" not in vars(base)
     )
 
 
 def _work(number: int, connection: Connection, job: Job) -> None:
-    from generator.runner.shard import make_shard  # noqa: PLC0415  (slow: numpy)
-
     with job.make_pipeline() as pipeline:
         connection.send(Ready(number))
         while (shard := connection.recv()) is not None:
@@ -99,10 +87,13 @@ def _make(
     def report(sample: Sample) -> None:
         connection.send(SampleDone(number, shard, sample.index, dict(sample.timings_s)))
 
+    # Imports numpy: only after this process is tied to its parent.
+    from generator.runner.shard import make_shard
+
     record = make_shard(job, pipeline, shard, report)
     samples = record.end - record.first
     connection.send(
-        ShardDone(number, shard, samples, record.bytes, record.rejections, resident_bytes())
+        ShardDone(number, shard, samples, record.size_bytes, record.rejections, resident_bytes())
     )
 
 

@@ -384,7 +384,7 @@ class _Liar:
     def __init__(self, **changes: Any) -> None:
         self.changes = changes
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         return replace(truth, **self.changes)
 
 

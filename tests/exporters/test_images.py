@@ -127,6 +127,15 @@ def test_object_coordinates_are_16_bit_colour() -> None:
     assert np.abs(pixels / 65_535 - coordinates).max() <= 0.5 / 65_535 + 1e-7
 
 
+def test_object_coordinates_a_rounding_outside_the_box_do_not_wrap() -> None:
+    """Boxes are known to a micrometre; 1.0001 is 1, not 0."""
+    coordinates = np.array([[[1.0001, -0.0001, 0.5]]], np.float32)
+
+    assert read_rgb16(png(Channel.OBJECT_COORDINATES, coordinates, 1.0)).tolist() == [
+        [[65_535, 0, 32_768]]
+    ]
+
+
 def test_encoding_twice_gives_the_same_bytes() -> None:
     """Data sets are compared by hash."""
     rgb = np.random.default_rng(4).integers(0, 256, (H, W, 3), dtype=np.uint8)

@@ -1,0 +1,227 @@
+"""What ``gen-data describe`` and ``gen-data schema`` tell about a plug-in."""
+
+from __future__ import annotations
+
+import json
+from enum import Enum
+from typing import Annotated, Any, Literal
+
+import pytest
+from pydantic import Field
+
+from generator.config.describe import describe, example_of
+from generator.config.distributions import (
+    Bounds,
+    Constant,
+    Count,
+    Direction,
+    Flag,
+    LogUniform,
+    Name,
+    Position,
+    Positive,
+    Rotation,
+    Scalar,
+    So3,
+    Uniform,
+)
+from generator.config.document import parse
+from generator.config.problems import Problems
+from generator.config.schema import json_schema
+from generator.config.strict import Strict
+from generator.config.validation import validate
+
+
+class Falloff(str, Enum):
+    """A closed set."""
+
+    NONE = "none"
+    SQUARE = "square"
+
+
+class Lighting(Strict):
+    """Illuminance and azimuth of every directional light.
+
+    Drawn anew for each view.
+
+    Attributes:
+        illuminance_lux: On a surface that faces the light [lux].
+        azimuth_deg, tilt: Where the light comes from; a long explanation that does not fit into
+            one line of the table and therefore has to be wrapped.
+    """
+
+    type: Literal["lighting"] = "lighting"
+    name: str = Field(examples=["lamps"], description="Key of its random stream.")
+    illuminance_lux: Positive = LogUniform(200.0, 2000.0)
+    azimuth_deg: Annotated[Scalar, Bounds(0, 360)] = Uniform(0.0, 360.0)
+    tilt: Rotation = So3()
+    falloff: Falloff = Falloff.SQUARE
+    size_px: tuple[int, int] = (640, 480)
+    tags: tuple[str, ...] = ()
+
+
+DESCRIPTION = """\
+Illuminance and azimuth of every directional light.
+
+field            type                                     default
+---------------  ---------------------------------------  --------------------------
+type             lighting                                 lighting
+name             text                                     required
+    Key of its random stream.
+illuminance_lux  number > 0 or a distribution             {log_uniform: [200, 2000]}
+    On a surface that faces the light [lux].
+azimuth_deg      number in [0, 360] or a distribution     {uniform: [0, 360]}
+    Where the light comes from; a long explanation that does not fit into one line of the table and
+    therefore has to be wrapped.
+tilt             rotation [w, x, y, z] or a distribution  so3
+    Where the light comes from; a long explanation that does not fit into one line of the table and
+    therefore has to be wrapped.
+falloff          none or square                           square
+size_px          list of 2 whole numbers                  [640, 480]
+tags             list of texts                            []
+
+Example:
+  type: lighting
+  name: lamps
+  illuminance_lux: {log_uniform: [200, 2000]}
+  azimuth_deg: {uniform: [0, 360]}
+"""
+
+
+def test_a_description_is_summary_table_and_example() -> None:
+    """Everything from the class itself: docstring, types, defaults."""
+    assert describe(Lighting) == DESCRIPTION
+
+
+class Demanding(Strict):
+    """Everything is required."""
+
+    scalar: Scalar
+    count: Count
+    name: Name
+    flag: Flag
+    rotation: Rotation
+    direction: Direction
+    position: Position
+    fov_deg: Annotated[Scalar, Bounds(10, 170)]
+    below: float = Field(lt=0)
+    whole: int
+    falloff: Falloff
+    style: Literal["matte", "glossy"]
+    inner: Lighting
+    several: tuple[Lighting, ...]
+    pair: tuple[float, str]
+    either: int | str
+    weights: dict[str, float]
+
+
+@pytest.mark.parametrize("model", [Lighting, Demanding])
+def test_the_example_of_a_description_validates(model: type[Strict]) -> None:
+    """Copied from the screen into a file, it works."""
+    text = describe(model).partition("Example:\n")[2]
+    problems = Problems()
+
+    made = validate(parse(text.replace("\n  ", "\n").removeprefix("  "), "x.yaml"), model, problems)
+
+    problems.raise_if_any()
+    assert isinstance(made, model)
+
+
+def test_a_model_that_refuses_every_made_up_value_has_no_example() -> None:
+    """Nothing is shown rather than something wrong."""
+
+    class Picky(Strict):
+        """Only one word will do."""
+
+        word: str = Field(pattern="^sesame$")
+
+    assert example_of(Picky) is None
+    assert "Example" not in describe(Picky)
+
+
+def test_a_class_without_fields_is_described_by_its_summary() -> None:
+    """No empty table."""
+
+    class Empty(Strict):
+        """Nothing to set."""
+
+    assert describe(Empty) == "Nothing to set.\n"
+
+
+def validator_of(model: type[Strict]) -> Any:
+    """A JSON Schema validator of a model."""
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json_schema(model)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+VALID: list[dict[str, Any]] = [
+    {"name": "a"},
+    {"name": "a", "illuminance_lux": 300},
+    {"name": "a", "illuminance_lux": {"uniform": [1, 2]}},
+    {"name": "a", "illuminance_lux": {"normal": {"mean": 1, "stddev": 2, "clip": [1, 2]}}},
+    {"name": "a", "illuminance_lux": {"choice": {"1": 3, "2": 1}}},
+    {"name": "a", "tilt": "about_z"},
+    {"name": "a", "tilt": {"about_z": [0, 90]}},
+    {"name": "a", "tilt": [1, 0, 0, 0]},
+]
+INVALID: list[dict[str, Any]] = [
+    {},
+    {"name": 3},
+    {"name": "a", "unknown": 1},
+    {"name": "a", "illuminance_lux": 0},
+    {"name": "a", "illuminance_lux": "bright"},
+    {"name": "a", "illuminance_lux": {"unifrom": [1, 2]}},
+    {"name": "a", "illuminance_lux": {"uniform": [1, 2, 3]}},
+    {"name": "a", "illuminance_lux": {"probability": 0.5}},
+    {"name": "a", "azimuth_deg": 400},
+    {"name": "a", "tilt": "so4"},
+    {"name": "a", "falloff": "cubic"},
+]
+
+
+@pytest.mark.parametrize("document", VALID, ids=json.dumps)
+def test_the_schema_accepts_what_validation_accepts(document: dict[str, Any]) -> None:
+    """Editors must not underline what works."""
+    assert validator_of(Lighting).is_valid(document)
+    Lighting.model_validate_json(json.dumps(document))
+
+
+@pytest.mark.parametrize("document", INVALID, ids=json.dumps)
+def test_the_schema_refuses_common_mistakes(document: dict[str, Any]) -> None:
+    """Editors underline what would be refused."""
+    assert not validator_of(Lighting).is_valid(document)
+
+
+def test_the_schema_tells_meanings_and_shares_distributions() -> None:
+    """What a number's distribution may be stands once, however many fields use it."""
+    schema = json_schema(Lighting)
+
+    assert schema["description"] == "Illuminance and azimuth of every directional light."
+    lux = schema["properties"]["illuminance_lux"]
+    assert lux["description"] == "On a surface that faces the light [lux]."
+    assert lux["default"] == {"log_uniform": [200.0, 2000.0]}
+    assert lux["anyOf"][1] == {"$ref": "#/$defs/distribution_of_number"}
+    assert json.dumps(schema).count("Every ratio is equally likely") == 1
+
+
+def test_descriptions_and_schemas_are_the_same_every_time() -> None:
+    """They are compared with files in the repository."""
+    assert describe(Lighting) == describe(Lighting)
+    assert json.dumps(json_schema(Lighting)) == json.dumps(json_schema(Lighting))
+
+
+def test_a_default_may_be_any_value() -> None:
+    """Constants are shown as the plain value they stand for."""
+
+    class Defaults(Strict):
+        """Two defaults."""
+
+        a: Scalar = Constant(0.5)
+        b: Position = Constant((0.0, 0.0, 1.0))
+
+    rows = describe(Defaults).split("\n")
+
+    assert rows[4].split("  ")[-1] == "0.5"
+    assert rows[5].split("  ")[-1] == "[0, 0, 1]"

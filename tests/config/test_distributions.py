@@ -1,0 +1,437 @@
+"""Distributions as values: construction, equality, mean, support, YAML form."""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import pytest
+
+from generator.config.distributions import (
+    DISTRIBUTIONS,
+    AboutZ,
+    Bounds,
+    Box,
+    Cap,
+    Choice,
+    Constant,
+    Count,
+    Direction,
+    Distribution,
+    EulerDeg,
+    Flag,
+    LogUniform,
+    Malformed,
+    Name,
+    Normal,
+    Numeric,
+    Position,
+    Probability,
+    QuaternionWxyz,
+    Rotation,
+    Scalar,
+    Sequence,
+    Shell,
+    So3,
+    Sphere,
+    Uniform,
+    UniformInteger,
+    bounded,
+)
+from generator.config.document import parse
+from generator.config.problems import Problems
+from generator.config.scalars import flow
+from generator.config.strict import Strict
+from generator.config.validation import validate
+from generator.core.streams import Rng, Streams
+
+
+def rng_of(index: int) -> Rng:
+    """A stream of scene or sample ``index``."""
+    return Streams(seed=3, scene=index, index=index).rng("test")
+
+
+class Fields(Strict):
+    """One field of each kind."""
+
+    scalar: Scalar = Constant(0.0)
+    count: Count = Constant(0)
+    name: Name = Constant("a")
+    flag: Flag = Constant(False)
+    rotation: Rotation = So3()
+    direction: Direction = Sphere()
+    position: Position = Constant((0.0, 0.0, 0.0))
+
+
+YAML_FORMS: list[tuple[str, str, Distribution[Any]]] = [
+    ("scalar", "0.5", Constant(0.5)),
+    ("scalar", "2", Constant(2.0)),
+    ("scalar", "{constant: 0.5}", Constant(0.5)),
+    ("scalar", "{uniform: [0.1, 0.9]}", Uniform(0.1, 0.9)),
+    ("scalar", "{log_uniform: [200, 2000]}", LogUniform(200, 2000)),
+    ("scalar", "{normal: {mean: 1, stddev: 2}}", Normal(1, 2)),
+    ("scalar", "{normal: {mean: 1, stddev: 2, clip: [0, 3]}}", Normal(1, 2, clip=(0, 3))),
+    ("scalar", "{uniform_integer: [3, 12]}", UniformInteger(3, 12)),
+    ("scalar", "{choice: [1, 2.5]}", Choice((1.0, 2.5))),
+    ("scalar", "{choice: {1: 3, 2.5: 1}}", Choice({1.0: 3, 2.5: 1})),
+    ("scalar", "{sequence: [1, 2]}", Sequence((1.0, 2.0))),
+    ("count", "3", Constant(3)),
+    ("count", "{uniform_integer: [3, 12]}", UniformInteger(3, 12)),
+    ("count", "{choice: {1: 3, 2: 1}}", Choice({1: 3, 2: 1})),
+    ("name", "mug", Constant("mug")),
+    ("name", "so3", Constant("so3")),
+    ("name", "uniform", Constant("uniform")),
+    ("name", "{choice: {a: 3, b: 1}}", Choice({"a": 3, "b": 1})),
+    ("name", "{choice: {1: 3, true: 1}}", Choice({"1": 3, "true": 1})),
+    ("name", "{sequence: [a, b]}", Sequence(("a", "b"))),
+    ("flag", "true", Constant(True)),
+    ("flag", "{probability: 0.3}", Probability(0.3)),
+    ("flag", "{choice: {true: 1, false: 2}}", Choice({True: 1, False: 2})),
+    ("flag", "{sequence: [true, false]}", Sequence((True, False))),
+    ("rotation", "[2, 0, 0, 0]", Constant((1.0, 0.0, 0.0, 0.0))),
+    ("rotation", "{quaternion_wxyz: [0, 0, 0, 3]}", QuaternionWxyz((0, 0, 0, 1))),
+    ("rotation", "{euler_deg: [0, 0, 90]}", EulerDeg((0, 0, 90))),
+    ("rotation", "so3", So3()),
+    ("rotation", "{so3: }", So3()),
+    ("rotation", "about_z", AboutZ()),
+    ("rotation", "{about_z: [-45, 45]}", AboutZ((-45, 45))),
+    ("rotation", "{choice: [[1, 0, 0, 0], [0, 1, 0, 0]]}", Choice(((1, 0, 0, 0), (0, 1, 0, 0)))),
+    ("direction", "[0, 0, -2]", Constant((0.0, 0.0, -1.0))),
+    ("direction", "sphere", Sphere()),
+    ("direction", "{cap: {axis: [0, 0, 2], half_angle_deg: 30}}", Cap((0, 0, 1), 30)),
+    ("position", "[1, 2, 3]", Constant((1.0, 2.0, 3.0))),
+    ("position", "{box: [[0, 0, 0], [1, 2, 3]]}", Box((0, 0, 0), (1, 2, 3))),
+    ("position", "{shell: {center_m: [0, 0, 1], radius_m: [1, 2]}}", Shell((0, 0, 1), (1, 2))),
+    (
+        "position",
+        "{shell: {center_m: [0, 0, 1], radius_m: [1, 2], elevation_deg: [10, 80]}}",
+        Shell((0, 0, 1), (1, 2), (10, 80)),
+    ),
+    ("position", "{sequence: [[0, 0, 0], [0, 0, 1]]}", Sequence(((0, 0, 0), (0, 0, 1)))),
+]
+
+
+def read(field: str, text: str) -> Distribution[Any]:
+    """The distribution that a YAML text stands for in a field."""
+    problems = Problems()
+    fields = validate(parse(f"{field}: {text}", "x.yaml"), Fields, problems)
+    problems.raise_if_any()
+    found: Distribution[Any] = getattr(fields, field)
+    return found
+
+
+@pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
+def test_each_yaml_form_is_a_distribution(
+    field: str, text: str, expected: Distribution[Any]
+) -> None:
+    """A plain value is a constant, a one-key mapping is a distribution."""
+    assert read(field, text) == expected
+    assert type(read(field, text)) is type(expected)
+
+
+@pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
+def test_each_distribution_writes_yaml_that_reads_back(
+    field: str, text: str, expected: Distribution[Any]
+) -> None:
+    """So a resolved configuration is a configuration."""
+    del text
+
+    assert read(field, flow(expected.to_yaml())) == expected
+
+
+@pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
+def test_each_distribution_is_a_picklable_hashable_value(
+    field: str, text: str, expected: Distribution[Any]
+) -> None:
+    """It goes to worker processes, and equal ones are equal after the trip."""
+    del field, text
+    travelled = pickle.loads(pickle.dumps(expected))
+
+    assert travelled == expected
+    assert hash(travelled) == hash(expected)
+    assert travelled.draw(rng_of(1)) == expected.draw(rng_of(1))
+
+
+@pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
+def test_what_is_drawn_lies_in_the_support(
+    field: str, text: str, expected: Distribution[Any]
+) -> None:
+    """Numbers between both ends, the mean as well; listed values where they are listed."""
+    del field, text
+    rng = rng_of(2)
+    drawn = [expected.draw(rng) for _ in range(200)]
+
+    if expected.outcomes():
+        assert set(drawn) <= set(expected.outcomes())
+    if isinstance(expected, Numeric) and not isinstance(drawn[0], (str, tuple)):
+        low, high = expected.support()
+        assert all(low <= value <= high for value in drawn)
+        assert low <= expected.mean() <= high
+
+
+def test_every_distribution_of_the_table_is_covered_here() -> None:
+    """A new line in the table needs a YAML form in this file."""
+    covered = {type(distribution).name for _, _, distribution in YAML_FORMS}
+
+    assert covered == set(DISTRIBUTIONS)
+    for name in DISTRIBUTIONS:
+        assert DISTRIBUTIONS.load(name).name == name
+        assert DISTRIBUTIONS.load(name).__doc__
+
+
+def test_a_model_writes_its_distributions_as_yaml_has_them() -> None:
+    """JSON of a model is a configuration that makes the same model."""
+    fields = Fields(scalar=Normal(1, 2, clip=(0, 3)), rotation=AboutZ((0, 90)), flag=Probability(1))
+
+    assert Fields.model_validate_json(fields.model_dump_json()) == fields
+    assert json.loads(fields.model_dump_json())["scalar"] == {
+        "normal": {"mean": 1.0, "stddev": 2.0, "clip": [0.0, 3.0]}
+    }
+    assert json.loads(fields.model_dump_json())["count"] == 0
+
+
+ZERO_WIDTH: list[tuple[Distribution[Any], Any]] = [
+    (Uniform(0.1, 0.1), 0.1),
+    (LogUniform(0.1, 0.1), 0.1),
+    (Normal(0.1, 0.0), 0.1),
+    (Normal(0.5, 2.0, clip=(0.1, 0.1)), 0.1),
+    (UniformInteger(3, 3), 3),
+    (Choice((0.1,)), 0.1),
+    (Sequence((0.1,)), 0.1),
+    (Probability(1), True),
+    (Probability(0), False),
+    (Cap((0, 0, 1), 0), (0.0, 0.0, 1.0)),
+    (Box((1, 2, 3), (1, 2, 3)), (1.0, 2.0, 3.0)),
+    (AboutZ((0, 0)), (1.0, 0.0, 0.0, 0.0)),
+]
+
+
+@pytest.mark.parametrize(("distribution", "value"), ZERO_WIDTH)
+def test_a_range_of_zero_width_gives_the_constant(
+    distribution: Distribution[Any], value: object
+) -> None:
+    """Bit for bit, so that a range can be narrowed to nothing."""
+    rng = rng_of(0)
+
+    assert {distribution.draw(rng) for _ in range(20)} == {value}
+
+
+# Means: elementary integrals, or (truncated normal) scipy.stats.truncnorm 1.17.
+MEANS: list[tuple[Numeric[Any], float]] = [
+    (Constant(3.5), 3.5),
+    (Uniform(1, 4), 2.5),
+    (LogUniform(1, math.e), math.e - 1),
+    (LogUniform(2, 2), 2.0),
+    (Normal(3, 2), 3.0),
+    (Normal(0, 1, clip=(-1, 1)), 0.0),
+    (Normal(0, 1, clip=(0, 10)), math.sqrt(2 / math.pi)),
+    (Normal(5, 0), 5.0),
+    (UniformInteger(3, 12), 7.5),
+    (Choice((1.0, 2.0, 6.0)), 3.0),
+    (Choice({1.0: 3, 5.0: 1}), 2.0),
+    (Sequence((1.0, 2.0, 6.0)), 3.0),
+    (Probability(0.3), 0.3),
+]
+
+
+@pytest.mark.parametrize(("distribution", "mean"), MEANS)
+def test_means_are_known_without_drawing(distribution: Numeric[Any], mean: float) -> None:
+    """From formulas."""
+    assert distribution.mean() == pytest.approx(mean, rel=1e-12, abs=1e-12)
+
+
+def test_mean_of_a_truncated_normal_agrees_with_scipy() -> None:
+    """Also when the clip range lies far in a tail."""
+    from scipy.stats import truncnorm
+
+    for mean, stddev, low, high in [(0, 1, 0.5, 3), (2, 0.5, -1, 1), (0, 1, 6, 9), (0, 1, -9, -6)]:
+        a, b = (low - mean) / stddev, (high - mean) / stddev
+        expected = truncnorm(a, b, loc=mean, scale=stddev).mean()
+        assert Normal(mean, stddev, (low, high)).mean() == pytest.approx(expected, rel=1e-9)
+
+
+SUPPORTS: list[tuple[Numeric[Any], tuple[float, float]]] = [
+    (Constant(3.5), (3.5, 3.5)),
+    (Uniform(1, 4), (1, 4)),
+    (LogUniform(1, 4), (1, 4)),
+    (Normal(0, 1), (-math.inf, math.inf)),
+    (Normal(0, 1, clip=(-1, 2)), (-1, 2)),
+    (Normal(0, 0), (0, 0)),
+    (UniformInteger(3, 12), (3, 12)),
+    (Choice({1.0: 1, 9.0: 0}), (1, 1)),
+    (Sequence((4.0, 2.0)), (2, 4)),
+    (Probability(0.5), (0, 1)),
+    (Probability(1), (1, 1)),
+]
+
+
+@pytest.mark.parametrize(("distribution", "support"), SUPPORTS)
+def test_supports_are_known_without_drawing(
+    distribution: Numeric[Any], support: tuple[float, float]
+) -> None:
+    """Values without weight do not count."""
+    assert distribution.support() == support
+
+
+def test_outcomes_lists_what_can_be_drawn_where_that_is_little() -> None:
+    """So that names can be checked before a run."""
+    assert Choice({"a": 1, "b": 0}).outcomes() == ("a",)
+    assert Sequence(("a", "b")).outcomes() == ("a", "b")
+    assert Constant("a").outcomes() == ("a",)
+    assert Probability(0.5).outcomes() == (False, True)
+    assert Uniform(0, 1).outcomes() == ()
+
+
+def test_names_have_no_mean() -> None:
+    """Asking for one is a mistake of the program, not of the user."""
+    with pytest.raises(TypeError, match="'a' is no number"):
+        Choice(("a", "b")).mean()
+
+
+def test_a_sequence_steps_with_the_scene_and_has_no_memory() -> None:
+    """Any sample can be made alone, in any order."""
+    sequence = Sequence(("a", "b", "c"))
+
+    assert [sequence.draw(rng_of(i)) for i in (0, 1, 2, 3, 7)] == ["a", "b", "c", "a", "b"]
+    assert [sequence.draw(rng_of(i)) for i in (7, 3)] == ["b", "a"]
+
+
+WRONG: list[tuple[Callable[[], object], str]] = [
+    (lambda: Uniform(1.2, 0.4), "uniform needs low <= high, got [1.2, 0.4]"),
+    (lambda: Uniform(math.nan, 1), "expected a finite number, got nan"),
+    (lambda: Uniform(-1.7e308, 1.7e308), "uniform needs a finite range, got [-1.7e+308, 1.7e+308]"),
+    (lambda: LogUniform(0, 1), "log_uniform needs low > 0 and high > 0, got [0, 1]"),
+    (lambda: LogUniform(-2, -1), "log_uniform needs low > 0 and high > 0, got [-2, -1]"),
+    (lambda: LogUniform(2, 1), "log_uniform needs low <= high, got [2, 1]"),
+    (lambda: Normal(0, -1), "normal needs stddev >= 0, got -1"),
+    (lambda: Normal(0, 1, (2, 1)), "normal clip needs low <= high, got [2, 1]"),
+    (lambda: Normal(0, 1, (50, 60)), "normal with mean 0 and stddev 1 never falls into clip [50, 60]"),
+    (lambda: Normal(0, 0, (1, 2)), "normal with mean 0 and stddev 0 never falls into clip [1, 2]"),
+    (lambda: UniformInteger(2, 1), "uniform_integer needs low <= high, got [2, 1]"),
+    (lambda: UniformInteger(0.5, 1), "expected a whole number, got 0.5"),  # type: ignore[arg-type]
+    (lambda: Choice(()), "choice needs at least one value"),
+    (lambda: Choice({"a": -1}), "choice needs weights >= 0, got -1 for 'a'"),
+    (lambda: Choice({"a": 0}), "choice needs at least one weight > 0"),
+    (lambda: Sequence(()), "sequence needs at least one value"),
+    (lambda: Probability(1.5), "probability needs a number in [0, 1], got 1.5"),
+    (lambda: AboutZ((90, -90)), "about_z needs low <= high, got [90, -90]"),
+    (lambda: Cap((0, 0, 0), 10), "a direction must not be zero"),
+    (lambda: Cap((0, 0, 1), 181), "cap needs half_angle_deg in [0, 180], got 181"),
+    (lambda: Box((0, 1, 0), (1, 0, 1)), "box along y needs low <= high, got [1, 0]"),
+    (lambda: Shell((0, 0, 0), (2, 1)), "shell radius_m needs low <= high, got [2, 1]"),
+    (lambda: Shell((0, 0, 0), (-1, 1)), "shell needs radius_m >= 0, got -1"),
+    (lambda: Shell((0, 0, 0), (1, 2), (0, 91)),
+     "shell needs elevation_deg within [-90, 90], got [0, 91]"),
+    (lambda: QuaternionWxyz((0, 0, 0, 0)), "a quaternion must not be zero"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "message"), WRONG, ids=[message for _, message in WRONG])
+def test_impossible_parameters_are_refused(make: Callable[[], object], message: str) -> None:
+    """In Python as in YAML, with the same words."""
+    with pytest.raises(Malformed) as caught:
+        make()
+
+    assert str(caught.value) == message
+
+
+SPATIAL_MESSAGES = [
+    ("rotation: so4", "unknown distribution 'so4'; expected one of constant, choice, sequence, "
+     "quaternion_wxyz, euler_deg, so3, about_z (did you mean 'so3'?)"),
+    ("rotation: [1, 0, 0]", "expected a quaternion [w, x, y, z], got [1, 0, 0]"),
+    ("rotation: {so3: 1}", "so3 takes no argument, got 1; write so3 alone"),
+    ("rotation: {euler_deg: 90}",
+     "expected three angles [roll, pitch, yaw] in degrees, got 90"),
+    ("direction: {cap: {axis: [0, 0, 1]}}", "cap needs 'half_angle_deg'"),
+    ("direction: {cap: {axis: [0, 1], half_angle_deg: 3}}",
+     "expected a direction [x, y, z], got [0, 1]"),
+    ("position: 3", "expected three numbers [x, y, z], got 3"),
+    ("position: [0, 0, a]", "expected a number, got 'a'"),
+    ("position: {box: [0, 0, 0]}", "box needs two corners [low, high], got [0, 0, 0]"),
+    ("position: {shell: {center_m: [0, 0, 0], radius: [1, 2]}}",
+     "unknown key 'radius' of shell; expected center_m, radius_m, elevation_deg "
+     "(did you mean 'radius_m'?)"),
+    ("position: {choice: {a: 1}}",
+     "weights by value need a number or a name, got 'a'; use a list"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "fact"), SPATIAL_MESSAGES)
+def test_mistakes_in_rotations_directions_and_positions_are_told(text: str, fact: str) -> None:
+    """In the same style as for numbers."""
+    problems = Problems()
+
+    validate(parse(text, "x.yaml"), Fields, problems)
+
+    assert [problem.fact for problem in problems.sorted()] == [fact]
+
+
+def test_reprs_show_how_to_make_the_value() -> None:
+    """For logs and test output."""
+    assert repr(Uniform(0.1, 0.9)) == "Uniform(low=0.1, high=0.9)"
+    assert repr(Choice({"a": 3, "b": 1})) == "Choice({'a': 3.0, 'b': 1.0})"
+    assert repr(Choice(("a", "b"))) == "Choice(('a', 'b'))"
+
+
+def test_equal_weights_need_not_be_written() -> None:
+    """A list and a mapping with equal weights draw alike."""
+    assert Choice(("a", "b")) == Choice({"a": 1, "b": 1})
+
+
+@pytest.mark.parametrize(
+    ("bounds", "text"),
+    [
+        (Bounds(1, 170), "in [1, 170]"),
+        (Bounds(1, 170, open_low=True, open_high=True), "in (1, 170)"),
+        (Bounds(low=0), ">= 0"),
+        (Bounds(low=0, open_low=True), "> 0"),
+        (Bounds(high=1), "<= 1"),
+        (Bounds(high=1, open_high=True), "< 1"),
+    ],
+)
+def test_bounds_read_like_mathematics(bounds: Bounds, text: str) -> None:
+    """Brackets include their end, parentheses do not."""
+    assert bounds.within() == text
+    assert (bounds.low in bounds) == ("[" in text or ">=" in text)
+    assert (bounds.high in bounds) == ("]" in text or "<=" in text)
+
+
+def test_bounds_can_be_set_on_any_field_type() -> None:
+    """On distributions by their support, on plain numbers by value."""
+
+    class Limited(Strict):
+        a: Annotated[Scalar, Bounds(0, 1)] = Constant(0.5)
+        b: Annotated[float, Bounds(0, 1)] = 0.5
+        c: bounded(Scalar, 2, 3) = Constant(2)  # type: ignore[valid-type]
+
+    problems = Problems()
+    validate(parse("{a: {uniform: [0, 2]}, b: 2, c: 1}", "x.yaml"), Limited, problems)
+
+    assert [f"{problem.field}: {problem.fact}" for problem in problems.sorted()] == [
+        "a: uniform can give 2, but every value must be in [0, 1]",
+        "b: 2 is not in [0, 1]",
+        "c: 1 is not in [2, 3]",
+    ]
+
+
+def test_a_scalar_is_drawn_in_microseconds() -> None:
+    """A scene draws some 300 values; that must not be felt."""
+    import timeit
+
+    rng = rng_of(0)
+    distributions: list[Distribution[Any]] = [
+        Uniform(0, 1),
+        LogUniform(1, 2),
+        Normal(0, 1, clip=(-1, 1)),
+        UniformInteger(0, 9),
+        Choice({"a": 3, "b": 1}),
+        So3(),
+        Shell((0, 0, 0), (1, 2)),
+    ]
+
+    seconds = min(timeit.repeat(lambda: [d.draw(rng) for d in distributions], number=200, repeat=5))
+
+    assert seconds / (200 * len(distributions)) < 50e-6
