@@ -158,7 +158,7 @@ def spec_of_source(
         return load_spec(source, seed=seed, overrides=overrides, without=without)
     try:
         kept = json.loads(plan.read_bytes())
-        text, name = json.dumps(kept["config"]), str(kept["name"])
+        text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
     document = parse(text, str(plan))

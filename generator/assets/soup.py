@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.core.geometry import Material
+from generator.core.se3 import Vec3
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -21,12 +22,15 @@ class Slot:
         name: Its name in the file; empty = unnamed.
         from_file: Whether the mesh file itself says what it looks like; otherwise whoever refers
             to the mesh may.
+        declared_color: Linear RGB that the file gives beside an image, though it means nothing
+            there.
         missing_library: File that should have defined it and is not there; empty = none.
     """
 
     name: str = ""
     material: Material = Material()
     from_file: bool = False
+    declared_color: Vec3 = (1.0, 1.0, 1.0)
     missing_library: str = ""
 
 

@@ -35,7 +35,7 @@ def describe(model: type[BaseModel]) -> str:
     if rows:
         parts.append("\n".join(_table(rows)))
     example = example_of(model)
-    if example is not None:
+    if example:
         parts.append(f"Example:\n{textwrap.indent(_block(example), '  ')}")
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -64,7 +64,24 @@ def example_of(model: type[BaseModel]) -> dict[str, Any] | None:
 
 def plain_default(info: FieldInfo) -> Any:
     """A field's default as plain data."""
-    return _plain(info.get_default(call_default_factory=True, validated_data={}))
+    return plain_of(info.get_default(call_default_factory=True, validated_data={}))
+
+
+def plain_of(value: Any) -> Any:
+    """A value of a model as the plain data that YAML would hold."""
+    if isinstance(value, Distribution):
+        return value.to_yaml()
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json")
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Mapping):
+        return {str(key): plain_of(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain_of(item) for item in value]
+    if isinstance(value, (set, frozenset)):
+        return sorted(plain_of(item) for item in value)
+    return value
 
 
 def summary_of(model: type[BaseModel]) -> str:
@@ -119,25 +136,9 @@ def _table(rows: list[tuple[str, str, str, str]]) -> Iterator[str]:
             )
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, Distribution):
-        return value.to_yaml()
-    if isinstance(value, BaseModel):
-        return value.model_dump(mode="json")
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, (set, frozenset)):
-        return sorted(_plain(item) for item in value)
-    return value
-
-
 def _sample_value(info: FieldInfo) -> Any:
     if info.examples:
-        return _plain(info.examples[0])
+        return plain_of(info.examples[0])
     if not info.is_required():
         return plain_default(info)
     return _made_up(info.annotation, tuple(info.metadata))

@@ -12,6 +12,7 @@ FieldPath = tuple[str | int, ...]
 
 _PLAIN_KEY = re.compile(r"[\w/-]{1,60}")
 _LINE_LENGTH = 100
+_TOLD_MAX = 100
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -72,9 +73,13 @@ class Problems:
         return tuple(sorted(self._problems, key=lambda problem: problem.position))
 
     def raise_if_any(self) -> None:
-        """Raise one ConfigError that tells all of them."""
-        if self._problems:
-            raise ConfigError("\n".join(str(problem) for problem in self.sorted()))
+        """Raise one ConfigError that tells all of them; of very many, the first and how many."""
+        if not self._problems:
+            return
+        told = [str(problem) for problem in self.sorted()[:_TOLD_MAX]]
+        if len(self) > _TOLD_MAX:
+            told.append(f"... and {len(self) - _TOLD_MAX} more")
+        raise ConfigError("\n".join(told))
 
 
 def dotted(path: FieldPath) -> str:

@@ -89,8 +89,9 @@ def shown(value: Any) -> str:
 
 
 def abbreviated(text: str, length: int = 60) -> str:
-    """At most ``length`` characters of a text."""
-    return text if len(text) <= length else text[: length - 3] + "..."
+    """At most ``length`` characters of a text, on one line; what cannot be printed is escaped."""
+    start = text if len(text) <= length else text[: length - 3] + "..."
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in start)
 
 
 def _integer(digits: str, base: int) -> int:

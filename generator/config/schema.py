@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema
 
-from generator.config.describe import documented_attributes, summary_of
+from generator.config.describe import documented_attributes, plain_of, summary_of
 from generator.config.distributions.fields import DISTRIBUTION_TITLE
 
 
@@ -16,7 +17,9 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
     What a distribution may be is the same for all fields of a kind: it stands once, in ``$defs``.
     """
     definitions: dict[str, Any] = {}
-    schema: dict[str, Any] = _shared(model.model_json_schema(), definitions)
+    schema: dict[str, Any] = _shared(
+        model.model_json_schema(schema_generator=_Generator), definitions
+    )
     schema["description"] = summary_of(model)
     attributes = documented_attributes(model)
     for name, entry in schema.get("properties", {}).items():
@@ -25,6 +28,13 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
     if definitions:
         schema["$defs"] = dict(sorted({**schema.get("$defs", {}), **definitions}.items()))
     return schema
+
+
+class _Generator(GenerateJsonSchema):
+    """Writes defaults as YAML has them."""
+
+    def encode_default(self, dft: Any) -> Any:
+        return plain_of(dft)
 
 
 def _shared(part: Any, definitions: dict[str, Any]) -> Any:

@@ -65,7 +65,7 @@ def _unknown_key(fault: Fault) -> str:
     known = list(getattr(fault.owner[0], "model_fields", {}))
     key = str(fault.path[-1])
     expected = f"expected one of {', '.join(known)}" if known else "no keys are expected here"
-    return f"unknown key '{key}'; {expected}{did_you_mean(key, known)}"
+    return f"unknown key {shown(key)}; {expected}{did_you_mean(key, known)}"
 
 
 def _unknown_tag(fault: Fault) -> str:

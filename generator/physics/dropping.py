@@ -12,6 +12,8 @@ from generator.physics.config import PhysicsConfig
 from generator.physics.support import guard_walls, home_surface, is_supported
 
 _CHECK_EVERY_S = 0.05
+_LIFTS_MAX = 32
+_LIFT_M = 0.01
 _LOWERINGS_MAX = 16
 _RELEASE_GAP_M = 0.002
 _TOUCH_M = 0.001
@@ -69,14 +71,14 @@ class Drop:
             movable.append(body.name)
 
     def _lift_clear(self, name: str, others: Sequence[str], home: Surface) -> None:
-        """Raise a body that starts inside others above them, if there is room."""
-        if all(self._world.gap_m(name, other, 0.0) > -_TOUCH_M for other in others):
-            return
-        low, high = self._world.bounds_m(name)
-        top = max(self._world.bounds_m(other)[1][2] for other in self._below(name, others))
-        rise = float(top - low[2]) + _RELEASE_GAP_M
+        """Raise a body that starts inside others until it is free, as far as there is room."""
+        below = self._below(name, others)
         ceiling = home.T_world_surface.translation_m[2] + home.clearance_m
-        if high[2] + rise <= ceiling:
+        for _ in range(_LIFTS_MAX):
+            overlap = -min((self._world.gap_m(name, other, 0.0) for other in below), default=0.0)
+            rise = max(overlap, _LIFT_M)
+            if overlap < _TOUCH_M or self._world.bounds_m(name)[1][2] + rise > ceiling:
+                return
             self._shift(name, rise)
 
     def _sink(self, name: str, others: Sequence[str], home: Surface) -> None:
@@ -162,9 +164,8 @@ class Drop:
         return Rejection("object fell off", f"{self._fewer()}, or a larger surface{guard}")
 
     def _still_moving(self) -> Rejection:
-        time_s = self._config.settle_time_s_max
         return Rejection(
-            f"still moving after {time_s:.1f} s",
+            f"still moving after {self._config.settle_time_s_max} s",
             f"a larger physics.settle_time_s_max, or {self._fewer()}",
         )
 

@@ -7,12 +7,12 @@ from types import TracebackType
 
 from generator.core.errors import Rejection
 from generator.core.interfaces import AssetLibrary, Settled
+from generator.core.kinematics import link_bodies
 from generator.core.scene import Articulation, Body, Scene
 from generator.physics.bullet import World
 from generator.physics.config import PhysicsConfig
 from generator.physics.dropping import Drop
 from generator.physics.goals import Arm, Stance
-from generator.physics.kinematics import link_bodies
 from generator.physics.shapes import CollisionShape, collision_shape
 from generator.physics.support import surfaces_of
 
@@ -56,10 +56,12 @@ class BulletEngine:
         Raises:
             AssetError: an asset has no collision geometry, or is no robot.
         """
-        self._world.reset()
         held = {a.goal.held for a in scene.articulations if a.goal and a.goal.kind == "hold"}
         falling = [b for b in _solids(scene) if b.motion == "dynamic" and b.name not in held]
         fixed = [b.name for b in _solids(scene) if b.motion != "dynamic" and b.name not in held]
+        if not falling and not scene.articulations:
+            return Settled(scene)
+        self._world.reset()
         for body in _solids(scene):
             self._add(body, body in falling)
 

@@ -7,12 +7,7 @@ from dataclasses import dataclass
 
 from generator.core.errors import Rejection
 from generator.core.geometry import RobotModel
-from generator.core.scene import ArmGoal, Articulation
-from generator.core.se3 import SE3
-from generator.physics.bullet import World
-from generator.physics.grasps import Grasp, Hand
-from generator.physics.ik import chain_of, solutions
-from generator.physics.kinematics import (
+from generator.core.kinematics import (
     all_positions,
     finger_links,
     is_arm_joint,
@@ -21,6 +16,11 @@ from generator.physics.kinematics import (
     rounded_positions,
     within_limits,
 )
+from generator.core.scene import ArmGoal, Articulation
+from generator.core.se3 import SE3
+from generator.physics.bullet import World
+from generator.physics.grasps import Grasp, Hand
+from generator.physics.ik import chain_of, solutions
 from generator.physics.shapes import CollisionShape
 
 COLLIDES = "arm collides"

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from generator.core.geometry import Gripper, RobotModel
+from generator.core.kinematics import all_positions, finger_links, link_poses, rigid_group
 from generator.core.se3 import SE3, Array, Vec3
 from generator.physics.bullet import World
-from generator.physics.kinematics import all_positions, finger_links, link_poses, rigid_group
 
 _PALM_GAP_M = 0.002
 _BISECTIONS = 14

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from generator.core.geometry import Gripper, Joint, RobotModel
+from generator.core.kinematics import is_arm_joint, joint_motion
 from generator.core.se3 import SE3, Vec3, rotate_by_quaternion
-from generator.physics.kinematics import is_arm_joint, joint_motion
 
 POSITION_TOLERANCE_M = 1e-3
 ANGLE_TOLERANCE_RAD = math.radians(0.5)

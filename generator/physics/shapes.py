@@ -111,12 +111,11 @@ def scale_step(scale: float) -> int:
 def collision_shape(parts: ConvexParts) -> CollisionShape:
     """The shape of an asset's convex parts."""
     measured = [_measured(part) for part in parts.parts_m]
-    volume_m3 = sum(volume for _, volume, _ in measured)
-    if volume_m3 > 0.0:
-        center = sum(volume * middle for _, volume, middle in measured) / volume_m3
-    else:
-        points = np.concatenate(parts.parts_m)
-        center = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    volumes_m3 = np.array([volume for _, volume, _ in measured])
+    middles = np.stack([middle for _, _, middle in measured])
+    # Parts that are all flat have no volume; then every part weighs the same.
+    weights = volumes_m3 if volumes_m3.sum() > 0.0 else np.ones(len(measured))
+    center = (weights[:, None] * middles).sum(axis=0) / weights.sum()
     x, y, z = (round(float(v), 9) for v in center)
     offset = np.array([x, y, z])
     hulls = tuple(

@@ -142,7 +142,6 @@ class Meter:
         elif isinstance(event, Exited):
             self._workers.discard(event.worker)
             self._in_flight.pop(event.worker, None)
-            self.worker_deaths += event.exit_code != 0
         else:
             return None
         self.show("samples")

@@ -134,6 +134,7 @@ class _Run:
             limits=self.settings.limits,
         )
         drive(self.job, supervisor, self.interruption, meter.observe)
+        meter.worker_deaths = supervisor.deaths
         if supervisor.error is not None:
             raise supervisor.error
 

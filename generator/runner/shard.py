@@ -116,13 +116,12 @@ def _written(
     on_sample: Callable[[Sample], None],
 ) -> Sample:
     """One sample without its pixels, after they and its scene are in files."""
-    explained = explaining(f"sample {index}", job.store.reproduce_command(index))
-    with explained:
+    with explaining(f"sample {index}", job.store.reproduce_command(index)):
         sample = pipeline.sample(index)
-    with explained, job.store.errors():
-        job.write_media(pipeline.info, sample, folder)
-        with (folder / SCENES_NAME).open("a", encoding="utf-8") as scenes:
-            scenes.write(scene_line(sample) + "\n")
+        with job.store.errors():
+            job.write_media(pipeline.info, sample, folder)
+            with (folder / SCENES_NAME).open("a", encoding="utf-8") as scenes:
+                scenes.write(scene_line(sample) + "\n")
     on_sample(sample)
     return without_pixels(sample)
 

@@ -80,6 +80,7 @@ class Supervisor:
         describe_sample: The command that makes one sample alone; for messages.
         error: The first error that ends the run, or None.
         given_up: Shards that killed their workers too often.
+        deaths: Processes that ended when nobody wanted them to.
     """
 
     shards: Sequence[int]
@@ -89,6 +90,7 @@ class Supervisor:
     limits: Limits = field(default_factory=Limits)
     error: GenDataError | None = None
     given_up: list[int] = field(default_factory=list)
+    deaths: int = 0
 
     def __post_init__(self) -> None:
         """Begin with no process."""
@@ -216,6 +218,7 @@ class Supervisor:
     def _bury(self, event: Exited, worker: _Worker) -> list[Action]:
         if worker.state is State.LEAVING:
             return []
+        self.deaths += 1
         cause = worker.killed or describe_exit(event)
         if event.out_of_memory and self.workers > 1:
             self.workers -= 1

@@ -64,6 +64,18 @@ def test_the_same_problem_is_told_once() -> None:
     assert told(problems) == "a.yaml:1:1: a: bad"
 
 
+def test_of_very_many_problems_the_first_hundred_are_told() -> None:
+    """A megabyte of nonsense does not become ten megabytes of messages."""
+    problems = Problems()
+    for line in range(1, 251):
+        problems.add(Position("a.yaml", line, 1), "a", "bad")
+
+    lines = told(problems).split("\n")
+
+    assert lines[0] == "a.yaml:1:1: a: bad"
+    assert lines[99:] == ["a.yaml:100:1: a: bad", "... and 150 more"]
+
+
 @pytest.mark.parametrize(
     ("path", "text"),
     [

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generator.config.document import parse
-from generator.config.scalars import flow, resolve
+from generator.config.scalars import flow, resolve, shown
 
 # Expected values: YAML 1.2.2, sections 10.2.1 and 10.3.2.
 CORE_SCHEMA = [
@@ -111,3 +111,20 @@ def test_what_is_written_in_flow_style_reads_back_equal(value: object) -> None:
 def test_flow_style_is_what_a_person_would_write(value: object, text: str) -> None:
     """Quotes only where needed, no trailing zeros."""
     assert flow(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("a b", "'a b'"),
+        ("two\nlines", "'two\\nlines'"),
+        ("\x1b[31m", "'\\x1b[31m'"),
+        ("x" * 100, "'" + "x" * 57 + "...'"),
+        (None, "nothing"),
+        (1.0, "1"),
+        ([1, "a"], "[1, a]"),
+    ],
+)
+def test_messages_quote_values_on_one_printable_line(value: object, text: str) -> None:
+    """A value cannot break a message apart or steer the terminal."""
+    assert shown(value) == text

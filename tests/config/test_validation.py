@@ -68,7 +68,7 @@ class Config(Strict):
     code: str = Field(default="a", pattern="^[a-z]+$")
     names: tuple[str, ...] = ()
     few: tuple[int, ...] = Field(default=(1,), min_length=1, max_length=2)
-    weights: dict[str, float] = {}
+    weights: dict[str, float] = Field(default_factory=dict)
     on: bool = True
     size: float | str | tuple[float, ...] = 1.0
     nested: int | Camera = 3

@@ -50,6 +50,10 @@ def _parts(asset_id: str) -> ConvexParts:
         "ball": lambda r: (ball(r),),
         "mug": mug,
         "bin": lambda x, y, z: tray(x, y, z, wall_m=0.01),
+        "mast": lambda: (
+            box(0.04, 0.08, 0.04, at=(0, 0, -0.1)),
+            box(0.015, 0.015, 0.2, at=(-0.0125, 0, 0.02)),
+        ),
         "bar": lambda: (box(0.26, 0.04, 0.04, at=(0.15, 0, 0)),),
     }
     return ConvexParts(tuple(makers[kind](*sizes)))

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from generator.core.kinematics import all_positions, is_arm_joint, link_poses, within_limits
 from generator.core.se3 import SE3
 from generator.physics.ik import Chain, chain_of, solutions
-from generator.physics.kinematics import all_positions, is_arm_joint, link_poses, within_limits
 from tests.physics.panda import panda
 
 ROBOT = panda()

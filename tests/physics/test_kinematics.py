@@ -9,9 +9,7 @@ import numpy as np
 import pybullet
 import pytest
 
-from generator.core.scene import Articulation
-from generator.core.se3 import SE3
-from generator.physics.kinematics import (
+from generator.core.kinematics import (
     all_positions,
     finger_links,
     link_bodies,
@@ -20,6 +18,8 @@ from generator.physics.kinematics import (
     rounded_positions,
     within_limits,
 )
+from generator.core.scene import Articulation
+from generator.core.se3 import SE3
 from tests.physics.panda import HOME, URDF, panda
 
 

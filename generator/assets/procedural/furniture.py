@@ -15,15 +15,18 @@ from generator.assets.procedural import hulls
 from generator.assets.procedural.family import Solid
 from generator.assets.procedural.materials import (
     ALUMINIUM,
+    STAINLESS,
     metal,
     painted,
     patterned,
 )
-from generator.assets.procedural.mesh import Array, Patch, in_place
+from generator.assets.procedural.mesh import Array, Patch, in_place, joined
 from generator.assets.procedural.shapes import block, fan, grid, lathe
-from generator.core.errors import AssetError
+from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import Material
 from generator.core.se3 import Vec3
+
+Box = tuple[Vec3, Vec3]
 
 SLOTS: Mapping[str, tuple[str, ...]] = {
     "table": ("top", "frame"),
@@ -34,10 +37,15 @@ SLOTS: Mapping[str, tuple[str, ...]] = {
     "backdrop": ("paper",),
     "box": ("body",),
     "pedestal": ("body", "plates"),
-    "room": ("floor", "ceiling", "walls", "skirting", "door", "frames", "window"),
+    "room": ("floor", "ceiling", "walls", "skirting", "door", "frames", "window", "handle"),
 }
 TABLE_STYLES = ("legs", "trestle", "bench")
 SHELF_STYLES = ("bookcase", "rack")
+
+COLORS: Mapping[str, str] = {
+    "white": "#dededb", "grey": "#8a8f94", "black": "#2b2d30", "blue": "#3f5f8f",
+    "green": "#4f7f5a", "red": "#a8382f", "yellow": "#d9b23c", "brown": "#8a6a4a",
+}
 
 _BOARD_M = 0.02
 _PLINTH_M = 0.06
@@ -89,9 +97,7 @@ def shelf(
         for top in (*shelf_levels_m(size_m, levels), z)
     ]
     if style == "rack":
-        frame = [((sx - 0.02 * (sx > 0), sy - 0.02 * (sy > 0), 0.0),
-                  (sx + 0.02 * (sx < 0), sy + 0.02 * (sy < 0), z))
-                 for sx in (-x / 2, x / 2) for sy in (-y / 2, y / 2)]
+        frame = [_post(sx * x / 2, sy * y / 2, t, z) for sx in (-1, 1) for sy in (-1, 1)]
     else:
         frame = [((-x / 2, -y / 2, 0.0), (-x / 2 + t, y / 2, z)),
                  ((x / 2 - t, -y / 2, 0.0), (x / 2, y / 2, z)),
@@ -127,15 +133,15 @@ def shelf_clearance_m(size_m: Vec3, levels: int) -> float:
     return shelf_pitch_m(size_m, levels) - _BOARD_M
 
 
-def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "#3f5f8f") -> Solid:
+def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
     """An open container with ribs and a rim, walls 8 mm thick. Slot: body.
 
     Args:
         size_m: Outer length, width, height.
-        color: sRGB colour ``#rrggbb``.
+        color: One of ``COLORS``.
 
     Raises:
-        AssetError: if a size is not usable.
+        AssetError: if a size or the colour is not usable.
     """
     x, y, z = _checked("bin", size_m, 0.06)
     rim = 0.012
@@ -149,7 +155,7 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "#3f5f8f") -> Solid:
         ((-x / 2, y / 2 - w, 0.0), (x / 2, y / 2, z)),
         ((-x / 2, -y / 2, 0.0), (x / 2, y / 2, _BIN_WALL_M)),
     ]
-    return in_place([shell, *ribs], (painted(color, 0.5),), [hulls.box(*wall) for wall in walls])
+    return in_place([shell, *ribs], (painted(_color("bin", color), 0.5),), [hulls.box(*wall) for wall in walls])
 
 
 def bin_interior_m(size_m: Vec3) -> tuple[float, float, float]:
@@ -158,16 +164,20 @@ def bin_interior_m(size_m: Vec3) -> tuple[float, float, float]:
     return (size_m[0] - wall, size_m[1] - wall, _BIN_WALL_M)
 
 
-def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "#8a8f94") -> Solid:
+def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> Solid:
     """A plain block. Slot: body.
 
+    Args:
+        size_m: Length, width, height.
+        color: One of ``COLORS``.
+
     Raises:
-        AssetError: if a size is not usable.
+        AssetError: if a size or the colour is not usable.
     """
     x, y, z = _checked("box", size_m, 0.001)
     corners = (-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)
     bevel = min(0.002, 0.1 * min(x, y, z))
-    return in_place([block(*corners, bevel)], (painted(color, 0.6),), [hulls.box(*corners)])
+    return in_place([block(*corners, bevel)], (painted(_color("box", color), 0.6),), [hulls.box(*corners)])
 
 
 def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
@@ -198,17 +208,14 @@ def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
     """
     x, y, z = _checked("gantry", size_m, 0.3)
     w = 0.04
-    posts = [((sx * x / 2 - w * (sx > 0), sy * y / 2 - w * (sy > 0), 0.0),
-              (sx * x / 2 + w * (sx < 0), sy * y / 2 + w * (sy < 0), z))
-             for sx in (-1, 1) for sy in (-1, 1)]
+    posts = [_post(sx * x / 2, sy * y / 2, w, z) for sx in (-1, 1) for sy in (-1, 1)]
     rails = [((sx * x / 2 - w * (sx > 0), -y / 2 + w, z - w),
               (sx * x / 2 + w * (sx < 0), y / 2 - w, z)) for sx in (-1, 1)]
     beam = [((-x / 2 + w, -w / 2, z - w), (x / 2 - w, w / 2, z))]
     bars = [*posts, *rails, *beam]
     patches = [piece for bar in bars for piece in _profile_bar(*bar)]
-    plates = [((px - 0.05, py - 0.05, 0.0), (px + 0.05, py + 0.05, 0.008))
-              for px, py in ((0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])) for a, b in posts)]
-    feet = [block(_clipped(a, x, y, -1), _clipped(b, x, y, 1), 0.001, 1) for a, b in plates]
+    feet = [block(*_between((sx * x / 2, sy * y / 2), (sx * (x / 2 - 0.1), sy * (y / 2 - 0.1)),
+                            0.0, 0.008), 0.001, 1) for sx in (-1, 1) for sy in (-1, 1)]
     materials = (metal(ALUMINIUM, 0.45), painted("#26282b", 0.5))
     return in_place([*patches, *feet], materials, [hulls.box(*bar) for bar in bars])
 
@@ -226,17 +233,17 @@ def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
 
 
 def backdrop(
-    size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str = "#d9d9d6"
+    size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str = "white"
 ) -> Solid:
     """A studio sweep: floor that curves up into a wall at +Y, open elsewhere. Slot: paper.
 
     Args:
         size_m: Width (X), depth (Y), height.
         radius_m: Radius of the curve.
-        color: sRGB colour ``#rrggbb``.
+        color: One of ``COLORS``.
 
     Raises:
-        AssetError: if a size is not usable.
+        AssetError: if a size or the colour is not usable.
     """
     x, y, z = _checked("backdrop", size_m, 0.1)
     r = min(radius_m, 0.9 * y, 0.9 * z)
@@ -248,26 +255,26 @@ def backdrop(
     parts = [hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
              hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
              *_cove(x, y, r)]
-    return in_place([sheet], (painted(color, 0.85),), parts)
+    return in_place([sheet], (painted(_color("backdrop", color), 0.85),), parts)
 
 
-def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: bool = True, window: bool = True) -> Solid:
+def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Solid:
     """The inside of a room, seen from within.
 
-    Slots: floor, ceiling, walls, skirting, door, frames, window. The door is in the wall at -X,
+    Slots: floor, ceiling, walls, skirting, door, frames, window, handle. The door is in the wall at -X,
     the window in the wall at +Y; both are left out where the wall is too small for them.
 
     Args:
         size_m: Inner length, width, height; the floor is at z = 0.
-        door: Whether there is a door.
-        window: Whether there is a window.
+        door: 1 with a door, 0 without.
+        window: 1 with a window, 0 without.
 
     Raises:
         AssetError: if a size is not usable.
     """
     x, y, z = _checked("room", size_m, 1.0)
-    has_door = door and y > 1.6 and z > 2.2
-    has_window = window and x > 2.0 and z > 2.0
+    has_door = door > 0 and y > 1.6 and z > 2.2
+    has_window = window > 0 and x > 2.0 and z > 2.0
     patches = [
         _rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0)),
         _rectangle((-x / 2, y / 2, z), (x, 0.0, 0.0), (0.0, -y, 0.0)).painted(1),
@@ -300,23 +307,214 @@ def _room_materials() -> tuple[Material, ...]:
         painted("#e9e7e1", 0.45),
         painted("#f3f2ee", 0.4),
         pane,
+        metal(STAINLESS, 0.3),
     )
 
 
-def _four_legs(x: float, y: float, z: float) -> list[tuple[Vec3, Vec3]]:
-    w, inset, apron = 0.06, 0.03, 0.08
+def _four_legs(x: float, y: float, z: float) -> list[Box]:
+    w, inset, rail, apron = 0.06, 0.03, 0.02, 0.08
     ax, ay = x / 2 - inset, y / 2 - inset
-    legs = [((sx * ax - w * (sx > 0), sy * ay - w * (sy > 0), 0.0),
-             (sx * ax + w * (sx < 0), sy * ay + w * (sy < 0), z))
-            for sx in (-1, 1) for sy in (-1, 1)]
-    aprons = [
-        *(((-ax + w, s * ay - 0.022 - 0.01 * (s > 0), z - apron),
-           (ax - w, s * ay + 0.022 * (s < 0) + 0.012 * (s < 0), z)) for s in (-1, 1)),
+    legs = [_post(sx * ax, sy * ay, w, z) for sx in (-1, 1) for sy in (-1, 1)]
+    long_rails = [_between((-ax + w, s * (ay - 0.01)), (ax - w, s * (ay - 0.01 - rail)), z - apron, z)
+                  for s in (-1, 1)]
+    short_rails = [_between((s * (ax - 0.01), -ay + w), (s * (ax - 0.01 - rail), ay - w), z - apron, z)
+                   for s in (-1, 1)]
+    return [*legs, *long_rails, *short_rails]
+
+
+def _trestles(x: float, y: float, z: float) -> list[Box]:
+    w, ax, ay = 0.05, 0.36 * x, y / 2 - 0.04
+    made = []
+    for s in (-1, 1):
+        made += [_post(s * ax, t * ay, w, z) for t in (-1, 1)]
+        made += [_between((s * ax, -ay + w), (s * (ax - w), ay - w), level - w, level)
+                 for level in (z, 0.25 * z)]
+    return [*made, _between((-ax + w, -0.02), (ax - w, 0.02), 0.25 * z - w, 0.25 * z)]
+
+
+def _bench(x: float, y: float, z: float) -> list[Box]:
+    w, ax, ay = 0.045, x / 2 - 0.02, y / 2 - 0.02
+    posts = [_post(sx * ax, sy * ay, w, z) for sx in (-1, 1) for sy in (-1, 1)]
+    rails = [_between((-ax + w, s * ay), (ax - w, s * (ay - w)), z - w, z) for s in (-1, 1)]
+    ends = [_between((s * ax, -ay + w), (s * (ax - w), ay - w), z - w, z) for s in (-1, 1)]
+    return [*posts, *rails, *ends, _between((-ax + w, -ay), (ax - w, ay), 0.15, 0.17)]
+
+
+def _post(x: float, y: float, width: float, height: float) -> Box:
+    """A square post whose outer corner is at (x, y)."""
+    return _between((x, y), (x - math.copysign(width, x), y - math.copysign(width, y)), 0.0, height)
+
+
+def _between(a: Sequence[float], b: Sequence[float], low: float, high: float) -> Box:
+    """The box over the rectangle between two corners."""
+    return (
+        (min(a[0], b[0]), min(a[1], b[1]), low),
+        (max(a[0], b[0]), max(a[1], b[1]), high),
+    )
+
+
+def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:
+    """Floor and wall in one sheet: outside bottom, wall, rim, inner wall, inside bottom."""
+    w, lip = _BIN_WALL_M, min(0.02, 0.2 * z)
+    levels = [
+        (rim + 0.006, 0.0, 0.016), (rim, 0.006, 0.02), (rim, z - lip, 0.02), (0.0, z - lip, 0.03),
+        (0.0, z - 0.002, 0.03), (0.002, z, 0.028), (rim + w - 0.002, z, 0.014),
+        (rim + w, z - 0.002, 0.012), (rim + w, w + 0.008, 0.012), (rim + w + 0.008, w, 0.006),
     ]
-    return [*legs, *_apron_boards(ax, ay, w, z, apron, len(aprons))]
+    loops = [_rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
+    rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in loops])
+    return joined([grid(rows), fan(loops[0][::-1]), fan(loops[-1])])
 
 
-def _apron_boards(
-    ax: float, ay: float, w: float, z: float, apron: float, _count: int
-) -> list[tuple[Vec3, Vec3]]:
-    return []
+def _bin_ribs(x: float, y: float, z: float, rim: float) -> list[Box]:
+    """Upright ribs on the four sides and one band around, between the bottom and the rim."""
+    depth, top = 0.7 * rim, z - min(0.02, 0.2 * z)
+    made = []
+    for length, other, along_x in ((x, y, True), (y, x, False)):
+        count = max(2, round(length / 0.12))
+        places = [length * ((i + 0.5) / count - 0.5) for i in range(count)]
+        spans = [(p - 0.0025, p + 0.0025, 0.006, top) for p in places]
+        spans.append((-length / 2 + rim + 0.02, length / 2 - rim - 0.02, 0.68 * z, 0.68 * z + 0.005))
+        for low, high, z0, z1 in spans:
+            for s in (-1, 1):
+                face, tip = s * (other / 2 - rim - 0.001), s * (other / 2 - rim + depth)
+                a, b = ((low, face), (high, tip)) if along_x else ((face, low), (tip, high))
+                made.append(_between(a, b, z0, z1))
+    return made
+
+
+def _rounded_loop(half_x: float, half_y: float, radius: float, z: float) -> Array:
+    """Counter-clockwise rounded rectangle, five points per corner."""
+    points = []
+    for quarter, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
+        for i in range(5):
+            turn = 0.5 * math.pi * (quarter + i / 4)
+            points.append((sx * (half_x - radius) + radius * math.cos(turn),
+                           sy * (half_y - radius) + radius * math.sin(turn), z))
+    return np.array(points)
+
+
+def _profile_bar(low: Vec3, high: Vec3) -> list[Patch]:
+    """An aluminium profile: four corner bars around a recessed core, so that its slots show."""
+    axis = max(range(3), key=lambda i: high[i] - low[i])
+    sides = [i for i in range(3) if i != axis]
+    made = []
+    for i in (0, 1):
+        for j in (0, 1):
+            a, b = list(low), list(high)
+            for side, far in zip(sides, (i, j)):
+                width = high[side] - low[side]
+                a[side] = low[side] + far * 0.6 * width
+                b[side] = a[side] + 0.4 * width
+            made.append(block((a[0], a[1], a[2]), (b[0], b[1], b[2]), 0.001))
+    a, b = list(low), list(high)
+    for side in sides:
+        inset = 0.25 * (high[side] - low[side])
+        a[side], b[side] = low[side] + inset, high[side] - inset
+    return [*made, block((a[0], a[1], a[2]), (b[0], b[1], b[2]))]
+
+
+def _cove(x: float, y: float, r: float) -> list[Array]:
+    """Wedges below the curve of a backdrop."""
+    turn = np.linspace(0.0, 0.5 * math.pi, 7)
+    curve = np.stack([y / 2 - r + r * np.sin(turn), r - r * np.cos(turn)], axis=1)
+    corner = (y / 2, 0.0)
+    return [
+        np.array([(s * x / 2, *p) for s in (-1.0, 1.0) for p in (a, b, corner)])
+        for a, b in zip(curve[:-1].tolist(), curve[1:].tolist())
+    ]
+
+
+def _skirting(x: float, y: float, door_half: float) -> list[Patch]:
+    """Boards along the walls, 8 cm high; the one at -X leaves out the door."""
+    t, h = 0.012, 0.08
+    spans = [
+        ((x / 2 - t, -y / 2, 0.0), (x / 2, y / 2, h)),
+        ((-x / 2, -y / 2, 0.0), (x / 2, -y / 2 + t, h)),
+        ((-x / 2, y / 2 - t, 0.0), (x / 2, y / 2, h)),
+        ((-x / 2, -y / 2, 0.0), (-x / 2 + t, -door_half, h)),
+        ((-x / 2, door_half, 0.0), (-x / 2 + t, y / 2, h)),
+    ]
+    return [block(low, high, 0.003, 3) for low, high in spans]
+
+
+def _door(wall: float) -> list[Patch]:
+    """A panelled door of 0.9 m x 2.05 m with frame and handle on the wall x = ``wall``."""
+    w, h = 0.45, 2.05
+    leaf = [block((wall, -w, 0.005), (wall + 0.012, w, h), 0.001, 4)]
+    leaf += [
+        block((wall + 0.012, s * 0.06 - 0.3 * (s < 0), z0),
+              (wall + 0.018, s * 0.06 + 0.3 * (s > 0), z1), 0.005, 4)
+        for s in (-1, 1) for z0, z1 in ((0.2, 0.95), (1.15, 1.9))
+    ]
+    frame = [
+        block((wall, -w - 0.08, 0.0), (wall + 0.03, -w, h + 0.08), 0.004, 5),
+        block((wall, w, 0.0), (wall + 0.03, w + 0.08, h + 0.08), 0.004, 5),
+        block((wall, -w, h), (wall + 0.03, w, h + 0.08), 0.004, 5),
+    ]
+    handle = [
+        block((wall + 0.012, 0.37, 0.95), (wall + 0.018, 0.41, 1.15), 0.003, 7),
+        block((wall + 0.018, 0.38, 1.04), (wall + 0.065, 0.40, 1.06), 0.004, 7),
+        block((wall + 0.05, 0.27, 1.04), (wall + 0.07, 0.40, 1.06), 0.007, 7),
+    ]
+    return [*leaf, *frame, *handle]
+
+
+def _window_wall(x: float, wall: float, z: float, window: bool) -> list[Patch]:
+    """The wall y = ``wall``; around a window it is four rectangles, a reveal, frame and pane."""
+    if not window:
+        return [_facing_room(-x / 2, x / 2, 0.0, z, wall)]
+    half, low, high, depth = min(0.8, 0.3 * x), 0.9, min(2.15, z - 0.25), 0.16
+    faces = [
+        _facing_room(-x / 2, -half, 0.0, z, wall), _facing_room(half, x / 2, 0.0, z, wall),
+        _facing_room(-half, half, 0.0, low, wall), _facing_room(-half, half, high, z, wall),
+    ]
+    back = wall + depth
+    reveal = [
+        _rectangle((-half, wall, low), (2 * half, 0, 0), (0, depth, 0)),
+        _rectangle((-half, back, high), (2 * half, 0, 0), (0, -depth, 0)),
+        _rectangle((-half, wall, low), (0, depth, 0), (0, 0, high - low)),
+        _rectangle((half, back, low), (0, -depth, 0), (0, 0, high - low)),
+    ]
+    w, y0 = 0.06, back - 0.05
+    bars = [
+        (-half, -half + w, low, high), (half - w, half, low, high), (-w / 2, w / 2, low, high),
+        (-half + w, half - w, low, low + w), (-half + w, half - w, high - w, high),
+    ]
+    frame = [block((a, y0, c), (b, back, d), 0.004, 5) for a, b, c, d in bars]
+    sill = block((-half - 0.05, wall - 0.04, low - 0.03), (half + 0.05, wall + 0.02, low + 0.002), 0.004, 5)
+    pane = _facing_room(-half, half, low, high, back - 0.02).painted(6)
+    return [*faces, *(face.painted(2) for face in reveal), *frame, sill, pane]
+
+
+def _facing_room(x0: float, x1: float, z0: float, z1: float, y: float) -> Patch:
+    """A rectangle in the plane of constant y that is seen from -Y."""
+    return _rectangle((x0, y, z0), (x1 - x0, 0.0, 0.0), (0.0, 0.0, z1 - z0)).painted(2)
+
+
+def _rectangle(corner: Vec3, right: Vec3, up: Vec3) -> Patch:
+    """Two triangles; outward is right x up."""
+    c, r, u = (np.array(v, dtype=np.float64) for v in (corner, right, up))
+    return grid(np.stack([np.stack([c, c + r]), np.stack([c + u, c + r + u])]))
+
+
+def _checked(name: str, size_m: Sequence[float], least: float) -> Vec3:
+    if len(size_m) != 3 or not all(least <= float(v) <= 100.0 for v in size_m):
+        raise AssetError(
+            f"{name}: size_m={','.join(str(v) for v in size_m)} is not usable; "
+            f"every side must be between {least} and 100 m"
+        )
+    return (float(size_m[0]), float(size_m[1]), float(size_m[2]))
+
+
+def _color(name: str, color: str) -> str:
+    _known(name, "color", color, tuple(COLORS))
+    return COLORS[color]
+
+
+def _known(name: str, parameter: str, value: str, options: Sequence[str]) -> None:
+    if value not in options:
+        raise AssetError(
+            f"{name}: {parameter}={value} is unknown; expected one of {', '.join(options)}"
+            f"{did_you_mean(value, options)}"
+        )

@@ -15,7 +15,7 @@ from generator.core.errors import AssetError, did_you_mean
 
 __all__ = ["MESH_SUFFIXES", "Source", "read_mesh"]
 
-_READERS: dict[str, Callable[[Folder, str], Source]] = {
+_READERS: dict[str, Callable[[Folder, str, bool], Source]] = {
     ".glb": read_gltf,
     ".gltf": read_gltf,
     ".obj": read_obj,
@@ -25,8 +25,13 @@ _READERS: dict[str, Callable[[Folder, str], Source]] = {
 MESH_SUFFIXES = frozenset(_READERS)
 
 
-def read_mesh(folder: Folder, relative: str) -> Source:
-    """Triangles and materials of a mesh file, chosen by its suffix.
+def read_mesh(folder: Folder, relative: str, *, materials: bool = True) -> Source:
+    """Triangles of a mesh file, read according to its suffix.
+
+    Args:
+        folder: Where it lies.
+        relative: Its path in the folder.
+        materials: Whether to read what it looks like, too.
 
     Raises:
         AssetError: if the file is missing, malformed, empty, or too large.
@@ -38,7 +43,7 @@ def read_mesh(folder: Folder, relative: str) -> Source:
             f"{path}: meshes of type '{suffix}' are not read{did_you_mean(suffix, _READERS)}; "
             f"convert it to one of {', '.join(sorted(_READERS))}"
         )
-    source = _READERS[suffix](folder, relative)
+    source = _READERS[suffix](folder, relative, materials)
     if not len(source.soup):
         raise AssetError(f"{path}: holds no triangles; export it again with its faces")
     if len(source.soup) > MAX_FACES:

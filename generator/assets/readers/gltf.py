@@ -44,7 +44,7 @@ class _Document:
     images: dict[str, bytes] = field(default_factory=dict)
 
 
-def read_gltf(folder: Folder, relative: str) -> Source:
+def read_gltf(folder: Folder, relative: str, materials: bool) -> Source:
     """Triangles of the default scene of a glTF file, in its own axes (Y up).
 
     Raises:
@@ -53,7 +53,8 @@ def read_gltf(folder: Folder, relative: str) -> Source:
     data = folder.read(relative)
     try:
         document = _document(folder, relative, data)
-        slots = (*(_slot(document, m) for m in _list(document, "materials")), Slot())
+        described = _list(document, "materials")
+        slots = tuple(_slot(document, m) if materials else Slot() for m in (*described, {}))
         parts = [
             part
             for matrix, mesh in _placed_meshes(document)

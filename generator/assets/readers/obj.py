@@ -39,7 +39,7 @@ class _Statements:
     libraries: list[str] = field(default_factory=list)
 
 
-def read_obj(folder: Folder, relative: str) -> Source:
+def read_obj(folder: Folder, relative: str, materials: bool) -> Source:
     """Triangles of an OBJ file with the materials of its MTL files.
 
     Polygons are cut into fans. Each ``o`` (or, where there is none, each ``g``) is a group.
@@ -50,6 +50,8 @@ def read_obj(folder: Folder, relative: str) -> Source:
     text = folder.read(relative).decode("utf-8", errors="replace").replace("\\\n", " ")
     try:
         statements = _statements(text)
+        if not materials:
+            statements.libraries.clear()
         soup = _soup(statements, _slots(folder, relative, statements))
     except ValueError as error:
         raise AssetError(
@@ -175,7 +177,12 @@ def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[Slot, ...]:
         else:
             missing = path
     return tuple(
-        Slot(name, defined[name], from_file=True)
+        Slot(
+            name,
+            _untinted(defined[name]),
+            from_file=True,
+            declared_color=defined[name].base_color,
+        )
         if name in defined
         else Slot(name, missing_library=missing if name else "")
         for name in s.materials
@@ -198,7 +205,7 @@ def _read_mtl(folder: Folder, relative: str) -> dict[str, Material]:
                     f"{folder.root / relative}: material '{name}': malformed '{key}'; "
                     "export it again"
                 ) from None
-    return {name: _unsullied(material) for name, material in materials.items()}
+    return materials
 
 
 def _with_key(
@@ -237,6 +244,6 @@ def _is_number(token: str) -> bool:
     return True
 
 
-def _unsullied(material: Material) -> Material:
+def _untinted(material: Material) -> Material:
     """Textured materials without a tint: exporters write arbitrary greys beside an image."""
     return replace(material, base_color=(1.0, 1.0, 1.0)) if material.texture else material

@@ -17,7 +17,7 @@ _MAX_HEADER_BYTES = 65536
 _ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)\s*$", re.MULTILINE)
 
 
-def read_ply(folder: Folder, relative: str) -> Source:
+def read_ply(folder: Folder, relative: str, _materials: bool) -> Source:
     """Triangles of a PLY file; colours per vertex are ignored.
 
     Raises:

@@ -13,7 +13,7 @@ _HEADER_BYTES = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl(folder: Folder, relative: str) -> Source:
+def read_stl(folder: Folder, relative: str, _materials: bool) -> Source:
     """Triangles of an STL file; its facet normals carry no information and are ignored.
 
     Raises:

@@ -259,9 +259,9 @@ def read_fields(
     for key in value:
         if key not in known:
             raise Malformed(
-                f"unknown key '{key}' of {name}; expected {', '.join(known)}"
-                f"{did_you_mean(str(key), known)}",
-                (str(key),),
+                f"unknown key {shown(key)} of {name}; expected {', '.join(known)}"
+                f"{did_you_mean(key, known)}",
+                (key,),
                 at_key=True,
             )
     for key in required:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from generator.core.streams import Rng
 
 _STANDARD = NormalDist()
+_LEAST_PROBABILITY = 1e-280
+"""Of a clip range: what is smaller could be rounded to nothing while drawing."""
 _RANGE_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 
 
@@ -162,7 +164,7 @@ class Normal(Numeric[float]):
         in_order("normal clip", low, high)
         if low < high and self.stddev > 0:
             below, above, _ = self._tail()
-            empty = not above > below
+            empty = not above - below > _LEAST_PROBABILITY
         else:
             empty = self.stddev == 0 and not low <= self.center <= high
         if empty:

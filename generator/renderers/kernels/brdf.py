@@ -1,7 +1,8 @@
 """The metallic-roughness surface: GGX over Lambert, energy-conserving.
 
 Sources: Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007 (GGX);
-Heitz, "Understanding the masking-shadowing function", JCGT 2014 (height-correlated Smith);
+Hammon, "PBR diffuse lighting for GGX+Smith microsurfaces", GDC 2017 (height-correlated Smith
+without square roots);
 Burley, "Physically based shading at Disney", 2012 (parameters); Lazarov, "Getting more physical
 in Call of Duty: Black Ops II", 2013, in the form of Karis, "Physically based shading on mobile",
 2014 (fit of the directional albedo); Turquin, "Practical multiple scattering compensation for
@@ -11,6 +12,8 @@ microfacet models", 2019; Lagarde and de Rousiers, "Moving Frostbite to PBR", 20
 from __future__ import annotations
 
 import warp as wp
+
+from generator.renderers.kernels.records import unit
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -38,6 +41,23 @@ class Brdf:
 
 
 @wp.func
+def directional_albedo(roughness: float, n_v: float):
+    """Reflectance of the GGX layer under uniform light: factors on F0 and on F90."""
+    rx = 1.0 - roughness
+    ry = 0.0425 - 0.0275 * roughness
+    # (1 + y / 64)^-64 for the exponential of the fit: 2^(-9.28 n_v).
+    decay = 1.0 / (1.0 + 0.10050566 * n_v)
+    decay = decay * decay
+    decay = decay * decay
+    decay = decay * decay
+    decay = decay * decay
+    decay = decay * decay
+    decay = decay * decay
+    k = wp.min(rx * rx, decay) * rx + ry
+    return -1.04 * k + 1.04 - 0.572 * roughness, 1.04 * k - 0.04 + 0.022 * roughness
+
+
+@wp.func
 def make_brdf(albedo: wp.vec3, roughness: float, metallic: float, specular: float, n_v: float):
     """The surface at a point with its view-dependent constants."""
     s = Brdf()
@@ -47,14 +67,10 @@ def make_brdf(albedo: wp.vec3, roughness: float, metallic: float, specular: floa
     s.f0 = wp.vec3(dielectric, dielectric, dielectric) + albedo * metallic
     # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
     s.f90 = wp.min(50.0 * wp.max(s.f0[0], wp.max(s.f0[1], s.f0[2])), 1.0)
-    rx = 1.0 - s.roughness
-    ry = 0.0425 - 0.0275 * s.roughness
-    k = wp.min(rx * rx, wp.exp(-6.4324 * s.n_v)) * rx + ry
-    scale = -1.04 * k + 1.04 - 0.572 * s.roughness
-    bias = (1.04 * k - 0.04 + 0.022 * s.roughness)
-    loss = 1.0 / wp.max(scale + bias, 0.05) - 1.0
+    albedo_scale, albedo_bias = directional_albedo(s.roughness, s.n_v)
+    loss = 1.0 / wp.max(albedo_scale + albedo_bias, 0.05) - 1.0
     s.boost = wp.vec3(1.0, 1.0, 1.0) + s.f0 * loss
-    s.gloss = wp.cw_mul(s.f0 * scale + wp.vec3(s.f90, s.f90, s.f90) * bias, s.boost)
+    s.gloss = wp.cw_mul(s.f0 * albedo_scale + wp.vec3(s.f90, s.f90, s.f90) * albedo_bias, s.boost)
     left = wp.vec3(1.0 - s.gloss[0], 1.0 - s.gloss[1], 1.0 - s.gloss[2]) * (1.0 - metallic)
     s.diffuse = wp.cw_mul(albedo, left)
     return s
@@ -68,18 +84,16 @@ def specular_lobe(s: Brdf, n: wp.vec3, v: wp.vec3, l: wp.vec3, n_l: float, widen
         widening: Added to alpha for a light that is not a point, with the peak lowered to
             keep its energy (Karis, "Real shading in Unreal Engine 4", 2013).
     """
-    h = wp.normalize(l + v)
+    h = unit(l + v)
     n_h = wp.min(wp.dot(n, h), 1.0)
-    v_h = wp.max(wp.dot(v, h), 0.0)
     alpha = s.roughness * s.roughness
     wide = wp.min(alpha + widening, 1.0)
-    energy = alpha / wide
     a2 = alpha * alpha
     q = n_h * n_h * (a2 - 1.0) + 1.0
-    d = a2 * energy * energy / (wp.pi * q * q)
-    g = n_l * wp.sqrt(s.n_v * s.n_v * (1.0 - a2) + a2)
-    g += s.n_v * wp.sqrt(n_l * n_l * (1.0 - a2) + a2)
-    c = 1.0 - v_h
-    c5 = c * c * c * c * c
+    g = 2.0 * n_l * s.n_v * (1.0 - alpha) + (n_l + s.n_v) * alpha
+    lobe = 0.5 * a2 * a2 / (wp.pi * q * q * wide * wide * wp.max(g, 1.0e-4))
+    c = 1.0 - wp.max(wp.dot(v, h), 0.0)
+    c2 = c * c
+    c5 = c2 * c2 * c
     f = s.f0 * (1.0 - c5) + wp.vec3(s.f90, s.f90, s.f90) * c5
-    return wp.cw_mul(f, s.boost) * (d * 0.5 / wp.max(g, 1.0e-6))
+    return wp.cw_mul(f, s.boost) * lobe

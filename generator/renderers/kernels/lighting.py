@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.records import Lamp
+from generator.renderers.kernels.records import Lamp, unit
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -44,12 +44,12 @@ def beam_from(lamp: Lamp, p_world: wp.vec3):
         beam.spread = lamp.radius
         return beam
     to_lamp = lamp.position_m - p_world
-    squared = wp.max(wp.dot(to_lamp, to_lamp), 1.0e-6)
-    distance = wp.sqrt(squared)
-    beam.direction = to_lamp / distance
-    beam.distance_m = distance
-    beam.normal_lux = lamp.power / wp.max(squared, lamp.radius * lamp.radius)
-    beam.spread = lamp.radius / distance
+    squared = wp.max(wp.dot(to_lamp, to_lamp), wp.max(lamp.radius * lamp.radius, 1.0e-6))
+    inverse = 1.0 / wp.sqrt(squared)
+    beam.direction = to_lamp * inverse
+    beam.distance_m = squared * inverse
+    beam.normal_lux = lamp.power * (inverse * inverse)
+    beam.spread = lamp.radius * inverse
     if lamp.kind == SPOT:
         cosine = -wp.dot(beam.direction, lamp.direction)
         span = wp.max(lamp.cos_inner - lamp.cos_outer, 1.0e-4)
@@ -59,13 +59,15 @@ def beam_from(lamp: Lamp, p_world: wp.vec3):
 
 
 @wp.func
-def towards_mirror(beam: Beam, mirrored: wp.vec3):
+def towards_mirror(beam: Beam, mirrored: wp.vec3, alpha: float):
     """Direction to the point of the lamp's ball nearest to a mirrored ray.
 
+    Where the lobe of width ``alpha`` is much wider than the ball this is the ball's centre.
     Source: Karis, "Real shading in Unreal Engine 4", 2013.
     """
-    along = wp.dot(beam.direction, mirrored)
-    to_ray = mirrored * along - beam.direction
-    length = wp.length(to_ray)
-    part = wp.min(beam.spread / wp.max(length, 1.0e-6), 1.0)
-    return wp.normalize(beam.direction + to_ray * part)
+    spread = beam.spread - 0.2 * alpha
+    if spread <= 0.0:
+        return beam.direction
+    to_ray = mirrored * wp.dot(beam.direction, mirrored) - beam.direction
+    part = wp.min(spread / wp.sqrt(wp.max(wp.dot(to_ray, to_ray), 1.0e-12)), 1.0)
+    return unit(beam.direction + to_ray * part)

@@ -159,6 +159,21 @@ def pixel_direction(view: View, x_px: float, y_px: float):
 
 
 @wp.func
+def unit(v: wp.vec3):
+    """The unit vector along v; one division where ``wp.normalize`` takes three."""
+    return v * (1.0 / wp.sqrt(wp.max(wp.dot(v, v), 1.0e-30)))
+
+
+@wp.func
+def floor_int(x: float):
+    """The largest integer <= x; ``wp.floor`` is a library call on the plainest processors."""
+    i = int(x)
+    if float(i) > x:
+        i -= 1
+    return i
+
+
+@wp.func
 def to_mesh_point(body: Body, p_world: wp.vec3):
     """World point to mesh frame."""
     return (wp.transpose(body.R_world_mesh) @ (p_world - body.t_world_mesh)) / body.scale

@@ -14,6 +14,7 @@ from generator.renderers.kernels.records import (
     View,
     World,
     pixel_direction,
+    unit,
 )
 from generator.renderers.kernels.sky import sky_image, sky_irradiance, sky_reflection
 from generator.renderers.kernels.surface import mesh_point
@@ -64,9 +65,9 @@ def mesh_mapped(
         tangent = body.R_world_mesh @ ((e1 * d2[1] - e2 * d1[1]) / area_uv)
         bitangent = body.R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) / area_uv)
         n = look.normal
-        tangent = wp.normalize(tangent - n * wp.dot(n, tangent))
-        bitangent = wp.normalize(bitangent - n * wp.dot(n, bitangent))
-        look.normal = wp.normalize(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
+        tangent = unit(tangent - n * wp.dot(n, tangent))
+        bitangent = unit(bitangent - n * wp.dot(n, bitangent))
+        look.normal = unit(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
     return look
 
 
@@ -130,7 +131,7 @@ def box_mapped(
     look.albedo = wp.cw_mul(look.albedo, wp.vec3(c[0], c[1], c[2]))
     look.roughness *= c[3]
     if texture.has_bumps != 0:
-        look.normal = wp.normalize(body.R_world_mesh @ m)
+        look.normal = unit(body.R_world_mesh @ m)
     return look
 
 
@@ -185,7 +186,7 @@ def seen_radiance(
             beam = beam_from(world.lamps[j], p_world)
             n_l = wp.dot(n, beam.direction)
             if n_l > 0.0:
-                l = towards_mirror(beam, mirrored)  # noqa: E741
+                l = towards_mirror(beam, mirrored, brdf.roughness * brdf.roughness)  # noqa: E741
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
                 lobe = specular_lobe(brdf, n, v, l, n_s, 0.5 * beam.spread)
                 response = brdf.diffuse * (n_l / wp.pi) + lobe * wp.min(n_s, n_l + beam.spread)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.records import Sky
+from generator.renderers.kernels.records import Sky, floor_int, unit
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -36,13 +36,13 @@ def sky_irradiance(sky: Sky, n_world: wp.vec3):
 @wp.func
 def sky_image(sky: Sky, d_world: wp.vec3):
     """The image in one direction, bilinear; any length."""
-    d = wp.normalize(to_sky(sky, d_world))
+    d = unit(to_sky(sky, d_world))
     height = sky.image.shape[0]
     width = sky.image.shape[1]
     x = (0.5 - wp.atan2(d[1], d[0]) * (0.5 / wp.pi)) * float(width) - 0.5
     y = wp.acos(wp.clamp(d[2], -1.0, 1.0)) / wp.pi * float(height) - 0.5
-    x0 = int(wp.floor(x))
-    y0 = int(wp.floor(y))
+    x0 = floor_int(x)
+    y0 = floor_int(y)
     fx = x - float(x0)
     fy = y - float(y0)
     xa = (x0 + width) % width
@@ -88,7 +88,7 @@ def sky_reflection(sky: Sky, d_world: wp.vec3, roughness: float):
     levels = sky.glossy.shape[0]
     level = roughness * float(levels) - 1.0
     p = octahedral(to_sky(sky, d_world))
-    lower = wp.clamp(int(wp.floor(level)), 0, levels - 1)
+    lower = wp.clamp(floor_int(level), 0, levels - 1)
     upper = wp.min(lower + 1, levels - 1)
     part = wp.clamp(level - float(lower), 0.0, 1.0)
     rough = glossy_level(sky, lower, p)
@@ -109,7 +109,7 @@ def octahedral_direction(x: float, y: float):
         fold_x = (1.0 - wp.abs(y)) * wp.where(x >= 0.0, 1.0, -1.0)
         y = (1.0 - wp.abs(x)) * wp.where(y >= 0.0, 1.0, -1.0)
         x = fold_x
-    return wp.normalize(wp.vec3(x, y, z))
+    return unit(wp.vec3(x, y, z))
 
 
 @wp.kernel

@@ -10,6 +10,7 @@ from generator.renderers.kernels.records import (
     View,
     World,
     pixel_direction,
+    unit,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -75,11 +76,11 @@ def smooth_normal(
     )
     if hit.outside == 0:
         n = -n
-    n = wp.normalize(body.R_world_mesh @ n)
+    n = unit(body.R_world_mesh @ n)
     # Interpolation may tip a normal over the horizon: bring it back to where it is seen edge-on.
-    over = wp.dot(n, d_world) / wp.dot(d_world, d_world)
+    over = wp.dot(n, d_world)
     if over > 0.0:
-        n = wp.normalize(n - d_world * (over * 1.001))
+        n = unit(n - d_world * (over * 1.001 / wp.dot(d_world, d_world)))
     return n
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.records import Texture
+from generator.renderers.kernels.records import Texture, floor_int
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -37,10 +37,10 @@ def taps_at(texture: Texture, u: float, v: float, level: int):
     """The four texels around (u, v); v grows upwards, rows downwards."""
     width = wp.max(texture.width >> level, 1)
     height = wp.max(texture.height >> level, 1)
-    x = (u - wp.floor(u)) * float(width) - 0.5
-    y = (1.0 - (v - wp.floor(v))) * float(height) - 0.5
-    x0 = int(wp.floor(x))
-    y0 = int(wp.floor(y))
+    x = (u - float(floor_int(u))) * float(width) - 0.5
+    y = (1.0 - (v - float(floor_int(v)))) * float(height) - 0.5
+    x0 = floor_int(x)
+    y0 = floor_int(y)
     t = Taps()
     t.fx = x - float(x0)
     t.fy = y - float(y0)
@@ -79,9 +79,12 @@ def albedo_at(texture: Texture, u: float, v: float, level: float):
     """Linear albedo and roughness factor in [0, 1], between two mip levels."""
     bounded = wp.clamp(level, 0.0, float(texture.levels - 1))
     lower = int(bounded)
-    part = bounded - float(lower)
+    # Levels are blended over the middle half of their distance only: half the taps elsewhere.
+    part = wp.clamp(2.0 * (bounded - float(lower)) - 0.5, 0.0, 1.0)
+    if part == 1.0:
+        lower += 1
     c = albedo_at_level(texture, u, v, lower)
-    if part > 0.01:
+    if part > 0.0 and part < 1.0:
         c = c * (1.0 - part) + albedo_at_level(texture, u, v, lower + 1) * part
     return c * (1.0 / 65025.0)
 

@@ -1,0 +1,1 @@
+"""Shipped configurations: ``gen-data --config tabletop.yaml`` finds them from any folder."""

@@ -1,0 +1,138 @@
+"""What was computed once: on disk by content hash, and in memory within a bound.
+
+A disk entry is one ``.npz`` of plain arrays, written whole or not at all, so that any number of
+processes may share a folder. An entry that cannot be read is made anew; a folder that cannot be
+written only costs time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+import zipfile
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.serial import canonical_json
+
+T = TypeVar("T")
+Arrays = dict[str, NDArray[Any]]
+
+FORMAT = 1
+"""Raised whenever the same sources would be stored as other arrays."""
+_MEMORY_BYTES = 512 * 1024 * 1024
+
+
+def content_key(description: Mapping[str, Any]) -> str:
+    """sha256, in hexadecimal, of a description of everything that a result depends on."""
+    return sha256(canonical_json(description).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class DiskCache:
+    """Arrays by key.
+
+    Attributes:
+        folder: Made when first written to.
+    """
+
+    folder: Path
+
+    def arrays(self, key: str, compute: Callable[[], Arrays]) -> Arrays:
+        """The arrays stored under a content key, computed and stored if they are not there."""
+        path = self.folder / key[:2] / f"{key}.npz"
+        stored = _load(path, key)
+        if stored is not None:
+            return stored
+        arrays = compute()
+        # A full disk or a read-only home must not stop a run: it will only be slower.
+        with contextlib.suppress(OSError):
+            _store(path, {**arrays, "key": np.frombuffer(key.encode(), dtype=np.uint8)})
+        return arrays
+
+    def load_json(self, name: str) -> dict[str, Any]:
+        """A JSON object stored by name; empty if there is none or it is damaged."""
+        try:
+            value = json.loads((self.folder / name).read_bytes())
+        except (OSError, ValueError):
+            return {}
+        return value if isinstance(value, dict) else {}
+
+    def store_json(self, name: str, value: Mapping[str, Any]) -> None:
+        """Store a JSON object by name, if the folder can be written."""
+        with contextlib.suppress(OSError):
+            _replace(self.folder / name, lambda file: file.write(canonical_json(value).encode()))
+
+
+class Store:
+    """Results by content key, in memory before disk before computing them.
+
+    Memory is bounded by total size; what was used least recently leaves first.
+    """
+
+    def __init__(self, disk: DiskCache, max_bytes: int = _MEMORY_BYTES) -> None:
+        self._disk = disk
+        self._max_bytes = max_bytes
+        self._bytes = 0
+        self._results: OrderedDict[str, tuple[Any, int]] = OrderedDict()
+
+    def get(self, key: str, compute: Callable[[], Arrays], view: Callable[[Arrays], T]) -> T:
+        """The result under a key of its own.
+
+        Args:
+            key: Content key of everything that the result depends on.
+            compute: Makes its arrays when they are nowhere.
+            view: Makes the result of its arrays.
+        """
+        if key not in self._results:
+            arrays = self._disk.arrays(key, compute)
+            self._keep(key, view(arrays), sum(array.nbytes for array in arrays.values()))
+        self._results.move_to_end(key)
+        result: T = self._results[key][0]
+        return result
+
+    def _keep(self, key: str, result: object, size: int) -> None:
+        self._results[key] = (result, size)
+        self._bytes += size
+        while self._bytes > self._max_bytes and len(self._results) > 1:
+            _, (_, dropped) = self._results.popitem(last=False)
+            self._bytes -= dropped
+
+
+def _load(path: Path, key: str) -> Arrays | None:
+    try:
+        # The zip's checksums are verified while its members are read.
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    if arrays.pop("key", np.zeros(0, np.uint8)).tobytes() != key.encode():
+        return None
+    for array in arrays.values():
+        array.setflags(write=False)
+    return arrays
+
+
+def _store(path: Path, arrays: Arrays) -> None:
+    _replace(path, lambda file: np.savez(file, allow_pickle=False, **arrays))
+
+
+def _replace(path: Path, write: Callable[[Any], object]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            write(file)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,207 @@
+"""Collision geometry: bounded unions of small convex hulls.
+
+A solid that its hull describes badly is cut in two by the axis-aligned plane that saves the most
+volume, again and again, until the pieces are convex enough or the bound is reached: the greedy
+core of approximate convex decomposition (Lien and Amato, "Approximate convex decomposition of
+polyhedra", SPM 2007), in which cutting the surface is enough, because a clipped surface and the
+clipped solid have the same hull.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.assets.mesh import first_occurrences, signed_volume
+from generator.assets.soup import Float64, Soup
+from generator.core.errors import AssetError
+from generator.core.geometry import ConvexParts
+
+MAX_PARTS = 24
+MAX_VERTICES = 64
+_CUTS = (0.25, 0.5, 0.75)
+_ENOUGH = 0.02
+"""A cut must save this share of the first hull's volume."""
+_MIN_THICKNESS = 0.02
+"""Flat parts are given this share of their largest extent as thickness."""
+_SCOUTS = 256
+"""While a cut is chosen, hulls are taken of about this many points."""
+
+
+def convex_parts(soup: Soup, place: str, max_parts: int = MAX_PARTS) -> ConvexParts:
+    """Collision parts of triangles: one hull for each group if the file has several.
+
+    A single group is cut into up to ``max_parts`` parts if that follows its surface much better.
+
+    Raises:
+        AssetError: if no hull can be made.
+    """
+    groups = [soup.corners[soup.face_groups == g] for g in np.unique(soup.face_groups)]
+    if 1 < len(groups) <= MAX_PARTS:
+        return ConvexParts(tuple(hull_vertices(g.reshape(-1, 3), place) for g in groups))
+    return ConvexParts(
+        tuple(hull_vertices(piece.reshape(-1, 3), place) for piece in decomposed(soup, max_parts))
+    )
+
+
+def one_hull(soup: Soup, place: str) -> ConvexParts:
+    """The convex hull of everything. Raises AssetError if there is none."""
+    return ConvexParts((hull_vertices(soup.corners.reshape(-1, 3), place),))
+
+
+def hull_vertices(points: Float64, place: str, max_vertices: int = MAX_VERTICES) -> Float64:
+    """Vertices [n, 3] of the convex hull of points, at most ``max_vertices``.
+
+    Larger hulls start from their extreme points along the axes and grow by the point that lies
+    farthest outside, as in quickhull, which keeps the error small for the number.
+
+    Raises:
+        AssetError: if the points lie on a line or are too few.
+    """
+    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415
+
+    points = _solid(_distinct(points))
+    try:
+        hull = ConvexHull(points)
+        points = points[np.sort(hull.vertices, kind="stable")]
+        if len(points) <= max_vertices:
+            return points
+        chosen = _extremes(points)
+        growing = ConvexHull(points[chosen], incremental=True)
+        while len(chosen) < max_vertices:
+            normals, offsets = growing.equations[:, :3], growing.equations[:, 3]
+            outside = np.einsum("ij,kj->ik", points, normals, optimize=False) + offsets
+            farthest = int(np.argmax(outside.max(axis=1)))
+            if farthest in chosen:
+                break
+            chosen.append(farthest)
+            growing.add_points(points[farthest : farthest + 1])
+        growing.close()
+    except QhullError:
+        raise AssetError(f"{place}: has no volume to collide with; give it a collision mesh") from None
+    return points[sorted(chosen)]
+
+
+def decomposed(soup: Soup, max_parts: int) -> list[Float64]:
+    """Triangles of a soup in pieces that are nearly convex, each [m, 3, 3]."""
+    pieces = [_Piece.of(soup.corners)]
+    whole = pieces[0].volume
+    enclosed = abs(signed_volume(soup.corners))
+    for _ in range(max_parts - 1):
+        if sum(p.volume for p in pieces) - enclosed < 2.0 * _ENOUGH * whole:
+            break
+        cuts = [_best_cut(piece) for piece in pieces]
+        savings = [p.volume - sum(half.volume for half in cut) if cut else 0.0
+                   for p, cut in zip(pieces, cuts, strict=True)]  # fmt: skip
+        best = int(np.argmax(savings))
+        if savings[best] < _ENOUGH * whole:
+            break
+        pieces[best : best + 1] = cuts[best]
+    return [piece.corners for piece in pieces]
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    corners: Float64
+    volume: float
+
+    @classmethod
+    def of(cls, corners: Float64) -> _Piece:
+        return cls(corners, _hull_volume(corners.reshape(-1, 3)))
+
+
+def _best_cut(piece: _Piece) -> Sequence[_Piece]:
+    """The two halves whose hulls have the least volume together; empty if none can be cut."""
+    low, high = piece.corners.min(axis=(0, 1)), piece.corners.max(axis=(0, 1))
+    best: Sequence[_Piece] = ()
+    least = piece.volume
+    for axis in range(3):
+        for share in _CUTS:
+            at = low[axis] + share * (high[axis] - low[axis])
+            halves = [_clipped(piece.corners, axis, at, side) for side in (1.0, -1.0)]
+            if not all(len(half) for half in halves):
+                continue
+            candidates = [_Piece.of(half) for half in halves]
+            volume = sum(c.volume for c in candidates)
+            if volume < least:
+                best, least = candidates, volume
+    return best
+
+
+def _clipped(corners: Float64, axis: int, at: float, side: float) -> Float64:
+    """The part of triangles with ``side * (coordinate - at) >= 0``."""
+    height = side * (corners[..., axis] - at)
+    above = height >= 0.0
+    whole = corners[above.all(axis=1)]
+    split = above.any(axis=1) & ~above.all(axis=1)
+    corners, height, above = corners[split], height[split], above[split]
+    # Turned so that the corner that is alone on its side comes first.
+    alone = np.where(above.sum(axis=1) == 1, np.argmax(above, axis=1), np.argmin(above, axis=1))
+    turn = (alone[:, None] + np.arange(3)) % 3
+    corners = np.take_along_axis(corners, turn[..., None], axis=1)
+    height = np.take_along_axis(height, turn, axis=1)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    t = height[:, :1] / (height[:, :1] - height[:, 1:])
+    ab, ac = a + t[:, :1] * (b - a), a + t[:, 1:] * (c - a)
+    tip = height[:, 0] >= 0.0
+    tips = np.stack([a, ab, ac], axis=1)[tip]
+    stumps = [np.stack(x, axis=1)[~tip] for x in ((ab, b, c), (ab, c, ac))]
+    return np.concatenate([whole, tips, *stumps])
+
+
+def _hull_volume(points: Float64) -> float:
+    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415
+
+    points = _distinct(points)
+    if len(points) > _SCOUTS:
+        points = points[_scouts(points)]
+    if len(points) < 4:
+        return 0.0
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:
+        return 0.0
+
+
+def _distinct(points: Float64) -> Float64:
+    extent = float((points.max(axis=0) - points.min(axis=0)).max())
+    _, first = first_occurrences(np.rint(points / max(extent * 1e-6, 1e-12)).astype(np.int64))
+    return points[first]
+
+
+def _directions(count: int) -> Float64:
+    """Unit vectors spread evenly over the sphere (Vogel's spiral), on a decimal grid."""
+    k = np.arange(count) + 0.5
+    z = 1.0 - 2.0 * k / count
+    radius = np.sqrt(1.0 - z * z)
+    turn = k * np.pi * (3.0 - np.sqrt(5.0))
+    return np.round(np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1), 9)
+
+
+def _scouts(points: Float64) -> list[int]:
+    """Numbers of the points that are extreme in some of many directions."""
+    heights = np.einsum("ij,kj->ik", points, _directions(_SCOUTS), optimize=False)
+    return sorted({int(k) for k in np.argmax(heights, axis=0)})
+
+
+def _extremes(points: Float64) -> list[int]:
+    """Numbers of points that span a volume: extreme along the axes and the diagonals."""
+    signs = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)]
+    heights = np.einsum("ij,kj->ik", points, np.array(signs, dtype=np.float64), optimize=False)
+    return sorted({int(k) for k in np.argmax(heights, axis=0)})
+
+
+def _solid(points: Float64) -> Float64:
+    """Points as they are; flat ones doubled to both sides of their plane."""
+    centred = points - points.mean(axis=0)
+    covariance = np.einsum("ni,nj->ij", centred, centred, optimize=False)
+    values, vectors = np.linalg.eigh(covariance)
+    extent = float((points.max(axis=0) - points.min(axis=0)).max())
+    normal = vectors[:, 0]
+    heights = (centred * normal).sum(axis=1)
+    missing = _MIN_THICKNESS * extent - float(heights.max() - heights.min())
+    if values[1] <= 0.0 or missing <= 0.98 * _MIN_THICKNESS * extent:
+        return points
+    return np.concatenate([points + 0.5 * missing * normal, points - 0.5 * missing * normal])

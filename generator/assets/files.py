@@ -1,0 +1,228 @@
+"""Assets that lie in files: pybullet's and the user's."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+from generator.assets.cache import FORMAT, Arrays, DiskCache, Store, content_key
+from generator.assets.catalogue import (
+    ImageEntry,
+    Listed,
+    MeshEntry,
+    RobotEntry,
+    listed,
+    read_index,
+    user_folder,
+)
+from generator.assets.digests import Digests
+from generator.assets.folder import Folder
+from generator.assets.images import decode, decode_radiance
+from generator.assets.importer import VERSION, Imported, import_link, import_object
+from generator.assets.packing import pack, unpack
+from generator.assets.robots import robot_model
+from generator.assets.urdf import Urdf, read_urdf
+from generator.core.errors import AssetError
+from generator.core.geometry import Asset, Float32, RobotModel, TextureData
+
+_BUILT_IN = Path(__file__).with_name("pybullet.yaml")
+
+T = TypeVar("T")
+
+
+class Files:
+    """The part of the library that is read from folders.
+
+    Ids are those of the indices; ``<robot>/<link>`` is a robot's link, and ``<asset>#<image>``
+    an image that an asset's materials refer to.
+    """
+
+    def __init__(self, user_roots: Sequence[Path], disk: DiskCache, store: Store) -> None:
+        self._user_roots = tuple(user_roots)
+        self._store = store
+        self._digests = Digests(disk)
+        self._listed: dict[str, Listed] | None = None
+        self._urdfs: dict[str, Urdf] = {}
+
+    def names(self) -> Iterator[str]:
+        """Every id."""
+        yield from self._all()
+
+    def __contains__(self, asset_id: str) -> bool:
+        """Whether an asset or a robot's link has that id."""
+        return asset_id in self._all() or self._link(asset_id) is not None
+
+    def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
+        """All assets of a kind that carry every tag."""
+        for one in self._all().values():
+            if one.kind == kind and tags.issubset(one.tags()):
+                yield self._asset(one)
+        self._digests.save()
+
+    def tags(self, kind: str) -> set[str]:
+        """Every tag of an asset of the kind."""
+        return {tag for one in self._all().values() if one.kind == kind for tag in one.tags()}
+
+    def get(self, asset_id: str) -> Asset:
+        """The asset, or a robot's link as an object of its own."""
+        link = self._link(asset_id)
+        if link is None:
+            asset = self._asset(self._all()[asset_id])
+        else:
+            robot = self._asset(link[0])
+            asset = replace(robot, asset_id=asset_id, kind="object")
+        self._digests.save()
+        return asset
+
+    def imported(self, asset_id: str) -> Imported:
+        """Geometry of an object or of a robot's link."""
+        link = self._link(asset_id)
+        one = link[0] if link else self._all()[asset_id]
+        entry, folder = one.entry, Folder(one.root)
+        name = link[1] if link else ""
+
+        def compute() -> Arrays:
+            if isinstance(entry, RobotEntry):
+                made = import_link(folder, entry, one.asset_id, self._urdf(one), name)
+            elif isinstance(entry, MeshEntry):
+                made = import_object(folder, entry, asset_id)
+            else:
+                raise AssetError(f"asset '{asset_id}': is no object but one of kind {one.kind}")
+            self._check_unchanged(one, folder)
+            return pack(made)
+
+        if isinstance(entry, RobotEntry) and not link:
+            links = ", ".join(f"{asset_id}/{n}" for n in list(self._urdf(one).links)[:2])
+            raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
+        key = content_key({"asset": self._key(one), "link": name})
+        return self._store.get(key, compute, unpack)
+
+    def robot(self, asset_id: str) -> RobotModel:
+        """Kinematics of a robot."""
+        one = self._all()[asset_id]
+        if not isinstance(one.entry, RobotEntry):
+            raise AssetError(f"asset '{asset_id}': is no robot but one of kind {one.kind}")
+        return robot_model(asset_id, self._urdf(one), one.entry, str(one.root / one.entry.file))
+
+    def texture(self, texture_id: str) -> TextureData:
+        """Images of a listed texture, or of a mesh's material (``<asset>#<image>``)."""
+        owner, _, name = texture_id.partition("#")
+        one = self._all()[owner]
+        folder = Folder(one.root)
+        if not name:
+            if one.kind != "texture":
+                raise AssetError(f"asset '{owner}': is no texture but one of kind {one.kind}")
+            name = one.entry.file
+        elif one.kind == "object" and name in (images := self.imported(owner).images):
+            return TextureData(images[name])
+        place = str(folder.root / name)
+        return self._of_file(folder, name, place, lambda: {"albedo": decode(folder.read(name), place)},
+                             lambda arrays: TextureData(arrays["albedo"]))  # fmt: skip
+
+    def environment(self, asset_id: str) -> Float32:
+        """Pixels of a panorama."""
+        one = self._all()[asset_id]
+        if one.kind != "environment":
+            raise AssetError(f"asset '{asset_id}': is no environment but one of kind {one.kind}")
+        folder, name = Folder(one.root), one.entry.file
+        place = str(folder.root / name)
+        return self._of_file(
+            folder, name, place,
+            lambda: {"radiance": decode_radiance(folder.read(name), place)},
+            lambda arrays: arrays["radiance"],
+        )  # fmt: skip
+
+    def _of_file(
+        self,
+        folder: Folder,
+        name: str,
+        place: str,
+        compute: Callable[[], Arrays],
+        view: Callable[[Arrays], T],
+    ) -> T:
+        if not folder.exists(name):
+            raise AssetError(f"{place}: no such image; put it there or correct what refers to it")
+        digests = self._digests.of(folder, name)
+        return self._store.get(content_key({"format": FORMAT, "image": digests[name]}), compute, view)
+
+    def _all(self) -> dict[str, Listed]:
+        if self._listed is None:
+            self._listed = {}
+            for one in _everything(self._user_roots):
+                if one.asset_id in self._listed:
+                    raise AssetError(
+                        f"asset '{one.asset_id}': both {self._listed[one.asset_id].root} and "
+                        f"{one.root} have it; rename one of them"
+                    )
+                self._listed[one.asset_id] = one
+        return self._listed
+
+    def _link(self, asset_id: str) -> tuple[Listed, str] | None:
+        """Robot and link name of an id ``<robot>/<link>``."""
+        robot, slash, link = asset_id.rpartition("/")
+        one = self._all().get(robot) if slash else None
+        if one is None or one.kind != "robot" or link not in self._urdf(one).links:
+            return None
+        return one, link
+
+    def _urdf(self, one: Listed) -> Urdf:
+        if one.asset_id not in self._urdfs:
+            self._urdfs[one.asset_id] = read_urdf(Folder(one.root), one.entry.file)
+        return self._urdfs[one.asset_id]
+
+    def _asset(self, one: Listed) -> Asset:
+        entry = one.entry
+        return Asset(
+            asset_id=one.asset_id,
+            kind=one.kind,
+            category="" if isinstance(entry, ImageEntry) else entry.category,
+            tags=one.tags(),
+            licence=one.origin.licence,
+            author=one.origin.author,
+            source=one.origin.source,
+            sha256=self._key(one),
+            mass_kg=entry.mass_kg if isinstance(entry, MeshEntry) else 0.0,
+            stackable=isinstance(entry, MeshEntry) and entry.stackable,
+        )
+
+    def _key(self, one: Listed) -> str:
+        """Hash of the files and of everything that the import does with them."""
+        return content_key(
+            {
+                "format": FORMAT,
+                "version": VERSION,
+                "id": one.asset_id,
+                "entry": one.entry.model_dump(exclude={"licence", "author", "source"}),
+                "files": self._files(one),
+            }
+        )
+
+    def _files(self, one: Listed) -> dict[str, str]:
+        folder = Folder(one.root)
+        files = self._digests.of(folder, one.entry.file)
+        collision = one.entry.collision if isinstance(one.entry, MeshEntry) else ""
+        return {**files, **self._digests.of(folder, collision)} if collision else files
+
+    def _check_unchanged(self, one: Listed, folder: Folder) -> None:
+        """What was parsed is what was hashed."""
+        known = self._files(one)
+        for name, digest in folder.digests.items():
+            if known.get(name, digest) != digest:
+                raise AssetError(f"{folder.root / name}: changed while it was read; start again")
+
+
+def _everything(user_roots: Sequence[Path]) -> Iterator[Listed]:
+    yield from listed(read_index(_BUILT_IN), _pybullet_data())
+    for root in user_roots:
+        yield from user_folder(root)
+
+
+def _pybullet_data() -> Path:
+    """Where pybullet's data lies; found without importing it."""
+    spec = importlib.util.find_spec("pybullet_data")
+    if spec is None or spec.origin is None:
+        raise AssetError("pybullet_data: not installed; pip install pybullet")
+    return Path(spec.origin).parent

@@ -1,0 +1,187 @@
+"""Assets that are computed: families of objects, textures and environments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
+
+from generator.assets.cache import Arrays, Store, content_key
+from generator.assets.ids import AssetId, ParameterValue, shown
+from generator.assets.importer import Imported
+from generator.assets.packing import pack, pack_texture, unpack, unpack_texture
+from generator.assets.procedural import (
+    ENVIRONMENTS,
+    FAMILIES,
+    TEXTURES,
+    EnvironmentFamily,
+    Family,
+    TextureFamily,
+)
+from generator.core.errors import AssetError, did_you_mean
+from generator.core.geometry import Asset, Float32, TextureData
+
+_MAX_SEED = 2**31 - 1
+_PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
+
+AnyFamily = Family | TextureFamily | EnvironmentFamily
+T = TypeVar("T")
+
+
+class Generated:
+    """The part of the library that needs no file. Names are what ids say before ``?``."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._families: dict[str, AnyFamily] = {
+            _PREFIXES[_kind(family)] + name: family
+            for table in (FAMILIES, TEXTURES, ENVIRONMENTS)
+            for name, family in table.items()
+        }
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a family of that name."""
+        return name in self._families
+
+    def names(self) -> Iterator[str]:
+        """Every id that is offered for selection, and the families that need parameters."""
+        for name, family in self._families.items():
+            yield from (f"{name}?seed={k}" for k in range(family.variants)) if (
+                family.variants
+            ) else (name,)
+
+    def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
+        """Assets offered for selection that are of a kind and carry every tag."""
+        for name, family in self._families.items():
+            if _kind(family) == kind and tags.issubset(_tags(name, family)):
+                for k in range(family.variants):
+                    yield self.get(AssetId(name, {"seed": k}))
+
+    def tags(self, kind: str) -> set[str]:
+        """Every tag of a family of the kind."""
+        return {
+            tag
+            for name, family in self._families.items()
+            if _kind(family) == kind
+            for tag in _tags(name, family)
+        }
+
+    def get(self, asset_id: AssetId) -> Asset:
+        """The asset of an id whose name is known. Raises AssetError on wrong parameters."""
+        family = self._families[asset_id.name]
+        return Asset(
+            asset_id=str(asset_id),
+            kind=_kind(family),
+            category=family.category if isinstance(family, Family) else family.name,
+            tags=_tags(asset_id.name, family),
+            licence="Apache-2.0",
+            author="gen-data contributors",
+            source="gen-data (procedural)",
+            sha256=self._key(asset_id, family),
+            mass_kg=family.mass_kg if isinstance(family, Family) else 0.0,
+            stackable=isinstance(family, Family) and family.stackable,
+        )
+
+    def imported(self, asset_id: AssetId) -> Imported:
+        """Geometry of an object."""
+        family = self._families[asset_id.name]
+        if not isinstance(family, Family):
+            raise AssetError(f"asset '{asset_id}': is no object but one of kind {_kind(family)}")
+
+        def compute() -> Arrays:
+            solid = family.build(**_arguments(asset_id, family))
+            return pack(Imported(solid.mesh, solid.collision, {}))
+
+        return self._result(asset_id, family, compute, unpack)
+
+    def texture(self, asset_id: AssetId) -> TextureData:
+        """Images of a texture."""
+        family = self._families[asset_id.name]
+        if not isinstance(family, TextureFamily):
+            raise AssetError(f"asset '{asset_id}': is no texture but one of kind {_kind(family)}")
+        return self._result(
+            asset_id,
+            family,
+            lambda: pack_texture(family.build(**_arguments(asset_id, family))),
+            unpack_texture,
+        )
+
+    def environment(self, asset_id: AssetId) -> Float32:
+        """Pixels of an environment."""
+        family = self._families[asset_id.name]
+        if not isinstance(family, EnvironmentFamily):
+            raise AssetError(
+                f"asset '{asset_id}': is no environment but one of kind {_kind(family)}"
+            )
+        return self._result(
+            asset_id,
+            family,
+            lambda: {"radiance": family.build(**_arguments(asset_id, family))},
+            lambda arrays: arrays["radiance"],
+        )
+
+    def _result(
+        self,
+        asset_id: AssetId,
+        family: AnyFamily,
+        compute: Callable[[], Arrays],
+        view: Callable[[Arrays], T],
+    ) -> T:
+        key = self._key(asset_id, family)
+        try:
+            return self._store.get(key, compute, view)
+        except ValueError as error:
+            raise AssetError(f"asset '{asset_id}': cannot be made: {error}") from error
+
+    def _key(self, asset_id: AssetId, family: AnyFamily) -> str:
+        arguments = _arguments(asset_id, family)
+        parameters = {name: shown(value) for name, value in arguments.items()}
+        return content_key(
+            {"family": asset_id.name, "version": family.version, "parameters": parameters}
+        )
+
+
+def _kind(family: AnyFamily) -> Any:
+    if isinstance(family, Family):
+        return "object"
+    return "texture" if isinstance(family, TextureFamily) else "environment"
+
+
+def _tags(name: str, family: AnyFamily) -> tuple[str, ...]:
+    """Its own tags, its name and its category as one word."""
+    category = family.category if isinstance(family, Family) else family.name
+    words = {*family.tags, name.rpartition("/")[2], category.replace(" ", "_"), "procedural"}
+    return tuple(sorted(words))
+
+
+def _arguments(asset_id: AssetId, family: AnyFamily) -> dict[str, Any]:
+    """Every parameter of a family's function, from the id or by default.
+
+    Raises:
+        AssetError: if the id has a parameter that the family has not, or of another type.
+    """
+    parameters = family.parameters if isinstance(family, Family) else {}
+    defaults: dict[str, Any] = dict(parameters)
+    if family.variants or not isinstance(family, Family):
+        defaults.setdefault("seed", 0)
+    for key, value in asset_id.parameters.items():
+        if key not in defaults:
+            raise AssetError(
+                f"asset '{asset_id}': '{asset_id.name}' has no parameter '{key}'"
+                f"{did_you_mean(key, defaults)}; expected {', '.join(sorted(defaults)) or 'none'}"
+            )
+        defaults[key] = _like(asset_id, key, value, defaults[key])
+    return defaults
+
+
+def _like(asset_id: AssetId, key: str, value: ParameterValue, default: Any) -> ParameterValue:
+    """The value, if it is of the default's type; whole numbers serve as fractions."""
+    if key == "seed" and not (isinstance(value, int) and 0 <= value <= _MAX_SEED):
+        raise AssetError(f"asset '{asset_id}': seed is not a whole number from 0 to {_MAX_SEED}")
+    if isinstance(default, tuple):
+        if isinstance(value, tuple) and len(value) == len(default):
+            return value
+        raise AssetError(f"asset '{asset_id}': {key} expects {len(default)} numbers with commas")
+    if isinstance(default, str) != isinstance(value, str) or isinstance(value, tuple):
+        expected = "a word" if isinstance(default, str) else "a number"
+        raise AssetError(f"asset '{asset_id}': {key} expects {expected}")
+    return float(value) if isinstance(default, float) and isinstance(value, int) else value

@@ -1,0 +1,262 @@
+"""From files to the normal form: one object, or one link of a robot.
+
+Objects get their origin at the centre of their bounding box (furniture: at the centre of its
+bottom), close to the centre of mass, since physics takes the origin for it. Links keep the frame
+of the URDF. Mesh and collision parts always share one frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from generator.assets.catalogue import Finish, MeshEntry, RobotEntry
+from generator.assets.convex import convex_parts, one_hull
+from generator.assets.folder import Folder
+from generator.assets.images import decode
+from generator.assets.mesh import NormalForm, check_coordinates, normal_form
+from generator.assets.primitives import box, cylinder, sphere
+from generator.assets.readers import read_mesh
+from generator.assets.readers.source import linear_of_srgb
+from generator.assets.soup import Float64, Slot, Soup, joined
+from generator.assets.urdf import Shape, Urdf, read_urdf
+from generator.core.errors import AssetError
+from generator.core.geometry import ConvexParts, Material, MeshData, UInt8
+from generator.core.se3 import SE3
+
+VERSION = 1
+"""Raised whenever the same files would come out as other geometry."""
+_WHITEST = 0.85
+"""Files say 1 for white; no matt surface reflects more than fresh snow does (about 0.85)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """An asset in the normal form.
+
+    Attributes:
+        mesh: None for a robot link that only collides.
+        collision: None for a robot link that is only seen.
+        images: ``{name: uint8 [h, w, 3]}`` of the images inside the file; a material's texture
+            ``<asset id>#<name>`` refers to one of these, or to a file of the folder.
+    """
+
+    mesh: MeshData | None
+    collision: ConvexParts | None
+    images: Mapping[str, UInt8]
+
+
+def import_object(folder: Folder, entry: MeshEntry, asset_id: str) -> Imported:
+    """An object from its mesh or URDF file. Raises AssetError if it is unfit."""
+    place = str(folder.root / entry.file)
+    looks, collides, images = _raw(folder, entry)
+    soup = _finished(joined(looks), entry.materials, place, asset_id)
+    matrix = _upright(entry)
+    soup = soup.transformed(matrix)
+    scale, shift = _scale_and_shift(soup, entry, place)
+    soup = soup.transformed(_scaling(scale, shift))
+    mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
+    if collides:
+        solid = joined(collides).transformed(matrix).transformed(_scaling(scale, shift))
+        check_coordinates(solid, place)
+        collision = convex_parts(solid, place, entry.parts)
+    else:
+        collision = convex_parts(replace(soup, face_groups=soup.face_slots * 0), place, entry.parts)
+    decoded = {name: decode(data, f"{place}#{name}") for name, data in images.items()}
+    return Imported(mesh, collision, decoded)
+
+
+def import_link(
+    folder: Folder, entry: RobotEntry, robot_id: str, urdf: Urdf, link_name: str
+) -> Imported:
+    """One link of a robot, in the link's frame. Raises AssetError if it is unfit."""
+    link = urdf.links[link_name]
+    place = f"{folder.root / entry.file}: link '{link_name}'"
+    mesh = collision = None
+    if link.visuals:
+        soup = joined([_shape_soup(folder, shape, SE3()) for shape in link.visuals])
+        if entry.palette:
+            soup = _palette_colors(folder, soup)
+        soup = _finished(soup, entry.materials, place, robot_id)
+        mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
+    if link.collisions:
+        solids = [_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
+        check_coordinates(joined(solids), place)
+        # One hull per element and group: what a URDF collides with is taken as convex.
+        collision = ConvexParts(
+            tuple(
+                part
+                for solid in solids
+                for part in (
+                    convex_parts(solid, place, 1) if _grouped(solid) else one_hull(solid, place)
+                ).parts_m
+            )
+        )
+    return Imported(mesh, collision, {})
+
+
+def _grouped(soup: Soup) -> bool:
+    return bool((soup.face_groups != soup.face_groups[0]).any())
+
+
+def _raw(
+    folder: Folder, entry: MeshEntry
+) -> tuple[list[Soup], list[Soup], Mapping[str, bytes]]:
+    """What is seen, what collides (empty = the same), and embedded images, as the files have it."""
+    images: Mapping[str, bytes] = {}
+    collides: list[Soup] = []
+    if entry.file.lower().endswith(".urdf"):
+        urdf = read_urdf(folder, entry.file)
+        poses = urdf.poses_at_zero()
+        visuals = [(s, poses[n]) for n, link in urdf.links.items() for s in link.visuals]
+        solids = [(s, poses[n]) for n, link in urdf.links.items() for s in link.collisions]
+        if not visuals:
+            raise AssetError(f"{folder.root / entry.file}: shows nothing; give it a <visual>")
+        looks = [_shape_soup(folder, shape, pose) for shape, pose in visuals]
+        if [_geometry(s) for s in solids] != [_geometry(v) for v in visuals]:
+            collides = [_shape_soup(folder, s, pose, materials=False) for s, pose in solids]
+    else:
+        source = read_mesh(folder, entry.file)
+        looks, images = [source.soup], source.images
+    if entry.collision:
+        collides = [read_mesh(folder, entry.collision, materials=False).soup]
+    return looks, collides, images
+
+
+def _geometry(placed: tuple[Shape, SE3]) -> tuple[object, ...]:
+    shape, pose = placed
+    return (shape.kind, shape.file, shape.size, shape.T_link_shape, pose)
+
+
+def _shape_soup(
+    folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
+) -> Soup:
+    """Triangles of a URDF element in the root frame, with the element's colour."""
+    matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
+    if shape.kind == "mesh":
+        soup = read_mesh(folder, shape.file, materials=materials).soup
+        matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
+    elif shape.kind == "box":
+        soup = Soup.of(box(shape.size))
+    elif shape.kind == "cylinder":
+        soup = Soup.of(cylinder(shape.size[0], shape.size[1]))
+    else:
+        soup = Soup.of(sphere(shape.size[0]))
+    slots = tuple(_painted(slot, shape) for slot in soup.slots)
+    return replace(soup, slots=slots).transformed(matrix)
+
+
+def _painted(slot: Slot, shape: Shape) -> Slot:
+    """A slot under the material of a URDF element: it colours what the file leaves plain.
+
+    White is what descriptions say when they mean nothing in particular: the mesh's own colours
+    stay then.
+    """
+    if shape.color is None or slot.material.texture:
+        return slot
+    if slot.from_file and min(shape.color) > 0.99:
+        return slot
+    color = linear_of_srgb(shape.color)
+    return Slot(shape.material or slot.name, replace(slot.material, base_color=color), True)
+
+
+def _finished(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str) -> Soup:
+    """Slots with the entry's finishes, textures named by their owner, and no impossible whites."""
+    slots = []
+    for slot in soup.slots:
+        finish = finishes.get(slot.name, finishes.get("*"))
+        if slot.missing_library and not slot.from_file and finish is None:
+            raise AssetError(
+                f"{place}: material '{slot.name}' should be in {slot.missing_library}, which is "
+                "missing; add that file, or give 'materials' in the asset index"
+            )
+        material = slot.material
+        if material.texture:
+            material = replace(material, texture=f"{owner}#{material.texture}")
+        else:
+            material = replace(material, base_color=_possible(material))
+        if finish is not None:
+            material = _with_finish(material, finish)
+        slots.append(replace(slot, material=material))
+    return replace(soup, slots=tuple(slots))
+
+
+def _with_finish(material: Material, finish: Finish) -> Material:
+    changes = {k: v for k, v in finish.model_dump().items() if v is not None}
+    return replace(material, **changes)
+
+
+def _possible(material: Material) -> tuple[float, float, float]:
+    if material.metallic > 0.5:
+        return material.base_color
+    red, green, blue = (min(c, _WHITEST) for c in material.base_color)
+    return (red, green, blue)
+
+
+def _palette_colors(folder: Folder, soup: Soup) -> Soup:
+    """Slots whose image only holds a colour take it: the median of what their corners touch.
+
+    The file's own colour wins where it is darker, since exporters write it beside the image.
+    """
+    slots = []
+    for k, slot in enumerate(soup.slots):
+        chosen = soup.face_slots == k
+        if slot.material.texture and soup.uvs is not None and chosen.any():
+            image = decode(folder.read(slot.material.texture), slot.material.texture)
+            rows, columns = _pixels(soup.uvs[chosen].reshape(-1, 2), image.shape[:2])
+            median = np.median(image[rows, columns], axis=0) / 255.0
+            own = slot.declared_color
+            color = linear_of_srgb((float(median[0]), float(median[1]), float(median[2])))
+            red, green, blue = (min(a, b) for a, b in zip(color, own, strict=True))
+            material = replace(slot.material, texture="", base_color=(red, green, blue))
+            slot = replace(slot, material=material)  # noqa: PLW2901
+        slots.append(slot)
+    return replace(soup, slots=tuple(slots), uvs=None)
+
+
+def _pixels(uvs: Float64, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    height, width = shape[:2]
+    columns = np.floor(uvs[:, 0] * width).astype(np.int64) % width
+    rows = np.floor((1.0 - uvs[:, 1]) * height).astype(np.int64) % height
+    return rows, columns
+
+
+def _upright(entry: MeshEntry) -> Float64:
+    """Affine map that turns the file's axes to Z up and the front to +X."""
+    suffix = entry.file.lower().rpartition(".")[2]
+    up = entry.up or ("y" if suffix in ("glb", "gltf") else "z")
+    axes = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]) if up == "y" else np.eye(3)
+    yaw = math.radians(entry.yaw_deg)
+    c, s = round(math.cos(yaw), 12), round(math.sin(yaw), 12)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    matrix = np.zeros((3, 4))
+    matrix[:, :3] = np.einsum("ij,jk->ik", turn, axes, optimize=False)
+    return matrix
+
+
+def _scale_and_shift(soup: Soup, entry: MeshEntry, place: str) -> tuple[float, Float64]:
+    if not np.isfinite(soup.corners).all():
+        raise AssetError(f"{place}: holds vertices that are not finite; export it again")
+    points = soup.corners.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    scale = entry.scale
+    if entry.size_m is not None:
+        extent = float((high - low).max())
+        if not extent > 0.0:
+            raise AssetError(f"{place}: has no extent; export it again")
+        scale = entry.size_m / extent
+    anchor = 0.5 * (low + high)
+    if entry.origin == "floor":
+        anchor[2] = low[2]
+    return scale, -scale * anchor
+
+
+def _scaling(scale: float, shift: Float64) -> Float64:
+    matrix = np.zeros((3, 4))
+    matrix[:, :3] = scale * np.eye(3)
+    matrix[:, 3] = shift
+    return matrix
+

@@ -1,0 +1,124 @@
+"""The library: every mesh, texture, environment and robot by id, in the normal form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+
+from generator.assets.cache import DiskCache, Store
+from generator.assets.files import Files
+from generator.assets.generated import Generated
+from generator.assets.ids import canonical, parse
+from generator.assets.importer import Imported
+from generator.core.errors import AssetError, did_you_mean
+from generator.core.geometry import (
+    Asset,
+    ConvexParts,
+    Float32,
+    Material,
+    MeshData,
+    RobotModel,
+    TextureData,
+)
+from generator.core.se3 import Vec3
+
+
+def open_library(user_roots: Sequence[Path] = (), cache_dir: Path | None = None) -> Library:
+    """A library of the procedural assets, pybullet's, and those in the user's folders.
+
+    Nothing is read before it is asked for.
+
+    Args:
+        user_roots: Folders with or without an ``assets.yaml``; their ids start with ``user/``.
+        cache_dir: Where normal forms are kept; by default the user's cache folder.
+    """
+    return Library(tuple(Path(root) for root in user_roots), cache_dir or _default_cache_dir())
+
+
+class Library:
+    """Implements ``AssetLibrary``. One per process; what it caches depends on content only."""
+
+    def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path) -> None:
+        disk = DiskCache(cache_dir)
+        store = Store(disk)
+        self._generated = Generated(store)
+        self._files = Files(user_roots, disk, store)
+
+    def get(self, asset_id: str) -> Asset:
+        """The entry of that id. Raises AssetError with the nearest id if unknown."""
+        if self._is_generated(asset_id):
+            return self._generated.get(parse(asset_id))
+        return self._files.get(asset_id)
+
+    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
+        """All assets of the kind that carry every tag, sorted by id; may be empty."""
+        wanted = frozenset(tags)
+        found = [*self._generated.find(wanted, kind), *self._files.find(wanted, kind)]
+        return tuple(sorted(found, key=lambda asset: asset.asset_id))
+
+    def tags(self, kind: str = "object") -> tuple[str, ...]:
+        """Every tag that some asset of the kind carries, sorted."""
+        return tuple(sorted({*self._generated.tags(kind), *self._files.tags(kind)}))
+
+    def materials(self, asset_id: str) -> tuple[Material, ...]:
+        """The asset's own materials, one per mesh slot."""
+        return self.mesh(asset_id).materials
+
+    def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+        """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
+        return self.mesh(asset_id).bounds_m()
+
+    def robot(self, asset_id: str) -> RobotModel:
+        """Kinematics of a robot. Raises AssetError if the asset is no robot."""
+        if self._is_generated(asset_id):
+            raise AssetError(f"asset '{asset_id}': is no robot")
+        return self._files.robot(asset_id)
+
+    def mesh(self, asset_id: str) -> MeshData:
+        """Visual geometry. Also for robot links: ``franka_panda/panda_link3``."""
+        mesh = self._imported(asset_id).mesh
+        if mesh is None:
+            raise AssetError(f"asset '{asset_id}': is a link that shows nothing")
+        return mesh
+
+    def convex_parts(self, asset_id: str) -> ConvexParts:
+        """Collision geometry, in the frame of the mesh."""
+        collision = self._imported(asset_id).collision
+        if collision is None:
+            raise AssetError(f"asset '{asset_id}': is a link that does not collide")
+        return collision
+
+    def texture(self, texture_id: str) -> TextureData:
+        """Images of a texture."""
+        if self._is_generated(texture_id.partition("#")[0]):
+            return self._generated.texture(parse(texture_id))
+        return self._files.texture(texture_id)
+
+    def environment(self, environment_id: str) -> Float32:
+        """Equirectangular relative radiance as ``AssetLibrary`` describes it."""
+        if self._is_generated(environment_id):
+            return self._generated.environment(parse(environment_id))
+        return self._files.environment(environment_id)
+
+    def _imported(self, asset_id: str) -> Imported:
+        if self._is_generated(asset_id):
+            return self._generated.imported(parse(asset_id))
+        return self._files.imported(asset_id)
+
+    def _is_generated(self, asset_id: str) -> bool:
+        """Whether an id is computed or read. Raises AssetError if there is no such asset."""
+        name = asset_id.partition("?")[0]
+        if name in self._generated:
+            return True
+        if asset_id in self._files:
+            return False
+        known = [*self._generated.names(), *self._files.names()]
+        raise AssetError(f"asset '{asset_id[:120]}': there is none{did_you_mean(asset_id[:120], known)}; "
+                         "'gen-data assets list' shows them all")
+
+
+def _default_cache_dir() -> Path:
+    from platformdirs import user_cache_path  # noqa: PLC0415
+
+    return user_cache_path("gen-data")

@@ -1,0 +1,146 @@
+"""Periodic noise on a square image: what repeats without a seam.
+
+Perlin, "Improving noise", SIGGRAPH 2002; Worley, "A cellular texture basis function", SIGGRAPH
+1996; both on a torus. ``cells`` are lattice cells per image as (down, across).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.geometry import Float32
+from generator.core.streams import Rng
+
+SIZE_PX = 512
+
+Cells = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Worley:
+    """Distances to scattered points, in cells, and which point is nearest.
+
+    Attributes:
+        nearest: float32 [n, n], distance to the nearest point.
+        second: float32 [n, n], distance to the second nearest.
+        number: int64 [n, n], number of the nearest point.
+        count: Number of points.
+    """
+
+    nearest: Float32
+    second: Float32
+    number: NDArray[np.int64]
+    count: int
+
+    def of_each(self, values: NDArray[np.float64]) -> Float32:
+        """A value per point, shape [count, ...], as an image."""
+        image: Float32 = values.astype(np.float32)[self.number]
+        return image
+
+
+def uniform(count: int | tuple[int, ...], rng: Rng) -> NDArray[np.float64]:
+    """Uniform numbers in [0, 1)."""
+    drawn: NDArray[np.float64] = rng.random(count)
+    return drawn
+
+
+def perlin(cells: Cells, rng: Rng, size_px: int = SIZE_PX) -> Float32:
+    """Gradient noise in about [-1, 1], shape [size, size]."""
+    down, across = cells
+    angle = 2.0 * math.pi * uniform((down, across), rng)
+    gy, gx = np.sin(angle).astype(np.float32), np.cos(angle).astype(np.float32)
+    iy, fy = _lattice(down, size_px)
+    ix, fx = _lattice(across, size_px)
+    sy, sx = _fade(fy)[:, None], _fade(fx)[None, :]
+
+    def corner(dy: int, dx: int) -> Float32:
+        row, column = (iy + dy) % down, (ix + dx) % across
+        at = np.ix_(row, column)
+        value: Float32 = gy[at] * (fy - dy)[:, None] + gx[at] * (fx - dx)[None, :]
+        return value
+
+    upper = corner(0, 0) * (1 - sx) + corner(0, 1) * sx
+    lower = corner(1, 0) * (1 - sx) + corner(1, 1) * sx
+    noise: Float32 = (upper * (1 - sy) + lower * sy) * np.float32(1.6)
+    return noise
+
+
+def fbm(cells: Cells, octaves: int, rng: Rng, gain: float = 0.5, size_px: int = SIZE_PX) -> Float32:
+    """Perlin octaves of doubling frequency, in about [-1, 1]."""
+    total = np.zeros((size_px, size_px), dtype=np.float32)
+    weight, weights = 1.0, 0.0
+    down, across = cells
+    for _ in range(octaves):
+        if max(down, across) > size_px:
+            break
+        total += np.float32(weight) * perlin((down, across), rng, size_px)
+        weights += weight
+        weight, down, across = weight * gain, 2 * down, 2 * across
+    return total / np.float32(math.sqrt(weights))
+
+
+def worley(cells: Cells, rng: Rng, jitter: float = 1.0, size_px: int = SIZE_PX) -> Worley:
+    """Cellular noise with one point per lattice cell."""
+    down, across = cells
+    place = 0.5 + jitter * (uniform((2, down, across), rng) - 0.5)
+    py, px = place.astype(np.float32)
+    iy, fy = _lattice(down, size_px)
+    ix, fx = _lattice(across, size_px)
+    nearest = np.full((size_px, size_px), 9.0, dtype=np.float32)
+    second = nearest.copy()
+    number = np.zeros((size_px, size_px), dtype=np.int64)
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            row, column = (iy + dy) % down, (ix + dx) % across
+            at = np.ix_(row, column)
+            away = (py[at] + (dy - fy)[:, None]) ** 2 + (px[at] + (dx - fx)[None, :]) ** 2
+            closer = away < nearest
+            second = np.where(closer, nearest, np.minimum(second, away))
+            number = np.where(closer, row[:, None] * across + column[None, :], number)
+            nearest = np.where(closer, away, nearest)
+    return Worley(np.sqrt(nearest), np.sqrt(second), number, down * across)
+
+
+def warped(image: Float32, dy_px: Float32, dx_px: Float32) -> Float32:
+    """The image sampled (nearest pixel, wrapping) at displaced places."""
+    rows, columns = image.shape[:2]
+    y = (np.arange(rows)[:, None] + np.round(dy_px).astype(np.int64)) % rows
+    x = (np.arange(columns)[None, :] + np.round(dx_px).astype(np.int64)) % columns
+    sampled: Float32 = image[y, x]
+    return sampled
+
+
+def blurred(image: Float32, passes: int = 1) -> Float32:
+    """A [1 2 1] / 4 blur in both directions, wrapping, repeated."""
+    for _ in range(passes):
+        for axis in (0, 1):
+            image = 0.5 * image + 0.25 * (np.roll(image, 1, axis) + np.roll(image, -1, axis))
+    return image
+
+
+def smoothstep(low: float, high: float, x: Float32) -> Float32:
+    """0 below ``low``, 1 above ``high``, smooth between; reversed bounds reverse it."""
+    t = np.clip((x - np.float32(low)) / np.float32(high - low), 0.0, 1.0)
+    step: Float32 = t * t * (3 - 2 * t)
+    return step
+
+
+def rows_and_columns(size_px: int = SIZE_PX) -> tuple[Float32, Float32]:
+    """Pixel centres in [0, 1): a column of y (down) and a row of x."""
+    centres = ((np.arange(size_px) + 0.5) / size_px).astype(np.float32)
+    return centres[:, None], centres[None, :]
+
+
+def _lattice(cells: int, size_px: int) -> tuple[NDArray[np.int64], Float32]:
+    position = (np.arange(size_px) + 0.5) * cells / size_px
+    index = np.floor(position).astype(np.int64)
+    return index, (position - index).astype(np.float32)
+
+
+def _fade(t: Float32) -> Float32:
+    faded: Float32 = t * t * t * (t * (t * 6 - 15) + 10)
+    return faded

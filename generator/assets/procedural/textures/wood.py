@@ -1,0 +1,77 @@
+"""Wood: fine grain of one board, and planks of a floor or table top. Grain runs across the image."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.assets.procedural.draw import between, pick, rng_of
+from generator.assets.procedural.noise import (
+    SIZE_PX,
+    fbm,
+    perlin,
+    rows_and_columns,
+    smoothstep,
+    uniform,
+)
+from generator.assets.procedural.textures.images import color, mixed, texture
+from generator.core.geometry import Float32, TextureData
+from generator.core.streams import Rng
+
+# Light and dark wood of: oak, beech, pine, walnut, cherry, ash, teak, wenge, birch.
+_SPECIES = (("#c8a478", "#a67c50"), ("#d2a67c", "#bb8a60"), ("#e0bd88", "#c18f55"),
+            ("#7d5a3e", "#4f3524"), ("#b06f45", "#8a4f2e"), ("#d8c3a0", "#b79c74"),
+            ("#a9763f", "#7a4f26"), ("#4b3629", "#2c1e17"), ("#e3cda6", "#cbb083"))
+
+
+def wood_grain(seed: int) -> TextureData:
+    """One board; 0.4 m per repeat."""
+    rng = rng_of("wood_grain", seed)
+    rings, fibre = _grain(rng)
+    light, dark = (color(code) for code in pick(_SPECIES, rng))
+    albedo = mixed(light, dark, 0.75 * rings + 0.35 * fibre)
+    return texture(albedo, 0.85 + 0.15 * fibre, -0.8 * fibre - 0.3 * rings)
+
+
+def wood_planks(seed: int) -> TextureData:
+    """Boards laid side by side, ends staggered; 1.2 m per repeat."""
+    rng = rng_of("wood_planks", seed)
+    rings, fibre = _grain(rng)
+    light, dark = (color(code) for code in pick(_SPECIES, rng))
+    rows = pick((4, 6, 8, 8, 10), rng)
+    per_row = pick((1, 2, 2, 3), rng)
+    y, x = rows_and_columns()
+    row = np.floor(y * rows).astype(np.int64) + np.zeros_like(x, dtype=np.int64)
+    along = (x + uniform(rows, rng).astype(np.float32)[row]) * per_row
+    plank = row * per_row + np.floor(along).astype(np.int64) % per_row
+    shift = (uniform((2, rows * per_row), rng) * SIZE_PX).astype(np.int64)
+    at = ((np.arange(SIZE_PX)[:, None] + shift[0][plank]) % SIZE_PX,
+          (np.arange(SIZE_PX)[None, :] + shift[1][plank]) % SIZE_PX)
+    rings, fibre = rings[at], fibre[at]
+    tone = (uniform(rows * per_row, rng).astype(np.float32) - 0.5)[plank]
+    albedo = mixed(light, dark, 0.6 * rings + 0.3 * fibre + 0.35 * tone)
+    albedo *= (1.0 + between(0.05, 0.2, rng) * tone)[..., None]
+    side = np.abs(y * rows - np.round(y * rows)) * SIZE_PX / rows
+    end = np.abs(along - np.round(along)) * SIZE_PX / per_row
+    width = between(1.0, 2.2, rng)
+    gap = 1 - smoothstep(0.3 * width, width, np.minimum(side, end))
+    albedo = mixed(albedo, 0.25 * dark, 0.85 * gap)
+    rough = 0.8 + 0.15 * fibre + 0.2 * gap
+    return texture(albedo, rough, -0.5 * fibre - 2.0 * gap)
+
+
+def _grain(rng: Rng) -> tuple[Float32, Float32]:
+    """Growth rings and fibres, both in about [0, 1]."""
+    y, _ = rows_and_columns()
+    count = pick((3, 5, 7, 9), rng)
+    bend = between(0.5, 1.6, rng)
+    phase = count * y + bend * fbm((2, 1), 3, rng) + 0.12 * fbm((24, 2), 2, rng)
+    ring = phase - np.floor(phase)
+    # Early wood is wide and pale, late wood a thin dark line that ends abruptly.
+    rings = ring ** np.float32(between(1.2, 3.0, rng)) * (1 - smoothstep(0.93, 1.0, ring))
+    streaks = np.abs(perlin((128, 4), rng)) + 0.5 * np.abs(perlin((256, 8), rng))
+    pores = smoothstep(0.5, 0.85, perlin((170, 17), rng) + 0.25 * rings)
+    tone = 0.18 * fbm((6, 2), 3, rng)
+    fibre: Float32 = np.clip(0.45 * streaks + 0.6 * pores, 0.0, 1.0)
+    return np.clip(rings + tone, 0.0, 1.0), fibre
+
+

@@ -1,0 +1,304 @@
+"""URDF: links, joints, and what they look like.
+
+Source: ROS wiki, urdf/XML. Document type declarations are refused, so that no entity is ever
+expanded; elements that describe neither kinematics nor geometry are ignored.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import PurePosixPath
+from typing import Any
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+from generator.assets.folder import Folder
+from generator.core.errors import AssetError
+from generator.core.geometry import Joint
+from generator.core.se3 import SE3, Vec3
+
+_MAX_ELEMENTS = 50_000
+_MAX_DEPTH = 64
+_MAX_LINKS = 500
+_KINDS = {"fixed", "revolute", "continuous", "prismatic"}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One visual or collision element.
+
+    Attributes:
+        kind: ``mesh``, ``box``, ``cylinder`` or ``sphere``.
+        file: Mesh file relative to the folder; empty for primitives.
+        size: Scale of a mesh; edges of a box; (radius, length, 0); (radius, 0, 0).
+        T_link_shape: Its pose.
+        material: Name of the material; empty = unnamed.
+        color: sRGB of the material; None = none is given.
+    """
+
+    kind: str
+    file: str
+    size: Vec3
+    T_link_shape: SE3
+    material: str = ""
+    color: Vec3 | None = None
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid part and its geometry."""
+
+    name: str
+    visuals: tuple[Shape, ...]
+    collisions: tuple[Shape, ...]
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """A robot description.
+
+    Attributes:
+        links: ``{name: link}``, root first, each after its parent.
+        joints: In the order of their child links.
+    """
+
+    links: dict[str, Link]
+    joints: tuple[Joint, ...]
+
+    def files(self) -> tuple[str, ...]:
+        """Every mesh file it refers to, sorted."""
+        shapes = [s for link in self.links.values() for s in (*link.visuals, *link.collisions)]
+        return tuple(sorted({s.file for s in shapes if s.file}))
+
+    def poses_at_zero(self) -> dict[str, SE3]:
+        """``T_root_link`` of every link with all joints at position 0."""
+        poses = {next(iter(self.links)): SE3()}
+        for joint in self.joints:
+            poses[joint.child] = poses[joint.parent] @ joint.T_parent_joint
+        return poses
+
+
+def read_urdf(folder: Folder, relative: str) -> Urdf:
+    """The robot in a URDF file.
+
+    Raises:
+        AssetError: if it is malformed, is no tree of links, or refers outside the folder.
+    """
+    place = str(folder.root / relative)
+    root = _parsed(folder.read(relative), place)
+    try:
+        colors = dict(_named_colors(root))
+        links = {
+            name: Link(
+                name,
+                tuple(_shapes(folder, relative, element, "visual", colors)),
+                tuple(_shapes(folder, relative, element, "collision", colors)),
+            )
+            for name, element in _distinct(root, "link")
+        }
+        joints = [_joint(element) for _, element in _distinct(root, "joint")]
+        return _ordered(links, joints)
+    except (ValueError, KeyError) as error:
+        reason = f"missing {error}" if isinstance(error, KeyError) else error
+        raise AssetError(f"{place}: malformed URDF ({reason}); correct it") from None
+
+
+def _parsed(data: bytes, place: str) -> Element:
+    builder = TreeBuilder()
+    parser = expat.ParserCreate()
+    depth = count = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, count
+        depth, count = depth + 1, count + 1
+        if depth > _MAX_DEPTH or count > _MAX_ELEMENTS:
+            raise ValueError(f"more than {_MAX_DEPTH} levels or {_MAX_ELEMENTS} elements")
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    def refuse(*_: Any) -> None:
+        raise ValueError("it declares a document type, which is not allowed; remove it")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+        root: Element = builder.close()
+    except (ValueError, expat.ExpatError, AssertionError) as error:
+        raise AssetError(f"{place}: malformed XML ({error}); correct it") from None
+    if root.tag != "robot":
+        raise AssetError(f"{place}: its root element is <{root.tag[:40]}>, not <robot>; give a URDF")
+    return root
+
+
+def _distinct(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
+    """Name and element of every child of a kind."""
+    seen: set[str] = set()
+    for element in root.findall(tag):
+        name = element.attrib["name"]
+        if name in seen or not name:
+            raise ValueError(f"two {tag}s named '{name[:40]}'")
+        seen.add(name)
+        yield name, element
+    if len(seen) > _MAX_LINKS:
+        raise ValueError(f"more than {_MAX_LINKS} {tag}s")
+
+
+def _named_colors(root: Element) -> Iterator[tuple[str, Vec3]]:
+    """Colours of named materials, wherever they are defined; the first definition counts."""
+    for material in reversed(root.findall(".//material")):
+        color = material.find("color")
+        if color is not None and material.get("name"):
+            yield material.attrib["name"], _numbers(color.attrib["rgba"], 4)[:3]  # type: ignore[misc]
+
+
+def _shapes(
+    folder: Folder, relative: str, link: Element, tag: str, colors: dict[str, Vec3]
+) -> Iterator[Shape]:
+    for element in link.findall(tag):
+        geometry = element.find("geometry")
+        if geometry is None or not len(geometry):
+            continue
+        shape = _shape(folder, relative, geometry[0], _pose(element.find("origin")))
+        material = element.find("material")
+        if material is not None:
+            color = material.find("color")
+            name = material.get("name", "")
+            own = _vector(color.attrib["rgba"].rsplit(None, 1)[0]) if color is not None else None
+            shape = replace(shape, material=name, color=own or colors.get(name))
+        yield shape
+
+
+def _shape(folder: Folder, relative: str, element: Element, pose: SE3) -> Shape:
+    get = element.attrib
+    if element.tag == "mesh":
+        file = _mesh_file(folder, relative, get["filename"])
+        scale = get.get("scale", "1 1 1").split()
+        return Shape("mesh", file, _vector(" ".join(scale * 3 if len(scale) == 1 else scale)), pose)
+    if element.tag == "box":
+        return Shape("box", "", _vector(get["size"]), pose)
+    if element.tag in ("cylinder", "capsule"):
+        return Shape("cylinder", "", (float(get["radius"]), float(get["length"]), 0.0), pose)
+    if element.tag == "sphere":
+        return Shape("sphere", "", (float(get["radius"]), 0.0, 0.0), pose)
+    raise ValueError(f"geometry <{element.tag[:40]}> is not known")
+
+
+def _mesh_file(folder: Folder, relative: str, name: str) -> str:
+    """The file that ``package://x/y`` or a relative path means, below the folder.
+
+    A package is the folder of that name beside or above the URDF; older descriptions leave the
+    package's name out, so the path is also tried as it stands.
+    """
+    if not name.startswith("package://"):
+        return folder.refer(relative, name)
+    path = name.removeprefix("package://")
+    base = PurePosixPath(relative).parent
+    candidates = []
+    for ancestor in (base, *base.parents):
+        at = str(ancestor / "x.urdf")
+        candidates.append(folder.refer(at, path))
+        if ancestor.name == PurePosixPath(path).parts[0]:
+            candidates.append(folder.refer(at, "/".join(PurePosixPath(path).parts[1:])))
+    return next((c for c in candidates if folder.exists(c)), candidates[0])
+
+
+def _joint(element: Element) -> Joint:
+    name, kind = element.attrib["name"], element.attrib["type"]
+    if kind not in _KINDS:
+        raise ValueError(f"joint '{name[:40]}' is of type '{kind[:40]}', not {sorted(_KINDS)}")
+    limit, axis, mimic = element.find("limit"), element.find("axis"), element.find("mimic")
+    lower = upper = 0.0
+    if kind == "continuous":
+        lower, upper = -math.pi, math.pi
+    elif kind != "fixed":
+        if limit is None:
+            raise ValueError(f"joint '{name[:40]}' has no limits")
+        lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
+        if not lower <= upper:
+            raise ValueError(f"joint '{name[:40]}' has lower limit {lower} above upper {upper}")
+    return Joint(
+        name=name,
+        kind=kind,  # type: ignore[arg-type]
+        parent=_child(element, "parent"),
+        child=_child(element, "child"),
+        T_parent_joint=_pose(element.find("origin")),
+        axis=(1.0, 0.0, 0.0) if kind == "fixed" or axis is None else _unit(axis.attrib["xyz"]),
+        lower=lower,
+        upper=upper,
+        mimic="" if mimic is None else mimic.attrib["joint"],
+    )
+
+
+def _child(element: Element, tag: str) -> str:
+    child = element.find(tag)
+    if child is None:
+        raise ValueError(f"joint '{element.attrib['name'][:40]}' has no {tag}")
+    return child.attrib["link"]
+
+
+def _ordered(links: dict[str, Link], joints: list[Joint]) -> Urdf:
+    """Links root first, in the order of the joints. Raises ValueError if they form no tree."""
+    by_parent: dict[str, list[Joint]] = {}
+    for joint in joints:
+        if joint.parent not in links or joint.child not in links:
+            raise ValueError(f"joint '{joint.name[:40]}' joins a link that does not exist")
+        by_parent.setdefault(joint.parent, []).append(joint)
+    children = [joint.child for joint in joints]
+    roots = [name for name in links if name not in set(children)]
+    if len(roots) != 1 or len(children) != len(set(children)):
+        raise ValueError(f"its links form no tree: {len(roots)} of them have no parent")
+    order, ordered_joints, pending = [roots[0]], [], list(reversed(by_parent.get(roots[0], [])))
+    while pending:
+        joint = pending.pop()
+        ordered_joints.append(joint)
+        order.append(joint.child)
+        pending += reversed(by_parent.get(joint.child, []))
+    if len(order) != len(links):
+        raise ValueError("its joints form a loop")
+    for joint in joints:
+        if joint.mimic and joint.mimic not in {j.name for j in joints}:
+            raise ValueError(f"joint '{joint.name[:40]}' follows a joint that does not exist")
+    return Urdf({name: links[name] for name in order}, tuple(ordered_joints))
+
+
+def _pose(origin: Element | None) -> SE3:
+    if origin is None:
+        return SE3()
+    return SE3(_vector(origin.get("xyz", "0 0 0")), _quaternion(*_vector(origin.get("rpy", "0 0 0"))))
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """Fixed-axis roll, pitch, yaw (URDF) as a quaternion, rounded off its decimal noise."""
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    return (round(w, 12), round(x, 12), round(y, 12), round(z, 12))
+
+
+def _unit(text: str) -> Vec3:
+    x, y, z = _vector(text)
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < 1e-9:
+        raise ValueError("a joint axis of length zero")
+    return (x / length, y / length, z / length)
+
+
+def _vector(text: str) -> Vec3:
+    x, y, z = _numbers(text, 3)
+    return (x, y, z)
+
+
+def _numbers(text: str, count: int) -> tuple[float, ...]:
+    numbers = tuple(float(word) for word in text.split())
+    if len(numbers) != count or not all(math.isfinite(n) for n in numbers):
+        raise ValueError(f"'{text[:40]}' is not {count} numbers")
+    return numbers

@@ -1,0 +1,119 @@
+"""The lattice: every second pixel of every second row, where light is gathered first.
+
+Light changes slowly along a surface. Shadows, ambient occlusion and shading are computed on the
+lattice, and every other pixel takes what lattice points on the same stretch of surface agree on.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from generator.renderers.kernels.records import View, World, pixel_direction, unit
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.struct
+class Lattice:
+    """What is seen at the lattice's points, flat, row by row.
+
+    Attributes:
+        body: -1 where nothing is seen.
+        p_m, normal: Point and smooth unit normal in the world.
+        origin_m: Where rays start that leave the surface.
+        skip: The body that cannot shade the point although it lies on it, or -1.
+    """
+
+    width: int
+    height: int
+    body: wp.array(dtype=int)
+    skip: wp.array(dtype=int)
+    p_m: wp.array(dtype=wp.vec3)
+    normal: wp.array(dtype=wp.vec3)
+    origin_m: wp.array(dtype=wp.vec3)
+
+
+@wp.func
+def ray_origin(
+    world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d_world: wp.vec3
+):
+    """A point just off the surface, on the curved surface that the normals speak of.
+
+    Source: Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021.
+    """
+    body = world.bodies[hit[0]]
+    geometry = world.geometries[body.geometry]
+    face = hit[1]
+    a = geometry.vertices_m[geometry.faces[3 * face]]
+    b = geometry.vertices_m[geometry.faces[3 * face + 1]]
+    c = geometry.vertices_m[geometry.faces[3 * face + 2]]
+    u = weight[0]
+    side = float(1.0)
+    if u > 1.5:
+        u -= 2.0
+        side = -1.0
+    v = weight[1]
+    w = 1.0 - u - v
+    p = a * w + b * u + c * v
+    na = geometry.normals[geometry.faces[3 * face]] * side
+    nb = geometry.normals[geometry.faces[3 * face + 1]] * side
+    nc = geometry.normals[geometry.faces[3 * face + 2]] * side
+    shift = na * (w * wp.min(0.0, wp.dot(p - a, na)))
+    shift += nb * (u * wp.min(0.0, wp.dot(p - b, nb)))
+    shift += nc * (v * wp.min(0.0, wp.dot(p - c, nc)))
+    flat = unit(body.R_world_mesh @ wp.cross(b - a, c - a)) * side
+    # A tenth of a millimetre per metre: above float32's grain, below what a pixel resolves.
+    lift = 2.0e-5 + 1.0e-4 * wp.length(d_world)
+    return p_world + flat * lift - body.R_world_mesh @ (shift * body.scale)
+
+
+@wp.kernel
+def sample_lattice(
+    view: View,
+    world: World,
+    hits: wp.array(dtype=wp.vec2i),
+    z_m: wp.array(dtype=float),
+    weights: wp.array(dtype=wp.vec2),
+    normals: wp.array(dtype=wp.vec3),
+    lattice: Lattice,
+):
+    """Fill in the lattice's points."""
+    i = wp.tid()
+    x = 2 * (i % lattice.width)
+    y = 2 * (i / lattice.width)
+    pixel = y * view.width + x
+    hit = hits[pixel]
+    lattice.body[i] = hit[0]
+    if hit[0] < 0:
+        return
+    d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+    offset = d * z_m[pixel]
+    p = view.eye_m + offset
+    lattice.p_m[i] = p
+    lattice.normal[i] = normals[pixel]
+    lattice.origin_m[i] = ray_origin(world, hit, weights[pixel], p, offset)
+    convex = world.geometries[world.bodies[hit[0]].geometry].convex
+    lattice.skip[i] = wp.where(convex != 0 and weights[pixel][0] < 1.5, hit[0], -1)
+
+
+@wp.func
+def agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: float):
+    """Whether two points lie on one stretch of surface; 0 or the cosine between normals."""
+    cosine = wp.dot(n, m)
+    if cosine < 0.9 or wp.abs(wp.dot(n, q - p)) > tolerance_m:
+        cosine = 0.0
+    return cosine
+
+
+@wp.func
+def same_surface(lattice: Lattice, i: int, j: int, tolerance_m: float):
+    """Whether two lattice points share what they see of the world."""
+    same = bool(False)
+    if lattice.body[i] == lattice.body[j]:
+        same = (
+            agree(
+                lattice.p_m[i], lattice.normal[i], lattice.p_m[j], lattice.normal[j], tolerance_m
+            )
+            > 0.0
+        )
+    return same

@@ -1,0 +1,123 @@
+"""What the robot arm does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.config.distributions import Choice, Name, NonNegative, Uniform, UnitInterval
+from generator.core.errors import ConfigError
+from generator.core.geometry import Joint, RobotModel
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import ArmGoal, Articulation, Body, Scene
+from generator.core.se3 import SE3
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase
+from randomizers.placing import half_extents_m
+
+MODES = ("joints", "reach", "hold")
+GRASP_MARGIN = 0.9
+"""An object is held only if it is narrower than this share of the gripper's stroke."""
+FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
+"""Half a turn about X: a hand that points down."""
+
+
+class ArmConfiguration(RandomizerBase):
+    """Draws a goal for every arm; physics takes the first candidate that is free of collision.
+
+    Attributes:
+        mode: joints: any configuration within the limits. reach: the hand over the workspace,
+            pointing down. hold: the same, with an object between the fingers; where no object fits
+            the gripper, the arm reaches.
+        candidates: How many are drawn.
+        range_share: Share of each joint's range that is used, around its middle.
+        tilt_deg: How far the hand leans from pointing straight down.
+        opening: Of the gripper; 0 is closed, 1 is open.
+    """
+
+    type: Literal["arm_configuration"] = "arm_configuration"
+    every: Literal["scene"] = "scene"
+    mode: Name = Choice({"joints": 1.0, "reach": 2.0, "hold": 1.0})
+    candidates: int = Field(24, ge=1, le=256)
+    range_share: float = Field(0.9, gt=0, le=1)
+    tilt_deg: NonNegative = Uniform(0.0, 35.0)
+    opening: UnitInterval = Uniform(0.0, 1.0)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with a goal for every articulation."""
+        return replace(
+            scene,
+            articulations=tuple(
+                replace(arm, goal=self._goal(arm, scene, assets, rng))
+                for arm in scene.articulations
+            ),
+        )
+
+    def _goal(self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng) -> ArmGoal:
+        mode = self.mode.draw(rng)
+        if mode not in MODES:
+            raise ConfigError(
+                f"randomizers.{self.name}.mode: unknown mode '{mode}'; expected one of "
+                f"{', '.join(MODES)}"
+            )
+        robot = assets.robot(arm.asset)
+        opening = round(self.opening.draw(rng), 4)
+        held = _graspable(scene, robot, assets, rng) if mode == "hold" else ""
+        if mode == "joints" or robot.gripper is None:
+            joints = tuple(self._joints(robot, rng) for _ in range(self.candidates))
+            return ArmGoal("joints", joint_candidates=joints, opening=opening)
+        poses = tuple(self._pose(arm, rng) for _ in range(self.candidates))
+        if held:
+            return ArmGoal("hold", pose_candidates=poses, opening=opening, held=held)
+        return ArmGoal("reach", pose_candidates=poses, opening=opening)
+
+    def _joints(self, robot: RobotModel, rng: Rng) -> tuple[float, ...]:
+        return tuple(self._position(joint, rng) for joint in _arm_joints(robot))
+
+    def _position(self, joint: Joint, rng: Rng) -> float:
+        low, high = joint.lower, joint.upper
+        if joint.kind == "continuous":
+            low, high = -math.pi, math.pi
+        middle, half = 0.5 * (low + high), 0.5 * (high - low) * self.range_share
+        return round(middle + half * float(rng.uniform(-1.0, 1.0)), 6)
+
+    def _pose(self, arm: Articulation, rng: Rng) -> SE3:
+        """A hand over the workspace, pointing down but for a tilt in any direction."""
+        low, high = arm.workspace_m
+        x, y, z = (float(rng.uniform(a, b)) for a, b in zip(low, high, strict=True))
+        half_tilt = 0.5 * math.radians(self.tilt_deg.draw(rng))
+        towards = float(rng.uniform(0.0, 2.0 * math.pi))
+        lean = SE3(
+            quaternion_wxyz=(
+                math.cos(half_tilt),
+                math.sin(half_tilt) * math.cos(towards),
+                math.sin(half_tilt) * math.sin(towards),
+                0.0,
+            )
+        )
+        yaw = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)))
+        return (SE3((x, y, z)) @ lean @ yaw @ FLIP).rounded()
+
+
+def _arm_joints(robot: RobotModel) -> tuple[Joint, ...]:
+    """Joints that a goal has a position for: no finger, none that follows another."""
+    fingers = robot.gripper.finger_joints if robot.gripper else ()
+    return tuple(j for j in robot.movable if not j.mimic and j.name not in fingers)
+
+
+def _graspable(scene: Scene, robot: RobotModel, assets: AssetIndex, rng: Rng) -> str:
+    """Name of an object that fits between the fingers; empty if there is none."""
+    if robot.gripper is None:
+        return ""
+    limit_m = GRASP_MARGIN * robot.gripper.stroke_m
+    fitting = [b.name for b in scene.bodies if b.group and _width_m(b, assets) < limit_m]
+    return fitting[int(rng.integers(len(fitting)))] if fitting else ""
+
+
+def _width_m(body: Body, assets: AssetIndex) -> float:
+    """The smaller horizontal extent of an object that stands upright."""
+    half = half_extents_m(*assets.bounds_m(body.asset), body.scale)
+    return 2.0 * min(half[0], half[1])

@@ -1,0 +1,77 @@
+"""Floor, walls and ceiling; ground and studio backdrops."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.assets.procedural.furniture import SLOTS
+from generator.config.distributions import Flag, Positive, Probability, Uniform, UnitInterval
+from generator.core.geometry import Material
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body, Scene
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase, materials_of, pick, textures_named
+from randomizers.color_space import linear_of_hsv
+
+PAINT_ROUGHNESS = 0.85
+
+
+class Backdrop(RandomizerBase):
+    """Redecorates what stands behind: a room's floor, walls and ceiling, or a bare backdrop.
+
+    Attributes:
+        floor: Families or tags of textures for floors, ground and backdrops.
+        floor_scale_m: Length of one repeat on the floor.
+        walls: Families or tags of textures for walls that are not painted.
+        wall_scale_m: Length of one repeat on the walls.
+        painted: Whether walls are painted instead of textured.
+        hue, saturation, value: Of the paint.
+    """
+
+    type: Literal["backdrop"] = "backdrop"
+    floor: tuple[str, ...] = Field(("planks", "tiles", "concrete", "carpet"), min_length=1)
+    floor_scale_m: Positive = Uniform(0.8, 2.0)
+    walls: tuple[str, ...] = Field(("plaster", "brick", "concrete"), min_length=1)
+    wall_scale_m: Positive = Uniform(0.8, 2.0)
+    painted: Flag = Probability(0.6)
+    hue: UnitInterval = Uniform(0.0, 1.0)
+    saturation: UnitInterval = Uniform(0.0, 0.35)
+    value: UnitInterval = Uniform(0.55, 0.95)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Every background body redecorated."""
+        field = f"randomizers.{self.name}"
+        floors = textures_named(assets, self.floor, f"{field}.floor")
+        walls = textures_named(assets, self.walls, f"{field}.walls")
+        background = [b for b in scene.bodies if b.instance_id == 0]
+        return scene.with_bodies(*(self._redone(b, assets, floors, walls, rng) for b in background))
+
+    def _redone(
+        self,
+        body: Body,
+        assets: AssetIndex,
+        floors: tuple[str, ...],
+        walls: tuple[str, ...],
+        rng: Rng,
+    ) -> Body:
+        ground = _covering(pick(floors, rng), self.floor_scale_m.draw(rng))
+        textured = _covering(pick(walls, rng), self.wall_scale_m.draw(rng))
+        color = linear_of_hsv(self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng))
+        paint = Material(base_color=color, roughness=PAINT_ROUGHNESS)
+        wall = paint if self.painted.draw(rng) else textured
+        looks = {"floor": ground, "ground": ground, "paper": paint, "walls": wall}
+        slots = SLOTS.get(body.asset.partition("?")[0], ())
+        materials = list(materials_of(body, assets))
+        for number, slot in enumerate(slots[: len(materials)]):
+            materials[number] = looks.get(slot, materials[number])
+        return replace(body, materials=tuple(materials))
+
+
+def _covering(texture: str, scale_m: float) -> Material:
+    white = (1.0, 1.0, 1.0)
+    return Material(
+        base_color=white, roughness=1.0, texture=texture, texture_scale_m=round(scale_m, 4)
+    )

@@ -1,0 +1,113 @@
+"""What all randomizers share."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.config.strict import Strict
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.geometry import Material
+from generator.core.interfaces import AssetIndex, Stage
+from generator.core.scene import Body, Scene
+from generator.core.streams import Rng
+
+
+class RandomizerBase(Strict):
+    """Frozen parameters and one pure method.
+
+    Attributes:
+        name: The key of its random stream: two of one type need two names.
+        every: scene: drawn once, all views share it. view: drawn anew for every view.
+    """
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    every: Literal["scene", "view"] = "scene"
+
+    @property
+    def stage(self) -> Stage:
+        """When it runs."""
+        return Stage(self.every)
+
+    @abstractmethod
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """A new scene; the given one stays as it is."""
+
+
+class LookRandomizer(RandomizerBase):
+    """A randomizer of surfaces: it looks at every material of its targets.
+
+    Attributes:
+        targets: Names of object groups or bodies; empty = every object group.
+    """
+
+    targets: tuple[str, ...] = ()
+
+    def chosen(self, scene: Scene) -> Iterator[Body]:
+        """The bodies it looks at, in order.
+
+        Raises:
+            ConfigError: a target names nothing.
+        """
+        groups = {group.name for group in scene.groups}
+        owners = {body.name.partition("/")[0] for body in scene.bodies}
+        for target in self.targets:
+            if target not in groups | owners:
+                known = sorted(groups | owners)
+                raise ConfigError(
+                    f"randomizers.{self.name}.targets: there is no '{target}'; expected one of "
+                    f"{', '.join(known)}{did_you_mean(target, known)}"
+                )
+        wanted = set(self.targets) or groups
+        for body in scene.bodies:
+            if body.group in wanted or body.name.partition("/")[0] in wanted:
+                yield body
+
+
+def materials_of(body: Body, assets: AssetIndex) -> tuple[Material, ...]:
+    """The materials a body shows: its own, else its asset's."""
+    return body.materials or assets.materials(body.asset)
+
+
+def with_materials(body: Body, assets: AssetIndex, change: Callable[[Material], Material]) -> Body:
+    """The body with every material changed that is not printed."""
+    changed = tuple(
+        material if material.printed else change(material)
+        for material in materials_of(body, assets)
+    )
+    return replace(body, materials=changed)
+
+
+def textures_named(assets: AssetIndex, names: tuple[str, ...], field: str) -> tuple[str, ...]:
+    """Ids of all textures that carry any of these tags, or are of these families; sorted.
+
+    Raises:
+        ConfigError: there is none for a name.
+    """
+    found: set[str] = set()
+    every = assets.find((), kind="texture")
+    for name in names:
+        fitting = {a.asset_id for a in every if name in a.tags or _family(a.asset_id) == name}
+        if not fitting:
+            known = sorted(
+                {_family(a.asset_id) for a in every} | {t for a in every for t in a.tags}
+            )
+            raise ConfigError(
+                f"{field}: there is no texture '{name}'; expected one of {', '.join(known)}"
+                f"{did_you_mean(name, known)}"
+            )
+        found |= fitting
+    return tuple(sorted(found))
+
+
+def pick(options: tuple[str, ...], rng: Rng) -> str:
+    """One of several, each as likely as the others."""
+    return options[int(rng.integers(len(options)))]
+
+
+def _family(asset_id: str) -> str:
+    return asset_id.partition("/")[2].partition("?")[0]

@@ -1,0 +1,83 @@
+"""Where cameras are and what they look at."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from generator.config.distributions import Bounds, NonNegative, Normal, Positive, Scalar, Uniform
+from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Camera, Scene
+from generator.core.se3 import look_at
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase
+from randomizers.clearance import is_in_the_open
+
+TRIES = 48
+
+
+class CameraPose(RandomizerBase):
+    """An orbit around what the scene is about.
+
+    Attributes:
+        camera: Name of a sensor; empty = every camera, each drawn for itself.
+        distance_m: From the point it looks at.
+        azimuth_deg: Around the vertical; 0 is the side of +X, 90 that of +Y.
+        elevation_deg: Height over the horizon.
+        jitter_m: The point it looks at lies this far from the focus at most, along each axis.
+        roll_deg: Turn about the viewing direction.
+        clearance_m: It keeps this far from every body.
+    """
+
+    type: Literal["camera_pose"] = "camera_pose"
+    every: Literal["scene", "view"] = "view"
+    camera: str = ""
+    distance_m: Positive = Uniform(0.8, 1.3)
+    azimuth_deg: Scalar = Uniform(0.0, 360.0)
+    elevation_deg: Annotated[Scalar, Bounds(-90, 90)] = Uniform(25.0, 65.0)
+    jitter_m: NonNegative = Uniform(0.0, 0.1)
+    roll_deg: Scalar = Normal(0.0, 3.0, clip=(-10.0, 10.0))
+    clearance_m: float = Field(0.1, ge=0)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with cameras elsewhere; none is inside a body or outside the room."""
+        known = [camera.name for camera in scene.cameras]
+        if self.camera and self.camera not in known:
+            raise ConfigError(
+                f"randomizers.{self.name}.camera: there is no camera '{self.camera}'; expected one "
+                f"of {', '.join(known)}{did_you_mean(self.camera, known)}"
+            )
+        cameras = tuple(
+            self._moved(camera, scene, assets, rng) if self.camera in ("", camera.name) else camera
+            for camera in scene.cameras
+        )
+        return replace(scene, cameras=cameras)
+
+    def _moved(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
+        x, y, z = scene.focus.center_m
+        for _ in range(TRIES):
+            distance_m = self.distance_m.draw(rng)
+            azimuth = math.radians(self.azimuth_deg.draw(rng))
+            elevation = math.radians(self.elevation_deg.draw(rng))
+            jitter_m = self.jitter_m.draw(rng)
+            jx, jy, jz = (jitter_m * float(rng.uniform(-1.0, 1.0)) for _ in range(3))
+            roll = math.radians(self.roll_deg.draw(rng))
+            target = (x + jx, y + jy, z + jz)
+            level_m = distance_m * math.cos(elevation)
+            eye = (
+                target[0] + level_m * math.cos(azimuth),
+                target[1] + level_m * math.sin(azimuth),
+                target[2] + distance_m * math.sin(elevation),
+            )
+            if is_in_the_open(eye, scene, assets, self.clearance_m):
+                return replace(camera, T_world_camera=look_at(eye, target, roll).rounded())
+        raise LayoutRejected(
+            Rejection(
+                "no free place for a camera",
+                f"other distance_m, azimuth_deg or elevation_deg (randomizers.{self.name})",
+            )
+        )

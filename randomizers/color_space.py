@@ -1,0 +1,60 @@
+"""Colours that people name: hue, temperature."""
+
+from __future__ import annotations
+
+import colorsys
+
+from generator.core.se3 import Vec3
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of linear sRGB in CIE Y (ITU-R BT.709)."""
+
+
+def linear_of_srgb(value: float) -> float:
+    """The sRGB transfer function undone (IEC 61966-2-1)."""
+    return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)
+
+
+def linear_of_hsv(hue: float, saturation: float, value: float) -> Vec3:
+    """Linear RGB of a colour given as a painter's hue, saturation and value in sRGB."""
+    red, green, blue = colorsys.hsv_to_rgb(hue % 1.0, saturation, value)
+    return (
+        round(linear_of_srgb(red), 6),
+        round(linear_of_srgb(green), 6),
+        round(linear_of_srgb(blue), 6),
+    )
+
+
+def chromaticity_of_temperature(kelvin: float) -> tuple[float, float]:
+    """CIE 1931 x, y of a black body between 1667 K and 25000 K.
+
+    Source: Kim et al., "Design of advanced color temperature control system for HDTV
+    applications", J. Korean Physical Society 41(6), 2002: cubic fits to the Planckian locus.
+    """
+    t = 1e3 / kelvin
+    if kelvin <= 4000.0:
+        x = -0.2661239 * t**3 - 0.2343589 * t**2 + 0.8776956 * t + 0.179910
+    else:
+        x = -3.0258469 * t**3 + 2.1070379 * t**2 + 0.2226347 * t + 0.240390
+    if kelvin <= 2222.0:
+        y = -1.1063814 * x**3 - 1.34811020 * x**2 + 2.18555832 * x - 0.20219683
+    elif kelvin <= 4000.0:
+        y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
+    else:
+        y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
+    return x, y
+
+
+def linear_of_temperature(kelvin: float) -> Vec3:
+    """Linear sRGB with luminance 1 of a black body; what the gamut lacks is clipped at 0."""
+    x, y = chromaticity_of_temperature(kelvin)
+    big_x, big_z = x / y, (1.0 - x - y) / y
+    # XYZ (D65) to linear sRGB, IEC 61966-2-1.
+    rgb = [
+        max(0.0, 3.2406 * big_x - 1.5372 - 0.4986 * big_z),
+        max(0.0, -0.9689 * big_x + 1.8758 + 0.0415 * big_z),
+        max(0.0, 0.0557 * big_x - 0.2040 + 1.0570 * big_z),
+    ]
+    luminance = sum(weight * part for weight, part in zip(LUMINANCE, rgb, strict=True))
+    red, green, blue = (round(part / luminance, 6) for part in rgb)
+    return (red, green, blue)

@@ -1,0 +1,23 @@
+"""Things that are in the way and have no label."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from generator.config.distributions import Count, UniformInteger
+from randomizers.objects import Objects
+
+
+class Distractors(Objects):
+    """Like ``objects``, for a group that the template does not annotate.
+
+    Distractors keep an instance id in the masks, so that what they hide counts as hidden.
+
+    Attributes:
+        group: Name of the template's object group; empty = the randomizer's own name.
+        count: How many distractors.
+    """
+
+    type: Literal["distractors"] = "distractors"  # type: ignore[assignment]
+    name: str = "distractors"
+    count: Count = UniformInteger(0, 4)

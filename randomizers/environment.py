@@ -1,0 +1,59 @@
+"""Light from all around."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.config.distributions import LogUniform, NonNegative, Scalar, Uniform
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Environment, Scene
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase, pick
+
+
+class EnvironmentLight(RandomizerBase):
+    """Draws the image that surrounds the scene, how bright it is, and how it is turned.
+
+    Attributes:
+        images: Families or tags of environments: studio, indoor, overcast; empty = all.
+        luminance_cd_m2: Mean luminance over the sphere.
+        yaw_deg: Turn about the vertical.
+        visible: Whether it is seen where nothing else is.
+    """
+
+    type: Literal["environment"] = "environment"
+    images: tuple[str, ...] = ()
+    luminance_cd_m2: NonNegative = LogUniform(30.0, 150.0)
+    yaw_deg: Scalar = Uniform(0.0, 360.0)
+    visible: bool = Field(True)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene in another light."""
+        environment = Environment(
+            image=pick(self._options(assets), rng),
+            luminance_cd_m2=round(self.luminance_cd_m2.draw(rng), 4),
+            yaw_rad=round(math.radians(self.yaw_deg.draw(rng)), 6),
+            visible=self.visible,
+        )
+        return replace(scene, environment=environment)
+
+    def _options(self, assets: AssetIndex) -> tuple[str, ...]:
+        every = assets.find((), kind="environment")
+        fitting = tuple(
+            a.asset_id
+            for a in every
+            if not self.images
+            or any(n in a.tags or f"/{n}?" in f"{a.asset_id}?" for n in self.images)
+        )
+        if not fitting:
+            known = sorted({tag for a in every for tag in a.tags})
+            raise ConfigError(
+                f"randomizers.{self.name}.images: no environment is {' or '.join(self.images)}; "
+                f"expected one of {', '.join(known)}"
+            )
+        return fitting

@@ -1,0 +1,30 @@
+"""How long the shutter is open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from generator.config.distributions import Scalar, Uniform
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase
+
+
+class Exposure(RandomizerBase):
+    """Fixes the exposure of every camera instead of leaving it to automatic metering.
+
+    Attributes:
+        ev100: Exposure value at ISO 100; 7 suits a lit room, each step more halves the light.
+    """
+
+    type: Literal["exposure"] = "exposure"
+    every: Literal["scene", "view"] = "view"
+    ev100: Scalar = Uniform(6.0, 8.5)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with cameras exposed otherwise."""
+        del assets
+        cameras = tuple(replace(c, ev100=round(self.ev100.draw(rng), 4)) for c in scene.cameras)
+        return replace(scene, cameras=cameras)

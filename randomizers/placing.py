@@ -1,0 +1,245 @@
+"""Where objects start: layouts on surfaces that physics then settles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from generator.config.distributions import So3
+from generator.core.errors import LayoutRejected, Rejection
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body, ObjectGroup, Scene, Surface
+from generator.core.se3 import SE3, Vec3
+from generator.core.streams import Rng
+
+GAP_M = 0.004
+"""Free space between what is placed."""
+DROP_M = (0.01, 0.05)
+"""Objects fall this far: enough to tumble, too little to bounce away."""
+DROP_TRIES = 8
+"""Free places are tried this often before an object is dropped on top of others."""
+SCATTER_TRIES = 200
+
+
+@dataclass(frozen=True)
+class Item:
+    """Something to be placed.
+
+    Attributes:
+        half_m: Half its extents along its own axes, scale included.
+        stackable: Flat above and below.
+    """
+
+    half_m: Vec3
+    stackable: bool = False
+
+    @property
+    def radius_m(self) -> float:
+        """Of the upright cylinder around it."""
+        return math.hypot(self.half_m[0], self.half_m[1])
+
+    @property
+    def reach_m(self) -> float:
+        """Of the ball around it, however it is turned."""
+        return math.hypot(*self.half_m)
+
+
+@dataclass
+class Floor:
+    """A surface that is being filled: cylinders ``(x, y, radius, top)`` in its own frame [m]."""
+
+    surface: Surface
+    taken: list[tuple[float, float, float, float]] = field(default_factory=list)
+    closed: list[Vec3] = field(default_factory=list)
+
+    def top_under(self, x: float, y: float, radius_m: float) -> float:
+        """How high what is placed reaches under a disc; 0 where the surface is bare."""
+        tops = [
+            top
+            for ox, oy, other_m, top in self.taken
+            if math.hypot(x - ox, y - oy) < radius_m + other_m + GAP_M
+        ]
+        return max(tops, default=0.0)
+
+    def is_closed(self, x: float, y: float, radius_m: float) -> bool:
+        """Whether a disc touches a place where nothing may be put."""
+        return any(math.hypot(x - cx, y - cy) < radius_m + r for cx, cy, r in self.closed)
+
+    def place(self, rng: Rng, radius_m: float) -> tuple[float, float]:
+        """A point at which a disc lies within the surface; its centre where it is too large."""
+        room_x = max(0.0, 0.5 * self.surface.size_m[0] - radius_m)
+        room_y = max(0.0, 0.5 * self.surface.size_m[1] - radius_m)
+        return float(rng.uniform(-room_x, room_x)), float(rng.uniform(-room_y, room_y))
+
+
+def floors_of(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Floor]:
+    """The surfaces of a group, with what already lies on them."""
+    floors = []
+    for name in group.surfaces:
+        surface = scene.surface(name)
+        T_surface_world = surface.T_world_surface.inverse()
+        floor = Floor(surface)
+        for x, y, radius_m in group.keep_out:
+            here = _moved(T_surface_world, (x, y, surface.T_world_surface.translation_m[2]))
+            floor.closed.append((here[0], here[1], radius_m))
+        for body in scene.bodies:
+            if body.motion == "dynamic":
+                cylinder = _cylinder(body, T_surface_world, assets)
+                if -GAP_M < cylinder[3] < surface.clearance_m:
+                    floor.taken.append(cylinder)
+        floors.append(floor)
+    return floors
+
+
+def layout(
+    group: ObjectGroup,
+    items: Sequence[Item],
+    floors: list[Floor],
+    rng: Rng,
+    upright: Sequence[bool],
+) -> list[SE3]:
+    """``T_world_body`` of every item, by the group's placement.
+
+    Raises:
+        LayoutRejected: there is no place.
+    """
+    if group.placement == "stack":
+        return _stacks(group, items, floors, rng)
+    if group.placement == "grid":
+        return _grid(items, floors, rng)
+    one = _dropped if group.placement == "drop" else _scattered
+    return [
+        one(group, item, floors[_drawn_floor(floors, item, rng)], rng, stands)
+        for item, stands in zip(items, upright, strict=True)
+    ]
+
+
+def _dropped(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:
+    """Above a free place if one is found soon, else above what lies there."""
+    radius_m = item.radius_m if upright else item.reach_m
+    half_height_m = item.half_m[2] if upright else item.reach_m
+    x = y = 0.0
+    for _ in range(DROP_TRIES):
+        x, y = floor.place(rng, item.radius_m)
+        if floor.is_closed(x, y, item.radius_m):
+            continue
+        if floor.top_under(x, y, radius_m) == 0.0:
+            break
+    if floor.is_closed(x, y, item.radius_m):
+        raise LayoutRejected(_no_place(group))
+    fall_m = float(rng.uniform(*DROP_M)) if not upright else DROP_M[0]
+    z = floor.top_under(x, y, radius_m) + half_height_m + fall_m
+    floor.taken.append((x, y, radius_m, z + half_height_m))
+    turn = _yaw(rng) if upright else SE3(quaternion_wxyz=So3().draw(rng))
+    return floor.surface.T_world_surface @ SE3((x, y, z)) @ turn
+
+
+def _scattered(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:
+    """Standing apart from everything else."""
+    del upright
+    for _ in range(SCATTER_TRIES):
+        x, y = floor.place(rng, item.radius_m)
+        bare = floor.top_under(x, y, item.radius_m) == 0.0
+        if bare and not floor.is_closed(x, y, item.radius_m):
+            return _standing(item, floor, x, y, 0.0, rng)
+    raise LayoutRejected(_no_place(group))
+
+
+def _grid(items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+    """In rows, surface after surface."""
+    poses = []
+    share = -(-len(items) // len(floors))
+    for number, item in enumerate(items):
+        floor = floors[number // share]
+        length_m, width_m = floor.surface.size_m
+        columns = max(1, round((share * length_m / width_m) ** 0.5))
+        rows = -(-share // columns)
+        row, column = divmod(number % share, columns)
+        x = length_m * ((column + 0.5) / columns - 0.5)
+        y = width_m * ((row + 0.5) / rows - 0.5)
+        poses.append(_standing(item, floor, x, y, 0.0, rng))
+    return poses
+
+
+def _stacks(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+    """In towers of two to four, the widest lowest; what is not flat stands alone."""
+    poses: dict[int, SE3] = {}
+    flat = [k for k, item in enumerate(items) if item.stackable]
+    flat.sort(key=lambda k: (-items[k].radius_m, k))
+    alone = [k for k, item in enumerate(items) if not item.stackable]
+    while flat:
+        height = min(int(rng.integers(2, 5)), len(flat))
+        tower, flat = flat[:height], flat[height:]
+        floor = floors[_drawn_floor(floors, items[tower[0]], rng)]
+        base = _scattered(group, items[tower[0]], floor, rng, upright=True)
+        x, y, _ = _moved(floor.surface.T_world_surface.inverse(), base.translation_m)
+        poses[tower[0]] = base
+        z = 2 * items[tower[0]].half_m[2]
+        for k in tower[1:]:
+            poses[k] = _standing(items[k], floor, x, y, z, rng)
+            z += 2 * items[k].half_m[2]
+    for k in alone:
+        floor = floors[_drawn_floor(floors, items[k], rng)]
+        poses[k] = _scattered(group, items[k], floor, rng, upright=True)
+    return [poses[k] for k in range(len(items))]
+
+
+def _standing(item: Item, floor: Floor, x: float, y: float, z: float, rng: Rng) -> SE3:
+    floor.taken.append((x, y, item.radius_m, z + 2 * item.half_m[2]))
+    place = SE3((x, y, z + item.half_m[2] + 0.0005))
+    return floor.surface.T_world_surface @ place @ _yaw(rng)
+
+
+def _drawn_floor(floors: list[Floor], item: Item, rng: Rng) -> int:
+    """One of the surfaces that the item fits under, by area."""
+    areas = [
+        f.surface.size_m[0] * f.surface.size_m[1]
+        if 2 * item.half_m[2] + DROP_M[0] < f.surface.clearance_m
+        else 0.0
+        for f in floors
+    ]
+    total = sum(areas)
+    if total == 0.0:
+        raise LayoutRejected(
+            Rejection("object higher than the space above the surface", "smaller objects or scale")
+        )
+    draw = float(rng.uniform()) * total
+    for number, area in enumerate(areas):
+        draw -= area
+        if draw < 0.0:
+            return number
+    return max(range(len(areas)), key=areas.__getitem__)
+
+
+def _cylinder(
+    body: Body, T_surface_world: SE3, assets: AssetIndex
+) -> tuple[float, float, float, float]:
+    low, high = assets.bounds_m(body.asset)
+    item = Item(half_extents_m(low, high, body.scale))
+    x, y, z = _moved(T_surface_world, body.T_world_body.translation_m)
+    return (x, y, item.reach_m, z + item.reach_m)
+
+
+def half_extents_m(low: Vec3, high: Vec3, scale: float) -> Vec3:
+    """Half the extents of a scaled bounding box."""
+    return (
+        0.5 * scale * (high[0] - low[0]),
+        0.5 * scale * (high[1] - low[1]),
+        0.5 * scale * (high[2] - low[2]),
+    )
+
+
+def _yaw(rng: Rng) -> SE3:
+    return SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)))
+
+
+def _moved(pose: SE3, point: Vec3) -> Vec3:
+    return (pose @ SE3(point)).translation_m
+
+
+def _no_place(group: ObjectGroup) -> Rejection:
+    return Rejection(
+        "no free place for an object",
+        f"fewer objects (randomizers.{group.name}.count) or a larger surface",
+    )

@@ -1,0 +1,59 @@
+"""Textures of objects and furniture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.config.distributions import Flag, Positive, Probability, Uniform
+from generator.core.geometry import Material
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from generator.core.streams import Rng
+from randomizers.base import LookRandomizer, pick, textures_named, with_materials
+
+
+class Textures(LookRandomizer):
+    """Covers its targets with drawn textures; what is printed stays as it is.
+
+    Attributes:
+        textures: Families or tags of textures: wood, marble, fabric.
+        probability: Whether a target is covered at all.
+        scale_m: Length of one repeat of the texture.
+        slots: Numbers of the material slots to cover; empty = all.
+    """
+
+    type: Literal["textures"] = "textures"
+    textures: tuple[str, ...] = Field(min_length=1)
+    probability: Flag = Probability(0.5)
+    scale_m: Positive = Uniform(0.15, 0.6)
+    slots: tuple[int, ...] = ()
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """One texture per body."""
+        options = textures_named(assets, self.textures, f"randomizers.{self.name}.textures")
+        covered = []
+        for body in self.chosen(scene):
+            if not self.probability.draw(rng):
+                continue
+            texture, scale_m = pick(options, rng), round(self.scale_m.draw(rng), 4)
+
+            def cover(
+                material: Material, texture: str = texture, scale_m: float = scale_m
+            ) -> Material:
+                return replace(
+                    material, base_color=(1.0, 1.0, 1.0), texture=texture, texture_scale_m=scale_m
+                )
+
+            changed = with_materials(body, assets, cover)
+            if self.slots:
+                before = body.materials or assets.materials(body.asset)
+                mixed = tuple(
+                    new if slot in self.slots else old
+                    for slot, (new, old) in enumerate(zip(changed.materials, before, strict=True))
+                )
+                changed = replace(changed, materials=mixed)
+            covered.append(changed)
+        return scene.with_bodies(*covered)

@@ -1,0 +1,20 @@
+"""Declarative scenes: YAML templates, and the element types they are made of."""
+
+from __future__ import annotations
+
+from generator.core.plugins import PluginTable
+
+TABLE = PluginTable(
+    "element",
+    {
+        "backdrop": "scene_templates.backdrop:Backdrop",
+        "bin": "scene_templates.bin:Bin",
+        "light": "scene_templates.light:LightElement",
+        "objects": "scene_templates.objects:Objects",
+        "prop": "scene_templates.prop:Prop",
+        "robot": "scene_templates.robot:Robot",
+        "room": "scene_templates.room:Room",
+        "shelf": "scene_templates.shelf:Shelf",
+        "surface": "scene_templates.surface:SurfaceElement",
+    },
+)

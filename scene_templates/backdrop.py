@@ -1,0 +1,31 @@
+"""What stands behind the scene when there is no room."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from scene_templates.element import PlacedElement, standing, with_static
+
+
+class Backdrop(PlacedElement):
+    """Flat ground (``plane``) or a photographer's sweep (``backdrop``), without a label.
+
+    Attributes:
+        asset: ``plane``, ``backdrop``, or either with a size: ``plane?size_m=6,6``.
+    """
+
+    type: Literal["backdrop"] = "backdrop"
+    asset: str = "plane"
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """A static body; background has no instance."""
+        return with_static(
+            scene,
+            assets,
+            name=self.name,
+            asset=self.asset,
+            T_world_body=standing(assets, self.asset, self.pose(scene)),
+            unlabelled=True,
+        )

@@ -1,0 +1,65 @@
+"""From a template's elements to its nominal Scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Light, ObjectGroup, Region, Scene, Surface
+from scene_templates.element import Element
+from scene_templates.robot import Robot
+
+CONTENT_HEIGHT_M = 0.25
+"""Height over a surface that counts as what is looked at."""
+
+DEFAULT_LIGHT = Light("lamp", "sphere", (0.4, -0.9, 2.2), intensity_cd=900.0, radius_m=0.08)
+
+
+def build(name: str, elements: Sequence[Element], assets: AssetIndex) -> Scene:
+    """The nominal scene of a template: every element at its nominal place, in order.
+
+    Raises:
+        ConfigError: a relation names nothing, or cannot hold.
+        AssetError: an asset is unknown or unfit.
+    """
+    scene = Scene(template=name)
+    for element in elements:
+        scene = element.add(scene, assets)
+    scene = replace(scene, groups=tuple(_kept_out(scene, g, elements) for g in scene.groups))
+    if not scene.lights:
+        scene = replace(scene, lights=(DEFAULT_LIGHT,))
+    return replace(scene, focus=focus_of(scene))
+
+
+def focus_of(scene: Scene) -> Region:
+    """The box around the surfaces that carry objects; without any, around all surfaces."""
+    names = {name for group in scene.groups for name in group.surfaces}
+    surfaces = [s for s in scene.surfaces if s.name in names] or list(scene.surfaces)
+    if not surfaces:
+        return Region()
+    points = np.concatenate([_content_corners(surface) for surface in surfaces])
+    low, high = points.min(axis=0), points.max(axis=0)
+    center, size = 0.5 * (low + high), high - low
+    return Region(
+        center_m=(
+            round(float(center[0]), 6),
+            round(float(center[1]), 6),
+            round(float(center[2]), 6),
+        ),
+        size_m=(round(float(size[0]), 6), round(float(size[1]), 6), round(float(size[2]), 6)),
+    )
+
+
+def _kept_out(scene: Scene, group: ObjectGroup, elements: Sequence[Element]) -> ObjectGroup:
+    discs = [e.keep_out(scene, group) for e in elements if isinstance(e, Robot)]
+    return replace(group, keep_out=tuple(disc for some in discs for disc in some))
+
+
+def _content_corners(surface: Surface) -> np.ndarray:
+    x, y = 0.5 * surface.size_m[0], 0.5 * surface.size_m[1]
+    top = min(CONTENT_HEIGHT_M, surface.clearance_m)
+    corners = [[sx * x, sy * y, z] for sx in (-1, 1) for sy in (-1, 1) for z in (0.0, top)]
+    return surface.T_world_surface.apply(np.array(corners))

@@ -1,0 +1,125 @@
+"""What all elements share: names, places, and how things get into a Scene."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import replace
+
+from pydantic import Field
+
+from generator.assets.ids import AssetId, ParameterValue
+from generator.config.strict import Strict
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body, Instance, Scene, Surface
+from generator.core.se3 import SE3, Vec3
+
+NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]*$"
+
+
+class Element(Strict):
+    """One line of a template.
+
+    Attributes:
+        name: What other elements, randomizers and labels call it; unique in the template.
+    """
+
+    name: str = Field(pattern=NAME_PATTERN)
+
+    @abstractmethod
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """The scene with this element in it, at its nominal place. Draws nothing.
+
+        Raises:
+            ConfigError: a relation names nothing, or cannot hold.
+        """
+
+
+class PlacedElement(Element):
+    """An element that stands somewhere.
+
+    Attributes:
+        on: Name of the surface or element it stands on; empty = the floor.
+        at_m: Place on what it stands on, from its centre along its axes; a third number lifts it.
+        yaw_deg: Turn about the vertical.
+    """
+
+    on: str = ""
+    at_m: tuple[float, float] | tuple[float, float, float] = (0.0, 0.0)
+    yaw_deg: float = 0.0
+
+    def pose(self, scene: Scene) -> SE3:
+        """``T_world_element``: origin where it stands, Z up."""
+        x, y, *lift = self.at_m
+        local = SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+        if not self.on:
+            return local
+        return surfaces_of(scene, self.on, f"elements.{self.name}.on")[0].T_world_surface @ local
+
+
+def surfaces_of(scene: Scene, name: str, field: str) -> tuple[Surface, ...]:
+    """The surface of that name, or all surfaces of the element of that name.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    found = tuple(s for s in scene.surfaces if name in (s.name, s.body))
+    if not found:
+        known = sorted({s.name for s in scene.surfaces} | {s.body for s in scene.surfaces})
+        listed = ", ".join(known) or "none: list the surface before what stands on it"
+        raise ConfigError(
+            f"{field}: there is no surface '{name}'; expected one of {listed}"
+            f"{did_you_mean(name, known)}"
+        )
+    return found
+
+
+def parametric(family: str, **parameters: ParameterValue) -> str:
+    """Canonical id of a parametric asset."""
+    return str(AssetId(family, parameters))
+
+
+def next_instance_id(scene: Scene) -> int:
+    """The smallest id above all that are taken."""
+    return max((i.instance_id for i in scene.instances), default=0) + 1
+
+
+def with_static(
+    scene: Scene,
+    assets: AssetIndex,
+    *,
+    name: str,
+    asset: str,
+    T_world_body: SE3,
+    annotated: bool = False,
+    unlabelled: bool = False,
+) -> Scene:
+    """The scene with a body that stands still, and the instance that labels it.
+
+    ``unlabelled`` bodies (walls, ground) have no instance: they are background.
+    """
+    entry = assets.get(asset)
+    instance_id = 0 if unlabelled else next_instance_id(scene)
+    body = Body(name, asset, T_world_body.rounded(), instance_id=instance_id)
+    if unlabelled:
+        return replace(scene, bodies=(*scene.bodies, body))
+    instance = Instance(instance_id, name, entry.category, 0, asset, annotated=annotated)
+    return replace(scene, bodies=(*scene.bodies, body), instances=(*scene.instances, instance))
+
+
+def with_surface(scene: Scene, surface: Surface) -> Scene:
+    """The scene with one more surface."""
+    return replace(scene, surfaces=(*scene.surfaces, surface))
+
+
+def standing(assets: AssetIndex, asset: str, T_world_stand: SE3) -> SE3:
+    """``T_world_body`` of an upright asset whose lowest point stands at a pose's origin."""
+    low, _ = assets.bounds_m(asset)
+    return T_world_stand @ SE3((0.0, 0.0, -low[2]))
+
+
+def extent_m(assets: AssetIndex, asset: str) -> Vec3:
+    """Size of an asset's bounding box along its own axes."""
+    low, high = assets.bounds_m(asset)
+    return (high[0] - low[0], high[1] - low[1], high[2] - low[2])

@@ -1,0 +1,44 @@
+"""A furnished room's shell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from generator.core.se3 import SE3
+from scene_templates.element import Element, parametric, with_static
+
+CLEARANCE_M = 0.15
+"""Cameras and lights keep this far from the walls."""
+
+
+class Room(Element):
+    """Floor, ceiling and four walls around the origin; what lies inside is lit and seen.
+
+    Attributes:
+        size_m: Length, width and height of the inside.
+        door, window: Whether the walls have them.
+    """
+
+    type: Literal["room"] = "room"
+    size_m: tuple[float, float, float] = (5.0, 4.0, 2.8)
+    door: bool = True
+    window: bool = True
+    name: str = Field("room", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """The room is background: it has no instance."""
+        x, y, z = self.size_m
+        asset = parametric("room", size_m=self.size_m, door=int(self.door), window=int(self.window))
+        scene = with_static(
+            scene, assets, name=self.name, asset=asset, T_world_body=SE3(), unlabelled=True
+        )
+        inside = (
+            (-x / 2 + CLEARANCE_M, -y / 2 + CLEARANCE_M, CLEARANCE_M),
+            (x / 2 - CLEARANCE_M, y / 2 - CLEARANCE_M, z - CLEARANCE_M),
+        )
+        return replace(scene, interior_m=inside)

@@ -1,0 +1,65 @@
+"""Tables and other things with a top."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene, Surface
+from generator.core.se3 import SE3
+from scene_templates.element import (
+    PlacedElement,
+    extent_m,
+    parametric,
+    standing,
+    with_static,
+    with_surface,
+)
+
+CLEARANCE_M = 1.5
+
+
+class SurfaceElement(PlacedElement):
+    """Something whose top other things stand on.
+
+    Attributes:
+        asset: ``table`` is made to measure; any other asset has the size it has.
+        top_size_m: Length and width of a table's top.
+        height_m: Height of a table's top.
+        style: How a table stands: legs, trestle or bench.
+        annotate: Whether labels are written for it.
+    """
+
+    type: Literal["surface"] = "surface"
+    asset: str = "table"
+    top_size_m: tuple[float, float] = (1.2, 0.8)
+    height_m: float = Field(0.74, gt=0, le=2)
+    style: Literal["legs", "trestle", "bench"] = "legs"
+    annotate: bool = False
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """A static body, its instance, and the surface of its top."""
+        asset = self.asset
+        if asset == "table":
+            size_m = (*self.top_size_m, self.height_m)
+            asset = parametric("table", size_m=size_m, style=self.style)
+        T_world_stand = self.pose(scene)
+        scene = with_static(
+            scene,
+            assets,
+            name=self.name,
+            asset=asset,
+            T_world_body=standing(assets, asset, T_world_stand),
+            annotated=self.annotate,
+        )
+        length_m, width_m, height_m = extent_m(assets, asset)
+        top = Surface(
+            name=self.name,
+            body=self.name,
+            T_world_surface=(T_world_stand @ SE3((0.0, 0.0, height_m))).rounded(),
+            size_m=(length_m, width_m),
+            clearance_m=CLEARANCE_M,
+        )
+        return with_surface(scene, top)

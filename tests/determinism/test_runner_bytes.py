@@ -1,0 +1,99 @@
+"""The same bytes whatever the number of workers, the order, or the interruptions."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from generator.runner.verify import verify
+from tests.runner.doubles import make, tree_digest
+from tests.runner.fake_run import DELAY_S, N, SHARD_SIZE
+from tests.runner.test_processes import start_fake_run
+
+
+@pytest.fixture(scope="module")
+def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Digest of the uninterrupted data set, made in this process."""
+    out = tmp_path_factory.mktemp("reference") / "out"
+    make(out, N, SHARD_SIZE)
+    return tree_digest(out)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_the_number_of_workers_does_not_matter(
+    tmp_path: Path, reference_digest: str, workers: int
+) -> None:
+    """One, two, three processes: the bytes that no process at all gives."""
+    make(tmp_path / "out", N, SHARD_SIZE, workers=workers)
+
+    assert tree_digest(tmp_path / "out") == reference_digest
+
+
+def test_exporters_that_must_copy_give_the_bytes_of_those_that_link(
+    tmp_path: Path, reference_digest: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether the file system has hard links is not visible in the data set."""
+
+    def copy(source: Path, target: Path) -> None:
+        Path(target).write_bytes(Path(source).read_bytes())
+
+    monkeypatch.setattr(os, "link", copy)
+    make(tmp_path / "out", N, SHARD_SIZE)
+
+    assert tree_digest(tmp_path / "out") == reference_digest
+    assert verify(tmp_path / "out", full=True).samples == N
+
+
+def test_samples_do_not_depend_on_how_many_there_are(tmp_path: Path) -> None:
+    """The shards of a small data set are the first shards of a larger one."""
+    make(tmp_path / "small", 8, 4)
+    make(tmp_path / "large", 16, 4)
+
+    for shard in ("000000", "000001"):
+        small = tree_digest(tmp_path / "small" / "shards" / shard)
+        assert small == tree_digest(tmp_path / "large" / "shards" / shard)
+
+
+def test_killed_at_random_instants_and_resumed_it_is_the_same_data_set(
+    tmp_path: Path, reference_digest: str
+) -> None:
+    """Twelve times kill -9 of the whole process group, each time resumed, then finished."""
+    rng = random.Random(3)
+    kills = 0
+    for attempt in range(12):
+        out = tmp_path / f"out{attempt // 4}"
+        process = start_fake_run(out, workers=2, delay_s=DELAY_S)
+        try:
+            process.wait(timeout=rng.uniform(0.15, 1.1))
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            kills += 1
+        process.communicate()
+
+    assert kills >= 6
+    for out in sorted(tmp_path.iterdir()):
+        make(out, N, SHARD_SIZE)
+        assert tree_digest(out) == reference_digest
+        verify(out, full=True)
+
+
+def test_a_resumed_run_makes_only_what_is_missing(tmp_path: Path) -> None:
+    """Samples of committed shards are not made again."""
+    out = tmp_path / "out"
+    process = start_fake_run(out, workers=1, delay_s=DELAY_S)
+    while not (out / "shards" / "000002.json").exists():
+        assert process.poll() is None, process.communicate()[1]
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    there = len(list((out / "shards").glob("*.json")))
+
+    summary = make(out, N, SHARD_SIZE)
+
+    assert summary.made == N - there * SHARD_SIZE

@@ -1,0 +1,132 @@
+"""settle(scene) is a function of the scene: of nothing before it, and of no process."""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from generator.core.geometry import ConvexParts
+from generator.core.scene import ArmGoal, Articulation, Scene
+from generator.core.se3 import SE3
+from generator.core.serial import canonical_json
+from generator.physics import PhysicsConfig, open_engine
+from generator.physics.bullet import World
+from generator.physics.engine import BulletEngine
+from generator.physics.shapes import collision_shape
+from tests.physics.doubles import TABLE_TOP_Z_M, Solids, box, dropped_clutter, table_scene, thing
+from tests.physics.panda import HOME
+
+
+@pytest.fixture
+def engine() -> Iterator[BulletEngine]:
+    """An engine with default settings."""
+    with open_engine(Solids(), PhysicsConfig()) as bullet:
+        yield bullet
+
+
+def with_arm(scene: Scene) -> Scene:
+    """A Panda reaches over the clutter."""
+    targets = tuple(SE3((0.1, 0.1 * k, TABLE_TOP_Z_M + 0.35), (0, 1, 0, 0)) for k in (0, 1, 2))
+    base = SE3((-0.5, 0.0, TABLE_TOP_Z_M))
+    goal = ArmGoal("reach", pose_candidates=targets)
+    return replace(scene, articulations=(Articulation("arm", "panda", 99, base, HOME, goal),))
+
+
+def digest(engine: BulletEngine, scene: Scene) -> str:
+    """Of every bit of the outcome."""
+    return hashlib.sha256(canonical_json(engine.settle(scene)).encode()).hexdigest()
+
+
+def settle_alone(seed: int) -> str:
+    """What a process of its own makes of a scene."""
+    with open_engine(Solids(), PhysicsConfig()) as engine:
+        return digest(engine, with_arm(dropped_clutter(seed)))
+
+
+def test_a_scene_settles_the_same_whatever_was_settled_before(engine: BulletEngine) -> None:
+    """A, B, A, refused, A and A in a new engine: the same bytes for every A."""
+    a, b = with_arm(dropped_clutter(5)), dropped_clutter(6)
+    refused = table_scene(thing("lost", "box 0.1 0.1 0.1", x=2.0))
+
+    first = digest(engine, a)
+    other = digest(engine, b)
+    second = digest(engine, a)
+    assert engine.settle(refused).rejection is not None
+    third = digest(engine, a)
+    with open_engine(Solids(), PhysicsConfig()) as fresh:
+        fourth = digest(fresh, a)
+
+    assert first == second == third == fourth
+    assert first != other
+
+
+def test_a_scene_settles_the_same_in_another_process() -> None:
+    """Spawned, so that nothing is inherited; after other work in this one."""
+    with open_engine(Solids(), PhysicsConfig()) as engine:
+        engine.settle(dropped_clutter(1))
+        here = digest(engine, with_arm(dropped_clutter(5)))
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        there = pool.apply(settle_alone, (5,))
+
+    assert here == there
+
+
+def test_bodies_that_once_ignored_each_other_meet_again() -> None:
+    """Pairs that may pass through each other are forgotten with the world they were in."""
+    floor, cube = (
+        collision_shape(ConvexParts((box(*size),))) for size in ((1, 1, 0.1), (0.1, 0.1, 0.1))
+    )
+    world = World(time_step_s=1 / 240, solver_iterations=50)
+    heights = []
+
+    for passes_through in (True, False):
+        world.reset()
+        world.add("floor", floor, SE3((0, 0, -0.05)))
+        world.add("cube", cube, SE3((0, 0, 0.05)), mass_kg=1.0)
+        if passes_through:
+            world.ignore("floor", ["cube"])
+        world.step(120)
+        heights.append(world.pose("cube").translation_m[2])
+    world.close()
+
+    assert heights[0] < -0.5
+    assert heights[1] == pytest.approx(0.05, abs=0.0005)
+
+
+def test_memory_does_not_grow_with_the_number_of_scenes(engine: BulletEngine) -> None:
+    """After a warm-up, sixty small scenes of ever new scale need less than 4 MB more."""
+
+    def settle(count: int) -> None:
+        for k in range(count):
+            scale = 0.8 + 0.4 * ((k * 0.618034) % 1.0)
+            engine.settle(table_scene(thing("cup", "mug 0.04 0.1", above_m=0.1, scale=scale)))
+
+    settle(30)
+    before = resident_mb()
+    settle(60)
+
+    assert resident_mb() - before < 4.0
+
+
+def resident_mb() -> float:
+    """Memory of this process that is in RAM [MB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 1e6
+
+
+def test_an_engine_gives_its_scratch_files_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is left in the temporary folder, and leaving twice does no harm."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with open_engine(Solids(), PhysicsConfig()) as engine:
+        engine.settle(table_scene(thing("cup", "mug 0.04 0.1", above_m=0.1)))
+        assert list(tmp_path.iterdir())
+    engine.__exit__(None, None, None)
+
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,195 @@
+"""An index of made-up assets whose sizes, tags and materials the tests state themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from generator.assets.ids import parse
+from generator.core.errors import AssetError, did_you_mean
+from generator.core.geometry import Asset, Gripper, Joint, Material, RobotModel
+from generator.core.scene import ObjectGroup, Scene, Surface
+from generator.core.se3 import SE3, Vec3
+from generator.core.streams import Rng, Streams
+
+FURNITURE_M: dict[str, Vec3] = {
+    "table": (1.2, 0.8, 0.74),
+    "shelf": (0.9, 0.32, 1.6),
+    "bin": (0.6, 0.4, 0.22),
+    "room": (5.0, 4.0, 2.8),
+    "gantry": (1.6, 1.0, 1.8),
+    "pedestal": (0.3, 0.3, 0.7),
+    "plane": (4.0, 4.0, 0.0),
+    "backdrop": (3.0, 3.0, 2.2),
+}
+SLOTS = {"room": 7, "table": 2, "shelf": 2}
+
+
+@dataclass(frozen=True)
+class Thing:
+    """What an object is like.
+
+    Attributes:
+        size_m: Its bounding box, around its origin.
+    """
+
+    category: str
+    size_m: Vec3
+    tags: tuple[str, ...] = ("household",)
+    mass_kg: float = 0.2
+    stackable: bool = False
+    materials: tuple[Material, ...] = (Material(),)
+
+
+PRINTED = Material(texture="texture/label?seed=1", printed=True)
+THINGS = {
+    "brick": Thing("brick", (0.06, 0.03, 0.02), stackable=True),
+    "can?seed=0": Thing("can", (0.066, 0.066, 0.12), stackable=True, materials=(PRINTED,)),
+    "can?seed=1": Thing("can", (0.07, 0.07, 0.10), stackable=True, materials=(PRINTED, Material())),
+    "bottle": Thing("bottle", (0.08, 0.08, 0.26)),
+    "ball": Thing("ball", (0.2, 0.2, 0.2), ("household", "toy")),
+    "bolt": Thing("bolt", (0.02, 0.02, 0.05), ("part",), 0.05),
+    "nut": Thing("nut", (0.03, 0.03, 0.015), ("part",), 0.02, stackable=True),
+    "odd": Thing("odd", (0.05, 0.07, 0.09), ("random_shape",)),
+}
+TEXTURES = {f"texture/{name}?seed={k}": (name, "surface")
+            for name in ("concrete", "plaster", "wood_planks", "wood_grain", "tiles")
+            for k in range(3)}  # fmt: skip
+ENVIRONMENTS = {
+    f"environment/{name}?seed={k}": (name, tag)
+    for name, tag in (("neutral", "indoor"), ("studio", "indoor"), ("sky", "outdoor"))
+    for k in range(2)
+}
+
+
+class FakeAssets:
+    """An AssetIndex without files; furniture has the size that its id asks for."""
+
+    def get(self, asset_id: str) -> Asset:
+        """Any thing, piece of furniture, robot, texture or environment above."""
+        if asset_id in THINGS:
+            thing = THINGS[asset_id]
+            return _asset(
+                asset_id, "object", thing.category, thing.tags, thing.mass_kg, thing.stackable
+            )
+        if asset_id in TEXTURES:
+            return _asset(asset_id, "texture", "", TEXTURES[asset_id])
+        if asset_id in ENVIRONMENTS:
+            return _asset(asset_id, "environment", "", ENVIRONMENTS[asset_id])
+        family = parse(asset_id).name
+        if family in FURNITURE_M:
+            return _asset(asset_id, "object", family, ("furniture",))
+        if family == "two_link":
+            return _asset(asset_id, "robot", "robot", ("arm",))
+        if family.startswith("two_link/"):
+            return _asset(asset_id, "object", "robot", ())
+        raise AssetError(f"unknown asset '{asset_id}'{did_you_mean(asset_id, THINGS)}")
+
+    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
+        """Everything of the kind that carries all tags, sorted by id."""
+        wanted = set(tags)
+        every = (self.get(i) for i in sorted([*THINGS, *TEXTURES, *ENVIRONMENTS, "two_link"]))
+        return tuple(a for a in every if a.kind == kind and wanted <= set(a.tags))
+
+    def materials(self, asset_id: str) -> tuple[Material, ...]:
+        """The thing's own; plain ones for furniture and links."""
+        if asset_id in THINGS:
+            return THINGS[asset_id].materials
+        return (Material(),) * SLOTS.get(parse(asset_id).name, 1)
+
+    def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+        """Things lie around their origin; furniture stands on its."""
+        if asset_id in THINGS:
+            x, y, z = THINGS[asset_id].size_m
+            return (-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2)
+        wanted = parse(asset_id)
+        if wanted.name.startswith("two_link/"):
+            return (-0.05, -0.05, 0.0), (0.05, 0.05, 0.3)
+        self.get(asset_id)
+        given = wanted.parameters.get("size_m", FURNITURE_M.get(wanted.name))
+        assert isinstance(given, tuple)
+        x, y, *height = (float(v) for v in given)
+        return (-x / 2, -y / 2, 0.0), (x / 2, y / 2, height[0] if height else 0.0)
+
+    def robot(self, asset_id: str) -> RobotModel:
+        """An arm of two links with a parallel gripper that opens 8 cm."""
+        if asset_id != "two_link":
+            raise AssetError(f"'{asset_id}' is no robot{did_you_mean(asset_id, ['two_link'])}")
+        return two_link_arm()
+
+
+def two_link_arm() -> RobotModel:
+    """Shoulder and elbow about Y, 0.3 m apart, then a hand with two sliding fingers."""
+    up = SE3((0.0, 0.0, 0.3))
+    y_axis, fingers = (0.0, 1.0, 0.0), ("left", "right")
+    joints = (
+        Joint("shoulder", "revolute", "base", "upper", up, y_axis, -2.0, 2.0),
+        Joint("elbow", "revolute", "upper", "hand", up, y_axis, -2.5, 2.5),
+        *(
+            Joint(f"{side}_slide", "prismatic", "hand", side, up, (0.0, sign, 0.0), 0.0, 0.04)
+            for side, sign in zip(fingers, (1.0, -1.0), strict=True)
+        ),
+    )
+    links = ("base", "upper", "hand", *fingers)
+    meshes = {link: f"two_link/{link}" for link in links}
+    return RobotModel(
+        links=links,
+        joints=joints,
+        visuals=meshes,
+        collisions=meshes,
+        home=(0.4, 0.9, 0.04, 0.04),
+        gripper=Gripper("hand", SE3((0.0, 0.0, 0.35)), ("left_slide", "right_slide"), 0.08),
+        no_collide=frozenset(),
+    )
+
+
+def rng_of(name: str = "test", scene: int = 0, index: int = 0) -> Rng:
+    """The stream of one name in one scene."""
+    return Streams(seed=7, scene=scene, index=index).rng(name)
+
+
+def surface_scene(
+    size_m: tuple[float, float] = (1.2, 0.8),
+    *,
+    assets: tuple[str, ...] = ("bottle", "brick", "can?seed=0", "can?seed=1"),
+    placement: str = "drop",
+    clearance_m: float = 1.5,
+    keep_out: tuple[Vec3, ...] = (),
+    levels: int = 1,
+) -> Scene:
+    """An empty group ``clutter`` on one or several surfaces above each other, 1 m over the floor."""
+    surfaces = tuple(
+        Surface(f"s{k}", "s", SE3((0.2, -0.1, 1.0 + k * clearance_m)), size_m, clearance_m)
+        for k in range(levels)
+    )
+    group = ObjectGroup(
+        "clutter",
+        tuple(s.name for s in surfaces),
+        assets,
+        0,
+        placement,  # type: ignore[arg-type]
+        keep_out=keep_out,
+    )
+    return Scene("test", surfaces=surfaces, groups=(group,))
+
+
+def _asset(
+    asset_id: str,
+    kind: str,
+    category: str,
+    tags: tuple[str, ...],
+    mass_kg: float = 0.0,
+    stackable: bool = False,
+) -> Asset:
+    return Asset(
+        asset_id,
+        kind,  # type: ignore[arg-type]
+        category,
+        tuple(sorted(tags)),
+        licence="CC0-1.0",
+        author="test",
+        source="test",
+        sha256="0" * 64,
+        mass_kg=mass_kg,
+        stackable=stackable,
+    )

@@ -1,0 +1,30 @@
+"""A fake data set made by a process of its own: ``python -m tests.runner.fake_run OUT WORKERS``.
+
+Tests kill it. Exit codes and message are those of the command line.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from generator.core.errors import GenDataError
+from tests.runner.doubles import Trouble, make
+
+N, SHARD_SIZE = 24, 2
+DELAY_S = 0.02
+
+
+def main() -> int:
+    """Run, and report like the command line does."""
+    out, workers, delay_s = Path(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
+    try:
+        make(out, N, SHARD_SIZE, workers=workers, trouble=Trouble(delay_s=delay_s))
+    except GenDataError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,231 @@
+"""Real worker processes: they die, hang, fail and are interrupted."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from generator.core.errors import SampleError, SceneRejected, WorkerLost
+from generator.runner.run import Limits, Settings
+from generator.runner.worker import sendable
+from tests.runner.doubles import (
+    RESUME,
+    Trouble,
+    make,
+    notes_of,
+    tree_digest,
+    write_raw_images,
+)
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Digest of the ten-sample data set, made in this process."""
+    out = tmp_path_factory.mktemp("reference") / "out"
+    make(out)
+    return tree_digest(out)
+
+
+def impatient(silence_s: float) -> Settings:
+    return Settings(limits=Limits(silence_s=silence_s), write_media=write_raw_images)
+
+
+def start_fake_run(out: Path, workers: int, delay_s: float) -> subprocess.Popen[str]:
+    """A run in a process group of its own."""
+    command = [sys.executable, "-m", "tests.runner.fake_run", str(out), str(workers), str(delay_s)]
+    return subprocess.Popen(
+        command, cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def wait_for(condition: object, seconds: float = 20.0) -> None:
+    """Poll until ``condition()`` holds."""
+    deadline_s = time.monotonic() + seconds
+    while time.monotonic() < deadline_s:
+        if condition():  # type: ignore[operator]
+            return
+        time.sleep(0.02)
+    raise AssertionError("waited in vain")
+
+
+def processes_of_session(session: int) -> list[int]:
+    """Pids of the living processes of a session; zombies do not count."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(int(path.parent.name))
+    return sorted(found)
+
+
+def committed(out: Path) -> int:
+    return len(list((out / "shards").glob("*.json"))) if (out / "shards").exists() else 0
+
+
+def test_a_killed_worker_is_replaced_and_its_shard_made_again(
+    tmp_path: Path, reference_digest: str
+) -> None:
+    """One SIGKILL at sample 5: the same bytes, and the log says what happened."""
+    trouble = Trouble(killed_once_at=5, marker=str(tmp_path / "marker"))
+
+    summary = make(tmp_path / "out", workers=2, trouble=trouble)
+
+    assert summary.worker_deaths == 1
+    assert tree_digest(tmp_path / "out") == reference_digest
+    (note,) = notes_of(tmp_path / "out")
+    assert "killed by signal 9 (SIGKILL)" in note
+    assert "shard 1, sample 5" in note
+
+
+def test_a_poisoned_sample_is_named_and_all_other_shards_are_made(tmp_path: Path) -> None:
+    """Three deaths on shard 1, then WorkerLost with the command that makes sample 6 alone."""
+    with pytest.raises(WorkerLost) as caught:
+        make(tmp_path / "out", workers=2, trouble=Trouble(killed_at=6))
+
+    assert "shard 1: its worker process died 3 times, at last in sample 6" in str(caught.value)
+    assert "killed by signal 9 (SIGKILL)" in str(caught.value)
+    assert f"contact-sheet {tmp_path / 'out'} --first 6 --n 1" in str(caught.value)
+    records = sorted(path.name for path in (tmp_path / "out/shards").glob("*.json"))
+    assert records == ["000000.json", "000002.json"]
+
+
+def test_a_healed_run_completes_what_a_poisoned_one_left(
+    tmp_path: Path, reference_digest: str
+) -> None:
+    """After the cause is gone, the same command makes the one missing shard."""
+    with pytest.raises(WorkerLost):
+        make(tmp_path / "out", workers=1, trouble=Trouble(killed_at=6))
+
+    summary = make(tmp_path / "out", workers=1)
+
+    assert summary.made == 4
+    assert tree_digest(tmp_path / "out") == reference_digest
+
+
+def test_a_hanging_worker_is_killed_and_its_shard_made_by_another(
+    tmp_path: Path, reference_digest: str
+) -> None:
+    """Silence over the limit counts as death."""
+    trouble = Trouble(hangs_once_at=5, marker=str(tmp_path / "marker"))
+
+    make(tmp_path / "out", workers=1, trouble=trouble, settings=impatient(2.0))
+
+    assert "no sign of life for 2 s" in notes_of(tmp_path / "out")[0]
+    assert tree_digest(tmp_path / "out") == reference_digest
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_a_rejected_scene_comes_back_as_itself(tmp_path: Path, workers: int) -> None:
+    """The error crosses the process border with its type and text."""
+    with pytest.raises(SceneRejected, match=r"scene 3: no valid layout.*object fell off"):
+        make(tmp_path / "out", workers=workers, trouble=Trouble(rejected_at=6))
+
+    assert (tmp_path / "out/shards/000000.json").exists()
+    assert not (tmp_path / "out/run/tmp").exists()
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_a_bug_is_one_message_with_place_trace_and_command(tmp_path: Path, workers: int) -> None:
+    """An error nobody foresaw names sample, line of code and how to see it again."""
+    with pytest.raises(SampleError) as caught:
+        make(tmp_path / "out", workers=workers, trouble=Trouble(bug_at=6))
+
+    assert str(caught.value).startswith("sample 6: ValueError: a wheel came off\n")
+    assert "doubles.py" in str(caught.value)
+    assert "--first 6 --n 1" in str(caught.value)
+
+
+def test_workers_that_cannot_start_end_the_run(tmp_path: Path) -> None:
+    """Not an endless loop of processes."""
+    with pytest.raises(WorkerLost, match="while they start: killed by signal 9"):
+        make(tmp_path / "out", workers=1, trouble=Trouble(start_fails=True))
+
+
+def test_what_workers_print_and_how_they_crash_is_kept_in_the_run_folder(tmp_path: Path) -> None:
+    """The terminal belongs to the command line; a worker has its own log."""
+    with pytest.raises(SampleError):
+        make(tmp_path / "out", workers=1, trouble=Trouble(bug_at=6))
+
+    assert "a wheel came off" in (tmp_path / "out/run/worker-0.log").read_text()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_stops_quickly_keeps_shards_and_tells_how_to_go_on(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    """Exit code 130 within ten seconds, the resume command, nobody left running."""
+    process = start_fake_run(tmp_path / "out", workers=2, delay_s=0.1)
+    wait_for(lambda: committed(tmp_path / "out") >= 1)
+
+    started_s = time.monotonic()
+    os.killpg(process.pid, number) if number == signal.SIGINT else process.send_signal(number)
+    _, message = process.communicate(timeout=10)
+
+    assert time.monotonic() - started_s < 10.0
+    assert process.returncode == 130
+    assert RESUME in message
+    assert "Traceback" not in message
+    assert committed(tmp_path / "out") >= 1
+    wait_for(lambda: processes_of_session(process.pid) == [], seconds=2.0)
+
+
+def test_a_killed_supervisor_leaves_no_process_behind(tmp_path: Path) -> None:
+    """SIGKILL of the parent alone: the kernel ends its workers within two seconds."""
+    process = start_fake_run(tmp_path / "out", workers=2, delay_s=0.1)
+    wait_for(lambda: committed(tmp_path / "out") >= 1)
+    assert len(processes_of_session(process.pid)) >= 3
+
+    process.kill()
+    process.communicate()
+
+    wait_for(lambda: processes_of_session(process.pid) == [], seconds=2.0)
+
+
+def test_a_run_in_a_thread_leaves_signals_alone(tmp_path: Path) -> None:
+    """Only the main thread may have handlers; a host program keeps its own."""
+    before = signal.getsignal(signal.SIGINT)
+    thread = threading.Thread(target=make, args=(tmp_path / "out",))
+    thread.start()
+    thread.join()
+
+    assert signal.getsignal(signal.SIGINT) is before
+    assert (tmp_path / "out/manifest.json").exists()
+
+
+def test_handlers_are_given_back(tmp_path: Path) -> None:
+    """After a run, Ctrl-C means what it meant before."""
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+
+    make(tmp_path / "out")
+
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+class Stubborn(SceneRejected):
+    """A plug-in's error that cannot be unpickled."""
+
+    def __init__(self) -> None:
+        super().__init__(3, ())
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (Stubborn, ("one argument too many",))
+
+
+def test_an_error_that_cannot_travel_arrives_as_its_nearest_relative() -> None:
+    """Kind and text survive; only the class of the plug-in is lost."""
+    arrived = sendable(Stubborn())
+
+    assert type(arrived) is SampleError
+    assert str(arrived).startswith("scene 3: no valid layout")

@@ -1,0 +1,542 @@
+"""LocalStore: commits, resumption, foreign folders, locks, and a disk that fails anywhere."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from generator.core.errors import DeterminismError, StorageError
+from generator.runner import files
+from generator.runner.plan import load_plan
+from generator.runner.run import Settings, run
+from generator.runner.shard import Job, make_shard
+from generator.runner.store import FolderState, LocalStore
+from tests.runner.doubles import (
+    RESUME,
+    FakeFactory,
+    FakePipeline,
+    Trouble,
+    fake_plan,
+    make,
+    tree_digest,
+    write_raw_images,
+)
+from tests.runner.fragile_disk import ERRNOS, FragileDisk, Killed
+
+
+@pytest.fixture(scope="module")
+def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Digest of the ten-sample data set, made without interruption."""
+    out = tmp_path_factory.mktemp("reference") / "out"
+    make(out)
+    return tree_digest(out)
+
+
+def names_in(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_a_finished_folder_holds_what_the_layout_says(tmp_path: Path) -> None:
+    """Plan, shards with records, exporter's folder, licences, sums, manifest, run."""
+    make(tmp_path / "out")
+
+    assert names_in(tmp_path / "out") == {
+        "plan.json",
+        "shards",
+        "lines",
+        "LICENSES-ASSETS.md",
+        "SHA256SUMS",
+        "manifest.json",
+        "run",
+    }
+    shards = {f"00000{k}{end}" for k in range(3) for end in ("", ".json")}
+    assert names_in(tmp_path / "out" / "shards") == shards
+    assert not (tmp_path / "out" / "run" / "tmp").exists()
+
+
+def test_sums_are_those_of_sha256sum(tmp_path: Path) -> None:
+    """The tool everybody has accepts the data set and covers every file of it."""
+    make(tmp_path / "out")
+
+    done = subprocess.run(
+        ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"], cwd=tmp_path / "out"
+    )
+
+    assert done.returncode == 0
+    listed = {line[66:] for line in (tmp_path / "out" / "SHA256SUMS").read_text().splitlines()}
+    there = {
+        path.relative_to(tmp_path / "out").as_posix()
+        for path in (tmp_path / "out").rglob("*")
+        if path.is_file()
+    }
+    outside_run = {path for path in there if not path.startswith("run/")}
+    assert listed == outside_run - {"SHA256SUMS"}
+
+
+def test_the_id_is_what_grep_and_sha256sum_print(tmp_path: Path) -> None:
+    """The documented shell line computes dataset_id."""
+    summary = make(tmp_path / "out")
+
+    line = "grep -v '  manifest.json$' SHA256SUMS | sha256sum"
+    printed = subprocess.run(
+        line, shell=True, cwd=tmp_path / "out", capture_output=True, text=True, check=True
+    ).stdout.split()[0]
+
+    assert printed == summary.dataset_id
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text())["dataset_id"] == printed
+
+
+def test_the_manifest_counts_samples_and_objects_by_split(tmp_path: Path) -> None:
+    """Ten samples of five scenes, two views each; scene 3 is validation, one object per image."""
+    make(tmp_path / "out")
+
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+
+    assert manifest["splits"] == [
+        {"split": "train", "samples": 8, "objects": {"bowl": 4, "mug": 4}},
+        {"split": "val", "samples": 2, "objects": {"bowl": 1, "mug": 1}},
+    ]
+    assert manifest["scenes"] == 5
+    assert manifest["rejections"] == 0 + 1 + 2 + 0 + 1
+
+
+def test_provenance_has_one_line_per_sample_in_order(tmp_path: Path) -> None:
+    """scenes.jsonl: index, scene, view, split, attempts and the scene itself."""
+    make(tmp_path / "out")
+
+    lines = (tmp_path / "out" / "shards" / "000001" / "scenes.jsonl").read_text().splitlines()
+    rows = [json.loads(line) for line in lines]
+
+    assert [row["index"] for row in rows] == [4, 5, 6, 7]
+    assert [(row["scene_index"], row["view_index"]) for row in rows] == [
+        (2, 0),
+        (2, 1),
+        (3, 0),
+        (3, 1),
+    ]
+    assert [row["split"] for row in rows] == ["train", "train", "val", "val"]
+    assert rows[0]["scene"]["instances"][0]["name"] == "thing-4"
+
+
+def test_exporters_see_no_pixels(tmp_path: Path) -> None:
+    """A shard's images are not held in memory: readings arrive with cameras only."""
+    seen = []
+
+    class Watching:
+        needs: frozenset[str] = frozenset()
+
+        def write_shard(self, info: object, samples: object, shard_dir: Path) -> None:
+            del info, shard_dir
+            seen.extend(samples)  # type: ignore[call-overload]
+
+        def finalize(self, *arguments: object) -> None:
+            """Nothing to merge."""
+
+    store = LocalStore(tmp_path / "out")
+    plan = fake_plan()
+    job = Job(plan, store, FakeFactory(10), write_raw_images)
+    with store.locked():
+        store.prepare(plan)
+        make_shard(job, FakePipeline(10, Trouble(), {"watching": Watching()}), 0, lambda _: None)
+
+    assert [sample.index for sample in seen] == [0, 1, 2, 3]
+    assert all(s.capture.readings["color"].channels == {} for s in seen)
+    assert all(s.capture.readings["color"].camera.name == "color" for s in seen)
+
+
+def test_a_finished_data_set_is_left_alone(tmp_path: Path) -> None:
+    """The same command again makes nothing, changes nothing, and says so."""
+    make(tmp_path / "out")
+    before = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").rglob("*") if "run" not in str(p)}
+
+    summary = make(tmp_path / "out")
+
+    assert summary.already_complete
+    assert summary.made == 0
+    assert "nothing to do" in dict(summary.rows())["samples"]
+    after = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").rglob("*") if "run" not in str(p)}
+    assert after == before
+
+
+def test_another_plan_is_refused_naming_the_field(tmp_path: Path) -> None:
+    """Nothing is written; the message has the dotted field and both values."""
+    make(tmp_path / "out")
+    before = tree_digest(tmp_path / "out")
+
+    with pytest.raises(StorageError, match=r"camera\.fov_deg: was 50, now 60"):
+        run(
+            fake_plan(camera={"fov_deg": 60}),
+            FakeFactory(10),
+            tmp_path / "out",
+            workers=0,
+            resume_command=RESUME,
+        )
+
+    assert tree_digest(tmp_path / "out") == before
+
+
+@pytest.mark.parametrize("name", ["holiday.jpg", "run/holiday.jpg", "manifest.json", "shards/x"])
+def test_a_foreign_folder_is_refused_and_not_touched(tmp_path: Path, name: str) -> None:
+    """Whatever lies there without a plan.json is somebody else's."""
+    foreign = tmp_path / "out" / name
+    foreign.parent.mkdir(parents=True)
+    foreign.write_text("mine")
+
+    with pytest.raises(StorageError, match="not empty and not a gen-data data set"):
+        make(tmp_path / "out")
+
+    assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [foreign]
+
+
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
+    """One message with the path."""
+    (tmp_path / "out").write_text("a file")
+
+    with pytest.raises(StorageError, match=r"out: is not a folder"):
+        make(tmp_path / "out")
+
+
+def test_a_missing_parent_that_cannot_be_made_names_path_and_errno(tmp_path: Path) -> None:
+    """A file where a parent folder should be."""
+    (tmp_path / "file").write_text("a file")
+
+    with pytest.raises(StorageError, match=r"file.*\(E(NOTDIR|EXIST)\)"):
+        make(tmp_path / "file" / "out")
+
+
+def test_an_empty_folder_and_a_killed_start_are_new(tmp_path: Path) -> None:
+    """The lock may be there before the plan is."""
+    (tmp_path / "out" / "run").mkdir(parents=True)
+    (tmp_path / "out" / "run" / "lock").write_text("")
+    store = LocalStore(tmp_path / "out")
+
+    assert store.state(fake_plan()) is FolderState.NEW
+    assert LocalStore(tmp_path / "absent").state(fake_plan()) is FolderState.NEW
+
+
+def test_a_second_run_on_the_folder_is_refused_quickly(tmp_path: Path) -> None:
+    """Within a second, naming host and process."""
+    store = LocalStore(tmp_path / "out")
+
+    with store.locked():
+        started_s = time.monotonic()
+        with pytest.raises(StorageError, match=rf'another run.*"pid": {os.getpid()}'):
+            make(tmp_path / "out")
+        assert time.monotonic() - started_s < 1.0
+
+    assert make(tmp_path / "out").made == 10
+
+
+def test_a_folder_without_record_is_quarantined_and_made_again(
+    tmp_path: Path, reference_digest: str
+) -> None:
+    """What a kill between folder and record leaves is no shard."""
+    out = tmp_path / "out"
+    make(out)
+    (out / "manifest.json").unlink()
+    (out / "shards" / "000001.json").unlink()
+    (out / "shards" / "000001" / "scenes.jsonl").write_text("half")
+
+    summary = make(out)
+
+    assert summary.made == 4
+    assert names_in(out / "run" / "quarantine") == {"0-000001"}
+    assert tree_digest(out) == reference_digest
+
+
+def damage_size(out: Path) -> None:
+    with (out / "shards/000002/color/rgb/000000008.png").open("ab") as file:
+        file.write(b"!")
+
+
+def damage_record(out: Path) -> None:
+    (out / "shards/000002.json").write_text('{"shard":')
+
+
+def lose_file(out: Path) -> None:
+    (out / "shards/000002/scenes.jsonl").unlink()
+
+
+def add_file(out: Path) -> None:
+    (out / "shards/000002/extra.txt").write_text("extra")
+
+
+def lose_shard(out: Path) -> None:
+    shutil.rmtree(out / "shards/000002")
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [damage_size, damage_record, lose_file, add_file, lose_shard],
+    ids=lambda d: d.__name__,
+)
+def test_a_damaged_shard_of_a_finished_data_set_is_made_again(
+    tmp_path: Path, reference_digest: str, damage: object
+) -> None:
+    """The same command repairs it; the other shards are kept."""
+    out = tmp_path / "out"
+    make(out)
+    damage(out)  # type: ignore[operator]
+
+    extra_only = damage is add_file
+    if extra_only:
+        (out / "manifest.json").unlink()
+    summary = make(out)
+
+    assert summary.made == 2
+    assert tree_digest(out) == reference_digest
+
+
+def test_a_flipped_bit_is_repaired_by_a_full_check(tmp_path: Path, reference_digest: str) -> None:
+    """Equal sizes hide it from the quick look, not from the digests."""
+    out = tmp_path / "out"
+    make(out)
+    path = out / "shards/000000/color/rgb/000000002.png"
+    data = path.read_bytes()
+    path.write_bytes(bytes([data[0] ^ 1]) + data[1:])
+
+    assert make(out).already_complete
+    full = Settings(full_check=True, write_media=write_raw_images)
+    assert make(out, settings=full).made == 4
+    assert tree_digest(out) == reference_digest
+
+
+def test_publishing_the_same_shard_twice_changes_nothing(tmp_path: Path) -> None:
+    """A worker that died after its commit is repeated harmlessly."""
+    store, plan = LocalStore(tmp_path / "out"), fake_plan()
+    job = Job(plan, store, FakeFactory(10), write_raw_images)
+    with store.locked():
+        store.prepare(plan)
+        first = make_shard(job, job.make_pipeline(), 1, lambda _: None)
+        before = tree_digest(tmp_path / "out")
+
+        assert make_shard(job, job.make_pipeline(), 1, lambda _: None) == first
+
+    assert tree_digest(tmp_path / "out") == before
+
+
+def test_publishing_other_bytes_is_a_determinism_error_and_keeps_both(tmp_path: Path) -> None:
+    """The message names the file; the second version lies in quarantine."""
+    store, plan = LocalStore(tmp_path / "out"), fake_plan()
+
+    def write_other_images(info: object, sample: object, shard_dir: Path) -> None:
+        write_raw_images(info, sample, shard_dir)  # type: ignore[arg-type]
+        path = shard_dir / "color/rgb/000000005.png"
+        if path.exists():
+            path.write_bytes(b"other")
+
+    job = Job(plan, store, FakeFactory(10), write_raw_images)
+    with store.locked():
+        store.prepare(plan)
+        make_shard(job, job.make_pipeline(), 1, lambda _: None)
+        other = replace(job, write_media=write_other_images)
+        with pytest.raises(DeterminismError, match=r"shard 1.*color/rgb/000000005\.png"):
+            make_shard(other, job.make_pipeline(), 1, lambda _: None)
+
+    kept = list((tmp_path / "out/run/quarantine").rglob("000000005.png"))
+    assert [path.read_bytes() for path in kept] == [b"other"]
+    assert (tmp_path / "out/shards/000001/color/rgb/000000005.png").read_bytes() != b"other"
+
+
+def test_planning_a_billion_samples_takes_no_memory(tmp_path: Path) -> None:
+    """Shards of a new data set are a range, not a list."""
+    plan = fake_plan(n=1_000_000_000, shard_size=64)
+    store = LocalStore(tmp_path / "out")
+    with store.locked():
+        store.prepare(plan)
+
+        assert store.scan(plan).missing == range(15_625_000)
+
+
+def count_operations(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> int:
+    disk = FragileDisk(tmp_path / "count", tmp_path / "attic")
+    with monkeypatch.context() as patch:
+        disk.install(patch)
+        make(tmp_path / "count")
+    return disk.count
+
+
+def test_a_kill_at_every_operation_is_resumed_to_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference_digest: str
+) -> None:
+    """Each fsync, rename, mkdir and unlink of a three-shard run, one after the other."""
+    operations = count_operations(tmp_path, monkeypatch)
+    assert operations > 80
+
+    for k in range(1, operations + 1):
+        out = tmp_path / f"out{k}"
+        with monkeypatch.context() as patch:
+            FragileDisk(out, tmp_path / f"attic{k}", fail_at=k).install(patch)
+            with pytest.raises(Killed):
+                make(out)
+        if not (out / "manifest.json").exists():
+            make(out)
+        assert tree_digest(out) == reference_digest, f"killed at operation {k}"
+        shutil.rmtree(out)
+
+
+def test_every_errno_at_every_operation_is_one_message_and_resumable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference_digest: str
+) -> None:
+    """Path, errno, free bytes and the resume command; then the same bytes once it is gone."""
+    operations = count_operations(tmp_path, monkeypatch)
+    messages = 0
+
+    for k in range(1, operations + 1):
+        out = tmp_path / f"out{k}"
+        number = ERRNOS[k % len(ERRNOS)]
+        with monkeypatch.context() as patch:
+            FragileDisk(out, tmp_path / f"attic{k}", fail_at=k, errno=number).install(patch)
+            try:
+                make(out)
+            except StorageError as error:
+                messages += 1
+                assert f"({errno.errorcode[number]})" in str(error)
+                assert "bytes free" in str(error)
+                assert RESUME in str(error)
+        make(out)
+        assert tree_digest(out) == reference_digest, f"{errno.errorcode[number]} at operation {k}"
+        shutil.rmtree(out)
+
+    assert messages > 0.8 * operations
+
+
+def survives_power_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, digest: str, fail_at: int, seed: int
+) -> bool:
+    """Whether a folder comes back to ``digest`` after a power cut at an operation, 0 = the end.
+
+    A folder that has a manifest must be right as it is.
+    """
+    out, attic = tmp_path / f"out{fail_at}-{seed}", tmp_path / f"attic{fail_at}-{seed}"
+    disk = FragileDisk(out, attic, fail_at=fail_at)
+    with monkeypatch.context() as patch:
+        disk.install(patch)
+        with suppress(Killed):
+            make(out)
+        disk.cut_power(seed)
+    try:
+        if not (out / "manifest.json").exists():
+            assert fail_at, "the data set was finished before the cut"
+            make(out)
+        return tree_digest(out) == digest
+    except (AssertionError, StorageError):
+        return False
+    finally:
+        shutil.rmtree(out, ignore_errors=True)
+        shutil.rmtree(attic)
+
+
+def test_a_power_cut_at_every_operation_is_resumed_to_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference_digest: str
+) -> None:
+    """Unsynced bytes and names are lost at random; no committed shard is."""
+    for k in range(count_operations(tmp_path, monkeypatch) + 1):
+        assert survives_power_cut(tmp_path, monkeypatch, reference_digest, k, seed=k), (
+            f"power cut at operation {k}"
+        )
+
+
+def plain_write(path: Path, data: bytes, scratch: Path) -> None:
+    del scratch
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("place", "mutant"),
+    [
+        ("store.sync_tree", lambda folder: None),
+        ("finalize.sync_tree", lambda folder, synced: None),
+        ("store.write_durably", plain_write),
+        ("finalize.write_durably", plain_write),
+        ("files.sync", lambda path: None),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_the_power_cut_harness_catches_a_missing_fsync(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    reference_digest: str,
+    place: str,
+    mutant: object,
+) -> None:
+    """With one kind of fsync planted out, a cut after the end damages a finished data set."""
+    monkeypatch.setattr(f"generator.runner.{place}", mutant)
+
+    survived = [
+        survives_power_cut(tmp_path, monkeypatch, reference_digest, 0, seed) for seed in range(12)
+    ]
+
+    assert not all(survived)
+
+
+@pytest.fixture
+def tiny_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of one megabyte."""
+    folder = tmp_path / "tiny"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
+        pytest.skip("mounting a small file system needs root")
+    yield folder
+    subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_a_full_disk_is_one_message_and_resumable_after_making_room(
+    tiny_disk: Path, reference_digest: str
+) -> None:
+    """A real file system without space: exit by StorageError, then the same bytes."""
+    out, ballast = tiny_disk / "out", tiny_disk / "ballast"
+    ballast.write_bytes(b"\0" * (990 << 10))
+
+    with pytest.raises(StorageError, match=r"ENOSPC|stopped before the disk is full") as caught:
+        make(out)
+    assert RESUME in str(caught.value)
+
+    ballast.unlink()
+    make(out)
+    assert tree_digest(out) == reference_digest
+
+
+def test_a_run_that_will_not_fit_stops_after_its_first_shard(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """6 of 10 samples to go at about 1.2 kB each: 2 kB free are not enough, the shard stays."""
+    monkeypatch.setattr("generator.runner.progress.free_bytes", lambda path: 2_000)
+
+    with pytest.raises(StorageError, match="other 6 samples need about") as caught:
+        make(tmp_path / "out")
+
+    assert RESUME in str(caught.value)
+    assert names_in(tmp_path / "out" / "shards") == {"000000", "000000.json"}
+
+
+def test_a_plan_is_the_first_file_in_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever a run stops, a folder with shards has a plan."""
+    monkeypatch.setattr(LocalStore, "scan", lambda *_: (_ for _ in ()).throw(Killed()))
+
+    with pytest.raises(Killed):
+        make(tmp_path / "out")
+
+    assert load_plan(tmp_path / "out") == fake_plan()
+
+
+def test_tree_sizes_reports_links_as_irregular(tmp_path: Path) -> None:
+    """A symbolic link, to a file or to a folder, is no content."""
+    (tmp_path / "a").write_text("abc")
+    (tmp_path / "b").symlink_to("a")
+    (tmp_path / "c").symlink_to(tmp_path, target_is_directory=True)
+
+    assert files.tree_sizes(tmp_path) == {"a": 3, "b": files.IRREGULAR, "c": files.IRREGULAR}

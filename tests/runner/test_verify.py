@@ -1,0 +1,139 @@
+"""verify: every deviation from the manifest is found and named."""
+
+from __future__ import annotations
+
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from generator.core.errors import VerificationError
+from generator.runner.verify import findings, verify
+from tests.runner.doubles import make
+
+
+@pytest.fixture(scope="module")
+def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished data set of ten samples; tests work on copies."""
+    out = tmp_path_factory.mktemp("pristine") / "out"
+    make(out)
+    return out
+
+
+@pytest.fixture
+def dataset(pristine: Path, tmp_path: Path) -> Path:
+    """A copy that a test may damage."""
+    return Path(shutil.copytree(pristine, tmp_path / "out"))
+
+
+def flip_bit(path: Path, bit: int) -> None:
+    data = bytearray(path.read_bytes())
+    data[bit // 8] ^= 1 << bit % 8
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_an_untouched_data_set_is_accepted(dataset: Path, full: bool) -> None:
+    """The report counts samples and files; copies of hard links are as good as links."""
+    report = verify(dataset, full=full)
+
+    assert report.samples == 10
+    assert report.files == sum(p.is_file() for p in dataset.rglob("*") if "run" not in p.parts)
+    assert ("sha256" in str(report)) == full
+
+
+def test_without_manifest_it_is_no_finished_data_set(dataset: Path) -> None:
+    """Interrupted runs are told apart from damaged ones."""
+    (dataset / "manifest.json").unlink()
+
+    with pytest.raises(VerificationError, match=r"not a finished data set.*manifest\.json"):
+        verify(dataset)
+
+
+def test_every_flipped_bit_is_found_by_full_verification(dataset: Path) -> None:
+    """150 random single bits in random files: 150 found, each naming its file."""
+    rng = random.Random(0)
+    paths = sorted(p for p in dataset.rglob("*") if p.is_file() and "run" not in p.parts)
+    sealing = ("SHA256SUMS", "manifest.json", "plan.json")
+
+    for _ in range(150):
+        path = rng.choice(paths)
+        bit = rng.randrange(path.stat().st_size * 8)
+        flip_bit(path, bit)
+        named = [finding.path for finding in findings(dataset, full=True)]
+        name = path.relative_to(dataset).as_posix()
+        assert named, f"bit {bit} of {name} went unnoticed"
+        assert name in named or name in sealing, f"bit {bit} of {name}: only {named}"
+        flip_bit(path, bit)
+    assert findings(dataset, full=True) == []
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (
+            lambda root: (root / "shards/000001/color/rgb/000000006.png").write_bytes(b"?"),
+            r"shards/000001/color/rgb/000000006\.png \(sample 6\): has 1 bytes instead of 144",
+        ),
+        (
+            lambda root: (root / "shards/000002/scenes.jsonl").unlink(),
+            r"shards/000002/scenes\.jsonl \(samples 8 to 9\): is missing",
+        ),
+        (
+            lambda root: (root / "lines/images/000000003_color.png").unlink(),
+            r"lines/images/000000003_color\.png \(sample 3\): is missing",
+        ),
+        (
+            lambda root: (root / "lines/all.jsonl").write_text("short"),
+            r"lines/all\.jsonl: has 5 bytes instead of",
+        ),
+        (
+            lambda root: (root / "notes.txt").write_text("mine"),
+            r"notes\.txt: does not belong to the data set",
+        ),
+        (
+            lambda root: (root / "shards/000001.json").unlink(),
+            r"shards/000001\.json \(samples 4 to 7\): is missing",
+        ),
+    ],
+)
+def test_a_deviation_names_file_and_sample(
+    dataset: Path, damage: Callable[[Path], object], message: str
+) -> None:
+    """Sizes, missing and extra files are seen without hashing."""
+    damage(dataset)
+
+    with pytest.raises(VerificationError, match=message):
+        verify(dataset)
+
+
+def test_swapped_files_are_found(dataset: Path) -> None:
+    """Equal sizes, valid content, wrong places: both are named."""
+    first = dataset / "shards/000000/color/rgb/000000000.png"
+    second = dataset / "shards/000000/color/rgb/000000001.png"
+    content = first.read_bytes()
+    first.write_bytes(second.read_bytes())
+    second.write_bytes(content)
+
+    assert [finding.samples for finding in findings(dataset, full=True)] == ["sample 0", "sample 1"]
+
+
+def test_all_deviations_are_listed_together(dataset: Path) -> None:
+    """One look, one complete list."""
+    for index in (1, 4, 8):
+        (dataset / f"lines/images/{index:09d}_color.png").unlink()
+
+    with pytest.raises(VerificationError, match=r"3 deviation\(s\)") as caught:
+        verify(dataset)
+
+    assert all(f"(sample {index})" in str(caught.value) for index in (1, 4, 8))
+
+
+def test_a_record_edited_together_with_its_file_is_found(dataset: Path) -> None:
+    """Whoever changes a file and its record still disagrees with the manifest."""
+    record = dataset / "shards/000000.json"
+    record.write_text(record.read_text().replace('"rejections":1', '"rejections":0'))
+
+    assert [f.path for f in findings(dataset)] == ["shards/000000.json"]
