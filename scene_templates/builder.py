@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetIndex
-from generator.core.scene import Light, ObjectGroup, Region, Scene, Surface
+from generator.core.scene import Light, Region, Scene, Surface
 from scene_templates.element import Element
-from scene_templates.robot import Robot
+from scene_templates.objects import Objects
 
 CONTENT_HEIGHT_M = 0.25
 """Height over a surface that counts as what is looked at."""
@@ -19,16 +20,19 @@ DEFAULT_LIGHT = Light("lamp", "sphere", (0.4, -0.9, 2.2), intensity_cd=900.0, ra
 
 
 def build(name: str, elements: Sequence[Element], assets: AssetIndex) -> Scene:
-    """The nominal scene of a template: every element at its nominal place, in order.
+    """The nominal scene of a template: every element at its nominal place.
+
+    Elements are added in the order of their lines, groups of objects after all others: they have
+    to keep clear of what stands on their surfaces.
 
     Raises:
         ConfigError: a relation names nothing, or cannot hold.
         AssetError: an asset is unknown or unfit.
     """
+    _check_names(elements)
     scene = Scene(template=name)
-    for element in elements:
+    for element in sorted(elements, key=lambda element: isinstance(element, Objects)):
         scene = element.add(scene, assets)
-    scene = replace(scene, groups=tuple(_kept_out(scene, g, elements) for g in scene.groups))
     if not scene.lights:
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
     return replace(scene, focus=focus_of(scene))
@@ -53,9 +57,14 @@ def focus_of(scene: Scene) -> Region:
     )
 
 
-def _kept_out(scene: Scene, group: ObjectGroup, elements: Sequence[Element]) -> ObjectGroup:
-    discs = [e.keep_out(scene, group) for e in elements if isinstance(e, Robot)]
-    return replace(group, keep_out=tuple(disc for some in discs for disc in some))
+def _check_names(elements: Sequence[Element]) -> None:
+    seen: set[str] = set()
+    for element in elements:
+        if element.name in seen:
+            raise ConfigError(
+                f"elements.{element.name}: two elements have this name; expected one of its own"
+            )
+        seen.add(element.name)
 
 
 def _content_corners(surface: Surface) -> np.ndarray:

@@ -11,8 +11,15 @@ from generator.config.strict import Strict
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Body, Instance, ObjectGroup, Placement, Scene, Surface
-from generator.core.se3 import SE3
-from scene_templates.element import Element, extent_m, next_instance_id, surfaces_of
+from generator.core.se3 import SE3, Vec3
+from scene_templates.element import (
+    Element,
+    extent_m,
+    next_instance_id,
+    standing,
+    surfaces_of,
+)
+from scene_templates.rows import LAYERS, in_rows, standing_discs
 
 
 class AssetChoice(Strict):
@@ -80,8 +87,9 @@ class Objects(Element):
     annotate: bool = True
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The group, and its objects in rows on the first surface."""
+        """The group, and its objects in rows on its surfaces, clear of what stands there."""
         surfaces = surfaces_of(scene, self.on, f"elements.{self.name}.on")
+        discs = [standing_discs(scene, surface, assets) for surface in surfaces]
         group = ObjectGroup(
             name=self.name,
             surfaces=tuple(s.name for s in surfaces),
@@ -89,30 +97,64 @@ class Objects(Element):
             count=self.count,
             placement=self.placement,
             annotated=self.annotate,
+            keep_out=tuple(disc for some in discs for disc in some),
         )
         scene = replace(scene, groups=(*scene.groups, group))
-        for number in range(self.count):
-            asset = group.assets[(number * len(group.assets)) // max(self.count, 1)]
-            scene = self._with_nominal(scene, assets, surfaces[number % len(surfaces)], asset)
+        share = -(-self.count // len(surfaces))
+        for number, surface in enumerate(surfaces):
+            here = range(self.count)[number * share : (number + 1) * share]
+            chosen = [self._nominal(group, k, surface, assets) for k in here]
+            points = self._points(chosen, surface, group, assets)
+            for k, asset, point in zip(here, chosen, points, strict=True):
+                stand = surface.T_world_surface @ SE3(point)
+                scene = self._with_object(scene, assets, k, asset, standing(assets, asset, stand))
         return scene
 
-    def _with_nominal(
-        self, scene: Scene, assets: AssetIndex, surface: Surface, asset: str
+    def _nominal(
+        self, group: ObjectGroup, number: int, surface: Surface, assets: AssetIndex
+    ) -> str:
+        """The asset of an object: evenly from the group's, the next one where one does not fit."""
+        first = (number * len(group.assets)) // max(self.count, 1)
+        for asset in (*group.assets[first:], *group.assets[:first]):
+            length_m, width_m, height_m = extent_m(assets, asset)
+            fits = length_m <= surface.size_m[0] and width_m <= surface.size_m[1]
+            if fits and height_m <= surface.clearance_m:
+                return asset
+        raise ConfigError(
+            f"elements.{self.name}.assets: every asset is larger than surface '{surface.name}'; "
+            "expected smaller assets or a larger surface"
+        )
+
+    def _points(
+        self, chosen: list[str], surface: Surface, group: ObjectGroup, assets: AssetIndex
+    ) -> list[Vec3]:
+        """Where the objects of one surface stand, in its frame."""
+        T_surface_world = surface.T_world_surface.inverse()
+        height_m = surface.T_world_surface.translation_m[2]
+        discs: list[Vec3] = []
+        for x, y, radius_m in group.keep_out:
+            here = (T_surface_world @ SE3((x, y, height_m))).translation_m
+            discs.append((here[0], here[1], radius_m))
+        sizes_m = [extent_m(assets, asset) for asset in chosen]
+        points = in_rows(sizes_m, surface, discs, LAYERS[self.placement])
+        if points is None:
+            raise ConfigError(
+                f"elements.{self.name}.count: {len(chosen)} objects do not fit on surface "
+                f"'{surface.name}' of {surface.size_m[0]:g} m x {surface.size_m[1]:g} m; "
+                "expected fewer objects or a larger surface"
+            )
+        return points
+
+    def _with_object(
+        self, scene: Scene, assets: AssetIndex, number: int, asset: str, T_world_body: SE3
     ) -> Scene:
-        """One more object, in the next cell of a grid that fills the surface."""
-        number = sum(1 for body in scene.bodies if body.group == self.name)
-        columns = max(1, round((self.count * surface.size_m[0] / surface.size_m[1]) ** 0.5))
-        rows = -(-self.count // columns)
-        row, column = divmod(number, columns)
-        x = surface.size_m[0] * ((column + 0.5) / columns - 0.5)
-        y = surface.size_m[1] * ((row + 0.5) / rows - 0.5)
-        z = 0.5 * extent_m(assets, asset)[2]
+        """One more object, with an instance of its own."""
         entry = assets.get(asset)
         instance_id = next_instance_id(scene)
         body = Body(
             name=f"{self.name}/{number}",
             asset=asset,
-            T_world_body=(surface.T_world_surface @ SE3((x, y, z))).rounded(),
+            T_world_body=T_world_body.rounded(),
             instance_id=instance_id,
             group=self.name,
             motion="dynamic",

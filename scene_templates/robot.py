@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from generator.core.interfaces import AssetIndex
 from generator.core.kinematics import link_bodies
-from generator.core.scene import Articulation, Instance, ObjectGroup, Scene
+from generator.core.scene import Articulation, Instance, Scene
 from generator.core.se3 import SE3, Vec3
 from scene_templates.element import PlacedElement, next_instance_id, surfaces_of
 
@@ -21,14 +22,12 @@ class Robot(PlacedElement):
 
     Attributes:
         asset: franka_panda, kuka_iiwa, xarm6, or a robot of yours.
-        keep_out_m: Objects of groups on the same surface stay this far from its base.
         reach_m: Its hand is sent no farther than this from its base.
         annotate: Whether labels are written for it.
     """
 
     type: Literal["robot"] = "robot"
     asset: str = "franka_panda"
-    keep_out_m: float = Field(0.16, ge=0)
     reach_m: float = Field(0.75, gt=0)
     annotate: bool = True
 
@@ -63,26 +62,16 @@ class Robot(PlacedElement):
             bodies=(*scene.bodies, *link_bodies(articulation, robot, parts)),
         )
 
-    def keep_out(self, scene: Scene, group: ObjectGroup) -> tuple[Vec3, ...]:
-        """Discs of the world in which a group's objects are not put."""
-        shares_surface = self.on in group.surfaces or any(
-            scene.surface(name).body == self.on for name in group.surfaces
-        )
-        if not shares_surface:
-            return ()
-        x, y, _ = next(
-            a.T_world_base.translation_m for a in scene.articulations if a.name == self.name
-        )
-        return ((x, y, self.keep_out_m),)
-
     def _workspace_m(self, scene: Scene, T_world_base: SE3) -> tuple[Vec3, Vec3]:
         """The air over the surface it stands on, as far as it reaches."""
         x, y, z = T_world_base.translation_m
         low, high = [x - self.reach_m, y - self.reach_m], [x + self.reach_m, y + self.reach_m]
         if self.on:
             surface = surfaces_of(scene, self.on, f"elements.{self.name}.on")[0]
-            cx, cy, _ = surface.T_world_surface.translation_m
-            half_m = 0.5 * min(surface.size_m)
-            low = [max(low[0], cx - half_m), max(low[1], cy - half_m)]
-            high = [min(high[0], cx + half_m), min(high[1], cy + half_m)]
+            half_x, half_y = (0.5 * size for size in surface.size_m)
+            corners = [[sx * half_x, sy * half_y, 0.0] for sx in (-1, 1) for sy in (-1, 1)]
+            around = surface.T_world_surface.apply(np.array(corners))
+            low = [max(low[k], float(around[:, k].min())) for k in (0, 1)]
+            high = [min(high[k], float(around[:, k].max())) for k in (0, 1)]
+        low, high = [round(v, 6) for v in low], [round(v, 6) for v in high]
         return (low[0], low[1], z + 0.10), (high[0], high[1], z + 0.50)

@@ -19,6 +19,8 @@ MARGIN_M = 0.02
 
 _GAPS_M = (0.24, 0.18, 0.12, 0.08, 0.05, 0.03, 0.015, 0.005)
 _STEP_M = 0.02
+_TURNS_MAX = 100_000
+"""Steps, rows and layers tried for one object; surfaces of many metres need fewer."""
 
 
 def standing_discs(scene: Scene, surface: Surface, assets: AssetIndex) -> tuple[Vec3, ...]:
@@ -75,8 +77,7 @@ def _packed(
     row_m = layer_m = 0.0
     points: list[Vec3] = []
     for length_m, width_m, height_m in sizes_m:
-        # Each turn goes on by a step, a row or a layer: the surface bounds their number.
-        while True:
+        for _ in range(_TURNS_MAX):
             if x + length_m > half_x:
                 if x == left:
                     return None
@@ -92,6 +93,8 @@ def _packed(
                 x += _STEP_M
             else:
                 break
+        else:
+            return None
         points.append((x + 0.5 * length_m, y + 0.5 * width_m, z))
         x += length_m + gap_m
         row_m, layer_m = max(row_m, width_m), max(layer_m, height_m)

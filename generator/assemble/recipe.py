@@ -6,20 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from scene_templates.builder import build
-
 from generator.annotations.truth import image_truth
 from generator.assemble.spec import Spec
 from generator.assemble.tables import TABLES
 from generator.assets.library import Library, open_library
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
-from generator.core.interfaces import Annotator, AssetIndex, DatasetInfo, Exporter
+from generator.core.interfaces import Annotator, AssetIndex, DatasetInfo, Exporter, Renderer
 from generator.core.scene import Scene
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
 from generator.pipeline.pipeline import Recipe
-from generator.renderers import open_renderer
+from scene_templates.builder import build
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class PipelineFactory:
             recipe,
             library,
             open_physics=partial(open_engine, library, spec.head.physics),
-            renderer=open_renderer(library, spec.head.render.device, spec.head.render.settings),
+            renderer=_renderer(spec, library),
         )
 
 
@@ -97,6 +95,14 @@ def nominal_scene(spec: Spec, assets: AssetIndex) -> Scene:
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
     return scene
+
+
+def _renderer(spec: Spec, library: Library) -> Renderer:
+    render = spec.head.render
+    renderer: Renderer = TABLES["renderer"].load(render.renderer)(
+        library, render.device, render.settings
+    )
+    return renderer
 
 
 def categories_of(scene: Scene, assets: AssetIndex) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -34,10 +34,12 @@ class Render(RenderSettings):
         description="auto, cpu or cuda:N; auto takes a CUDA GPU where there is one.",
     )
 
+    renderer: Literal["warp"] = Field("warp", description="Which renderer makes the images.")
+
     @property
     def settings(self) -> RenderSettings:
         """What the renderer itself needs to know."""
-        return RenderSettings(**self.model_dump(exclude={"device"}))
+        return RenderSettings(**self.model_dump(exclude={"device", "renderer"}))
 
 
 class Splits(Strict):

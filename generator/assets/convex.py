@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.assets.mesh import first_occurrences, signed_volume
 from generator.assets.soup import Float64, Soup
+from generator.assets.welding import first_occurrences
 from generator.core.errors import AssetError
 from generator.core.geometry import ConvexParts
 
@@ -88,10 +88,7 @@ def decomposed(soup: Soup, max_parts: int) -> list[Float64]:
     """Triangles of a soup in pieces that are nearly convex, each [m, 3, 3]."""
     pieces = [_Piece.of(soup.corners)]
     whole = pieces[0].volume
-    enclosed = abs(signed_volume(soup.corners))
     for _ in range(max_parts - 1):
-        if sum(p.volume for p in pieces) - enclosed < 2.0 * _ENOUGH * whole:
-            break
         cuts = [_best_cut(piece) for piece in pieces]
         savings = [p.volume - sum(half.volume for half in cut) if cut else 0.0
                    for p, cut in zip(pieces, cuts, strict=True)]  # fmt: skip

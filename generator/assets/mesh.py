@@ -14,6 +14,7 @@ import numpy as np
 
 from generator.assets.decimate import decimated
 from generator.assets.soup import Float64, Int64, Soup
+from generator.assets.welding import first_occurrences
 from generator.core.errors import AssetError
 from generator.core.geometry import Material, MeshData
 
@@ -61,7 +62,7 @@ def normal_form(soup: Soup, place: str, form: NormalForm = NormalForm()) -> Mesh
             f"{place}: {len(soup)} textured triangles, at most {MAX_TEXTURED_FACES}; decimate it"
         )
     if not textured and len(soup) > form.max_faces:
-        soup, faces = _welded(decimated(soup, faces, form.max_faces))
+        soup, faces = _welded(decimated(soup, form.max_faces))
     soup, faces = _outward(soup, faces)
     soup = replace(soup, uvs=soup.uvs if textured else None)
     normals = soup.normals if _sane_normals(soup) else _creased(soup, faces, form.crease_deg)
@@ -118,26 +119,6 @@ def mesh_of(soup: Soup, normals: Float64) -> MeshData:
     for array in (mesh.vertices_m, mesh.faces, mesh.normals, mesh.uvs, mesh.face_slots):
         array.setflags(write=False)
     return mesh
-
-
-def first_occurrences(keys: Int64) -> tuple[Int64, Int64]:
-    """Numbers of the distinct rows of ``keys`` [n, k] in order of first occurrence.
-
-    Returns:
-        The number of each row [n], and the first row of each number.
-    """
-    order = np.lexsort(keys.T[::-1])
-    ordered = keys[order]
-    starts = np.concatenate([[True], (ordered[1:] != ordered[:-1]).any(axis=1)])
-    group = np.cumsum(starts) - 1
-    # lexsort is stable: the first row of a group is its first occurrence.
-    first = order[starts]
-    rank_order = np.argsort(first, kind="stable")
-    rank = np.zeros(len(first), dtype=np.int64)
-    rank[rank_order] = np.arange(len(first))
-    numbers = np.zeros(len(keys), dtype=np.int64)
-    numbers[order] = rank[group]
-    return numbers, first[rank_order]
 
 
 def _grid(corners: Float64) -> float:

@@ -20,9 +20,9 @@ from rich.progress import (
 from rich.table import Table
 
 from generator.assemble.recipe import PipelineFactory
-from generator.assemble.record import licences_text, plan_of
 from generator.cli.options import Choice
 from generator.core.errors import ConfigError
+from generator.runner.identity import licences_text, plan_of
 from generator.runner.run import RunProgress, Summary, run
 
 

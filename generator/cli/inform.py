@@ -87,15 +87,15 @@ def _renders() -> str:
 
 
 def _device() -> str:
-    from generator.renderers.device import describe_device
+    from generator.renderers.device import open_device
 
-    return describe_device("auto")
+    return str(open_device("auto"))
 
 
 def _cache() -> str:
-    from generator.assemble.recipe import cache_dir
+    from generator.assets.library import default_cache_dir
 
-    folder = cache_dir()
+    folder = default_cache_dir()
     folder.mkdir(parents=True, exist_ok=True)
     probe = folder / "doctor-probe"
     probe.write_bytes(b"ok")

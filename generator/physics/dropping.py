@@ -17,7 +17,8 @@ _LIFT_M = 0.01
 _LOWERINGS_MAX = 16
 _RELEASE_GAP_M = 0.002
 _TOUCH_M = 0.001
-_FALLEN_M = 0.5
+_ATTEMPTS_MAX = 4
+_LOST_M = 0.3
 """This far below its lowest surface an object is not waited for any longer."""
 
 
@@ -43,32 +44,62 @@ class Drop:
         self._surfaces = surfaces
         # Lowest first, so that each is lowered onto what lies below it; ties stay in order.
         self._falling = sorted(falling, key=lambda body: float(world.bounds_m(body.name)[0][2]))
-        self._time_left_s = config.settle_time_s_max
+        self._homes = {
+            body.name: home_surface(surfaces[body.name], *world.bounds_m(body.name))
+            for body in falling
+        }
 
     def settle(self, fixed: Sequence[str], arms: Sequence[str]) -> Rejection | None:
-        """Let everything fall and come to rest; None when all is well."""
-        self._lower(fixed, arms)
-        guards = self._guards() if self._config.guard_walls else []
-        rejection = self._come_to_rest()
-        if rejection is None and guards:
-            leaning = any(
-                (one in guards or other in guards) and gap_m < _TOUCH_M
-                for one, other, gap_m in self._world.contacts()
-            )
-            for name in guards:
-                self._world.remove(name)
-            rejection = self._come_to_rest() if leaning else None
-        return rejection or self._judged()
+        """Let everything fall and come to rest; None when all is well.
 
-    def _lower(self, fixed: Sequence[str], arms: Sequence[str]) -> None:
+        With guard walls, what falls off nevertheless is dropped again, nearer to the middle of
+        its surface, a few times.
+        """
+        loose = self._falling
+        for attempt in range(_ATTEMPTS_MAX if self._config.guard_walls else 1):
+            for body in loose:
+                self._restart(body, pull=1.0 - 0.5**attempt)
+            self._lower(loose, fixed, arms)
+            if not self._rest_guarded():
+                return self._still_moving()
+            loose = [body for body in self._falling if not self._is_supported(body)]
+            if not loose:
+                break
+            if any(self._homes[body.name] is None for body in loose):
+                return self._fell_off()
+        return self._fell_off() if loose else self._judged()
+
+    def _restart(self, body: Body, pull: float) -> None:
+        """Put a body where it started, moved towards the middle of its surface by a share."""
+        home = self._homes[body.name]
+        x, y, z = body.T_world_body.translation_m
+        if home is not None:
+            to_x, to_y, _ = home.T_world_surface.translation_m
+            x, y = x + pull * (to_x - x), y + pull * (to_y - y)
+        self._world.place(body.name, SE3((x, y, z), body.T_world_body.quaternion_wxyz))
+
+    def _rest_guarded(self) -> bool:
+        """Whether all comes to rest: first inside guard walls, then without what it leans on."""
+        guards = self._guards() if self._config.guard_walls else []
+        rests = self._come_to_rest()
+        leaning = any(
+            (one in guards or other in guards) and gap_m < _TOUCH_M
+            for one, other, gap_m in (self._world.contacts() if guards else ())
+        )
+        for name in guards:
+            self._world.remove(name)
+        return self._come_to_rest() if rests and leaning else rests
+
+    def _lower(self, loose: Sequence[Body], fixed: Sequence[str], arms: Sequence[str]) -> None:
         """Bring each body to just above what is below it: a short fall stays where it lands."""
-        movable = list(arms)
-        for body in self._falling:
-            home = home_surface(self._surfaces[body.name], *self._world.bounds_m(body.name))
+        names = [body.name for body in loose]
+        movable = [*arms, *(b.name for b in self._falling if b.name not in names)]
+        for name in names:
+            home = self._homes[name]
             if home is not None:
-                self._lift_clear(body.name, movable, home)
-                self._sink(body.name, [*fixed, *movable], home)
-            movable.append(body.name)
+                self._lift_clear(name, movable, home)
+                self._sink(name, [*fixed, *movable], home)
+            movable.append(name)
 
     def _lift_clear(self, name: str, others: Sequence[str], home: Surface) -> None:
         """Raise a body that starts inside others until it is free, as far as there is room."""
@@ -107,16 +138,10 @@ class Drop:
 
     def _guards(self) -> list[str]:
         """Put walls around every surface that something will land on."""
-        at_home: dict[str, list[str]] = {}
-        surfaces: dict[str, Surface] = {}
-        for body in self._falling:
-            home = home_surface(self._surfaces[body.name], *self._world.bounds_m(body.name))
-            if home is not None:
-                surfaces[home.name] = home
-                at_home.setdefault(home.name, []).append(body.name)
         names = []
-        for home in surfaces.values():
-            strangers = [b.name for b in self._falling if b.name not in at_home[home.name]]
+        homes = {home.name: home for home in self._homes.values() if home is not None}
+        for home in homes.values():
+            strangers = [name for name, other in self._homes.items() if other is not home]
             for number, (shape, pose) in enumerate(guard_walls(home)):
                 name = f"guard/{home.name}/{number}"
                 self._world.add(name, shape, pose, friction=0.0, restitution=0.0)
@@ -124,20 +149,18 @@ class Drop:
                 names.append(name)
         return names
 
-    def _come_to_rest(self) -> Rejection | None:
-        """Let time pass until nothing moves, something fell off, or the time is up."""
+    def _come_to_rest(self) -> bool:
+        """Let time pass until nothing moves or something is lost; False when time is up first."""
         config = self._config
         steps = max(1, round(_CHECK_EVERY_S / config.time_step_s))
-        calm_s = 0.0
-        while self._falling and self._time_left_s > 0.0:
+        elapsed_s, calm_s = 0.0, 0.0
+        while elapsed_s < config.settle_time_s_max:
             self._world.step(steps)
-            self._time_left_s -= steps * config.time_step_s
-            if any(self._fell(body) for body in self._falling):
-                return self._fell_off()
+            elapsed_s += steps * config.time_step_s
             calm_s = calm_s + steps * config.time_step_s if self._is_calm() else 0.0
-            if calm_s >= config.rest_time_s - 1e-9:
-                return None
-        return self._still_moving() if self._falling else None
+            if calm_s >= config.rest_time_s - 1e-9 or any(map(self._is_lost, self._falling)):
+                return True
+        return not self._falling
 
     def _is_calm(self) -> bool:
         speeds = [self._world.speed(body.name) for body in self._falling]
@@ -146,16 +169,16 @@ class Drop:
             for speed, spin in speeds
         )
 
-    def _fell(self, body: Body) -> bool:
+    def _is_lost(self, body: Body) -> bool:
         heights = [s.T_world_surface.translation_m[2] for s in self._surfaces[body.name]]
         lowest = min(heights, default=float("-inf"))
-        return self._world.pose(body.name).translation_m[2] < lowest - _FALLEN_M
+        return self._world.pose(body.name).translation_m[2] < lowest - _LOST_M
+
+    def _is_supported(self, body: Body) -> bool:
+        surfaces = self._surfaces[body.name]
+        return not surfaces or is_supported(surfaces, *self._world.bounds_m(body.name))
 
     def _judged(self) -> Rejection | None:
-        for body in self._falling:
-            surfaces = self._surfaces[body.name]
-            if surfaces and not is_supported(surfaces, *self._world.bounds_m(body.name)):
-                return self._fell_off()
         deepest = min((gap_m for _, _, gap_m in self._world.contacts()), default=0.0)
         return self._overlapping() if deepest < -self._config.penetration_m_max else None
 

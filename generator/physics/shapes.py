@@ -22,7 +22,10 @@ SHELL_M = 0.001
 
 _SHELL_SHARE_MAX = 0.4
 """Of a part's smallest width: a hull never shrinks to nothing."""
-_RETREAT_MAX = 4.0
+_RETREAT_MAX = 1.75
+"""Just above the square root of 3, of a box's corner. Sharper tips move less than their faces ask
+for: better a gap of less than half a shell than a tip that sinks in by several.
+"""
 _SCALE_STEP = 1.05
 """Hulls are shrunk for the nearest of these steps of scale: 25 micrometres at most are missing."""
 _BOXES_MAX = 16

@@ -13,7 +13,7 @@ from generator.physics.shapes import CollisionShape, collision_shape
 
 _SINK_M = 0.02
 """How far below a surface a body on it may reach: more than any contact error."""
-_WALL_THICKNESS_M = 0.1
+_WALL_THICKNESS_M = 1.0
 _WALL_BELOW_M = 0.5
 _WALL_ABOVE_M = 5.0
 

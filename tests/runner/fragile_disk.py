@@ -88,10 +88,10 @@ class FragileDisk:
 
     def _path(self, argument: Any, options: dict[str, Any]) -> str:
         if isinstance(argument, int):
-            return os.readlink(f"/proc/self/fd/{argument}")
+            return str(Path(f"/proc/self/fd/{argument}").readlink())
         folder = options.get("dir_fd")
         if folder is not None:
-            return f"{os.readlink(f'/proc/self/fd/{folder}')}/{os.fspath(argument)}"
+            return f"{Path(f'/proc/self/fd/{folder}').readlink()}/{os.fspath(argument)}"
         return self._text(argument)
 
     @staticmethod
@@ -99,25 +99,25 @@ class FragileDisk:
         return os.fspath(argument) if isinstance(argument, (str, os.PathLike)) else str(argument)
 
     def _note_fsync(self, path: str) -> None:
-        if os.path.isdir(path):
+        if Path(path).is_dir():
             self.synced_folders.add(path)
             self.pending = [p for p in self.pending if p.folder != path]
         else:
-            status = os.stat(path)
+            status = Path(path).stat()
             self.synced_bytes[status.st_ino] = status.st_size
 
     def _note_rename(self, source: str, target: str) -> Pending:
-        kept = self._keep(target) if os.path.isfile(target) else None
+        kept = self._keep(target) if Path(target).is_file() else None
         moved = {p for p in self.synced_folders if p == source or p.startswith(f"{source}/")}
         self.synced_folders |= {target + p[len(source) :] for p in moved}
 
         def undo() -> None:
-            if os.path.exists(target) and os.path.isdir(os.path.dirname(source)):
+            if Path(target).exists() and Path(source).parent.is_dir():
                 self.originals["rename"](target, source)
             if kept is not None:
                 self.originals["rename"](kept, target)
 
-        return Pending(os.path.dirname(target), undo)
+        return Pending(str(Path(target).parent), undo)
 
     _note_replace = _note_rename
 
@@ -125,19 +125,19 @@ class FragileDisk:
         if path == str(self.root):
             # Its parent is outside of what is watched.
             return None
-        return Pending(os.path.dirname(path), lambda: shutil.rmtree(path, ignore_errors=True))
+        return Pending(str(Path(path).parent), lambda: shutil.rmtree(path, ignore_errors=True))
 
     def _note_unlink(self, path: str, *_: str) -> Pending:
         kept = self._keep(path)
 
         def undo() -> None:
-            if os.path.isdir(os.path.dirname(path)):
+            if Path(path).parent.is_dir():
                 self.originals["rename"](kept, path)
 
-        return Pending(os.path.dirname(path), undo)
+        return Pending(str(Path(path).parent), undo)
 
     def _keep(self, path: str) -> str:
-        kept = str(self.attic / f"{self.count}-{len(self.pending)}-{os.path.basename(path)}")
+        kept = str(self.attic / f"{self.count}-{len(self.pending)}-{Path(path).name}")
         self.originals["link"](path, kept)
         return kept
 

@@ -27,7 +27,7 @@ def test_shard_count_rounds_up(n: int, shard_size: int, shards: int) -> None:
 
 
 def test_a_plan_that_holds_nothing_is_refused() -> None:
-    """n and shard_size are at least 1."""
+    """Both n and shard_size are at least 1."""
     with pytest.raises(ValueError, match="must be >= 1"):
         fake_plan(n=0)
 

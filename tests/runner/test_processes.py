@@ -220,6 +220,7 @@ class Stubborn(SceneRejected):
         super().__init__(3, ())
 
     def __reduce__(self) -> tuple[object, ...]:
+        """What does not fit the constructor."""
         return (Stubborn, ("one argument too many",))
 
 

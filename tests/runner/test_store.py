@@ -69,7 +69,9 @@ def test_sums_are_those_of_sha256sum(tmp_path: Path) -> None:
     make(tmp_path / "out")
 
     done = subprocess.run(
-        ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"], cwd=tmp_path / "out"
+        ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"],
+        cwd=tmp_path / "out",
+        check=False,
     )
 
     assert done.returncode == 0
@@ -388,27 +390,25 @@ def test_a_kill_at_every_operation_is_resumed_to_the_same_bytes(
 def test_every_errno_at_every_operation_is_one_message_and_resumable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference_digest: str
 ) -> None:
-    """Path, errno, free bytes and the resume command; then the same bytes once it is gone."""
-    operations = count_operations(tmp_path, monkeypatch)
-    messages = 0
+    """Path, errno, free bytes and the resume command; then the same bytes once it is gone.
 
-    for k in range(1, operations + 1):
+    Where the fault only hits the tidying up after the manifest, the run succeeds.
+    """
+    for k in range(1, count_operations(tmp_path, monkeypatch) + 1):
         out = tmp_path / f"out{k}"
         number = ERRNOS[k % len(ERRNOS)]
+        message = ""
         with monkeypatch.context() as patch:
             FragileDisk(out, tmp_path / f"attic{k}", fail_at=k, errno=number).install(patch)
             try:
                 make(out)
             except StorageError as error:
-                messages += 1
-                assert f"({errno.errorcode[number]})" in str(error)
-                assert "bytes free" in str(error)
-                assert RESUME in str(error)
+                message = str(error)
+        facts = (f"({errno.errorcode[number]})", str(out), "bytes free", RESUME)
+        assert all(fact in message for fact in facts) or (out / "manifest.json").exists()
         make(out)
         assert tree_digest(out) == reference_digest, f"{errno.errorcode[number]} at operation {k}"
         shutil.rmtree(out)
-
-    assert messages > 0.8 * operations
 
 
 def survives_power_cut(
@@ -486,7 +486,7 @@ def tiny_disk(tmp_path: Path) -> Iterator[Path]:
     folder = tmp_path / "tiny"
     folder.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
         pytest.skip("mounting a small file system needs root")
     yield folder
     subprocess.run(["umount", "-l", str(folder)], check=True)

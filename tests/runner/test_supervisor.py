@@ -228,6 +228,7 @@ class Simulation:
     attempts: Counter[int] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
+        """Begin at time 0 with no process."""
         self.rng = random.Random(self.seed)
         self.now_s = 0.0
         self.alive: dict[int, VirtualWorker] = {}

@@ -80,6 +80,38 @@ FAMILIES: Mapping[str, Family] = _table((
     _static("room", "furniture:room", size_m=(5.0, 4.0, 2.8), door=1, window=1),
 ))
 
-TEXTURES: Mapping[str, TextureFamily] = _table(())
+TEXTURES: Mapping[str, TextureFamily] = _table((
+    _texture("wood_grain", "textures.wood:wood_grain", "surface wood", 18),
+    _texture("wood_planks", "textures.wood:wood_planks", "floor surface wood", 18),
+    _texture("marble", "textures.stone:marble", "floor stone surface"),
+    _texture("terrazzo", "textures.stone:terrazzo", "floor stone surface"),
+    _texture("concrete", "textures.stone:concrete", "floor stone surface wall"),
+    _texture("plaster", "textures.stone:plaster", "surface wall"),
+    _texture("brick", "textures.stone:brick", "stone surface wall"),
+    _texture("tiles", "textures.stone:tiles", "floor stone surface wall"),
+    _texture("fabric", "textures.fabric:fabric", "surface textile"),
+    _texture("carpet", "textures.fabric:carpet", "floor surface textile"),
+    _texture("leather", "textures.fabric:leather", "surface textile"),
+    _texture("cardboard", "textures.fabric:cardboard", "surface"),
+    _texture("brushed_metal", "textures.metal:brushed_metal", "metal surface"),
+    _texture("painted_metal", "textures.metal:painted_metal", "metal surface"),
+    _texture("checker", "textures.pattern:checker", "pattern"),
+    _texture("stripes", "textures.pattern:stripes", "pattern"),
+    _texture("perlin_noise", "textures.pattern:perlin_noise", "pattern"),
+    _texture("voronoi_noise", "textures.pattern:voronoi_noise", "pattern"),
+    _texture("label", "textures.printed:label", "printed", 36),
+    _texture("can_label", "textures.printed:can_label", "printed", 32),
+    _texture("carton", "textures.printed:carton", "printed", 32),
+    _texture("milk_label", "textures.printed:milk_label", "printed"),
+    _texture("book_cover", "textures.printed:book_cover", "printed", 32),
+))
 
-ENVIRONMENTS: Mapping[str, EnvironmentFamily] = _table(())
+ENVIRONMENTS: Mapping[str, EnvironmentFamily] = _table((
+    _environment("neutral", "studio"),
+    _environment("studio", "studio", 16),
+    _environment("indoor", "indoor", 16),
+    _environment("overcast", "outdoor"),
+    _environment("clear_sky", "outdoor", 12),
+    _environment("sunset", "outdoor", 12),
+    _environment("night_city", "outdoor"),
+))

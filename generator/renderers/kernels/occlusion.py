@@ -30,7 +30,8 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 TILE = wp.constant(8)
 LIST_LENGTH = wp.constant(48)
 UNSEEN = wp.constant(-1.0)
-GOLDEN_ANGLE = wp.constant(2.399963)
+# Where a sun is taken to be; no scene is larger.
+SUN_DISTANCE_M = wp.constant(1.0e3)
 
 
 @wp.struct
@@ -46,7 +47,7 @@ class Tile:
 
 
 @wp.func
-def tile_of(lattice: Lattice, column: int, row: int, tolerance: float):
+def tile_of(lattice: Lattice, column: int, row: int):
     """Bounds of one tile."""
     low = wp.vec3(1.0e9)
     high = wp.vec3(-1.0e9)
@@ -72,15 +73,21 @@ def tile_of(lattice: Lattice, column: int, row: int, tolerance: float):
 
 
 @wp.func
-def in_shaft(world: World, b: int, tile: Tile, to_lamp: wp.vec3, radius_m: float):
-    """Whether a body's box may touch the shaft between a tile and a ball."""
+def in_shaft(world: World, b: int, tile: Tile, to_lamp: wp.vec3, radius_m: float, slope: float):
+    """Whether a body's box may touch the shaft between a tile and a lamp.
+
+    Args:
+        radius_m: Of the lamp.
+        slope: By how much the shaft widens per metre, instead, for a sun.
+    """
     body = world.bodies[b]
     geometry = world.geometries[body.geometry]
     low = geometry.low_m
     high = geometry.high_m
     o = to_mesh_point(body, tile.centre_m)
     d = to_mesh_vector(body, to_lamp)
-    grown = wp.max(tile.radius_m, radius_m) / body.scale
+    reach = wp.length((low + high) * 0.5 - o) + wp.length(high - low) * 0.5
+    grown = wp.max(tile.radius_m, radius_m) / body.scale + slope * reach
     t0 = float(0.0)
     t1 = float(1.0)
     for k in range(3):
@@ -107,6 +114,30 @@ def above_tile(world: World, b: int, tile: Tile):
     return top * body.scale + wp.dot(body.t_world_mesh, tile.normal) > tile.height_m + 1.0e-4
 
 
+@wp.func
+def may_shade(world: World, b: int, tile: Tile, lamp: Lamp):
+    """Whether a body may come between a tile and a lamp."""
+    to_lamp = lamp.position_m - tile.centre_m
+    radius = lamp.radius
+    slope = float(0.0)
+    if lamp.kind == SUN:
+        to_lamp = lamp.direction * -SUN_DISTANCE_M
+        radius = 0.0
+        slope = lamp.radius
+    return in_shaft(world, b, tile, to_lamp, radius, slope)
+
+
+@wp.func
+def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
+    """Put a body on a list, or mark the list as too long."""
+    n = lists[tile, j, 0]
+    if n >= 0 and n < LIST_LENGTH:
+        lists[tile, j, 1 + n] = b
+        lists[tile, j, 0] = n + 1
+    else:
+        lists[tile, j, 0] = -1
+
+
 @wp.kernel
 def list_occluders(
     world: World,
@@ -120,37 +151,25 @@ def list_occluders(
     A list begins with its length, which is -1 where it would be too long.
     """
     i = wp.tid()
-    tile = tile_of(lattice, i % tile_columns, i / tile_columns, 0.0)
+    tile = tile_of(lattice, i % tile_columns, i / tile_columns)
     lamps = world.lamps.shape[0]
     for j in range(lamps + 1):
         lists[i, j, 0] = 0
     if tile.count == 0:
         return
+    near = Tile()
+    near.centre_m = tile.centre_m
+    near.radius_m = tile.radius_m + ambient_radius_m
     for b in range(world.bodies.shape[0]):
         candidate = bool(True)
         if tile.flat != 0:
             candidate = above_tile(world, b, tile)
         if candidate:
-            for j in range(lamps + 1):
-                touches = bool(False)
-                if j == lamps:
-                    near = Tile()
-                    near.centre_m = tile.centre_m
-                    near.radius_m = tile.radius_m + ambient_radius_m
-                    touches = in_shaft(world, b, near, wp.vec3(0.0), 0.0)
-                elif world.lamps[j].kind == SUN:
-                    far = world.lamps[j].direction * -1.0e3
-                    touches = in_shaft(world, b, tile, far, world.lamps[j].radius * 30.0)
-                else:
-                    to_lamp = world.lamps[j].position_m - tile.centre_m
-                    touches = in_shaft(world, b, tile, to_lamp, world.lamps[j].radius)
-                if touches:
-                    n = lists[i, j, 0]
-                    if n >= 0 and n < LIST_LENGTH:
-                        lists[i, j, 1 + n] = b
-                        lists[i, j, 0] = n + 1
-                    else:
-                        lists[i, j, 0] = -1
+            for j in range(lamps):
+                if may_shade(world, b, tile, world.lamps[j]):
+                    append(lists, i, j, b)
+            if in_shaft(world, b, near, wp.vec3(0.0), 0.0, 0.0):
+                append(lists, i, lamps, b)
 
 
 @wp.func
@@ -197,23 +216,253 @@ def bayer(x: int, y: int):
 
 
 @wp.func
-def sunflower(k: int, n: int):
-    """Point k of n spread evenly over the unit disc (Vogel 1979)."""
-    r = wp.sqrt((float(k) + 0.5) / float(n))
-    a = float(k) * GOLDEN_ANGLE
-    return wp.vec2(r * wp.cos(a), r * wp.sin(a))
+def frame_of(z: wp.vec3):
+    """Two unit vectors that complete a right-handed frame.
+
+    Source: Duff et al., "Building an orthonormal basis, revisited", JCGT 2017.
+    """
+    sign = wp.where(z[2] >= 0.0, 1.0, -1.0)
+    a = -1.0 / (sign + z[2])
+    b = z[0] * z[1] * a
+    x = wp.vec3(1.0 + sign * z[0] * z[0] * a, sign * b, -sign * z[0])
+    y = wp.vec3(b, sign + z[1] * z[1] * a, -z[1])
+    return x, y
 
 
 @wp.func
-def path_to_lamp(lamp: Lamp, origin: wp.vec3, k: int, n: int):
-    """From a point to part k of n of a lamp."""
+def path_to_lamp(lamp: Lamp, origin: wp.vec3, part: wp.vec2):
+    """From a point to a part of a lamp's disc."""
     to_lamp = lamp.position_m - origin
     radius = lamp.radius
     if lamp.kind == SUN:
-        to_lamp = lamp.direction * -1.0e3
-        radius = lamp.radius * 1.0e3
-    z = unit(to_lamp)
-    x = unit(wp.cross(wp.where(wp.abs(z[2]) < 0.9, wp.vec3(0.0, 0.0, 1.0), wp.vec3(1.0, 0.0, 0.0)), z))
-    y = wp.cross(z, x)
-    s = sunflower(k, n)
-    return to_lamp + (x * s[0] + y * s[1]) * radius
+        to_lamp = lamp.direction * -SUN_DISTANCE_M
+        radius = lamp.radius * SUN_DISTANCE_M
+    x, y = frame_of(unit(to_lamp))
+    return to_lamp + (x * part[0] + y * part[1]) * radius
+
+
+@wp.func
+def tile_index(lattice: Lattice, i: int, tile_columns: int):
+    """The tile a lattice point belongs to."""
+    return ((i / lattice.width) / TILE) * tile_columns + (i % lattice.width) / TILE
+
+
+@wp.kernel
+def probe_lamps(
+    world: World,
+    lattice: Lattice,
+    tile_columns: int,
+    lists: wp.array(dtype=int, ndim=3),
+    disc: wp.array(dtype=wp.vec2),
+    lit: wp.array(dtype=float, ndim=2),
+):
+    """One ray per point and lamp: 1, 0, or UNSEEN where the lamp lights nothing anyway.
+
+    Args:
+        disc: Sixteen points of the unit disc.
+    """
+    i = wp.tid()
+    seen = lattice.body[i] >= 0
+    tile = tile_index(lattice, i, tile_columns)
+    for j in range(world.lamps.shape[0]):
+        value = float(UNSEEN)
+        if seen:
+            origin = lattice.origin_m[i]
+            beam = beam_from(world.lamps[j], origin)
+            if (
+                wp.dot(beam.direction, lattice.normal[i]) > -beam.spread
+                and wp.max(beam.normal_lux) > 0.0
+            ):
+                value = 1.0
+                if lists[tile, j, 0] != 0:
+                    part = disc[bayer(i % lattice.width, i / lattice.width)]
+                    path = path_to_lamp(world.lamps[j], origin, part)
+                    if blocked(world, lists, tile, j, lattice.skip[i], origin, path):
+                        value = 0.0
+        lit[j, i] = value
+
+
+@wp.kernel
+def classify_blocks(
+    lattice: Lattice, values: wp.array(dtype=float, ndim=2), classes: wp.array(dtype=int, ndim=3)
+):
+    """What the points of each aligned 4 x 4 block say: bits 1 for zeros, 2 for ones, 4 for else."""
+    row, column, j = wp.tid()
+    found = int(0)
+    for y in range(4 * row, wp.min(4 * row + 4, lattice.height)):
+        for x in range(4 * column, wp.min(4 * column + 4, lattice.width)):
+            value = values[j, y * lattice.width + x]
+            if value == 0.0:
+                found = found | 1
+            elif value == 1.0:
+                found = found | 2
+            elif value != UNSEEN:
+                found = found | 4
+    classes[row, column, j] = found
+
+
+@wp.func
+def classes_around(classes: wp.array(dtype=int, ndim=3), x: int, y: int, j: int):
+    """What the blocks say that a 4 x 4 window around a point touches."""
+    last_row = classes.shape[0] - 1
+    last_column = classes.shape[1] - 1
+    x0 = wp.max((x - 2) >> 2, 0)
+    y0 = wp.max((y - 2) >> 2, 0)
+    x1 = wp.min((x + 1) >> 2, last_column)
+    y1 = wp.min((y + 1) >> 2, last_row)
+    return classes[y0, x0, j] | classes[y0, x1, j] | classes[y1, x0, j] | classes[y1, x1, j]
+
+
+@wp.func
+def window_mean(
+    lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, i: int, tolerance_m: float
+):
+    """Mean over the 4 x 4 window around a point, on its own surface."""
+    x = i % lattice.width
+    y = i / lattice.width
+    total = float(0.0)
+    count = float(0.0)
+    for v in range(wp.max(y - 2, 0), wp.min(y + 2, lattice.height)):
+        for u in range(wp.max(x - 2, 0), wp.min(x + 2, lattice.width)):
+            k = v * lattice.width + u
+            value = values[j, k]
+            if value != UNSEEN and same_surface(lattice, i, k, tolerance_m):
+                total += value
+                count += 1.0
+    mean = values[j, i]
+    if count > 0.0:
+        mean = total / count
+    return mean
+
+
+@wp.kernel
+def refine_lamps(
+    view: View,
+    world: World,
+    lattice: Lattice,
+    tile_columns: int,
+    lists: wp.array(dtype=int, ndim=3),
+    classes: wp.array(dtype=int, ndim=3),
+    disc: wp.array(dtype=wp.vec2),
+    probed: wp.array(dtype=float, ndim=2),
+    lit: wp.array(dtype=float, ndim=2),
+):
+    """Four more rays where a lamp is neither seen by all points around nor by none.
+
+    Args:
+        disc: Sixty-four points of the unit disc.
+    """
+    i = wp.tid()
+    x = i % lattice.width
+    y = i / lattice.width
+    tile = tile_index(lattice, i, tile_columns)
+    for j in range(world.lamps.shape[0]):
+        value = probed[j, i]
+        if value != UNSEEN and (classes_around(classes, x, y, j) & 3) == 3:
+            tolerance_m = surface_tolerance(view, lattice.p_m[i])
+            mean = window_mean(lattice, probed, j, i, tolerance_m)
+            if mean > 0.0 and mean < 1.0:
+                seen = float(0.0)
+                origin = lattice.origin_m[i]
+                for k in range(4):
+                    part = disc[16 * k + bayer(x, y)]
+                    path = path_to_lamp(world.lamps[j], origin, part)
+                    if not blocked(world, lists, tile, j, lattice.skip[i], origin, path):
+                        seen += 0.25
+                value = seen
+        lit[j, i] = value
+
+
+@wp.func
+def surface_tolerance(view: View, p: wp.vec3):
+    """How far from a point's tangent plane its neighbours may be: three pixels' width."""
+    return 3.0 * view.pixel_rad * wp.length(p - view.eye_m)
+
+
+@wp.kernel
+def smooth_lattice(
+    view: View,
+    lattice: Lattice,
+    classes: wp.array(dtype=int, ndim=3),
+    values: wp.array(dtype=float, ndim=2),
+    smoothed: wp.array(dtype=float, ndim=2),
+):
+    """Average the values of neighbours on one surface, wherever they differ."""
+    i = wp.tid()
+    x = i % lattice.width
+    y = i / lattice.width
+    for j in range(values.shape[0]):
+        value = values[j, i]
+        if value != UNSEEN:
+            found = classes_around(classes, x, y, j)
+            if found != 1 and found != 2:
+                value = window_mean(lattice, values, j, i, surface_tolerance(view, lattice.p_m[i]))
+        smoothed[j, i] = value
+
+
+@wp.kernel
+def probe_ambient(
+    world: World,
+    lattice: Lattice,
+    tile_columns: int,
+    lists: wp.array(dtype=int, ndim=3),
+    hemisphere: wp.array(dtype=wp.vec3),
+    radius_m: float,
+    open_sky: wp.array(dtype=float, ndim=2),
+):
+    """One short ray per point: 1 where it meets nothing, less the nearer the obstacle.
+
+    Args:
+        hemisphere: Sixteen directions about +Z with cosine-weighted density.
+    """
+    i = wp.tid()
+    value = float(UNSEEN)
+    if lattice.body[i] >= 0:
+        value = 1.0
+        lamps = world.lamps.shape[0]
+        tile = tile_index(lattice, i, tile_columns)
+        if lists[tile, lamps, 0] != 0:
+            n = lattice.normal[i]
+            x, y = frame_of(n)
+            h = hemisphere[bayer(i % lattice.width, i / lattice.width)]
+            path = (x * h[0] + y * h[1] + n * h[2]) * radius_m
+            t = free_path(world, lists, tile, lamps, lattice.skip[i], lattice.origin_m[i], path)
+            value = t * (2.0 - t)
+    open_sky[0, i] = value
+
+
+@wp.func
+def free_path(
+    world: World,
+    lists: wp.array(dtype=int, ndim=3),
+    tile: int,
+    j: int,
+    skip: int,
+    origin: wp.vec3,
+    path: wp.vec3,
+):
+    """The part of a path that is free, from 0 to 1."""
+    free = float(1.0)
+    count = lists[tile, j, 0]
+    if count >= 0:
+        for k in range(count):
+            b = lists[tile, j, 1 + k]
+            if b != skip:
+                free = freed_by(world, b, origin, path, free)
+    else:
+        candidates = wp.bvh_query_ray(world.tree, origin, path)
+        b = int(0)
+        while wp.bvh_query_next(candidates, b, free):
+            if b != skip:
+                free = freed_by(world, b, origin, path, free)
+    return free
+
+
+@wp.func
+def freed_by(world: World, b: int, origin: wp.vec3, path: wp.vec3, free: float):
+    """The free part of a path before one body, at most ``free``."""
+    body = world.bodies[b]
+    o = to_mesh_point(body, origin)
+    d = to_mesh_vector(body, path)
+    answer = wp.mesh_query_ray(world.geometries[body.geometry].mesh, o, d, free)
+    return wp.where(answer.result, answer.t, free)

@@ -1,225 +1,293 @@
-"""Radiance of what is seen at every pixel centre."""
+"""Light at what is seen: fully on the lattice and where surfaces turn sharply, gathered elsewhere."""
 
 from __future__ import annotations
 
 import warp as wp
 
 from generator.renderers.kernels.brdf import make_brdf, specular_lobe
+from generator.renderers.kernels.lattice import Lattice, agree, ray_origin
 from generator.renderers.kernels.lighting import beam_from, towards_mirror
-from generator.renderers.kernels.records import (
-    Body,
-    Geometry,
-    Surface,
-    Texture,
-    View,
-    World,
-    pixel_direction,
-    unit,
+from generator.renderers.kernels.look import Look, look_at_hit, surface_index
+from generator.renderers.kernels.occlusion import (
+    NO_TILE,
+    UNSEEN,
+    blocked,
+    free_path,
+    frame_of,
+    path_to_lamp,
+    surface_tolerance,
 )
+from generator.renderers.kernels.records import View, World, pixel_direction, unit
 from generator.renderers.kernels.sky import sky_image, sky_irradiance, sky_reflection
-from generator.renderers.kernels.surface import mesh_point
-from generator.renderers.kernels.texturing import albedo_at, bump_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Light of two points may be mixed if their normals differ by less than eight degrees.
+SMOOTH_COSINE = wp.constant(0.99)
+# Highlights of smoother surfaces are too small to be gathered.
+GATHERED_ROUGHNESS = wp.constant(0.25)
+
 
 @wp.struct
-class Look:
-    """A surface with its textures looked up."""
+class Images:
+    """What is seen at every pixel centre, flat; as in generator.renderers.visibility.Seen."""
 
-    albedo: wp.vec3
-    roughness: float
-    normal: wp.vec3
-
-
-@wp.func
-def mesh_mapped(
-    look: Look,
-    texture: Texture,
-    body: Body,
-    geometry: Geometry,
-    face: int,
-    weight: wp.vec2,
-    footprint_m: float,
-):
-    """Textures by the mesh's own UVs."""
-    i = geometry.faces[3 * face]
-    j = geometry.faces[3 * face + 1]
-    k = geometry.faces[3 * face + 2]
-    u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
-    uv0 = geometry.uvs[i]
-    d1 = geometry.uvs[j] - uv0
-    d2 = geometry.uvs[k] - uv0
-    uv = uv0 + d1 * u + d2 * weight[1]
-    e1 = (geometry.vertices_m[j] - geometry.vertices_m[i]) * body.scale
-    e2 = (geometry.vertices_m[k] - geometry.vertices_m[i]) * body.scale
-    area_uv = d1[0] * d2[1] - d1[1] * d2[0]
-    area_m2 = wp.length(wp.cross(e1, e2))
-    texels = wp.abs(area_uv) * float(texture.width) * float(texture.height)
-    level = 0.5 * wp.log2(wp.max(texels * footprint_m * footprint_m / area_m2, 1.0e-6))
-    c = albedo_at(texture, uv[0], uv[1], level)
-    look.albedo = wp.cw_mul(look.albedo, wp.vec3(c[0], c[1], c[2]))
-    look.roughness *= c[3]
-    if texture.has_bumps != 0 and area_uv != 0.0:
-        bump = bump_at(texture, uv[0], uv[1], level)
-        tangent = body.R_world_mesh @ ((e1 * d2[1] - e2 * d1[1]) / area_uv)
-        bitangent = body.R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) / area_uv)
-        n = look.normal
-        tangent = unit(tangent - n * wp.dot(n, tangent))
-        bitangent = unit(bitangent - n * wp.dot(n, bitangent))
-        look.normal = unit(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
-    return look
+    hits: wp.array(dtype=wp.vec2i)
+    z_m: wp.array(dtype=float)
+    weights: wp.array(dtype=wp.vec2)
+    normals: wp.array(dtype=wp.vec3)
 
 
-@wp.func
-def axis_texel(texture: Texture, p: wp.vec3, axis: int, level: float):
-    """One of the three projections of triplanar mapping; X and Y faces keep Z upright."""
-    u = p[0]
-    v = p[1]
-    if axis == 0:
-        u = p[1]
-        v = p[2]
-    elif axis == 1:
-        u = p[0]
-        v = p[2]
-    return albedo_at(texture, u, v, level)
+@wp.struct
+class Light:
+    """Light that leaves a point towards the viewer [cd/m^2], but for the diffuse albedo.
 
-
-@wp.func
-def axis_bump(texture: Texture, p: wp.vec3, axis: int, level: float, n: wp.vec3):
-    """Normal of one projection, in the mesh frame.
-
-    Source: Golus, "Normal mapping for a triplanar shader", 2017 (tangent offsets added).
+    Attributes:
+        diffuse: To be multiplied by the albedo.
+        rest: Reflections and the surface's own light.
     """
-    u = p[0]
-    v = p[1]
-    if axis == 0:
-        u = p[1]
-        v = p[2]
-    elif axis == 1:
-        u = p[0]
-        v = p[2]
-    bump = bump_at(texture, u, v, level)
-    tilted = wp.vec3(bump[0], bump[1], 0.0)
-    if axis == 0:
-        tilted = wp.vec3(0.0, bump[0], bump[1])
-    elif axis == 1:
-        tilted = wp.vec3(bump[0], 0.0, bump[1])
-    return n * wp.max(bump[2], 0.1) + tilted
+
+    diffuse: wp.vec3
+    rest: wp.vec3
 
 
 @wp.func
-def box_mapped(
-    look: Look, texture: Texture, body: Body, scale_m: float, p_mesh: wp.vec3, footprint_m: float
-):
-    """Textures projected along the body's three axes, blended where the surface turns."""
-    n = wp.transpose(body.R_world_mesh) @ look.normal
-    p = p_mesh * (body.scale / scale_m)
-    level = wp.log2(wp.max(footprint_m / scale_m * float(texture.width), 1.0e-3))
-    w = wp.vec3(n[0] * n[0], n[1] * n[1], n[2] * n[2])
-    # Fourth powers of the squares: projections meet in a narrow band only.
-    w = wp.cw_mul(w, w)
-    w = wp.cw_mul(w, w)
-    w = w / (w[0] + w[1] + w[2])
-    c = wp.vec4(0.0)
-    m = wp.vec3(0.0)
-    for axis in range(3):
-        if w[axis] > 0.004:
-            c += axis_texel(texture, p, axis, level) * w[axis]
-            if texture.has_bumps != 0:
-                m += axis_bump(texture, p, axis, level, n) * w[axis]
-    look.albedo = wp.cw_mul(look.albedo, wp.vec3(c[0], c[1], c[2]))
-    look.roughness *= c[3]
-    if texture.has_bumps != 0:
-        look.normal = unit(body.R_world_mesh @ m)
-    return look
-
-
-@wp.func
-def seen_radiance(
+def light_at(
     view: View,
     world: World,
     hit: wp.vec2i,
-    weight: wp.vec2,
-    normal: wp.vec3,
-    z_m: float,
-    d_world: wp.vec3,
+    look: Look,
+    p_world: wp.vec3,
+    v: wp.vec3,
     lit: wp.array(dtype=float, ndim=2),
     open_sky: float,
-    pixel: int,
+    k: int,
 ):
-    """Luminance towards the eye [cd/m^2], linear RGB.
+    """Light of all lamps and of the sky at a point.
 
     Args:
-        d_world: From the eye, with z-depth 1.
-        lit: Visible part of every lamp [lamp, pixel].
-        open_sky: Visible part of the hemisphere (ambient occlusion).
+        v: To the viewer.
+        lit: Visible part of each lamp at points [lamp, k]; UNSEEN is none.
+        open_sky: Visible part of the hemisphere.
     """
-    body = world.bodies[hit[0]]
-    geometry = world.geometries[body.geometry]
-    material = world.surfaces[body.first_material + geometry.face_slots[hit[1]]]
-    ray_length = wp.length(d_world)
-    v = d_world * (-1.0 / ray_length)
-    look = Look()
-    look.albedo = material.base_color
-    look.roughness = material.roughness
-    look.normal = normal
-    if material.texture >= 0:
-        # Half-way between the short and the long axis of the footprint's ellipse.
-        slant = wp.sqrt(wp.max(wp.dot(normal, v), 0.05))
-        footprint_m = z_m * view.pixel_rad / slant
-        texture = world.textures[material.texture]
-        if material.texture_scale_m > 0.0:
-            p_mesh = mesh_point(geometry, hit[1], weight)
-            look = box_mapped(look, texture, body, material.texture_scale_m, p_mesh, footprint_m)
-        else:
-            look = mesh_mapped(look, texture, body, geometry, hit[1], weight, footprint_m)
+    material = world.surfaces[surface_index(world, hit)]
     n = look.normal
     n_v = wp.dot(n, v)
     brdf = make_brdf(look.albedo, look.roughness, material.metallic, material.specular, n_v)
     mirrored = n * (2.0 * n_v) - v
-    p_world = view.eye_m + d_world * z_m
-    radiance = material.emission_cd_m2
+    alpha = brdf.roughness * brdf.roughness
+    lux = wp.vec3(0.0)
+    rest = material.emission_cd_m2
     for j in range(world.lamps.shape[0]):
-        visible = lit[j, pixel]
+        visible = lit[j, k]
         if visible > 0.0:
             beam = beam_from(world.lamps[j], p_world)
             n_l = wp.dot(n, beam.direction)
             if n_l > 0.0:
-                l = towards_mirror(beam, mirrored, brdf.roughness * brdf.roughness)  # noqa: E741
+                l = towards_mirror(beam, mirrored, alpha)  # noqa: E741
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
                 lobe = specular_lobe(brdf, n, v, l, n_s, 0.5 * beam.spread)
-                response = brdf.diffuse * (n_l / wp.pi) + lobe * wp.min(n_s, n_l + beam.spread)
-                radiance += wp.cw_mul(response, beam.normal_lux) * visible
-    ambient = wp.cw_mul(brdf.diffuse, sky_irradiance(world.sky, n)) * open_sky
+                lux += beam.normal_lux * (n_l * visible)
+                rest += wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
+    ambient = sky_irradiance(world.sky, n) * open_sky
+    # Specular occlusion after Lagarde and de Rousiers 2014, with a fixed exponent.
     open_lobe = brdf.n_v + open_sky
     open_lobe = wp.clamp(open_lobe * open_lobe - 1.0 + open_sky, 0.0, 1.0)
-    glossy = sky_reflection(world.sky, mirrored, brdf.roughness) * open_lobe
-    return radiance + ambient + wp.cw_mul(brdf.gloss, glossy)
+    rest += wp.cw_mul(brdf.gloss, sky_reflection(world.sky, mirrored, brdf.roughness)) * open_lobe
+    light = Light()
+    light.diffuse = wp.cw_mul(brdf.diffuse, lux * (1.0 / wp.pi) + ambient)
+    light.rest = rest
+    return light
 
 
 @wp.kernel
-def shade_pixels(
+def shade_points(
     view: View,
     world: World,
-    hits: wp.array(dtype=wp.vec2i),
-    z_m: wp.array(dtype=float),
-    weights: wp.array(dtype=wp.vec2),
-    normals: wp.array(dtype=wp.vec3),
+    images: Images,
+    pixels: wp.array(dtype=int),
     lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float),
+    open_sky: wp.array(dtype=float, ndim=2),
+    lights: wp.array(dtype=Light),
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Luminance at every pixel centre [cd/m^2]."""
-    i = wp.tid()
+    """Shade a list of pixels; ``lights`` are theirs to share."""
+    k = wp.tid()
+    i = pixels[k]
+    hit = images.hits[i]
     x = float(i % view.width) + 0.5
     y = float(i / view.width) + 0.5
     d = view.R_world_camera @ pixel_direction(view, x, y)
-    if hits[i][0] < 0:
+    light = Light()
+    if hit[0] >= 0:
+        z = images.z_m[i]
+        v = unit(-d)
+        look = look_at_hit(view, world, hit, images.weights[i], images.normals[i], z, v)
+        p = view.eye_m + d * z
+        light = light_at(view, world, hit, look, p, v, lit, open_sky[0, k], k)
+        radiance[i] = wp.cw_mul(light.diffuse, look.albedo) + light.rest
+    elif world.sky.visible != 0:
+        radiance[i] = sky_image(world.sky, d)
+    else:
+        radiance[i] = wp.vec3(0.0)
+    lights[k] = light
+
+
+@wp.struct
+class Gathered:
+    """What a pixel takes from lattice points around it.
+
+    Attributes:
+        count: How many lie on its surface.
+        smooth: How many of them are turned so little that their light can be mixed.
+    """
+
+    points: wp.vec4i
+    count: int
+    smooth: int
+    light: Light
+
+
+@wp.func
+def gather(
+    view: View,
+    world: World,
+    images: Images,
+    lattice: Lattice,
+    lights: wp.array(dtype=Light),
+    i: int,
+    p: wp.vec3,
+):
+    """The lattice points around a pixel that lie on its surface, and the mean of their light."""
+    g = Gathered()
+    x = i % view.width
+    y = i / view.width
+    tolerance_m = surface_tolerance(view, p)
+    surface = surface_index(world, images.hits[i])
+    n = images.normals[i]
+    for k in range(4):
+        # Odd columns have a lattice point on either side, even ones lie on one.
+        lx = (x + (k & 1)) >> 1
+        ly = (y + (k >> 1)) >> 1
+        twice = ((k & 1) == 1 and (x & 1) == 0) or (k >= 2 and (y & 1) == 0)
+        if lx < lattice.width and ly < lattice.height and not twice:
+            q = ly * lattice.width + lx
+            if lattice.surface[q] == surface:
+                cosine = agree(p, n, lattice.p_m[q], lattice.normal[q], tolerance_m)
+                if cosine > 0.0:
+                    g.points[g.count] = q
+                    g.count += 1
+                    if cosine > SMOOTH_COSINE:
+                        g.smooth += 1
+                        g.light.diffuse += lights[q].diffuse
+                        g.light.rest += lights[q].rest
+    return g
+
+
+@wp.func
+def mixed(values: wp.array(dtype=float, ndim=2), j: int, g: Gathered):
+    """Mean of what lattice points see; UNSEEN where none of them looks."""
+    total = float(0.0)
+    count = float(0.0)
+    for k in range(g.count):
+        value = values[j, g.points[k]]
+        if value != UNSEEN:
+            total += value
+            count += 1.0
+    mean = float(UNSEEN)
+    if count > 0.0:
+        mean = total / count
+    return mean
+
+
+@wp.kernel
+def gather_light(
+    view: View,
+    world: World,
+    images: Images,
+    lattice: Lattice,
+    lights: wp.array(dtype=Light),
+    lattice_lit: wp.array(dtype=float, ndim=2),
+    lattice_sky: wp.array(dtype=float, ndim=2),
+    disc: wp.array(dtype=wp.vec2),
+    radius_m: float,
+    count: wp.array(dtype=int),
+    pixels: wp.array(dtype=int),
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: wp.array(dtype=float, ndim=2),
+    radiance: wp.array(dtype=wp.vec3),
+):
+    """Light every pixel off the lattice from lattice points, or list it to be shaded by itself.
+
+    Args:
+        count: Length of the list; 0 at first.
+        pixels, lit, open_sky: The list, with what each of its pixels sees of lamps and sky.
+    """
+    i = wp.tid()
+    x = i % view.width
+    y = i / view.width
+    if (x & 1) == 0 and (y & 1) == 0:
+        return
+    d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+    hit = images.hits[i]
+    if hit[0] < 0:
         radiance[i] = wp.vec3(0.0)
         if world.sky.visible != 0:
             radiance[i] = sky_image(world.sky, d)
         return
-    radiance[i] = seen_radiance(
-        view, world, hits[i], weights[i], normals[i], z_m[i], d, lit, open_sky[i], i
-    )
+    z = images.z_m[i]
+    p = view.eye_m + d * z
+    g = gather(view, world, images, lattice, lights, i, p)
+    material = world.surfaces[surface_index(world, hit)]
+    if g.smooth > 0 and g.smooth == g.count and gatherable(world, material):
+        share = 1.0 / float(g.smooth)
+        albedo = material.base_color
+        if material.texture >= 0:
+            look = look_at_hit(
+                view, world, hit, images.weights[i], images.normals[i], z, unit(-d)
+            )
+            albedo = look.albedo
+        radiance[i] = (wp.cw_mul(g.light.diffuse, albedo) + g.light.rest) * share
+        return
+    k = wp.atomic_add(count, 0, 1)
+    pixels[k] = i
+    if g.count > 0:
+        for j in range(world.lamps.shape[0]):
+            lit[j, k] = mixed(lattice_lit, j, g)
+        open_sky[0, k] = mixed(lattice_sky, 0, g)
+    else:
+        origin = ray_origin(world, hit, images.weights[i], p, d * z)
+        n = images.normals[i]
+        for j in range(world.lamps.shape[0]):
+            lit[j, k] = seen_part(world, j, hit[0], origin, n, disc)
+        open_sky[0, k] = seen_sky(world, origin, n, disc, radius_m)
+
+
+@wp.func
+def gatherable(world: World, material: Surface):
+    """Whether a material's light changes slowly enough to be taken from the lattice."""
+    smooth = material.roughness >= GATHERED_ROUGHNESS
+    if smooth and material.texture >= 0:
+        smooth = material.metallic < 0.05 and world.textures[material.texture].has_bumps == 0
+    return smooth
+
+
+@wp.func
+def seen_part(
+    world: World,
+    j: int,
+    own: int,
+    origin: wp.vec3,
+    n: wp.vec3,
+    disc: wp.array(dtype=wp.vec2),
+):
+    """How much of a lamp a point sees, by four rays, for pixels without lattice points."""
+    beam = beam_from(world.lamps[j], origin)
+    value = float(UNSEEN)
+    if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
+        value = 0.0
+        for k in range(4):
+            path = path_to_lamp(world.lamps[j], origin, disc[4 * k + 1])
+            if not blocked(world, no_lists, NO_TILE, j, -1, origin, path):
+                value += 0.25
+    return value

@@ -1,0 +1,153 @@
+"""Shadows and ambient occlusion: what of each lamp and of the sky the lattice's points see."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from generator.core.se3 import Array
+from generator.renderers.kernels import lattice as lattice_kernels
+from generator.renderers.kernels import occlusion, records
+from generator.renderers.packing import PackedWorld
+from generator.renderers.settings import RenderSettings
+from generator.renderers.stock import AssetStock
+from generator.renderers.visibility import Seen
+
+_TILE = int(occlusion.TILE)
+_LIST_LENGTH = int(occlusion.LIST_LENGTH)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Openness:
+    """What reaches the lattice's points.
+
+    Attributes:
+        lit: Visible part of each lamp, [lamps, points]; UNSEEN where it lights nothing.
+        open_sky: Visible part of the hemisphere, [1, points].
+        lists: Bodies that may shade each tile, see list_occluders.
+    """
+
+    lit: wp.array
+    open_sky: wp.array
+    lists: wp.array
+    tile_columns: int
+
+
+def sampled_lattice(
+    world: PackedWorld, view: records.View, seen: Seen, stock: AssetStock
+) -> lattice_kernels.Lattice:
+    """The lattice of a view."""
+    lattice = lattice_kernels.Lattice()
+    lattice.width, lattice.height = (view.width + 1) // 2, (view.height + 1) // 2
+    n = lattice.width * lattice.height
+    lattice.body = stock.scratch("lattice body", n, wp.int32)
+    lattice.skip = stock.scratch("lattice skip", n, wp.int32)
+    lattice.p_m = stock.scratch("lattice p", n, wp.vec3)
+    lattice.normal = stock.scratch("lattice normal", n, wp.vec3)
+    lattice.origin_m = stock.scratch("lattice origin", n, wp.vec3)
+    inputs = [view, world.record, seen.hits, seen.z_m, seen.weights, seen.normals, lattice]
+    wp.launch(lattice_kernels.sample_lattice, n, inputs, device=stock.device)
+    return lattice
+
+
+def openness(
+    world: PackedWorld,
+    view: records.View,
+    lattice: lattice_kernels.Lattice,
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> Openness:
+    """Shadows and ambient occlusion of all points."""
+    lamps = world.record.lamps.shape[0]
+    columns = -(-lattice.width // _TILE)
+    tiles = columns * -(-lattice.height // _TILE)
+    lists = stock.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
+    radius_m = settings.ambient_occlusion_radius_m
+    inputs = [world.record, lattice, columns, radius_m, lists]
+    wp.launch(occlusion.list_occluders, tiles, inputs, device=stock.device)
+    return Openness(
+        _lit(world, view, lattice, lists, columns, stock),
+        _open_sky(world, view, lattice, lists, columns, radius_m, stock),
+        lists,
+        columns,
+    )
+
+
+def sunflower(n: int) -> Array:
+    """Points spread evenly over the unit disc, shape [n, 2] (Vogel, Math. Biosciences 44, 1979)."""
+    k = np.arange(n)
+    radius, angle = np.sqrt((k + 0.5) / n), k * math.pi * (3.0 - math.sqrt(5.0))
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def cosine_hemisphere(n: int) -> Array:
+    """Unit directions about +Z whose density goes with the cosine (Malley), shape [n, 3]."""
+    disc = sunflower(n)
+    up = np.sqrt(1.0 - (disc * disc).sum(axis=1))
+    return np.concatenate([disc, up[:, None]], axis=1)
+
+
+def _lit(
+    world: PackedWorld,
+    view: records.View,
+    lattice: lattice_kernels.Lattice,
+    lists: wp.array,
+    columns: int,
+    stock: AssetStock,
+) -> wp.array:
+    device = stock.device
+    n, lamps = lattice.width * lattice.height, world.record.lamps.shape[0]
+    probed = stock.scratch("probed", (max(lamps, 1), n), float)
+    lit = stock.scratch("lit", (max(lamps, 1), n), float)
+    if lamps == 0:
+        return lit
+    few = wp.array(sunflower(16), dtype=wp.vec2, device=device)
+    many = wp.array(sunflower(64), dtype=wp.vec2, device=device)
+    inputs = [world.record, lattice, columns, lists]
+    wp.launch(occlusion.probe_lamps, n, [*inputs, few], [probed], device=device)
+    classes = _classes(lattice, probed, lamps, stock)
+    inputs = [view, *inputs, classes, many, probed]
+    wp.launch(occlusion.refine_lamps, n, inputs, [lit], device=device)
+    classes = _classes(lattice, lit, lamps, stock)
+    wp.launch(
+        occlusion.smooth_lattice, n, [view, lattice, classes, lit], [probed], device=device
+    )
+    return probed
+
+
+def _open_sky(
+    world: PackedWorld,
+    view: records.View,
+    lattice: lattice_kernels.Lattice,
+    lists: wp.array,
+    columns: int,
+    radius_m: float,
+    stock: AssetStock,
+) -> wp.array:
+    n = lattice.width * lattice.height
+    probed = stock.scratch("probed sky", (1, n), float)
+    open_sky = stock.scratch("open sky", (1, n), float)
+    if radius_m == 0.0:
+        open_sky.fill_(1.0)
+        return open_sky
+    hemisphere = wp.array(cosine_hemisphere(16), dtype=wp.vec3, device=stock.device)
+    inputs = [world.record, lattice, columns, lists, hemisphere, radius_m]
+    wp.launch(occlusion.probe_ambient, n, inputs, [probed], device=stock.device)
+    classes = _classes(lattice, probed, 1, stock)
+    inputs = [view, lattice, classes, probed]
+    wp.launch(occlusion.smooth_lattice, n, inputs, [open_sky], device=stock.device)
+    return open_sky
+
+
+def _classes(
+    lattice: lattice_kernels.Lattice, values: wp.array, rows: int, stock: AssetStock
+) -> wp.array:
+    shape = (-(-lattice.height // 4), -(-lattice.width // 4), rows)
+    classes = stock.scratch("classes", shape, wp.int32)
+    wp.launch(
+        occlusion.classify_blocks, shape, [lattice, values], [classes], device=stock.device
+    )
+    return classes

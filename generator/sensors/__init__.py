@@ -1,0 +1,7 @@
+"""Sensors: how a scene becomes readings."""
+
+from __future__ import annotations
+
+from generator.core.plugins import PluginTable
+
+TABLE = PluginTable("sensor", {"rgb_camera": "generator.sensors.rgb_camera:RgbCamera"})

@@ -1,0 +1,80 @@
+"""A pinhole camera with every label channel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from generator.config.strict import Strict
+from generator.core.capture import Channel, Reading
+from generator.core.interfaces import Renderer
+from generator.core.intrinsics import Intrinsics
+from generator.core.scene import Camera, Region, Scene
+from generator.core.se3 import SE3, look_at
+from generator.core.streams import Rng
+
+Image = Literal[
+    "rgb", "depth", "range", "normals", "instance", "part", "category", "object_coordinates"
+]
+"""Channels that can be written as images; see ``generator.core.capture.Channel``."""
+
+SidePx = Annotated[int, Field(ge=8, le=8192)]
+
+NOMINAL_AZIMUTH_RAD = math.radians(-60.0)
+NOMINAL_ELEVATION_RAD = math.radians(35.0)
+
+
+class RgbCamera(Strict):
+    """A camera without distortion; its pose and lens are varied by randomizers.
+
+    Attributes:
+        name: What labels, files and randomizers call it.
+        size_px: Width and height of its images.
+        hfov_deg: Nominal horizontal field of view.
+        channels: What is written as images.
+        ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
+    """
+
+    type: Literal["rgb_camera"] = "rgb_camera"
+    name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    size_px: tuple[SidePx, SidePx] = (640, 480)
+    hfov_deg: float = Field(60.0, ge=1, le=170)
+    channels: tuple[Image, ...] = Field(("rgb", "depth", "instance", "category"), min_length=1)
+    ev100: float | None = None
+
+    @property
+    def media(self) -> tuple[Channel, ...]:
+        """Channels that are written as images, in a fixed order."""
+        return tuple(channel for channel in Channel if channel.value in self.channels)
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with this camera in it, looking at the scene's focus."""
+        width_px, height_px = self.size_px
+        intrinsics = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
+        pose = _nominal_pose(scene.focus, 0.5 * math.radians(self.hfov_deg))
+        camera = Camera(self.name, pose, intrinsics, self.ev100)
+        return replace(scene, cameras=(*scene.cameras, camera))
+
+    def capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> Reading:
+        """Its own channels and those asked for, as an ideal sensor without noise."""
+        del rng
+        return renderer.render(scene, scene.camera(self.name), channels | set(self.media))
+
+
+def _nominal_pose(focus: Region, half_angle_rad: float) -> SE3:
+    """``T_world_camera`` from which the whole focus is in view."""
+    radius_m = 0.5 * math.hypot(*focus.size_m)
+    distance_m = radius_m / math.sin(min(half_angle_rad, math.radians(45.0)))
+    level_m = distance_m * math.cos(NOMINAL_ELEVATION_RAD)
+    x, y, z = focus.center_m
+    eye = (
+        x + level_m * math.cos(NOMINAL_AZIMUTH_RAD),
+        y + level_m * math.sin(NOMINAL_AZIMUTH_RAD),
+        z + distance_m * math.sin(NOMINAL_ELEVATION_RAD),
+    )
+    return look_at(eye, focus.center_m).rounded()
