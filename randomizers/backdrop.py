@@ -32,9 +32,9 @@ class Backdrop(RandomizerBase):
     """
 
     type: Literal["backdrop"] = "backdrop"
-    floor: tuple[str, ...] = Field(("planks", "tiles", "concrete", "carpet"), min_length=1)
+    floor: tuple[str, ...] = Field(("floor",), min_length=1)
     floor_scale_m: Positive = Uniform(0.8, 2.0)
-    walls: tuple[str, ...] = Field(("plaster", "brick", "concrete"), min_length=1)
+    walls: tuple[str, ...] = Field(("wall",), min_length=1)
     wall_scale_m: Positive = Uniform(0.8, 2.0)
     painted: Flag = Probability(0.6)
     hue: UnitInterval = Uniform(0.0, 1.0)

@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import Field
 
 from generator.config.distributions import LogUniform, NonNegative, Scalar, Uniform
-from generator.core.errors import ConfigError
+from generator.core.errors import ConfigError, did_you_mean
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Environment, Scene
 from generator.core.streams import Rng
@@ -54,6 +54,6 @@ class EnvironmentLight(RandomizerBase):
             known = sorted({tag for a in every for tag in a.tags})
             raise ConfigError(
                 f"randomizers.{self.name}.images: no environment is {' or '.join(self.images)}; "
-                f"expected one of {', '.join(known)}"
+                f"expected one of {', '.join(known)}{did_you_mean(self.images[0], known)}"
             )
         return fitting

@@ -29,8 +29,8 @@ from randomizers.color_space import linear_of_temperature
 
 TRIES = 24
 KINDS = ("sphere", "spot", "sun")
-MARGIN_M = 0.1
-"""A lamp keeps this far from bodies."""
+MARGIN_M = 0.05
+"""The ball of a lamp keeps this far from bodies."""
 
 
 class Lighting(RandomizerBase):
@@ -91,7 +91,8 @@ class Lighting(RandomizerBase):
                 illuminance_lux=round(lux, 4),
                 angular_radius_rad=round(math.radians(self.angular_radius_deg.draw(rng)), 6),
             )
-        position = self._position(scene, assets, rng)
+        radius_m = round(self.radius_m.draw(rng), 4)
+        position = self._position(scene, assets, rng, radius_m + MARGIN_M)
         away = (position[0] - target[0], position[1] - target[1], position[2] - target[2])
         squared_m2 = away[0] ** 2 + away[1] ** 2 + away[2] ** 2
         distance_m = math.sqrt(squared_m2)
@@ -105,7 +106,7 @@ class Lighting(RandomizerBase):
             color=color,
             # Photometric inverse square law: E = I / d^2 on a surface that faces the lamp.
             intensity_cd=round(lux * squared_m2, 4),
-            radius_m=round(self.radius_m.draw(rng), 4),
+            radius_m=radius_m,
             cone_rad=round(math.radians(self.cone_deg.draw(rng)), 6),
         )
 
@@ -115,7 +116,7 @@ class Lighting(RandomizerBase):
         level = math.cos(elevation)
         return (level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation))
 
-    def _position(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Vec3:
+    def _position(self, scene: Scene, assets: AssetIndex, rng: Rng, margin_m: float) -> Vec3:
         x, y, z = scene.focus.center_m
         for _ in range(TRIES):
             dx, dy, dz = self._direction(rng)
@@ -124,7 +125,7 @@ class Lighting(RandomizerBase):
                 d = shortened * distance_m
                 position = _rounded((x + d * dx, y + d * dy, z + d * dz))
                 if is_inside(position, *scene.interior_m):
-                    if is_in_the_open(position, scene, assets, MARGIN_M):
+                    if is_in_the_open(position, scene, assets, margin_m):
                         return position
                     break
         raise LayoutRejected(

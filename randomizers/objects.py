@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from generator.config.distributions import Constant, Count, Flag, Positive, Probability
 from generator.config.distributions import UniformInteger as Whole
 from generator.core.errors import ConfigError, did_you_mean
-from generator.core.geometry import Asset
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Body, Instance, ObjectGroup, Scene
 from generator.core.streams import Rng
@@ -38,14 +37,15 @@ class Objects(RandomizerBase):
     count: Count = Whole(4, 10)
     scale: Positive = Constant(1.0)
     upright: Flag = Probability(0.6)
-    weights: dict[str, float] = Field({})
+    weights: dict[str, Annotated[float, Field(ge=0)]] = Field({})
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with the group's objects exchanged."""
         group = self._group(scene)
         scene = _without(scene, group.name)
         count = self.count.draw(rng)
-        chosen = [self._asset(group, assets, rng) for _ in range(count)]
+        categories = self._weighted(group, assets)
+        chosen = [assets.get(_drawn(categories, rng)) for _ in range(count)]
         scales = [round(self.scale.draw(rng), 4) for _ in range(count)]
         upright = [self.upright.draw(rng) for _ in range(count)]
         items = [
@@ -53,14 +53,14 @@ class Objects(RandomizerBase):
             for asset, scale in zip(chosen, scales, strict=True)
         ]
         poses = layout(group, items, floors_of(scene, group, assets), rng, upright)
-        first_id = max((i.instance_id for i in scene.instances), default=0) + 1
+        ids = _free_ids(scene, count)
         bodies = tuple(
             Body(
                 name=f"{group.name}/{k}",
                 asset=asset.asset_id,
                 T_world_body=pose.rounded(),
                 scale=scale,
-                instance_id=first_id + k,
+                instance_id=ids[k],
                 group=group.name,
                 motion="dynamic",
                 mass_kg=round(asset.mass_kg * scale**3, 6),
@@ -91,18 +91,39 @@ class Objects(RandomizerBase):
             f"one of {', '.join(known)}{did_you_mean(name, known)}"
         )
 
-    def _asset(self, group: ObjectGroup, assets: AssetIndex, rng: Rng) -> Asset:
-        by_category: dict[str, list[str]] = {}
+    def _weighted(
+        self, group: ObjectGroup, assets: AssetIndex
+    ) -> list[tuple[float, tuple[str, ...]]]:
+        """Weight and assets of every category that may be drawn.
+
+        Raises:
+            ConfigError: a weight is given to a category that the group lacks, or none is left.
+        """
+        field = f"randomizers.{self.name}.weights"
+        members: dict[str, list[str]] = {}
         for asset_id in group.assets:
-            by_category.setdefault(assets.get(asset_id).category, []).append(asset_id)
-        categories = sorted(by_category)
-        weights = [self.weights.get(name, 1.0) for name in categories]
-        draw = float(rng.uniform()) * sum(weights)
-        for name, weight in zip(categories, weights, strict=True):
-            draw -= weight
-            if draw < 0.0:
-                return assets.get(pick(tuple(by_category[name]), rng))
-        return assets.get(pick(tuple(by_category[categories[-1]]), rng))
+            members.setdefault(assets.get(asset_id).category, []).append(asset_id)
+        for name in self.weights:
+            if name not in members:
+                raise ConfigError(
+                    f"{field}: the group has no category '{name}'; expected one of "
+                    f"{', '.join(sorted(members))}{did_you_mean(name, sorted(members))}"
+                )
+        weighted = [(self.weights.get(name, 1.0), tuple(members[name])) for name in sorted(members)]
+        kept = [(weight, ids) for weight, ids in weighted if weight > 0.0]
+        if not kept:
+            raise ConfigError(f"{field}: every weight is 0; expected one above 0")
+        return kept
+
+
+def _drawn(categories: list[tuple[float, tuple[str, ...]]], rng: Rng) -> str:
+    """An asset of a category that is drawn in proportion to its weight."""
+    draw = float(rng.uniform()) * sum(weight for weight, _ in categories)
+    for weight, ids in categories:
+        draw -= weight
+        if draw < 0.0:
+            return pick(ids, rng)
+    return pick(categories[-1][1], rng)
 
 
 def _without(scene: Scene, group: str) -> Scene:
@@ -113,3 +134,9 @@ def _without(scene: Scene, group: str) -> Scene:
         bodies=tuple(body for body in scene.bodies if body.group != group),
         instances=tuple(i for i in scene.instances if i.instance_id not in gone),
     )
+
+
+def _free_ids(scene: Scene, count: int) -> list[int]:
+    """The smallest instance ids that nothing has."""
+    taken = {instance.instance_id for instance in scene.instances}
+    return [k for k in range(1, len(taken) + count + 1) if k not in taken][:count]

@@ -21,6 +21,9 @@ DROP_TRIES = 8
 """Free places are tried this often before an object is dropped on top of others."""
 SCATTER_TRIES = 200
 
+_LIFT_M = 0.0005
+_TOO_HIGH = Rejection("object higher than the space above the surface", "smaller objects or scale")
+
 
 @dataclass(frozen=True)
 class Item:
@@ -107,7 +110,7 @@ def layout(
     if group.placement == "stack":
         return _stacks(group, items, floors, rng)
     if group.placement == "grid":
-        return _grid(items, floors, rng)
+        return _grid(group, items, floors, rng)
     one = _dropped if group.placement == "drop" else _scattered
     return [
         one(group, item, floors[_drawn_floor(floors, item, rng)], rng, stands)
@@ -117,19 +120,23 @@ def layout(
 
 def _dropped(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:
     """Above a free place if one is found soon, else above what lies there."""
+    clearance_m = floor.surface.clearance_m
+    upright = upright or 2 * item.reach_m + DROP_M[1] > clearance_m
     radius_m = item.radius_m if upright else item.reach_m
     half_height_m = item.half_m[2] if upright else item.reach_m
     x = y = 0.0
     for _ in range(DROP_TRIES):
-        x, y = floor.place(rng, item.radius_m)
-        if floor.is_closed(x, y, item.radius_m):
+        x, y = floor.place(rng, radius_m)
+        if floor.is_closed(x, y, radius_m):
             continue
         if floor.top_under(x, y, radius_m) == 0.0:
             break
-    if floor.is_closed(x, y, item.radius_m):
+    if floor.is_closed(x, y, radius_m):
         raise LayoutRejected(_no_place(group))
     fall_m = float(rng.uniform(*DROP_M)) if not upright else DROP_M[0]
     z = floor.top_under(x, y, radius_m) + half_height_m + fall_m
+    if z + half_height_m > clearance_m:
+        raise LayoutRejected(_no_place(group))
     floor.taken.append((x, y, radius_m, z + half_height_m))
     turn = _yaw(rng) if upright else SE3(quaternion_wxyz=So3().draw(rng))
     return floor.surface.T_world_surface @ SE3((x, y, z)) @ turn
@@ -142,24 +149,48 @@ def _scattered(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: 
         x, y = floor.place(rng, item.radius_m)
         bare = floor.top_under(x, y, item.radius_m) == 0.0
         if bare and not floor.is_closed(x, y, item.radius_m):
-            return _standing(item, floor, x, y, 0.0, rng)
+            return _standing(item, floor, (x, y, 0.0), _yaw(rng))
     raise LayoutRejected(_no_place(group))
 
 
-def _grid(items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
-    """In rows, surface after surface."""
+def _grid(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+    """In rows, surface after surface, turned by quarters."""
     poses = []
     share = -(-len(items) // len(floors))
-    for number, item in enumerate(items):
-        floor = floors[number // share]
-        length_m, width_m = floor.surface.size_m
-        columns = max(1, round((share * length_m / width_m) ** 0.5))
-        rows = -(-share // columns)
-        row, column = divmod(number % share, columns)
-        x = length_m * ((column + 0.5) / columns - 0.5)
-        y = width_m * ((row + 0.5) / rows - 0.5)
-        poses.append(_standing(item, floor, x, y, 0.0, rng))
+    for number, floor in enumerate(floors):
+        here = items[number * share : (number + 1) * share]
+        cells = _cells(floor, here)
+        if len(cells) < len(here):
+            raise LayoutRejected(_no_place(group))
+        for item, (x, y) in zip(here, cells, strict=False):
+            quarter = SE3.about_z(0.5 * math.pi * int(rng.integers(4)))
+            poses.append(_standing(item, floor, (x, y, 0.0), quarter))
     return poses
+
+
+def _cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]]:
+    """Centres of the free cells of the coarsest grid that has one for every item; else none."""
+    half_m = max((max(item.half_m[:2]) for item in items), default=0.0)
+    length_m, width_m = floor.surface.size_m
+    for count in range(max(len(items), 1), 4 * len(items) + 64):
+        columns = max(1, round((count * length_m / width_m) ** 0.5))
+        rows = -(-count // columns)
+        if min(length_m / columns, width_m / rows) < 2 * half_m + GAP_M:
+            continue
+        centers = [
+            (length_m * ((k + 0.5) / columns - 0.5), width_m * ((row + 0.5) / rows - 0.5))
+            for row in range(rows)
+            for k in range(columns)
+        ]
+        radius_m = math.sqrt(2.0) * half_m
+        free = [
+            (x, y)
+            for x, y in centers
+            if not floor.is_closed(x, y, radius_m) and floor.top_under(x, y, half_m) == 0.0
+        ]
+        if len(free) >= len(items):
+            return free
+    return []
 
 
 def _stacks(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
@@ -177,7 +208,7 @@ def _stacks(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng:
         poses[tower[0]] = base
         z = 2 * items[tower[0]].half_m[2]
         for k in tower[1:]:
-            poses[k] = _standing(items[k], floor, x, y, z, rng)
+            poses[k] = _standing(items[k], floor, (x, y, z), _yaw(rng))
             z += 2 * items[k].half_m[2]
     for k in alone:
         floor = floors[_drawn_floor(floors, items[k], rng)]
@@ -185,10 +216,15 @@ def _stacks(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng:
     return [poses[k] for k in range(len(items))]
 
 
-def _standing(item: Item, floor: Floor, x: float, y: float, z: float, rng: Rng) -> SE3:
-    floor.taken.append((x, y, item.radius_m, z + 2 * item.half_m[2]))
-    place = SE3((x, y, z + item.half_m[2] + 0.0005))
-    return floor.surface.T_world_surface @ place @ _yaw(rng)
+def _standing(item: Item, floor: Floor, place: Vec3, turn: SE3) -> SE3:
+    """Upright on a point of the surface's frame."""
+    x, y, z = place
+    top_m = z + 2 * item.half_m[2]
+    if top_m > floor.surface.clearance_m:
+        raise LayoutRejected(_TOO_HIGH)
+    floor.taken.append((x, y, item.radius_m, top_m))
+    center = SE3((x, y, z + item.half_m[2] + _LIFT_M))
+    return floor.surface.T_world_surface @ center @ turn
 
 
 def _drawn_floor(floors: list[Floor], item: Item, rng: Rng) -> int:
@@ -201,9 +237,7 @@ def _drawn_floor(floors: list[Floor], item: Item, rng: Rng) -> int:
     ]
     total = sum(areas)
     if total == 0.0:
-        raise LayoutRejected(
-            Rejection("object higher than the space above the surface", "smaller objects or scale")
-        )
+        raise LayoutRejected(_TOO_HIGH)
     draw = float(rng.uniform()) * total
     for number, area in enumerate(areas):
         draw -= area

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import model_validator
+
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Scene
 from scene_templates.element import PlacedElement, standing, with_static
@@ -15,14 +17,23 @@ class Prop(PlacedElement):
     Attributes:
         asset: Its id, such as ``gantry?size_m=1.6,1,1.8``.
         annotate: Whether labels are written for it.
+        hollow: Cameras and lamps may be within its bounding box, as under a gantry. It counts as
+            background then: it has no instance.
     """
 
     type: Literal["prop"] = "prop"
     asset: str
     annotate: bool = False
+    hollow: bool = False
+
+    @model_validator(mode="after")
+    def _is_one_or_the_other(self) -> Prop:
+        if self.annotate and self.hollow:
+            raise ValueError("annotate and hollow exclude each other")
+        return self
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A static body and its instance."""
+        """A static body and, unless it is background, its instance."""
         return with_static(
             scene,
             assets,
@@ -30,4 +41,5 @@ class Prop(PlacedElement):
             asset=self.asset,
             T_world_body=standing(assets, self.asset, self.pose(scene)),
             annotated=self.annotate,
+            unlabelled=self.hollow,
         )

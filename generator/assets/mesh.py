@@ -266,8 +266,8 @@ def _sane_normals(soup: Soup) -> bool:
 def _creased(soup: Soup, faces: Int64, crease_deg: float) -> Float64:
     """Unit normals [m, 3, 3], smooth within pieces of the surface bounded by creases.
 
-    Weights: N. Max, "Weights for computing vertex normals from facet normals", Journal of Graphics
-    Tools 4(2), 1999: exact on a sphere, and free of trigonometry.
+    Triangles weigh by their area, so that large flat ones keep their look beside narrow bevels
+    ("weighted normals", the custom of hard-surface modelling).
     """
     from scipy.sparse import coo_array  # noqa: PLC0415
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
@@ -281,10 +281,7 @@ def _creased(soup: Soup, faces: Int64, crease_deg: float) -> Float64:
     rows, columns = smooth[:, 0].reshape(-1), smooth[:, 1].reshape(-1)
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), (faces.size,) * 2)
     count, group = connected_components(graph, directed=False)
-    ahead = np.roll(soup.corners, -1, axis=1) - soup.corners
-    behind = np.roll(soup.corners, 1, axis=1) - soup.corners
-    weights = 1.0 / ((ahead**2).sum(axis=2) * (behind**2).sum(axis=2))
-    weighted = (weights[..., None] * crosses[:, None]).reshape(-1, 3)
+    weighted = np.repeat(crosses, 3, axis=0)
     sums = np.stack([np.bincount(group, weighted[:, k], minlength=count) for k in range(3)], axis=1)
     normals = _unit(sums)[group].reshape(-1, 3, 3)
     # Where the sum cancels out (a knife's edge), the face's own normal is as good as any.

@@ -27,13 +27,10 @@ class Openness:
     Attributes:
         lit: Visible part of each lamp, [lamps, points]; UNSEEN where it lights nothing.
         open_sky: Visible part of the hemisphere, [1, points].
-        lists: Bodies that may shade each tile, see list_occluders.
     """
 
     lit: wp.array
     open_sky: wp.array
-    lists: wp.array
-    tile_columns: int
 
 
 def sampled_lattice(
@@ -44,6 +41,8 @@ def sampled_lattice(
     lattice.width, lattice.height = (view.width + 1) // 2, (view.height + 1) // 2
     n = lattice.width * lattice.height
     lattice.body = stock.scratch("lattice body", n, wp.int32)
+    lattice.surface = stock.scratch("lattice surface", n, wp.int32)
+    lattice.pixel = stock.scratch("lattice pixel", n, wp.int32)
     lattice.skip = stock.scratch("lattice skip", n, wp.int32)
     lattice.p_m = stock.scratch("lattice p", n, wp.vec3)
     lattice.normal = stock.scratch("lattice normal", n, wp.vec3)
@@ -71,8 +70,6 @@ def openness(
     return Openness(
         _lit(world, view, lattice, lists, columns, stock),
         _open_sky(world, view, lattice, lists, columns, radius_m, stock),
-        lists,
-        columns,
     )
 
 

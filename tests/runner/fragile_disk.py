@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import os
+import pathlib
 import random
 import shutil
 from collections.abc import Callable
@@ -61,6 +62,10 @@ class FragileDisk:
         for name in OPERATIONS:
             self.originals[name] = getattr(os, name)
             monkeypatch.setattr(os, name, self._wrapped(name))
+            # Python 3.10's pathlib took its functions when it was imported.
+            accessor = getattr(pathlib, "_NormalAccessor", None)
+            if accessor is not None and hasattr(accessor, name):
+                monkeypatch.setattr(accessor, name, staticmethod(self._wrapped(name)))
 
     def _wrapped(self, name: str) -> Callable[..., Any]:
         def operation(*arguments: Any, **options: Any) -> Any:

@@ -82,7 +82,7 @@ FAMILIES: Mapping[str, Family] = _table((
 
 TEXTURES: Mapping[str, TextureFamily] = _table((
     _texture("wood_grain", "textures.wood:wood_grain", "surface wood", 18),
-    _texture("wood_planks", "textures.wood:wood_planks", "floor surface wood", 18),
+    _texture("wood_planks", "textures.wood:wood_planks", "floor planks surface wood", 18),
     _texture("marble", "textures.stone:marble", "floor stone surface"),
     _texture("terrazzo", "textures.stone:terrazzo", "floor stone surface"),
     _texture("concrete", "textures.stone:concrete", "floor stone surface wall"),

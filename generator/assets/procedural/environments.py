@@ -92,7 +92,9 @@ def clear_sky(seed: int) -> Float32:
     up = np.maximum(d[..., 2:], 0.0)
     blue, pale = np.array((0.32, 0.62, 1.35)), np.array((0.86, 0.98, 1.12))
     haze = (1 - up) ** between(3.0, 6.0, rng)
-    sky = light[..., None] * (blue + (pale - blue) * haze)
+    bright = smoothstep(1.0, 4.0, light / light.mean())[..., None]
+    tint = blue + (pale - blue) * np.maximum(haze, bright)
+    sky = light[..., None] * tint
     cover = smoothstep(between(0.1, 0.9, rng), 1.3, _clouds(d, rng))[..., None]
     sky = sky * (1 - cover) + cover * light.mean() * 2.2
     return normalised(_over_ground(sky, d, rng))
@@ -106,9 +108,9 @@ def sunset(seed: int) -> Float32:
     sun = _direction(azimuth, between(0.01, 0.12, rng))
     towards = np.clip((d * sun).sum(axis=2), -1, 1)[..., None]
     up = np.maximum(d[..., 2:], 0.0)
-    zenith = np.array(pick(((0.16, 0.24, 0.5), (0.22, 0.26, 0.48), (0.12, 0.2, 0.42)), rng))
-    glow = np.array(pick(((2.4, 1.0, 0.35), (2.6, 0.85, 0.4), (2.0, 1.15, 0.55)), rng))
-    far = np.array((0.45, 0.36, 0.5))
+    zenith = np.array(pick(((0.1, 0.16, 0.34), (0.14, 0.17, 0.31), (0.07, 0.13, 0.29)), rng))
+    glow = np.array(pick(((2.4, 0.95, 0.22), (2.6, 0.75, 0.25), (2.1, 1.15, 0.42)), rng))
+    far = np.array((0.32, 0.22, 0.28))
     low = np.exp(-up / between(0.16, 0.3, rng))
     horizon = far + (glow - far) * (0.5 + 0.5 * towards) ** 3
     sky = zenith * (0.6 + 0.4 * (0.5 + 0.5 * towards)) + horizon * low
@@ -125,7 +127,7 @@ def night_city(seed: int) -> Float32:
     rows, columns = d.shape[:2]
     elevation = np.arcsin(np.clip(d[..., 2], -1, 1))
     glow = np.exp(-np.maximum(elevation, 0) / 0.35)[..., None] * np.array((0.5, 0.36, 0.22))
-    image = np.array((0.03, 0.045, 0.09)) + 0.5 * glow
+    image = np.array((0.012, 0.018, 0.04)) + 0.22 * glow
     blocks = 64
     skyline = 0.05 + 0.38 * uniform(blocks, rng) ** 2
     roof = skyline[np.arange(columns) * blocks // columns]
@@ -134,15 +136,15 @@ def night_city(seed: int) -> Float32:
     shade = np.array((0.05, 0.05, 0.06))
     warm = np.array((1.0, 0.72, 0.4)) + np.array((-0.25, 0.15, 0.5)) * (uniform(
         (rows, columns), rng)[..., None] > 0.8)
-    lit = (window > between(0.75, 0.9, rng))[..., None] * 3.0 * warm
+    lit = (window > between(0.75, 0.9, rng))[..., None] * 6.0 * warm
     image = np.where(building[..., None], shade + lit, image)
     below = d[..., 2] < -0.02
-    street = 0.12 + 0.6 * np.exp(elevation / 0.25)
+    street = 0.1 + 0.5 * np.exp(elevation / 0.25)
     image = np.where(below[..., None], street[..., None] * np.array((0.5, 0.36, 0.22)), image)
     for _ in range(pick((5, 8, 12), rng)):
         lamp = _direction(between(-math.pi, math.pi, rng), between(0.08, 0.5, rng))
         away = np.arccos(np.clip((d * lamp).sum(axis=2), -1, 1))
-        image += between(30.0, 90.0, rng) * np.exp(-((away / 0.03) ** 2))[..., None] * np.array(
+        image += between(20.0, 50.0, rng) * np.exp(-((away / 0.05) ** 2))[..., None] * np.array(
             pick(((1.0, 0.66, 0.3), (1.0, 0.85, 0.62), (0.85, 0.95, 1.0)), rng))
     return normalised(image)
 
@@ -228,7 +230,9 @@ def _over_ground(sky: Array, d: Array, rng: Rng) -> Array:
     """The sky above the horizon, and ground below that reflects a fifth or so of its mean."""
     above = smoothstep(-0.01, 0.01, d[..., 2:])
     soil = np.array(linear(pick(("#8c8a84", "#7d7f73", "#94866f", "#8b9094"), rng)))
-    upper = sky[: sky.shape[0] // 2].mean(axis=(0, 1))
+    # What lights the ground is the sky and a sun that is not in it: whiter than the sky.
+    mean = sky[: sky.shape[0] // 2].mean(axis=(0, 1))
+    upper = 0.35 * mean + 0.65 * float((mean * _LUMINANCE).sum())
     ground = soil * upper * (1.0 - 0.25 * smoothstep(0.0, -1.0, d[..., 2:]))
     mixed: Array = sky * above + ground * (1 - above)
     return mixed

@@ -8,7 +8,13 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.records import View, World, pixel_direction, unit
+from generator.renderers.kernels.records import (
+    View,
+    World,
+    pixel_direction,
+    surface_index,
+    unit,
+)
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -19,6 +25,8 @@ class Lattice:
 
     Attributes:
         body: -1 where nothing is seen.
+        surface: Index of the material.
+        pixel: Index of the pixel.
         p_m, normal: Point and smooth unit normal in the world.
         origin_m: Where rays start that leave the surface.
         skip: The body that cannot shade the point although it lies on it, or -1.
@@ -27,6 +35,8 @@ class Lattice:
     width: int
     height: int
     body: wp.array(dtype=int)
+    surface: wp.array(dtype=int)
+    pixel: wp.array(dtype=int)
     skip: wp.array(dtype=int)
     p_m: wp.array(dtype=wp.vec3)
     normal: wp.array(dtype=wp.vec3)
@@ -84,8 +94,11 @@ def sample_lattice(
     pixel = y * view.width + x
     hit = hits[pixel]
     lattice.body[i] = hit[0]
+    lattice.pixel[i] = pixel
+    lattice.surface[i] = -1
     if hit[0] < 0:
         return
+    lattice.surface[i] = surface_index(world, hit)
     d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
     offset = d * z_m[pixel]
     p = view.eye_m + offset

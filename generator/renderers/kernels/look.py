@@ -131,13 +131,6 @@ def box_mapped(
 
 
 @wp.func
-def surface_index(world: World, hit: wp.vec2i):
-    """The material of a face."""
-    body = world.bodies[hit[0]]
-    return body.first_material + world.geometries[body.geometry].face_slots[hit[1]]
-
-
-@wp.func
 def look_at_hit(
     view: View,
     world: World,

@@ -182,7 +182,19 @@ def blocked_by(world: World, b: int, origin: wp.vec3, path: wp.vec3):
 
 
 @wp.func
-def blocked(
+def blocked(world: World, origin: wp.vec3, path: wp.vec3):
+    """Whether anything cuts a path."""
+    hit = bool(False)
+    candidates = wp.bvh_query_ray(world.tree, origin, path)
+    b = int(0)
+    while wp.bvh_query_next(candidates, b, 1.0):
+        if not hit:
+            hit = blocked_by(world, b, origin, path)
+    return hit
+
+
+@wp.func
+def blocked_by_listed(
     world: World,
     lists: wp.array(dtype=int, ndim=3),
     tile: int,
@@ -194,17 +206,12 @@ def blocked(
     """Whether anything but ``skip`` cuts the path from a point of a tile to lamp j."""
     hit = bool(False)
     count = lists[tile, j, 0]
-    if count >= 0:
-        for k in range(count):
-            b = lists[tile, j, 1 + k]
-            if not hit and b != skip:
-                hit = blocked_by(world, b, origin, path)
-    else:
-        candidates = wp.bvh_query_ray(world.tree, origin, path)
-        b = int(0)
-        while wp.bvh_query_next(candidates, b, 1.0):
-            if not hit and b != skip:
-                hit = blocked_by(world, b, origin, path)
+    if count < 0:
+        return blocked(world, origin, path)
+    for k in range(count):
+        b = lists[tile, j, 1 + k]
+        if not hit and b != skip:
+            hit = blocked_by(world, b, origin, path)
     return hit
 
 
@@ -277,7 +284,9 @@ def probe_lamps(
                 if lists[tile, j, 0] != 0:
                     part = disc[bayer(i % lattice.width, i / lattice.width)]
                     path = path_to_lamp(world.lamps[j], origin, part)
-                    if blocked(world, lists, tile, j, lattice.skip[i], origin, path):
+                    if blocked_by_listed(
+                        world, lists, tile, j, lattice.skip[i], origin, path
+                    ):
                         value = 0.0
         lit[j, i] = value
 
@@ -367,7 +376,9 @@ def refine_lamps(
                 for k in range(4):
                     part = disc[16 * k + bayer(x, y)]
                     path = path_to_lamp(world.lamps[j], origin, part)
-                    if not blocked(world, lists, tile, j, lattice.skip[i], origin, path):
+                    if not blocked_by_listed(
+                        world, lists, tile, j, lattice.skip[i], origin, path
+                    ):
                         seen += 0.25
                 value = seen
         lit[j, i] = value
@@ -426,35 +437,41 @@ def probe_ambient(
             x, y = frame_of(n)
             h = hemisphere[bayer(i % lattice.width, i / lattice.width)]
             path = (x * h[0] + y * h[1] + n * h[2]) * radius_m
-            t = free_path(world, lists, tile, lamps, lattice.skip[i], lattice.origin_m[i], path)
+            t = free_of_listed(world, lists, tile, lattice.skip[i], lattice.origin_m[i], path)
             value = t * (2.0 - t)
     open_sky[0, i] = value
 
 
 @wp.func
-def free_path(
+def free_path(world: World, origin: wp.vec3, path: wp.vec3):
+    """The part of a path that is free, from 0 to 1."""
+    free = float(1.0)
+    candidates = wp.bvh_query_ray(world.tree, origin, path)
+    b = int(0)
+    while wp.bvh_query_next(candidates, b, free):
+        free = freed_by(world, b, origin, path, free)
+    return free
+
+
+@wp.func
+def free_of_listed(
     world: World,
     lists: wp.array(dtype=int, ndim=3),
     tile: int,
-    j: int,
     skip: int,
     origin: wp.vec3,
     path: wp.vec3,
 ):
-    """The part of a path that is free, from 0 to 1."""
+    """The part of a path from a point of a tile that is free of anything but ``skip``."""
+    j = world.lamps.shape[0]
     free = float(1.0)
     count = lists[tile, j, 0]
-    if count >= 0:
-        for k in range(count):
-            b = lists[tile, j, 1 + k]
-            if b != skip:
-                free = freed_by(world, b, origin, path, free)
-    else:
-        candidates = wp.bvh_query_ray(world.tree, origin, path)
-        b = int(0)
-        while wp.bvh_query_next(candidates, b, free):
-            if b != skip:
-                free = freed_by(world, b, origin, path, free)
+    if count < 0:
+        return free_path(world, origin, path)
+    for k in range(count):
+        b = lists[tile, j, 1 + k]
+        if b != skip:
+            free = freed_by(world, b, origin, path, free)
     return free
 
 

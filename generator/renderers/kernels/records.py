@@ -206,3 +206,10 @@ class World:
     textures: wp.array(dtype=Texture)
     lamps: wp.array(dtype=Lamp)
     sky: Sky
+
+
+@wp.func
+def surface_index(world: World, hit: wp.vec2i):
+    """The material of a face."""
+    body = world.bodies[hit[0]]
+    return body.first_material + world.geometries[body.geometry].face_slots[hit[1]]

@@ -7,17 +7,23 @@ import warp as wp
 from generator.renderers.kernels.brdf import make_brdf, specular_lobe
 from generator.renderers.kernels.lattice import Lattice, agree, ray_origin
 from generator.renderers.kernels.lighting import beam_from, towards_mirror
-from generator.renderers.kernels.look import Look, look_at_hit, surface_index
+from generator.renderers.kernels.look import Look, look_at_hit
 from generator.renderers.kernels.occlusion import (
-    NO_TILE,
-    UNSEEN,
     blocked,
     free_path,
     frame_of,
     path_to_lamp,
     surface_tolerance,
 )
-from generator.renderers.kernels.records import View, World, pixel_direction, unit
+from generator.renderers.kernels.records import (
+    Lamp,
+    Surface,
+    View,
+    World,
+    pixel_direction,
+    surface_index,
+    unit,
+)
 from generator.renderers.kernels.sky import sky_image, sky_irradiance, sky_reflection
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -133,71 +139,41 @@ def shade_points(
     lights[k] = light
 
 
-@wp.struct
-class Gathered:
-    """What a pixel takes from lattice points around it.
+@wp.func
+def neighbour(lattice: Lattice, x: int, y: int, k: int):
+    """The k-th of the four lattice points around a pixel, or -1.
 
-    Attributes:
-        count: How many lie on its surface.
-        smooth: How many of them are turned so little that their light can be mixed.
+    Odd columns have a point on either side, even ones lie on one; rows likewise.
     """
-
-    points: wp.vec4i
-    count: int
-    smooth: int
-    light: Light
+    column = (x + (k & 1)) >> 1
+    row = (y + (k >> 1)) >> 1
+    twice = ((k & 1) == 1 and (x & 1) == 0) or (k >= 2 and (y & 1) == 0)
+    q = row * lattice.width + column
+    if twice or column >= lattice.width or row >= lattice.height:
+        q = -1
+    return q
 
 
 @wp.func
-def gather(
-    view: View,
-    world: World,
-    images: Images,
-    lattice: Lattice,
-    lights: wp.array(dtype=Light),
-    i: int,
-    p: wp.vec3,
+def agreement(
+    view: View, images: Images, lattice: Lattice, surface: int, i: int, p: wp.vec3, q: int
 ):
-    """The lattice points around a pixel that lie on its surface, and the mean of their light."""
-    g = Gathered()
-    x = i % view.width
-    y = i / view.width
-    tolerance_m = surface_tolerance(view, p)
-    surface = surface_index(world, images.hits[i])
-    n = images.normals[i]
-    for k in range(4):
-        # Odd columns have a lattice point on either side, even ones lie on one.
-        lx = (x + (k & 1)) >> 1
-        ly = (y + (k >> 1)) >> 1
-        twice = ((k & 1) == 1 and (x & 1) == 0) or (k >= 2 and (y & 1) == 0)
-        if lx < lattice.width and ly < lattice.height and not twice:
-            q = ly * lattice.width + lx
-            if lattice.surface[q] == surface:
-                cosine = agree(p, n, lattice.p_m[q], lattice.normal[q], tolerance_m)
-                if cosine > 0.0:
-                    g.points[g.count] = q
-                    g.count += 1
-                    if cosine > SMOOTH_COSINE:
-                        g.smooth += 1
-                        g.light.diffuse += lights[q].diffuse
-                        g.light.rest += lights[q].rest
-    return g
+    """Cosine between the normals of pixel i and lattice point q; 0 if on other surfaces."""
+    cosine = float(0.0)
+    if q >= 0:
+        if lattice.surface[q] == surface:
+            tolerance_m = surface_tolerance(view, p)
+            cosine = agree(p, images.normals[i], lattice.p_m[q], lattice.normal[q], tolerance_m)
+    return cosine
 
 
 @wp.func
-def mixed(values: wp.array(dtype=float, ndim=2), j: int, g: Gathered):
-    """Mean of what lattice points see; UNSEEN where none of them looks."""
-    total = float(0.0)
-    count = float(0.0)
-    for k in range(g.count):
-        value = values[j, g.points[k]]
-        if value != UNSEEN:
-            total += value
-            count += 1.0
-    mean = float(UNSEEN)
-    if count > 0.0:
-        mean = total / count
-    return mean
+def gatherable(world: World, material: Surface):
+    """Whether a material's light changes slowly enough to be taken from the lattice."""
+    smooth = material.roughness >= GATHERED_ROUGHNESS
+    if smooth and material.texture >= 0:
+        smooth = material.metallic < 0.05 and world.textures[material.texture].has_bumps == 0
+    return smooth
 
 
 @wp.kernel
@@ -207,21 +183,15 @@ def gather_light(
     images: Images,
     lattice: Lattice,
     lights: wp.array(dtype=Light),
-    lattice_lit: wp.array(dtype=float, ndim=2),
-    lattice_sky: wp.array(dtype=float, ndim=2),
-    disc: wp.array(dtype=wp.vec2),
-    radius_m: float,
     count: wp.array(dtype=int),
     pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
     radiance: wp.array(dtype=wp.vec3),
 ):
     """Light every pixel off the lattice from lattice points, or list it to be shaded by itself.
 
     Args:
         count: Length of the list; 0 at first.
-        pixels, lit, open_sky: The list, with what each of its pixels sees of lamps and sky.
+        pixels: The list, in any order.
     """
     i = wp.tid()
     x = i % view.width
@@ -237,57 +207,103 @@ def gather_light(
         return
     z = images.z_m[i]
     p = view.eye_m + d * z
-    g = gather(view, world, images, lattice, lights, i, p)
-    material = world.surfaces[surface_index(world, hit)]
-    if g.smooth > 0 and g.smooth == g.count and gatherable(world, material):
-        share = 1.0 / float(g.smooth)
-        albedo = material.base_color
-        if material.texture >= 0:
-            look = look_at_hit(
-                view, world, hit, images.weights[i], images.normals[i], z, unit(-d)
-            )
-            albedo = look.albedo
-        radiance[i] = (wp.cw_mul(g.light.diffuse, albedo) + g.light.rest) * share
+    surface = surface_index(world, hit)
+    material = world.surfaces[surface]
+    diffuse = wp.vec3(0.0)
+    rest = wp.vec3(0.0)
+    found = float(0.0)
+    if gatherable(world, material):
+        for k in range(4):
+            q = neighbour(lattice, x, y, k)
+            if agreement(view, images, lattice, surface, i, p, q) > SMOOTH_COSINE:
+                diffuse += lights[q].diffuse
+                rest += lights[q].rest
+                found += 1.0
+    if found == 0.0:
+        pixels[wp.atomic_add(count, 0, 1)] = i
         return
-    k = wp.atomic_add(count, 0, 1)
-    pixels[k] = i
-    if g.count > 0:
+    albedo = material.base_color
+    if material.texture >= 0:
+        weight = images.weights[i]
+        albedo = look_at_hit(view, world, hit, weight, images.normals[i], z, unit(-d)).albedo
+    radiance[i] = (wp.cw_mul(diffuse, albedo) + rest) * (1.0 / found)
+
+
+@wp.kernel
+def look_around(
+    view: View,
+    world: World,
+    images: Images,
+    lattice: Lattice,
+    lattice_lit: wp.array(dtype=float, ndim=2),
+    lattice_sky: wp.array(dtype=float, ndim=2),
+    disc: wp.array(dtype=wp.vec2),
+    radius_m: float,
+    pixels: wp.array(dtype=int),
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: wp.array(dtype=float, ndim=2),
+):
+    """What listed pixels see of lamps and sky: the mean of lattice points, or by rays.
+
+    Args:
+        disc: Four points of the unit disc.
+        radius_m: Of ambient occlusion.
+    """
+    k = wp.tid()
+    i = pixels[k]
+    x = i % view.width
+    y = i / view.width
+    d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+    hit = images.hits[i]
+    p = view.eye_m + d * images.z_m[i]
+    surface = surface_index(world, hit)
+    found = float(0.0)
+    sky = float(0.0)
+    for j in range(world.lamps.shape[0]):
+        lit[j, k] = 0.0
+    for c in range(4):
+        q = neighbour(lattice, x, y, c)
+        if agreement(view, images, lattice, surface, i, p, q) > 0.0:
+            found += 1.0
+            sky += lattice_sky[0, q]
+            for j in range(world.lamps.shape[0]):
+                lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0)
+    if found > 0.0:
+        open_sky[0, k] = sky / found
         for j in range(world.lamps.shape[0]):
-            lit[j, k] = mixed(lattice_lit, j, g)
-        open_sky[0, k] = mixed(lattice_sky, 0, g)
+            lit[j, k] = lit[j, k] / found
     else:
-        origin = ray_origin(world, hit, images.weights[i], p, d * z)
         n = images.normals[i]
+        origin = ray_origin(world, hit, images.weights[i], p, d * images.z_m[i])
         for j in range(world.lamps.shape[0]):
-            lit[j, k] = seen_part(world, j, hit[0], origin, n, disc)
+            lit[j, k] = seen_part(world, world.lamps[j], origin, n, disc)
         open_sky[0, k] = seen_sky(world, origin, n, disc, radius_m)
 
 
 @wp.func
-def gatherable(world: World, material: Surface):
-    """Whether a material's light changes slowly enough to be taken from the lattice."""
-    smooth = material.roughness >= GATHERED_ROUGHNESS
-    if smooth and material.texture >= 0:
-        smooth = material.metallic < 0.05 and world.textures[material.texture].has_bumps == 0
-    return smooth
+def seen_part(world: World, lamp: Lamp, origin: wp.vec3, n: wp.vec3, disc: wp.array(dtype=wp.vec2)):
+    """How much of a lamp a point sees."""
+    beam = beam_from(lamp, origin)
+    seen = float(0.0)
+    if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
+        for k in range(disc.shape[0]):
+            if not blocked(world, origin, path_to_lamp(lamp, origin, disc[k])):
+                seen += 1.0
+    return seen / float(disc.shape[0])
 
 
 @wp.func
-def seen_part(
-    world: World,
-    j: int,
-    own: int,
-    origin: wp.vec3,
-    n: wp.vec3,
-    disc: wp.array(dtype=wp.vec2),
+def seen_sky(
+    world: World, origin: wp.vec3, n: wp.vec3, disc: wp.array(dtype=wp.vec2), radius_m: float
 ):
-    """How much of a lamp a point sees, by four rays, for pixels without lattice points."""
-    beam = beam_from(world.lamps[j], origin)
-    value = float(UNSEEN)
-    if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
-        value = 0.0
-        for k in range(4):
-            path = path_to_lamp(world.lamps[j], origin, disc[4 * k + 1])
-            if not blocked(world, no_lists, NO_TILE, j, -1, origin, path):
-                value += 0.25
-    return value
+    """How open a point is to the sky."""
+    if radius_m == 0.0:
+        return 1.0
+    x, y = frame_of(n)
+    total = float(0.0)
+    for k in range(disc.shape[0]):
+        c = disc[k]
+        up = wp.sqrt(1.0 - wp.dot(c, c))
+        t = free_path(world, origin, (x * c[0] + y * c[1] + n * up) * radius_m)
+        total += t * (2.0 - t)
+    return total / float(disc.shape[0])

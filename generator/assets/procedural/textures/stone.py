@@ -36,7 +36,7 @@ _TILES = ("#f0efeb", "#e6e0d2", "#d7dcdc", "#9fb4b8", "#3f5d6b", "#7e9a80", "#c9
 def marble(seed: int) -> TextureData:
     """Polished marble; 0.8 m per repeat."""
     rng = rng_of("marble", seed)
-    ground, vein_color = (color(code) for code in pick(_MARBLES, rng))
+    ground, vein_color = (color(code) for code in _MARBLES[seed % len(_MARBLES)])
     clouds = fbm((3, 3), 5, rng)
     veins = np.zeros_like(clouds)
     for cells, width, weight in (((2, 2), 0.06, 1.0), ((4, 3), 0.045, 0.6), ((8, 8), 0.03, 0.35)):
@@ -106,7 +106,7 @@ def brick(seed: int) -> TextureData:
     base = drawn_color(_BRICKS, 0.08, rng)
     other = drawn_color(_BRICKS, 0.08, rng)
     pick_other = (uniform(bricks, rng) < between(0.0, 0.35, rng)).astype(np.float64)
-    tone = 0.75 + 0.45 * uniform(bricks, rng)
+    tone = 0.72 + 0.33 * uniform(bricks, rng)
     tints = (base + (other - base) * pick_other[:, None]) * tone[:, None]
     grit = fbm((48, 48), 4, rng, 0.7)
     albedo = tints.astype(np.float32)[number] * (1 + 0.13 * grit + 0.1 * fbm((5, 5), 3, rng))[..., None]

@@ -27,7 +27,7 @@ def wood_grain(seed: int) -> TextureData:
     """One board; 0.4 m per repeat."""
     rng = rng_of("wood_grain", seed)
     rings, fibre = _grain(rng)
-    light, dark = (color(code) for code in pick(_SPECIES, rng))
+    light, dark = (color(code) for code in _SPECIES[seed % len(_SPECIES)])
     albedo = mixed(light, dark, 0.75 * rings + 0.35 * fibre)
     return texture(albedo, 0.85 + 0.15 * fibre, -0.8 * fibre - 0.3 * rings)
 
@@ -36,7 +36,7 @@ def wood_planks(seed: int) -> TextureData:
     """Boards laid side by side, ends staggered; 1.2 m per repeat."""
     rng = rng_of("wood_planks", seed)
     rings, fibre = _grain(rng)
-    light, dark = (color(code) for code in pick(_SPECIES, rng))
+    light, dark = (color(code) for code in _SPECIES[seed % len(_SPECIES)])
     rows = pick((4, 6, 8, 8, 10), rng)
     per_row = pick((1, 2, 2, 3), rng)
     y, x = rows_and_columns()
@@ -62,15 +62,17 @@ def wood_planks(seed: int) -> TextureData:
 def _grain(rng: Rng) -> tuple[Float32, Float32]:
     """Growth rings and fibres, both in about [0, 1]."""
     y, _ = rows_and_columns()
-    count = pick((3, 5, 7, 9), rng)
-    bend = between(0.5, 1.6, rng)
-    phase = count * y + bend * fbm((2, 1), 3, rng) + 0.12 * fbm((24, 2), 2, rng)
+    count = pick((6, 9, 12, 16), rng)
+    # Quarter-sawn boards have straight lines, flat-sawn ones wander.
+    bend = between(0.4, 2.2, rng)
+    phase = count * y + bend * fbm((3, 1), 2, rng) + 0.1 * fbm((40, 4), 2, rng)
     ring = phase - np.floor(phase)
     # Early wood is wide and pale, late wood a thin dark line that ends abruptly.
     rings = ring ** np.float32(between(1.2, 3.0, rng)) * (1 - smoothstep(0.93, 1.0, ring))
     streaks = np.abs(perlin((128, 4), rng)) + 0.5 * np.abs(perlin((256, 8), rng))
     pores = smoothstep(0.5, 0.85, perlin((170, 17), rng) + 0.25 * rings)
-    tone = 0.18 * fbm((6, 2), 3, rng)
+    rings = rings * (0.6 + 0.4 * smoothstep(-0.5, 0.5, fbm((4, 2), 2, rng)))
+    tone = 0.22 * fbm((7, 2), 3, rng)
     fibre: Float32 = np.clip(0.45 * streaks + 0.6 * pores, 0.0, 1.0)
     return np.clip(rings + tone, 0.0, 1.0), fibre
 

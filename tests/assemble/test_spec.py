@@ -1,0 +1,161 @@
+"""A configuration and its template become one validated Spec; every fault is told at its place."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+
+import pytest
+
+from generator.assemble.spec import load_spec, spec_of_source
+from generator.assemble.tables import find_plugin
+from generator.core.errors import ConfigError
+
+CAMERA = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}]\n"
+
+
+def written(folder: Path, text: str) -> str:
+    """Path of a configuration with that text."""
+    path = folder / "mine.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def refusal(source: str, **options: object) -> str:
+    """The message with which a configuration is refused."""
+    with pytest.raises(ConfigError) as error:
+        load_spec(source, **options)  # type: ignore[arg-type]
+    return str(error.value)
+
+
+@pytest.mark.parametrize("name", ["tabletop.yaml", "bin_picking.yaml", "shelf.yaml", "tabletop"])
+def test_shipped_configurations_are_valid_from_any_folder(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Shipped names work wherever the user is, with or without their suffix."""
+    monkeypatch.chdir(tmp_path)
+
+    spec = load_spec(name)
+
+    assert spec.name == name.removesuffix(".yaml")
+    assert spec.elements and spec.randomizers and spec.sensors and spec.exporters
+
+
+def test_a_file_of_the_user_comes_before_a_shipped_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``tabletop.yaml`` in the current folder is the user's."""
+    (tmp_path / "tabletop.yaml").write_text("template: tabletop\nseed: 41\n" + CAMERA)
+    monkeypatch.chdir(tmp_path)
+
+    assert load_spec("tabletop.yaml").head.seed == 41
+
+
+def test_configuration_overrides_its_template_by_element_name(tmp_path: Path) -> None:
+    """Only what is named changes; the rest of the element stays the template's."""
+    source = written(tmp_path, "template: tabletop\nelements: {table: {height_m: 0.9}}\n" + CAMERA)
+    nominal = {e.name: e for e in load_spec("tabletop.yaml").elements}
+
+    table = {e.name: e for e in load_spec(source).elements}["table"]
+
+    assert table.height_m == 0.9
+    assert table.top_size_m == nominal["table"].top_size_m
+
+
+def test_override_of_an_unknown_element_is_refused(tmp_path: Path) -> None:
+    """The position of the key, the known names, and the nearest of them."""
+    source = written(tmp_path, "template: tabletop\nelements: {tabel: {height_m: 1}}\n" + CAMERA)
+
+    message = refusal(source)
+
+    assert message.startswith(f"{source}:2:12: elements.tabel: ")
+    assert "did you mean 'table'?" in message
+
+
+def test_command_line_wins_over_file_and_template() -> None:
+    """``--set`` reaches elements and randomizers by name, the top level, and absent sections."""
+    spec = load_spec(
+        "tabletop.yaml",
+        seed=0,
+        overrides=(
+            "elements.table.height_m=0.6",
+            "randomizers.clutter.count=3",
+            "physics.settle_time_s_max=2.5",
+            "views_per_scene=2",
+        ),
+    )
+
+    assert spec.head.seed == 0
+    assert {e.name: e for e in spec.elements}["table"].height_m == 0.6
+    assert {r.name: r for r in spec.randomizers}["clutter"].count.mean() == 3
+    assert spec.head.physics.settle_time_s_max == 2.5
+    assert spec.head.views_per_scene == 2
+
+
+def test_without_leaves_a_randomizer_out() -> None:
+    """The others keep their order; an unknown name is refused."""
+    names = [r.name for r in load_spec("tabletop.yaml").randomizers]
+
+    kept = [r.name for r in load_spec("tabletop.yaml", without=("colors",)).randomizers]
+
+    assert kept == [name for name in names if name != "colors"]
+    assert "did you mean 'colors'?" in refusal("tabletop.yaml", without=("colour",))
+
+
+def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
+    """What ``plan.json`` keeps is enough to make every sample of a data set again."""
+    first = load_spec("tabletop.yaml", seed=5, overrides=("randomizers.clutter.count=3",))
+    plan = {"config": first.resolved, "name": first.name}
+    (tmp_path / "plan.json").write_text(json.dumps(plan))
+
+    again = spec_of_source(str(tmp_path))
+
+    assert again == first
+
+
+def test_spec_crosses_process_borders() -> None:
+    """A worker process gets the Spec itself, not a path that may change meanwhile."""
+    spec = load_spec("tabletop.yaml")
+
+    assert pickle.loads(pickle.dumps(spec)) == spec
+
+
+@pytest.mark.parametrize(
+    ("text", "fact"),
+    [
+        ("seed: 1\n" + CAMERA, "template: expected the name of a template"),
+        ("template: tabeltop\n" + CAMERA, "did you mean 'tabletop.yaml'?"),
+        ("template: tabletop\n", "sensors: at least one sensor is needed"),
+        ("template: tabletop\nseed: -1\n" + CAMERA, "seed: "),
+        ("template: tabletop\nsplits: {train: 0.5, val: 0.1}\n" + CAMERA, "shares must sum to 1"),
+        ("template: tabletop\nrandomizers: {a: 1}\n" + CAMERA, "randomizers: expected a list"),
+        ("template: tabletop\nrandomizers: [{name: a}]\n" + CAMERA, "randomizers[0].type: "),
+        ("template: tabletop\nannotations: [boxes]\n" + CAMERA, "unknown annotation 'boxes'"),
+        ("template: tabletop\nrender: {device: gpu}\n" + CAMERA, "render.device: "),
+    ],
+)
+def test_wrong_configuration_is_refused(tmp_path: Path, text: str, fact: str) -> None:
+    """The field and the fact are named."""
+    assert fact in refusal(written(tmp_path, text))
+
+
+def test_equal_names_are_refused_at_the_second(tmp_path: Path) -> None:
+    """Names are keys of random streams: two of one would draw the same."""
+    text = (
+        "template: tabletop\nrandomizers:\n"
+        "  - {type: colors, name: a}\n  - {type: materials, name: a}\n"
+    )
+    source = written(tmp_path, text + CAMERA)
+
+    assert f"{source}:4:29: randomizers[1].name: the name 'a' is taken" in refusal(source)
+
+
+def test_plugins_are_found_by_name_and_kind() -> None:
+    """A name that two kinds share needs its kind; an unknown one gets the nearest."""
+    assert find_plugin("lighting")[0] == "randomizer"
+    assert find_plugin("element/objects")[0] == "element"
+    with pytest.raises(ConfigError, match="element/objects, randomizer/objects"):
+        find_plugin("objects")
+    with pytest.raises(ConfigError, match="did you mean 'lighting'"):
+        find_plugin("lightning")
