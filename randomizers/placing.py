@@ -17,7 +17,7 @@ GAP_M = 0.004
 """Free space between what is placed."""
 DROP_M = (0.01, 0.05)
 """Objects fall this far: enough to tumble, too little to bounce away."""
-DROP_TRIES = 8
+DROP_TRIES = 24
 """Free places are tried this often before an object is dropped on top of others."""
 SCATTER_TRIES = 200
 
@@ -124,22 +124,35 @@ def _dropped(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bo
     upright = upright or 2 * item.reach_m + DROP_M[1] > clearance_m
     radius_m = item.radius_m if upright else item.reach_m
     half_height_m = item.half_m[2] if upright else item.reach_m
-    x = y = 0.0
-    for _ in range(DROP_TRIES):
-        x, y = floor.place(rng, radius_m)
-        if floor.is_closed(x, y, radius_m):
-            continue
-        if floor.top_under(x, y, radius_m) == 0.0:
-            break
-    if floor.is_closed(x, y, radius_m):
+    place = _lowest_place(floor, radius_m, rng)
+    if place is None:
         raise LayoutRejected(_no_place(group))
+    x, y, top_m = place
     fall_m = float(rng.uniform(*DROP_M)) if not upright else DROP_M[0]
-    z = floor.top_under(x, y, radius_m) + half_height_m + fall_m
+    z = top_m + half_height_m + fall_m
     if z + half_height_m > clearance_m:
         raise LayoutRejected(_no_place(group))
     floor.taken.append((x, y, radius_m, z + half_height_m))
     turn = _yaw(rng) if upright else SE3(quaternion_wxyz=So3().draw(rng))
     return floor.surface.T_world_surface @ SE3((x, y, z)) @ turn
+
+
+def _lowest_place(floor: Floor, radius_m: float, rng: Rng) -> Vec3 | None:
+    """``(x, y, height)`` of the first bare place of some, else of that with the least below it.
+
+    None if something stands at all of them.
+    """
+    lowest: Vec3 | None = None
+    for _ in range(DROP_TRIES):
+        x, y = floor.place(rng, radius_m)
+        if floor.is_closed(x, y, radius_m):
+            continue
+        top_m = floor.top_under(x, y, radius_m)
+        if lowest is None or top_m < lowest[2]:
+            lowest = (x, y, top_m)
+        if top_m == 0.0:
+            break
+    return lowest
 
 
 def _scattered(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:

@@ -132,7 +132,7 @@ def _replace(path: Path, write: Callable[[Any], object]) -> None:
     try:
         with os.fdopen(descriptor, "wb") as file:
             write(file)
-        os.replace(temporary, path)
+        Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise

@@ -76,7 +76,7 @@ class MeshEntry(Origin):
     parts: Annotated[int, Field(ge=1, le=24)] = 8
     """Bound on the convex parts that a concave mesh without a collision file is cut into."""
     max_faces: Annotated[int, Field(ge=100)] = 20_000
-    materials: dict[str, Finish] = {}
+    materials: dict[str, Finish] = Field(default_factory=dict)
     """By the material's name in the file; ``*`` = every other."""
 
     @model_validator(mode="after")
@@ -104,7 +104,7 @@ class RobotEntry(Origin):
     """URDF file, relative to the folder."""
     category: Annotated[str, Field(min_length=1, max_length=60)] = "robot"
     tags: tuple[Word, ...] = ()
-    home: dict[str, float] = {}
+    home: dict[str, float] = Field(default_factory=dict)
     """Position [rad or m] per joint; by default 0, or the middle where 0 is out of limits."""
     gripper: GripperEntry | None = None
     touching: tuple[tuple[str, str], ...] = ()
@@ -113,7 +113,7 @@ class RobotEntry(Origin):
     """The meshes' images only hold their colours: each material takes its median colour."""
     max_faces: Annotated[int, Field(ge=100)] = 2_000
     """Per link."""
-    materials: dict[str, Finish] = {}
+    materials: dict[str, Finish] = Field(default_factory=dict)
 
 
 class ImageEntry(Origin):
@@ -165,7 +165,7 @@ def read_index(path: Path) -> Index:
     problems = Problems()
     index = validate(load(path), Index, problems)
     problems.raise_if_any()
-    assert index is not None  # noqa: S101 - nothing was wrong
+    assert index is not None
     return index
 
 
@@ -224,7 +224,7 @@ def _found(root: Path) -> Index:
 
 
 def _meshes_of(root: Path, urdf: str) -> tuple[str, ...]:
-    from generator.assets.urdf import read_urdf  # noqa: PLC0415 - only for folders with URDFs
+    from generator.assets.urdf import read_urdf
 
     try:
         return read_urdf(Folder(root), urdf).files()

@@ -60,7 +60,7 @@ def hull_vertices(points: Float64, place: str, max_vertices: int = MAX_VERTICES)
     Raises:
         AssetError: if the points lie on a line or are too few.
     """
-    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415
+    from scipy.spatial import ConvexHull, QhullError
 
     points = _solid(_distinct(points))
     try:
@@ -80,7 +80,9 @@ def hull_vertices(points: Float64, place: str, max_vertices: int = MAX_VERTICES)
             growing.add_points(points[farthest : farthest + 1])
         growing.close()
     except QhullError:
-        raise AssetError(f"{place}: has no volume to collide with; give it a collision mesh") from None
+        raise AssetError(
+            f"{place}: has no volume to collide with; give it a collision mesh"
+        ) from None
     return points[sorted(chosen)]
 
 
@@ -149,7 +151,7 @@ def _clipped(corners: Float64, axis: int, at: float, side: float) -> Float64:
 
 
 def _hull_volume(points: Float64) -> float:
-    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415
+    from scipy.spatial import ConvexHull, QhullError
 
     points = _distinct(points)
     if len(points) > _SCOUTS:

@@ -34,7 +34,7 @@ def decimated(soup: Soup, max_faces: int) -> Soup:
 
 
 def _collapsed(corners: Float64, max_faces: int) -> Float64:
-    import fast_simplification  # noqa: PLC0415
+    import fast_simplification
 
     flat = corners.reshape(-1, 3)
     # Scaled to unit size: the collapse compares with absolute thresholds.

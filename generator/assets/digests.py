@@ -36,7 +36,7 @@ class Digests:
         known = self._known.get(name)
         if isinstance(known, list) and known and all(_unchanged(folder, row) for row in known):
             return {row[0]: row[3] for row in known}
-        rows = []
+        rows: list[list[Any]] = []
         for file in files_of(folder, relative):
             status = folder.path(file).stat()
             digest = sha256(folder.read(file)).hexdigest()
@@ -56,6 +56,6 @@ class Digests:
 def _unchanged(folder: Folder, row: Any) -> bool:
     try:
         status = (folder.root / row[0]).stat()
-        return [row[0], status.st_size, status.st_mtime_ns, str(row[3])] == row
+        return bool(row == [row[0], status.st_size, status.st_mtime_ns, str(row[3])])
     except (OSError, TypeError, IndexError):
         return False

@@ -119,8 +119,11 @@ class Files:
         elif one.kind == "object" and name in (images := self.imported(owner).images):
             return TextureData(images[name])
         place = str(folder.root / name)
-        return self._of_file(folder, name, place, lambda: {"albedo": decode(folder.read(name), place)},
-                             lambda arrays: TextureData(arrays["albedo"]))  # fmt: skip
+        return self._of_file(
+            folder, name, place,
+            lambda: {"albedo": decode(folder.read(name), place)},
+            lambda arrays: TextureData(arrays["albedo"]),
+        )  # fmt: skip
 
     def environment(self, asset_id: str) -> Float32:
         """Pixels of a panorama."""
@@ -146,7 +149,9 @@ class Files:
         if not folder.exists(name):
             raise AssetError(f"{place}: no such image; put it there or correct what refers to it")
         digests = self._digests.of(folder, name)
-        return self._store.get(content_key({"format": FORMAT, "image": digests[name]}), compute, view)
+        return self._store.get(
+            content_key({"format": FORMAT, "image": digests[name]}), compute, view
+        )
 
     def _all(self) -> dict[str, Listed]:
         if self._listed is None:

@@ -45,9 +45,11 @@ class Generated:
     def names(self) -> Iterator[str]:
         """Every id that is offered for selection, and the families that need parameters."""
         for name, family in self._families.items():
-            yield from (f"{name}?seed={k}" for k in range(family.variants)) if (
-                family.variants
-            ) else (name,)
+            yield from (
+                (f"{name}?seed={k}" for k in range(family.variants))
+                if (family.variants)
+                else (name,)
+            )
 
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
         """Assets offered for selection that are of a kind and carry every tag."""
@@ -101,7 +103,7 @@ class Generated:
         return self._result(
             asset_id,
             family,
-            lambda: pack_texture(family.build(**_arguments(asset_id, family))),
+            lambda: pack_texture(family.build(_arguments(asset_id, family)["seed"])),
             unpack_texture,
         )
 
@@ -115,7 +117,7 @@ class Generated:
         return self._result(
             asset_id,
             family,
-            lambda: {"radiance": family.build(**_arguments(asset_id, family))},
+            lambda: {"radiance": family.build(_arguments(asset_id, family)["seed"])},
             lambda arrays: arrays["radiance"],
         )
 

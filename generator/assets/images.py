@@ -17,7 +17,7 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
 
 
 def decode(data: bytes, place: str) -> UInt8:
-    """sRGB image, uint8 [height, width, 3]; transparency is dropped.
+    """Pixels in sRGB, uint8 [height, width, 3]; transparency is dropped.
 
     Args:
         data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA.
@@ -26,17 +26,17 @@ def decode(data: bytes, place: str) -> UInt8:
     Raises:
         AssetError: if it is unreadable, or larger than 16,384 pixels a side or 64 megapixels.
     """
-    from PIL import Image  # noqa: PLC0415
+    from PIL import Image
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
-                _check_size(*image.size, place)
+                _check_size(image.width, image.height, place)
                 return np.array(image.convert("RGB"), dtype=np.uint8)
     except AssetError:
         raise
-    except Exception as error:  # noqa: BLE001 - a decoder of foreign bytes may raise anything
+    except Exception as error:
         raise AssetError(
             f"{place}: unreadable image ({type(error).__name__}); save it again as PNG or JPEG"
         ) from None
@@ -52,7 +52,7 @@ def decode_radiance(data: bytes, place: str) -> Float32:
     Raises:
         AssetError: if it is unreadable, too large, of another shape, dark or not finite.
     """
-    import cv2  # noqa: PLC0415
+    import cv2
 
     width, height = _radiance_size(data, place)
     _check_size(width, height, place)
@@ -69,7 +69,8 @@ def decode_radiance(data: bytes, place: str) -> Float32:
     mean = _mean_luminance(rgb)
     if not np.isfinite(rgb).all() or mean <= 0.0:
         raise AssetError(f"{place}: black or not finite; save it again from its source")
-    return (rgb / mean).astype(np.float32)
+    radiance: Float32 = (rgb / mean).astype(np.float32)
+    return radiance
 
 
 def _radiance_size(data: bytes, place: str) -> tuple[int, int]:

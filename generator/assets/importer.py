@@ -15,13 +15,14 @@ import numpy as np
 
 from generator.assets.catalogue import Finish, MeshEntry, RobotEntry
 from generator.assets.convex import convex_parts, one_hull
+from generator.assets.decimate import decimated
 from generator.assets.folder import Folder
 from generator.assets.images import decode
 from generator.assets.mesh import NormalForm, check_coordinates, normal_form
 from generator.assets.primitives import box, cylinder, sphere
 from generator.assets.readers import read_mesh
 from generator.assets.readers.source import linear_of_srgb
-from generator.assets.soup import Float64, Slot, Soup, joined
+from generator.assets.soup import Float64, Int64, Slot, Soup, joined
 from generator.assets.urdf import Shape, Urdf, read_urdf
 from generator.core.errors import AssetError
 from generator.core.geometry import ConvexParts, Material, MeshData, UInt8
@@ -64,7 +65,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str) -> Imported:
         check_coordinates(solid, place)
         collision = convex_parts(solid, place, entry.parts)
     else:
-        collision = convex_parts(replace(soup, face_groups=soup.face_slots * 0), place, entry.parts)
+        collision = convex_parts(_solid_of(mesh, entry.max_faces), place, entry.parts)
     decoded = {name: decode(data, f"{place}#{name}") for name, data in images.items()}
     return Imported(mesh, collision, decoded)
 
@@ -98,13 +99,17 @@ def import_link(
     return Imported(mesh, collision, {})
 
 
+def _solid_of(mesh: MeshData, max_faces: int) -> Soup:
+    """Triangles of a mesh as a solid to collide with, few enough to be cut up quickly."""
+    soup = Soup.of(mesh.vertices_m.astype(np.float64)[mesh.faces])
+    return decimated(soup, max_faces) if len(soup) > max_faces else soup
+
+
 def _grouped(soup: Soup) -> bool:
     return bool((soup.face_groups != soup.face_groups[0]).any())
 
 
-def _raw(
-    folder: Folder, entry: MeshEntry
-) -> tuple[list[Soup], list[Soup], Mapping[str, bytes]]:
+def _raw(folder: Folder, entry: MeshEntry) -> tuple[list[Soup], list[Soup], Mapping[str, bytes]]:
     """What is seen, what collides (empty = the same), and embedded images, as the files have it."""
     images: Mapping[str, bytes] = {}
     collides: list[Soup] = []
@@ -131,9 +136,7 @@ def _geometry(placed: tuple[Shape, SE3]) -> tuple[object, ...]:
     return (shape.kind, shape.file, shape.size, shape.T_link_shape, pose)
 
 
-def _shape_soup(
-    folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
-) -> Soup:
+def _shape_soup(folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True) -> Soup:
     """Triangles of a URDF element in the root frame, with the element's colour."""
     matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
     if shape.kind == "mesh":
@@ -217,7 +220,7 @@ def _palette_colors(folder: Folder, soup: Soup) -> Soup:
     return replace(soup, slots=tuple(slots), uvs=None)
 
 
-def _pixels(uvs: Float64, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def _pixels(uvs: Float64, shape: tuple[int, ...]) -> tuple[Int64, Int64]:
     height, width = shape[:2]
     columns = np.floor(uvs[:, 0] * width).astype(np.int64) % width
     rows = np.floor((1.0 - uvs[:, 1]) * height).astype(np.int64) % height
@@ -259,4 +262,3 @@ def _scaling(scale: float, shift: Float64) -> Float64:
     matrix[:, :3] = scale * np.eye(3)
     matrix[:, 3] = shift
     return matrix
-

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import cached_property
 from pathlib import Path
 
 from generator.assets.cache import DiskCache, Store
 from generator.assets.files import Files
 from generator.assets.generated import Generated
-from generator.assets.ids import canonical, parse
+from generator.assets.ids import parse
 from generator.assets.importer import Imported
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import (
@@ -114,11 +113,13 @@ class Library:
         if asset_id in self._files:
             return False
         known = [*self._generated.names(), *self._files.names()]
-        raise AssetError(f"asset '{asset_id[:120]}': there is none{did_you_mean(asset_id[:120], known)}; "
-                         "'gen-data assets list' shows them all")
+        raise AssetError(
+            f"asset '{asset_id[:120]}': there is none{did_you_mean(asset_id[:120], known)}; "
+            "'gen-data assets list' shows them all"
+        )
 
 
 def _default_cache_dir() -> Path:
-    from platformdirs import user_cache_path  # noqa: PLC0415
+    from platformdirs import user_cache_path
 
     return user_cache_path("gen-data")

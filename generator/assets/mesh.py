@@ -38,7 +38,7 @@ class NormalForm:
     max_faces: int = 20_000
 
 
-def normal_form(soup: Soup, place: str, form: NormalForm = NormalForm()) -> MeshData:  # noqa: B008
+def normal_form(soup: Soup, place: str, form: NormalForm = NormalForm()) -> MeshData:
     """The mesh of a soup that is in metres and Z up already.
 
     The file's own normals are kept where they agree with the triangles and round them off at all;
@@ -65,8 +65,8 @@ def normal_form(soup: Soup, place: str, form: NormalForm = NormalForm()) -> Mesh
         soup, faces = _welded(decimated(soup, form.max_faces))
     soup, faces = _outward(soup, faces)
     soup = replace(soup, uvs=soup.uvs if textured else None)
-    normals = soup.normals if _sane_normals(soup) else _creased(soup, faces, form.crease_deg)
-    return mesh_of(soup, normals)
+    own = _sane_normals(soup)
+    return mesh_of(soup, _creased(soup, faces, form.crease_deg) if own is None else own)
 
 
 def check_coordinates(soup: Soup, place: str) -> None:
@@ -98,7 +98,7 @@ def mesh_of(soup: Soup, normals: Float64) -> MeshData:
     """Indexed mesh of triangles with unit normals [m, 3, 3]; equal corners become one vertex."""
     slots, slot_of = _merged_slots(soup)
     uvs = np.zeros((len(soup), 3, 2)) if soup.uvs is None else soup.uvs
-    # 1e-6 relative: two computed normals of one crease group are equal; a file's may differ.
+    # On grids much finer than anything that is seen, so that noise does not split vertices.
     keys = np.concatenate(
         [
             np.rint(soup.corners.reshape(-1, 3) / _grid(soup.corners)).astype(np.int64),
@@ -216,8 +216,8 @@ def signed_volume(corners: Float64) -> float:
 
 def _winding_flips(face_count: int, edges: _Edges) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Which faces to turn so that neighbours agree; each piece follows its majority."""
-    from scipy.sparse import coo_array  # noqa: PLC0415
-    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
     # Faces doubled into (as is, turned): an edge links equal sides if it is opposed, else unequal
     # ones. Sides in one component belong together.
@@ -240,27 +240,28 @@ def _flipped(
     soup: Soup, faces: Int64, flip: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 ) -> tuple[Soup, Int64]:
     turned = soup.flipped()
-    mask = flip[:, None, None]
+
+    def chosen(new: Float64 | None, old: Float64 | None) -> Float64 | None:
+        return None if new is None or old is None else np.where(flip[:, None, None], new, old)
+
     return (
         replace(
             soup,
-            corners=np.where(mask, turned.corners, soup.corners),
-            uvs=None if soup.uvs is None else np.where(mask, turned.uvs, soup.uvs),
-            normals=None if soup.normals is None else np.where(mask, turned.normals, soup.normals),
+            corners=np.where(flip[:, None, None], turned.corners, soup.corners),
+            uvs=chosen(turned.uvs, soup.uvs),
+            normals=chosen(turned.normals, soup.normals),
         ),
         np.where(flip[:, None], faces[:, ::-1], faces),
     )
 
 
-def _sane_normals(soup: Soup) -> bool:
-    """Whether the file's normals are unit, on the right side, and smooth anything."""
+def _sane_normals(soup: Soup) -> Float64 | None:
+    """The file's normals, if they point away from their triangles and smooth anything at all."""
     if soup.normals is None or not np.isfinite(soup.normals).all():
-        return False
-    lengths = np.sqrt((soup.normals**2).sum(axis=2))
-    if (np.abs(lengths - 1.0) > 0.01).any():
-        return False
-    agreement = (soup.normals * _unit(face_crosses(soup.corners))[:, None]).sum(axis=2)
-    return bool((agreement > 0.2).all() and (agreement < 0.9999).any())
+        return None
+    normals = _unit(soup.normals)
+    agreement = (normals * _unit(face_crosses(soup.corners))[:, None]).sum(axis=2)
+    return normals if (agreement > 0.2).all() and (agreement < 0.9999).any() else None
 
 
 def _creased(soup: Soup, faces: Int64, crease_deg: float) -> Float64:
@@ -269,8 +270,8 @@ def _creased(soup: Soup, faces: Int64, crease_deg: float) -> Float64:
     Triangles weigh by their area, so that large flat ones keep their look beside narrow bevels
     ("weighted normals", the custom of hard-surface modelling).
     """
-    from scipy.sparse import coo_array  # noqa: PLC0415
-    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
     crosses = face_crosses(soup.corners)
     units = _unit(crosses)
@@ -282,7 +283,9 @@ def _creased(soup: Soup, faces: Int64, crease_deg: float) -> Float64:
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), (faces.size,) * 2)
     count, group = connected_components(graph, directed=False)
     weighted = np.repeat(crosses, 3, axis=0)
-    sums = np.stack([np.bincount(group, weighted[:, k], minlength=count) for k in range(3)], axis=1)
+    sums: Float64 = np.stack(
+        [np.bincount(group, weighted[:, k], minlength=count) for k in range(3)], axis=1
+    )
     normals = _unit(sums)[group].reshape(-1, 3, 3)
     # Where the sum cancels out (a knife's edge), the face's own normal is as good as any.
     cancelled = (normals * units[:, None]).sum(axis=2) < 0.05

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def _revolved(profile: list[tuple[float, float]]) -> Float64:
     triangles: list[tuple[tuple[float, float, float], ...]] = []
     turns = [2.0 * math.pi * k / SEGMENTS for k in range(SEGMENTS)]
     ring = [(math.cos(a), math.sin(a)) for a in turns]
-    for (r0, z0), (r1, z1) in zip(profile, profile[1:], strict=False):
+    for (r0, z0), (r1, z1) in pairwise(profile):
         for (cx, cy), (nx, ny) in zip(ring, [*ring[1:], ring[0]], strict=True):
             a, b = (r0 * cx, r0 * cy, z0), (r0 * nx, r0 * ny, z0)
             c, d = (r1 * nx, r1 * ny, z1), (r1 * cx, r1 * cy, z1)

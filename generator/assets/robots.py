@@ -35,7 +35,10 @@ def _check_names(urdf: Urdf, entry: RobotEntry, place: str) -> None:
     named_joints = [*entry.home, *(gripper.finger_joints if gripper else ())]
     named_links = [*(link for pair in entry.touching for link in pair)]
     named_links += [gripper.link] if gripper else []
-    for names, known, what in ((named_joints, joints, "movable joint"), (named_links, links, "link")):
+    for names, known, what in (
+        (named_joints, joints, "movable joint"),
+        (named_links, links, "link"),
+    ):
         for name in names:
             if name not in known:
                 raise AssetError(

@@ -14,6 +14,9 @@ Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
 
 
+_PLAIN = Material()
+
+
 @dataclass(frozen=True, eq=False)
 class Slot:
     """A named material of a file.
@@ -28,7 +31,7 @@ class Slot:
     """
 
     name: str = ""
-    material: Material = Material()
+    material: Material = _PLAIN
     from_file: bool = False
     declared_color: Vec3 = (1.0, 1.0, 1.0)
     missing_library: str = ""
@@ -55,10 +58,10 @@ class Soup:
     slots: tuple[Slot, ...]
 
     @classmethod
-    def of(cls, corners: Float64, slot: Slot = Slot()) -> Soup:  # noqa: B008 - immutable
+    def of(cls, corners: Float64, slot: Slot | None = None) -> Soup:
         """Bare triangles of one slot."""
         zeros = np.zeros(len(corners), dtype=np.int64)
-        return cls(corners, None, None, zeros, zeros, (slot,))
+        return cls(corners, None, None, zeros, zeros, (slot or Slot(),))
 
     def __len__(self) -> int:
         """Number of triangles."""
@@ -125,7 +128,9 @@ def joined(soups: list[Soup]) -> Soup:
         normals=np.concatenate([s.normals for s in soups if s.normals is not None])
         if has_normals
         else None,
-        face_slots=np.concatenate([s.face_slots + k for s, k in zip(soups, slot_starts, strict=False)]),
+        face_slots=np.concatenate(
+            [s.face_slots + k for s, k in zip(soups, slot_starts, strict=False)]
+        ),
         face_groups=np.concatenate(
             [s.face_groups + k for s, k in zip(soups, group_starts, strict=False)]
         ),

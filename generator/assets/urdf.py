@@ -133,7 +133,9 @@ def _parsed(data: bytes, place: str) -> Element:
     except (ValueError, expat.ExpatError, AssertionError) as error:
         raise AssetError(f"{place}: malformed XML ({error}); correct it") from None
     if root.tag != "robot":
-        raise AssetError(f"{place}: its root element is <{root.tag[:40]}>, not <robot>; give a URDF")
+        raise AssetError(
+            f"{place}: its root element is <{root.tag[:40]}>, not <robot>; give a URDF"
+        )
     return root
 
 
@@ -271,7 +273,9 @@ def _ordered(links: dict[str, Link], joints: list[Joint]) -> Urdf:
 def _pose(origin: Element | None) -> SE3:
     if origin is None:
         return SE3()
-    return SE3(_vector(origin.get("xyz", "0 0 0")), _quaternion(*_vector(origin.get("rpy", "0 0 0"))))
+    return SE3(
+        _vector(origin.get("xyz", "0 0 0")), _quaternion(*_vector(origin.get("rpy", "0 0 0")))
+    )
 
 
 def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:

@@ -13,11 +13,17 @@ TRACE_LINES = 12
 
 @contextmanager
 def explaining(place: str, command: str = "") -> Iterator[None]:
-    """Turn whatever is no GenDataError into a SampleError that names the place."""
+    """Turn whatever is no GenDataError into a SampleError that names the place.
+
+    A plain SampleError gets place and command, too; its subclasses say more than that themselves.
+    """
     try:
         yield
-    except GenDataError:
-        raise
+    except GenDataError as error:
+        if type(error) is not SampleError:
+            raise
+        reproduce = f"\n  Reproduce: {command}" if command else ""
+        raise SampleError(f"{place}: {error}{reproduce}") from error
     except Exception as error:
         raise unforeseen(error, place, command) from error
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
 
 from generator.assets.ids import parse
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import Asset, Gripper, Joint, Material, RobotModel
-from generator.core.scene import ObjectGroup, Scene, Surface
-from generator.core.se3 import SE3, Vec3
+from generator.core.scene import Body, ObjectGroup, Scene, Surface
+from generator.core.se3 import SE3, Array, Vec3
 from generator.core.streams import Rng, Streams
 
 FURNITURE_M: dict[str, Vec3] = {
@@ -52,9 +55,16 @@ THINGS = {
     "nut": Thing("nut", (0.03, 0.03, 0.015), ("part",), 0.02, stackable=True),
     "odd": Thing("odd", (0.05, 0.07, 0.09), ("random_shape",)),
 }
-TEXTURES = {f"texture/{name}?seed={k}": (name, "surface")
-            for name in ("concrete", "plaster", "wood_planks", "wood_grain", "tiles")
-            for k in range(3)}  # fmt: skip
+TEXTURES = {
+    f"texture/{name}?seed={k}": tags
+    for name, tags in (
+        ("concrete", ("floor", "wall", "stone")),
+        ("plaster", ("wall",)),
+        ("wood_planks", ("floor", "wood")),
+        ("wood_grain", ("wood",)),
+    )
+    for k in range(3)
+}
 ENVIRONMENTS = {
     f"environment/{name}?seed={k}": (name, tag)
     for name, tag in (("neutral", "indoor"), ("studio", "indoor"), ("sky", "outdoor"))
@@ -157,7 +167,7 @@ def surface_scene(
     keep_out: tuple[Vec3, ...] = (),
     levels: int = 1,
 ) -> Scene:
-    """An empty group ``clutter`` on one or several surfaces above each other, 1 m over the floor."""
+    """An empty group ``clutter`` on surfaces above each other, the lowest 1 m over the floor."""
     surfaces = tuple(
         Surface(f"s{k}", "s", SE3((0.2, -0.1, 1.0 + k * clearance_m)), size_m, clearance_m)
         for k in range(levels)
@@ -193,3 +203,37 @@ def _asset(
         mass_kg=mass_kg,
         stackable=stackable,
     )
+
+
+def box_of(body: Body) -> tuple[Array, Array, Array]:
+    """Centre [m], axes (columns) and half extents [m] of a body's box in the world."""
+    low, high = (np.array(corner) * body.scale for corner in FakeAssets().bounds_m(body.asset))
+    center = body.T_world_body.apply(0.5 * (low + high))
+    return center, body.T_world_body.rotation(), 0.5 * (high - low)
+
+
+def corners_of(body: Body) -> Array:
+    """Corners of a body's box in the world [m], shape [8, 3]."""
+    center, axes, half = box_of(body)
+    signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
+    corners: Array = center + (signs * half) @ axes.T
+    return corners
+
+
+def overlap_m(one: Body, other: Body) -> float:
+    """How deep two boxes are in each other [m]; negative where they are apart.
+
+    Separating axes of two oriented boxes: Gottschalk, Lin and Manocha, "OBBTree", 1996.
+    """
+    (c1, a1, h1), (c2, a2, h2) = box_of(one), box_of(other)
+    crossed = [np.cross(a1[:, i], a2[:, j]) for i in range(3) for j in range(3)]
+    axes = [*a1.T, *a2.T, *(v / np.linalg.norm(v) for v in crossed if np.linalg.norm(v) > 1e-9)]
+    return min(
+        float(np.abs(a1.T @ n) @ h1 + np.abs(a2.T @ n) @ h2 - abs(n @ (c2 - c1))) for n in axes
+    )
+
+
+def deepest_overlap_m(bodies: Sequence[Body]) -> float:
+    """The deepest overlap of any two bodies [m]."""
+    pairs = combinations(bodies, 2)
+    return max((overlap_m(one, other) for one, other in pairs), default=-np.inf)

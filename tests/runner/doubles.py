@@ -15,7 +15,7 @@ import numpy as np
 
 from generator.core.boxes import BoxPx
 from generator.core.capture import Capture, Channel, Reading
-from generator.core.errors import Rejection, SceneRejected
+from generator.core.errors import Rejection, SampleError, SceneRejected
 from generator.core.interfaces import DatasetInfo, Exporter, media_path
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, MaskPx, ObjectTruth, Sample
@@ -39,7 +39,7 @@ class Trouble:
         killed_at: The process kills itself.
         killed_once_at: The process kills itself the first time; ``marker`` remembers.
         hangs_once_at: The process stops making progress the first time.
-        rejected_at, bug_at: The sample raises SceneRejected, or ValueError.
+        rejected_at, wrong_at, bug_at: It raises SceneRejected, SampleError, or ValueError.
         start_fails: The pipeline's process dies before it is ready.
     """
 
@@ -47,6 +47,7 @@ class Trouble:
     killed_once_at: int = -1
     hangs_once_at: int = -1
     rejected_at: int = -1
+    wrong_at: int = -1
     bug_at: int = -1
     start_fails: bool = False
     marker: str = ""
@@ -121,6 +122,8 @@ class FakePipeline:
             time.sleep(600)
         if index == trouble.rejected_at:
             raise SceneRejected(index // 2, (Rejection("object fell off", "fewer objects"),))
+        if index == trouble.wrong_at:
+            raise SampleError("two labels contradict each other")
         if index == trouble.bug_at:
             raise ValueError("a wheel came off")
 

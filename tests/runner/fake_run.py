@@ -12,7 +12,7 @@ from generator.core.errors import GenDataError
 from tests.runner.doubles import Trouble, make
 
 N, SHARD_SIZE = 24, 2
-DELAY_S = 0.02
+DELAY_S = 0.04
 
 
 def main() -> int:

@@ -147,6 +147,17 @@ def test_a_bug_is_one_message_with_place_trace_and_command(tmp_path: Path, worke
     assert "--first 6 --n 1" in str(caught.value)
 
 
+def test_a_wrong_sample_is_named_with_the_command_that_makes_it(tmp_path: Path) -> None:
+    """The pipeline knows what is wrong; the runner knows where."""
+    with pytest.raises(SampleError) as caught:
+        make(tmp_path / "out", workers=1, trouble=Trouble(wrong_at=6))
+
+    assert str(caught.value) == (
+        "sample 6: two labels contradict each other\n"
+        f"  Reproduce: gen-data contact-sheet {tmp_path / 'out'} --first 6 --n 1"
+    )
+
+
 def test_workers_that_cannot_start_end_the_run(tmp_path: Path) -> None:
     """Not an endless loop of processes."""
     with pytest.raises(WorkerLost, match="while they start: killed by signal 9"):

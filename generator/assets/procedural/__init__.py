@@ -69,6 +69,7 @@ FAMILIES: Mapping[str, Family] = _table((
     _household("milk_carton", "carton", "container printed", 16, 0.8, stackable=False,
                build="containers:milk_carton"),
     _household("jar", "jar", "container printed", 20, 0.45, stackable=True, build="containers:jar"),
+    _household("book", "book", "printed", 32, 0.4, stackable=True, build="books:book"),
     _static("table", "furniture:table", size_m=(1.2, 0.8, 0.74), style="legs"),
     _static("shelf", "furniture:shelf", size_m=(0.9, 0.32, 1.6), levels=4, style="bookcase"),
     _static("bin", "furniture:bin_", size_m=(0.6, 0.4, 0.22), color="blue"),

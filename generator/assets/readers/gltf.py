@@ -136,8 +136,8 @@ def _placed_meshes(document: _Document) -> list[tuple[Float64, Mapping[str, Any]
 
 def _local_matrix(node: Mapping[str, Any]) -> Float64:
     if "matrix" in node:
-        columns: Float64 = np.array(node["matrix"], dtype=np.float64).reshape(4, 4)
-        return columns.T
+        rows: Float64 = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        return rows
     x, y, z, w = (float(v) for v in node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
     rotation = np.array(
         [
@@ -219,7 +219,7 @@ def _optional(
     return values
 
 
-def _accessor(document: _Document, index: Any, width: int) -> NDArray[np.generic]:
+def _accessor(document: _Document, index: Any, width: int) -> NDArray[Any]:
     """The values of an accessor, shape [count, width]; integers marked normalized become floats."""
     accessor = _at(_list(document, "accessors"), index, "accessor")
     if "sparse" in accessor or "bufferView" not in accessor:
@@ -234,9 +234,9 @@ def _accessor(document: _Document, index: Any, width: int) -> NDArray[np.generic
     stride = int(view.get("byteStride", 0)) or item
     if count < 1 or offset < 0 or stride < item or offset + stride * (count - 1) + item > len(data):
         raise ValueError(f"accessor {index} claims more than its buffer holds")
-    values = np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
+    values: NDArray[Any] = np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
     if accessor.get("normalized") and dtype.kind in "iu":
-        return np.maximum(values / np.iinfo(dtype).max, -1.0)
+        values = np.maximum(values / np.iinfo(dtype).max, -1.0)
     return values
 
 

@@ -36,7 +36,7 @@ def read_ply(folder: Folder, relative: str, _materials: bool) -> Source:
 
 
 def _triangles(data: bytes, path: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    import trimesh  # noqa: PLC0415
+    import trimesh
 
     try:
         with warnings.catch_warnings():
@@ -44,8 +44,10 @@ def _triangles(data: bytes, path: str) -> np.ndarray[tuple[int, ...], np.dtype[n
             mesh = trimesh.load_mesh(io.BytesIO(data), file_type="ply", process=False)
             vertices = np.asarray(mesh.vertices, dtype=np.float64)
             faces = np.asarray(mesh.faces, dtype=np.int64)
-    except Exception as error:  # noqa: BLE001 - a parser of foreign bytes may raise anything
-        raise AssetError(f"{path}: malformed PLY ({type(error).__name__}); export it again") from None
+    except Exception as error:
+        raise AssetError(
+            f"{path}: malformed PLY ({type(error).__name__}); export it again"
+        ) from None
     if faces.ndim != 2 or len(faces) == 0:
         raise AssetError(f"{path}: holds no triangles; export it again with its faces")
     if faces.min() < 0 or faces.max() >= len(vertices):

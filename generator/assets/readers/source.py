@@ -38,9 +38,10 @@ def roughness_of_shininess(exponent: float) -> float:
     Source: Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007:
     alpha = sqrt(2 / (n + 2)); perceptual roughness is the root of alpha (Burley 2012).
     """
-    return round((2.0 / (max(exponent, 0.0) + 2.0)) ** 0.25, 4)
+    return round(math.pow(2.0 / (max(exponent, 0.0) + 2.0), 0.25), 4)
 
 
 def _linear(c: float) -> float:
     # Rounded, because pow() may differ in the last bit between C libraries.
-    return round(c / 12.92 if c <= 0.04045 else math.pow((c + 0.055) / 1.055, 2.4), 6)
+    linear = c / 12.92 if c <= 0.04045 else math.pow((c + 0.055) / 1.055, 2.4)
+    return round(linear, 6)

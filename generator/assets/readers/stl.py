@@ -28,7 +28,7 @@ def read_stl(folder: Folder, relative: str, _materials: bool) -> Source:
     corners = _ascii(data) if data.lstrip()[:5].lower() == b"solid" else None
     if corners is None:
         raise AssetError(
-            f"{folder.root / relative}: neither a whole binary STL nor an ASCII STL; export it again"
+            f"{folder.root / relative}: neither a whole binary nor an ASCII STL; export it again"
         )
     return Source(Soup.of(corners))
 

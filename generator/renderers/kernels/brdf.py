@@ -23,7 +23,7 @@ class Brdf:
     """A surface at a point, seen from one direction.
 
     Attributes:
-        diffuse: Lambertian albedo left over by the specular layer.
+        matte: Part of the light that the specular layer leaves to the diffuse albedo.
         f0, f90: Specular reflectance at normal and grazing incidence.
         gloss: Directional albedo of the specular layer, multiple scattering included.
         boost: Multiple scattering relative to single scattering.
@@ -31,7 +31,7 @@ class Brdf:
         n_v: Cosine between normal and viewer.
     """
 
-    diffuse: wp.vec3
+    matte: wp.vec3
     f0: wp.vec3
     f90: float
     gloss: wp.vec3
@@ -71,8 +71,7 @@ def make_brdf(albedo: wp.vec3, roughness: float, metallic: float, specular: floa
     loss = 1.0 / wp.max(albedo_scale + albedo_bias, 0.05) - 1.0
     s.boost = wp.vec3(1.0, 1.0, 1.0) + s.f0 * loss
     s.gloss = wp.cw_mul(s.f0 * albedo_scale + wp.vec3(s.f90, s.f90, s.f90) * albedo_bias, s.boost)
-    left = wp.vec3(1.0 - s.gloss[0], 1.0 - s.gloss[1], 1.0 - s.gloss[2]) * (1.0 - metallic)
-    s.diffuse = wp.cw_mul(albedo, left)
+    s.matte = wp.vec3(1.0 - s.gloss[0], 1.0 - s.gloss[1], 1.0 - s.gloss[2]) * (1.0 - metallic)
     return s
 
 

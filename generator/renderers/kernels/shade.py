@@ -101,7 +101,7 @@ def light_at(
     open_lobe = wp.clamp(open_lobe * open_lobe - 1.0 + open_sky, 0.0, 1.0)
     rest += wp.cw_mul(brdf.gloss, sky_reflection(world.sky, mirrored, brdf.roughness)) * open_lobe
     light = Light()
-    light.diffuse = wp.cw_mul(brdf.diffuse, lux * (1.0 / wp.pi) + ambient)
+    light.diffuse = wp.cw_mul(brdf.matte, lux * (1.0 / wp.pi) + ambient)
     light.rest = rest
     return light
 

@@ -7,14 +7,14 @@ squeezed into the image, so that letters look right on the object.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from generator.assets.procedural import containers
-from generator.assets.procedural.draw import between, chance, pick, rng_of, shuffled
+from generator.assets.procedural.draw import between, chance, pick, rng_of
 from generator.assets.procedural.materials import srgb
 from generator.assets.procedural.shapes import UvRect
 from generator.core.geometry import TextureData
@@ -22,10 +22,14 @@ from generator.core.streams import Rng
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
 
 _SIZE_PX = 512
 
 Color = tuple[int, int, int]
+Place = tuple[float, float]
+# Left, top, right, bottom as fractions of an image, y down.
+Box = tuple[float, float, float, float]
 
 # Ground, second colour, accent, ink.
 _SCHEMES = (
@@ -204,7 +208,7 @@ def _ground(image: Image, design: _Design, rng: Rng) -> None:
         draw.ellipse([-0.25 * w, -0.35 * h, 1.25 * w, 0.42 * h], fill=design.second)
 
 
-def _picture(image: Image, box: UvRect, design: _Design, rng: Rng) -> None:
+def _picture(image: Image, box: Box, design: _Design, rng: Rng) -> None:
     """A simple picture of what is inside: bowl, fruit, leaves, sun over hills, or rings."""
     draw = _pen(image)
     x0, y0, x1, y1 = _pixels(image, box)
@@ -218,8 +222,8 @@ def _picture(image: Image, box: UvRect, design: _Design, rng: Rng) -> None:
             draw.ellipse([px - s, py - 0.7 * s, px + s, py + 0.7 * s], fill=shade)
         draw.pieslice([cx - r, cy - 0.95 * r, cx + r, cy + 0.95 * r], 2, 178, fill=design.accent)
     elif design.picture == 1:
-        for i, (dx, dy) in enumerate(((-0.42, 0.2), (0.4, 0.25), (0.0, -0.25))):
-            _fruit(draw, cx + dx * r, cy + dy * r, 0.5 * r, pick(_FRUIT, rng), i)
+        for dx, dy in ((-0.42, 0.2), (0.4, 0.25), (0.0, -0.25)):
+            _fruit(draw, cx + dx * r, cy + dy * r, 0.5 * r, pick(_FRUIT, rng))
     elif design.picture == 2:
         for i in range(7):
             turn = math.pi * (i / 6 + 1)
@@ -308,7 +312,7 @@ def _bands(image: Image, design: _Design) -> None:
         draw.rectangle([0, y, w, y + t], fill=design.accent)
 
 
-def _panel(image: Image, box: UvRect, fill: Color) -> None:
+def _panel(image: Image, box: Box, fill: Color) -> None:
     x0, y0, x1, y1 = _pixels(image, box)
     _pen(image).rounded_rectangle([x0, y0, x1, y1], radius=max(1, (y1 - y0) // 6), fill=fill)
 
@@ -324,7 +328,7 @@ def _burst(image: Image, centre: tuple[float, float], radius: float, design: _De
                   (cx + 0.6 * radius) / w, (cy + 0.3 * radius) / h), "NEW", design.ground, 2)
 
 
-def _lines(image: Image, box: UvRect, ink: Color, rng: Rng) -> None:
+def _lines(image: Image, box: Box, ink: Color, rng: Rng) -> None:
     """Text too small to read: words as dashes."""
     draw = _pen(image)
     x0, y0, x1, y1 = _pixels(image, box)
@@ -338,7 +342,7 @@ def _lines(image: Image, box: UvRect, ink: Color, rng: Rng) -> None:
             x += word + 4
 
 
-def _table(image: Image, box: UvRect, ink: Color, rng: Rng) -> None:
+def _table(image: Image, box: Box, ink: Color, rng: Rng) -> None:
     """Nutrition facts."""
     draw = _pen(image)
     x0, y0, x1, y1 = _pixels(image, box)
@@ -352,7 +356,7 @@ def _table(image: Image, box: UvRect, ink: Color, rng: Rng) -> None:
         draw.rectangle([x1 - 0.2 * (x1 - x0), y + h, x1 - 4, y + 2 * h], fill=(60, 60, 60))
 
 
-def _barcode(image: Image, box: UvRect, rng: Rng) -> None:
+def _barcode(image: Image, box: Box, rng: Rng) -> None:
     draw = _pen(image)
     x0, y0, x1, y1 = _pixels(image, box)
     draw.rectangle([x0, y0, x1, y1], fill=(250, 250, 250))
@@ -367,27 +371,99 @@ def _barcode(image: Image, box: UvRect, rng: Rng) -> None:
           digits, (15, 15, 15), 0)
 
 
-def _text(image: Image, box: UvRect, text: str, fill: Color, bold: int) -> None:
+def _text(image: Image, box: Box, text: str, fill: Color, bold: int) -> None:
     """Text fitted into a box (fractions, y down), centred, at most a quarter narrower or wider."""
-    from PIL import Image as images
-    from PIL import ImageDraw, ImageFont
+    from PIL import ImageFont
+    from PIL.Image import Resampling
 
     x0, y0, x1, y1 = _pixels(image, box)
     if x1 - x0 < 4 or y1 - y0 < 3:
         return
     font = ImageFont.load_default(size=72)
     left, top, right, bottom = font.getbbox(text, stroke_width=bold)
-    mask = images.new("L", (int(right - left) + 2, int(bottom - top) + 2))
-    ImageDraw.Draw(mask).text((1 - left, 1 - top), text, fill=255, font=font, stroke_width=bold)
+    mask = _canvas(int(right - left) + 2, int(bottom - top) + 2, (0, 0, 0))
+    _pen(mask).text((1 - left, 1 - top), text, fill=(255, 255, 255), font=font, stroke_width=bold)
+    mask = mask.convert("L")
     scale = min((x1 - x0) / mask.width, (y1 - y0) / mask.height)
     w = int(min(x1 - x0, 1.3 * scale * mask.width))
     h = int(min(y1 - y0, 1.5 * scale * mask.height))
-    small = mask.resize((max(1, w), max(1, h)), images.Resampling.BOX if scale < 0.5 else
-                        images.Resampling.BILINEAR)
+    small = mask.resize((max(1, w), max(1, h)), Resampling.BOX if scale < 0.5 else
+                        Resampling.BILINEAR)
     image.paste(fill, ((x0 + x1 - w) // 2, (y0 + y1 - h) // 2), small)
 
 
-def _fruit(draw: object, x: float, y: float, r: float, fill: Color, number: int) -> None:
-    pen = draw
-    pen.ellipse([x - r, y - r, x + r, y + r], fill=fill)  # type: ignore[attr-defined]
-    del number
+def _fruit(pen: ImageDraw, x: float, y: float, r: float, fill: Color) -> None:
+    pen.ellipse([x - r, y - r, x + r, y + r], fill=fill)
+    light = _blend(fill, (255, 255, 255), 0.45)
+    pen.ellipse([x - 0.55 * r, y - 0.6 * r, x - 0.15 * r, y - 0.2 * r], fill=light)
+    pen.line([x, y - 0.8 * r, x + 0.1 * r, y - 1.25 * r], fill=(70, 50, 30), width=max(1, int(0.09 * r)))
+    _leaf(pen, (x + 0.05 * r, y - r), (x + 0.7 * r, y - 1.3 * r), (60, 130, 60))
+
+
+def _leaf(pen: ImageDraw, foot: Place, tip: Place, fill: Color) -> None:
+    """A pointed oval."""
+    dx, dy = tip[0] - foot[0], tip[1] - foot[1]
+    edges = []
+    for side in (1.0, -1.0):
+        for i in range(9):
+            t = i / 8 if side > 0 else 1 - i / 8
+            out = side * 0.22 * math.sin(math.pi * t)
+            edges.append((foot[0] + t * dx - out * dy, foot[1] + t * dy + out * dx))
+    pen.polygon(edges, fill=fill)
+
+
+def _gradient(image: Image, top: Color, bottom: Color) -> None:
+    pen = _pen(image)
+    for y in range(image.height):
+        pen.line([0, y, image.width, y], fill=_blend(top, bottom, y / image.height))
+
+
+def _readable(design: _Design, ground: Color) -> Color:
+    """The design's colour that stands out most from a ground."""
+    options: Sequence[Color] = (design.ink, design.ground, (255, 255, 255), (20, 20, 22))
+    return max(options, key=lambda c: abs(_brightness(c) - _brightness(ground)))
+
+
+def _brightness(c: Color) -> float:
+    return 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2]
+
+
+def _blend(a: Color, b: Color, t: float) -> Color:
+    r, g, bl = (round(x + (y - x) * t) for x, y in zip(a, b, strict=True))
+    return (r, g, bl)
+
+
+def _pixels(image: Image, box: Box) -> tuple[int, int, int, int]:
+    w, h = image.size
+    return (int(box[0] * w), int(box[1] * h), int(box[2] * w), int(box[3] * h))
+
+
+def _pen(image: Image) -> ImageDraw:
+    from PIL import ImageDraw as drawing
+
+    return drawing.Draw(image)
+
+
+def _canvas(w: int, h: int, fill: Color) -> Image:
+    from PIL import Image as images
+
+    return images.new("RGB", (w, h), fill)
+
+
+def _squeezed(image: Image, w: int, h: int) -> TextureData:
+    from PIL import Image as images
+
+    return TextureData(np.array(image.resize((w, h), images.Resampling.LANCZOS), dtype=np.uint8))
+
+
+def _atlas(faces: Mapping[str, Image], places: Mapping[str, UvRect], ground: Color) -> TextureData:
+    """The faces squeezed into their places; v points up, rows down."""
+    from PIL import Image as images
+
+    sheet = _canvas(_SIZE_PX, _SIZE_PX, ground)
+    for name, (u0, v0, u1, v1) in places.items():
+        x0, x1 = math.floor(u0 * _SIZE_PX), math.ceil(u1 * _SIZE_PX)
+        y0, y1 = math.floor((1 - v1) * _SIZE_PX), math.ceil((1 - v0) * _SIZE_PX)
+        face = faces[name].resize((x1 - x0, y1 - y0), images.Resampling.LANCZOS)
+        sheet.paste(face, (x0, y0))
+    return TextureData(np.array(sheet, dtype=np.uint8))

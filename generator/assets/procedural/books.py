@@ -1,0 +1,83 @@
+"""Books, lying flat with the front cover up; the spine is at -Y and the title reads from +X."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, chance, rng_of
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.materials import jittered, linear, printed
+from generator.assets.procedural.mesh import Array, Patch, centred, joined
+from generator.assets.procedural.shapes import Point2, UvRect, grid, rounded_box
+from generator.core.geometry import Material
+
+COVER_ATLAS: Mapping[str, UvRect] = {
+    "back": (0.002, 0.002, 0.438, 0.998),
+    "spine": (0.442, 0.002, 0.558, 0.998),
+    "front": (0.562, 0.002, 0.998, 0.998),
+}
+_FORMATS = ((0.178, 0.11), (0.198, 0.129), (0.21, 0.148), (0.234, 0.156), (0.19, 0.19), (0.297, 0.21))
+
+
+def book_size_m(seed: int) -> tuple[float, float, float]:
+    """Length along the spine, width and thickness."""
+    rng = rng_of("book/size", seed)
+    length, width = _FORMATS[seed % len(_FORMATS)]
+    scale = between(0.97, 1.03, rng)
+    return (length * scale, width * scale, between(0.012, 0.042, rng))
+
+
+def book(seed: int) -> Solid:
+    """A paperback or hardcover. Slots: cover, pages."""
+    rng = rng_of("book", seed)
+    length, width, thickness = book_size_m(seed)
+    hard = chance(0.5, rng)
+    board = 0.0028 if hard else 0.0006
+    margin = 0.003 if hard else 0.0
+    cover = _cover(length, width, thickness, board)
+    pages = rounded_box((length - 2 * margin, width - margin - board, thickness - 2 * board), 0.0003, 1)
+    pages = pages.painted(1).moved(0.0, 0.5 * (board - margin) - (0.0002 if not hard else 0.0), 0.0)
+    paper = Material(jittered(linear("#e9e2cf"), 0.05, rng), 0.85)
+    print_ = printed(f"texture/book_cover?seed={seed}", between(0.25, 0.6, rng))
+    half = (0.5 * length, 0.5 * width, 0.5 * thickness)
+    low = (-half[0], -half[1], -half[2])
+    return centred([cover, pages], (print_, paper), [hulls.box(low, half)])
+
+
+def _cover(length: float, width: float, thickness: float, board: float) -> Patch:
+    """A folded sheet: back, rounded spine, front, as one closed band around X."""
+    h, bow = 0.5 * thickness, min(0.004, 0.3 * thickness)
+    y0, y1 = -0.5 * width, 0.5 * width
+    spine = [(y0 + bow * t**2, -h * t) for t in (0.9, 0.5, 0.0, -0.5, -0.9)]
+    outer = [(y1, -h), (y0 + bow, -h), *spine, (y0 + bow, h), (y1, h)]
+    inner = [(y1, h - board), (y0 + bow + board, h - board),
+             *((y + board, z * (1 - board / h)) for y, z in spine[::-1]),
+             (y0 + bow + board, board - h), (y1, board - h)]
+    back, side, front = (COVER_ATLAS[name] for name in ("back", "spine", "front"))
+    turn = np.linspace(side[0], side[2], 7)
+    # Walking from the back's free edge around the spine to the front's: u runs the same way.
+    us = (np.array([back[0], back[2]]), turn, np.array([front[0], front[2]]))
+    spans = (outer[0:2], outer[1:8], outer[7:9])
+    patches = [_band(span, length, u) for span, u in zip(spans, us, strict=True)]
+    rest = [*inner, outer[0]]
+    patches.append(_band([outer[-1], *rest], length, np.full(len(rest) + 1, side[0])))
+    return joined([*patches, *_rims(outer, inner, length)])
+
+
+def _band(points: Sequence[Point2], length: float, u: Array) -> Patch:
+    """A polyline in the plane of Y and Z drawn out along X; images point up towards -X."""
+    rows = [[(x, y, z) for y, z in points] for x in (0.5 * length, -0.5 * length)]
+    return grid(np.array(rows), u, np.array([0.002, 0.998]))
+
+
+def _rims(outer: Sequence[Point2], inner: Sequence[Point2], length: float) -> list[Patch]:
+    """The cut edges at both ends of the sheet."""
+    made = []
+    for x in (-0.5 * length, 0.5 * length):
+        rows = np.array([[(x, y, z) for y, z in line] for line in (outer, inner[::-1])])
+        strip = grid(rows, np.full(len(outer), COVER_ATLAS["spine"][0]), np.array([0.01, 0.02]))
+        made.append(strip if x > 0 else strip.flipped())
+    return made

@@ -1,0 +1,182 @@
+"""What must hold for every randomizer in the table, ours or anybody's."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from generator.config.describe import describe
+from generator.config.schema import json_schema
+from generator.core.interfaces import Stage
+from generator.core.intrinsics import Intrinsics
+from generator.core.scene import Camera, Scene
+from generator.core.se3 import look_at
+from generator.core.serial import canonical_json, from_plain, to_plain
+from randomizers import TABLE
+from scene_templates.builder import build
+from scene_templates.objects import AssetChoice, Objects
+from scene_templates.robot import Robot
+from scene_templates.room import Room
+from scene_templates.surface import SurfaceElement
+from tests.randomizers.doubles import FakeAssets, rng_of
+
+GIVEN: dict[str, dict[str, Any]] = {
+    "distractors": {"count": {"uniform_integer": [1, 4]}},
+    "colors": {"probability": True},
+    "materials": {"probability": True},
+    "textures": {"textures": ["wood"], "probability": True},
+}
+"""Fields without which a randomizer cannot be made, or may leave a scene as it is."""
+
+PHYSICS_BOUND = ("arm_configuration", "distractors", "objects", "physics_properties")
+"""Randomizers whose draws physics has to see."""
+
+
+def nominal_scene() -> Scene:
+    """A room with a table, an arm, objects, distractors and two cameras."""
+    household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
+    elements = (
+        Room(name="room"),
+        SurfaceElement(name="table"),
+        Robot(name="arm", asset="two_link", on="table", at_m=(-0.45, 0.0)),
+        Objects(name="objects", on="table", count=4, assets=household),
+        Objects(name="distractors", on="table", count=1, assets=shapes, annotate=False),
+    )
+    lens = Intrinsics.from_hfov(64, 48, 1.0)
+    cameras = tuple(
+        Camera(name, look_at((1.0, 0.0, 1.5), (0.0, 0.0, 0.8)), lens) for name in ("left", "right")
+    )
+    return replace(build("test", elements, FakeAssets()), cameras=cameras)
+
+
+def made(kind: str) -> Any:
+    """A randomizer of that type, read as YAML would be."""
+    plain = {"type": kind, "name": kind, **GIVEN.get(kind, {})}
+    return TABLE.load(kind).model_validate_json(json.dumps(plain))
+
+
+def drawn(kind: str, stream: str = "stream", scene_index: int = 0) -> Scene:
+    """The nominal scene after one draw."""
+    return made(kind)(nominal_scene(), FakeAssets(), rng_of(stream, scene_index))
+
+
+each = pytest.mark.parametrize("kind", list(TABLE))
+
+
+@each
+def test_scene_that_is_handed_in_stays_as_it_is(kind: str) -> None:
+    """A randomizer returns a new scene."""
+    scene = nominal_scene()
+    before = canonical_json(scene)
+
+    made(kind)(scene, FakeAssets(), rng_of())
+
+    assert canonical_json(scene) == before
+
+
+@each
+def test_same_stream_draws_the_same_scene_in_any_process(kind: str) -> None:
+    """Twice, and once more by a copy that was sent to another process."""
+    copy = pickle.loads(pickle.dumps(made(kind)))
+    by_copy = copy(nominal_scene(), FakeAssets(), rng_of("stream"))
+
+    assert drawn(kind) == drawn(kind) == by_copy
+
+
+@each
+def test_other_streams_draw_other_scenes(kind: str) -> None:
+    """Five streams give five different scenes, none of them the nominal one."""
+    scenes = [nominal_scene(), *(drawn(kind, f"stream {k}") for k in range(5))]
+
+    assert len({canonical_json(scene) for scene in scenes}) == 6
+
+
+@each
+def test_scene_holds_plain_values_only(kind: str) -> None:
+    """No numpy scalar hides in it: it reads back from JSON as the same scene."""
+    scene = drawn(kind)
+    plain = to_plain(scene)
+
+    assert_plain(plain)
+    assert from_plain(Scene, json.loads(canonical_json(scene))) == scene
+
+
+@each
+def test_names_and_ids_stay_in_order(kind: str) -> None:
+    """Body names and instance ids are unique, every body's instance exists, cameras remain."""
+    for scene_index in range(5):
+        scene = drawn(kind, scene_index=scene_index)
+        names = [body.name for body in scene.bodies]
+        ids = [instance.instance_id for instance in scene.instances]
+
+        assert len(set(names)) == len(names)
+        assert len(set(ids)) == len(ids)
+        assert min(ids) == 1
+        assert {body.instance_id for body in scene.bodies} <= {0, *ids}
+        assert [camera.name for camera in scene.cameras] == ["left", "right"]
+        assert [arm.name for arm in scene.articulations] == ["arm"]
+
+
+@each
+def test_it_explains_itself(kind: str) -> None:
+    """Schema and description exist, and every field of ours is described."""
+    model = TABLE.load(kind)
+    schema = json_schema(model)
+    undescribed = [
+        name
+        for name, entry in schema["properties"].items()
+        if not entry.get("description") and name not in {"type", "name", "every"}
+    ]
+
+    assert not undescribed
+    assert describe(model)
+    assert schema["properties"]["type"]["const"] == kind
+
+
+@each
+def test_unknown_fields_are_refused(kind: str) -> None:
+    """A misspelt field is an error, never ignored."""
+    plain = {"type": kind, "name": kind, "no_such_field": 1, **GIVEN.get(kind, {})}
+    with pytest.raises(ValidationError, match="no_such_field"):
+        TABLE.load(kind).model_validate_json(json.dumps(plain))
+
+
+@each
+def test_values_do_not_change_after_it_is_made(kind: str) -> None:
+    """Parameters are frozen."""
+    with pytest.raises(ValidationError):
+        made(kind).name = "other"
+
+
+@pytest.mark.parametrize("kind", PHYSICS_BOUND)
+def test_what_physics_has_to_see_is_drawn_per_scene_only(kind: str) -> None:
+    """``every: view`` would come after physics, and is refused."""
+    assert made(kind).stage is Stage.BUILD
+    plain = {"type": kind, "name": kind, "every": "view", **GIVEN.get(kind, {})}
+    with pytest.raises(ValidationError, match="every"):
+        TABLE.load(kind).model_validate_json(json.dumps(plain))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in TABLE if kind not in PHYSICS_BOUND])
+def test_looks_can_be_drawn_per_scene_or_per_view(kind: str) -> None:
+    """``every`` names the stage."""
+    for every, stage in (("scene", Stage.BUILD), ("view", Stage.VIEW)):
+        plain = {"type": kind, "name": kind, "every": every, **GIVEN.get(kind, {})}
+        assert TABLE.load(kind).model_validate_json(json.dumps(plain)).stage is stage
+
+
+def assert_plain(value: Any) -> None:
+    """Exactly JSON's own types, all the way down."""
+    if isinstance(value, dict):
+        for item in value.values():
+            assert_plain(item)
+    elif isinstance(value, list):
+        for item in value:
+            assert_plain(item)
+    else:
+        assert type(value) in (float, int, str, bool, type(None)), repr(value)

@@ -1,0 +1,265 @@
+"""Which objects a group gets, and where they start."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.config.distributions import (
+    Constant,
+    Count,
+    Flag,
+    Sequence,
+    Uniform,
+    UniformInteger,
+)
+from generator.core.errors import ConfigError, LayoutRejected
+from generator.core.scene import Body, Instance, Scene
+from generator.core.se3 import SE3, Vec3
+from randomizers.distractors import Distractors
+from randomizers.objects import Objects
+from tests.randomizers.doubles import (
+    THINGS,
+    FakeAssets,
+    corners_of,
+    deepest_overlap_m,
+    overlap_m,
+    rng_of,
+    surface_scene,
+)
+
+PLACEMENTS = ("drop", "scatter", "grid", "stack")
+KEEP_OUT: tuple[Vec3, ...] = ((0.0, 0.0, 0.15),)
+
+
+def drawn(
+    scene: Scene, count: Count, scene_index: int = 0, *, upright: Flag | None = None
+) -> Scene:
+    """The scene with that many objects in its group ``clutter``."""
+    given = {} if upright is None else {"upright": upright}
+    objects = Objects(name="clutter", count=count, **given)  # type: ignore[arg-type]
+    return objects(scene, FakeAssets(), rng_of("objects", scene_index, index=scene_index))
+
+
+def bodies_of(scene: Scene) -> list[Body]:
+    """The objects of the group."""
+    return [body for body in scene.bodies if body.group == "clutter"]
+
+
+@pytest.mark.parametrize("placement", PLACEMENTS)
+@pytest.mark.parametrize("upright", [True, False])
+def test_objects_start_clear_of_each_other(placement: str, upright: bool) -> None:
+    """No two boxes overlap, whatever the placement and however they are turned."""
+    for scene_index in range(12):
+        scene = surface_scene((1.4, 1.0), placement=placement)
+        scene = drawn(scene, Constant(9), scene_index, upright=Constant(upright))
+
+        assert deepest_overlap_m(bodies_of(scene)) < 1e-6
+
+
+@pytest.mark.parametrize("placement", PLACEMENTS)
+def test_objects_start_over_their_surface(placement: str) -> None:
+    """Every corner of every box is over the rectangle, and none is below it."""
+    for scene_index in range(12):
+        scene = drawn(surface_scene((1.4, 1.0), placement=placement), Constant(8), scene_index)
+        surface = scene.surface("s0")
+        corners = np.concatenate([corners_of(body) for body in bodies_of(scene)])
+        here = surface.T_world_surface.inverse().apply(corners)
+
+        assert (np.abs(here[:, 0]) <= 0.7 + 1e-6).all()
+        assert (np.abs(here[:, 1]) <= 0.5 + 1e-6).all()
+        assert (here[:, 2] > 0.0).all()
+
+
+@pytest.mark.parametrize("placement", PLACEMENTS)
+def test_nothing_starts_where_it_is_kept_out(placement: str) -> None:
+    """No part of a box, seen from above, is in the disc around the arm's base."""
+    for scene_index in range(12):
+        scene = surface_scene((1.4, 1.0), placement=placement, keep_out=KEEP_OUT)
+        for body in bodies_of(drawn(scene, Constant(6), scene_index)):
+            corners = corners_of(body)[:, :2]
+            along = np.linspace(0.0, 1.0, 9).reshape(9, 1, 1, 1)
+            edges = along * corners[:, None] + (1.0 - along) * corners[None, :]
+            nearest_m = float(np.hypot(edges[..., 0], edges[..., 1]).min())
+
+            assert nearest_m > KEEP_OUT[0][2] - 1e-6
+
+
+def test_standing_objects_rest_on_the_surface() -> None:
+    """Scattered objects need no fall: their lowest point is within a millimetre."""
+    scene = drawn(surface_scene(placement="scatter"), Constant(6))
+    for body in bodies_of(scene):
+        lowest_m = corners_of(body)[:, 2].min() - 1.0
+
+        assert 0.0 < lowest_m < 0.001
+
+
+def test_dropped_objects_fall_a_few_centimetres_at_most_onto_a_bare_surface() -> None:
+    """A single object starts low: physics need not wait for it, and it does not bounce away."""
+    for scene_index in range(20):
+        (body,) = bodies_of(drawn(surface_scene(), Constant(1), scene_index))
+        half_m = 0.5 * np.linalg.norm(THINGS[body.asset].size_m)
+
+        assert body.T_world_body.translation_m[2] - 1.0 <= half_m + 0.05 + 1e-6
+
+
+def test_towers_are_of_stackable_things_only() -> None:
+    """Whatever stands on another thing, and what it stands on, is flat above and below."""
+    scene = surface_scene(placement="stack", assets=("bottle", "brick", "can?seed=0"))
+    raised = 0
+    for scene_index in range(8):
+        bodies = bodies_of(drawn(scene, Constant(7), scene_index))
+        for body in bodies:
+            lowest_m = corners_of(body)[:, 2].min()
+            if lowest_m < 1.001:
+                continue
+            raised += 1
+            sunk = replace(body, T_world_body=SE3((0.0, 0.0, -0.004)) @ body.T_world_body)
+            below = [other for other in bodies if other != body and overlap_m(sunk, other) > 0.0]
+
+            assert THINGS[body.asset].stackable
+            assert len(below) == 1
+            assert THINGS[below[0].asset].stackable
+    assert raised > 5
+
+
+def test_shelves_are_filled_on_every_board_and_below_the_next() -> None:
+    """Three boards 0.3 m apart: all are used, and nothing reaches through the next one."""
+    used: set[int] = set()
+    for placement in ("scatter", "drop"):
+        scene = surface_scene((0.9, 0.5), placement=placement, clearance_m=0.28, levels=3)
+        for scene_index in range(10):
+            for body in bodies_of(drawn(scene, Constant(5), scene_index)):
+                height_m = corners_of(body)[:, 2] - 1.0
+                level = math.floor(height_m.min() / 0.28)
+                used.add(level)
+
+                assert height_m.max() < (level + 1) * 0.28
+    assert used == {0, 1, 2}
+
+
+def test_things_higher_than_the_space_are_refused_with_a_reason() -> None:
+    """A bottle of 26 cm under a board at 20 cm."""
+    scene = surface_scene(assets=("bottle",), clearance_m=0.2)
+    with pytest.raises(LayoutRejected, match="higher than the space"):
+        drawn(scene, Constant(1))
+
+
+@pytest.mark.parametrize("placement", ["scatter", "grid", "stack"])
+def test_too_many_to_stand_apart_are_refused_with_a_remedy(placement: str) -> None:
+    """Ninety bottles on a small table: bounded tries, then the field to change."""
+    scene = surface_scene((0.4, 0.3), placement=placement, assets=("bottle",))
+    with pytest.raises(LayoutRejected) as refused:
+        drawn(scene, Constant(90))
+    assert "randomizers.clutter.count" in refused.value.rejection.remedy
+
+
+def test_counts_are_those_that_were_asked_for() -> None:
+    """All of 2..5 occur, and nothing else."""
+    seen = {len(bodies_of(drawn(surface_scene(), UniformInteger(2, 5), k))) for k in range(40)}
+
+    assert seen == {2, 3, 4, 5}
+
+
+def test_sequence_of_counts_goes_by_scene_number() -> None:
+    """Scene k has the count of its turn, whichever scenes were made before."""
+    counts = Sequence((3, 0, 5))
+    seen = [len(bodies_of(drawn(surface_scene(), counts, k))) for k in (4, 0, 2, 1, 3)]
+
+    assert seen == [0, 3, 5, 0, 3]
+
+
+def test_categories_are_equally_likely_however_many_variants_they_have() -> None:
+    """Two cans, one bottle, one brick: each category gets a third of 600 draws (3.9 sigma)."""
+    counts: Counter[str] = Counter()
+    for scene_index in range(60):
+        scene = drawn(surface_scene((3.0, 3.0)), Constant(10), scene_index)
+        counts.update(instance.category for instance in scene.instances)
+
+    assert set(counts) == {"bottle", "brick", "can"}
+    assert all(abs(n - 200) < 45 for n in counts.values())
+
+
+def test_weights_change_how_often_a_category_is_drawn() -> None:
+    """Weight 0 never comes; weight 3 comes three times as often as 1."""
+    objects = Objects(name="clutter", count=Constant(10), weights={"bottle": 0.0, "can": 3.0})
+    counts: Counter[str] = Counter()
+    for scene_index in range(40):
+        scene = objects(surface_scene((3.0, 3.0)), FakeAssets(), rng_of("w", scene_index))
+        counts.update(instance.category for instance in scene.instances)
+
+    assert "bottle" not in counts
+    assert abs(counts["can"] - 300) < 35
+
+
+def test_scale_changes_size_and_mass_together() -> None:
+    """Mass goes with the cube of the scale."""
+    objects = Objects(name="clutter", count=Constant(6), scale=Uniform(0.5, 2.0))
+    for body in bodies_of(objects(surface_scene((3.0, 3.0)), FakeAssets(), rng_of())):
+        assert 0.5 <= body.scale <= 2.0
+        assert body.mass_kg == pytest.approx(THINGS[body.asset].mass_kg * body.scale**3, abs=1e-6)
+
+
+def test_objects_are_labelled_bodies_that_fall() -> None:
+    """Names count from 0 within the group; each has an instance of its asset's category."""
+    scene = drawn(surface_scene(), Constant(4))
+
+    assert [body.name for body in scene.bodies] == [f"clutter/{k}" for k in range(4)]
+    for body in scene.bodies:
+        instance = scene.instance(body.instance_id)
+        assert (body.motion, body.collides) == ("dynamic", True)
+        assert (instance.name, instance.asset) == (body.name, body.asset)
+        assert instance.category == THINGS[body.asset].category
+        assert instance.annotated
+
+
+def test_instance_ids_are_the_smallest_that_are_free() -> None:
+    """Ids 1 and 4 belong to others; three objects get 2, 3 and 5, again and again."""
+    others = tuple(Instance(k, f"other/{k}", "thing", 0, "brick") for k in (1, 4))
+    scene = replace(surface_scene(), instances=others)
+    for scene_index in range(3):
+        scene = drawn(scene, Constant(3), scene_index)
+
+        assert [body.instance_id for body in bodies_of(scene)] == [2, 3, 5]
+        assert scene.instances[:2] == others
+
+
+def test_objects_keep_clear_of_what_other_groups_have_put() -> None:
+    """A second group sees the first."""
+    for scene_index in range(10):
+        scene = drawn(surface_scene(), Constant(5), scene_index)
+        more = replace(scene.groups[0], name="more")
+        scene = replace(scene, groups=(*scene.groups, more))
+        both = Objects(name="more", count=Constant(5))(
+            scene, FakeAssets(), rng_of("m", scene_index)
+        )
+
+        assert len(both.bodies) == 10
+        assert deepest_overlap_m(both.bodies) < 1e-6
+
+
+def test_distractors_have_ids_but_no_annotations() -> None:
+    """They follow their group's ``annotated``."""
+    scene = surface_scene(assets=("odd",))
+    group = replace(scene.groups[0], name="distractors", annotated=False)
+    scene = replace(scene, groups=(group,))
+    scene = Distractors(count=Constant(3))(scene, FakeAssets(), rng_of())
+
+    assert [instance.annotated for instance in scene.instances] == [False] * 3
+    assert [instance.instance_id for instance in scene.instances] == [1, 2, 3]
+
+
+def test_unknown_group_and_category_are_named_with_the_nearest_that_exist() -> None:
+    """Typing errors in names are answered with what was probably meant."""
+    with pytest.raises(ConfigError, match=r"no object group 'cluter'.*did you mean 'clutter'"):
+        Objects(name="cluter")(surface_scene(), FakeAssets(), rng_of())
+    with pytest.raises(ConfigError, match=r"no category 'botle'.*did you mean 'bottle'"):
+        Objects(name="clutter", weights={"botle": 1})(surface_scene(), FakeAssets(), rng_of())
+    with pytest.raises(ConfigError, match="every weight is 0"):
+        Objects(name="clutter", weights={"bottle": 0, "brick": 0, "can": 0})(
+            surface_scene(), FakeAssets(), rng_of()
+        )
