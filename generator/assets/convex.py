@@ -9,7 +9,6 @@ clipped solid have the same hull.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,20 +88,22 @@ def hull_vertices(points: Float64, place: str, max_vertices: int = MAX_VERTICES)
 def decomposed(soup: Soup, max_parts: int) -> list[Float64]:
     """Triangles of a soup in pieces that are nearly convex, each [m, 3, 3]."""
     pieces = [_Piece.of(soup.corners)]
-    whole = pieces[0].volume
+    cuts = [_best_cut(pieces[0])]
+    enough = _ENOUGH * pieces[0].volume
     for _ in range(max_parts - 1):
-        cuts = [_best_cut(piece) for piece in pieces]
-        savings = [p.volume - sum(half.volume for half in cut) if cut else 0.0
-                   for p, cut in zip(pieces, cuts, strict=True)]  # fmt: skip
-        best = int(np.argmax(savings))
-        if savings[best] < _ENOUGH * whole:
+        best = int(np.argmax([cut.saving for cut in cuts]))
+        if cuts[best].saving < enough:
             break
-        pieces[best : best + 1] = cuts[best]
+        halves = cuts[best].halves
+        pieces[best : best + 1] = halves
+        cuts[best : best + 1] = [_best_cut(half) for half in halves]
     return [piece.corners for piece in pieces]
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
+    """Part of a surface, and the volume of its hull."""
+
     corners: Float64
     volume: float
 
@@ -111,21 +112,28 @@ class _Piece:
         return cls(corners, _hull_volume(corners.reshape(-1, 3)))
 
 
-def _best_cut(piece: _Piece) -> Sequence[_Piece]:
-    """The two halves whose hulls have the least volume together; empty if none can be cut."""
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """Two halves of a piece, and how much less volume their hulls have than the piece's."""
+
+    halves: tuple[_Piece, ...] = ()
+    saving: float = 0.0
+
+
+def _best_cut(piece: _Piece) -> _Cut:
+    """The axis-aligned cut that saves most; an empty one if none saves anything."""
     low, high = piece.corners.min(axis=(0, 1)), piece.corners.max(axis=(0, 1))
-    best: Sequence[_Piece] = ()
-    least = piece.volume
+    best = _Cut()
     for axis in range(3):
         for share in _CUTS:
             at = low[axis] + share * (high[axis] - low[axis])
-            halves = [_clipped(piece.corners, axis, at, side) for side in (1.0, -1.0)]
-            if not all(len(half) for half in halves):
+            clipped = [_clipped(piece.corners, axis, at, side) for side in (1.0, -1.0)]
+            if not all(len(half) for half in clipped):
                 continue
-            candidates = [_Piece.of(half) for half in halves]
-            volume = sum(c.volume for c in candidates)
-            if volume < least:
-                best, least = candidates, volume
+            halves = tuple(_Piece.of(half) for half in clipped)
+            saving = piece.volume - sum(half.volume for half in halves)
+            if saving > best.saving:
+                best = _Cut(halves, saving)
     return best
 
 
