@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import Field
 
 from generator.config.distributions import Choice, Name, NonNegative, Uniform, UnitInterval
-from generator.core.errors import ConfigError
+from generator.core.errors import ConfigError, did_you_mean
 from generator.core.geometry import Joint, RobotModel
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import ArmGoal, Articulation, Body, Scene
@@ -61,7 +61,7 @@ class ArmConfiguration(RandomizerBase):
         if mode not in MODES:
             raise ConfigError(
                 f"randomizers.{self.name}.mode: unknown mode '{mode}'; expected one of "
-                f"{', '.join(MODES)}"
+                f"{', '.join(MODES)}{did_you_mean(mode, MODES)}"
             )
         robot = assets.robot(arm.asset)
         opening = round(self.opening.draw(rng), 4)

@@ -18,7 +18,7 @@ from generator.config.distributions import (
     Uniform,
     UniformInteger,
 )
-from generator.core.errors import ConfigError, LayoutRejected, Rejection
+from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Light, Scene
 from generator.core.se3 import Vec3
@@ -77,7 +77,7 @@ class Lighting(RandomizerBase):
         if kind not in KINDS:
             raise ConfigError(
                 f"randomizers.{self.name}.kind: unknown light '{kind}'; expected one of "
-                f"{', '.join(KINDS)}"
+                f"{', '.join(KINDS)}{did_you_mean(kind, KINDS)}"
             )
         color = linear_of_temperature(self.temperature_k.draw(rng))
         target = scene.focus.center_m

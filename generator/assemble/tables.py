@@ -5,7 +5,8 @@ from __future__ import annotations
 import exporters
 import randomizers
 import scene_templates
-from generator import annotations, renderers, sensors
+from generator import renderers, sensors
+from generator.annotations import TABLE as ANNOTATIONS
 from generator.core.errors import ConfigError, did_you_mean
 from generator.core.plugins import PluginTable
 
@@ -13,7 +14,7 @@ TABLES: dict[str, PluginTable] = {
     "element": scene_templates.TABLE,
     "randomizer": randomizers.TABLE,
     "sensor": sensors.TABLE,
-    "annotation": annotations.TABLE,
+    "annotation": ANNOTATIONS,
     "exporter": exporters.TABLE,
     "renderer": renderers.TABLE,
 }

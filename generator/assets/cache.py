@@ -100,6 +100,10 @@ class Store:
         result: T = self._results[key][0]
         return result
 
+    def __len__(self) -> int:
+        """How many results are in memory."""
+        return len(self._results)
+
     def _keep(self, key: str, result: object, size: int) -> None:
         self._results[key] = (result, size)
         self._bytes += size

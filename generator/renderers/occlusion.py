@@ -106,7 +106,7 @@ def _lit(
     inputs = [world.record, lattice, columns, lists]
     wp.launch(occlusion.probe_lamps, n, [*inputs, few], [probed], device=device)
     classes = _classes(lattice, probed, lamps, stock)
-    inputs = [view, *inputs, classes, many, probed]
+    inputs = [*inputs, classes, many, probed]
     wp.launch(occlusion.refine_lamps, n, inputs, [lit], device=device)
     classes = _classes(lattice, lit, lamps, stock)
     wp.launch(

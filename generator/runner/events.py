@@ -33,6 +33,7 @@ class ShardDone:
     Attributes:
         bytes: Size of its files.
         rss_bytes: Memory of the worker's process, 0 if unknown.
+        timings_s: CPU seconds of the shard as a whole, by stage.
     """
 
     worker: int
@@ -41,6 +42,7 @@ class ShardDone:
     bytes: int
     rejections: int
     rss_bytes: int = 0
+    timings_s: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -176,7 +176,10 @@ class Meter:
         _, before = self._in_flight.get(event.worker, (event.shard, 0))
         self._in_flight[event.worker] = (event.shard, before + 1)
         self._measured += 1
-        for stage, seconds in event.timings_s.items():
+        self._spend(event.timings_s)
+
+    def _spend(self, timings_s: Mapping[str, float]) -> None:
+        for stage, seconds in timings_s.items():
             self._cpu_s[stage] = self._cpu_s.get(stage, 0.0) + seconds
 
     def _shard(self, event: ShardDone) -> GenDataError | None:
@@ -184,6 +187,7 @@ class Meter:
         self.made += event.samples
         self.bytes += event.bytes
         self.rejections += event.rejections
+        self._spend(event.timings_s)
         self.rss_bytes_max = max(self.rss_bytes_max, event.rss_bytes)
         self.log(
             {

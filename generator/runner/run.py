@@ -10,7 +10,7 @@ from pathlib import Path
 
 from generator.core.errors import GenDataError
 from generator.core.sample import Sample
-from generator.runner.events import SampleDone, ShardDone
+from generator.runner.events import SampleDone
 from generator.runner.finalize import finalize
 from generator.runner.interruption import Interruption
 from generator.runner.plan import Plan
@@ -20,7 +20,7 @@ from generator.runner.shard import EnteredPipeline, Job, MediaWriter, make_shard
 from generator.runner.store import FolderState, LocalStore, Scan
 from generator.runner.supervisor import Limits, Supervisor
 from generator.runner.verify import findings
-from generator.runner.worker import resident_bytes
+from generator.runner.worker import done_event
 
 __all__ = ["Limits", "RunProgress", "Settings", "Summary", "run"]
 
@@ -145,17 +145,8 @@ class _Run:
                 def on_sample(sample: Sample, shard: int = shard) -> None:
                     meter.observe(SampleDone(IN_PROCESS, shard, sample.index, sample.timings_s))
 
-                record = make_shard(self.job, pipeline, shard, on_sample)
-                samples = record.end - record.first
-                done = ShardDone(
-                    IN_PROCESS,
-                    shard,
-                    samples,
-                    record.size_bytes,
-                    record.rejections,
-                    resident_bytes(),
-                )
-                objection: GenDataError | None = meter.observe(done)
+                made = make_shard(self.job, pipeline, shard, on_sample)
+                objection: GenDataError | None = meter.observe(done_event(IN_PROCESS, made))
                 if objection is not None:
                     raise objection
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -79,9 +80,17 @@ class Job:
     write_media: MediaWriter = write_images
 
 
+@dataclass(frozen=True)
+class MadeShard:
+    """A committed shard, and the CPU seconds that its labels and its commit took, by stage."""
+
+    record: ShardRecord
+    timings_s: Mapping[str, float]
+
+
 def make_shard(
     job: Job, pipeline: PipelineLike, shard: int, on_sample: Callable[[Sample], None]
-) -> ShardRecord:
+) -> MadeShard:
     """Make and commit one shard.
 
     A sample's images are written and dropped as soon as it is made; exporters then see the whole
@@ -96,16 +105,18 @@ def make_shard(
         folder = job.store.scratch_dir()
     try:
         samples = [_written(job, pipeline, index, folder, on_sample) for index in indices]
+        started_s = time.process_time()
         for name in sorted(pipeline.exporters):
             with explaining(f"shard {shard}, exporter {name}"), job.store.errors():
                 pipeline.exporters[name].write_shard(pipeline.info, samples, folder)
         with job.store.errors():
             record = describe_shard(shard, indices, samples, folder)
             job.store.commit(folder, record)
+        write_s = time.process_time() - started_s
     finally:
         # After a failure, give the space back; after a commit there is nothing left here.
         shutil.rmtree(folder, ignore_errors=True)
-    return record
+    return MadeShard(record, {"write": write_s})
 
 
 def _written(
@@ -118,11 +129,13 @@ def _written(
     """One sample without its pixels, after they and its scene are in files."""
     with explaining(f"sample {index}", job.store.reproduce_command(index)):
         sample = pipeline.sample(index)
+        started_s = time.process_time()
         with job.store.errors():
             job.write_media(pipeline.info, sample, folder)
             with (folder / SCENES_NAME).open("a", encoding="utf-8") as scenes:
                 scenes.write(scene_line(sample) + "\n")
-    on_sample(sample)
+        encode_s = time.process_time() - started_s
+    on_sample(replace(sample, timings_s={**sample.timings_s, "encode": encode_s}))
     return without_pixels(sample)
 
 

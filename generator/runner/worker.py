@@ -26,7 +26,7 @@ from generator.runner.unforeseen import unforeseen
 
 if TYPE_CHECKING:
     from generator.core.sample import Sample
-    from generator.runner.shard import Job, PipelineLike
+    from generator.runner.shard import Job, MadeShard, PipelineLike
 
 PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 
@@ -90,10 +90,21 @@ def _make(
     # Imports numpy: only after this process is tied to its parent.
     from generator.runner.shard import make_shard
 
-    record = make_shard(job, pipeline, shard, report)
-    samples = record.end - record.first
-    connection.send(
-        ShardDone(number, shard, samples, record.size_bytes, record.rejections, resident_bytes())
+    made = make_shard(job, pipeline, shard, report)
+    connection.send(done_event(number, made))
+
+
+def done_event(number: int, made: MadeShard) -> ShardDone:
+    """What the supervisor is told about a shard that worker ``number`` made."""
+    record = made.record
+    return ShardDone(
+        number,
+        record.shard,
+        record.end - record.first,
+        record.size_bytes,
+        record.rejections,
+        resident_bytes(),
+        made.timings_s,
     )
 
 

@@ -319,10 +319,10 @@ def test_publishing_the_same_shard_twice_changes_nothing(tmp_path: Path) -> None
     job = Job(plan, store, FakeFactory(10), write_raw_images)
     with store.locked():
         store.prepare(plan)
-        first = make_shard(job, job.make_pipeline(), 1, lambda _: None)
+        first = make_shard(job, job.make_pipeline(), 1, lambda _: None).record
         before = tree_digest(tmp_path / "out")
 
-        assert make_shard(job, job.make_pipeline(), 1, lambda _: None) == first
+        assert make_shard(job, job.make_pipeline(), 1, lambda _: None).record == first
 
     assert tree_digest(tmp_path / "out") == before
 

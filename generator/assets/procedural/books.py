@@ -79,5 +79,5 @@ def _rims(outer: Sequence[Point2], inner: Sequence[Point2], length: float) -> li
     for x in (-0.5 * length, 0.5 * length):
         rows = np.array([[(x, y, z) for y, z in line] for line in (outer, inner[::-1])])
         strip = grid(rows, np.full(len(outer), COVER_ATLAS["spine"][0]), np.array([0.01, 0.02]))
-        made.append(strip if x > 0 else strip.flipped())
+        made.append(strip.flipped() if x > 0 else strip)
     return made

@@ -144,7 +144,7 @@ def night_city(seed: int) -> Float32:
     for _ in range(pick((5, 8, 12), rng)):
         lamp = _direction(between(-math.pi, math.pi, rng), between(0.08, 0.5, rng))
         away = np.arccos(np.clip((d * lamp).sum(axis=2), -1, 1))
-        image += between(20.0, 50.0, rng) * np.exp(-((away / 0.05) ** 2))[..., None] * np.array(
+        image += between(20.0, 50.0, rng) * np.exp(-((away / 0.035) ** 2))[..., None] * np.array(
             pick(((1.0, 0.66, 0.3), (1.0, 0.85, 0.62), (0.85, 0.95, 1.0)), rng))
     return normalised(image)
 

@@ -122,7 +122,7 @@ def agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: float):
 def same_surface(lattice: Lattice, i: int, j: int, tolerance_m: float):
     """Whether two lattice points share what they see of the world."""
     same = bool(False)
-    if lattice.body[i] == lattice.body[j]:
+    if lattice.surface[i] == lattice.surface[j]:
         same = (
             agree(
                 lattice.p_m[i], lattice.normal[i], lattice.p_m[j], lattice.normal[j], tolerance_m

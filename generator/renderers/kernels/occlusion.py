@@ -17,6 +17,8 @@ import warp as wp
 from generator.renderers.kernels.lattice import Lattice, same_surface
 from generator.renderers.kernels.lighting import SUN, beam_from
 from generator.renderers.kernels.records import (
+    Body,
+    Geometry,
     Lamp,
     View,
     World,
@@ -30,6 +32,7 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 TILE = wp.constant(8)
 LIST_LENGTH = wp.constant(48)
 UNSEEN = wp.constant(-1.0)
+TRIANGLES_LOOKED_AT = wp.constant(64)
 # Where a sun is taken to be; no scene is larger.
 SUN_DISTANCE_M = wp.constant(1.0e3)
 
@@ -72,29 +75,60 @@ def tile_of(lattice: Lattice, column: int, row: int):
     return tile
 
 
-@wp.func
-def in_shaft(world: World, b: int, tile: Tile, to_lamp: wp.vec3, radius_m: float, slope: float):
-    """Whether a body's box may touch the shaft between a tile and a lamp.
+@wp.struct
+class Shaft:
+    """All straight ways from a tile to a lamp, in a body's mesh frame.
 
-    Args:
-        radius_m: Of the lamp.
-        slope: By how much the shaft widens per metre, instead, for a sun.
+    Attributes:
+        start, way: From the tile's centre to the lamp's.
+        radius: Of a tube around it that holds tile and lamp.
+        slope: By how much the tube widens per length, instead, for a sun.
+        normal, height: Plane below which nothing shades the tile, if ``flat``.
     """
-    body = world.bodies[b]
-    geometry = world.geometries[body.geometry]
-    low = geometry.low_m
-    high = geometry.high_m
-    o = to_mesh_point(body, tile.centre_m)
-    d = to_mesh_vector(body, to_lamp)
-    reach = wp.length((low + high) * 0.5 - o) + wp.length(high - low) * 0.5
-    grown = wp.max(tile.radius_m, radius_m) / body.scale + slope * reach
+
+    start: wp.vec3
+    way: wp.vec3
+    radius: float
+    slope: float
+    flat: int
+    normal: wp.vec3
+    height: float
+
+
+@wp.func
+def shaft_to(body: Body, tile: Tile, way: wp.vec3, radius_m: float, slope: float):
+    """The shaft from a tile along a way, to a ball."""
+    shaft = Shaft()
+    shaft.start = to_mesh_point(body, tile.centre_m)
+    shaft.way = to_mesh_vector(body, way)
+    shaft.radius = wp.max(tile.radius_m, radius_m) / body.scale
+    shaft.slope = slope
+    shaft.flat = tile.flat
+    shaft.normal = wp.transpose(body.R_world_mesh) @ tile.normal
+    height_m = tile.height_m + 1.0e-4 - wp.dot(body.t_world_mesh, tile.normal)
+    shaft.height = height_m / body.scale
+    return shaft
+
+
+@wp.func
+def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
+    """Whether a box may reach into a shaft."""
+    centre = (low + high) * 0.5
+    half = (high - low) * 0.5
+    if shaft.flat != 0:
+        top = wp.dot(shaft.normal, centre) + wp.dot(wp.abs(shaft.normal), half)
+        if top <= shaft.height:
+            return False
+    grown = shaft.radius
+    if shaft.slope > 0.0:
+        grown += shaft.slope * (wp.length(centre - shaft.start) + wp.length(half))
     t0 = float(0.0)
     t1 = float(1.0)
     for k in range(3):
-        a = low[k] - grown - o[k]
-        c = high[k] + grown - o[k]
-        if wp.abs(d[k]) > 1.0e-9:
-            inverse = 1.0 / d[k]
+        a = low[k] - grown - shaft.start[k]
+        c = high[k] + grown - shaft.start[k]
+        if wp.abs(shaft.way[k]) > 1.0e-9:
+            inverse = 1.0 / shaft.way[k]
             t0 = wp.max(t0, wp.min(a * inverse, c * inverse))
             t1 = wp.min(t1, wp.max(a * inverse, c * inverse))
         elif a > 0.0 or c < 0.0:
@@ -103,28 +137,56 @@ def in_shaft(world: World, b: int, tile: Tile, to_lamp: wp.vec3, radius_m: float
 
 
 @wp.func
-def above_tile(world: World, b: int, tile: Tile):
-    """Whether any of a body's box rises above the plane of a flat tile."""
-    body = world.bodies[b]
-    geometry = world.geometries[body.geometry]
-    n = wp.transpose(body.R_world_mesh) @ tile.normal
-    centre = (geometry.low_m + geometry.high_m) * 0.5
-    half = (geometry.high_m - geometry.low_m) * 0.5
-    top = wp.dot(n, centre) + wp.dot(wp.abs(n), half)
-    return top * body.scale + wp.dot(body.t_world_mesh, tile.normal) > tile.height_m + 1.0e-4
+def triangles_touch(shaft: Shaft, geometry: Geometry):
+    """Whether any triangle may reach into a shaft; True where it is tedious to know.
+
+    Bodies that surround the scene (a room) or are long and slanted have boxes that touch
+    everything; their triangles do not.
+    """
+    grown = wp.vec3(shaft.radius, shaft.radius, shaft.radius)
+    end = shaft.start + shaft.way
+    query = wp.mesh_query_aabb(
+        geometry.mesh, wp.min(shaft.start, end) - grown, wp.max(shaft.start, end) + grown
+    )
+    found = bool(False)
+    face = int(0)
+    looked_at = int(0)
+    while wp.mesh_query_aabb_next(query, face):
+        a = geometry.vertices_m[geometry.faces[3 * face]]
+        b = geometry.vertices_m[geometry.faces[3 * face + 1]]
+        c = geometry.vertices_m[geometry.faces[3 * face + 2]]
+        rises = bool(True)
+        if shaft.flat != 0:
+            top = wp.max(wp.dot(shaft.normal, a), wp.dot(shaft.normal, b))
+            rises = wp.max(top, wp.dot(shaft.normal, c)) > shaft.height
+        looked_at += 1
+        if looked_at > TRIANGLES_LOOKED_AT:
+            found = True
+        elif rises and touches(shaft, wp.min(a, wp.min(b, c)), wp.max(a, wp.max(b, c))):
+            found = True
+        if found:
+            break
+    return found
 
 
 @wp.func
-def may_shade(world: World, b: int, tile: Tile, lamp: Lamp):
+def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float, slope: float):
+    """Whether a body may come between a tile and a ball at the end of a way."""
+    body = world.bodies[b]
+    geometry = world.geometries[body.geometry]
+    shaft = shaft_to(body, tile, way, radius_m, slope)
+    shades = touches(shaft, geometry.low_m, geometry.high_m)
+    if shades and slope == 0.0:
+        shades = triangles_touch(shaft, geometry)
+    return shades
+
+
+@wp.func
+def may_shade_from(world: World, b: int, tile: Tile, lamp: Lamp):
     """Whether a body may come between a tile and a lamp."""
-    to_lamp = lamp.position_m - tile.centre_m
-    radius = lamp.radius
-    slope = float(0.0)
     if lamp.kind == SUN:
-        to_lamp = lamp.direction * -SUN_DISTANCE_M
-        radius = 0.0
-        slope = lamp.radius
-    return in_shaft(world, b, tile, to_lamp, radius, slope)
+        return may_shade(world, b, tile, lamp.direction * -SUN_DISTANCE_M, 0.0, lamp.radius)
+    return may_shade(world, b, tile, lamp.position_m - tile.centre_m, lamp.radius, 0.0)
 
 
 @wp.func
@@ -157,19 +219,14 @@ def list_occluders(
         lists[i, j, 0] = 0
     if tile.count == 0:
         return
-    near = Tile()
-    near.centre_m = tile.centre_m
+    near = tile
     near.radius_m = tile.radius_m + ambient_radius_m
     for b in range(world.bodies.shape[0]):
-        candidate = bool(True)
-        if tile.flat != 0:
-            candidate = above_tile(world, b, tile)
-        if candidate:
-            for j in range(lamps):
-                if may_shade(world, b, tile, world.lamps[j]):
-                    append(lists, i, j, b)
-            if in_shaft(world, b, near, wp.vec3(0.0), 0.0, 0.0):
-                append(lists, i, lamps, b)
+        for j in range(lamps):
+            if may_shade_from(world, b, tile, world.lamps[j]):
+                append(lists, i, j, b)
+        if may_shade(world, b, near, wp.vec3(0.0), 0.0, 0.0):
+            append(lists, i, lamps, b)
 
 
 @wp.func
@@ -323,6 +380,22 @@ def classes_around(classes: wp.array(dtype=int, ndim=3), x: int, y: int, j: int)
 
 
 @wp.func
+def window_bits(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, i: int):
+    """What the points of the same material say in the 4 x 4 window around a point."""
+    x = i % lattice.width
+    y = i / lattice.width
+    own = lattice.surface[i]
+    found = int(0)
+    for v in range(wp.max(y - 2, 0), wp.min(y + 2, lattice.height)):
+        for u in range(wp.max(x - 2, 0), wp.min(x + 2, lattice.width)):
+            k = v * lattice.width + u
+            if lattice.surface[k] == own:
+                value = values[j, k]
+                found = found | wp.where(value == 1.0, 2, wp.where(value == 0.0, 1, 0))
+    return found
+
+
+@wp.func
 def window_mean(
     lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, i: int, tolerance_m: float
 ):
@@ -346,7 +419,6 @@ def window_mean(
 
 @wp.kernel
 def refine_lamps(
-    view: View,
     world: World,
     lattice: Lattice,
     tile_columns: int,
@@ -368,9 +440,7 @@ def refine_lamps(
     for j in range(world.lamps.shape[0]):
         value = probed[j, i]
         if value != UNSEEN and (classes_around(classes, x, y, j) & 3) == 3:
-            tolerance_m = surface_tolerance(view, lattice.p_m[i])
-            mean = window_mean(lattice, probed, j, i, tolerance_m)
-            if mean > 0.0 and mean < 1.0:
+            if window_bits(lattice, probed, j, i) == 3:
                 seen = float(0.0)
                 origin = lattice.origin_m[i]
                 for k in range(4):

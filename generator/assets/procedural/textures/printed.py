@@ -52,7 +52,8 @@ _PRODUCTS = ("CRISPY FLAKES", "GREEN TEA", "TOMATO SOUP", "SEA SALT", "ORANGE & 
              "MOUNTAIN", "GINGER ALE")
 _NOTES = ("new recipe", "no added sugar", "since 1926", "100% natural", "family size", "extra fresh",
           "original", "with real fruit", "crunchy!", "light")
-_SIZES = ("330 ml", "500 ml", "1 L", "250 g", "375 g", "400 g", "750 ml", "12 pcs", "500 g")
+_VOLUMES = ("330 ml", "500 ml", "750 ml", "1 L")
+_WEIGHTS = ("250 g", "375 g", "400 g", "500 g")
 _TITLES = ("THE LONG", "A QUIET", "WINTER", "THE LAST", "BEYOND THE", "NORTH OF", "THE PAPER", "SEVEN",
            "NIGHT", "THE GLASS")
 _SUBJECTS = ("HARBOUR", "GARDEN", "RIVER", "MACHINE", "LETTERS", "ISLAND", "ORCHARD", "SIGNAL", "HOUSE",
@@ -79,14 +80,17 @@ class _Design:
 def label(seed: int) -> TextureData:
     """Wrap-around label of a bottle or jar; the front is in the middle. 512 x 256."""
     rng = rng_of("label", seed)
-    image = _wrap(int(_SIZE_PX * 1.5), containers.label_aspect("label", seed), _design(seed, rng), rng)
+    image = _wrap(int(_SIZE_PX * 1.5), containers.label_aspect("label", seed),
+                  _design(seed, rng, _VOLUMES), rng)
     return _squeezed(image, _SIZE_PX, _SIZE_PX // 2)
 
 
 def can_label(seed: int) -> TextureData:
     """All around a can; the front is in the middle."""
     rng = rng_of("can_label", seed)
-    image = _wrap(int(_SIZE_PX * 1.5), containers.label_aspect("can", seed), _design(seed, rng), rng)
+    sizes = _WEIGHTS if containers.can_size(seed).food else ("330 ml", "500 ml")
+    image = _wrap(int(_SIZE_PX * 1.5), containers.label_aspect("can", seed),
+                  _design(seed, rng, sizes), rng)
     return _squeezed(image, _SIZE_PX, _SIZE_PX)
 
 
@@ -117,7 +121,7 @@ def book_cover(seed: int) -> TextureData:
     return _atlas(faces, books.COVER_ATLAS, design.ground)
 
 
-def _design(seed: int, rng: Rng) -> _Design:
+def _design(seed: int, rng: Rng, sizes: Sequence[str] = _WEIGHTS) -> _Design:
     ground, second, accent, ink = (srgb(code) for code in _SCHEMES[seed % len(_SCHEMES)])
     if chance(0.3, rng):
         second, accent = accent, second
@@ -127,10 +131,10 @@ def _design(seed: int, rng: Rng) -> _Design:
         brand=name.upper() if chance(0.5, rng) else name,
         product=pick(_PRODUCTS, rng),
         note=pick(_NOTES, rng),
-        size=pick(_SIZES, rng),
+        size=pick(sizes, rng),
         layout=int(between(0, 5, rng)),
         picture=int(between(0, 5, rng)),
-        bold=int(between(2, 9, rng)),
+        bold=int(between(1, 5, rng)),
     )
 
 
@@ -145,7 +149,7 @@ def _box_print(name: str, seed: int, size_m: tuple[float, float, float]) -> Text
         "back": _front(w, h, design, rng_of(f"{name}/back", seed)),
         "left": _info(d, h, design, rng),
         "right": _side(d, h, design, rng),
-        "top": _strip(w, d, design),
+        "top": _canvas(w, d, design.second) if name == "milk_label" else _strip(w, d, design),
         "bottom": _strip(w, d, design),
     }
     return _atlas(faces, containers.CARTON_ATLAS, design.ground)
@@ -169,9 +173,9 @@ def _front(w: int, h: int, design: _Design, rng: Rng) -> Image:
     image = _canvas(w, h, design.ground)
     _ground(image, design, rng)
     tall = h > 0.8 * w
-    brand = (0.08, 0.07, 0.92, 0.29) if tall else (0.05, 0.08, 0.62, 0.42)
-    product = (0.12, 0.31, 0.88, 0.4) if tall else (0.05, 0.5, 0.6, 0.66)
-    picture = (0.2, 0.44, 0.8, 0.88) if tall else (0.64, 0.12, 0.97, 0.88)
+    brand = (0.1, 0.06, 0.9, 0.24) if tall else (0.05, 0.08, 0.62, 0.42)
+    product = (0.12, 0.345, 0.88, 0.42) if tall else (0.05, 0.5, 0.6, 0.66)
+    picture = (0.2, 0.46, 0.8, 0.88) if tall else (0.64, 0.12, 0.97, 0.88)
     _picture(image, picture, design, rng)
     on_ground = design.layout in (0, 3)
     if design.layout in (1, 4):
@@ -183,8 +187,8 @@ def _front(w: int, h: int, design: _Design, rng: Rng) -> Image:
     size = (0.68, 0.91, 0.95, 0.97) if tall else (0.44, 0.78, 0.6, 0.88)
     _text(image, note, design.note, design.ink, 0)
     _text(image, size, design.size, design.ink, 1)
-    if chance(0.5, rng):
-        _burst(image, (0.84, 0.46) if tall else (0.6, 0.2), 0.11 * w, design)
+    if tall and chance(0.5, rng):
+        _burst(image, (0.85, 0.5), 0.11 * w, design)
     return image
 
 
@@ -195,17 +199,17 @@ def _ground(image: Image, design: _Design, rng: Rng) -> None:
     if design.layout == 0:
         _gradient(image, design.ground, _blend(design.ground, design.second, 0.45))
     elif design.layout == 1:
-        draw.rectangle([0, 0, w, int(0.36 * h)], fill=design.second)
+        draw.rectangle([0, 0, w, int(0.31 * h)], fill=design.second)
     elif design.layout == 2:
-        bend, phase = between(0.02, 0.06, rng), between(0.0, 6.0, rng)
-        edge = [(x, h * (0.38 + bend * math.sin(phase + 5.0 * x / w))) for x in range(0, w + 8, 4)]
+        bend, phase = between(0.01, 0.035, rng), between(0.0, 6.0, rng)
+        edge = [(x, h * (0.27 + bend * math.sin(phase + 5.0 * x / w))) for x in range(0, w + 8, 4)]
         draw.polygon([(0, 0), (w + 8, 0), *edge[::-1]], fill=design.second)
         draw.line([(x, y + 0.015 * h) for x, y in edge], fill=design.accent, width=max(2, h // 60))
     elif design.layout == 3:
         draw.polygon([(0, h), (w, 0.62 * h), (w, h)], fill=design.accent)
         draw.polygon([(0, h), (w, 0.72 * h), (w, h)], fill=design.second)
     else:
-        draw.ellipse([-0.25 * w, -0.35 * h, 1.25 * w, 0.42 * h], fill=design.second)
+        draw.ellipse([-0.35 * w, -0.35 * h, 1.35 * w, 0.33 * h], fill=design.second)
 
 
 def _picture(image: Image, box: Box, design: _Design, rng: Rng) -> None:

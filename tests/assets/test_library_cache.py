@@ -1,0 +1,124 @@
+"""The cache: same bytes with it, without it, and when it is damaged."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.assets.cache import DiskCache, Store, content_key
+from generator.assets.library import open_library
+from generator.core.geometry import MeshData
+
+ROOT = Path(__file__).parents[2]
+ASSET = "random_urdfs/007"
+
+
+def assert_same(a: MeshData, b: MeshData) -> None:
+    """Bit by bit."""
+    for field in fields(MeshData):
+        left, right = getattr(a, field.name), getattr(b, field.name)
+        if isinstance(left, np.ndarray):
+            assert left.dtype == right.dtype
+            assert left.tobytes() == right.tobytes()
+        else:
+            assert left == right
+
+
+def entries(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*.npz"))
+
+
+def test_cold_warm_and_another_cache_give_the_same_bytes(tmp_path: Path) -> None:
+    """What comes from the cache is what was computed."""
+    cold = open_library(cache_dir=tmp_path / "a")
+    warm = open_library(cache_dir=tmp_path / "a")
+    other = open_library(cache_dir=tmp_path / "b")
+    assert_same(cold.mesh(ASSET), warm.mesh(ASSET))
+    assert_same(cold.mesh(ASSET), other.mesh(ASSET))
+    for one, two in zip(
+        cold.convex_parts(ASSET).parts_m, warm.convex_parts(ASSET).parts_m, strict=True
+    ):
+        assert one.tobytes() == two.tobytes()
+    names = [[p.name for p in entries(tmp_path / x)] for x in "ab"]
+    assert names[0] == names[1]
+
+
+@pytest.mark.parametrize("damage", ["truncated", "bit flip", "empty", "foreign"])
+def test_a_damaged_entry_is_made_anew(tmp_path: Path, damage: str) -> None:
+    """Bit rot in the cache never reaches a data set."""
+    good = open_library(cache_dir=tmp_path).mesh(ASSET)
+    (path,) = entries(tmp_path)
+    data = bytearray(path.read_bytes())
+    if damage == "truncated":
+        path.write_bytes(data[: len(data) // 2])
+    elif damage == "bit flip":
+        data[len(data) // 3] ^= 0x10
+        path.write_bytes(data)
+    elif damage == "empty":
+        path.write_bytes(b"")
+    else:
+        np.savez(path, vertices_m=np.zeros((3, 3)))
+    assert_same(open_library(cache_dir=tmp_path).mesh(ASSET), good)
+
+
+def test_a_cache_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None:
+    """A file stands where the cache folder should be."""
+    blocked = tmp_path / "cache"
+    blocked.write_text("in the way")
+    assert len(open_library(cache_dir=blocked).mesh(ASSET).faces) > 100
+
+
+def test_no_temporary_file_stays_behind(tmp_path: Path) -> None:
+    """Entries appear whole or not at all."""
+    open_library(cache_dir=tmp_path).mesh(ASSET)
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_several_processes_may_share_a_cache(tmp_path: Path) -> None:
+    """Three processes import the same asset at once and agree."""
+    program = (
+        "import sys; from pathlib import Path; from hashlib import sha256\n"
+        "from generator.assets.library import open_library\n"
+        "mesh = open_library(cache_dir=Path(sys.argv[1])).mesh(sys.argv[2])\n"
+        "print(sha256(mesh.vertices_m.tobytes() + mesh.faces.tobytes()).hexdigest())\n"
+    )
+    command = [sys.executable, "-c", program, str(tmp_path), ASSET]
+    running = [
+        subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(3)
+    ]
+    answers = {process.communicate(timeout=120)[0] for process in running}
+    assert {process.returncode for process in running} == {0}
+    assert len(answers) == 1
+    assert len(entries(tmp_path)) == 1
+
+
+def test_memory_is_bounded_and_forgets_the_oldest(tmp_path: Path) -> None:
+    """A store of 1,000 bytes holds two results of 400."""
+    store = Store(DiskCache(tmp_path / "none"), max_bytes=1000)
+    computed: list[str] = []
+
+    def get(name: str) -> float:
+        def compute() -> dict[str, np.ndarray]:
+            computed.append(name)
+            return {"x": np.full(50, float(len(computed)))}
+
+        (tmp_path / "none").mkdir(exist_ok=True)
+        return store.get(content_key({"name": name}), compute, lambda arrays: float(arrays["x"][0]))
+
+    assert [get(n) for n in "aba"] == [1.0, 2.0, 1.0]
+    get("c")
+    assert computed == ["a", "b", "c"]
+    assert len(store) == 2
+
+
+def test_opening_reads_nothing(tmp_path: Path) -> None:
+    """A library can be opened on a folder that does not exist; asking tells what is wrong."""
+    library = open_library([tmp_path / "missing"], cache_dir=tmp_path / "cache")
+    assert not (tmp_path / "cache").exists()
+    with pytest.raises(Exception, match="no such folder"):
+        library.get(ASSET)

@@ -1,0 +1,131 @@
+"""Robots: kinematics as the URDF says, geometry link by link."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from generator.assets.library import Library, open_library
+from generator.core.geometry import RobotModel
+from generator.core.se3 import SE3
+
+ROBOTS = ("franka_panda", "kuka_iiwa", "xarm6")
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """A library with a fresh cache."""
+    return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
+
+
+def link_poses(robot: RobotModel, positions: tuple[float, ...]) -> dict[str, SE3]:
+    """Forward kinematics, written here independently."""
+    poses, remaining = {robot.links[0]: SE3()}, list(positions)
+    for joint in robot.joints:
+        motion = SE3()
+        if joint.movable:
+            q = remaining.pop(0)
+            x, y, z = joint.axis
+            if joint.kind == "prismatic":
+                motion = SE3((q * x, q * y, q * z))
+            else:
+                s = math.sin(q / 2)
+                motion = SE3((0.0, 0.0, 0.0), (math.cos(q / 2), s * x, s * y, s * z))
+        poses[joint.child] = poses[joint.parent] @ joint.T_parent_joint @ motion
+    return poses
+
+
+def test_the_panda_reaches_where_its_maker_says(library: Library) -> None:
+    """At the zero position the flange is at (0.088, 0, 0.926) m and looks down (Franka, DH table)."""
+    robot = library.robot("franka_panda")
+    flange = link_poses(robot, (0.0,) * 9)["panda_link8"]
+    assert flange.translation_m == pytest.approx((0.088, 0.0, 0.926), abs=1e-6)
+    assert flange.rotate(np.array([0.0, 0.0, 1.0])) == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
+
+
+def test_the_panda_has_seven_joints_and_two_fingers(library: Library) -> None:
+    """Order of the movable joints: arm from base to hand, then fingers."""
+    robot = library.robot("franka_panda")
+    names = [joint.name for joint in robot.movable]
+    assert names == [*(f"panda_joint{k}" for k in range(1, 8)),
+                     "panda_finger_joint1", "panda_finger_joint2"]  # fmt: skip
+    assert robot.movable[8].mimic == "panda_finger_joint1"
+    assert robot.home == pytest.approx(
+        (0, -math.pi / 4, 0, -3 * math.pi / 4, 0, math.pi / 2, math.pi / 4, 0.04, 0.04), abs=1e-6
+    )
+    assert robot.gripper is not None
+    assert robot.gripper.stroke_m == 0.08
+
+
+def test_the_grasp_frame_lies_between_the_finger_tips(library: Library) -> None:
+    """Fully open, the tips are 0.08 m apart along the grasp frame's Y, at its height."""
+    robot = library.robot("franka_panda")
+    poses = link_poses(robot, robot.home)
+    assert robot.gripper is not None
+    T_grasp_world = (poses["panda_hand"] @ robot.gripper.T_link_grasp).inverse()
+    tips = {}
+    for side in ("left", "right"):
+        link = f"panda_{side}finger"
+        points = library.mesh(robot.visuals[link]).vertices_m.astype(np.float64)
+        tips[side] = (T_grasp_world @ poses[link]).apply(points)
+    assert tips["left"][:, 1].min() == pytest.approx(0.04, abs=0.001)
+    assert tips["right"][:, 1].max() == pytest.approx(-0.04, abs=0.001)
+    for points in tips.values():
+        assert points[:, 2].max() == pytest.approx(0.009, abs=0.003)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_links_come_root_first_and_home_is_within_limits(library: Library, name: str) -> None:
+    """Each link after its parent; one home position per movable joint."""
+    robot = library.robot(name)
+    assert [j.child for j in robot.joints] == list(robot.links[1:])
+    seen = {robot.links[0]}
+    for joint in robot.joints:
+        assert joint.parent in seen
+        seen.add(joint.child)
+    for joint, position in zip(robot.movable, robot.home, strict=True):
+        assert joint.lower <= position <= joint.upper
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_neighbours_may_touch_and_distant_links_may_not(library: Library, name: str) -> None:
+    """Pairs that a joint connects are allowed, base and last link are not."""
+    robot = library.robot(name)
+    for joint in robot.joints:
+        assert (joint.parent, joint.child) in robot.no_collide
+    solid = list(robot.collisions)
+    assert (solid[0], solid[-1]) not in robot.no_collide
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_link_is_small_enough_and_collides(library: Library, name: str) -> None:
+    """At most 35,000 triangles for a robot, and hulls close to what is seen."""
+    robot = library.robot(name)
+    total = 0
+    for link, asset_id in robot.visuals.items():
+        mesh = library.mesh(asset_id)
+        total += len(mesh.faces)
+        hull = np.concatenate(library.convex_parts(robot.collisions[link]).parts_m)
+        low, high = np.array(mesh.bounds_m())
+        assert hull.min(axis=0) == pytest.approx(low, abs=0.02)
+        assert hull.max(axis=0) == pytest.approx(high, abs=0.02)
+    assert 5_000 < total < 35_000
+
+
+def test_the_pandas_base_is_white_plastic_like_its_arm(library: Library) -> None:
+    """link0 and link7 are shown by untextured collision meshes; nothing is whiter than snow."""
+    for link in ("panda_link0", "panda_link1", "panda_link7"):
+        (material,) = library.materials(f"franka_panda/{link}")
+        assert material.base_color == (0.85, 0.85, 0.85)
+        assert not material.texture
+    forearm = [m.base_color for m in library.materials("franka_panda/panda_link5")]
+    assert min(max(color) for color in forearm) < 0.1
+
+
+def test_links_can_be_asked_for_by_id(library: Library) -> None:
+    """A link has the licence and category of its robot."""
+    link = library.get("franka_panda/panda_link3")
+    assert (link.kind, link.category, link.licence) == ("object", "robot", "Apache-2.0")
+    assert [a.asset_id for a in library.find({"arm"}, "robot")] == sorted(ROBOTS)

@@ -1,0 +1,157 @@
+"""Lamps, the sun, and light from all around."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.config.distributions import Choice, Constant, Sequence, Uniform
+from generator.core.errors import ConfigError, LayoutRejected
+from generator.core.scene import Body, Light, Region, Scene
+from generator.core.se3 import SE3
+from randomizers.environment import EnvironmentLight
+from randomizers.lighting import Lighting
+from tests.randomizers.doubles import FakeAssets, rng_of
+
+FOCUS = Region((0.3, -0.2, 0.8), (1.2, 0.8, 0.25))
+ROOM = ((-2.3, -1.8, 0.1), (2.3, 1.8, 2.6))
+SCENE = Scene("test", focus=FOCUS, interior_m=ROOM)
+
+
+def lit(scene: Scene = SCENE, scene_index: int = 0, **given: object) -> tuple[Light, ...]:
+    """The lights that are drawn."""
+    lighting = Lighting(name="lamps", **given)  # type: ignore[arg-type]
+    return lighting(scene, FakeAssets(), rng_of("lamps", scene_index, index=scene_index)).lights
+
+
+def illuminance_lux(light: Light) -> float:
+    """On a small surface at the focus that faces the light: E = I / d^2 for a small source."""
+    if light.kind == "sun":
+        return light.illuminance_lux
+    distance_m = math.dist(light.position_m, FOCUS.center_m)
+    return light.intensity_cd / distance_m**2
+
+
+@pytest.mark.parametrize("kind", ["sphere", "spot", "sun"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_lights_add_up_to_the_illuminance_at_the_focus(kind: str, count: int) -> None:
+    """By the photometric law, whatever their distance, number and kind."""
+    lights = lit(count=Constant(count), kind=Constant(kind), illuminance_lux=Constant(640.0))
+
+    assert len(lights) == count
+    assert {light.kind for light in lights} == {kind}
+    assert sum(illuminance_lux(light) for light in lights) == pytest.approx(640.0, rel=1e-4)
+
+
+def test_lamps_hang_where_they_were_asked_to() -> None:
+    """Elevation and azimuth seen from the focus; distance at most the one drawn."""
+    elevation, azimuth = Uniform(40.0, 60.0), Uniform(100.0, 140.0)
+    for scene_index in range(20):
+        for light in lit(
+            scene_index=scene_index, elevation_deg=elevation, azimuth_deg=azimuth,
+            distance_m=Uniform(0.9, 1.6),
+        ):  # fmt: skip
+            away = np.subtract(light.position_m, FOCUS.center_m)
+            distance_m = float(np.linalg.norm(away))
+
+            assert distance_m <= 1.6 + 1e-5
+            assert 40.0 - 1e-3 <= math.degrees(math.asin(away[2] / distance_m)) <= 60.0 + 1e-3
+            assert 100.0 - 1e-3 <= math.degrees(math.atan2(away[1], away[0])) <= 140.0 + 1e-3
+
+
+def test_lamps_are_in_the_room_and_outside_of_bodies() -> None:
+    """A box as large as half the space around the focus leaves the rest to them."""
+    body = Body("cupboard", "plane?size_m=1,1", instance_id=1)
+    cupboard = replace(body, asset="room?size_m=1.2,1.2,1.2", T_world_body=SE3((0.8, -0.2, 0.9)))
+    scene = replace(SCENE, bodies=(cupboard,))
+    for scene_index in range(40):
+        for light in lit(scene, scene_index, count=Constant(2), radius_m=Constant(0.1)):
+            inside = np.array(light.position_m)
+
+            assert (inside >= ROOM[0]).all()
+            assert (inside <= ROOM[1]).all()
+            here = inside - (0.8, -0.2, 0.9)
+            gap_m = np.maximum(np.abs(here - (0, 0, 0.6)) - 0.6, 0.0)
+            assert gap_m.max() >= 0.1
+
+
+def test_no_place_for_a_lamp_is_told_with_a_remedy() -> None:
+    """Straight down from the focus is under the floor."""
+    with pytest.raises(LayoutRejected) as refused:
+        lit(elevation_deg=Constant(-90.0), distance_m=Uniform(3.0, 4.0))
+    assert "randomizers.lamps" in refused.value.rejection.remedy
+
+
+def test_spots_and_suns_shine_on_the_focus() -> None:
+    """A spot's axis goes through the focus; the sun comes from above. Directions are unit."""
+    (spot,) = lit(count=Constant(1), kind=Constant("spot"), cone_deg=Constant(25.0))
+    (sun,) = lit(count=Constant(1), kind=Constant("sun"), elevation_deg=Constant(30.0))
+    towards = np.subtract(FOCUS.center_m, spot.position_m)
+
+    assert np.allclose(towards / np.linalg.norm(towards), spot.direction, atol=2e-6)
+    assert spot.cone_rad == pytest.approx(math.radians(25.0), abs=1e-6)
+    assert np.linalg.norm(sun.direction) == pytest.approx(1.0, abs=1e-5)
+    assert sun.direction[2] == pytest.approx(-0.5, abs=1e-6)
+
+
+def test_lights_have_their_temperature_and_softness() -> None:
+    """Linear RGB of luminance 1, warm or cold; radius as drawn."""
+    (warm,) = lit(count=Constant(1), temperature_k=Constant(2700.0), radius_m=Constant(0.07))
+    (cold,) = lit(count=Constant(1), temperature_k=Constant(9000.0))
+
+    assert warm.color[0] > 1.0 > warm.color[2]
+    assert cold.color[2] > 1.0 > cold.color[0]
+    assert np.dot(warm.color, (0.2126, 0.7152, 0.0722)) == pytest.approx(1.0, abs=1e-5)
+    assert warm.radius_m == 0.07
+
+
+def test_defaults_are_those_of_a_room() -> None:
+    """Between 250 and 1200 lx, balls of 2 to 12 cm, above what they light."""
+    for scene_index in range(30):
+        lights = lit(scene_index=scene_index)
+
+        assert 1 <= len(lights) <= 3
+        assert 249.0 < sum(illuminance_lux(light) for light in lights) < 1201.0
+        assert all(0.02 <= light.radius_m <= 0.12 for light in lights)
+        assert all(light.position_m[2] > FOCUS.center_m[2] + 0.3 for light in lights)
+
+
+def test_illuminance_can_follow_a_sequence() -> None:
+    """The turn is that of the scene or sample, not of the draw."""
+    levels = Sequence((100.0, 400.0))
+    sums = [sum(illuminance_lux(light) for light in lit(scene_index=k, illuminance_lux=levels))
+            for k in (1, 0, 3)]  # fmt: skip
+
+    assert sums == pytest.approx([400.0, 100.0, 400.0], rel=1e-4)
+
+
+def test_unknown_kind_of_light_is_named() -> None:
+    """With what was probably meant."""
+    with pytest.raises(ConfigError, match=r"unknown light 'spehre'.*did you mean 'sphere'"):
+        lit(kind=Choice(["spehre"]))
+
+
+def test_environment_is_one_of_those_asked_for() -> None:
+    """By family or tag; luminance and turn within their ranges."""
+    asked = EnvironmentLight(
+        name="sky", images=("studio", "outdoor"), luminance_cd_m2=Uniform(40.0, 60.0),
+        yaw_deg=Uniform(90.0, 180.0), visible=False,
+    )  # fmt: skip
+    seen = set()
+    for scene_index in range(40):
+        environment = asked(SCENE, FakeAssets(), rng_of("sky", scene_index)).environment
+        seen.add(environment.image)
+
+        assert 40.0 <= environment.luminance_cd_m2 <= 60.0
+        assert math.pi / 2 <= environment.yaw_rad <= math.pi + 1e-6
+        assert not environment.visible
+    assert seen == {f"environment/{name}?seed={k}" for name in ("studio", "sky") for k in (0, 1)}
+
+
+def test_unknown_environment_is_named() -> None:
+    """With what was probably meant."""
+    with pytest.raises(ConfigError, match=r"no environment is studoi.*did you mean 'studio'"):
+        EnvironmentLight(name="sky", images=("studoi",))(SCENE, FakeAssets(), rng_of())
