@@ -111,9 +111,10 @@ def layout(
         return _stacks(group, items, floors, rng)
     if group.placement == "grid":
         return _grid(group, items, floors, rng)
-    one = _dropped if group.placement == "drop" else _scattered
+    if group.placement == "scatter":
+        return _scattered(group, items, floors, rng)
     return [
-        one(group, item, floors[_drawn_floor(floors, item, rng)], rng, stands)
+        _dropped(group, item, floors[_drawn_floor(floors, item, rng)], rng, stands)
         for item, stands in zip(items, upright, strict=True)
     ]
 
@@ -155,14 +156,27 @@ def _lowest_place(floor: Floor, radius_m: float, rng: Rng) -> Vec3 | None:
     return lowest
 
 
-def _scattered(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:
-    """Standing apart from everything else."""
-    del upright
+def _scattered(
+    group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng
+) -> list[SE3]:
+    """Standing apart from everything else; the widest choose first."""
+    poses: dict[int, SE3] = {}
+    for k in sorted(range(len(items)), key=lambda k: (-items[k].radius_m, k)):
+        floor, x, y = _bare_place(group, items[k], floors, rng)
+        poses[k] = _standing(items[k], floor, (x, y, 0.0), _yaw(rng))
+    return [poses[k] for k in range(len(items))]
+
+
+def _bare_place(
+    group: ObjectGroup, item: Item, floors: list[Floor], rng: Rng
+) -> tuple[Floor, float, float]:
+    """A surface, and a point on it around which there is room for an upright item."""
     for _ in range(SCATTER_TRIES):
+        floor = floors[_drawn_floor(floors, item, rng)]
         x, y = floor.place(rng, item.radius_m)
         bare = floor.top_under(x, y, item.radius_m) == 0.0
         if bare and not floor.is_closed(x, y, item.radius_m):
-            return _standing(item, floor, (x, y, 0.0), _yaw(rng))
+            return floor, x, y
     raise LayoutRejected(_no_place(group))
 
 
@@ -215,17 +229,14 @@ def _stacks(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng:
     while flat:
         height = min(int(rng.integers(2, 5)), len(flat))
         tower, flat = flat[:height], flat[height:]
-        floor = floors[_drawn_floor(floors, items[tower[0]], rng)]
-        base = _scattered(group, items[tower[0]], floor, rng, upright=True)
-        x, y, _ = _moved(floor.surface.T_world_surface.inverse(), base.translation_m)
-        poses[tower[0]] = base
-        z = 2 * items[tower[0]].half_m[2]
-        for k in tower[1:]:
+        floor, x, y = _bare_place(group, items[tower[0]], floors, rng)
+        z = 0.0
+        for k in tower:
             poses[k] = _standing(items[k], floor, (x, y, z), _yaw(rng))
             z += 2 * items[k].half_m[2]
     for k in alone:
-        floor = floors[_drawn_floor(floors, items[k], rng)]
-        poses[k] = _scattered(group, items[k], floor, rng, upright=True)
+        floor, x, y = _bare_place(group, items[k], floors, rng)
+        poses[k] = _standing(items[k], floor, (x, y, 0.0), _yaw(rng))
     return [poses[k] for k in range(len(items))]
 
 

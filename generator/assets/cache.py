@@ -115,7 +115,7 @@ class Store:
 def _load(path: Path, key: str) -> Arrays | None:
     try:
         # The zip's checksums are verified while its members are read.
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None

@@ -10,6 +10,7 @@ clipped solid have the same hull.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,8 @@ MAX_VERTICES = 64
 _CUTS = (0.25, 0.5, 0.75)
 _ENOUGH = 0.02
 """A cut must save this share of the first hull's volume."""
+_DEEP = 0.15
+"""A pocket is deeper than this share of the extent."""
 _MIN_THICKNESS = 0.02
 """Flat parts are given this share of their largest extent as thickness."""
 _SCOUTS = 256
@@ -88,11 +91,11 @@ def hull_vertices(points: Float64, place: str, max_vertices: int = MAX_VERTICES)
 def decomposed(soup: Soup, max_parts: int) -> list[Float64]:
     """Triangles of a soup in pieces that are nearly convex, each [m, 3, 3]."""
     pieces = [_Piece.of(soup.corners)]
-    cuts = [_best_cut(pieces[0])]
     enough = _ENOUGH * pieces[0].volume
+    cuts = [_first_cut(pieces[0], enough)]
     for _ in range(max_parts - 1):
         best = int(np.argmax([cut.saving for cut in cuts]))
-        if cuts[best].saving < enough:
+        if cuts[best].saving <= enough:
             break
         halves = cuts[best].halves
         pieces[best : best + 1] = halves
@@ -120,21 +123,55 @@ class _Cut:
     saving: float = 0.0
 
 
-def _best_cut(piece: _Piece) -> _Cut:
-    """The axis-aligned cut that saves most; an empty one if none saves anything."""
-    low, high = piece.corners.min(axis=(0, 1)), piece.corners.max(axis=(0, 1))
-    best = _Cut()
+def _first_cut(piece: _Piece, enough: float) -> _Cut:
+    """The cut that saves most, by itself or together with the cut after it.
+
+    Half a bowl is as full as the whole one; a quarter is not.
+    """
+    cut = _best_cut(piece)
+    if cut.saving > enough or not _has_pocket(piece):
+        return cut
     for axis in range(3):
-        for share in _CUTS:
-            at = low[axis] + share * (high[axis] - low[axis])
-            clipped = [_clipped(piece.corners, axis, at, side) for side in (1.0, -1.0)]
-            if not all(len(half) for half in clipped):
-                continue
-            halves = tuple(_Piece.of(half) for half in clipped)
-            saving = piece.volume - sum(half.volume for half in halves)
-            if saving > best.saving:
-                best = _Cut(halves, saving)
-    return best
+        halving = _cut_at(piece, axis, 0.5)
+        saving = halving.saving + sum(_best_cut(half).saving for half in halving.halves)
+        if saving > cut.saving:
+            cut = _Cut(halving.halves, saving)
+    return cut
+
+
+def _best_cut(piece: _Piece) -> _Cut:
+    cuts = [_cut_at(piece, axis, share) for axis in range(3) for share in _CUTS]
+    return cuts[int(np.argmax([cut.saving for cut in cuts]))]
+
+
+def _cut_at(piece: _Piece, axis: int, share: float) -> _Cut:
+    """The cut at a share of the extent along an axis; an empty one if a side has nothing."""
+    low, high = piece.corners[..., axis].min(), piece.corners[..., axis].max()
+    at = low + share * (high - low)
+    clipped = [_clipped(piece.corners, axis, at, side) for side in (1.0, -1.0)]
+    if not all(len(half) for half in clipped):
+        return _Cut()
+    halves = tuple(_Piece.of(half) for half in clipped)
+    return _Cut(halves, piece.volume - sum(half.volume for half in halves))
+
+
+def _has_pocket(piece: _Piece) -> bool:
+    """Whether one must go far from some triangle, straight away from it, to leave the hull."""
+    hull = _hull(piece.corners.reshape(-1, 3))
+    if hull is None:
+        return False
+    crosses = np.cross(
+        piece.corners[:, 1] - piece.corners[:, 0], piece.corners[:, 2] - piece.corners[:, 0]
+    )
+    lengths = np.sqrt((crosses * crosses).sum(axis=1))
+    centres = piece.corners.mean(axis=1)[lengths > 0.0]
+    outward = crosses[lengths > 0.0] / lengths[lengths > 0.0, None]
+    facing = np.einsum("ij,kj->ik", outward, hull.equations[:, :3], optimize=False)
+    depth = -np.einsum("ij,kj->ik", centres, hull.equations[:, :3], optimize=False)
+    depth = np.maximum(depth - hull.equations[:, 3], 0.0)
+    ways_out = np.where(facing > 1e-6, depth / np.maximum(facing, 1e-6), np.inf).min(axis=1)
+    points = piece.corners.reshape(-1, 3)
+    return float(ways_out.max()) > _DEEP * float((points.max(axis=0) - points.min(axis=0)).max())
 
 
 def _clipped(corners: Float64, axis: int, at: float, side: float) -> Float64:
@@ -159,17 +196,21 @@ def _clipped(corners: Float64, axis: int, at: float, side: float) -> Float64:
 
 
 def _hull_volume(points: Float64) -> float:
+    hull = _hull(points)
+    return 0.0 if hull is None else float(hull.volume)
+
+
+def _hull(points: Float64) -> Any:
+    """Hull of the most extreme points; None if they are flat."""
     from scipy.spatial import ConvexHull, QhullError
 
     points = _distinct(points)
     if len(points) > _SCOUTS:
         points = points[_scouts(points)]
-    if len(points) < 4:
-        return 0.0
     try:
-        return float(ConvexHull(points).volume)
+        return ConvexHull(points) if len(points) > 3 else None
     except QhullError:
-        return 0.0
+        return None
 
 
 def _distinct(points: Float64) -> Float64:

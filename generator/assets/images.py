@@ -34,6 +34,10 @@ def decode(data: bytes, place: str) -> UInt8:
             with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
                 _check_size(image.width, image.height, place)
                 return np.array(image.convert("RGB"), dtype=np.uint8)
+    except Image.DecompressionBombError:
+        raise AssetError(
+            f"{place}: more than {MAX_PIXELS // 1_000_000} megapixels; scale it down"
+        ) from None
     except AssetError:
         raise
     except Exception as error:

@@ -162,6 +162,16 @@ def face_crosses(corners: Float64) -> Float64:
     return crosses
 
 
+def corner_angles(corners: Float64) -> Float64:
+    """Angle [rad] at each corner of each triangle, [m, 3]."""
+    ahead = _unit(np.roll(corners, -1, axis=1) - corners)
+    behind = _unit(np.roll(corners, 1, axis=1) - corners)
+    cosines = np.clip((ahead * behind).sum(axis=2), -1.0, 1.0)
+    # Rounded, because the last bits of arccos differ between processors.
+    angles: Float64 = np.round(np.arccos(cosines), 6)
+    return angles
+
+
 @dataclass(frozen=True, eq=False)
 class _Edges:
     """Edges shared by exactly two faces.
@@ -267,8 +277,9 @@ def _sane_normals(soup: Soup) -> Float64 | None:
 def _creased(soup: Soup, faces: Int64, crease_deg: float) -> Float64:
     """Unit normals [m, 3, 3], smooth within pieces of the surface bounded by creases.
 
-    Triangles weigh by their area, so that large flat ones keep their look beside narrow bevels
-    ("weighted normals", the custom of hard-surface modelling).
+    A corner weighs by its triangle's area and its angle: large flats keep their look beside narrow
+    bevels, and how a quad is cut in two does not matter ("weighted normals", as hard-surface
+    modellers have them).
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -282,7 +293,7 @@ def _creased(soup: Soup, faces: Int64, crease_deg: float) -> Float64:
     rows, columns = smooth[:, 0].reshape(-1), smooth[:, 1].reshape(-1)
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), (faces.size,) * 2)
     count, group = connected_components(graph, directed=False)
-    weighted = np.repeat(crosses, 3, axis=0)
+    weighted = (corner_angles(soup.corners)[..., None] * crosses[:, None]).reshape(-1, 3)
     sums: Float64 = np.stack(
         [np.bincount(group, weighted[:, k], minlength=count) for k in range(3)], axis=1
     )

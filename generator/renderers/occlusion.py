@@ -101,13 +101,11 @@ def _lit(
     lit = stock.scratch("lit", (max(lamps, 1), n), float)
     if lamps == 0:
         return lit
-    few = wp.array(sunflower(16), dtype=wp.vec2, device=device)
-    many = wp.array(sunflower(64), dtype=wp.vec2, device=device)
-    inputs = [world.record, lattice, columns, lists]
-    wp.launch(occlusion.probe_lamps, n, [*inputs, few], [probed], device=device)
+    disc = wp.array(sunflower(48), dtype=wp.vec2, device=device)
+    inputs = [world.record, lattice, columns, lists, disc]
+    wp.launch(occlusion.probe_lamps, n, inputs, [probed], device=device)
     classes = _classes(lattice, probed, lamps, stock)
-    inputs = [*inputs, classes, many, probed]
-    wp.launch(occlusion.refine_lamps, n, inputs, [lit], device=device)
+    wp.launch(occlusion.refine_lamps, n, [*inputs, classes, probed], [lit], device=device)
     classes = _classes(lattice, lit, lamps, stock)
     wp.launch(
         occlusion.smooth_lattice, n, [view, lattice, classes, lit], [probed], device=device

@@ -54,12 +54,16 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     placed["first_material"] = np.cumsum(counts) - counts
     body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
     vertex_count = _place(placed, scene.bodies, body_meshes, camera)
-    low, high = _world_boxes(placed, body_meshes)
+    placed["low_m"], placed["high_m"] = _world_boxes(placed, body_meshes)
 
     def upload(values: NDArray[np.void] | list[object], dtype: Any) -> wp.array:
         return wp.array(values, dtype=dtype, device=stock.device)
 
-    tree = wp.Bvh(upload(low, wp.vec3), upload(high, wp.vec3))
+    # A hierarchy needs a box; rays never meet this one.
+    nowhere = np.full((1, 3), 1e9, np.float32)
+    low = placed["low_m"] if len(placed) else nowhere
+    high = placed["high_m"] if len(placed) else nowhere
+    tree = wp.Bvh(upload(np.ascontiguousarray(low), wp.vec3), upload(np.ascontiguousarray(high), wp.vec3))
     world = records.World()
     world.tree = tree.id
     world.geometries = upload(_stacked(meshes, records.Geometry), records.Geometry)
@@ -117,8 +121,7 @@ def _world_boxes(
     placed: NDArray[np.void], meshes: Sequence[DeviceMesh]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     if not meshes:
-        # A hierarchy needs a box; rays never meet this one.
-        return np.full((1, 3), 1e9, np.float32), np.full((1, 3), 1e9, np.float32)
+        return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)
     scale = placed["scale"].astype(np.float64)[:, None]
     R = placed["R_world_mesh"].astype(np.float64)
     low = np.stack([mesh.low_m for mesh in meshes]) * scale

@@ -48,13 +48,11 @@ def see(
     else:
         inputs = [view, world.record, raster.Z_NEAR_M]
         wp.launch(rays.trace_pixels, n, inputs, [seen.hits], device=stock.device)
-    wp.launch(
-        surface.resolve,
-        n,
-        [view, world.record, seen.hits],
-        [seen.z_m, seen.weights, seen.normals],
-        device=stock.device,
-    )
+    # One thread per row on the CPU, where threads run one after the other anyway.
+    run = view.width if stock.device.is_cpu else 1
+    outputs = [seen.z_m, seen.weights, seen.normals]
+    inputs = [view, world.record, run, seen.hits]
+    wp.launch(surface.resolve, (view.height, view.width // run), inputs, outputs, device=stock.device)
     return seen
 
 

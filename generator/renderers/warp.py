@@ -11,6 +11,7 @@ from generator.renderers.device import open_device
 from generator.renderers.labels import label_images
 from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
+from generator.renderers.silhouettes import silhouettes
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import see
 
@@ -47,9 +48,14 @@ class WarpRenderer:
         world = pack_world(scene, camera, self._stock)
         view = pack_view(camera)
         seen = see(world, view, self._stock, self._settings.visibility)
+        if Channel.AMODAL in channels:
+            channels = channels | {Channel.INSTANCE}
         images = label_images(scene, world, view, seen, channels)
         if Channel.RGB in channels:
             images[Channel.RGB] = color_image(
                 camera, world, view, seen, self._stock, self._settings
             )
-        return Reading(camera.name, camera, images)
+        outlines = {}
+        if Channel.AMODAL in channels:
+            outlines = silhouettes(scene, world, view, self._stock, images[Channel.INSTANCE])
+        return Reading(camera.name, camera, images, outlines)

@@ -42,14 +42,14 @@ def test_canonical_ids_read_back_as_themselves(
     """Writing and reading an id loses nothing."""
     text = str(AssetId("family", parameters))
     assert str(parse(text)) == text
-    assert parse(text).parameters == pytest.approx(parameters) if parameters else True
+    assert parse(text).parameters == parameters
 
 
 @pytest.mark.parametrize(
     "text",
     [
         "", "?seed=1", "/etc/passwd", "../x", "a//b", "a/../b", "mug?", "mug?seed", "mug?seed=",
-        "mug?seed=1&seed=2", "mug?Seed=1", "mug?seed=1;rm", "mug?seed=nan", "mug?size_m=1,,2",
+        "mug?seed=1&seed=2", "mug?Seed=1", "mug?seed=1;rm", "mug?seed=-", "mug?size_m=1,,2",
         "mug?size_m=1,x", "a\nb", "x" * 500, "mug?seed=1e999",
     ],
 )  # fmt: skip

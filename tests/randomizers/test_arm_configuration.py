@@ -68,7 +68,7 @@ def test_hand_is_sent_into_the_workspace_pointing_down() -> None:
 
 
 def test_only_what_fits_between_the_fingers_is_held() -> None:
-    """The gripper opens 8 cm: of a ball of 20 cm, a bottle of 8 cm and a brick, it takes the brick."""
+    """The gripper opens 8 cm: a ball of 20 cm and a bottle of 8 cm stay where they are."""
     held = {goal("hold", "ball", "bottle", "brick", scene_index=k).held for k in range(20)}
 
     assert held == {"clutter/2"}

@@ -182,8 +182,12 @@ def test_walls_are_painted_or_covered() -> None:
 
 def test_weights_and_friction_change_for_what_falls_only() -> None:
     """Mass by the factor, friction and restitution in their ranges; the table stays."""
-    properties = PhysicsProperties(name="p", mass_factor=Constant(2.0),
-                                   friction=Uniform(0.3, 0.4), restitution=Constant(0.2))  # fmt: skip
+    properties = PhysicsProperties(
+        name="p",
+        mass_factor=Constant(2.0),
+        friction=Uniform(0.3, 0.4),
+        restitution=Constant(0.2),
+    )
     scene = scene_with("brick", "bottle")
     now = after(properties, scene)
 

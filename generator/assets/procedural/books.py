@@ -57,7 +57,9 @@ def _cover(length: float, width: float, thickness: float, board: float) -> Patch
              *((y + board, z * (1 - board / h)) for y, z in spine[::-1]),
              (y0 + bow + board, board - h), (y1, board - h)]
     back, side, front = (COVER_ATLAS[name] for name in ("back", "spine", "front"))
-    turn = np.linspace(side[0], side[2], 7)
+    arc = np.array(outer[1:8])
+    steps = np.sqrt((np.diff(arc, axis=0) ** 2).sum(axis=1))
+    turn = side[0] + (side[2] - side[0]) * np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
     # Walking from the back's free edge around the spine to the front's: u runs the same way.
     us = (np.array([back[0], back[2]]), turn, np.array([front[0], front[2]]))
     spans = (outer[0:2], outer[1:8], outer[7:9])

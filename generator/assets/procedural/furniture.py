@@ -21,7 +21,7 @@ from generator.assets.procedural.materials import (
     patterned,
 )
 from generator.assets.procedural.mesh import Array, Patch, in_place, joined
-from generator.assets.procedural.shapes import block, fan, grid, lathe
+from generator.assets.procedural.shapes import along_grain, block, fan, grid, lathe
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import Material
 from generator.core.se3 import Vec3
@@ -68,10 +68,11 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
     thick = 0.03 if style != "bench" else 0.04
     top = (-x / 2, -y / 2, z - thick), (x / 2, y / 2, z)
     frame = {"legs": _four_legs, "trestle": _trestles, "bench": _bench}[style](x, y, z - thick)
-    patches = [block(*top, 0.003), *(block(low, high, 0.002, 1) for low, high in frame)]
-    wood = patterned("texture/wood_planks?seed=3", 0.9, 0.45)
+    patches = [along_grain(block(*top, 0.003), 0.9),
+               *(along_grain(block(low, high, 0.002, 1), 0.5) for low, high in frame)]
+    wood = patterned("texture/wood_planks?seed=1", 0.0, 0.45)
     legs = painted("#3b4046", 0.4) if style == "bench" else patterned(
-        "texture/wood_grain?seed=3", 0.4, 0.5
+        "texture/wood_grain?seed=1", 0.0, 0.5
     )
     return in_place(patches, (wood, legs), [hulls.box(*top), *(hulls.box(*f) for f in frame)])
 
@@ -102,8 +103,9 @@ def shelf(
         frame = [((-x / 2, -y / 2, 0.0), (-x / 2 + t, y / 2, z)),
                  ((x / 2 - t, -y / 2, 0.0), (x / 2, y / 2, z)),
                  ((-x / 2 + t, y / 2 - 0.008, _PLINTH_M - t), (x / 2 - t, y / 2 - 0.002, z))]
-    patches = [*(block(*b, 0.0015) for b in boards), *(block(*f, 0.0015, 1) for f in frame)]
-    wood = patterned("texture/wood_grain?seed=1", 0.5, 0.45)
+    patches = [*(along_grain(block(*b, 0.0015), 0.6) for b in boards),
+               *(along_grain(block(*f, 0.0015, 1), 0.6) for f in frame)]
+    wood = patterned("texture/wood_grain?seed=8", 0.0, 0.45)
     posts = painted("#2f3338", 0.4) if style == "rack" else wood
     return in_place(patches, (wood, posts), [hulls.box(*b) for b in (*boards, *frame)])
 
@@ -302,7 +304,7 @@ def _room_materials() -> tuple[Material, ...]:
     return (
         patterned("texture/wood_planks?seed=0", 1.6, 0.45),
         painted("#f2f1ed", 0.9),
-        patterned("texture/plaster?seed=0", 1.5, 0.9),
+        patterned("texture/plaster?seed=3", 1.5, 0.9),
         painted("#eceae4", 0.5),
         painted("#e9e7e1", 0.45),
         painted("#f3f2ee", 0.4),

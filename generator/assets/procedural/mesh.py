@@ -153,12 +153,13 @@ def _whole_triangles(cells: Indices) -> tuple[Array, NDArray[np.bool_]]:
 def _corner_normals(cells: Indices, corners: Array, crease_deg: float) -> Array:
     """Unit normal per corner: the mean over the faces that meet there without a crease.
 
-    Weighted by the angle of each face at the vertex: Thürmer and Wüthrich, "Computing vertex
-    normals from polygonal facets", J. Graphics Tools 3(1), 1998.
+    Weighted by the angle of each face at the vertex (Thürmer and Wüthrich, "Computing vertex
+    normals from polygonal facets", J. Graphics Tools 3(1), 1998) and by its area, so that a flat
+    face stays flat next to a small bevel.
     """
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     face_normals = np.repeat(_unit(cross), 3, axis=0)
-    weighted = face_normals * _corner_angles(corners).reshape(-1, 1)
+    weighted = np.repeat(cross, 3, axis=0) * _corner_angles(corners).reshape(-1, 1)
     _, vertex = _unique_rows(cells)
     order = np.argsort(vertex, kind="stable")
     counts = np.bincount(vertex)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -258,6 +259,32 @@ def spline(points: Sequence[Sequence[float]], count: int) -> Array:
     return curve
 
 
+def evenly(path: Array, count: int) -> Array:
+    """Points at equal distances along a polyline, shape [count, dimensions]."""
+    steps = np.sqrt(((path[1:] - path[:-1]) ** 2).sum(axis=1))
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    at = np.linspace(0.0, float(length[-1]), count)
+    return np.stack([np.interp(at, length, path[:, i]) for i in range(path.shape[1])], axis=1)
+
+
+def along_grain(patch: Patch, repeat_m: float) -> Patch:
+    """The patch with a texture's horizontal along its longest side, one repeat per ``repeat_m``.
+
+    Each piece starts at another place of the image, as boards cut from different logs do.
+    """
+    low, high = patch.bounds_m()
+    axes = np.argsort(-np.round(high - low, 6), kind="stable")
+    corners = patch.corners_m
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = np.abs(cross).argmax(axis=1)
+    u_axis = np.where(facing == axes[0], axes[1], axes[0])
+    v_axis = 3 - facing - u_axis
+    place = corners - low + 1.618 * (low + high)
+    rows = np.arange(len(corners))
+    uv = np.stack([place[rows, :, u_axis], place[rows, :, v_axis]], axis=2) / repeat_m
+    return replace(patch, uvs=uv)
+
+
 def _quads(points: Array) -> Array:
     a, b = points[:-1, :-1], points[:-1, 1:]
     c, d = points[1:, 1:], points[1:, :-1]
@@ -345,13 +372,27 @@ def _bridged(points: Array, loop: list[int], hole: list[int]) -> list[int]:
     k = int(np.argmax(points[hole, 0]))
     hole = hole[k:] + hole[:k]
     tip = points[hole[0]]
-    edges = [(points[a], points[b]) for a, b in zip(loop, loop[1:] + loop[:1])]
-    for i in np.argsort(((points[loop] - tip) ** 2).sum(axis=1), kind="stable"):
-        target = points[loop[int(i)]]
-        if target[0] >= tip[0] and not any(_cross(tip, target, a, b) for a, b in edges):
-            i = int(i)
+    edges = [(points[a], points[b]) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
+    for i in np.argsort(((points[loop] - tip) ** 2).sum(axis=1), kind="stable").tolist():
+        before, target, after = (points[loop[(i + k) % len(loop)]] for k in (-1, 0, 1))
+        if (
+            target[0] >= tip[0]
+            and _opens_towards(before, target, after, tip)
+            and not any(_cross(tip, target, a, b) for a, b in edges)
+        ):
             return loop[: i + 1] + hole + [hole[0]] + loop[i:]
     raise ValueError("a hole of the polygon lies outside its outline")
+
+
+def _opens_towards(before: Array, corner: Array, after: Array, p: Array) -> bool:
+    """Whether the inside of a counter-clockwise corner faces ``p``.
+
+    A corner that a bridge has doubled faces only one of the two sides of its bridge. O'Rourke,
+    "Computational Geometry in C", 1998, section 1.5.
+    """
+    if _side(corner, after, before) >= 0.0:
+        return _side(corner, p, before) > 0.0 and _side(p, corner, after) > 0.0
+    return not (_side(corner, p, after) >= 0.0 and _side(p, corner, before) >= 0.0)
 
 
 def _cross(a: Array, b: Array, c: Array, d: Array) -> bool:

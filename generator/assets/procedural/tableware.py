@@ -19,7 +19,7 @@ from generator.assets.procedural.materials import (
     plastic,
 )
 from generator.assets.procedural.mesh import Array, Patch, centred
-from generator.assets.procedural.shapes import Point2, circle, fillet, lathe, spline, sweep
+from generator.assets.procedural.shapes import Point2, circle, evenly, fillet, lathe, sweep
 from generator.core.geometry import Material
 from generator.core.streams import Rng
 
@@ -47,7 +47,7 @@ def mug(seed: int) -> Solid:
             *hulls.ring((middle - wall, middle, 0.5 * height), (top - wall, top, height), 9),
         ]
     base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
-    grip_hulls = hulls.tube(path[:: (len(path) - 1) // 5], 0.8 * across[1])
+    grip_hulls = hulls.tube(path[[0, 4, 9, 13, 18, 22]], 0.8 * across[1])
     return centred(
         [*_two_sided(profile, 32), handle], (outside, inside, grip), [base, *rings, *grip_hulls]
     )
@@ -159,16 +159,14 @@ def _handle_path(
         bow = bulge * (1.0 - abs(2.0 * t - 1.0))
         return bottom + (top - bottom) * t + bow - 0.5 * wall
 
-    belly = between(0.75, 1.0, rng)
-    points = [
-        (wall_at(high), 0.0, high),
-        (wall_at(high) + 0.55 * reach, 0.0, high + 0.002),
-        (wall_at(high) + reach, 0.0, high - 0.22 * (high - low)),
-        (wall_at(low) + belly * reach, 0.0, low + 0.3 * (high - low)),
-        (wall_at(low) + 0.45 * reach, 0.0, low + 0.05 * (high - low)),
-        (wall_at(low), 0.0, low),
-    ]
-    return spline(points, 21)
+    belly, square = between(-0.25, 0.0, rng), between(0.45, 0.75, rng)
+    turn = np.linspace(0.5 * math.pi, -0.5 * math.pi, 181)
+    # A superellipse: it leaves the wall level and bulges less below where belly is negative.
+    out = np.maximum(np.cos(turn), 0.0) ** square * (1.0 + 0.5 * belly * (1.0 - np.sin(turn)))
+    z = low + (high - low) * 0.5 * (1.0 + np.sin(turn))
+    x = np.array([wall_at(float(h)) for h in z]) + reach * out
+    x[[0, -1]] = wall_at(high), wall_at(low)
+    return evenly(np.stack([x, np.zeros_like(x), z], axis=1), 23)
 
 
 def _flared(count: int) -> Array:

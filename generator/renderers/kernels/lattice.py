@@ -11,9 +11,12 @@ import warp as wp
 from generator.renderers.kernels.records import (
     View,
     World,
+    corners_of,
+    normal_at,
     pixel_direction,
     surface_index,
     unit,
+    vertex_at,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -51,30 +54,27 @@ def ray_origin(
 
     Source: Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021.
     """
-    body = world.bodies[hit[0]]
-    geometry = world.geometries[body.geometry]
-    face = hit[1]
-    a = geometry.vertices_m[geometry.faces[3 * face]]
-    b = geometry.vertices_m[geometry.faces[3 * face + 1]]
-    c = geometry.vertices_m[geometry.faces[3 * face + 2]]
-    u = weight[0]
-    side = float(1.0)
-    if u > 1.5:
-        u -= 2.0
-        side = -1.0
+    b = hit[0]
+    g = world.bodies[b].geometry
+    corner = corners_of(world, g, hit[1])
+    p0 = vertex_at(world, g, corner[0])
+    p1 = vertex_at(world, g, corner[1])
+    p2 = vertex_at(world, g, corner[2])
+    side = wp.where(weight[0] > 1.5, -1.0, 1.0)
+    u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
     v = weight[1]
     w = 1.0 - u - v
-    p = a * w + b * u + c * v
-    na = geometry.normals[geometry.faces[3 * face]] * side
-    nb = geometry.normals[geometry.faces[3 * face + 1]] * side
-    nc = geometry.normals[geometry.faces[3 * face + 2]] * side
-    shift = na * (w * wp.min(0.0, wp.dot(p - a, na)))
-    shift += nb * (u * wp.min(0.0, wp.dot(p - b, nb)))
-    shift += nc * (v * wp.min(0.0, wp.dot(p - c, nc)))
-    flat = unit(body.R_world_mesh @ wp.cross(b - a, c - a)) * side
+    p = p0 * w + p1 * u + p2 * v
+    n0 = normal_at(world, g, corner[0]) * side
+    n1 = normal_at(world, g, corner[1]) * side
+    n2 = normal_at(world, g, corner[2]) * side
+    shift = n0 * (w * wp.min(0.0, wp.dot(p - p0, n0)))
+    shift += n1 * (u * wp.min(0.0, wp.dot(p - p1, n1)))
+    shift += n2 * (v * wp.min(0.0, wp.dot(p - p2, n2)))
+    flat = unit(wp.cross(p1 - p0, p2 - p0)) * side
     # A tenth of a millimetre per metre: above float32's grain, below what a pixel resolves.
-    lift = 2.0e-5 + 1.0e-4 * wp.length(d_world)
-    return p_world + flat * lift - body.R_world_mesh @ (shift * body.scale)
+    lift_m = 2.0e-5 + 1.0e-4 * wp.length(d_world)
+    return p_world + world.bodies[b].R_world_mesh @ (flat * lift_m - shift * world.bodies[b].scale)
 
 
 @wp.kernel

@@ -17,14 +17,14 @@ import warp as wp
 from generator.renderers.kernels.lattice import Lattice, same_surface
 from generator.renderers.kernels.lighting import SUN, beam_from
 from generator.renderers.kernels.records import (
-    Body,
-    Geometry,
     Lamp,
     View,
     World,
+    corners_of,
     to_mesh_point,
     to_mesh_vector,
     unit,
+    vertex_at,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -81,80 +81,89 @@ class Shaft:
 
     Attributes:
         start, way: From the tile's centre to the lamp's.
-        radius: Of a tube around it that holds tile and lamp.
-        slope: By how much the tube widens per length, instead, for a sun.
+        radius, end_radius: Of a tube around it that holds the tile, and the lamp.
         normal, height: Plane below which nothing shades the tile, if ``flat``.
     """
 
     start: wp.vec3
     way: wp.vec3
     radius: float
-    slope: float
+    end_radius: float
     flat: int
     normal: wp.vec3
     height: float
 
 
 @wp.func
-def shaft_to(body: Body, tile: Tile, way: wp.vec3, radius_m: float, slope: float):
-    """The shaft from a tile along a way, to a ball."""
+def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
+    """The shaft from a tile along a way, to a ball, seen from body b."""
+    shrink = 1.0 / world.bodies[b].scale
     shaft = Shaft()
-    shaft.start = to_mesh_point(body, tile.centre_m)
-    shaft.way = to_mesh_vector(body, way)
-    shaft.radius = wp.max(tile.radius_m, radius_m) / body.scale
-    shaft.slope = slope
+    shaft.start = to_mesh_point(world, b, tile.centre_m)
+    shaft.way = to_mesh_vector(world, b, way)
+    shaft.radius = tile.radius_m * shrink
+    shaft.end_radius = radius_m * shrink
     shaft.flat = tile.flat
-    shaft.normal = wp.transpose(body.R_world_mesh) @ tile.normal
-    height_m = tile.height_m + 1.0e-4 - wp.dot(body.t_world_mesh, tile.normal)
-    shaft.height = height_m / body.scale
+    shaft.normal = wp.transpose(world.bodies[b].R_world_mesh) @ tile.normal
+    height_m = tile.height_m + 1.0e-4 - wp.dot(world.bodies[b].t_world_mesh, tile.normal)
+    shaft.height = height_m * shrink
     return shaft
 
 
 @wp.func
-def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
-    """Whether a box may reach into a shaft."""
-    centre = (low + high) * 0.5
-    half = (high - low) * 0.5
-    if shaft.flat != 0:
-        top = wp.dot(shaft.normal, centre) + wp.dot(wp.abs(shaft.normal), half)
-        if top <= shaft.height:
-            return False
-    grown = shaft.radius
-    if shaft.slope > 0.0:
-        grown += shaft.slope * (wp.length(centre - shaft.start) + wp.length(half))
+def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
+    """The stretch of a shaft's axis that lies in a grown box; empty if it ends before it begins."""
     t0 = float(0.0)
     t1 = float(1.0)
     for k in range(3):
         a = low[k] - grown - shaft.start[k]
         c = high[k] + grown - shaft.start[k]
-        if wp.abs(shaft.way[k]) > 1.0e-9:
-            inverse = 1.0 / shaft.way[k]
-            t0 = wp.max(t0, wp.min(a * inverse, c * inverse))
-            t1 = wp.min(t1, wp.max(a * inverse, c * inverse))
-        elif a > 0.0 or c < 0.0:
-            t1 = -1.0
+        inverse = 1.0 / wp.where(wp.abs(shaft.way[k]) < 1.0e-20, 1.0e-20, shaft.way[k])
+        t0 = wp.max(t0, wp.min(a * inverse, c * inverse))
+        t1 = wp.min(t1, wp.max(a * inverse, c * inverse))
+    return t0, t1
+
+
+@wp.func
+def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
+    """Whether a box may reach into a shaft."""
+    if shaft.flat != 0:
+        top = wp.dot(shaft.normal, (low + high) * 0.5)
+        if top + wp.dot(wp.abs(shaft.normal), (high - low) * 0.5) <= shaft.height:
+            return False
+    # The shaft is as wide as its wider end, then only as wide as where the box may touch it.
+    t0, t1 = overlap(shaft, low, high, wp.max(shaft.radius, shaft.end_radius))
+    for _ in range(2):
+        if t0 <= t1:
+            widening = shaft.end_radius - shaft.radius
+            grown = shaft.radius + wp.max(widening * t0, widening * t1)
+            t0, t1 = overlap(shaft, low, high, grown)
     return t0 <= t1
 
 
 @wp.func
-def triangles_touch(shaft: Shaft, geometry: Geometry):
+def triangles_touch(shaft: Shaft, world: World, g: int):
     """Whether any triangle may reach into a shaft; True where it is tedious to know.
 
     Bodies that surround the scene (a room) or are long and slanted have boxes that touch
     everything; their triangles do not.
     """
-    grown = wp.vec3(shaft.radius, shaft.radius, shaft.radius)
+    here = wp.vec3(shaft.radius, shaft.radius, shaft.radius)
+    there = wp.vec3(shaft.end_radius, shaft.end_radius, shaft.end_radius)
     end = shaft.start + shaft.way
     query = wp.mesh_query_aabb(
-        geometry.mesh, wp.min(shaft.start, end) - grown, wp.max(shaft.start, end) + grown
+        world.geometries[g].mesh,
+        wp.min(shaft.start - here, end - there),
+        wp.max(shaft.start + here, end + there),
     )
     found = bool(False)
     face = int(0)
     looked_at = int(0)
     while wp.mesh_query_aabb_next(query, face):
-        a = geometry.vertices_m[geometry.faces[3 * face]]
-        b = geometry.vertices_m[geometry.faces[3 * face + 1]]
-        c = geometry.vertices_m[geometry.faces[3 * face + 2]]
+        corner = corners_of(world, g, face)
+        a = vertex_at(world, g, corner[0])
+        b = vertex_at(world, g, corner[1])
+        c = vertex_at(world, g, corner[2])
         rises = bool(True)
         if shaft.flat != 0:
             top = wp.max(wp.dot(shaft.normal, a), wp.dot(shaft.normal, b))
@@ -170,23 +179,33 @@ def triangles_touch(shaft: Shaft, geometry: Geometry):
 
 
 @wp.func
-def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float, slope: float):
+def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     """Whether a body may come between a tile and a ball at the end of a way."""
-    body = world.bodies[b]
-    geometry = world.geometries[body.geometry]
-    shaft = shaft_to(body, tile, way, radius_m, slope)
-    shades = touches(shaft, geometry.low_m, geometry.high_m)
-    if shades and slope == 0.0:
-        shades = triangles_touch(shaft, geometry)
+    # Box against box first: it settles most cases.
+    here = wp.vec3(tile.radius_m, tile.radius_m, tile.radius_m)
+    there = wp.vec3(radius_m, radius_m, radius_m)
+    end = tile.centre_m + way
+    low = wp.min(tile.centre_m - here, end - there) - world.bodies[b].high_m
+    high = wp.max(tile.centre_m + here, end + there) - world.bodies[b].low_m
+    if wp.max(low) > 0.0 or wp.min(high) < 0.0:
+        return False
+    g = world.bodies[b].geometry
+    shaft = shaft_to(world, b, tile, way, radius_m)
+    shades = touches(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
+    if shades:
+        shades = triangles_touch(shaft, world, g)
     return shades
 
 
 @wp.func
 def may_shade_from(world: World, b: int, tile: Tile, lamp: Lamp):
     """Whether a body may come between a tile and a lamp."""
+    way = lamp.position_m - tile.centre_m
+    radius_m = lamp.radius
     if lamp.kind == SUN:
-        return may_shade(world, b, tile, lamp.direction * -SUN_DISTANCE_M, 0.0, lamp.radius)
-    return may_shade(world, b, tile, lamp.position_m - tile.centre_m, lamp.radius, 0.0)
+        way = lamp.direction * -SUN_DISTANCE_M
+        radius_m = lamp.radius * SUN_DISTANCE_M
+    return may_shade(world, b, tile, way, radius_m)
 
 
 @wp.func
@@ -225,17 +244,37 @@ def list_occluders(
         for j in range(lamps):
             if may_shade_from(world, b, tile, world.lamps[j]):
                 append(lists, i, j, b)
-        if may_shade(world, b, near, wp.vec3(0.0), 0.0, 0.0):
+        if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
             append(lists, i, lamps, b)
+
+
+@wp.func
+def crosses_box(origin: wp.vec3, path: wp.vec3, low: wp.vec3, high: wp.vec3):
+    """Whether a path may cross a box."""
+    # A grain instead of zero: its reciprocal is large, and its sign does not matter.
+    x = 1.0 / wp.where(wp.abs(path[0]) < 1.0e-20, 1.0e-20, path[0])
+    y = 1.0 / wp.where(wp.abs(path[1]) < 1.0e-20, 1.0e-20, path[1])
+    z = 1.0 / wp.where(wp.abs(path[2]) < 1.0e-20, 1.0e-20, path[2])
+    a = wp.cw_mul(low - origin, wp.vec3(x, y, z))
+    b = wp.cw_mul(high - origin, wp.vec3(x, y, z))
+    near = wp.min(a, b)
+    far = wp.max(a, b)
+    enters = wp.max(wp.max(near), 0.0)
+    leaves = wp.min(wp.min(far), 1.0)
+    return enters <= leaves * 1.000001 + 1.0e-7
 
 
 @wp.func
 def blocked_by(world: World, b: int, origin: wp.vec3, path: wp.vec3):
     """Whether a body cuts the straight path."""
-    body = world.bodies[b]
-    o = to_mesh_point(body, origin)
-    d = to_mesh_vector(body, path)
-    return wp.mesh_query_ray_anyhit(world.geometries[body.geometry].mesh, o, d, 1.0)
+    g = world.bodies[b].geometry
+    o = to_mesh_point(world, b, origin)
+    d = to_mesh_vector(world, b, path)
+    # Most listed bodies are missed: this test costs a fifth of a query that finds nothing.
+    hit = crosses_box(o, d, world.geometries[g].low_m, world.geometries[g].high_m)
+    if hit:
+        hit = wp.mesh_query_ray_anyhit(world.geometries[g].mesh, o, d, 1.0)
+    return hit
 
 
 @wp.func
@@ -323,7 +362,7 @@ def probe_lamps(
     """One ray per point and lamp: 1, 0, or UNSEEN where the lamp lights nothing anyway.
 
     Args:
-        disc: Sixteen points of the unit disc.
+        disc: Forty-eight points of the unit disc; a point looks at one of three in a row.
     """
     i = wp.tid()
     seen = lattice.body[i] >= 0
@@ -339,7 +378,7 @@ def probe_lamps(
             ):
                 value = 1.0
                 if lists[tile, j, 0] != 0:
-                    part = disc[bayer(i % lattice.width, i / lattice.width)]
+                    part = disc[3 * bayer(i % lattice.width, i / lattice.width) + 1]
                     path = path_to_lamp(world.lamps[j], origin, part)
                     if blocked_by_listed(
                         world, lists, tile, j, lattice.skip[i], origin, path
@@ -423,15 +462,15 @@ def refine_lamps(
     lattice: Lattice,
     tile_columns: int,
     lists: wp.array(dtype=int, ndim=3),
-    classes: wp.array(dtype=int, ndim=3),
     disc: wp.array(dtype=wp.vec2),
+    classes: wp.array(dtype=int, ndim=3),
     probed: wp.array(dtype=float, ndim=2),
     lit: wp.array(dtype=float, ndim=2),
 ):
-    """Four more rays where a lamp is neither seen by all points around nor by none.
+    """Two more rays where a lamp is neither seen by all points around nor by none.
 
     Args:
-        disc: Sixty-four points of the unit disc.
+        disc: As for probe_lamps.
     """
     i = wp.tid()
     x = i % lattice.width
@@ -441,16 +480,16 @@ def refine_lamps(
         value = probed[j, i]
         if value != UNSEEN and (classes_around(classes, x, y, j) & 3) == 3:
             if window_bits(lattice, probed, j, i) == 3:
-                seen = float(0.0)
+                seen = value
                 origin = lattice.origin_m[i]
-                for k in range(4):
-                    part = disc[16 * k + bayer(x, y)]
+                for k in range(2):
+                    part = disc[3 * bayer(x, y) + 2 * k]
                     path = path_to_lamp(world.lamps[j], origin, part)
                     if not blocked_by_listed(
                         world, lists, tile, j, lattice.skip[i], origin, path
                     ):
-                        seen += 0.25
-                value = seen
+                        seen += 1.0
+                value = seen / 3.0
         lit[j, i] = value
 
 
@@ -548,8 +587,11 @@ def free_of_listed(
 @wp.func
 def freed_by(world: World, b: int, origin: wp.vec3, path: wp.vec3, free: float):
     """The free part of a path before one body, at most ``free``."""
-    body = world.bodies[b]
-    o = to_mesh_point(body, origin)
-    d = to_mesh_vector(body, path)
-    answer = wp.mesh_query_ray(world.geometries[body.geometry].mesh, o, d, free)
-    return wp.where(answer.result, answer.t, free)
+    g = world.bodies[b].geometry
+    o = to_mesh_point(world, b, origin)
+    d = to_mesh_vector(world, b, path)
+    if crosses_box(o, d, world.geometries[g].low_m, world.geometries[g].high_m):
+        answer = wp.mesh_query_ray(world.geometries[g].mesh, o, d, free)
+        if answer.result:
+            free = answer.t
+    return free

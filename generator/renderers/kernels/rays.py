@@ -29,10 +29,10 @@ def nearest_hit(world: World, origin: wp.vec3, direction: wp.vec3, t_min: float)
     candidates = wp.bvh_query_ray(world.tree, start, direction)
     b = int(0)
     while wp.bvh_query_next(candidates, b, nearest):
-        body = world.bodies[b]
-        o = to_mesh_point(body, start)
-        d = to_mesh_vector(body, direction)
-        answer = wp.mesh_query_ray(world.geometries[body.geometry].mesh, o, d, nearest)
+        o = to_mesh_point(world, b, start)
+        d = to_mesh_vector(world, b, direction)
+        mesh = world.geometries[world.bodies[b].geometry].mesh
+        answer = wp.mesh_query_ray(mesh, o, d, nearest)
         if answer.result:
             nearest = answer.t
             hit = wp.vec2i(b, answer.face)

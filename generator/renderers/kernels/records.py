@@ -63,6 +63,7 @@ class Body:
         B_mesh_camera: Camera direction to mesh direction, scale included.
         eye_mesh: The camera's centre in the mesh frame.
         R_world_mesh, t_world_mesh: Rotation without scale, and position.
+        low_m, high_m: Box in the world.
     """
 
     geometry: int
@@ -75,6 +76,8 @@ class Body:
     eye_mesh: wp.vec3
     R_world_mesh: wp.mat33
     t_world_mesh: wp.vec3
+    low_m: wp.vec3
+    high_m: wp.vec3
 
 
 @wp.struct
@@ -173,24 +176,6 @@ def floor_int(x: float):
     return i
 
 
-@wp.func
-def to_mesh_point(body: Body, p_world: wp.vec3):
-    """World point to mesh frame."""
-    return (wp.transpose(body.R_world_mesh) @ (p_world - body.t_world_mesh)) / body.scale
-
-
-@wp.func
-def to_mesh_vector(body: Body, v_world: wp.vec3):
-    """World displacement to mesh frame."""
-    return (wp.transpose(body.R_world_mesh) @ v_world) / body.scale
-
-
-@wp.func
-def to_world_point(body: Body, p_mesh: wp.vec3):
-    """Mesh point to world frame."""
-    return body.R_world_mesh @ (p_mesh * body.scale) + body.t_world_mesh
-
-
 @wp.struct
 class World:
     """Everything that is not the camera.
@@ -208,8 +193,48 @@ class World:
     sky: Sky
 
 
+# Functions take a World and an index rather than a Body or a Geometry: a record that is copied
+# costs more than the few of its fields that are read.
+
+
+@wp.func
+def to_mesh_point(world: World, b: int, p_world: wp.vec3):
+    """World point to the mesh frame of body b."""
+    moved = wp.transpose(world.bodies[b].R_world_mesh) @ (p_world - world.bodies[b].t_world_mesh)
+    return moved * (1.0 / world.bodies[b].scale)
+
+
+@wp.func
+def to_mesh_vector(world: World, b: int, v_world: wp.vec3):
+    """World displacement to the mesh frame of body b."""
+    return (wp.transpose(world.bodies[b].R_world_mesh) @ v_world) * (1.0 / world.bodies[b].scale)
+
+
+@wp.func
+def corners_of(world: World, g: int, face: int):
+    """Vertex indices of one face of geometry g."""
+    first = 3 * face
+    return wp.vec3i(
+        world.geometries[g].faces[first],
+        world.geometries[g].faces[first + 1],
+        world.geometries[g].faces[first + 2],
+    )
+
+
+@wp.func
+def vertex_at(world: World, g: int, i: int):
+    """Vertex i of geometry g."""
+    return world.geometries[g].vertices_m[i]
+
+
+@wp.func
+def normal_at(world: World, g: int, i: int):
+    """Normal of vertex i of geometry g."""
+    return world.geometries[g].normals[i]
+
+
 @wp.func
 def surface_index(world: World, hit: wp.vec2i):
-    """The material of a face."""
-    body = world.bodies[hit[0]]
-    return body.first_material + world.geometries[body.geometry].face_slots[hit[1]]
+    """The material of a (body, face)."""
+    g = world.bodies[hit[0]].geometry
+    return world.bodies[hit[0]].first_material + world.geometries[g].face_slots[hit[1]]

@@ -17,7 +17,6 @@ from generator.renderers.kernels.occlusion import (
 )
 from generator.renderers.kernels.records import (
     Lamp,
-    Surface,
     View,
     World,
     pixel_direction,
@@ -59,9 +58,8 @@ class Light:
 
 @wp.func
 def light_at(
-    view: View,
     world: World,
-    hit: wp.vec2i,
+    surface: int,
     look: Look,
     p_world: wp.vec3,
     v: wp.vec3,
@@ -76,14 +74,14 @@ def light_at(
         lit: Visible part of each lamp at points [lamp, k]; UNSEEN is none.
         open_sky: Visible part of the hemisphere.
     """
-    material = world.surfaces[surface_index(world, hit)]
     n = look.normal
     n_v = wp.dot(n, v)
-    brdf = make_brdf(look.albedo, look.roughness, material.metallic, material.specular, n_v)
+    metallic = world.surfaces[surface].metallic
+    brdf = make_brdf(look.albedo, look.roughness, metallic, world.surfaces[surface].specular, n_v)
     mirrored = n * (2.0 * n_v) - v
     alpha = brdf.roughness * brdf.roughness
     lux = wp.vec3(0.0)
-    rest = material.emission_cd_m2
+    rest = world.surfaces[surface].emission_cd_m2
     for j in range(world.lamps.shape[0]):
         visible = lit[j, k]
         if visible > 0.0:
@@ -128,9 +126,11 @@ def shade_points(
     if hit[0] >= 0:
         z = images.z_m[i]
         v = unit(-d)
-        look = look_at_hit(view, world, hit, images.weights[i], images.normals[i], z, v)
+        surface = surface_index(world, hit)
+        weight = images.weights[i]
+        look = look_at_hit(view, world, surface, hit, weight, images.normals[i], z, v)
         p = view.eye_m + d * z
-        light = light_at(view, world, hit, look, p, v, lit, open_sky[0, k], k)
+        light = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
         radiance[i] = wp.cw_mul(light.diffuse, look.albedo) + light.rest
     elif world.sky.visible != 0:
         radiance[i] = sky_image(world.sky, d)
@@ -158,21 +158,27 @@ def neighbour(lattice: Lattice, x: int, y: int, k: int):
 def agreement(
     view: View, images: Images, lattice: Lattice, surface: int, i: int, p: wp.vec3, q: int
 ):
-    """Cosine between the normals of pixel i and lattice point q; 0 if on other surfaces."""
+    """Cosine between the normals of pixel i and lattice point q; 0 if on other surfaces.
+
+    One triangle is taken to be flat.
+    """
     cosine = float(0.0)
     if q >= 0:
-        if lattice.surface[q] == surface:
+        if images.hits[lattice.pixel[q]] == images.hits[i]:
+            cosine = 1.0
+        elif lattice.surface[q] == surface:
             tolerance_m = surface_tolerance(view, p)
             cosine = agree(p, images.normals[i], lattice.p_m[q], lattice.normal[q], tolerance_m)
     return cosine
 
 
 @wp.func
-def gatherable(world: World, material: Surface):
+def gatherable(world: World, surface: int):
     """Whether a material's light changes slowly enough to be taken from the lattice."""
-    smooth = material.roughness >= GATHERED_ROUGHNESS
-    if smooth and material.texture >= 0:
-        smooth = material.metallic < 0.05 and world.textures[material.texture].has_bumps == 0
+    smooth = world.surfaces[surface].roughness >= GATHERED_ROUGHNESS
+    texture = world.surfaces[surface].texture
+    if smooth and texture >= 0:
+        smooth = world.surfaces[surface].metallic < 0.05 and world.textures[texture].has_bumps == 0
     return smooth
 
 
@@ -208,11 +214,10 @@ def gather_light(
     z = images.z_m[i]
     p = view.eye_m + d * z
     surface = surface_index(world, hit)
-    material = world.surfaces[surface]
     diffuse = wp.vec3(0.0)
     rest = wp.vec3(0.0)
     found = float(0.0)
-    if gatherable(world, material):
+    if gatherable(world, surface):
         for k in range(4):
             q = neighbour(lattice, x, y, k)
             if agreement(view, images, lattice, surface, i, p, q) > SMOOTH_COSINE:
@@ -222,10 +227,9 @@ def gather_light(
     if found == 0.0:
         pixels[wp.atomic_add(count, 0, 1)] = i
         return
-    albedo = material.base_color
-    if material.texture >= 0:
-        weight = images.weights[i]
-        albedo = look_at_hit(view, world, hit, weight, images.normals[i], z, unit(-d)).albedo
+    weight = images.weights[i]
+    v = unit(-d)
+    albedo = look_at_hit(view, world, surface, hit, weight, images.normals[i], z, v).albedo
     radiance[i] = (wp.cw_mul(diffuse, albedo) + rest) * (1.0 / found)
 
 

@@ -5,89 +5,89 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.records import (
-    Body,
-    Geometry,
     View,
     World,
+    corners_of,
+    normal_at,
     pixel_direction,
     unit,
+    vertex_at,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 
 @wp.struct
-class Hit:
-    """Where a ray meets the plane of one triangle.
+class Facet:
+    """One triangle, made ready for many rays from the camera's centre.
+
+    For a direction d in the camera frame, with ``det = d . across``: the barycentric weights of
+    the second and third vertex are ``d . along_u / det`` and ``d . along_v / det``, the z-depth is
+    ``depth / det``, the side that is seen is the sign of ``det``.
+    Source: Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection", 1997,
+    with the products of the triangle's own vectors taken first.
 
     Attributes:
-        z_m: Distance along the optical axis.
-        u, v: Barycentric weights of the second and third vertex, within the triangle.
-        outside: 1 where the ray meets the side the triangle is wound for.
+        z_m: z-depths of the three vertices.
+        n, n_u, n_v: Normal of the first vertex and the steps to the others, world frame.
     """
 
-    z_m: float
-    u: float
-    v: float
-    outside: int
+    across: wp.vec3
+    along_u: wp.vec3
+    along_v: wp.vec3
+    depth: float
+    z_m: wp.vec3
+    n: wp.vec3
+    n_u: wp.vec3
+    n_v: wp.vec3
 
 
 @wp.func
-def intersect(body: Body, geometry: Geometry, face: int, d_camera: wp.vec3):
-    """The ray's meeting with one triangle it is known to hit, or to miss by a rounding.
-
-    Source: Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection", 1997.
-    """
-    p0 = geometry.vertices_m[geometry.faces[3 * face]]
-    e1 = geometry.vertices_m[geometry.faces[3 * face + 1]] - p0
-    e2 = geometry.vertices_m[geometry.faces[3 * face + 2]] - p0
-    d = body.B_mesh_camera @ d_camera
-    to_eye = body.eye_mesh - p0
-    p = wp.cross(d, e2)
+def facet_of(world: World, hit: wp.vec2i):
+    """The facet of a (body, face)."""
+    b = hit[0]
+    g = world.bodies[b].geometry
+    corner = corners_of(world, g, hit[1])
+    p = vertex_at(world, g, corner[0])
+    e1 = vertex_at(world, g, corner[1]) - p
+    e2 = vertex_at(world, g, corner[2]) - p
+    to_eye = world.bodies[b].eye_mesh - p
+    camera = wp.transpose(world.bodies[b].B_mesh_camera)
     q = wp.cross(to_eye, e1)
-    det = wp.dot(e1, p)
-    hit = Hit()
-    hit.outside = wp.where(det > 0.0, 1, 0)
-    inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
-    u = wp.dot(to_eye, p) * inverse
-    v = wp.dot(d, q) * inverse
-    z = wp.dot(e2, q) * inverse
-    if u < 0.0 or v < 0.0 or u + v > 1.0:
-        # Snapping moved an edge across this pixel's centre: take the triangle's nearest point.
-        u = wp.clamp(u, 0.0, 1.0)
-        v = wp.clamp(v, 0.0, 1.0 - u)
-        p_camera = body.A_camera_mesh @ (p0 + e1 * u + e2 * v) + body.t_camera_mesh
-        z = p_camera[2]
-    hit.u = u
-    hit.v = v
-    hit.z_m = z
-    return hit
+    f = Facet()
+    f.across = camera @ wp.cross(e2, e1)
+    f.along_u = camera @ wp.cross(e2, to_eye)
+    f.along_v = camera @ q
+    f.depth = wp.dot(e2, q)
+    A = world.bodies[b].A_camera_mesh
+    row = wp.vec3(A[2, 0], A[2, 1], A[2, 2])
+    z = wp.dot(row, p) + world.bodies[b].t_camera_mesh[2]
+    f.z_m = wp.vec3(z, z + wp.dot(row, e1), z + wp.dot(row, e2))
+    R = world.bodies[b].R_world_mesh
+    f.n = R @ normal_at(world, g, corner[0])
+    f.n_u = R @ normal_at(world, g, corner[1]) - f.n
+    f.n_v = R @ normal_at(world, g, corner[2]) - f.n
+    return f
 
 
 @wp.func
-def smooth_normal(
-    body: Body, geometry: Geometry, face: int, hit: Hit, d_world: wp.vec3
-):
-    """Interpolated unit normal in the world, on the viewer's side."""
-    n = (
-        geometry.normals[geometry.faces[3 * face]] * (1.0 - hit.u - hit.v)
-        + geometry.normals[geometry.faces[3 * face + 1]] * hit.u
-        + geometry.normals[geometry.faces[3 * face + 2]] * hit.v
-    )
-    if hit.outside == 0:
-        n = -n
-    n = unit(body.R_world_mesh @ n)
-    # Interpolation may tip a normal over the horizon: bring it back to where it is seen edge-on.
-    over = wp.dot(n, d_world)
+def facing(n: wp.vec3, d_world: wp.vec3):
+    """A unit normal that is not turned away from the viewer.
+
+    Interpolation may tip a normal over the horizon: it is brought back to where it is seen edge-on.
+    """
+    m = unit(n)
+    over = wp.dot(m, d_world)
     if over > 0.0:
-        n = unit(n - d_world * (over * 1.001 / wp.dot(d_world, d_world)))
-    return n
+        m = unit(m - d_world * (over * 1.001 / wp.dot(d_world, d_world)))
+    return m
 
 
 @wp.kernel
 def resolve(
     view: View,
     world: World,
+    run: int,
     hits: wp.array(dtype=wp.vec2i),
     z_m: wp.array(dtype=float),
     weights: wp.array(dtype=wp.vec2),
@@ -96,22 +96,44 @@ def resolve(
     """z-depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
 
     Weights are stored as (u, v), with 2 added to u where the inside of the triangle is seen.
+
+    Args:
+        run: Pixels in a row per thread: neighbours on one triangle share its preparation.
     """
-    i = wp.tid()
-    b = hits[i][0]
-    if b < 0:
-        z_m[i] = wp.inf
-        normals[i] = wp.vec3(0.0)
-        return
-    x = float(i % view.width) + 0.5
-    y = float(i / view.width) + 0.5
-    d = pixel_direction(view, x, y)
-    body = world.bodies[b]
-    geometry = world.geometries[body.geometry]
-    hit = intersect(body, geometry, hits[i][1], d)
-    z_m[i] = hit.z_m
-    weights[i] = wp.vec2(hit.u + wp.where(hit.outside == 1, 0.0, 2.0), hit.v)
-    normals[i] = smooth_normal(body, geometry, hits[i][1], hit, view.R_world_camera @ d)
+    y, segment = wp.tid()
+    x = segment * run
+    end = wp.min(x + run, view.width)
+    row = y * view.width
+    while x < end:
+        hit = hits[row + x]
+        if hit[0] < 0:
+            z_m[row + x] = wp.inf
+            normals[row + x] = wp.vec3(0.0)
+            x += 1
+        else:
+            facet = facet_of(world, hit)
+            same = bool(True)
+            while same:
+                d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+                det = wp.dot(d, facet.across)
+                inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
+                u = wp.dot(d, facet.along_u) * inverse
+                v = wp.dot(d, facet.along_v) * inverse
+                z = facet.depth * inverse
+                if u < 0.0 or v < 0.0 or u + v > 1.0:
+                    # Snapping moved an edge across this pixel's centre.
+                    u = wp.clamp(u, 0.0, 1.0)
+                    v = wp.clamp(v, 0.0, 1.0 - u)
+                    z = facet.z_m[0] * (1.0 - u - v) + facet.z_m[1] * u + facet.z_m[2] * v
+                n = facet.n + facet.n_u * u + facet.n_v * v
+                side = wp.where(det < 0.0, -1.0, 1.0)
+                z_m[row + x] = z
+                weights[row + x] = wp.vec2(u + 1.0 - side, v)
+                normals[row + x] = facing(n * side, view.R_world_camera @ d)
+                x += 1
+                same = False
+                if x < end:
+                    same = hits[row + x][0] == hit[0] and hits[row + x][1] == hit[1]
 
 
 @wp.kernel
@@ -166,7 +188,7 @@ def label_object_coordinates(
     p = wp.vec3(0.0)
     if b >= 0:
         if frames[b].labelled != 0:
-            m = mesh_point(world.geometries[world.bodies[b].geometry], hits[i][1], weights[i])
+            m = mesh_point(world, hits[i], weights[i])
             q = frames[b].A_box_mesh @ m + frames[b].t_box_mesh
             p = wp.vec3(
                 wp.clamp(q[0], 0.0, 1.0), wp.clamp(q[1], 0.0, 1.0), wp.clamp(q[2], 0.0, 1.0)
@@ -175,14 +197,11 @@ def label_object_coordinates(
 
 
 @wp.func
-def mesh_point(geometry: Geometry, face: int, weight: wp.vec2):
-    """The point of a triangle with stored barycentric weights."""
-    u = weight[0]
-    if u > 1.5:
-        u -= 2.0
+def mesh_point(world: World, hit: wp.vec2i, weight: wp.vec2):
+    """The point of a (body, face) with stored barycentric weights, in the mesh frame."""
+    u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
     v = weight[1]
-    return (
-        geometry.vertices_m[geometry.faces[3 * face]] * (1.0 - u - v)
-        + geometry.vertices_m[geometry.faces[3 * face + 1]] * u
-        + geometry.vertices_m[geometry.faces[3 * face + 2]] * v
-    )
+    g = world.bodies[hit[0]].geometry
+    corner = corners_of(world, g, hit[1])
+    p = vertex_at(world, g, corner[0]) * (1.0 - u - v)
+    return p + vertex_at(world, g, corner[1]) * u + vertex_at(world, g, corner[2]) * v

@@ -1,0 +1,165 @@
+"""Fruit: spheres pressed, pulled and bent into shape, with stalks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, rng_of
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.materials import linear, printed
+from generator.assets.procedural.mesh import Array, Patch, centred
+from generator.assets.procedural.shapes import ball, circle, evenly, spline, sweep
+from generator.core.geometry import Material
+from generator.core.streams import Rng
+
+_STALK = Material(linear("#5a4329"), 0.8)
+
+
+def apple(seed: int) -> Solid:
+    """An apple with dimples and a stalk. Slots: skin, stalk."""
+    rng = rng_of("apple", seed)
+    radius, slim = between(0.034, 0.042, rng), between(0.9, 1.02, rng)
+    lumps = _lumps(5, 0.025, rng)
+    pinch = between(0.28, 0.36, rng)
+
+    def shape(d: Array) -> Array:
+        z = d[..., 2]
+        dent = pinch * np.exp(-((1 - np.abs(z)) / 0.09)) * np.where(z > 0, 1.0, 0.7)
+        taper = 1.0 + 0.07 * z
+        r = radius * (1 - dent + lumps(d) * (1 - z**2)) * taper
+        return np.stack([r * d[..., 0], r * d[..., 1], slim * r * z], axis=2)
+
+    dip = radius * slim * (1 - pinch) * 1.07
+    skin = printed(f"texture/apple_skin?seed={seed}", between(0.25, 0.4, rng))
+    stalk = _stalk((0.0, 0.0, dip - 0.002), between(0.012, 0.02, rng), 0.0013, rng)
+    body = ball(shape, 22, 28)
+    return centred([body, stalk.painted(1)], (skin, _STALK),
+                   [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)])
+
+
+def orange(seed: int) -> Solid:
+    """An orange with the scar of its stalk. Slots: peel, stalk."""
+    rng = rng_of("orange", seed)
+    radius, flat = between(0.034, 0.042, rng), between(0.93, 1.0, rng)
+    lumps = _lumps(4, 0.012, rng)
+
+    def shape(d: Array) -> Array:
+        z = d[..., 2]
+        dent = 0.05 * np.exp(-((1 - np.abs(z)) / 0.02))
+        r = radius * (1 - dent + lumps(d))
+        return np.stack([r * d[..., 0], r * d[..., 1], flat * r * z], axis=2)
+
+    peel = printed(f"texture/citrus_peel?seed={seed}", between(0.4, 0.55, rng))
+    body = ball(shape, 24, 36)
+    button = ball(lambda d: 0.0035 * d * np.array([1.0, 1.0, 0.4]), 6, 10).painted(1)
+    button = button.moved(z=radius * flat * 0.955)
+    green = Material(linear("#6d7a3a"), 0.8)
+    return centred([body, button], (peel, green), [hulls.extreme(body.corners_m)])
+
+
+def lemon(seed: int) -> Solid:
+    """A lemon lying along X, pointed at one end. Slot: peel."""
+    rng = rng_of("lemon", seed)
+    radius, long = between(0.025, 0.03, rng), between(1.25, 1.45, rng)
+    lumps = _lumps(5, 0.025, rng)
+
+    def shape(d: Array) -> Array:
+        z = d[..., 2]
+        tip = 0.22 * np.exp(-((1 - z) / 0.05)) + 0.12 * np.exp(-((1 + z) / 0.04))
+        r = radius * (1 + lumps(d) * (1 - z**2))
+        x = radius * long * (z + tip * np.sign(z))
+        return np.stack([x, r * d[..., 1], -r * d[..., 0]], axis=2)
+
+    peel = printed(f"texture/citrus_peel?seed={seed + 1000}", between(0.35, 0.5, rng))
+    body = ball(shape, 24, 24)
+    return centred([body], (peel,), [hulls.extreme(body.corners_m)])
+
+
+def pear(seed: int) -> Solid:
+    """A pear standing upright. Slots: skin, stalk."""
+    rng = rng_of("pear", seed)
+    radius, height = between(0.03, 0.036, rng), between(0.085, 0.105, rng)
+    neck, lean = between(0.42, 0.52, rng), between(-0.006, 0.006, rng)
+    lumps = _lumps(4, 0.03, rng)
+
+    def shape(d: Array) -> Array:
+        z = d[..., 2]
+        t = 0.5 + 0.5 * z
+        body = 1.0 - (1.0 - neck) * t**1.5 * (1.0 + 0.35 * np.sin(math.pi * t))
+        flank = np.sqrt(np.maximum(1 - z**2, 0.0)) ** 0.85
+        unit = d[..., :2] / np.maximum(np.sqrt(1 - z**2), 1e-9)[..., None]
+        r = radius * flank * body * (1 + lumps(d)) * 1.12
+        dent = 0.1 * np.exp(-((1 + z) / 0.06))
+        up = 0.5 * height * (z + dent)
+        return np.stack([r * unit[..., 0] + lean * t**2, r * unit[..., 1], up], axis=2)
+
+    skin = printed(f"texture/pear_skin?seed={seed}", between(0.35, 0.5, rng))
+    body = ball(shape, 24, 24)
+    stalk = _stalk((lean, 0.0, 0.5 * height - 0.002), between(0.014, 0.022, rng), 0.0014, rng)
+    points = body.corners_m.reshape(-1, 3)
+    lower, upper = points[points[:, 2] < 0.12 * height], points[points[:, 2] > 0.02 * height]
+    return centred([body, stalk.painted(1)], (skin, _STALK),
+                   [hulls.extreme(lower), hulls.extreme(upper), hulls.extreme(stalk.corners_m, 16)])
+
+
+def banana(seed: int) -> Solid:
+    """A banana lying on its side, bent in the plane of the ground. Slot: peel."""
+    rng = rng_of("banana", seed)
+    length, thick = between(0.17, 0.21, rng), between(0.0165, 0.0195, rng)
+    bend = between(0.9, 1.35, rng)
+    arc = np.linspace(-0.5 * bend, 0.5 * bend, 25)
+    radius = length / bend
+    path = np.stack([radius * np.sin(arc), radius * (1 - np.cos(arc)), np.zeros_like(arc)], axis=1)
+    # Five blunt edges; the stem end is long and thin, the blossom end short.
+    t = np.linspace(0.0, 1.0, 25)
+    girth = np.interp(t, [0, 0.04, 0.1, 0.18, 0.32, 0.5, 0.72, 0.88, 0.95, 0.985, 1.0],
+                      [0.3, 0.26, 0.3, 0.62, 0.92, 1.0, 0.97, 0.78, 0.5, 0.3, 0.24])
+    turn = 2 * math.pi * np.arange(20) / 20
+    edge = 1.0 + 0.045 * np.cos(5 * turn) + 0.008 * np.cos(10 * turn)
+    section = thick * edge[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    skin = sweep(path, section, scale=_smoothed(girth))
+    peel = printed(f"texture/banana_peel?seed={seed}", between(0.4, 0.55, rng))
+    parts = []
+    for a, b in ((0, 4), (4, 9), (9, 15), (15, 20), (20, 24)):
+        ring = np.concatenate([_ring_of(skin, path, i) for i in (a, (a + b) // 2, b)])
+        parts.append(hulls.extreme(ring))
+    return centred([skin], (peel,), parts)
+
+
+def _ring_of(skin: Patch, path: Array, i: int) -> Array:
+    """Points of the skin nearest to one point of the centre line."""
+    points = np.unique(np.round(skin.corners_m.reshape(-1, 3), 9), axis=0)
+    nearest = ((points[:, None, :] - path[None, :, :]) ** 2).sum(axis=2).argmin(axis=1)
+    return np.array(points[nearest == i])
+
+
+def _smoothed(values: Array) -> Array:
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    smooth: Array = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+    return smooth
+
+
+def _lumps(count: int, size: float, rng: Rng) -> Callable[[Array], Array]:
+    """A low-frequency swelling over directions: a sum of cosines."""
+    axes = rng.random((count, 3)) - 0.5
+    phases = 2 * math.pi * rng.random(count)
+
+    def lumps(d: Array) -> Array:
+        total = np.zeros(d.shape[:2])
+        for axis, phase in zip(axes, phases, strict=True):
+            total += np.cos(6.0 * (d * axis).sum(axis=2) + phase)
+        return size * total / count
+
+    return lumps
+
+
+def _stalk(foot: tuple[float, float, float], length: float, thick: float, rng: Rng) -> Patch:
+    """A bent, tapering twig."""
+    x, y, z = foot
+    lean = between(-0.4, 0.4, rng) * length
+    path = evenly(spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24), 6)
+    return sweep(path, circle(thick, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5]))

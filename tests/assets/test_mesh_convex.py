@@ -1,0 +1,93 @@
+"""Collision parts: inside the hull, around the shape, few and small."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from generator.assets.convex import convex_parts, hull_vertices
+from generator.assets.primitives import box, sphere
+from generator.assets.soup import Soup, joined
+from generator.core.errors import AssetError
+
+
+def moved(corners: np.ndarray, by: tuple[float, float, float]) -> np.ndarray:
+    return corners + np.array(by)
+
+
+def tray() -> Soup:
+    """A floor and four walls in one group, 0.4 x 0.4 x 0.1 m, 0.02 m thick."""
+    parts = [
+        box((0.4, 0.4, 0.02)),
+        moved(box((0.02, 0.4, 0.1)), (-0.19, 0, 0.05)),
+        moved(box((0.02, 0.4, 0.1)), (0.19, 0, 0.05)),
+        moved(box((0.4, 0.02, 0.1)), (0, -0.19, 0.05)),
+        moved(box((0.4, 0.02, 0.1)), (0, 0.19, 0.05)),
+    ]
+    return Soup.of(np.concatenate(parts))
+
+
+def test_a_convex_solid_is_one_part_with_its_corners() -> None:
+    """A box is its eight corners."""
+    (part,) = convex_parts(Soup.of(box((0.1, 0.2, 0.3))), "box").parts_m
+    assert sorted(map(tuple, part.tolist())) == sorted(
+        (x, y, z) for x in (-0.05, 0.05) for y in (-0.1, 0.1) for z in (-0.15, 0.15)
+    )
+
+
+def test_groups_of_a_file_become_parts() -> None:
+    """A decomposition made elsewhere is taken as it is."""
+    two = joined([Soup.of(box((1, 1, 1))), Soup.of(moved(box((1, 1, 1)), (3, 0, 0)))])
+    parts = convex_parts(two, "two").parts_m
+    assert [len(part) for part in parts] == [8, 8]
+
+
+def test_a_hollow_thing_stays_hollow() -> None:
+    """A tray's parts leave its middle free, so that things can lie in it."""
+    parts = convex_parts(tray(), "tray", max_parts=16).parts_m
+    assert len(parts) > 4
+    middle = np.array([0.0, 0.0, 0.06])
+    for part in parts:
+        equations = ConvexHull(part).equations
+        assert (equations[:, :3] @ middle + equations[:, 3]).max() > 0.0
+
+
+def test_parts_cover_the_surface() -> None:
+    """Every vertex of the solid lies in some part."""
+    soup = tray()
+    hulls = [ConvexHull(part).equations for part in convex_parts(soup, "tray", 16).parts_m]
+    points = soup.corners.reshape(-1, 3)
+    outside = np.stack([(points @ e[:, :3].T + e[:, 3]).max(axis=1) for e in hulls]).min(axis=0)
+    assert outside.max() < 1e-6
+
+
+@pytest.mark.parametrize("limit", [8, 16, 64])
+def test_large_hulls_are_simplified_from_inside(limit: int) -> None:
+    """A subset of the points that fills most of the hull; more points fill more."""
+    points = sphere(0.1).reshape(-1, 3)
+    part = hull_vertices(points, "ball", limit)
+    assert len(part) <= max(limit, 26)
+    assert {tuple(p) for p in part.round(9)} <= {tuple(p) for p in points.round(9)}
+    share = ConvexHull(part).volume / ConvexHull(points).volume
+    assert share > {8: 0.6, 16: 0.6, 64: 0.85}[limit]
+
+
+def test_a_sheet_of_paper_gets_a_thickness() -> None:
+    """Flat meshes collide, too: 2 % of their extent thick."""
+    sheet = np.array([[[0.0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], [[0.2, 0, 0], [0.2, 0.3, 0], [0, 0.3, 0]]])
+    (part,) = convex_parts(Soup.of(sheet), "sheet").parts_m
+    assert part[:, 2].max() - part[:, 2].min() == pytest.approx(0.02 * 0.3)
+
+
+def test_points_on_a_line_are_refused() -> None:
+    """There is nothing to collide with."""
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [4, 0, 0]])
+    with pytest.raises(AssetError, match="line: .*collision"):
+        hull_vertices(line, "line")
+
+
+def test_parts_are_the_same_every_time() -> None:
+    """Bit by bit."""
+    one, two = (convex_parts(tray(), "tray").parts_m for _ in range(2))
+    assert [p.tobytes() for p in one] == [p.tobytes() for p in two]

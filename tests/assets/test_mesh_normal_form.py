@@ -1,0 +1,176 @@
+"""The normal form: outward, welded, split along creases, bounded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.assets.mesh import NormalForm, normal_form
+from generator.assets.primitives import box, cylinder, sphere
+from generator.assets.soup import Slot, Soup
+from generator.core.errors import AssetError
+from generator.core.geometry import Material, MeshData
+
+
+def volume_m3(mesh: MeshData) -> float:
+    """Signed volume: positive if triangles wind counter-clockwise seen from outside."""
+    corners = mesh.vertices_m.astype(np.float64)[mesh.faces]
+    return float(np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
+
+
+def face_normals(mesh: MeshData) -> np.ndarray:
+    corners = mesh.vertices_m.astype(np.float64)[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def test_a_box_keeps_its_edges() -> None:
+    """Six flat sides share no vertex: 24 vertices, each normal along an axis."""
+    mesh = normal_form(Soup.of(box((0.2, 0.3, 0.4))), "box")
+    assert (len(mesh.vertices_m), len(mesh.faces)) == (24, 12)
+    assert np.abs(mesh.normals).max(axis=1) == pytest.approx(1.0)
+    assert volume_m3(mesh) == pytest.approx(0.2 * 0.3 * 0.4, rel=1e-5)
+
+
+def test_a_ball_is_smooth() -> None:
+    """No vertex is split, and normals point along the radius."""
+    mesh = normal_form(Soup.of(sphere(0.1)), "ball")
+    directions = mesh.vertices_m / np.linalg.norm(mesh.vertices_m, axis=1, keepdims=True)
+    assert (mesh.normals * directions).sum(axis=1).min() > 0.999
+    assert len(mesh.vertices_m) == len(np.unique(mesh.vertices_m.round(6), axis=0))
+
+
+def test_a_cylinder_is_smooth_around_and_sharp_at_its_rims() -> None:
+    """Each rim vertex occurs twice: once for the side, once for the cap."""
+    mesh = normal_form(Soup.of(cylinder(0.05, 0.2)), "can")
+    rim = np.abs(np.hypot(mesh.vertices_m[:, 0], mesh.vertices_m[:, 1]) - 0.05) < 1e-6
+    assert rim.sum() == 2 * 2 * 32
+    vertical = np.abs(mesh.normals[rim, 2])
+    assert set(vertical.round(5).tolist()) == {0.0, 1.0}
+
+
+@pytest.mark.parametrize("crease_deg", [5.0, 60.0])
+def test_the_crease_angle_decides_what_is_smooth(crease_deg: float) -> None:
+    """A 32-sided cylinder has 11.25 degrees between its sides."""
+    mesh = normal_form(Soup.of(cylinder(0.05, 0.2)), "can", NormalForm(crease_deg=crease_deg))
+    flat = np.repeat(face_normals(mesh), 3, axis=0)
+    deviation = (mesh.normals[mesh.faces.reshape(-1)] * flat).sum(axis=1).min()
+    expected = 1.0 if crease_deg < 11.25 else math.cos(math.radians(11.25 / 2))
+    assert deviation == pytest.approx(expected, abs=1e-4)
+
+
+def test_an_inside_out_mesh_is_turned() -> None:
+    """A closed surface encloses a positive volume."""
+    mesh = normal_form(Soup.of(box((0.2, 0.2, 0.2))).flipped(), "box")
+    assert volume_m3(mesh) == pytest.approx(0.008, rel=1e-5)
+    outward = (face_normals(mesh) * mesh.vertices_m[mesh.faces].mean(axis=1)).sum(axis=1)
+    assert (outward > 0).all()
+
+
+def test_mixed_windings_are_made_consistent() -> None:
+    """Every third triangle of a ball is wound the wrong way."""
+    corners = sphere(0.1)
+    corners[::3] = corners[::3, ::-1]
+    mesh = normal_form(Soup.of(corners), "ball")
+    assert volume_m3(mesh) == pytest.approx(volume_m3(normal_form(Soup.of(sphere(0.1)), "ball")))
+    assert (face_normals(mesh) * mesh.vertices_m[mesh.faces].mean(axis=1)).sum(axis=1).min() > 0
+
+
+def test_an_open_surface_keeps_the_winding_of_its_file() -> None:
+    """A single triangle has no inside."""
+    triangle = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    assert normal_form(Soup.of(triangle), "t").normals[0, 2] == 1.0
+    assert normal_form(Soup.of(triangle).flipped(), "t").normals[0, 2] == -1.0
+
+
+def test_degenerate_and_duplicate_triangles_are_dropped() -> None:
+    """A point, a line, and the same triangle twice leave one triangle."""
+    triangle = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    turned = [triangle[1], triangle[2], triangle[0]]
+    line = [[0.0, 0, 0], [0.5, 0, 0], [1, 0, 0]]
+    mesh = normal_form(Soup.of(np.array([triangle, [triangle[0]] * 3, line, turned])), "t")
+    assert mesh.faces.tolist() == [[0, 1, 2]]
+
+
+def test_good_normals_of_a_file_are_kept() -> None:
+    """An artist's normals, up to 45 degrees off the face, survive."""
+    soup = Soup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
+    tilted = np.array([[[0.6, 0, 0.8], [0, 0.6, 0.8], [0.0, 0, 1]]])
+    assert normal_form(replace(soup, normals=tilted), "t").normals == pytest.approx(tilted[0])
+
+
+@pytest.mark.parametrize("bad", [np.zeros((1, 3, 3)), np.full((1, 3, 3), np.nan)])
+def test_bad_normals_of_a_file_are_replaced(bad: np.ndarray) -> None:
+    """Zero, undefined or backward normals say nothing."""
+    soup = Soup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
+    backward = np.broadcast_to(np.array([0.0, 0.0, -1.0]), (1, 3, 3))
+    for normals in (bad, backward):
+        mesh = normal_form(replace(soup, normals=normals), "t")
+        assert mesh.normals[:, 2].tolist() == [1.0, 1.0, 1.0]
+
+
+def test_a_dense_mesh_is_thinned_out_to_its_budget_and_keeps_its_shape() -> None:
+    """A ball of 4,096 triangles in two colours comes down to about 1,000."""
+    corners = np.array([t for s in _subdivided(sphere(0.1), 1) for t in [s]])
+    upper = (corners.mean(axis=1)[:, 2] > 0).astype(np.int64)
+    red, blue = Material(base_color=(1, 0, 0)), Material(base_color=(0, 0, 1))
+    soup = replace(
+        Soup.of(corners), face_slots=upper, slots=(Slot("a", red, True), Slot("b", blue, True))
+    )
+    mesh = normal_form(soup, "ball", NormalForm(max_faces=1000))
+    assert len(corners) > 3500
+    assert 800 < len(mesh.faces) < 1200
+    assert np.abs(np.linalg.norm(mesh.vertices_m, axis=1) - 0.1).max() < 0.004
+    heights = mesh.vertices_m[mesh.faces].mean(axis=1)[:, 2]
+    assert mesh.materials == (red, blue)
+    assert ((heights > 0) == (mesh.face_slots == 1)).all()
+
+
+def _subdivided(corners: np.ndarray, times: int) -> np.ndarray:
+    for _ in range(times):
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        corners = np.concatenate([np.stack(p, axis=1) for p in parts])
+    return corners
+
+
+def test_equal_materials_become_one_slot_and_unused_ones_none() -> None:
+    """Renderers get one draw per look, not one per name."""
+    plain = Material()
+    slots = (Slot("a", plain), Slot("b", plain), Slot("c", Material(roughness=0.1)))
+    soup = replace(
+        Soup.of(box((1, 1, 1))), face_slots=np.array([0, 1] * 6), slots=slots
+    )
+    mesh = normal_form(soup, "box")
+    assert mesh.materials == (plain,)
+    assert set(mesh.face_slots.tolist()) == {0}
+
+
+@pytest.mark.parametrize(
+    ("corners", "reason"),
+    [
+        (np.zeros((0, 3, 3)), "no triangles"),
+        (np.full((1, 3, 3), np.nan), "not finite"),
+        (box((1e-5, 1e-5, 1e-5)), "set scale or size_m"),
+        (box((2e3, 1, 1)), "set scale or size_m"),
+        (box((1, 1, 1)) + 1e5, "from its origin"),
+        (np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]]), "degenerate"),
+    ],
+)
+def test_unusable_soups_are_refused(corners: np.ndarray, reason: str) -> None:
+    """The message names the place, the fact and what to do."""
+    with pytest.raises(AssetError, match=rf"^place: .*{reason}"):
+        normal_form(Soup.of(corners), "place")
+
+
+def test_mirroring_keeps_the_outside_outside() -> None:
+    """A scale of -1 along one axis, as some URDFs have, does not turn a mesh inside out."""
+    matrix = np.hstack([np.diag([-1.0, 1.0, 1.0]), np.zeros((3, 1))])
+    soup = Soup.of(box((0.1, 0.2, 0.3))).transformed(matrix)
+    assert (np.einsum("ni,ni->n", soup.corners.mean(axis=1),
+            np.cross(soup.corners[:, 1] - soup.corners[:, 0],
+                     soup.corners[:, 2] - soup.corners[:, 0])) > 0).all()  # fmt: skip

@@ -1,0 +1,188 @@
+"""File formats: what the files say is what is read."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from generator.assets.folder import Folder
+from generator.assets.library import open_library
+from generator.assets.primitives import box, sphere
+from generator.assets.readers import read_mesh
+
+CUBE_OBJ = """mtllib cube.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 0 0 1
+v 1 0 1
+v 1 1 1
+v 0 1 1
+usemtl red
+f 4 3 2 1
+f 5 6 7 8
+usemtl shiny
+f -8 -7 -3 -4
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+"""
+
+
+def test_obj_polygons_negative_indices_and_materials(tmp_path: Path) -> None:
+    """Quads become two triangles; -8 of 8 vertices is the first."""
+    (tmp_path / "cube.obj").write_text(CUBE_OBJ)
+    (tmp_path / "cube.mtl").write_text(
+        "newmtl red\nKd 1 0 0\nNs 0\nnewmtl shiny\nKd 0.5 0.5 0.5\nPr 0.1\nPm 1\n"
+    )
+    soup = read_mesh(Folder(tmp_path), "cube.obj").soup
+    assert len(soup) == 12
+    front = soup.corners[4:6].reshape(-1, 3)
+    assert set(front[:, 1].tolist()) == {0.0}
+    used = {soup.slots[k].name: soup.slots[k].material for k in np.unique(soup.face_slots)}
+    assert used["red"].base_color == (1.0, 0.0, 0.0)
+    # IEC 61966-2-1: sRGB 0.5 is linear 0.2140.
+    assert used["shiny"].base_color == pytest.approx((0.2140,) * 3, abs=1e-4)
+    assert (used["shiny"].roughness, used["shiny"].metallic) == (0.1, 1.0)
+
+
+def test_obj_groups_follow_its_objects(tmp_path: Path) -> None:
+    """Two ``o`` statements are two groups."""
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\no a\nf 1 2 3\no b\nf 1 3 2\n"
+    (tmp_path / "two.obj").write_text(text)
+    assert len(set(read_mesh(Folder(tmp_path), "two.obj").soup.face_groups.tolist())) == 2
+
+
+def test_obj_texture_options_and_odd_line_ends(tmp_path: Path) -> None:
+    """``-s 2 2 1`` before the file name, spaces in it, and CR LF."""
+    (tmp_path / "a.mtl").write_bytes(b"newmtl m\r\nmap_Kd -s 2 2 1 -clamp on maps/my wood.png\r\n")
+    (tmp_path / "a.obj").write_bytes(
+        b"mtllib a.mtl\r\nusemtl m\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\n"
+        b"vt 0 0\r\nvt 1 0\r\nvt 0 1\r\nf 1/1 2/2 3/3\r\n"
+    )
+    soup = read_mesh(Folder(tmp_path), "a.obj").soup
+    assert soup.slots[int(soup.face_slots[0])].material.texture == "maps/my wood.png"
+    assert soup.uvs is not None
+    assert soup.uvs[0].tolist() == [[0, 0], [1, 0], [0, 1]]
+
+
+@pytest.mark.parametrize("suffix", ["stl", "stl_ascii", "ply", "obj"])
+def test_files_written_by_another_tool_read_back(tmp_path: Path, suffix: str) -> None:
+    """trimesh writes, we read: the same triangles as a set."""
+    corners = sphere(0.1).round(4)
+    mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(len(corners) * 3).reshape(-1, 3), process=False)
+    name = f"ball.{suffix.partition('_')[0]}"
+    data = mesh.export(file_type=suffix)
+    (tmp_path / name).write_bytes(data if isinstance(data, bytes) else data.encode())
+    read = read_mesh(Folder(tmp_path), name).soup
+    assert read.corners == pytest.approx(corners, abs=1e-6)
+
+
+def glb(tree: dict[str, Any], binary: bytes) -> bytes:
+    """A binary glTF file of a document and one buffer."""
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    binary += b"\0" * (-len(binary) % 4)
+    length = 12 + 8 + len(text) + 8 + len(binary)
+    return (
+        struct.pack("<4sII", b"glTF", 2, length)
+        + struct.pack("<II", len(text), 0x4E4F534A) + text
+        + struct.pack("<II", len(binary), 0x004E4942) + binary
+    )  # fmt: skip
+
+
+def textured_triangle(tmp_path: Path) -> tuple[dict[str, Any], bytes]:
+    """A triangle in the plane Y = 0 of glTF, 2 m wide, with an embedded 4 x 2 image."""
+    image = np.zeros((2, 4, 3), np.uint8)
+    image[0, 0] = (255, 0, 0)
+    Image.fromarray(image).save(tmp_path / "i.png")
+    png = (tmp_path / "i.png").read_bytes()
+    positions = np.array([[0, 0, 0], [2, 0, 0], [0, 0, -2]], "<f4").tobytes()
+    uvs = np.array([[0, 0], [1, 0], [0, 1]], "<f4").tobytes()
+    indices = np.array([0, 1, 2], "<u2").tobytes() + b"\0\0"
+    binary = positions + uvs + indices + png
+    tree = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"children": [1], "scale": [0.5, 0.5, 0.5]}, {"mesh": 0, "translation": [2, 0, 0]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1},
+                                    "indices": 2, "material": 0}]}],
+        "materials": [{"name": "paint", "pbrMetallicRoughness": {
+            "baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.5, 0.5, 1],
+            "metallicFactor": 0, "roughnessFactor": 0.3}}],
+        "textures": [{"source": 0}],
+        "images": [{"bufferView": 3, "mimeType": "image/png"}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5123, "count": 3, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 36, "byteLength": 24},
+            {"buffer": 0, "byteOffset": 60, "byteLength": 6},
+            {"buffer": 0, "byteOffset": 68, "byteLength": len(png)},
+        ],
+        "buffers": [{"byteLength": len(binary)}],
+    }  # fmt: skip
+    return tree, binary
+
+
+def test_glb_comes_upright_with_its_embedded_image(tmp_path: Path) -> None:
+    """Node transforms apply, Y becomes Z, UVs count from the bottom, images are served."""
+    tree, binary = textured_triangle(tmp_path)
+    folder = tmp_path / "assets"
+    folder.mkdir()
+    (folder / "flag.glb").write_bytes(glb(tree, binary))
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    mesh = library.mesh("user/flag")
+    low, high = np.array(mesh.bounds_m())
+    assert high - low == pytest.approx([1.0, 1.0, 0.0], abs=1e-6)
+    # glTF's +Y, the triangle's front, is our +Z.
+    assert mesh.normals[:, 2] == pytest.approx(1.0)
+    assert mesh.uvs[0].tolist() == [0.0, 1.0]
+    (material,) = mesh.materials
+    assert material.texture == "user/flag#0"
+    assert (material.roughness, material.metallic) == (0.3, 0.0)
+    assert material.base_color == (0.5, 0.5, 0.5)
+    assert library.texture(material.texture).albedo[0, 0].tolist() == [255, 0, 0]
+    again = open_library([folder], cache_dir=tmp_path / "cache")
+    assert again.texture(material.texture).albedo.shape == (2, 4, 3)
+
+
+def test_gltf_with_separate_and_inline_buffers_agree(tmp_path: Path) -> None:
+    """A .bin beside the file, a data URI and a GLB hold the same triangles."""
+    tree, binary = textured_triangle(tmp_path)
+    (tmp_path / "a.glb").write_bytes(glb(tree, binary))
+    (tmp_path / "my data.bin").write_bytes(binary)
+    tree["buffers"][0]["uri"] = "my%20data.bin"
+    (tmp_path / "b.gltf").write_text(json.dumps(tree))
+    tree["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
+    (tmp_path / "c.gltf").write_text(json.dumps(tree))
+    soups = [read_mesh(Folder(tmp_path), name).soup for name in ("a.glb", "b.gltf", "c.gltf")]
+    for soup in soups[1:]:
+        assert soup.corners.tobytes() == soups[0].corners.tobytes()
+
+
+def test_glb_written_by_another_tool_reads_back(tmp_path: Path) -> None:
+    """trimesh writes a box with a transform; it comes at its place and size."""
+    scene = trimesh.Scene()
+    matrix = np.eye(4)
+    matrix[:3, 3] = (1, 2, 3)
+    cube = box((0.2, 0.4, 0.6))
+    mesh = trimesh.Trimesh(cube.reshape(-1, 3), np.arange(36).reshape(-1, 3), process=False)
+    scene.add_geometry(mesh, transform=matrix)
+    (tmp_path / "box.glb").write_bytes(scene.export(file_type="glb"))
+    points = read_mesh(Folder(tmp_path), "box.glb").soup.corners.reshape(-1, 3)
+    assert points.min(axis=0) == pytest.approx([0.9, 1.8, 2.7], abs=1e-6)
+    assert points.max(axis=0) == pytest.approx([1.1, 2.2, 3.3], abs=1e-6)

@@ -1,0 +1,151 @@
+"""What must hold for every template and configuration that is shipped."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import configs
+import scene_templates
+from generator.assemble.recipe import nominal_scene
+from generator.assemble.spec import Spec, load_spec
+from generator.assets.library import Library, open_library
+from generator.config.describe import describe
+from generator.config.document import load
+from generator.config.schema import json_schema
+from generator.core.errors import LayoutRejected
+from generator.core.interfaces import Stage
+from generator.core.scene import Body, Scene
+from generator.core.serial import canonical_json
+from generator.core.streams import Streams
+
+CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
+TEMPLATES = sorted(path.stem for path in Path(scene_templates.__path__[0]).glob("*.yaml"))
+
+
+@cache
+def library() -> Library:
+    """The assets that come with the package and its dependencies."""
+    return open_library(())
+
+
+@cache
+def spec(name: str) -> Spec:
+    """A shipped configuration."""
+    return load_spec(name)
+
+
+@cache
+def scene_of(name: str) -> Scene:
+    """Its nominal scene."""
+    return nominal_scene(spec(name), library())
+
+
+def box_m(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of a body in the world [m], from the corners of its own box."""
+    low, high = (np.array(corner) * body.scale for corner in library().bounds_m(body.asset))
+    signs = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
+    corners = body.T_world_body.apply(low + signs * (high - low))
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def randomized(name: str, streams: Streams) -> Scene | None:
+    """One attempt at a scene, without physics; None where a randomizer found no valid draw."""
+    scene = scene_of(name)
+    for randomizer in sorted(spec(name).randomizers, key=lambda r: r.stage is Stage.VIEW):
+        try:
+            scene = randomizer(scene, library(), streams.rng(randomizer.name))
+        except LayoutRejected:
+            return None
+    return scene
+
+
+def test_every_template_is_used_by_a_configuration() -> None:
+    """What is shipped can be run."""
+    assert {spec(name).head.template for name in CONFIGS} == set(TEMPLATES)
+
+
+@pytest.mark.parametrize("kind", list(scene_templates.TABLE))
+def test_every_element_explains_itself(kind: str) -> None:
+    """Schema and description exist, and every field is described."""
+    model = scene_templates.TABLE.load(kind)
+    schema = json_schema(model)
+    undescribed = [
+        name
+        for name, entry in schema["properties"].items()
+        if not entry.get("description") and name not in {"type", "name"}
+    ]
+
+    assert not undescribed
+    assert schema["properties"]["type"]["const"] == kind
+    assert describe(model)
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_template_has_a_comment_that_tells_what_it_is(name: str) -> None:
+    """The first line of the file, in words."""
+    first = (Path(scene_templates.__path__[0]) / f"{name}.yaml").read_text().splitlines()[0]
+
+    assert first.startswith("# ")
+    assert len(first) > 20
+    assert load(Path(scene_templates.__path__[0]) / f"{name}.yaml").get("elements") is not None
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_configuration_tells_editors_its_schema(name: str) -> None:
+    """The modeline that editors complete by."""
+    text = (Path(configs.__path__[0]) / f"{name}.yaml").read_text()
+
+    assert text.startswith("# yaml-language-server: $schema=schema.json\n")
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_nominal_objects_stand_on_their_surfaces_inside_the_room(name: str) -> None:
+    """Over one of the group's rectangles, at its height or higher, below its ceiling."""
+    scene = scene_of(name)
+    groups = {group.name: group for group in scene.groups}
+    for body in (b for b in scene.bodies if b.group):
+        low, high = box_m(body)
+        surfaces = [scene.surface(s) for s in groups[body.group].surfaces]
+        over = [
+            s
+            for s in surfaces
+            if (np.abs(0.5 * (low + high) - s.T_world_surface.translation_m)[:2]
+                <= np.array(s.size_m) / 2).all()
+            and low[2] - s.T_world_surface.translation_m[2] >= -1e-6
+            and high[2] - s.T_world_surface.translation_m[2] <= s.clearance_m
+        ]  # fmt: skip
+
+        assert over
+        assert (low >= scene.interior_m[0] - np.array([0.15, 0.15, 0.15])).all()
+        assert (high <= scene.interior_m[1] + np.array([0.15, 0.15, 0.15])).all()
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_nominal_scene_is_the_same_every_time(name: str) -> None:
+    """Built twice, from two libraries."""
+    again = nominal_scene(load_spec(name), open_library(()))
+
+    assert canonical_json(again) == canonical_json(scene_of(name))
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_randomizers_draw_valid_scenes(name: str) -> None:
+    """Ten scenes: names and ids unique, cameras and lamps in the room; few attempts are refused."""
+    attempts = 0
+    for scene_index in range(10):
+        scene = None
+        while scene is None:
+            attempts += 1
+            assert attempts <= 15
+            scene = randomized(name, Streams(1, scene_index, attempt=attempts))
+        low, high = (np.array(corner) for corner in scene.interior_m)
+        places = [light.position_m for light in scene.lights if light.kind != "sun"]
+        places += [camera.T_world_camera.translation_m for camera in scene.cameras]
+
+        assert all(((low <= place) & (place <= high)).all() for place in map(np.array, places))
+        assert len({body.name for body in scene.bodies}) == len(scene.bodies)
+        assert len({i.instance_id for i in scene.instances}) == len(scene.instances)
