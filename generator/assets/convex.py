@@ -30,6 +30,8 @@ _MIN_THICKNESS = 0.02
 """Flat parts are given this share of their largest extent as thickness."""
 _SCOUTS = 256
 """While a cut is chosen, hulls are taken of about this many points."""
+_CROWD = 4096
+"""Of more points than this, only the extreme ones are looked at: qhull crawls on round shapes."""
 
 
 def convex_parts(soup: Soup, place: str, max_parts: int = MAX_PARTS) -> ConvexParts:
@@ -65,6 +67,8 @@ def hull_vertices(points: Float64, place: str, max_vertices: int = MAX_VERTICES)
     from scipy.spatial import ConvexHull, QhullError
 
     points = _solid(_distinct(points))
+    if len(points) > _CROWD:
+        points = points[sorted({*_scouts(points), *_extremes(points)})]
     try:
         hull = ConvexHull(points)
         points = points[np.sort(hull.vertices, kind="stable")]

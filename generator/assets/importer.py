@@ -140,7 +140,13 @@ def _shape_soup(folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bo
     """Triangles of a URDF element in the root frame, with the element's colour."""
     matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
     if shape.kind == "mesh":
-        soup = read_mesh(folder, shape.file, materials=materials).soup
+        source = read_mesh(folder, shape.file, materials=materials)
+        if source.images:
+            raise AssetError(
+                f"{folder.root / shape.file}: holds its images inside, which a URDF's meshes may "
+                "not; export it with images as files"
+            )
+        soup = source.soup
         matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
     elif shape.kind == "box":
         soup = Soup.of(box(shape.size))

@@ -73,7 +73,9 @@ def test_collision_parts_cover_what_is_seen(library: Library, name: str) -> None
     assert (points.max(axis=0) <= high + slack).all()
     assert (points.min(axis=0) >= low - slack).all()
     assert (points.max(axis=0) >= high - slack).all()
-    assert (points.max(axis=0) - points.min(axis=0))[:2] == pytest.approx((high - low)[:2], abs=slack)
+    assert (points.max(axis=0) - points.min(axis=0))[:2] == pytest.approx(
+        (high - low)[:2], abs=slack
+    )
 
 
 @pytest.mark.parametrize("name", OBJECTS)
@@ -100,7 +102,7 @@ def test_a_thousand_random_shapes_are_found_by_tag(library: Library) -> None:
 
 
 def test_random_shapes_come_at_the_size_of_their_urdf(library: Library) -> None:
-    """A mesh of some units at scale 0.015 becomes a hand-sized object, coloured as the URDF says."""
+    """At scale 0.015 they are hand-sized, and they have the colour of their URDF."""
     lines = Path(pybullet_data.getDataPath(), "random_urdfs/000/000.obj").read_text().splitlines()
     points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=float)
     expected = 0.015 * (points.max(axis=0) - points.min(axis=0))

@@ -75,7 +75,9 @@ def test_large_hulls_are_simplified_from_inside(limit: int) -> None:
 
 def test_a_sheet_of_paper_gets_a_thickness() -> None:
     """Flat meshes collide, too: 2 % of their extent thick."""
-    sheet = np.array([[[0.0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], [[0.2, 0, 0], [0.2, 0.3, 0], [0, 0.3, 0]]])
+    sheet = np.array(
+        [[[0.0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], [[0.2, 0, 0], [0.2, 0.3, 0], [0, 0.3, 0]]]
+    )
     (part,) = convex_parts(Soup.of(sheet), "sheet").parts_m
     assert part[:, 2].max() - part[:, 2].min() == pytest.approx(0.02 * 0.3)
 
@@ -83,7 +85,7 @@ def test_a_sheet_of_paper_gets_a_thickness() -> None:
 def test_points_on_a_line_are_refused() -> None:
     """There is nothing to collide with."""
     line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [4, 0, 0]])
-    with pytest.raises(AssetError, match="line: .*collision"):
+    with pytest.raises(AssetError, match=r"line: .*collision"):
         hull_vertices(line, "line")
 
 

@@ -106,7 +106,8 @@ MESHES: dict[str, tuple[str, bytes | str]] = {
         ply(f"element vertex 3\n{VERTICES}element face 1\n{FACES}",
             np.eye(3, dtype="<f4").tobytes() + b"\x03" + np.array([0, 1, 9], "<i4").tobytes()),
     ),
-    "truncated ply": ("a.ply", ply(f"element vertex 30\n{VERTICES}element face 9\n{FACES}", b"x" * 60)),
+    "truncated ply": (
+        "a.ply", ply(f"element vertex 30\n{VERTICES}element face 9\n{FACES}", b"x" * 60)),
     "no header end ply": ("a.ply", b"ply\n" + b"comment x\n" * 20_000),
     "empty glb": ("a.glb", b""),
     "magic only glb": ("a.glb", b"glTF"),
@@ -125,13 +126,15 @@ MESHES: dict[str, tuple[str, bytes | str]] = {
     "cycle of 20,000 nodes gltf": ("a.gltf", gltf(nodes=chain(20_000))),
     "count of two billion gltf": ("a.gltf", gltf(accessors=accessor(count=2**31))),
     "zero count gltf": ("a.gltf", gltf(accessors=accessor(count=0))),
-    "no view gltf": ("a.gltf", gltf(accessors=[{"componentType": 5126, "count": 10**9, "type": "VEC3"}])),
+    "no view gltf": (
+        "a.gltf", gltf(accessors=[{"componentType": 5126, "count": 10**9, "type": "VEC3"}])),
     "sparse gltf": ("a.gltf", gltf(accessors=accessor(sparse={"count": 1}))),
     "unknown component gltf": ("a.gltf", gltf(accessors=accessor(componentType=1))),
     "wrong type gltf": ("a.gltf", gltf(accessors=accessor(type="MAT4"))),
     "offset beyond gltf": ("a.gltf", gltf(accessors=accessor(byteOffset=30))),
     "negative offset gltf": ("a.gltf", gltf(accessors=accessor(byteOffset=-4))),
-    "small stride gltf": ("a.gltf", gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": 1}])),
+    "small stride gltf": (
+        "a.gltf", gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": 1}])),
     "view beyond gltf": ("a.gltf", gltf(bufferViews=[{"buffer": 0, "byteLength": 999}])),
     "file uri gltf": ("a.gltf", gltf(buffers=[{"byteLength": 36, "uri": "file:///etc/passwd"}])),
     "http uri gltf": ("a.gltf", gltf(buffers=[{"byteLength": 36, "uri": "http://127.0.0.1:9/x"}])),
@@ -179,13 +182,15 @@ URDFS: dict[str, str | bytes] = {
     "two links of one name": robot(extra='<link name="a"/>'),
     "two roots": robot(extra='<link name="b"/>'),
     "own parent": robot(extra=joint("a", "a")),
-    "loop": robot(extra='<link name="b"/><link name="c"/>' + joint("b", "c", "j1") + joint("c", "b", "j2")),
+    "loop": robot(extra='<link name="b"/><link name="c"/>' + joint("b", "c", "j1")
+                  + joint("c", "b", "j2")),
     "two parents": robot(extra='<link name="b"/><link name="c"/>' + joint("a", "c", "j1")
                          + joint("b", "c", "j2") + joint("a", "b", "j3")),
     "joint to nowhere": robot(extra=joint("a", "z")),
     "unknown joint type": robot(extra='<link name="b"/>' + joint("a", "b", kind="magic")),
     "no limits": robot(extra='<link name="b"/>' + joint("a", "b", kind="revolute")),
-    "nan pose": robot('<visual><origin xyz="nan 0 0"/><geometry><box size="1 1 1"/></geometry></visual>'),
+    "nan pose": robot('<visual><origin xyz="nan 0 0"/>'
+                      '<geometry><box size="1 1 1"/></geometry></visual>'),
     "two numbers": robot('<visual><geometry><box size="1 1"/></geometry></visual>'),
     "negative nothing box": robot('<visual><geometry><box size="0 0 0"/></geometry></visual>'),
     "unknown geometry": robot("<visual><geometry><plane/></geometry></visual>"),
@@ -225,8 +230,12 @@ def test_hostile_meshes_are_refused(tmp_path: Path, name: str) -> None:
     """An AssetError within seconds, and nothing is cached."""
     file, content = MESHES[name]
     (tmp_path / "assets").mkdir()
-    (tmp_path / "assets" / file).write_bytes(content if isinstance(content, bytes) else content.encode())
-    (tmp_path / "assets/assets.yaml").write_text(f"assets: [{{id: a, file: {file}, category: x}}]\n")
+    (tmp_path / "assets" / file).write_bytes(
+        content if isinstance(content, bytes) else content.encode()
+    )
+    (tmp_path / "assets/assets.yaml").write_text(
+        f"assets: [{{id: a, file: {file}, category: x}}]\n"
+    )
     refused(tmp_path, file, lambda library: library.mesh("user/a"))
 
 
@@ -235,7 +244,9 @@ def test_hostile_urdfs_are_refused(tmp_path: Path, name: str) -> None:
     """Entities are never expanded, references never leave the folder, trees are trees."""
     content = URDFS[name]
     (tmp_path / "assets").mkdir()
-    (tmp_path / "assets/a.urdf").write_bytes(content if isinstance(content, bytes) else content.encode())
+    (tmp_path / "assets/a.urdf").write_bytes(
+        content if isinstance(content, bytes) else content.encode()
+    )
     (tmp_path / "assets/assets.yaml").write_text("assets: [{id: a, file: a.urdf, category: x}]\n")
     refused(tmp_path, "a.urdf", lambda library: library.mesh("user/a"))
 
@@ -244,7 +255,9 @@ def png_claiming(width: int, height: int) -> bytes:
     """A PNG of a few bytes whose header claims a size."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
 
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header)

@@ -142,9 +142,7 @@ def test_equal_materials_become_one_slot_and_unused_ones_none() -> None:
     """Renderers get one draw per look, not one per name."""
     plain = Material()
     slots = (Slot("a", plain), Slot("b", plain), Slot("c", Material(roughness=0.1)))
-    soup = replace(
-        Soup.of(box((1, 1, 1))), face_slots=np.array([0, 1] * 6), slots=slots
-    )
+    soup = replace(Soup.of(box((1, 1, 1))), face_slots=np.array([0, 1] * 6), slots=slots)
     mesh = normal_form(soup, "box")
     assert mesh.materials == (plain,)
     assert set(mesh.face_slots.tolist()) == {0}

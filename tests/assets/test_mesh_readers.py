@@ -17,6 +17,7 @@ from generator.assets.folder import Folder
 from generator.assets.library import open_library
 from generator.assets.primitives import box, sphere
 from generator.assets.readers import read_mesh
+from generator.core.errors import AssetError
 
 CUBE_OBJ = """mtllib cube.mtl
 v 0 0 0
@@ -77,9 +78,11 @@ def test_obj_texture_options_and_odd_line_ends(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", ["stl", "stl_ascii", "ply", "obj"])
 def test_files_written_by_another_tool_read_back(tmp_path: Path, suffix: str) -> None:
-    """trimesh writes, we read: the same triangles as a set."""
+    """Trimesh writes, we read: the same triangles as a set."""
     corners = sphere(0.1).round(4)
-    mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(len(corners) * 3).reshape(-1, 3), process=False)
+    mesh = trimesh.Trimesh(
+        corners.reshape(-1, 3), np.arange(len(corners) * 3).reshape(-1, 3), process=False
+    )
     name = f"ball.{suffix.partition('_')[0]}"
     data = mesh.export(file_type=suffix)
     (tmp_path / name).write_bytes(data if isinstance(data, bytes) else data.encode())
@@ -114,7 +117,8 @@ def textured_triangle(tmp_path: Path) -> tuple[dict[str, Any], bytes]:
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": [{"children": [1], "scale": [0.5, 0.5, 0.5]}, {"mesh": 0, "translation": [2, 0, 0]}],
+        "nodes": [{"children": [1], "scale": [0.5, 0.5, 0.5]},
+                  {"mesh": 0, "translation": [2, 0, 0]}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1},
                                     "indices": 2, "material": 0}]}],
         "materials": [{"name": "paint", "pbrMetallicRoughness": {
@@ -160,6 +164,27 @@ def test_glb_comes_upright_with_its_embedded_image(tmp_path: Path) -> None:
     assert again.texture(material.texture).albedo.shape == (2, 4, 3)
 
 
+def test_images_inside_the_meshes_of_a_urdf_are_refused(tmp_path: Path) -> None:
+    """Nobody would serve them; collision meshes may have them, since nobody looks."""
+    tree, binary = textured_triangle(tmp_path)
+    folder = tmp_path / "assets"
+    folder.mkdir()
+    (folder / "flag.glb").write_bytes(glb(tree, binary))
+    mesh = '<geometry><mesh filename="flag.glb"/></geometry>'
+    for name, visual, collision in (
+        ("seen", mesh, mesh),
+        ("felt", '<geometry><box size="1 1 1"/></geometry>', mesh),
+    ):
+        (folder / f"{name}.urdf").write_text(
+            f'<robot name="r"><link name="a"><visual>{visual}</visual>'
+            f"<collision>{collision}</collision></link></robot>"
+        )
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    with pytest.raises(AssetError, match="holds its images inside"):
+        library.mesh("user/seen")
+    assert len(library.convex_parts("user/felt").parts_m) == 1
+
+
 def test_gltf_with_separate_and_inline_buffers_agree(tmp_path: Path) -> None:
     """A .bin beside the file, a data URI and a GLB hold the same triangles."""
     tree, binary = textured_triangle(tmp_path)
@@ -167,7 +192,9 @@ def test_gltf_with_separate_and_inline_buffers_agree(tmp_path: Path) -> None:
     (tmp_path / "my data.bin").write_bytes(binary)
     tree["buffers"][0]["uri"] = "my%20data.bin"
     (tmp_path / "b.gltf").write_text(json.dumps(tree))
-    tree["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
+    tree["buffers"][0]["uri"] = (
+        "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
+    )
     (tmp_path / "c.gltf").write_text(json.dumps(tree))
     soups = [read_mesh(Folder(tmp_path), name).soup for name in ("a.glb", "b.gltf", "c.gltf")]
     for soup in soups[1:]:
@@ -175,7 +202,7 @@ def test_gltf_with_separate_and_inline_buffers_agree(tmp_path: Path) -> None:
 
 
 def test_glb_written_by_another_tool_reads_back(tmp_path: Path) -> None:
-    """trimesh writes a box with a transform; it comes at its place and size."""
+    """Trimesh writes a box with a transform; it comes at its place and size."""
     scene = trimesh.Scene()
     matrix = np.eye(4)
     matrix[:3, 3] = (1, 2, 3)

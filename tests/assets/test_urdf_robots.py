@@ -38,7 +38,7 @@ def link_poses(robot: RobotModel, positions: tuple[float, ...]) -> dict[str, SE3
 
 
 def test_the_panda_reaches_where_its_maker_says(library: Library) -> None:
-    """At the zero position the flange is at (0.088, 0, 0.926) m and looks down (Franka, DH table)."""
+    """At zero the flange is at (0.088, 0, 0.926) m and looks down (Franka, DH table)."""
     robot = library.robot("franka_panda")
     flange = link_poses(robot, (0.0,) * 9)["panda_link8"]
     assert flange.translation_m == pytest.approx((0.088, 0.0, 0.926), abs=1e-6)

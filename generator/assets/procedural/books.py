@@ -13,6 +13,7 @@ from generator.assets.procedural.materials import jittered, linear, printed
 from generator.assets.procedural.mesh import Array, Patch, centred, joined
 from generator.assets.procedural.shapes import Point2, UvRect, grid, rounded_box
 from generator.core.geometry import Material
+from generator.core.se3 import Vec3
 
 COVER_ATLAS: Mapping[str, UvRect] = {
     "back": (0.002, 0.002, 0.438, 0.998),
@@ -37,9 +38,11 @@ def book(seed: int) -> Solid:
     hard = chance(0.5, rng)
     board = 0.0028 if hard else 0.0006
     margin = 0.003 if hard else 0.0
-    cover = _cover(length, width, thickness, board)
-    pages = rounded_box((length - 2 * margin, width - margin - board, thickness - 2 * board), 0.0003, 1)
-    pages = pages.painted(1).moved(0.0, 0.5 * (board - margin) - (0.0002 if not hard else 0.0), 0.0)
+    bow = min(0.004, 0.3 * thickness) if hard else 0.0006
+    cover = _cover((length, width, thickness), board, bow)
+    inside = margin + board + bow
+    block = rounded_box((length - 2 * margin, width - inside, thickness - 2 * board), 0.0003, 1)
+    pages = block.painted(1).moved(y=0.5 * (board + bow - margin))
     paper = Material(jittered(linear("#e9e2cf"), 0.05, rng), 0.85)
     print_ = printed(f"texture/book_cover?seed={seed}", between(0.25, 0.6, rng))
     half = (0.5 * length, 0.5 * width, 0.5 * thickness)
@@ -47,9 +50,10 @@ def book(seed: int) -> Solid:
     return centred([cover, pages], (print_, paper), [hulls.box(low, half)])
 
 
-def _cover(length: float, width: float, thickness: float, board: float) -> Patch:
+def _cover(size_m: Vec3, board: float, bow: float) -> Patch:
     """A folded sheet: back, rounded spine, front, as one closed band around X."""
-    h, bow = 0.5 * thickness, min(0.004, 0.3 * thickness)
+    length, width, thickness = size_m
+    h = 0.5 * thickness
     y0, y1 = -0.5 * width, 0.5 * width
     spine = [(y0 + bow * t**2, -h * t) for t in (0.9, 0.5, 0.0, -0.5, -0.9)]
     outer = [(y1, -h), (y0 + bow, -h), *spine, (y0 + bow, h), (y1, h)]

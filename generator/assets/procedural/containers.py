@@ -275,15 +275,17 @@ def jar(seed: int) -> Solid:
 def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     """Two-piece aluminium can: domed base, necked top, recessed lid."""
     neck, rim = r - 0.0062, r - 0.006
+    z0, z1 = 0.1 * h, h - 0.024
+    v1 = (z1 - z0) / (h - 0.004 - z0)
     bottom = fillet([(0.0, 0.009), (0.55 * r, 0.006), (0.72 * r, 0.0), (0.76 * r, 0.0),
-                     (r, 0.012), (r, 0.1 * h)], [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 3)
-    side = [(r, 0.1 * h), (r, 0.9 * h)]
-    top = fillet([(r, 0.9 * h), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002),
+                     (r, 0.012), (r, z0)], [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 3)
+    side = [(r, z0), (r, z1)]
+    top = fillet([(r, z1), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002),
                   (rim, h), (rim - 0.002, h), (rim - 0.0028, h - 0.005), (0.0, h - 0.005)],
                  [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0], 3)
     split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
-    patches = [lathe(bottom, 36, 1), lathe(side, 36, 0, v=(0.0, 0.9)),
-               lathe(top[: split + 1], 36, 0, v=(0.9, 1.0)), lathe(top[split:], 36, 1)]
+    patches = [lathe(bottom, 36, 1), lathe(side, 36, 0, v=(0.0, v1)),
+               lathe(top[: split + 1], 36, 0, v=(v1, 1.0)), lathe(top[split:], 36, 1)]
     stages = [(0.76 * r, 0.0), (r, 0.012), (r, h - 0.015), (neck, h - 0.0035), (rim, h)]
     return patches, stages
 

@@ -70,7 +70,7 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
     frame = {"legs": _four_legs, "trestle": _trestles, "bench": _bench}[style](x, y, z - thick)
     patches = [along_grain(block(*top, 0.003), 0.9),
                *(along_grain(block(low, high, 0.002, 1), 0.5) for low, high in frame)]
-    wood = patterned("texture/wood_planks?seed=1", 0.0, 0.45)
+    wood = patterned("texture/wood_grain?seed=1", 0.0, 0.45)
     legs = painted("#3b4046", 0.4) if style == "bench" else patterned(
         "texture/wood_grain?seed=1", 0.0, 0.5
     )

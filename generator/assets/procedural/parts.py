@@ -88,13 +88,13 @@ def washer(seed: int) -> Solid:
 def stepped_shaft(seed: int) -> Solid:
     """A turned shaft of several diameters, lying along X. Slot: body."""
     rng = rng_of("stepped_shaft", seed)
-    radii = [between(0.008, 0.012, rng), between(0.012, 0.018, rng), between(0.015, 0.024, rng),
-             between(0.01, 0.014, rng), between(0.006, 0.009, rng)][: pick((3, 4, 5), rng)]
+    radii = [between(0.005, 0.008, rng), between(0.007, 0.011, rng), between(0.01, 0.016, rng),
+             between(0.007, 0.01, rng), between(0.004, 0.007, rng)][: pick((3, 4, 5), rng)]
     chamfer, z = 0.0008, 0.0
     profile: list[Point2] = [(0.0, 0.0)]
     parts = []
     for r in radii:
-        length = between(0.012, 0.035, rng)
+        length = between(0.012, 0.04, rng)
         profile += [(r - chamfer, z), (r, z + chamfer), (r, z + length - chamfer), (r - chamfer, z + length)]
         parts.append(hulls.frustum((r, z), (r, z + length)))
         z += length
@@ -148,7 +148,7 @@ def gear(seed: int) -> Solid:
     bore = between(0.25, 0.35, rng) * pitch
     outline = []
     for i in range(teeth):
-        for share, r in ((-0.3, root), (-0.22, root), (-0.09, tip), (0.09, tip), (0.22, root)):
+        for share, r in ((-0.34, root), (-0.25, pitch), (-0.13, tip), (0.13, tip), (0.25, pitch), (0.34, root)):
             turn = 2 * math.pi * (i + share) / teeth
             outline.append((r * math.cos(turn), r * math.sin(turn)))
     disc = extruded(np.array(outline), thick, 0.0004, [circle(bore, 28)])

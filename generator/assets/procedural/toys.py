@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from generator.assets.procedural import hulls
 from generator.assets.procedural.draw import between, chance, pick, rng_of
 from generator.assets.procedural.family import Solid
@@ -15,8 +13,9 @@ from generator.assets.procedural.materials import (
     jittered,
     linear,
     plastic,
+    printed,
 )
-from generator.assets.procedural.mesh import Patch, centred
+from generator.assets.procedural.mesh import centred
 from generator.assets.procedural.shapes import ball as sphere
 from generator.assets.procedural.shapes import fillet, lathe, rounded_box, spline
 from generator.core.geometry import Material
@@ -36,17 +35,19 @@ def block(seed: int) -> Solid:
 
 
 def ball(seed: int) -> Solid:
-    """A tennis, rubber or striped beach ball. Slots: first and second colour."""
+    """A tennis, rubber, beach, basket or foot ball; the small ones are toys. Slot: cover."""
     rng = rng_of("ball", seed)
-    kind = ("tennis", "rubber", "striped")[seed % 3]
-    radius = {"tennis": 0.0334, "rubber": between(0.02, 0.035, rng), "striped": between(0.05, 0.09, rng)}[kind]
-    body = sphere(lambda d: radius * d, 20, 36)
-    tint, band = plastic(rng), plastic(rng, ("#f0f0ec", *PLASTICS))
-    if kind == "tennis":
-        tint = Material(jittered(linear("#c8d936"), 0.06, rng), 0.9)
-        band = Material(linear("#eef0e2"), 0.8)
-    slots = _seams(body, kind)
-    return centred([Patch(body.corners_m, body.uvs, slots)], (tint, band), [hulls.extreme(body.corners_m)])
+    kind = ball_kind(seed)
+    radius = {"tennis": 0.0334, "rubber": between(0.02, 0.035, rng)}.get(kind, between(0.05, 0.09, rng))
+    rough = {"tennis": 0.9, "basket": 0.65}.get(kind, between(0.3, 0.5, rng))
+    body = sphere(lambda d: radius * d, 22, 36)
+    cover = printed(f"texture/ball_cover?seed={seed}", rough)
+    return centred([body], (cover,), [hulls.extreme(body.corners_m)])
+
+
+def ball_kind(seed: int) -> str:
+    """Which sport a ball is for."""
+    return ("tennis", "rubber", "beach", "basket", "foot")[seed % 5]
 
 
 def candle(seed: int) -> Solid:
@@ -82,16 +83,3 @@ def vase(seed: int) -> Solid:
         [lathe(profile, 36), lathe([outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)], 36, 1)],
         (outside, inside), hulls.stack(stages),
     )
-
-
-def _seams(body: Patch, kind: str) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """Slot per triangle: six gores, a tennis ball's curved seam, or one colour."""
-    d = body.corners_m.mean(axis=1)
-    d = d / np.sqrt((d**2).sum(axis=1, keepdims=True))
-    turn = np.arctan2(d[:, 1], d[:, 0])
-    if kind == "striped":
-        # Nudged, so that no triangle's centre lies on a border.
-        return (np.floor(turn / (np.pi / 3) + 1e-6).astype(np.int64) % 2).astype(np.int64)
-    if kind == "tennis":
-        return (np.abs(d[:, 2] - 0.55 * np.cos(2 * turn)) < 0.07).astype(np.int64)
-    return np.zeros(len(d), dtype=np.int64)

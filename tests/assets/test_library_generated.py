@@ -1,0 +1,87 @@
+"""Procedural assets through the library: ids, parameters, hashes, cache."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from generator.assets.library import Library, open_library
+from generator.core.errors import AssetError
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Library:
+    """A library with a fresh cache."""
+    return open_library(cache_dir=tmp_path / "cache")
+
+
+def test_every_spelling_of_an_id_is_one_asset(library: Library) -> None:
+    """The canonical id and the content hash do not depend on how an id is written."""
+    one = library.get("table?size_m=1.20,0.80,0.74")
+    two = library.get("table?size_m=1.2,0.8,0.74")
+    assert one == two
+    assert one.asset_id == "table?size_m=1.2,0.8,0.74"
+
+
+def test_defaults_count_as_parameters(library: Library) -> None:
+    """Leaving a default out and writing it gives the same content."""
+    assert library.get("mug").sha256 == library.get("mug?seed=0").sha256
+    assert library.get("mug?seed=1").sha256 != library.get("mug?seed=0").sha256
+
+
+def test_size_parameters_are_obeyed(library: Library) -> None:
+    """A table of 0.9 x 0.6 x 0.5 m, standing on the floor."""
+    low, high = library.bounds_m("table?size_m=0.9,0.6,0.5")
+    assert low == pytest.approx((-0.45, -0.3, 0.0), abs=1e-3)
+    assert high == pytest.approx((0.45, 0.3, 0.5), abs=1e-3)
+
+
+def test_seeds_are_listed_and_parametric_families_are_not(library: Library) -> None:
+    """Furniture is asked for by its size, not drawn."""
+    mugs = library.find({"mug", "procedural"})
+    assert [a.asset_id for a in mugs] == sorted(f"mug?seed={k}" for k in range(len(mugs)))
+    assert not [a for a in library.find({"procedural"}) if a.asset_id.startswith("table")]
+
+
+def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> None:
+    """Bit by bit, materials included."""
+    made = library.mesh("mug?seed=2")
+    loaded = open_library(cache_dir=tmp_path / "cache").mesh("mug?seed=2")
+    for name in ("vertices_m", "faces", "normals", "uvs", "face_slots"):
+        assert getattr(made, name).tobytes() == getattr(loaded, name).tobytes()
+    assert made.materials == loaded.materials
+    assert np.asarray(made.face_slots).max() < len(made.materials)
+
+
+@pytest.mark.parametrize(
+    ("asset_id", "reason"),
+    [
+        ("mug?sede=1", "did you mean 'seed'"),
+        ("mug?seed=-1", "whole number from 0"),
+        ("mug?seed=1.5", "whole number from 0"),
+        ("mug?seed=red", "whole number from 0"),
+        ("table?size_m=1,2", "expects 3 numbers"),
+        ("table?size_m=wide", "expects 3 numbers"),
+        ("table?style=3", "expects a word"),
+        ("table?size_m=0,0,0", "table"),
+        ("mgu?seed=3", "did you mean 'mug"),
+    ],
+)
+def test_wrong_parameters_are_refused_with_the_right_ones(
+    library: Library, asset_id: str, reason: str
+) -> None:
+    """Before anything is built."""
+    with pytest.raises(AssetError, match=reason):
+        library.mesh(asset_id)
+
+
+def test_kinds_are_not_confused(library: Library) -> None:
+    """A mug has no pixels, and is no robot."""
+    with pytest.raises(AssetError, match="no texture"):
+        library.texture("mug?seed=0")
+    with pytest.raises(AssetError, match="no environment"):
+        library.environment("mug?seed=0")
+    with pytest.raises(AssetError, match="no robot"):
+        library.robot("mug?seed=0")
