@@ -62,10 +62,6 @@ class Files:
                 yield self._asset(one)
         self._digests.save()
 
-    def tags(self, kind: str) -> set[str]:
-        """Every tag of an asset of the kind."""
-        return {tag for one in self._all().values() if one.kind == kind for tag in one.tags()}
-
     def get(self, asset_id: str) -> Asset:
         """The asset, or a robot's link as an object of its own."""
         link = self._link(asset_id)

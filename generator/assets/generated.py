@@ -58,15 +58,6 @@ class Generated:
                 for k in range(family.variants):
                     yield self.get(AssetId(name, {"seed": k}))
 
-    def tags(self, kind: str) -> set[str]:
-        """Every tag of a family of the kind."""
-        return {
-            tag
-            for name, family in self._families.items()
-            if _kind(family) == kind
-            for tag in _tags(name, family)
-        }
-
     def get(self, asset_id: AssetId) -> Asset:
         """The asset of an id whose name is known. Raises AssetError on wrong parameters."""
         family = self._families[asset_id.name]

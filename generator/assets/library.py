@@ -32,33 +32,41 @@ def open_library(user_roots: Sequence[Path] = (), cache_dir: Path | None = None)
         user_roots: Folders with or without an ``assets.yaml``; their ids start with ``user/``.
         cache_dir: Where normal forms are kept; by default the user's cache folder.
     """
-    return Library(tuple(Path(root) for root in user_roots), cache_dir or _default_cache_dir())
+    return Library(tuple(Path(root) for root in user_roots), cache_dir or default_cache_dir())
 
 
 class Library:
-    """Implements ``AssetLibrary``. One per process; what it caches depends on content only."""
+    """Implements ``AssetLibrary``. One per process; what it caches depends on content only.
+
+    Entries and bounds are looked up hundreds of times per scene, so they are remembered: an asset
+    whose files change while a process runs keeps the content that was read first.
+    """
 
     def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path) -> None:
         disk = DiskCache(cache_dir)
         store = Store(disk)
         self._generated = Generated(store)
         self._files = Files(user_roots, disk, store)
+        self._entries: dict[str, Asset] = {}
+        self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
+        self._bounds_m: dict[str, tuple[Vec3, Vec3]] = {}
 
     def get(self, asset_id: str) -> Asset:
         """The entry of that id. Raises AssetError with the nearest id if unknown."""
-        if self._is_generated(asset_id):
-            return self._generated.get(parse(asset_id))
-        return self._files.get(asset_id)
+        if asset_id not in self._entries:
+            generated = self._is_generated(asset_id)
+            self._entries[asset_id] = (
+                self._generated.get(parse(asset_id)) if generated else self._files.get(asset_id)
+            )
+        return self._entries[asset_id]
 
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
         """All assets of the kind that carry every tag, sorted by id; may be empty."""
-        wanted = frozenset(tags)
-        found = [*self._generated.find(wanted, kind), *self._files.find(wanted, kind)]
-        return tuple(sorted(found, key=lambda asset: asset.asset_id))
-
-    def tags(self, kind: str = "object") -> tuple[str, ...]:
-        """Every tag that some asset of the kind carries, sorted."""
-        return tuple(sorted({*self._generated.tags(kind), *self._files.tags(kind)}))
+        key = (frozenset(tags), kind)
+        if key not in self._found:
+            found = [*self._generated.find(*key), *self._files.find(*key)]
+            self._found[key] = tuple(sorted(found, key=lambda asset: asset.asset_id))
+        return self._found[key]
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """The asset's own materials, one per mesh slot."""
@@ -66,7 +74,9 @@ class Library:
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
-        return self.mesh(asset_id).bounds_m()
+        if asset_id not in self._bounds_m:
+            self._bounds_m[asset_id] = self.mesh(asset_id).bounds_m()
+        return self._bounds_m[asset_id]
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is no robot."""
@@ -114,12 +124,12 @@ class Library:
             return False
         known = [*self._generated.names(), *self._files.names()]
         raise AssetError(
-            f"asset '{asset_id[:120]}': there is none{did_you_mean(asset_id[:120], known)}; "
-            "'gen-data assets list' shows them all"
+            f"asset '{asset_id[:120]}': there is none{did_you_mean(asset_id[:120], known)}"
         )
 
 
-def _default_cache_dir() -> Path:
+def default_cache_dir() -> Path:
+    """The user's cache folder for this program."""
     from platformdirs import user_cache_path
 
     return user_cache_path("gen-data")

@@ -7,8 +7,10 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.scene import Camera
+from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
-from generator.renderers.kernels import records, shade, tone
+from generator.renderers.kernels import antialias, records, shade, tone
+from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.occlusion import openness, sampled_lattice, sunflower
 from generator.renderers.packing import PackedWorld
 from generator.renderers.settings import RenderSettings
@@ -25,23 +27,49 @@ def color_image(
     settings: RenderSettings,
 ) -> NDArray[np.uint8]:
     """sRGB, uint8 [h, w, 3]."""
-    radiance = shaded(world, view, seen, stock, settings)
+    device, n = stock.device, view.width * view.height
+    images = _images(seen)
+    radiance = _shaded(world, view, seen, images, stock, settings)
     ev100 = camera.ev100
     if ev100 is None:
         ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
     exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
-    curve = wp.array(tone_curve(settings.tone), dtype=wp.uint8, device=stock.device)
-    n = view.width * view.height
-    rgb = wp.zeros((n, 3), dtype=wp.uint8, device=stock.device)
-    wp.launch(tone.develop, n, [radiance, exposure, curve], [rgb], device=stock.device)
+    curve = wp.array(tone_curve(settings.tone), dtype=wp.uint8, device=device)
+    rgb = wp.zeros((n, 3), dtype=wp.uint8, device=device)
+    wp.launch(tone.develop, n, [radiance, exposure, curve], [rgb], device=device)
+    if settings.antialias > 1:
+        count = wp.zeros(1, dtype=wp.int32, device=device)
+        pixels = stock.scratch("listed pixels", n, wp.int32)
+        wp.launch(antialias.find_edges, view.height, [view, images], [count, pixels], device=device)
+        offsets = wp.array(pixel_parts(settings.antialias), dtype=wp.vec2, device=device)
+        inputs = [view, world.record, images, radiance, pixels, offsets, exposure, Z_NEAR_M, curve]
+        edges = int(count.numpy()[0])
+        wp.launch(antialias.antialias, edges, inputs, [rgb], device=device)
     image: NDArray[np.uint8] = rgb.numpy().reshape(view.height, view.width, 3)
     return image
 
 
-def shaded(
+def pixel_parts(n: int) -> Array:
+    """Sample positions in a pixel, [0, 1), shape [n, 2]: no two in one row or column (n-rooks)."""
+    rows = np.arange(n)
+    # Steps of 2 in 4 and of 3 in 8, shifted by half turns, are the rotated grids of graphics cards.
+    step = {1: 1, 2: 1, 4: 2, 8: 3}[n]
+    columns = (rows * step + (rows * step) // n + (1 if n > 1 else 0)) % n
+    return (np.stack([columns, rows], axis=-1) + 0.5) / n
+
+
+def _images(seen: Seen) -> shade.Images:
+    images = shade.Images()
+    images.hits, images.z_m = seen.hits, seen.z_m
+    images.weights, images.normals = seen.weights, seen.normals
+    return images
+
+
+def _shaded(
     world: PackedWorld,
     view: records.View,
     seen: Seen,
+    images: shade.Images,
     stock: AssetStock,
     settings: RenderSettings,
 ) -> wp.array:
@@ -50,9 +78,6 @@ def shaded(
     radiance = stock.scratch("radiance", n, wp.vec3)
     lattice = sampled_lattice(world, view, seen, stock)
     around = openness(world, view, lattice, stock, settings)
-    images = shade.Images()
-    images.hits, images.z_m = seen.hits, seen.z_m
-    images.weights, images.normals = seen.weights, seen.normals
     points = lattice.width * lattice.height
     lights = stock.scratch("lights", points, shade.Light)
     frame = [view, world.record, images]

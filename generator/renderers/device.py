@@ -14,7 +14,7 @@ from generator.core.errors import ConfigError
 
 # Not -march=native: fused multiply-adds would give other bytes on other machines. Inlining
 # everything is worth a quarter of all ray time.
-_COMPILER_FLAGS = "-ffp-contract=off -mllvm=-inline-threshold=200000"
+_COMPILER_FLAGS = "-ffp-contract=off -mllvm=-inline-threshold=30000"
 
 
 def open_device(name: str) -> wp.Device:

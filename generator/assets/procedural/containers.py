@@ -23,13 +23,12 @@ from generator.assets.procedural.materials import (
     plastic,
     printed,
 )
-from generator.assets.procedural.mesh import Array, Patch, centred
+from generator.assets.procedural.mesh import Patch, centred
 from generator.assets.procedural.shapes import (
     Point2,
     UvRect,
     circle,
     extruded,
-    fan,
     fillet,
     grid,
     lathe,
@@ -81,26 +80,80 @@ _DARK_GLASS = ("#1d3320", "#26331c", "#3a2413", "#142a25", "#2d1a10", "#4a5a34")
 _CLEAR = ("#b9d3dc", "#c9dfe4", "#a9cbd8", "#cfe3dc", "#9fc4d6")
 _CAPS = ("#f2f2ee", "#1f6fb5", "#c62828", "#2e9e4f", "#202124", "#e8b21c")
 BOTTLES: Mapping[str, _BottleStyle] = {
-    "wine": _BottleStyle((0.29, 0.32), (0.036, 0.039), 0.0145, (0.70, 0.74), (0.12, 0.42),
-                         ((1.0, 0.25), (0.93, 0.45), (0.45, 0.72), (0.08, 0.92)), (0.0155, 0.055),
-                         1.0, _DARK_GLASS, ("#5a1020", "#1a1a1a", "#b08d3a", "#23402f", "#c9c5ba")),
-    "beer": _BottleStyle((0.22, 0.25), (0.029, 0.032), 0.0135, (0.68, 0.74), (0.14, 0.42),
-                         ((1.0, 0.3), (0.85, 0.5), (0.4, 0.75), (0.1, 0.93)), (0.0145, 0.009),
-                         1.0, ("#3a2010", "#2a1508", "#16361d", "#52300f"), _CAPS),
-    "water": _BottleStyle((0.2, 0.235), (0.031, 0.0345), 0.0125, (0.80, 0.84), (0.38, 0.62),
-                          ((1.0, 0.12), (0.92, 0.4), (0.55, 0.75), (0.15, 0.96)), (0.0148, 0.016),
-                          1.0, _CLEAR, _CAPS),
-    "soda": _BottleStyle((0.215, 0.25), (0.0325, 0.036), 0.0125, (0.80, 0.84), (0.33, 0.58),
-                         ((1.02, 0.15), (0.9, 0.45), (0.5, 0.75), (0.12, 0.95)), (0.0148, 0.015),
-                         1.0, ("#2b120a", "#b34a12", "#2f7a3a", "#1c0d08", "#c9a21a"), _CAPS),
-    "ketchup": _BottleStyle((0.17, 0.2), (0.034, 0.038), 0.02, (0.78, 0.82), (0.2, 0.62),
-                            ((0.97, 0.3), (0.75, 0.7), (0.3, 0.97)), (0.022, 0.03),
-                            0.66, ("#a3150f", "#c5281a", "#d9a514", "#e9e4d0", "#5f2a16"),
-                            ("#f2f2ee", "#c62828", "#2e7d32", "#e0c020"), (0.2, 0.35)),
-    "detergent": _BottleStyle((0.22, 0.26), (0.042, 0.047), 0.016, (0.8, 0.85), (0.16, 0.6),
-                              ((1.0, 0.25), (0.8, 0.55), (0.35, 0.9)), (0.018, 0.035),
-                              0.6, ("#1f6fb5", "#f0f0ec", "#2e9e4f", "#e8629a", "#f2c417", "#7b3fa0"),
-                              ("#f2f2ee", "#1f6fb5", "#e8b21c", "#c62828"), (0.2, 0.4)),
+    "wine": _BottleStyle(
+        (0.29, 0.32),
+        (0.036, 0.039),
+        0.0145,
+        (0.70, 0.74),
+        (0.12, 0.42),
+        ((1.0, 0.25), (0.93, 0.45), (0.45, 0.72), (0.08, 0.92)),
+        (0.0155, 0.055),
+        1.0,
+        _DARK_GLASS,
+        ("#5a1020", "#1a1a1a", "#b08d3a", "#23402f", "#c9c5ba"),
+    ),
+    "beer": _BottleStyle(
+        (0.22, 0.25),
+        (0.029, 0.032),
+        0.0135,
+        (0.68, 0.74),
+        (0.14, 0.42),
+        ((1.0, 0.3), (0.85, 0.5), (0.4, 0.75), (0.1, 0.93)),
+        (0.0145, 0.009),
+        1.0,
+        ("#3a2010", "#2a1508", "#16361d", "#52300f"),
+        _CAPS,
+    ),
+    "water": _BottleStyle(
+        (0.2, 0.235),
+        (0.031, 0.0345),
+        0.0125,
+        (0.80, 0.84),
+        (0.38, 0.62),
+        ((1.0, 0.12), (0.92, 0.4), (0.55, 0.75), (0.15, 0.96)),
+        (0.0148, 0.016),
+        1.0,
+        _CLEAR,
+        _CAPS,
+    ),
+    "soda": _BottleStyle(
+        (0.215, 0.25),
+        (0.0325, 0.036),
+        0.0125,
+        (0.80, 0.84),
+        (0.33, 0.58),
+        ((1.02, 0.15), (0.9, 0.45), (0.5, 0.75), (0.12, 0.95)),
+        (0.0148, 0.015),
+        1.0,
+        ("#2b120a", "#b34a12", "#2f7a3a", "#1c0d08", "#c9a21a"),
+        _CAPS,
+    ),
+    "ketchup": _BottleStyle(
+        (0.17, 0.2),
+        (0.034, 0.038),
+        0.02,
+        (0.78, 0.82),
+        (0.2, 0.62),
+        ((0.97, 0.3), (0.75, 0.7), (0.3, 0.97)),
+        (0.022, 0.03),
+        0.66,
+        ("#a3150f", "#c5281a", "#d9a514", "#e9e4d0", "#5f2a16"),
+        ("#f2f2ee", "#c62828", "#2e7d32", "#e0c020"),
+        (0.2, 0.35),
+    ),
+    "detergent": _BottleStyle(
+        (0.22, 0.26),
+        (0.042, 0.047),
+        0.016,
+        (0.8, 0.85),
+        (0.16, 0.6),
+        ((1.0, 0.25), (0.8, 0.55), (0.35, 0.9)),
+        (0.018, 0.035),
+        0.6,
+        ("#1f6fb5", "#f0f0ec", "#2e9e4f", "#e8629a", "#f2c417", "#7b3fa0"),
+        ("#f2f2ee", "#1f6fb5", "#e8b21c", "#c62828"),
+        (0.2, 0.4),
+    ),
 }
 
 
@@ -114,13 +167,24 @@ class _Can:
 
 
 CANS = (
-    _Can(0.0331, 0.1152, False), _Can(0.0331, 0.1152, False), _Can(0.0265, 0.1345, False),
-    _Can(0.0331, 0.168, False), _Can(0.0365, 0.109, True), _Can(0.0365, 0.109, True),
-    _Can(0.0495, 0.118, True), _Can(0.0425, 0.036, True),
+    _Can(0.0331, 0.1152, False),
+    _Can(0.0331, 0.1152, False),
+    _Can(0.0265, 0.1345, False),
+    _Can(0.0331, 0.168, False),
+    _Can(0.0365, 0.109, True),
+    _Can(0.0365, 0.109, True),
+    _Can(0.0495, 0.118, True),
+    _Can(0.0425, 0.036, True),
 )
 _CARTONS: tuple[tuple[float, float, float], ...] = (
-    (0.065, 0.19, 0.28), (0.055, 0.17, 0.25), (0.07, 0.125, 0.075), (0.06, 0.09, 0.125),
-    (0.035, 0.155, 0.21), (0.05, 0.1, 0.17), (0.04, 0.13, 0.18), (0.075, 0.15, 0.07),
+    (0.065, 0.19, 0.28),
+    (0.055, 0.17, 0.25),
+    (0.07, 0.125, 0.075),
+    (0.06, 0.09, 0.125),
+    (0.035, 0.155, 0.21),
+    (0.05, 0.1, 0.17),
+    (0.04, 0.13, 0.18),
+    (0.075, 0.15, 0.07),
 )
 
 
@@ -160,16 +224,41 @@ def bottle(seed: int) -> Solid:
     neck_top, neck_start = height - 0.4 * cap_height, height * between(*style.neck_share, rng)
     z0, z1 = (height * share for share in style.label_share)
     z1 = min(z1, neck_start - 0.01)
-    shoulder = [(style.neck_m + r * (radius - style.neck_m), z1 + t * (neck_start - z1))
-                for r, t in style.shoulder]
-    lower = fillet([(0.0, 0.004), (0.6 * radius, 0.003), (0.72 * radius, 0.0), (0.93 * radius, 0.0),
-                    (radius, 0.008), (radius, z0 - _PROUD_M), (radius + _PROUD_M, z0)],
-                   [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0], 3)
-    upper = [(radius + _PROUD_M, z1), (radius, z1 + _PROUD_M), *shoulder,
-             (style.neck_m, neck_start), (style.neck_m, neck_top)]
+    shoulder = [
+        (style.neck_m + r * (radius - style.neck_m), z1 + t * (neck_start - z1))
+        for r, t in style.shoulder
+    ]
+    lower = fillet(
+        [
+            (0.0, 0.004),
+            (0.6 * radius, 0.003),
+            (0.72 * radius, 0.0),
+            (0.93 * radius, 0.0),
+            (radius, 0.008),
+            (radius, z0 - _PROUD_M),
+            (radius + _PROUD_M, z0),
+        ],
+        [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0],
+        3,
+    )
+    upper = [
+        (radius + _PROUD_M, z1),
+        (radius, z1 + _PROUD_M),
+        *shoulder,
+        (style.neck_m, neck_start),
+        (style.neck_m, neck_top),
+    ]
     upper = fillet(upper, [0.0, 0.0, *[0.06] * (len(upper) - 3), 0.0], 3)
-    cap = fillet([(style.neck_m, height - cap_height), (cap_radius, height - cap_height),
-                  (cap_radius * 0.97, height), (0.0, height)], [0.0, 0.0008, 0.002, 0.0], 2)
+    cap = fillet(
+        [
+            (style.neck_m, height - cap_height),
+            (cap_radius, height - cap_height),
+            (cap_radius * 0.97, height),
+            (0.0, height),
+        ],
+        [0.0, 0.0008, 0.002, 0.0],
+        2,
+    )
     patches = [
         lathe(lower, 32, 0),
         lathe([(radius + _PROUD_M, z0), (radius + _PROUD_M, z1)], 32, 1, v=(0.0, 1.0)),
@@ -178,9 +267,15 @@ def bottle(seed: int) -> Solid:
         lathe([upper[-1], (0.0, neck_top)], 32, 0),
     ]
     patches = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
-    stages = [(0.93 * radius, 0.0), (radius, 0.008), (radius, z1), *shoulder,
-              (max(style.neck_m, 0.96 * cap_radius), neck_start + 0.004),
-              (cap_radius, height - cap_height), (0.97 * cap_radius, height)]
+    stages = [
+        (0.93 * radius, 0.0),
+        (radius, 0.008),
+        (radius, z1),
+        *shoulder,
+        (max(style.neck_m, 0.96 * cap_radius), neck_start + 0.004),
+        (cap_radius, height - cap_height),
+        (0.97 * cap_radius, height),
+    ]
     flat = np.array([1.0, style.depth, 1.0])
     parts = [hull * flat for hull in hulls.stack(_climbing(stages))]
     body = Material(jittered(linear(pick(style.colors, rng)), 0.1, rng), between(*style.gloss, rng))
@@ -203,8 +298,11 @@ def can(seed: int) -> Solid:
         patches, stages = _drink_can(r, h)
         lid = _tab(0.68 * r)
         lid = [piece.moved(z=h - 0.0045) for piece in lid]
-    materials = (print_, metal(STEEL if size.food else ALUMINIUM, between(0.22, 0.35, rng)),
-                 metal(ALUMINIUM, 0.3))
+    materials = (
+        print_,
+        metal(STEEL if size.food else ALUMINIUM, between(0.22, 0.35, rng)),
+        metal(ALUMINIUM, 0.3),
+    )
     return centred([*patches, *lid], materials, hulls.stack(stages))
 
 
@@ -223,22 +321,33 @@ def milk_carton(seed: int) -> Solid:
     """A gable-top carton with a screw cap; its front faces +X. Slots: print, cap."""
     rng = rng_of("milk_carton", seed)
     x, y, z = milk_size_m(seed)
-    slots = {"top": 0}
-    body = rounded_box((x, y, z), 0.0015, 1, uv=CARTON_ATLAS, slots=slots).moved(z=z / 2)
+    body = rounded_box((x, y, z), 0.0015, 1, uv=CARTON_ATLAS).moved(z=z / 2)
     rise, fin = 0.33 * x, 0.016
     roof = _gable(x, y, rise, fin).moved(z=z)
     print_ = printed(f"texture/milk_label?seed={seed}", between(0.35, 0.5, rng))
     patches = [body, roof]
     if chance(0.7, rng):
-        screw = lathe(fillet([(0.0, -0.004), (0.013, -0.004), (0.013, 0.009), (0.0, 0.009)],
-                             [0.0, 0.0, 0.0015, 0.0], 2), 24, 1)
+        screw = lathe(
+            fillet(
+                [(0.0, -0.004), (0.013, -0.004), (0.013, 0.009), (0.0, 0.009)],
+                [0.0, 0.0, 0.0015, 0.0],
+                2,
+            ),
+            24,
+            1,
+        )
         tilt = float(np.arctan2(rise, 0.5 * x))
         patches.append(screw.rotated("y", tilt).moved(0.27 * x, 0.0, z + 0.46 * rise))
     ridge = z + rise
-    prism = np.array([(sx * 0.5 * x, sy * 0.5 * y, z) for sx in (-1, 1) for sy in (-1, 1)]
-                     + [(sx * 0.002, sy * 0.5 * y, ridge) for sx in (-1, 1) for sy in (-1, 1)])
-    parts = [hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)), prism,
-             hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))]
+    prism = np.array(
+        [(sx * 0.5 * x, sy * 0.5 * y, z) for sx in (-1, 1) for sy in (-1, 1)]
+        + [(sx * 0.002, sy * 0.5 * y, ridge) for sx in (-1, 1) for sy in (-1, 1)]
+    )
+    parts = [
+        hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)),
+        prism,
+        hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin)),
+    ]
     return centred(patches, (print_, plastic(rng, _CAPS)), parts)
 
 
@@ -249,26 +358,62 @@ def jar(seed: int) -> Solid:
     lid_radius, lid_height = 0.9 * radius, 0.014
     z0, z1 = 0.2 * height, 0.66 * height
     top = height - lid_height
-    lower = fillet([(0.0, 0.002), (0.7 * radius, 0.002), (0.78 * radius, 0.0), (0.92 * radius, 0.0),
-                    (radius, 0.008), (radius, z0 - _PROUD_M), (radius + _PROUD_M, z0)],
-                   [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0], 3)
-    upper = fillet([(radius + _PROUD_M, z1), (radius, z1 + _PROUD_M), (radius, 0.8 * height),
-                    (0.86 * radius, top - 0.003), (0.86 * radius, top + 0.004), (0.0, top + 0.004)],
-                   [0.0, 0.0, 0.02, 0.006, 0.0, 0.0], 4)
-    lid = fillet([(0.0, top), (lid_radius, top), (lid_radius, height), (lid_radius - 0.006, height),
-                  (lid_radius - 0.008, height - 0.0012), (0.0, height - 0.0012)],
-                 [0.0, 0.001, 0.002, 0.0, 0.0, 0.0], 2)
-    patches = [lathe(lower, 32, 0),
-               lathe([(radius + _PROUD_M, z0), (radius + _PROUD_M, z1)], 32, 1, v=(0.0, 1.0)),
-               lathe(upper, 32, 0), lathe(lid, 32, 2)]
+    lower = fillet(
+        [
+            (0.0, 0.002),
+            (0.7 * radius, 0.002),
+            (0.78 * radius, 0.0),
+            (0.92 * radius, 0.0),
+            (radius, 0.008),
+            (radius, z0 - _PROUD_M),
+            (radius + _PROUD_M, z0),
+        ],
+        [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0],
+        3,
+    )
+    upper = fillet(
+        [
+            (radius + _PROUD_M, z1),
+            (radius, z1 + _PROUD_M),
+            (radius, 0.8 * height),
+            (0.86 * radius, top - 0.003),
+            (0.86 * radius, top + 0.004),
+            (0.0, top + 0.004),
+        ],
+        [0.0, 0.0, 0.02, 0.006, 0.0, 0.0],
+        4,
+    )
+    lid = fillet(
+        [
+            (0.0, top),
+            (lid_radius, top),
+            (lid_radius, height),
+            (lid_radius - 0.006, height),
+            (lid_radius - 0.008, height - 0.0012),
+            (0.0, height - 0.0012),
+        ],
+        [0.0, 0.001, 0.002, 0.0, 0.0, 0.0],
+        2,
+    )
+    patches = [
+        lathe(lower, 32, 0),
+        lathe([(radius + _PROUD_M, z0), (radius + _PROUD_M, z1)], 32, 1, v=(0.0, 1.0)),
+        lathe(upper, 32, 0),
+        lathe(lid, 32, 2),
+    ]
     fill = pick(("#6d0f1c", "#b34a12", "#d9a02a", "#3b1a12", "#7a8a2a", "#c9b48a", "#4a1030"), rng)
     materials = (
         Material(jittered(linear(fill), 0.15, rng), between(0.06, 0.12, rng)),
         printed(f"texture/label?seed={seed + 1000}", between(0.45, 0.65, rng)),
         pick((metal((0.83, 0.69, 0.35), 0.3), metal(STEEL, 0.3), plastic(rng, _CAPS)), rng),
     )
-    stages = [(0.92 * radius, 0.0), (radius, 0.008), (radius, 0.8 * height), (lid_radius, top),
-              (lid_radius, height)]
+    stages = [
+        (0.92 * radius, 0.0),
+        (radius, 0.008),
+        (radius, 0.8 * height),
+        (lid_radius, top),
+        (lid_radius, height),
+    ]
     return centred(patches, materials, hulls.stack(stages))
 
 
@@ -277,15 +422,33 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     neck, rim = r - 0.0062, r - 0.006
     z0, z1 = 0.1 * h, h - 0.024
     v1 = (z1 - z0) / (h - 0.004 - z0)
-    bottom = fillet([(0.0, 0.009), (0.55 * r, 0.006), (0.72 * r, 0.0), (0.76 * r, 0.0),
-                     (r, 0.012), (r, z0)], [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 3)
+    bottom = fillet(
+        [(0.0, 0.009), (0.55 * r, 0.006), (0.72 * r, 0.0), (0.76 * r, 0.0), (r, 0.012), (r, z0)],
+        [0.0, 0.03, 0.001, 0.002, 0.012, 0.0],
+        2,
+    )
     side = [(r, z0), (r, z1)]
-    top = fillet([(r, z1), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002),
-                  (rim, h), (rim - 0.002, h), (rim - 0.0028, h - 0.005), (0.0, h - 0.005)],
-                 [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0], 3)
+    top = fillet(
+        [
+            (r, z1),
+            (r, h - 0.014),
+            (neck, h - 0.0035),
+            (neck, h - 0.002),
+            (rim, h),
+            (rim - 0.002, h),
+            (rim - 0.0028, h - 0.005),
+            (0.0, h - 0.005),
+        ],
+        [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0],
+        2,
+    )
     split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
-    patches = [lathe(bottom, 36, 1), lathe(side, 36, 0, v=(0.0, v1)),
-               lathe(top[: split + 1], 36, 0, v=(v1, 1.0)), lathe(top[split:], 36, 1)]
+    patches = [
+        lathe(bottom, 32, 1),
+        lathe(side, 32, 0, v=(0.0, v1)),
+        lathe(top[: split + 1], 32, 0, v=(v1, 1.0)),
+        lathe(top[split:], 32, 1),
+    ]
     stages = [(0.76 * r, 0.0), (r, 0.012), (r, h - 0.015), (neck, h - 0.0035), (rim, h)]
     return patches, stages
 
@@ -293,8 +456,16 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
 def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     """Three-piece steel can: seamed ends, paper label between."""
     seam = 0.0035
-    end = [(0.0, 0.003), (0.8 * r, 0.003), (0.82 * r, 0.004), (0.9 * r, 0.004), (0.93 * r, 0.0),
-           (r, 0.0), (r, seam), (r - 0.001, seam + 0.001)]
+    end = [
+        (0.0, 0.003),
+        (0.8 * r, 0.003),
+        (0.82 * r, 0.004),
+        (0.9 * r, 0.004),
+        (0.93 * r, 0.0),
+        (r, 0.0),
+        (r, seam),
+        (r - 0.001, seam + 0.001),
+    ]
     z0, z1 = seam + 0.001, h - seam - 0.001
     wall = r - 0.001
     body = [(wall, z0), (wall, z1)]
@@ -306,7 +477,9 @@ def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
 def _tab(length: float) -> list[Patch]:
     """Pull tab lying on the lid, its origin at the rivet."""
     ring_ = circle(1.0, 14) * np.array([0.5 * length, 0.3 * length])
-    hole = circle(1.0, 10) * np.array([0.22 * length, 0.17 * length]) + np.array([0.18 * length, 0.0])
+    hole = circle(1.0, 10) * np.array([0.22 * length, 0.17 * length]) + np.array(
+        [0.18 * length, 0.0]
+    )
     plate = extruded(ring_, 0.0012, 0.0003, [hole], 2)
     rivet = lathe([(0.0, 0.0), (0.0035, 0.0), (0.0033, 0.002), (0.0, 0.0022)], 12, 2)
     return [plate.moved(x=0.18 * length), rivet.moved(x=-0.12 * length)]
@@ -322,9 +495,13 @@ def _gable(x: float, y: float, rise: float, fin: float) -> Patch:
         foot = [(s * x / 2, -s * y / 2, 0.0), (s * x / 2, s * y / 2, 0.0)]
         head = [(s * t, -s * y / 2, rise), (s * t, s * y / 2, rise)]
         tip = [(s * t, -s * y / 2, rise + fin), (s * t, s * y / 2, rise + fin)]
-        made.append(grid(np.array([foot, head, tip]), np.array([u0, u1]), np.array([v0, 0.8 * v1, v1])))
-    crest = [[(t, -y / 2, rise + fin), (t, y / 2, rise + fin)],
-             [(-t, -y / 2, rise + fin), (-t, y / 2, rise + fin)]]
+        made.append(
+            grid(np.array([foot, head, tip]), np.array([u0, u1]), np.array([v0, 0.8 * v1, v1]))
+        )
+    crest = [
+        [(t, -y / 2, rise + fin), (t, y / 2, rise + fin)],
+        [(-t, -y / 2, rise + fin), (-t, y / 2, rise + fin)],
+    ]
     made.append(grid(np.array(crest), np.array([u0, u0]), np.array([v0, v0])))
     for s in (1.0, -1.0):
         inner = (0.0, s * (y / 2 - tuck), 0.55 * rise)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -46,8 +47,15 @@ def spoon(seed: int) -> Solid:
     rng = rng_of("spoon", seed)
     size = (1.0, 0.86, 0.66)[seed % 3] * between(0.96, 1.04, rng)
     wide, tail = between(0.93, 1.07, rng), between(0.85, 1.2, rng)
-    bowl = [(-32, 3.0, 12.0, 0.5), (-22, 12.0, 9.5, 4.0), (-8, 19.5, 7.0, 7.5), (8, 21.0, 6.5, 8.0),
-            (20, 17.5, 7.5, 6.5), (28, 10.5, 9.0, 3.0), (31.5, 4.0, 10.0, 0.5)]
+    bowl = [
+        (-32, 3.0, 12.0, 0.5),
+        (-22, 12.0, 9.5, 4.0),
+        (-8, 19.5, 7.0, 7.5),
+        (8, 21.0, 6.5, 8.0),
+        (20, 17.5, 7.5, 6.5),
+        (28, 10.5, 9.0, 3.0),
+        (31.5, 4.0, 10.0, 0.5),
+    ]
     head = [_Station(67 + x, wide * w, wide * w, z + h, 1.6, h) for x, w, z, h in bowl]
     stations = [*_handle(tail, 13.0, 36.0, rng), *head]
     return _cutlery([_sheet(stations, 40)], size, 36.0, rng)
@@ -57,9 +65,17 @@ def fork(seed: int) -> Solid:
     """A table or dessert fork with three or four tines. Slots: head, handle."""
     rng = rng_of("fork", seed)
     size = (1.0, 0.86)[seed % 2] * between(0.97, 1.03, rng)
-    tail, half, count = between(0.85, 1.2, rng), between(11.5, 13.0, rng), 3 if chance(0.25, rng) else 4
-    head = [_Station(40, 4.0, 4.0, 14.5, 2.2), _Station(48, 10.5, 10.5, 12.0, 2.0, 1.0),
-            _Station(56, half, half, 9.0, 1.9, 2.0), _Station(63, half, half, 6.0, 1.9, 2.0)]
+    tail, half, count = (
+        between(0.85, 1.2, rng),
+        between(11.5, 13.0, rng),
+        3 if chance(0.25, rng) else 4,
+    )
+    head = [
+        _Station(40, 4.0, 4.0, 14.5, 2.2),
+        _Station(48, 10.5, 10.5, 12.0, 2.0, 1.0),
+        _Station(56, half, half, 9.0, 1.9, 2.0),
+        _Station(63, half, half, 6.0, 1.9, 2.0),
+    ]
     root = _sheet([*_handle(tail, 15.5, 32.0, rng), *head], 36)
     pitch = 2 * half / (count - 0.36)
     tines = []
@@ -68,9 +84,20 @@ def fork(seed: int) -> Solid:
         w = 0.32 * pitch
         # The tines continue the head's curve across, and rise again towards their tips.
         lift = 2.0 * (middle / half) ** 2 - 2.0
-        line = [(60, 7.3, w), (75, 3.6, 0.97 * w), (90, 3.0, 0.9 * w), (104, 5.2, 0.72 * w), (110, 7.0, 0.25 * w)]
-        tines.append(_sheet([_Station(x, w_ - middle, w_ + middle, z + lift + 2.0, 1.8)
-                             for x, z, w_ in line], 10, 2))
+        line = [
+            (60, 7.3, w),
+            (75, 3.6, 0.97 * w),
+            (90, 3.0, 0.9 * w),
+            (104, 5.2, 0.72 * w),
+            (110, 7.0, 0.25 * w),
+        ]
+        tines.append(
+            _sheet(
+                [_Station(x, w_ - middle, w_ + middle, z + lift + 2.0, 1.8) for x, z, w_ in line],
+                10,
+                2,
+            )
+        )
     return _cutlery([root, *tines], size, 36.0, rng)
 
 
@@ -79,12 +106,23 @@ def knife(seed: int) -> Solid:
     rng = rng_of("knife", seed)
     size = between(0.94, 1.06, rng)
     grip, tip = between(0.9, 1.15, rng), between(0.0, 5.0, rng)
-    handle = [_Station(-112, 3.0, 3.0, 3.2, 3.4), _Station(-108, 8.0 * grip, 8.0 * grip, 3.4, 5.0),
-              _Station(-80, 8.8 * grip, 8.8 * grip, 3.6, 6.4), _Station(-40, 8.0 * grip, 8.0 * grip, 3.6, 6.2),
-              _Station(-8, 6.6, 6.6, 3.4, 5.4), _Station(-2, 6.2, 6.2, 3.2, 4.2)]
-    blade = [_Station(-4, 6.0, 6.0, 3.0, 2.4), _Station(4, 7.5, 7.0, 3.0, 1.8), _Station(30, 11.0, 8.5, 3.0, 1.5),
-             _Station(70, 11.5, 9.0, 3.0, 1.3), _Station(95, 9.0 - tip, 9.0, 3.0, 1.2),
-             _Station(107, 2.0 - tip, 8.0, 3.0, 1.1), _Station(112, -4.5, 6.0, 3.0, 1.0)]
+    handle = [
+        _Station(-112, 3.0, 3.0, 3.2, 3.4),
+        _Station(-108, 8.0 * grip, 8.0 * grip, 3.4, 5.0),
+        _Station(-80, 8.8 * grip, 8.8 * grip, 3.6, 6.4),
+        _Station(-40, 8.0 * grip, 8.0 * grip, 3.6, 6.2),
+        _Station(-8, 6.6, 6.6, 3.4, 5.4),
+        _Station(-2, 6.2, 6.2, 3.2, 4.2),
+    ]
+    blade = [
+        _Station(-4, 6.0, 6.0, 3.0, 2.4),
+        _Station(4, 7.5, 7.0, 3.0, 1.8),
+        _Station(30, 11.0, 8.5, 3.0, 1.5),
+        _Station(70, 11.5, 9.0, 3.0, 1.3),
+        _Station(95, 9.0 - tip, 9.0, 3.0, 1.2),
+        _Station(107, 2.0 - tip, 8.0, 3.0, 1.1),
+        _Station(112, -4.5, 6.0, 3.0, 1.0),
+    ]
     return _cutlery([_sheet(handle, 22), _sheet(blade, 26)], size, -3.0, rng)
 
 
@@ -125,7 +163,7 @@ def _cutlery(sheets: list[Patch], size: float, cut_mm: float, rng: Rng) -> Solid
     handle: Material = plastic(rng) if chance(0.2, rng) else steel
     low, high = patch.bounds_m()
     edges = np.linspace(float(low[0]), float(high[0]), 8)
-    parts = [hulls.extreme(_slice(patch, a, b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [hulls.extreme(_slice(patch, a, b)) for a, b in pairwise(edges.tolist())]
     return centred([patch], (steel, handle), parts)
 
 
@@ -134,4 +172,5 @@ def _slice(patch: Patch, a: float, b: float) -> Array:
     x = patch.corners_m[:, :, 0]
     touched = patch.corners_m[(x.max(axis=1) > a) & (x.min(axis=1) < b)].reshape(-1, 3)
     margin = 0.004
-    return touched[(touched[:, 0] > a - margin) & (touched[:, 0] < b + margin)]
+    inside: Array = touched[(touched[:, 0] > a - margin) & (touched[:, 0] < b + margin)]
+    return inside

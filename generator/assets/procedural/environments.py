@@ -134,8 +134,9 @@ def night_city(seed: int) -> Float32:
     building = (elevation < roof) & (elevation > -0.02)
     window = uniform((rows, columns), rng)
     shade = np.array((0.05, 0.05, 0.06))
-    warm = np.array((1.0, 0.72, 0.4)) + np.array((-0.25, 0.15, 0.5)) * (uniform(
-        (rows, columns), rng)[..., None] > 0.8)
+    warm = np.array((1.0, 0.72, 0.4)) + np.array((-0.25, 0.15, 0.5)) * (
+        uniform((rows, columns), rng)[..., None] > 0.8
+    )
     lit = (window > between(0.75, 0.9, rng))[..., None] * 6.0 * warm
     image = np.where(building[..., None], shade + lit, image)
     below = d[..., 2] < -0.02
@@ -144,8 +145,11 @@ def night_city(seed: int) -> Float32:
     for _ in range(pick((5, 8, 12), rng)):
         lamp = _direction(between(-math.pi, math.pi, rng), between(0.08, 0.5, rng))
         away = np.arccos(np.clip((d * lamp).sum(axis=2), -1, 1))
-        image += between(20.0, 50.0, rng) * np.exp(-((away / 0.035) ** 2))[..., None] * np.array(
-            pick(((1.0, 0.66, 0.3), (1.0, 0.85, 0.62), (0.85, 0.95, 1.0)), rng))
+        image += (
+            between(20.0, 50.0, rng)
+            * np.exp(-((away / 0.035) ** 2))[..., None]
+            * np.array(pick(((1.0, 0.66, 0.3), (1.0, 0.85, 0.62), (0.85, 0.95, 1.0)), rng))
+        )
     return normalised(image)
 
 
@@ -171,8 +175,9 @@ def normalised(image: Array) -> Float32:
 
 def _direction(azimuth_rad: float, elevation_rad: float) -> Array:
     flat = math.cos(elevation_rad)
-    return np.array([flat * math.cos(azimuth_rad), flat * math.sin(azimuth_rad),
-                     math.sin(elevation_rad)])
+    return np.array(
+        [flat * math.cos(azimuth_rad), flat * math.sin(azimuth_rad), math.sin(elevation_rad)]
+    )
 
 
 def _panel(d: Array, azimuth: float, height: float, half_size: tuple[float, float]) -> Array:
@@ -185,8 +190,11 @@ def _panel(d: Array, azimuth: float, height: float, half_size: tuple[float, floa
     v = (d * up).sum(axis=2) / np.maximum(depth, 1e-6)
     w, h = half_size
     soft = 0.03
-    inside: Array = (depth > 0) * smoothstep(w + soft, w - soft, np.abs(u)) * smoothstep(
-        h + soft, h - soft, np.abs(v))
+    inside: Array = (
+        (depth > 0)
+        * smoothstep(w + soft, w - soft, np.abs(u))
+        * smoothstep(h + soft, h - soft, np.abs(v))
+    )
     return inside
 
 
@@ -220,8 +228,9 @@ def _perez(d: Array, sun: Array, c: tuple[float, float, float, float, float]) ->
     up = np.maximum(d[..., 2], 0.02)
     angle = np.arccos(np.clip((d * sun).sum(axis=2), -1.0, 1.0))
     gradation = 1 + c[0] * np.exp(c[1] / up)
-    scattering = 1 + c[2] * (np.exp(c[3] * angle) - math.exp(c[3] * math.pi / 2)) + c[
-        4] * np.cos(angle) ** 2
+    scattering = (
+        1 + c[2] * (np.exp(c[3] * angle) - math.exp(c[3] * math.pi / 2)) + c[4] * np.cos(angle) ** 2
+    )
     sky: Array = np.minimum(gradation * scattering, 8.0 * float((gradation * scattering).mean()))
     return sky
 

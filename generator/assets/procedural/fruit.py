@@ -37,8 +37,11 @@ def apple(seed: int) -> Solid:
     skin = printed(f"texture/apple_skin?seed={seed}", between(0.25, 0.4, rng))
     stalk = _stalk((0.0, 0.0, dip - 0.002), between(0.012, 0.02, rng), 0.0013, rng)
     body = ball(shape, 22, 28)
-    return centred([body, stalk.painted(1)], (skin, _STALK),
-                   [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)])
+    return centred(
+        [body, stalk.painted(1)],
+        (skin, _STALK),
+        [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)],
+    )
 
 
 def orange(seed: int) -> Solid:
@@ -102,8 +105,11 @@ def pear(seed: int) -> Solid:
     stalk = _stalk((lean, 0.0, 0.5 * height - 0.002), between(0.014, 0.022, rng), 0.0014, rng)
     points = body.corners_m.reshape(-1, 3)
     lower, upper = points[points[:, 2] < 0.12 * height], points[points[:, 2] > 0.02 * height]
-    return centred([body, stalk.painted(1)], (skin, _STALK),
-                   [hulls.extreme(lower), hulls.extreme(upper), hulls.extreme(stalk.corners_m, 16)])
+    return centred(
+        [body, stalk.painted(1)],
+        (skin, _STALK),
+        [hulls.extreme(lower), hulls.extreme(upper), hulls.extreme(stalk.corners_m, 16)],
+    )
 
 
 def banana(seed: int) -> Solid:
@@ -116,8 +122,11 @@ def banana(seed: int) -> Solid:
     path = np.stack([radius * np.sin(arc), radius * (1 - np.cos(arc)), np.zeros_like(arc)], axis=1)
     # Five blunt edges; the stem end is long and thin, the blossom end short.
     t = np.linspace(0.0, 1.0, 25)
-    girth = np.interp(t, [0, 0.04, 0.1, 0.18, 0.32, 0.5, 0.72, 0.88, 0.95, 0.985, 1.0],
-                      [0.3, 0.26, 0.3, 0.62, 0.92, 1.0, 0.97, 0.78, 0.5, 0.3, 0.24])
+    girth = np.interp(
+        t,
+        [0, 0.04, 0.1, 0.18, 0.32, 0.5, 0.72, 0.88, 0.95, 0.985, 1.0],
+        [0.3, 0.26, 0.3, 0.62, 0.92, 1.0, 0.97, 0.78, 0.5, 0.3, 0.24],
+    )
     turn = 2 * math.pi * np.arange(20) / 20
     edge = 1.0 + 0.045 * np.cos(5 * turn) + 0.008 * np.cos(10 * turn)
     section = thick * edge[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
@@ -162,4 +171,6 @@ def _stalk(foot: tuple[float, float, float], length: float, thick: float, rng: R
     x, y, z = foot
     lean = between(-0.4, 0.4, rng) * length
     path = evenly(spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24), 6)
-    return sweep(path, circle(thick, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5]))
+    return sweep(
+        path, circle(thick, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5])
+    )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,8 +44,14 @@ TABLE_STYLES = ("legs", "trestle", "bench")
 SHELF_STYLES = ("bookcase", "rack")
 
 COLORS: Mapping[str, str] = {
-    "white": "#dededb", "grey": "#8a8f94", "black": "#2b2d30", "blue": "#3f5f8f",
-    "green": "#4f7f5a", "red": "#a8382f", "yellow": "#d9b23c", "brown": "#8a6a4a",
+    "white": "#dededb",
+    "grey": "#8a8f94",
+    "black": "#2b2d30",
+    "blue": "#3f5f8f",
+    "green": "#4f7f5a",
+    "red": "#a8382f",
+    "yellow": "#d9b23c",
+    "brown": "#8a6a4a",
 }
 
 _BOARD_M = 0.02
@@ -68,18 +75,20 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
     thick = 0.03 if style != "bench" else 0.04
     top = (-x / 2, -y / 2, z - thick), (x / 2, y / 2, z)
     frame = {"legs": _four_legs, "trestle": _trestles, "bench": _bench}[style](x, y, z - thick)
-    patches = [along_grain(block(*top, 0.003), 0.9),
-               *(along_grain(block(low, high, 0.002, 1), 0.5) for low, high in frame)]
+    patches = [
+        along_grain(block(*top, 0.003), 0.9),
+        *(along_grain(block(low, high, 0.002, 1), 0.5) for low, high in frame),
+    ]
     wood = patterned("texture/wood_grain?seed=1", 0.0, 0.45)
-    legs = painted("#3b4046", 0.4) if style == "bench" else patterned(
-        "texture/wood_grain?seed=1", 0.0, 0.5
+    legs = (
+        painted("#3b4046", 0.4)
+        if style == "bench"
+        else patterned("texture/wood_grain?seed=1", 0.0, 0.5)
     )
     return in_place(patches, (wood, legs), [hulls.box(*top), *(hulls.box(*f) for f in frame)])
 
 
-def shelf(
-    size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookcase"
-) -> Solid:
+def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookcase") -> Solid:
     """A shelf open towards -Y. Slots: boards, frame.
 
     Args:
@@ -100,11 +109,15 @@ def shelf(
     if style == "rack":
         frame = [_post(sx * x / 2, sy * y / 2, t, z) for sx in (-1, 1) for sy in (-1, 1)]
     else:
-        frame = [((-x / 2, -y / 2, 0.0), (-x / 2 + t, y / 2, z)),
-                 ((x / 2 - t, -y / 2, 0.0), (x / 2, y / 2, z)),
-                 ((-x / 2 + t, y / 2 - 0.008, _PLINTH_M - t), (x / 2 - t, y / 2 - 0.002, z))]
-    patches = [*(along_grain(block(*b, 0.0015), 0.6) for b in boards),
-               *(along_grain(block(*f, 0.0015, 1), 0.6) for f in frame)]
+        frame = [
+            ((-x / 2, -y / 2, 0.0), (-x / 2 + t, y / 2, z)),
+            ((x / 2 - t, -y / 2, 0.0), (x / 2, y / 2, z)),
+            ((-x / 2 + t, y / 2 - 0.008, _PLINTH_M - t), (x / 2 - t, y / 2 - 0.002, z)),
+        ]
+    patches = [
+        *(along_grain(block(*b, 0.0015), 0.6) for b in boards),
+        *(along_grain(block(*f, 0.0015, 1), 0.6) for f in frame),
+    ]
     wood = patterned("texture/wood_grain?seed=8", 0.0, 0.45)
     posts = painted("#2f3338", 0.4) if style == "rack" else wood
     return in_place(patches, (wood, posts), [hulls.box(*b) for b in (*boards, *frame)])
@@ -157,7 +170,9 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
         ((-x / 2, y / 2 - w, 0.0), (x / 2, y / 2, z)),
         ((-x / 2, -y / 2, 0.0), (x / 2, y / 2, _BIN_WALL_M)),
     ]
-    return in_place([shell, *ribs], (painted(_color("bin", color), 0.5),), [hulls.box(*wall) for wall in walls])
+    return in_place(
+        [shell, *ribs], (painted(_color("bin", color), 0.5),), [hulls.box(*wall) for wall in walls]
+    )
 
 
 def bin_interior_m(size_m: Vec3) -> tuple[float, float, float]:
@@ -179,7 +194,9 @@ def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> Solid:
     x, y, z = _checked("box", size_m, 0.001)
     corners = (-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)
     bevel = min(0.002, 0.1 * min(x, y, z))
-    return in_place([block(*corners, bevel)], (painted(_color("box", color), 0.6),), [hulls.box(*corners)])
+    return in_place(
+        [block(*corners, bevel)], (painted(_color("box", color), 0.6),), [hulls.box(*corners)]
+    )
 
 
 def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
@@ -193,9 +210,11 @@ def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
     plates = [((-x / 2, -y / 2, z0), (x / 2, y / 2, z0 + t)) for z0 in (0.0, z - t)]
     body = (-0.38 * x, -0.38 * y, t), (0.38 * x, 0.38 * y, z - t)
     bolts = [
-        lathe([(0.0, 0.0), (0.009, 0.0), (0.009, 0.007), (0.007, 0.009), (0.0, 0.009)], 6, 1)
-        .moved(sx * 0.44 * x, sy * 0.44 * y, t)
-        for sx in (-1, 1) for sy in (-1, 1)
+        lathe([(0.0, 0.0), (0.009, 0.0), (0.009, 0.007), (0.007, 0.009), (0.0, 0.009)], 6, 1).moved(
+            sx * 0.44 * x, sy * 0.44 * y, t
+        )
+        for sx in (-1, 1)
+        for sy in (-1, 1)
     ]
     patches = [block(*body, 0.006), *(block(*p, 0.002, 1) for p in plates), *bolts]
     materials = (painted("#d7d9d8", 0.4), metal((0.45, 0.46, 0.48), 0.42))
@@ -211,13 +230,24 @@ def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
     x, y, z = _checked("gantry", size_m, 0.3)
     w = 0.04
     posts = [_post(sx * x / 2, sy * y / 2, w, z) for sx in (-1, 1) for sy in (-1, 1)]
-    rails = [((sx * x / 2 - w * (sx > 0), -y / 2 + w, z - w),
-              (sx * x / 2 + w * (sx < 0), y / 2 - w, z)) for sx in (-1, 1)]
+    rails = [
+        ((sx * x / 2 - w * (sx > 0), -y / 2 + w, z - w), (sx * x / 2 + w * (sx < 0), y / 2 - w, z))
+        for sx in (-1, 1)
+    ]
     beam = [((-x / 2 + w, -w / 2, z - w), (x / 2 - w, w / 2, z))]
     bars = [*posts, *rails, *beam]
     patches = [piece for bar in bars for piece in _profile_bar(*bar)]
-    feet = [block(*_between((sx * x / 2, sy * y / 2), (sx * (x / 2 - 0.1), sy * (y / 2 - 0.1)),
-                            0.0, 0.008), 0.001, 1) for sx in (-1, 1) for sy in (-1, 1)]
+    feet = [
+        block(
+            *_between(
+                (sx * x / 2, sy * y / 2), (sx * (x / 2 - 0.1), sy * (y / 2 - 0.1)), 0.0, 0.008
+            ),
+            0.001,
+            1,
+        )
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]
     materials = (metal(ALUMINIUM, 0.45), painted("#26282b", 0.5))
     return in_place([*patches, *feet], materials, [hulls.box(*bar) for bar in bars])
 
@@ -234,9 +264,7 @@ def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
     return in_place([ground], (patterned("texture/concrete?seed=0", 2.0, 0.8),), [slab])
 
 
-def backdrop(
-    size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str = "white"
-) -> Solid:
+def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str = "white") -> Solid:
     """A studio sweep: floor that curves up into a wall at +Y, open elsewhere. Slot: paper.
 
     Args:
@@ -254,17 +282,19 @@ def backdrop(
     zs = np.concatenate([[0.0], r - r * np.cos(turn), [z]])
     rows = [np.stack([np.full(len(ys), s * x / 2), ys, zs], axis=1) for s in (-1.0, 1.0)]
     sheet = grid(np.stack(rows, axis=1))
-    parts = [hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
-             hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
-             *_cove(x, y, r)]
+    parts = [
+        hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
+        hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
+        *_cove(x, y, r),
+    ]
     return in_place([sheet], (painted(_color("backdrop", color), 0.85),), parts)
 
 
 def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Solid:
     """The inside of a room, seen from within.
 
-    Slots: floor, ceiling, walls, skirting, door, frames, window, handle. The door is in the wall at -X,
-    the window in the wall at +Y; both are left out where the wall is too small for them.
+    Slots: floor, ceiling, walls, skirting, door, frames, window, handle. The door is in the wall
+    at -X, the window in the wall at +Y; both are left out where the wall is too small for them.
 
     Args:
         size_m: Inner length, width, height; the floor is at z = 0.
@@ -317,10 +347,14 @@ def _four_legs(x: float, y: float, z: float) -> list[Box]:
     w, inset, rail, apron = 0.06, 0.03, 0.02, 0.08
     ax, ay = x / 2 - inset, y / 2 - inset
     legs = [_post(sx * ax, sy * ay, w, z) for sx in (-1, 1) for sy in (-1, 1)]
-    long_rails = [_between((-ax + w, s * (ay - 0.01)), (ax - w, s * (ay - 0.01 - rail)), z - apron, z)
-                  for s in (-1, 1)]
-    short_rails = [_between((s * (ax - 0.01), -ay + w), (s * (ax - 0.01 - rail), ay - w), z - apron, z)
-                   for s in (-1, 1)]
+    long_rails = [
+        _between((-ax + w, s * (ay - 0.01)), (ax - w, s * (ay - 0.01 - rail)), z - apron, z)
+        for s in (-1, 1)
+    ]
+    short_rails = [
+        _between((s * (ax - 0.01), -ay + w), (s * (ax - 0.01 - rail), ay - w), z - apron, z)
+        for s in (-1, 1)
+    ]
     return [*legs, *long_rails, *short_rails]
 
 
@@ -329,8 +363,10 @@ def _trestles(x: float, y: float, z: float) -> list[Box]:
     made = []
     for s in (-1, 1):
         made += [_post(s * ax, t * ay, w, z) for t in (-1, 1)]
-        made += [_between((s * ax, -ay + w), (s * (ax - w), ay - w), level - w, level)
-                 for level in (z, 0.25 * z)]
+        made += [
+            _between((s * ax, -ay + w), (s * (ax - w), ay - w), level - w, level)
+            for level in (z, 0.25 * z)
+        ]
     return [*made, _between((-ax + w, -0.02), (ax - w, 0.02), 0.25 * z - w, 0.25 * z)]
 
 
@@ -359,9 +395,16 @@ def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:
     """Floor and wall in one sheet: outside bottom, wall, rim, inner wall, inside bottom."""
     w, lip = _BIN_WALL_M, min(0.02, 0.2 * z)
     levels = [
-        (rim + 0.006, 0.0, 0.016), (rim, 0.006, 0.02), (rim, z - lip, 0.02), (0.0, z - lip, 0.03),
-        (0.0, z - 0.002, 0.03), (0.002, z, 0.028), (rim + w - 0.002, z, 0.014),
-        (rim + w, z - 0.002, 0.012), (rim + w, w + 0.008, 0.012), (rim + w + 0.008, w, 0.006),
+        (rim + 0.006, 0.0, 0.016),
+        (rim, 0.006, 0.02),
+        (rim, z - lip, 0.02),
+        (0.0, z - lip, 0.03),
+        (0.0, z - 0.002, 0.03),
+        (0.002, z, 0.028),
+        (rim + w - 0.002, z, 0.014),
+        (rim + w, z - 0.002, 0.012),
+        (rim + w, w + 0.008, 0.012),
+        (rim + w + 0.008, w, 0.006),
     ]
     loops = [_rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
     rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in loops])
@@ -376,7 +419,9 @@ def _bin_ribs(x: float, y: float, z: float, rim: float) -> list[Box]:
         count = max(2, round(length / 0.12))
         places = [length * ((i + 0.5) / count - 0.5) for i in range(count)]
         spans = [(p - 0.0025, p + 0.0025, 0.006, top) for p in places]
-        spans.append((-length / 2 + rim + 0.02, length / 2 - rim - 0.02, 0.68 * z, 0.68 * z + 0.005))
+        spans.append(
+            (-length / 2 + rim + 0.02, length / 2 - rim - 0.02, 0.68 * z, 0.68 * z + 0.005)
+        )
         for low, high, z0, z1 in spans:
             for s in (-1, 1):
                 face, tip = s * (other / 2 - rim - 0.001), s * (other / 2 - rim + depth)
@@ -391,8 +436,13 @@ def _rounded_loop(half_x: float, half_y: float, radius: float, z: float) -> Arra
     for quarter, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
         for i in range(5):
             turn = 0.5 * math.pi * (quarter + i / 4)
-            points.append((sx * (half_x - radius) + radius * math.cos(turn),
-                           sy * (half_y - radius) + radius * math.sin(turn), z))
+            points.append(
+                (
+                    sx * (half_x - radius) + radius * math.cos(turn),
+                    sy * (half_y - radius) + radius * math.sin(turn),
+                    z,
+                )
+            )
     return np.array(points)
 
 
@@ -404,11 +454,11 @@ def _profile_bar(low: Vec3, high: Vec3) -> list[Patch]:
     for i in (0, 1):
         for j in (0, 1):
             a, b = list(low), list(high)
-            for side, far in zip(sides, (i, j)):
+            for side, far in zip(sides, (i, j), strict=True):
                 width = high[side] - low[side]
                 a[side] = low[side] + far * 0.6 * width
                 b[side] = a[side] + 0.4 * width
-            made.append(block((a[0], a[1], a[2]), (b[0], b[1], b[2]), 0.001))
+            made.append(block((a[0], a[1], a[2]), (b[0], b[1], b[2])))
     a, b = list(low), list(high)
     for side in sides:
         inset = 0.25 * (high[side] - low[side])
@@ -423,7 +473,7 @@ def _cove(x: float, y: float, r: float) -> list[Array]:
     corner = (y / 2, 0.0)
     return [
         np.array([(s * x / 2, *p) for s in (-1.0, 1.0) for p in (a, b, corner)])
-        for a, b in zip(curve[:-1].tolist(), curve[1:].tolist())
+        for a, b in pairwise(curve.tolist())
     ]
 
 
@@ -445,9 +495,14 @@ def _door(wall: float) -> list[Patch]:
     w, h = 0.45, 2.05
     leaf = [block((wall, -w, 0.005), (wall + 0.012, w, h), 0.001, 4)]
     leaf += [
-        block((wall + 0.012, s * 0.06 - 0.3 * (s < 0), z0),
-              (wall + 0.018, s * 0.06 + 0.3 * (s > 0), z1), 0.005, 4)
-        for s in (-1, 1) for z0, z1 in ((0.2, 0.95), (1.15, 1.9))
+        block(
+            (wall + 0.012, s * 0.06 - 0.3 * (s < 0), z0),
+            (wall + 0.018, s * 0.06 + 0.3 * (s > 0), z1),
+            0.005,
+            4,
+        )
+        for s in (-1, 1)
+        for z0, z1 in ((0.2, 0.95), (1.15, 1.9))
     ]
     frame = [
         block((wall, -w - 0.08, 0.0), (wall + 0.03, -w, h + 0.08), 0.004, 5),
@@ -468,8 +523,10 @@ def _window_wall(x: float, wall: float, z: float, window: bool) -> list[Patch]:
         return [_facing_room(-x / 2, x / 2, 0.0, z, wall)]
     half, low, high, depth = min(0.8, 0.3 * x), 0.9, min(2.15, z - 0.25), 0.16
     faces = [
-        _facing_room(-x / 2, -half, 0.0, z, wall), _facing_room(half, x / 2, 0.0, z, wall),
-        _facing_room(-half, half, 0.0, low, wall), _facing_room(-half, half, high, z, wall),
+        _facing_room(-x / 2, -half, 0.0, z, wall),
+        _facing_room(half, x / 2, 0.0, z, wall),
+        _facing_room(-half, half, 0.0, low, wall),
+        _facing_room(-half, half, high, z, wall),
     ]
     back = wall + depth
     reveal = [
@@ -480,11 +537,16 @@ def _window_wall(x: float, wall: float, z: float, window: bool) -> list[Patch]:
     ]
     w, y0 = 0.06, back - 0.05
     bars = [
-        (-half, -half + w, low, high), (half - w, half, low, high), (-w / 2, w / 2, low, high),
-        (-half + w, half - w, low, low + w), (-half + w, half - w, high - w, high),
+        (-half, -half + w, low, high),
+        (half - w, half, low, high),
+        (-w / 2, w / 2, low, high),
+        (-half + w, half - w, low, low + w),
+        (-half + w, half - w, high - w, high),
     ]
     frame = [block((a, y0, c), (b, back, d), 0.004, 5) for a, b, c, d in bars]
-    sill = block((-half - 0.05, wall - 0.04, low - 0.03), (half + 0.05, wall + 0.02, low + 0.002), 0.004, 5)
+    sill = block(
+        (-half - 0.05, wall - 0.04, low - 0.03), (half + 0.05, wall + 0.02, low + 0.002), 0.004, 5
+    )
     pane = _facing_room(-half, half, low, high, back - 0.02).painted(6)
     return [*faces, *(face.painted(2) for face in reveal), *frame, sill, pane]
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,8 +17,15 @@ from generator.core.se3 import Vec3
 
 def box(low: Vec3, high: Vec3) -> Array:
     """The eight corners of an axis-aligned box."""
-    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
-                     for z in (low[2], high[2])], dtype=np.float64)
+    return np.array(
+        [
+            [x, y, z]
+            for x in (low[0], high[0])
+            for y in (low[1], high[1])
+            for z in (low[2], high[2])
+        ],
+        dtype=np.float64,
+    )
 
 
 def frustum(low: tuple[float, float], high: tuple[float, float], sides: int = 20) -> Array:
@@ -27,7 +35,7 @@ def frustum(low: tuple[float, float], high: tuple[float, float], sides: int = 20
 
 def stack(profile: Sequence[tuple[float, float]], sides: int = 20) -> list[Array]:
     """One frustum per segment of a profile of (radius, z), from bottom to top."""
-    return [frustum(a, b, sides) for a, b in zip(profile[:-1], profile[1:])]
+    return [frustum(a, b, sides) for a, b in pairwise(profile)]
 
 
 def ring(
@@ -45,8 +53,10 @@ def ring(
         points = [
             (radius * math.cos(middle + turn), radius * math.sin(middle + turn), z)
             for inner, outer, z in (low, high)
-            for radius, turns in ((min(inner * inner_factor, outer), (-half, half)),
-                                  (outer, (-half, 0.0, half)))
+            for radius, turns in (
+                (min(inner * inner_factor, outer), (-half, half)),
+                (outer, (-half, 0.0, half)),
+            )
             for turn in turns
         ]
         wedges.append(np.array(points))
@@ -71,13 +81,21 @@ def tube(path: Array, radius: float) -> list[Array]:
     The boxes are as thick as the tube: half width ``radius``.
     """
     boxes = []
-    for a, b in zip(path[:-1], path[1:]):
+    for a, b in pairwise(path):
         along = b - a
         length = math.sqrt(float((along * along).sum()))
         across = np.array([-along[2], 0.0, along[0]]) / length * radius
         side = np.array([0.0, radius, 0.0])
-        boxes.append(np.array([p + s * across + t * side for p in (a, b)
-                               for s in (-1.0, 1.0) for t in (-1.0, 1.0)]))
+        boxes.append(
+            np.array(
+                [
+                    p + s * across + t * side
+                    for p in (a, b)
+                    for s in (-1.0, 1.0)
+                    for t in (-1.0, 1.0)
+                ]
+            )
+        )
     return boxes
 
 

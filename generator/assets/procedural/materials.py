@@ -22,10 +22,40 @@ COPPER: Vec3 = (0.95, 0.64, 0.54)
 BLACK_OXIDE: Vec3 = (0.045, 0.045, 0.048)
 ZINC: Vec3 = (0.66, 0.68, 0.70)
 
-GLAZES = ("#f4f1ea", "#e9e4d8", "#d9dfe2", "#2d4f7c", "#7aa0b8", "#3d6b5c", "#8fa98a", "#b5432e",
-          "#d98a3d", "#e3c565", "#a3627a", "#5b4a6f", "#3a3a3d", "#1d1f22", "#7d5a43", "#c7b299")
-PLASTICS = ("#d7261e", "#f2a71b", "#f7d423", "#2e9e4f", "#1f6fb5", "#123a6b", "#7b3fa0", "#e8629a",
-            "#f0f0ec", "#202124", "#6a6f73", "#12a3a3", "#ef6c2f", "#9ccb3b")
+GLAZES = (
+    "#f4f1ea",
+    "#e9e4d8",
+    "#d9dfe2",
+    "#2d4f7c",
+    "#7aa0b8",
+    "#3d6b5c",
+    "#8fa98a",
+    "#b5432e",
+    "#d98a3d",
+    "#e3c565",
+    "#a3627a",
+    "#5b4a6f",
+    "#3a3a3d",
+    "#1d1f22",
+    "#7d5a43",
+    "#c7b299",
+)
+PLASTICS = (
+    "#d7261e",
+    "#f2a71b",
+    "#f7d423",
+    "#2e9e4f",
+    "#1f6fb5",
+    "#123a6b",
+    "#7b3fa0",
+    "#e8629a",
+    "#f0f0ec",
+    "#202124",
+    "#6a6f73",
+    "#12a3a3",
+    "#ef6c2f",
+    "#9ccb3b",
+)
 WOODS = ("#c79a6b", "#a8743f", "#7d5230", "#e0c196", "#5b3a24")
 
 
@@ -62,7 +92,9 @@ def ceramic(rng: Rng, colors: Sequence[str] = GLAZES) -> Material:
     return Material(base_color=color, roughness=between(0.1, 0.3, rng))
 
 
-def plastic(rng: Rng, colors: Sequence[str] = PLASTICS, gloss: tuple[float, float] = (0.25, 0.5)) -> Material:
+def plastic(
+    rng: Rng, colors: Sequence[str] = PLASTICS, gloss: tuple[float, float] = (0.25, 0.5)
+) -> Material:
     """Injection-moulded plastic."""
     color = jittered(linear(pick(colors, rng)), 0.06, rng)
     return Material(base_color=color, roughness=between(*gloss, rng))
@@ -89,7 +121,9 @@ def printed(texture_id: str, roughness: float, metallic: float = 0.0) -> Materia
     )
 
 
-def patterned(texture_id: str, scale_m: float, roughness: float, color: Vec3 = (1.0, 1.0, 1.0)) -> Material:
+def patterned(
+    texture_id: str, scale_m: float, roughness: float, color: Vec3 = (1.0, 1.0, 1.0)
+) -> Material:
     """A material texture projected along the axes, one repeat per ``scale_m``."""
     return Material(
         base_color=color, roughness=roughness, texture=texture_id, texture_scale_m=scale_m

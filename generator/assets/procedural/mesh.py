@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from generator.assets.procedural.family import Solid
 from generator.core.geometry import ConvexParts, Material, MeshData
-from generator.core.se3 import Vec3
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -46,7 +45,7 @@ class Patch:
         return replace(self, corners_m=self.corners_m + np.array([x, y, z]))
 
     def rotated(self, axis: str, angle_rad: float) -> Patch:
-        """The patch turned about a coordinate axis (``x``, ``y`` or ``z``) by the right-hand rule."""
+        """The patch turned about the axis ``x``, ``y`` or ``z`` by the right-hand rule."""
         return replace(self, corners_m=rotated(self.corners_m, axis, angle_rad))
 
     def painted(self, slot: int) -> Patch:
@@ -72,7 +71,7 @@ def rotated(points: Array, axis: str, angle_rad: float) -> Array:
     i = "xyz".index(axis)
     j, k = (i + 1) % 3, (i + 2) % 3
     c, s = math.cos(angle_rad), math.sin(angle_rad)
-    turned = points.copy()
+    turned: Array = points.copy()
     turned[..., j] = c * points[..., j] - s * points[..., k]
     turned[..., k] = s * points[..., j] + c * points[..., k]
     return turned
@@ -207,9 +206,3 @@ def _unique_rows(rows: Indices) -> tuple[Indices, Indices]:
     rank = np.zeros(len(first), dtype=np.int64)
     rank[appearance] = np.arange(len(first))
     return first[appearance], rank[number]
-
-
-def size_m(solid: Solid) -> Vec3:
-    """Extent of the visual geometry [m]."""
-    low, high = solid.mesh.bounds_m()
-    return (high[0] - low[0], high[1] - low[1], high[2] - low[2])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from generator.core.streams import Rng
 SIZE_PX = 512
 
 Cells = tuple[int, int]
+_Reals = TypeVar("_Reals", Float32, NDArray[np.float64])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -36,7 +38,7 @@ class Worley:
     number: NDArray[np.int64]
     count: int
 
-    def of_each(self, values: NDArray[np.float64]) -> Float32:
+    def of_each(self, values: NDArray[np.floating[Any]]) -> Float32:
         """A value per point, shape [count, ...], as an image."""
         image: Float32 = values.astype(np.float32)[self.number]
         return image
@@ -122,10 +124,10 @@ def blurred(image: Float32, passes: int = 1) -> Float32:
     return image
 
 
-def smoothstep(low: float, high: float, x: Float32) -> Float32:
+def smoothstep(low: float, high: float, x: _Reals) -> _Reals:
     """0 below ``low``, 1 above ``high``, smooth between; reversed bounds reverse it."""
     t = np.clip((x - np.float32(low)) / np.float32(high - low), 0.0, 1.0)
-    step: Float32 = t * t * (3 - 2 * t)
+    step: _Reals = t * t * (3 - 2 * t)
     return step
 
 

@@ -33,10 +33,21 @@ from generator.core.geometry import Material
 from generator.core.streams import Rng
 
 # Thread, width across flats, height of head, of nut, pitch [mm]: ISO 4014 and ISO 4032.
-_HEX = ((8, 13, 5.3, 6.8, 1.25), (10, 16, 6.4, 8.4, 1.5), (12, 18, 7.5, 10.8, 1.75), (16, 24, 10, 14.8, 2.0),
-        (20, 30, 12.5, 18, 2.5))
+_HEX = (
+    (8, 13, 5.3, 6.8, 1.25),
+    (10, 16, 6.4, 8.4, 1.5),
+    (12, 18, 7.5, 10.8, 1.75),
+    (16, 24, 10, 14.8, 2.0),
+    (20, 30, 12.5, 18, 2.5),
+)
 # Thread, inner and outer diameter, thickness [mm]: ISO 7089.
-_WASHERS = ((8, 8.4, 16, 1.6), (10, 10.5, 20, 2.0), (12, 13, 24, 2.5), (16, 17, 30, 3.0), (20, 21, 37, 3.0))
+_WASHERS = (
+    (8, 8.4, 16, 1.6),
+    (10, 10.5, 20, 2.0),
+    (12, 13, 24, 2.5),
+    (16, 17, 30, 3.0),
+    (20, 21, 37, 3.0),
+)
 _ABS = ("#202124", "#6a6f73", "#f0f0ec", "#1f6fb5", "#d7261e", "#f2a71b", "#2e9e4f")
 
 
@@ -48,7 +59,11 @@ def hex_bolt(seed: int) -> Solid:
     threaded = min(length - d, max(2 * d, 0.55 * length))
     corner = flats / math.sqrt(3)
     end = head + length
-    profile: list[Point2] = [(0.0, head - 0.0005), (0.5 * d, head - 0.0005), (0.5 * d, end - threaded)]
+    profile: list[Point2] = [
+        (0.0, head - 0.0005),
+        (0.5 * d, head - 0.0005),
+        (0.5 * d, end - threaded),
+    ]
     root, turns = 0.5 * d - 0.61 * pitch, max(3, int((threaded - pitch) / pitch))
     step = (threaded - pitch) / turns
     for i in range(turns):
@@ -56,8 +71,10 @@ def hex_bolt(seed: int) -> Solid:
         profile += [(root, z + 0.5 * step), (0.5 * d, z + step)]
     profile += [(root, end), (0.0, end)]
     patches = [extruded(circle(corner, 6), head, 0.06 * flats), lathe(profile, 20)]
-    parts = [hulls.frustum((corner, 0.0), (corner, head), 6),
-             hulls.frustum((0.5 * d, head), (0.5 * d, end), 12)]
+    parts = [
+        hulls.frustum((corner, 0.0), (corner, head), 6),
+        hulls.frustum((0.5 * d, head), (0.5 * d, end), 12),
+    ]
     return centred(patches, (_steel(rng),), parts, crease_deg=25.0)
 
 
@@ -79,8 +96,11 @@ def washer(seed: int) -> Solid:
     rng = rng_of("washer", seed)
     _, inner, outer, thick = (0.001 * v for v in _WASHERS[seed % len(_WASHERS)])
     r, big = 0.5 * inner, 0.5 * outer
-    profile = fillet([(r, 0.5 * thick), (r, 0.0), (big, 0.0), (big, thick), (r, thick), (r, 0.5 * thick)],
-                     0.12 * thick, 1)
+    profile = fillet(
+        [(r, 0.5 * thick), (r, 0.0), (big, 0.0), (big, thick), (r, thick), (r, 0.5 * thick)],
+        0.12 * thick,
+        1,
+    )
     wedges = hulls.ring((r, big, 0.0), (r, big, thick), 8)
     return centred([lathe(profile, 36)], (_steel(rng),), wedges)
 
@@ -88,14 +108,24 @@ def washer(seed: int) -> Solid:
 def stepped_shaft(seed: int) -> Solid:
     """A turned shaft of several diameters, lying along X. Slot: body."""
     rng = rng_of("stepped_shaft", seed)
-    radii = [between(0.005, 0.008, rng), between(0.007, 0.011, rng), between(0.01, 0.016, rng),
-             between(0.007, 0.01, rng), between(0.004, 0.007, rng)][: pick((3, 4, 5), rng)]
+    radii = [
+        between(0.005, 0.008, rng),
+        between(0.007, 0.011, rng),
+        between(0.01, 0.016, rng),
+        between(0.007, 0.01, rng),
+        between(0.004, 0.007, rng),
+    ][: pick((3, 4, 5), rng)]
     chamfer, z = 0.0008, 0.0
     profile: list[Point2] = [(0.0, 0.0)]
     parts = []
     for r in radii:
         length = between(0.012, 0.04, rng)
-        profile += [(r - chamfer, z), (r, z + chamfer), (r, z + length - chamfer), (r - chamfer, z + length)]
+        profile += [
+            (r - chamfer, z),
+            (r, z + chamfer),
+            (r, z + length - chamfer),
+            (r - chamfer, z + length),
+        ]
         parts.append(hulls.frustum((r, z), (r, z + length)))
         z += length
     profile.append((0.0, z))
@@ -117,11 +147,18 @@ def pipe_elbow(seed: int) -> Solid:
     ring = _collar(inner, collar, 0.55 * outer).moved(z=-0.55 * outer)
     first = ring.rotated("y", -0.5 * math.pi).moved(-straight)
     second = ring.rotated("x", -0.5 * math.pi).moved(bend, bend + straight)
-    parts = [_tube_piece(path[a : b + 1], outer) for a, b in ((0, 1), (1, 5), (5, 9), (9, 13), (13, 14))]
+    parts = [
+        _tube_piece(path[a : b + 1], outer) for a, b in ((0, 1), (1, 5), (5, 9), (9, 13), (13, 14))
+    ]
     band = hulls.frustum((collar, -0.55 * outer), (collar, 0.0))
-    parts += [rotated(band, "y", -0.5 * math.pi) + np.array([-straight, 0, 0]),
-              rotated(band, "x", -0.5 * math.pi) + np.array([bend, bend + straight, 0])]
-    finish = pick((metal(BRASS, 0.3), metal((0.72, 0.45, 0.33), 0.35), metal(ZINC, 0.4), plastic(rng, _ABS)), rng)
+    parts += [
+        rotated(band, "y", -0.5 * math.pi) + np.array([-straight, 0, 0]),
+        rotated(band, "x", -0.5 * math.pi) + np.array([bend, bend + straight, 0]),
+    ]
+    finish = pick(
+        (metal(BRASS, 0.3), metal((0.72, 0.45, 0.33), 0.35), metal(ZINC, 0.4), plastic(rng, _ABS)),
+        rng,
+    )
     return centred([wall, bore, first, second], (finish,), parts)
 
 
@@ -133,9 +170,15 @@ def bracket(seed: int) -> Solid:
     hole = min(0.16 * width, 0.004)
     foot = _holed_plate(a, width, thick, hole)
     upright = _holed_plate(b, width, thick, hole).rotated("y", -0.5 * math.pi).moved(thick)
-    finish = pick((metal(ZINC, 0.35), metal(STAINLESS, 0.3), metal(BLACK_OXIDE, 0.5), metal(ALUMINIUM, 0.4)), rng)
+    finish = pick(
+        (metal(ZINC, 0.35), metal(STAINLESS, 0.3), metal(BLACK_OXIDE, 0.5), metal(ALUMINIUM, 0.4)),
+        rng,
+    )
     half = 0.5 * width
-    parts = [hulls.box((0.0, -half, 0.0), (a, half, thick)), hulls.box((0.0, -half, 0.0), (thick, half, b))]
+    parts = [
+        hulls.box((0.0, -half, 0.0), (a, half, thick)),
+        hulls.box((0.0, -half, 0.0), (thick, half, b)),
+    ]
     return centred([foot, upright], (finish,), parts)
 
 
@@ -148,7 +191,14 @@ def gear(seed: int) -> Solid:
     bore = between(0.25, 0.35, rng) * pitch
     outline = []
     for i in range(teeth):
-        for share, r in ((-0.34, root), (-0.25, pitch), (-0.13, tip), (0.13, tip), (0.25, pitch), (0.34, root)):
+        for share, r in (
+            (-0.34, root),
+            (-0.25, pitch),
+            (-0.13, tip),
+            (0.13, tip),
+            (0.25, pitch),
+            (0.34, root),
+        ):
             turn = 2 * math.pi * (i + share) / teeth
             outline.append((r * math.cos(turn), r * math.sin(turn)))
     disc = extruded(np.array(outline), thick, 0.0004, [circle(bore, 28)])
@@ -176,8 +226,10 @@ def flange(seed: int) -> Solid:
     disc = extruded(circle(radius, 56), thick, 0.0006, holes)
     neck, rise = 0.56 * radius, between(0.3, 0.6, rng) * radius
     collar = _collar(bore, neck, rise).moved(z=thick)
-    parts = [*hulls.ring((bore, radius, 0.0), (bore, radius, thick), 12),
-             *hulls.ring((bore, neck, thick), (bore, neck, thick + rise), 8)]
+    parts = [
+        *hulls.ring((bore, radius, 0.0), (bore, radius, thick), 12),
+        *hulls.ring((bore, neck, thick), (bore, neck, thick + rise), 8),
+    ]
     return centred([disc, collar], (_machined(rng),), parts)
 
 
@@ -187,39 +239,68 @@ def connector(seed: int) -> Solid:
     side = between(0.022, 0.034, rng)
     port, reach = 0.32 * side, between(0.2, 0.45, rng) * side
     body = rounded_box((side, side, side), 0.06 * side, 2)
-    stub = _collar(0.7 * port, port, reach).moved(z=0.5 * side)
+    stub = _collar(0.7 * port, port, reach, 22).moved(z=0.5 * side)
     level = 0.5 * side + 0.3 * reach
-    plug = lathe([(0.0, 0.5 * side - 0.001), (0.72 * port, 0.5 * side - 0.001), (0.72 * port, level), (0.0, level)], 24)
+    plug = lathe(
+        [
+            (0.0, 0.5 * side - 0.001),
+            (0.72 * port, 0.5 * side - 0.001),
+            (0.72 * port, level),
+            (0.0, level),
+        ],
+        22,
+    )
     pieces = joined([stub.painted(1), plug])
     band = hulls.frustum((port, 0.5 * side), (port, 0.5 * side + reach), 16)
-    turns = [("y", 0.0), ("y", 0.5 * math.pi), ("y", -0.5 * math.pi), ("x", 0.5 * math.pi),
-             ("x", -0.5 * math.pi), ("y", math.pi)][: pick((3, 4, 5, 6), rng)]
+    turns = [
+        ("y", 0.0),
+        ("y", 0.5 * math.pi),
+        ("y", -0.5 * math.pi),
+        ("x", 0.5 * math.pi),
+        ("x", -0.5 * math.pi),
+        ("y", math.pi),
+    ][: pick((3, 4, 5, 6), rng)]
     half = 0.5 * side
-    parts = [hulls.box((-half, -half, -half), (half, half, half)),
-             *(rotated(band, axis, turn) for axis, turn in turns)]
+    parts = [
+        hulls.box((-half, -half, -half), (half, half, half)),
+        *(rotated(band, axis, turn) for axis, turn in turns),
+    ]
     block = plastic(rng, _ABS) if chance(0.5, rng) else _machined(rng)
     finish = pick((metal(BRASS, 0.3), metal(ZINC, 0.35), block), rng)
-    return centred([body, *(pieces.rotated(axis, turn) for axis, turn in turns)], (block, finish), parts)
+    return centred(
+        [body, *(pieces.rotated(axis, turn) for axis, turn in turns)], (block, finish), parts
+    )
 
 
 def _steel(rng: Rng) -> Material:
     """Fastener: zinc-plated, stainless, black or brass."""
-    color, rough = pick(((ZINC, 0.3), (ZINC, 0.35), (STAINLESS, 0.25), (BLACK_OXIDE, 0.5), (BRASS, 0.3)), rng)
+    color, rough = pick(
+        ((ZINC, 0.3), (ZINC, 0.35), (STAINLESS, 0.25), (BLACK_OXIDE, 0.5), (BRASS, 0.3)), rng
+    )
     return metal(color, rough * between(0.85, 1.2, rng))
 
 
 def _machined(rng: Rng) -> Material:
     """Turned or milled steel, aluminium or brass."""
-    color, rough = pick(((STEEL, 0.35), (STEEL, 0.4), (ALUMINIUM, 0.35), (BRASS, 0.3), (BLACK_OXIDE, 0.45)), rng)
+    color, rough = pick(
+        ((STEEL, 0.35), (STEEL, 0.4), (ALUMINIUM, 0.35), (BRASS, 0.3), (BLACK_OXIDE, 0.45)), rng
+    )
     return metal(color, rough * between(0.85, 1.2, rng))
 
 
-def _collar(bore: float, outer: float, height: float) -> Patch:
+def _collar(bore: float, outer: float, height: float, segments: int = 28) -> Patch:
     """A closed ring from z = 0 to ``height``, its outer edges broken."""
     c = 0.06 * outer
-    profile = [(bore, height), (bore, 0.0), (outer - c, 0.0), (outer, c), (outer, height - c),
-               (outer - c, height), (bore, height)]
-    return lathe(profile, 28)
+    profile = [
+        (bore, height),
+        (bore, 0.0),
+        (outer - c, 0.0),
+        (outer, c),
+        (outer, height - c),
+        (outer - c, height),
+        (bore, height),
+    ]
+    return lathe(profile, segments)
 
 
 def _holed_plate(length: float, width: float, thick: float, hole: float) -> Patch:
@@ -230,7 +311,9 @@ def _holed_plate(length: float, width: float, thick: float, hole: float) -> Patc
     for sign, start in ((-1.0, -0.5 * math.pi), (1.0, 0.0)):
         for i in range(6):
             turn = start + 0.5 * math.pi * i / 5
-            corners.append((length - r + r * math.cos(turn), sign * (half - r) + r * math.sin(turn)))
+            corners.append(
+                (length - r + r * math.cos(turn), sign * (half - r) + r * math.sin(turn))
+            )
     # Turned a little, so that no three points of the triangulation are in line.
     holes = [circle(hole, 14, (share * length, 0.0), share) for share in (0.42, 0.78)]
     return extruded(np.array([*near, *corners]), thick, 0.12 * thick, holes)
@@ -240,4 +323,3 @@ def _tube_piece(path: Array, radius: float) -> Array:
     """Convex hull points of a piece of pipe in the plane z = 0."""
     tube = sweep(path, circle(radius, 16), capped=False)
     return hulls.extreme(tube.corners_m, 48)
-

@@ -84,7 +84,7 @@ def sweep(
 
     Args:
         path: Centre line [m], shape [n, 3].
-        section: Counter-clockwise outline [m], shape [k, 2]; its first axis starts out along ``up``.
+        section: Counter-clockwise outline [m], shape [k, 2]; its first axis starts along ``up``.
         up: Direction of the section's first axis at the start.
         scale: Factors on the section per path point, shape [n] or [n, 2].
         closed: Whether the path returns to its start.
@@ -174,23 +174,27 @@ def rounded_box(
     patches = []
     for name, axes in BOX_FACES.items():
         outward, right, up = (np.array(axis) for axis in axes)
-        a, b = (_rounded_ticks(float((half * np.abs(axis)).sum()), radius, steps)
-                for axis in (right, up))
-        flat = (outward * half + a[None, :, None] * right + b[:, None, None] * up)
+        a, b = (
+            _rounded_ticks(float((half * np.abs(axis)).sum()), radius, steps)
+            for axis in (right, up)
+        )
+        flat = outward * half + a[None, :, None] * right + b[:, None, None] * up
         core = np.clip(flat, -(half - radius), half - radius)
         away = flat - core
         length = np.sqrt((away**2).sum(axis=2, keepdims=True))
         points = core + radius * away / np.maximum(length, 1e-300)
         u0, v0, u1, v1 = (uv or {}).get(name, WHOLE_IMAGE)
         u, v = ((t - t[0]) / (t[-1] - t[0]) for t in (a, b))
-        patches.append(grid(points, u0 + (u1 - u0) * u, v0 + (v1 - v0) * v, (slots or {}).get(name, 0)))
+        patches.append(
+            grid(points, u0 + (u1 - u0) * u, v0 + (v1 - v0) * v, (slots or {}).get(name, 0))
+        )
     return joined(patches)
 
 
 def block(low: Vec3, high: Vec3, radius_m: float = 0.0, slot: int = 0) -> Patch:
     """A box between two corners; a small edge radius catches highlights."""
     size = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
-    centre = [0.5 * (a + b) for a, b in zip(low, high)]
+    centre = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
     made = rounded_box(size, radius_m, 1) if radius_m > 0 else _plain_box(size)
     return made.moved(*centre).painted(slot)
 
@@ -209,8 +213,11 @@ def extruded(
     """
     loops = [_wound(outline, 1.0), *(_wound(hole, -1.0) for hole in holes)]
     inner = [_inset(loop, bevel_m) if bevel_m > 0 else loop for loop in loops]
-    levels = ([(inner, 0.0), (loops, bevel_m), (loops, height_m - bevel_m), (inner, height_m)]
-              if bevel_m > 0 else [(loops, 0.0), (loops, height_m)])
+    levels = (
+        [(inner, 0.0), (loops, bevel_m), (loops, height_m - bevel_m), (inner, height_m)]
+        if bevel_m > 0
+        else [(loops, 0.0), (loops, height_m)]
+    )
     walls = []
     for i in range(len(loops)):
         rows = [_at_height(np.concatenate([level[i], level[i][:1]]), z) for level, z in levels]
@@ -226,7 +233,9 @@ def circle(radius_m: float, sides: int, centre: Point2 = (0.0, 0.0), phase: floa
     return points
 
 
-def fillet(points: Sequence[Point2], radii_m: Sequence[float] | float, steps: int = 3) -> list[Point2]:
+def fillet(
+    points: Sequence[Point2], radii_m: Sequence[float] | float, steps: int = 3
+) -> list[Point2]:
     """An open polyline with its inner corners rounded by arcs of the given radii."""
     radii = [radii_m] * len(points) if isinstance(radii_m, float) else list(radii_m)
     p = np.array(points, dtype=np.float64)
@@ -305,8 +314,10 @@ def _rounded_ticks(half: float, radius: float, steps: int) -> Array:
     """Positions along a face whose projection on the rounding is even in angle."""
     angles = np.linspace(0.25 * math.pi, 0.0, steps + 1)
     edge = -(half - radius) - radius * np.tan(angles)
-    return np.concatenate([edge, -edge[::-1]]) if half > radius + 1e-9 else np.concatenate(
-        [edge, -edge[-2::-1]]
+    return (
+        np.concatenate([edge, -edge[::-1]])
+        if half > radius + 1e-9
+        else np.concatenate([edge, -edge[-2::-1]])
     )
 
 
@@ -315,9 +326,16 @@ def _plain_box(size: Sequence[float]) -> Patch:
     patches = []
     for axes in BOX_FACES.values():
         outward, right, up = (np.array(axis) * half for axis in axes)
-        patches.append(grid(np.stack([
-            np.stack([outward - right + s * up, outward + right + s * up]) for s in (-1.0, 1.0)
-        ])))
+        patches.append(
+            grid(
+                np.stack(
+                    [
+                        np.stack([outward - right + s * up, outward + right + s * up])
+                        for s in (-1.0, 1.0)
+                    ]
+                )
+            )
+        )
     return joined(patches)
 
 
@@ -430,9 +448,9 @@ def _best_ear(points: Array, loop: list[int]) -> int:
 
 
 def _areas(a: Array, b: Array, c: Array) -> Array:
-    doubled: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (
-        b[..., 1] - a[..., 1]
-    ) * (c[..., 0] - a[..., 0])
+    doubled: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
+        c[..., 0] - a[..., 0]
+    )
     return doubled
 
 

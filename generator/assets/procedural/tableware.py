@@ -11,7 +11,6 @@ from generator.assets.procedural.draw import between, chance, pick, rng_of
 from generator.assets.procedural.family import Solid
 from generator.assets.procedural.materials import (
     GLAZES,
-    PLASTICS,
     ceramic,
     jittered,
     lighter,
@@ -76,7 +75,10 @@ def bowl(seed: int) -> Solid:
     outer = _bowl_curve(foot, radius, lift, height, fullness)
     inner = _offset(outer, wall)
     profile = [
-        (0.0, 0.6 * lift), (foot - 0.005, 0.6 * lift), (foot - 0.004, 0.0), (foot, 0.0),
+        (0.0, 0.6 * lift),
+        (foot - 0.005, 0.6 * lift),
+        (foot - 0.004, 0.0),
+        (foot, 0.0),
         *((float(r), float(z)) for r, z in outer),
         (radius - 0.5 * wall, height + 0.5 * wall),
         *((float(r), float(z)) for r, z in inner[::-1]),
@@ -86,8 +88,10 @@ def bowl(seed: int) -> Solid:
     inside = outside if chance(0.5, rng) else ceramic(rng, ("#f4f1ea", "#e9e4d8", "#d9dfe2"))
     k = len(outer) // 2
     floor = float(inner[0, 1])
-    levels = [(float(inner[i, 0]), float(outer[i, 0]), z) for i, z in
-              ((0, floor - 0.5 * wall), (k, float(outer[k, 1])), (-1, height))]
+    levels = [
+        (float(inner[i, 0]), float(outer[i, 0]), z)
+        for i, z in ((0, floor - 0.5 * wall), (k, float(outer[k, 1])), (-1, height + 0.5 * wall))
+    ]
     parts = [
         hulls.frustum((foot, 0.0), (max(foot, levels[0][0]), floor)),
         *hulls.ring(levels[0], levels[1], 8),
@@ -104,18 +108,35 @@ def plate(seed: int) -> Solid:
     well, foot = radius * between(0.6, 0.72, rng), radius * between(0.5, 0.58, rng)
     step = rise * between(0.45, 0.7, rng)
     upper = fillet(
-        [(radius, rise), (well + 0.35 * (radius - well), step + 0.002), (well, 0.002 + wall),
-         (0.0, 0.002 + wall)], 0.014, 3,
+        [
+            (radius, rise),
+            (well + 0.35 * (radius - well), step + 0.002),
+            (well, 0.002 + wall),
+            (0.0, 0.002 + wall),
+        ],
+        0.014,
+        3,
     )
     lower = fillet(
-        [(0.0, 0.002), (foot - 0.004, 0.002), (foot - 0.003, 0.0), (foot, 0.0), (foot + 0.002, 0.002),
-         (well, 0.0025), (well + 0.35 * (radius - well), step + 0.002 - wall),
-         (radius, rise - 0.8 * wall)], [0.0] * 5 + [0.012, 0.012, 0.0], 3,
+        [
+            (0.0, 0.002),
+            (foot - 0.004, 0.002),
+            (foot - 0.003, 0.0),
+            (foot, 0.0),
+            (foot + 0.002, 0.002),
+            (well, 0.0025),
+            (well + 0.35 * (radius - well), step + 0.002 - wall),
+            (radius, rise - 0.8 * wall),
+        ],
+        [0.0] * 5 + [0.012, 0.012, 0.0],
+        3,
     )
     profile = [*lower, (radius + 0.4 * wall, rise - 0.4 * wall), *upper]
     outside = ceramic(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
-    inside = outside if chance(0.7, rng) else Material(
-        jittered(linear(pick(GLAZES, rng)), 0.08, rng), outside.roughness
+    inside = (
+        outside
+        if chance(0.7, rng)
+        else Material(jittered(linear(pick(GLAZES, rng)), 0.08, rng), outside.roughness)
     )
     walls = hulls.ring(
         (well - 0.004, well + 0.006, 0.001), (radius - 0.003, radius + 0.4 * wall, rise), 20
@@ -138,12 +159,30 @@ def _cup_profile(
     waist = [(middle, 0.5 * height)] if bulge > 0 else []
     inner_waist = [(middle - wall, 0.5 * height)] if bulge > 0 else []
     points = [
-        (0.0, 0.0015), (0.78 * bottom, 0.0015), (0.8 * bottom, 0.0), (bottom, 0.0), *waist,
-        (top, height), (top - wall, height), *inner_waist, (bottom - wall, wall), (0.0, wall),
+        (0.0, 0.0015),
+        (0.78 * bottom, 0.0015),
+        (0.8 * bottom, 0.0),
+        (bottom, 0.0),
+        *waist,
+        (top, height),
+        (top - wall, height),
+        *inner_waist,
+        (bottom - wall, wall),
+        (0.0, wall),
     ]
     rim = 0.45 * wall
-    radii = [0.0, 0.0, 0.0, 0.007, *([0.12] if waist else []), rim, rim,
-             *([0.12] if waist else []), 0.006, 0.0]
+    radii = [
+        0.0,
+        0.0,
+        0.0,
+        0.007,
+        *([0.12] if waist else []),
+        rim,
+        rim,
+        *([0.12] if waist else []),
+        0.006,
+        0.0,
+    ]
     return fillet(points, radii, 4)
 
 
@@ -175,9 +214,7 @@ def _flared(count: int) -> Array:
     return 1.0 + 0.35 * t**6
 
 
-def _bowl_curve(
-    foot: float, radius: float, lift: float, height: float, fullness: float
-) -> Array:
+def _bowl_curve(foot: float, radius: float, lift: float, height: float, fullness: float) -> Array:
     """Outer wall from foot to rim, a superellipse arc: shape [10, 2]."""
     t = np.linspace(0.0, 0.5 * math.pi, 10)
     r = foot + (radius - foot) * np.sin(t) ** fullness
@@ -191,5 +228,3 @@ def _offset(curve: Array, distance: float) -> Array:
     step = step / np.sqrt((step**2).sum(axis=1, keepdims=True))
     moved: Array = curve + distance * np.stack([-step[:, 1], step[:, 0]], axis=1)
     return moved
-
-

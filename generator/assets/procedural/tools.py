@@ -21,7 +21,16 @@ from generator.assets.procedural.materials import (
     plastic,
 )
 from generator.assets.procedural.mesh import Array, Patch, centred, joined, rotated
-from generator.assets.procedural.shapes import circle, extruded, fan, fillet, grid, lathe, rounded_box, sweep
+from generator.assets.procedural.shapes import (
+    circle,
+    extruded,
+    fan,
+    fillet,
+    grid,
+    lathe,
+    rounded_box,
+    sweep,
+)
 from generator.core.geometry import Material
 
 _LAID = 0.5 * math.pi
@@ -34,23 +43,61 @@ def screwdriver(seed: int) -> Solid:
     blade, shaft = between(0.06, 0.15, rng), between(0.0025, 0.0038, rng)
     flutes = pick((0, 6, 6, 8), rng)
     t = np.linspace(0.0, 1.0, 22)
-    girth = np.interp(t, [0.0, 0.03, 0.1, 0.3, 0.6, 0.78, 0.88, 0.95, 1.0],
-                      [0.55, 0.8, 0.97, 1.0, 0.95, 0.72, 0.66, 0.72, 0.5])
+    girth = np.interp(
+        t,
+        [0.0, 0.03, 0.1, 0.3, 0.6, 0.78, 0.88, 0.95, 1.0],
+        [0.55, 0.8, 0.97, 1.0, 0.95, 0.72, 0.66, 0.72, 0.5],
+    )
     turn = 2 * math.pi * np.arange(32) / 32
     depth = np.where((t > 0.08) & (t < 0.72), 0.09, 0.0) * (flutes > 0)
     r = radius * girth[:, None] * (1 - depth[:, None] * np.maximum(np.cos(flutes * turn), 0.0) ** 2)
-    rows = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(grip * t[:, None], r.shape)], axis=2)
+    rows = np.stack(
+        [r * np.cos(turn), r * np.sin(turn), np.broadcast_to(grip * t[:, None], r.shape)], axis=2
+    )
     rows = np.concatenate([rows, rows[:, :1]], axis=1)
     handle = [grid(rows), fan(rows[0, :0:-1]), fan(rows[-1, :-1])]
     end = grip + blade
-    rod = lathe(fillet([(0.0, grip - 0.01), (shaft, grip - 0.01), (shaft, end - 0.012), (0.0, end - 0.012)], 0.0), 16, 1)
-    collar = lathe([(0.0, grip - 0.001), (0.45 * radius, grip - 0.001), (0.42 * radius, grip + 0.004),
-                    (0.0, grip + 0.004)], 20, 2)
-    tip = _flat_tip(shaft, end) if chance(0.5, rng) else lathe(
-        [(0.0, end - 0.013), (shaft, end - 0.013), (shaft, end - 0.008), (0.3 * shaft, end), (0.0, end)], 8, 1)
+    rod = lathe(
+        fillet(
+            [(0.0, grip - 0.01), (shaft, grip - 0.01), (shaft, end - 0.012), (0.0, end - 0.012)],
+            0.0,
+        ),
+        16,
+        1,
+    )
+    collar = lathe(
+        [
+            (0.0, grip - 0.001),
+            (0.45 * radius, grip - 0.001),
+            (0.42 * radius, grip + 0.004),
+            (0.0, grip + 0.004),
+        ],
+        20,
+        2,
+    )
+    tip = (
+        _flat_tip(shaft, end)
+        if chance(0.5, rng)
+        else lathe(
+            [
+                (0.0, end - 0.013),
+                (shaft, end - 0.013),
+                (shaft, end - 0.008),
+                (0.3 * shaft, end),
+                (0.0, end),
+            ],
+            8,
+            1,
+        )
+    )
     patches = [p.rotated("y", _LAID) for p in (*handle, rod, collar, tip)]
-    profile = [(0.55 * radius, 0.0), (0.97 * radius, 0.1 * grip), (0.97 * radius, 0.6 * grip),
-               (0.7 * radius, 0.82 * grip), (0.6 * radius, grip)]
+    profile = [
+        (0.55 * radius, 0.0),
+        (0.97 * radius, 0.1 * grip),
+        (0.97 * radius, 0.6 * grip),
+        (0.7 * radius, 0.82 * grip),
+        (0.6 * radius, grip),
+    ]
     parts = [*hulls.stack(profile, 16), hulls.frustum((shaft, grip), (shaft, end), 12)]
     materials = (plastic(rng), metal(ZINC, between(0.2, 0.35, rng)), plastic(rng, ("#202124",)))
     return centred(patches, materials, [rotated(part, "y", _LAID) for part in parts])
@@ -60,8 +107,15 @@ def hammer(seed: int) -> Solid:
     """A joiner's hammer with wooden or plastic handle. Slots: handle, head."""
     rng = rng_of("hammer", seed)
     length, size = between(0.26, 0.33, rng), between(0.9, 1.1, rng)
-    stations = [(0.0, 0.9, 1.0), (0.02, 1.05, 1.1), (0.1, 0.95, 1.05), (0.25, 1.05, 1.1),
-                (0.5, 0.8, 0.95), (0.75, 0.72, 0.9), (0.97, 0.75, 0.9)]
+    stations = [
+        (0.0, 0.9, 1.0),
+        (0.02, 1.05, 1.1),
+        (0.1, 0.95, 1.05),
+        (0.25, 1.05, 1.1),
+        (0.5, 0.8, 0.95),
+        (0.75, 0.72, 0.9),
+        (0.97, 0.75, 0.9),
+    ]
     t = np.linspace(0.0, 0.97, 18)
     wide, deep = (np.interp(t, [s[0] for s in stations], [s[i] for s in stations]) for i in (1, 2))
     path = np.stack([length * t, 0 * t, 0 * t], axis=1)
@@ -69,20 +123,45 @@ def hammer(seed: int) -> Solid:
     handle = sweep(path, oval, scale=np.stack([wide, deep], axis=1))
     at = length - 0.005
     eye = rounded_box((0.03 * size, 0.036 * size, 0.026 * size), 0.003, 1).moved(at)
-    face = lathe(fillet([(0.0, 0.015), (0.009, 0.015), (0.009, 0.034), (0.0138, 0.04), (0.0138, 0.058),
-                         (0.0, 0.0585)], [0, 0, 0.004, 0.003, 0.0015, 0], 2), 24)
+    face = lathe(
+        fillet(
+            [
+                (0.0, 0.015),
+                (0.009, 0.015),
+                (0.009, 0.034),
+                (0.0138, 0.04),
+                (0.0138, 0.058),
+                (0.0, 0.0585),
+            ],
+            [0, 0, 0.004, 0.003, 0.0015, 0],
+            2,
+        ),
+        24,
+    )
     peen = _peen(size)
-    head = [eye, face.scaled(size, size, size).rotated("x", -_LAID).moved(at),
-            peen.moved(at)]
+    head = [eye, face.scaled(size, size, size).rotated("x", -_LAID).moved(at), peen.moved(at)]
     wood = chance(0.6, rng)
-    grip = Material(jittered(linear(pick(WOODS[:4], rng)), 0.1, rng), 0.55) if wood else plastic(rng, PLASTICS)
+    grip = (
+        Material(jittered(linear(pick(WOODS[:4], rng)), 0.1, rng), 0.55)
+        if wood
+        else plastic(rng, PLASTICS)
+    )
     steel = pick((metal(STEEL, 0.35), metal(BLACK_OXIDE, 0.45)), rng)
-    parts = [hulls.extreme(handle.corners_m[abs(handle.corners_m[:, :, 0].mean(axis=1) / length - m) < 0.2], 40)
-             for m in (0.18, 0.5, 0.8)]
+    parts = [
+        hulls.extreme(
+            handle.corners_m[abs(handle.corners_m[:, :, 0].mean(axis=1) / length - m) < 0.2], 40
+        )
+        for m in (0.18, 0.5, 0.8)
+    ]
     half = 0.5 * size * np.array([0.03, 0.036, 0.026])
-    cylinder = rotated(hulls.frustum((0.0138 * size, 0.015 * size), (0.0138 * size, 0.058 * size), 16), "x", -_LAID)
-    parts += [hulls.box((at - half[0], -half[1], -half[2]), (at + half[0], half[1], half[2])),
-              cylinder + np.array([at, 0.0, 0.0]), hulls.extreme(peen.moved(at).corners_m, 24)]
+    cylinder = rotated(
+        hulls.frustum((0.0138 * size, 0.015 * size), (0.0138 * size, 0.058 * size), 16), "x", -_LAID
+    )
+    parts += [
+        hulls.box((at - half[0], -half[1], -half[2]), (at + half[0], half[1], half[2])),
+        cylinder + np.array([at, 0.0, 0.0]),
+        hulls.extreme(peen.moved(at).corners_m, 24),
+    ]
     return centred([handle, *(p.painted(1) for p in head)], (grip, steel), parts)
 
 
@@ -94,16 +173,25 @@ def wrench(seed: int) -> Solid:
     thick, bar = 0.33 * across + 0.0012, 0.36 * across + 0.0015
     head, ring = 1.12 * across, 0.8 * across
     centre = np.array([length - head, 0.0])
-    shank = np.array([(0.6 * ring, -bar), (length - 1.75 * head, -0.85 * bar),
-                      (length - 1.75 * head, 0.85 * bar), (0.6 * ring, bar)])
+    shank = np.array(
+        [
+            (0.6 * ring, -bar),
+            (length - 1.75 * head, -0.85 * bar),
+            (length - 1.75 * head, 0.85 * bar),
+            (0.6 * ring, bar),
+        ]
+    )
     bevel = 0.12 * thick
     patches = [
         extruded(_turned(_jaw(across, head)) + centre, thick, bevel).moved(z=-0.5 * thick),
         extruded(shank, 0.8 * thick, 0.3 * thick).moved(z=-0.4 * thick),
         extruded(circle(ring, 32), 1.3 * thick, bevel, [circle(0.57 * across, 24)]).moved(
-            z=-0.65 * thick),
+            z=-0.65 * thick
+        ),
     ]
-    finish = pick((metal((0.72, 0.73, 0.74), 0.18), metal(STEEL, 0.35), metal(BLACK_OXIDE, 0.4)), rng)
+    finish = pick(
+        (metal((0.72, 0.73, 0.74), 0.18), metal(STEEL, 0.35), metal(BLACK_OXIDE, 0.4)), rng
+    )
     h = 0.5 * thick
     parts = [
         *(_slab(_turned(piece) + centre, h) for piece in _jaw_pieces(across, head)),
@@ -136,7 +224,9 @@ def _jaw_pieces(across: float, radius: float) -> list[Array]:
 def _turned(points: Array) -> Array:
     """Points [n, 2] turned by the 15 degrees of a wrench's jaw."""
     c, s = math.cos(math.radians(15.0)), math.sin(math.radians(15.0))
-    return np.stack([c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]], axis=1)
+    return np.stack(
+        [c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]], axis=1
+    )
 
 
 def _slab(outline: Array, half: float) -> Array:
@@ -149,14 +239,23 @@ def _flat_tip(radius: float, end: float) -> Patch:
     stations = [(-0.014, 1.0, 1.0), (-0.01, 1.35, 0.62), (-0.004, 1.25, 0.3), (0.0, 1.2, 0.16)]
     z, wide, thin = (np.array([s[i] for s in stations]) for i in range(3))
     path = np.stack([0 * z, 0 * z, end + z], axis=1)
-    return sweep(path, circle(radius, 12), up=(1.0, 0.0, 0.0), scale=np.stack([wide, thin], axis=1), slot=1)
+    return sweep(
+        path, circle(radius, 12), up=(1.0, 0.0, 0.0), scale=np.stack([wide, thin], axis=1), slot=1
+    )
 
 
 def _peen(size: float) -> Patch:
     """The wedge at the back of a hammer's head, towards -Y."""
-    stations = [(0.015, 0.013, 0.011), (0.03, 0.012, 0.009), (0.056, 0.0115, 0.0022), (0.059, 0.0105, 0.0012)]
+    stations = [
+        (0.015, 0.013, 0.011),
+        (0.03, 0.012, 0.009),
+        (0.056, 0.0115, 0.0022),
+        (0.059, 0.0105, 0.0012),
+    ]
     rows = []
     for y, wide, thin in stations:
-        rows.append([(a * wide, -y, b * thin) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))])
+        rows.append(
+            [(a * wide, -y, b * thin) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]
+        )
     loops = size * np.array(rows)
     return joined([grid(loops), fan(loops[0, :0:-1]), fan(loops[-1, :-1])])

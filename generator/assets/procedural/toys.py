@@ -20,8 +20,14 @@ from generator.assets.procedural.shapes import ball as sphere
 from generator.assets.procedural.shapes import fillet, lathe, rounded_box, spline
 from generator.core.geometry import Material
 
-_SHAPES = ((0.04, 0.04, 0.04), (0.03, 0.06, 0.03), (0.03, 0.09, 0.03), (0.05, 0.05, 0.025),
-           (0.06, 0.06, 0.03), (0.025, 0.075, 0.015))
+_SHAPES = (
+    (0.04, 0.04, 0.04),
+    (0.03, 0.06, 0.03),
+    (0.03, 0.09, 0.03),
+    (0.05, 0.05, 0.025),
+    (0.06, 0.06, 0.03),
+    (0.025, 0.075, 0.015),
+)
 
 
 def block(seed: int) -> Solid:
@@ -29,7 +35,11 @@ def block(seed: int) -> Solid:
     rng = rng_of("block", seed)
     x, y, z = (side * between(0.95, 1.05, rng) for side in _SHAPES[seed % len(_SHAPES)])
     bare = chance(0.25, rng)
-    paint = Material(jittered(linear(pick(WOODS, rng)), 0.08, rng), 0.6) if bare else plastic(rng, PLASTICS[:8])
+    paint = (
+        Material(jittered(linear(pick(WOODS, rng)), 0.08, rng), 0.6)
+        if bare
+        else plastic(rng, PLASTICS[:8])
+    )
     body = rounded_box((x, y, z), 0.0025, 2)
     return centred([body], (paint,), [hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))])
 
@@ -38,7 +48,9 @@ def ball(seed: int) -> Solid:
     """A tennis, rubber, beach, basket or foot ball; the small ones are toys. Slot: cover."""
     rng = rng_of("ball", seed)
     kind = ball_kind(seed)
-    radius = {"tennis": 0.0334, "rubber": between(0.02, 0.035, rng)}.get(kind, between(0.05, 0.09, rng))
+    radius = {"tennis": 0.0334, "rubber": between(0.02, 0.035, rng)}.get(
+        kind, between(0.05, 0.09, rng)
+    )
     rough = {"tennis": 0.9, "basket": 0.65}.get(kind, between(0.3, 0.5, rng))
     body = sphere(lambda d: radius * d, 22, 36)
     cover = printed(f"texture/ball_cover?seed={seed}", rough)
@@ -54,14 +66,37 @@ def candle(seed: int) -> Solid:
     """A pillar candle with a wick. Slots: wax, wick."""
     rng = rng_of("candle", seed)
     radius, height = between(0.022, 0.04, rng), between(0.05, 0.15, rng)
-    wax = fillet([(0.0, 0.0), (radius, 0.0), (radius, height), (0.75 * radius, height - 0.003),
-                  (0.0, height - 0.006)], [0.0, 0.002, 0.003, 0.004, 0.0], 3)
-    wick = lathe([(0.0, height - 0.008), (0.001, height - 0.008), (0.001, height + 0.007), (0.0, height + 0.0075)], 8, 1)
+    wax = fillet(
+        [
+            (0.0, 0.0),
+            (radius, 0.0),
+            (radius, height),
+            (0.75 * radius, height - 0.003),
+            (0.0, height - 0.006),
+        ],
+        [0.0, 0.002, 0.003, 0.004, 0.0],
+        3,
+    )
+    wick = lathe(
+        [
+            (0.0, height - 0.008),
+            (0.001, height - 0.008),
+            (0.001, height + 0.007),
+            (0.0, height + 0.0075),
+        ],
+        8,
+        1,
+    )
     colors = ("#f1e8d2", "#e9dcc0", "#a83a34", "#3f5a4a", "#d9a441", "#7d8fa3", "#c58b8b")
     material = Material(jittered(linear(pick(colors, rng)), 0.05, rng), between(0.4, 0.6, rng))
-    return centred([lathe(wax, 32), wick], (material, Material((0.02, 0.02, 0.02), 0.9)),
-                   [hulls.frustum((radius, 0.0), (radius, height)),
-                    hulls.frustum((0.001, height), (0.001, height + 0.0075), 6)])
+    return centred(
+        [lathe(wax, 32), wick],
+        (material, Material((0.02, 0.02, 0.02), 0.9)),
+        [
+            hulls.frustum((radius, 0.0), (radius, height)),
+            hulls.frustum((0.001, height), (0.001, height + 0.0075), 6),
+        ],
+    )
 
 
 def vase(seed: int) -> Solid:
@@ -70,16 +105,28 @@ def vase(seed: int) -> Solid:
     height, belly = between(0.15, 0.27, rng), between(0.04, 0.06, rng)
     foot, neck = belly * between(0.55, 0.75, rng), belly * between(0.3, 0.6, rng)
     mouth, widest = neck * between(1.1, 1.6, rng), between(0.3, 0.55, rng)
-    curve = spline([(foot, 0.004), (belly, widest * height), (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height),
-                    (neck, 0.82 * height), (mouth, height)], 26)
+    curve = spline(
+        [
+            (foot, 0.004),
+            (belly, widest * height),
+            (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height),
+            (neck, 0.82 * height),
+            (mouth, height),
+        ],
+        17,
+    )
     wall = 0.004
     inner = [(float(r) - wall, float(z)) for r, z in curve[::-1] if z > 0.02]
     outer = [(float(r), float(z)) for r, z in curve]
     profile = [(0.0, 0.001), (foot - 0.004, 0.001), (foot - 0.003, 0.0), (foot, 0.0), *outer]
     outside = ceramic(rng, GLAZES)
     inside = Material(outside.base_color, 0.4)
-    stages = [(foot, 0.0), *(outer[i] for i in (5, 9, 13, 17, 21, 25))]
+    stages = [(foot, 0.0), *outer[2:16:2], (mouth, height + 0.0015)]
     return centred(
-        [lathe(profile, 36), lathe([outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)], 36, 1)],
-        (outside, inside), hulls.stack(stages),
+        [
+            lathe(profile, 32),
+            lathe([outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)], 32, 1),
+        ],
+        (outside, inside),
+        hulls.stack(stages),
     )

@@ -54,7 +54,7 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> Source:
     try:
         document = _document(folder, relative, data)
         described = _list(document, "materials")
-        slots = tuple(_slot(document, m) if materials else Slot() for m in (*described, {}))
+        slots = (*(_slot(document, m) if materials else Slot() for m in described), Slot())
         parts = [
             part
             for matrix, mesh in _placed_meshes(document)

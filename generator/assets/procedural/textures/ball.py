@@ -30,7 +30,9 @@ def ball_cover(seed: int) -> TextureData:
     rng = rng_of("ball_cover", seed)
     kind = toys.ball_kind(seed)
     if kind == "rubber":
-        return texture(drawn_color(_BRIGHT, 0.05, rng) * (1 + 0.02 * fbm((8, 8), 3, rng))[..., None])
+        return texture(
+            drawn_color(_BRIGHT, 0.05, rng) * (1 + 0.02 * fbm((8, 8), 3, rng))[..., None]
+        )
     make = {"tennis": _tennis, "beach": _beach, "basket": _basket, "foot": _foot}[kind]
     return texture(make(_directions(), rng))
 
@@ -66,17 +68,26 @@ def _basket(d: Float32, rng: Rng) -> Float32:
     bow = np.abs(np.abs(y) - 0.62 - 0.22 * x**2)
     line = smoothstep(0.03, 0.02, np.minimum(np.minimum(np.abs(x), np.abs(z)), bow))
     pebble = worley((64, 128), rng).nearest
-    leather = drawn_color(("#c8682a", "#b5571f", "#d07a38"), 0.04, rng) * (1.04 - 0.12 * pebble)[..., None]
+    leather = (
+        drawn_color(("#c8682a", "#b5571f", "#d07a38"), 0.04, rng)
+        * (1.04 - 0.12 * pebble)[..., None]
+    )
     return mixed(leather, color("#1d1815"), line)
 
 
 def _foot(d: Float32, rng: Rng) -> Float32:
     """Twelve dark pentagons and twenty white hexagons."""
     golden = 0.5 * (1 + math.sqrt(5))
-    corners = np.array([p for a in (-1, 1) for b in (-golden, golden)
-                        for p in ((0, a, b), (a, b, 0), (b, 0, a))]) / math.sqrt(1 + golden**2)
-    close = [(i, j, k) for i in range(12) for j in range(i) for k in range(j)
-             if min(_dot(corners, i, j), _dot(corners, j, k), _dot(corners, i, k)) > 0.4]
+    corners = np.array(
+        [p for a in (-1, 1) for b in (-golden, golden) for p in ((0, a, b), (a, b, 0), (b, 0, a))]
+    ) / math.sqrt(1 + golden**2)
+    close = [
+        (i, j, k)
+        for i in range(12)
+        for j in range(i)
+        for k in range(j)
+        if min(_dot(corners, i, j), _dot(corners, j, k), _dot(corners, i, k)) > 0.4
+    ]
     faces = np.array([corners[list(t)].sum(axis=0) for t in close])
     faces /= np.sqrt((faces**2).sum(axis=1, keepdims=True))
     heights = np.concatenate([corners / _PENTAGON, faces / _HEXAGON])

@@ -20,10 +20,32 @@ from generator.assets.procedural.textures.images import drawn_color, mixed, text
 from generator.core.geometry import Float32, TextureData
 from generator.core.streams import Rng
 
-_CLOTH = ("#e8e3d8", "#2f3e5c", "#7a8b99", "#8c2f39", "#3f5b45", "#c9a66b", "#2b2b2e", "#b5643c",
-          "#5d6b70", "#d7b7b0", "#476b8a", "#9a8f7d")
-_CARPETS = ("#6e6a66", "#8c7b68", "#45506b", "#7c2f34", "#a39a8b", "#3e5148", "#b7ab9a", "#2f3033",
-            "#5c4a5e", "#86919b")
+_CLOTH = (
+    "#e8e3d8",
+    "#2f3e5c",
+    "#7a8b99",
+    "#8c2f39",
+    "#3f5b45",
+    "#c9a66b",
+    "#2b2b2e",
+    "#b5643c",
+    "#5d6b70",
+    "#d7b7b0",
+    "#476b8a",
+    "#9a8f7d",
+)
+_CARPETS = (
+    "#6e6a66",
+    "#8c7b68",
+    "#45506b",
+    "#7c2f34",
+    "#a39a8b",
+    "#3e5148",
+    "#b7ab9a",
+    "#2f3033",
+    "#5c4a5e",
+    "#86919b",
+)
 _HIDES = ("#5a3825", "#2a1d17", "#8a5a34", "#1c1b1b", "#a87a4f", "#6b2a22", "#c9b497", "#39434d")
 
 
@@ -45,7 +67,9 @@ def fabric(seed: int) -> TextureData:
     thread = np.where(over[..., None], warp_colors[warp], weft_colors[weft])
     fuzz = 0.06 * fbm((64, 64), 3, rng, 0.7)
     albedo = thread * (0.62 + 0.42 * height + fuzz)[..., None]
-    return texture(albedo.astype(np.float32), None, (256.0 / yarns * 0.5 * height).astype(np.float32))
+    return texture(
+        albedo.astype(np.float32), None, (256.0 / yarns * 0.5 * height).astype(np.float32)
+    )
 
 
 def carpet(seed: int) -> TextureData:

@@ -19,8 +19,15 @@ from generator.core.geometry import Float32, TextureData
 from generator.core.streams import Rng
 
 # Ground and blush of apples.
-_APPLES = (("#d9b24a", "#b01f2a"), ("#c9382f", "#8a1620"), ("#a8bf4a", "#93b03a"), ("#d8c45a", "#c8442f"),
-           ("#a3202b", "#6f121b"), ("#cfd06a", "#c9b83f"), ("#b8c25a", "#b0362f"))
+_APPLES = (
+    ("#d9b24a", "#b01f2a"),
+    ("#c9382f", "#8a1620"),
+    ("#a8bf4a", "#93b03a"),
+    ("#d8c45a", "#c8442f"),
+    ("#a3202b", "#6f121b"),
+    ("#cfd06a", "#c9b83f"),
+    ("#b8c25a", "#b0362f"),
+)
 
 
 def apple_skin(seed: int) -> TextureData:
@@ -39,16 +46,20 @@ def apple_skin(seed: int) -> TextureData:
 
 
 def citrus_peel(seed: int) -> TextureData:
-    """Even colour with oil glands: a dimpled, glossy surface. Oranges from seed 0, lemons from 1000."""
+    """Dimpled by oil glands. Seeds below 1000 are oranges, others lemons."""
     rng = rng_of("citrus_peel", seed)
-    codes = ("#e8791a", "#f08c1e", "#e06a12", "#eb9a2a") if seed < 1000 else ("#f0cf2c", "#f4da45", "#e6c21f")
+    codes = (
+        ("#e8791a", "#f08c1e", "#e06a12", "#eb9a2a")
+        if seed < 1000
+        else ("#f0cf2c", "#f4da45", "#e6c21f")
+    )
     base = drawn_color(codes, 0.05, rng)
     glands = worley((48, 72), rng, 0.9)
     dimple = smoothstep(0.5, 0.1, glands.nearest)
     shade = 1 + 0.05 * fbm((3, 3), 4, rng) - 0.07 * dimple
     y, _ = rows_and_columns()
     ends = smoothstep(0.1, 0.0, y) + smoothstep(0.94, 1.0, y)
-    albedo = mixed(base * shade[..., None], color("#a9a23a"), 0.45 * ends + 0 * dimple)
+    albedo = mixed(base * shade[..., None], color("#a9a23a"), 0.45 * ends)
     return texture(albedo, None, -1.3 * dimple)
 
 
@@ -56,7 +67,9 @@ def banana_peel(seed: int) -> TextureData:
     """Yellow, greener towards the ends, dark tips and ripening spots."""
     rng = rng_of("banana_peel", seed)
     ripe = between(0.0, 1.0, rng)
-    base = mixed(color("#d3c83c"), color("#ecc22c"), np.full((SIZE_PX, SIZE_PX), ripe, dtype=np.float32))
+    base = mixed(
+        color("#d3c83c"), color("#ecc22c"), np.full((SIZE_PX, SIZE_PX), ripe, dtype=np.float32)
+    )
     y, _ = rows_and_columns()
     wander = 0.02 * fbm((4, 6), 3, rng)
     ends = smoothstep(0.22, 0.05, y + wander) + smoothstep(0.8, 0.95, y + wander)
@@ -77,7 +90,11 @@ def pear_skin(seed: int) -> TextureData:
     albedo = mixed(base, blush, 0.7 * smoothstep(0.0, 0.9, fbm((2, 2), 4, rng)))
     albedo = mixed(albedo, color("#6f5a2c"), 0.55 * _dots(56, 0.25, rng))
     y, _ = rows_and_columns()
-    russet = smoothstep(0.12, 0.0, y) + smoothstep(0.88, 1.0, y) + smoothstep(0.5, 1.2, fbm((6, 6), 4, rng))
+    russet = (
+        smoothstep(0.12, 0.0, y)
+        + smoothstep(0.88, 1.0, y)
+        + smoothstep(0.5, 1.2, fbm((6, 6), 4, rng))
+    )
     return texture(mixed(albedo, color("#8a6a3a"), 0.6 * russet))
 
 

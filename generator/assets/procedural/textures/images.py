@@ -27,7 +27,9 @@ def texture(
         relief: Factor on the height.
     """
     rough = None if roughness is None else quantised(roughness)
-    return TextureData(quantised(albedo), rough, None if height is None else normals(height, relief))
+    return TextureData(
+        quantised(albedo), rough, None if height is None else normals(height, relief)
+    )
 
 
 def normals(height: Float32, relief: float) -> UInt8:

@@ -11,16 +11,28 @@ from generator.core.geometry import Float32, TextureData
 from generator.core.streams import Rng
 
 _METALS = ("#c6c7c8", "#b7b9bb", "#d5d6d7", "#c9b27c", "#a8aaad", "#8f9194", "#c48f6b")
-_PAINTS = ("#2e5e8c", "#c23b2a", "#e0b02a", "#3d7a4c", "#d9dad6", "#44484d", "#e07b2a", "#6f8fa3",
-           "#1f2a33", "#7d8a6a")
+_PAINTS = (
+    "#2e5e8c",
+    "#c23b2a",
+    "#e0b02a",
+    "#3d7a4c",
+    "#d9dad6",
+    "#44484d",
+    "#e07b2a",
+    "#6f8fa3",
+    "#1f2a33",
+    "#7d8a6a",
+)
 
 
 def brushed_metal(seed: int) -> TextureData:
     """Brushed sheet, strokes across the image; 0.3 m per repeat."""
     rng = rng_of("brushed_metal", seed)
     strokes = sum(
-        (weight * perlin(cells, rng) for cells, weight in
-         (((256, 2), 0.6), ((128, 4), 0.5), ((512, 8), 0.5), ((64, 1), 0.3))),
+        (
+            weight * perlin(cells, rng)
+            for cells, weight in (((256, 2), 0.6), ((128, 4), 0.5), ((512, 8), 0.5), ((64, 1), 0.3))
+        ),
         start=np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32),
     )
     clouds = fbm((2, 3), 4, rng)
@@ -43,7 +55,9 @@ def painted_metal(seed: int) -> TextureData:
     metal = mixed(steel, rust, smoothstep(-0.3, 0.6, fbm((9, 9), 4, rng)))
     scratches = _scratches(rng)
     albedo = paint * (1 + 0.015 * peel - 0.13 * grime)[..., None]
-    albedo = mixed(albedo, np.minimum(paint * 1.5 + 0.12, 0.9), np.maximum(0.35 * rim, 0.5 * scratches))
+    albedo = mixed(
+        albedo, np.minimum(paint * 1.5 + 0.12, 0.9), np.maximum(0.35 * rim, 0.5 * scratches)
+    )
     albedo = mixed(albedo, metal, bare)
     rough = 0.55 + 0.2 * grime + 0.4 * bare + 0.15 * scratches
     return texture(albedo, rough, 0.35 * peel - 1.5 * bare - 0.5 * scratches)
@@ -63,5 +77,3 @@ def _scratches(rng: Rng) -> Float32:
         line = smoothstep(1.4 / SIZE_PX, 0.4 / SIZE_PX, np.abs(offset))
         total = np.maximum(total, line * smoothstep(reach, 0.7 * reach, np.abs(along)))
     return total
-
-

@@ -68,7 +68,11 @@ def voronoi_noise(seed: int) -> TextureData:
 
 def _vivid(rng: Rng) -> Float32:
     """A colour that is even over hue, from grey to saturated and from dark to light."""
-    hue, saturation, value = 6.0 * float(rng.random()), between(0.1, 1.0, rng), between(0.12, 0.97, rng)
+    hue, saturation, value = (
+        6.0 * float(rng.random()),
+        between(0.1, 1.0, rng),
+        between(0.12, 0.97, rng),
+    )
     channels = [
         value * (1 - saturation * min(max(abs(math.remainder(hue - shift, 6.0)) - 1.0, 0.0), 1.0))
         for shift in (0.0, 2.0, 4.0)

@@ -33,31 +33,127 @@ Box = tuple[float, float, float, float]
 
 # Ground, second colour, accent, ink.
 _SCHEMES = (
-    ("#f6f2e7", "#c8202f", "#f2b705", "#2a1a14"), ("#12355b", "#f2f2ee", "#e94f37", "#f2f2ee"),
-    ("#1f7a4d", "#f3f0df", "#f2c14e", "#f3f0df"), ("#f4d35e", "#d1495b", "#2e4057", "#2e2420"),
-    ("#ffffff", "#0f6fb8", "#7ac143", "#12324a"), ("#c1121f", "#fdf0d5", "#f2b705", "#fdf0d5"),
-    ("#3d2a5c", "#e7c6ff", "#f7b801", "#ffffff"), ("#f7ede2", "#84a59d", "#f28482", "#3a3a3a"),
-    ("#111417", "#c9a24b", "#8d1b24", "#f0e9d8"), ("#e76f51", "#264653", "#f4e3b2", "#fff6e0"),
-    ("#9fd3e6", "#ffffff", "#e63946", "#1d3557"), ("#f2a6c0", "#ffffff", "#7a1f4b", "#5a1236"),
-    ("#5c3a21", "#e8c99b", "#d98e04", "#fff1d6"), ("#0b8f8c", "#ffffff", "#ffd23f", "#ffffff"),
-    ("#ff8c1a", "#ffffff", "#3a2a8c", "#2b1a10"), ("#dfe5e8", "#4a5a66", "#d62828", "#1f2a30"),
+    ("#f6f2e7", "#c8202f", "#f2b705", "#2a1a14"),
+    ("#12355b", "#f2f2ee", "#e94f37", "#f2f2ee"),
+    ("#1f7a4d", "#f3f0df", "#f2c14e", "#f3f0df"),
+    ("#f4d35e", "#d1495b", "#2e4057", "#2e2420"),
+    ("#ffffff", "#0f6fb8", "#7ac143", "#12324a"),
+    ("#c1121f", "#fdf0d5", "#f2b705", "#fdf0d5"),
+    ("#3d2a5c", "#e7c6ff", "#f7b801", "#ffffff"),
+    ("#f7ede2", "#84a59d", "#f28482", "#3a3a3a"),
+    ("#111417", "#c9a24b", "#8d1b24", "#f0e9d8"),
+    ("#e76f51", "#264653", "#f4e3b2", "#fff6e0"),
+    ("#9fd3e6", "#ffffff", "#e63946", "#1d3557"),
+    ("#f2a6c0", "#ffffff", "#7a1f4b", "#5a1236"),
+    ("#5c3a21", "#e8c99b", "#d98e04", "#fff1d6"),
+    ("#0b8f8c", "#ffffff", "#ffd23f", "#ffffff"),
+    ("#ff8c1a", "#ffffff", "#3a2a8c", "#2b1a10"),
+    ("#dfe5e8", "#4a5a66", "#d62828", "#1f2a30"),
 )
-_STARTS = ("Sol", "Ver", "Kin", "Bra", "Lun", "Mar", "Tol", "Fen", "Ori", "Zan", "Pel", "Gra", "Nor",
-           "Cas", "Dul", "Ha", "Riv", "Ost", "Quil", "Tam")
-_ENDS = ("ara", "ello", "ix", "on", "ita", "berg", "ova", "ette", "um", "ino", "ay", "eva", "or", "ula",
-         "ano", "is", "enda", "ik", "ora", "ey")
-_PRODUCTS = ("CRISPY FLAKES", "GREEN TEA", "TOMATO SOUP", "SEA SALT", "ORANGE & LIME", "DARK ROAST",
-             "WHOLE OATS", "RED BEANS", "FRESH CITRUS", "CLASSIC COLA", "PEACH ICED TEA", "BASIL PESTO",
-             "CORN & PEAS", "WILD BERRY", "COCOA CRUNCH", "SPARKLING", "HONEY NUT", "SOFT CARE",
-             "MOUNTAIN", "GINGER ALE")
-_NOTES = ("new recipe", "no added sugar", "since 1926", "100% natural", "family size", "extra fresh",
-          "original", "with real fruit", "crunchy!", "light")
+_STARTS = (
+    "Sol",
+    "Ver",
+    "Kin",
+    "Bra",
+    "Lun",
+    "Mar",
+    "Tol",
+    "Fen",
+    "Ori",
+    "Zan",
+    "Pel",
+    "Gra",
+    "Nor",
+    "Cas",
+    "Dul",
+    "Ha",
+    "Riv",
+    "Ost",
+    "Quil",
+    "Tam",
+)
+_ENDS = (
+    "ara",
+    "ello",
+    "ix",
+    "on",
+    "ita",
+    "berg",
+    "ova",
+    "ette",
+    "um",
+    "ino",
+    "ay",
+    "eva",
+    "or",
+    "ula",
+    "ano",
+    "is",
+    "enda",
+    "ik",
+    "ora",
+    "ey",
+)
+_PRODUCTS = (
+    "CRISPY FLAKES",
+    "GREEN TEA",
+    "TOMATO SOUP",
+    "SEA SALT",
+    "ORANGE & LIME",
+    "DARK ROAST",
+    "WHOLE OATS",
+    "RED BEANS",
+    "FRESH CITRUS",
+    "CLASSIC COLA",
+    "PEACH ICED TEA",
+    "BASIL PESTO",
+    "CORN & PEAS",
+    "WILD BERRY",
+    "COCOA CRUNCH",
+    "SPARKLING",
+    "HONEY NUT",
+    "SOFT CARE",
+    "MOUNTAIN",
+    "GINGER ALE",
+)
+_NOTES = (
+    "new recipe",
+    "no added sugar",
+    "since 1926",
+    "100% natural",
+    "family size",
+    "extra fresh",
+    "original",
+    "with real fruit",
+    "crunchy!",
+    "light",
+)
 _VOLUMES = ("330 ml", "500 ml", "750 ml", "1 L")
 _WEIGHTS = ("250 g", "375 g", "400 g", "500 g")
-_TITLES = ("THE LONG", "A QUIET", "WINTER", "THE LAST", "BEYOND THE", "NORTH OF", "THE PAPER", "SEVEN",
-           "NIGHT", "THE GLASS")
-_SUBJECTS = ("HARBOUR", "GARDEN", "RIVER", "MACHINE", "LETTERS", "ISLAND", "ORCHARD", "SIGNAL", "HOUSE",
-             "MEADOW")
+_TITLES = (
+    "THE LONG",
+    "A QUIET",
+    "WINTER",
+    "THE LAST",
+    "BEYOND THE",
+    "NORTH OF",
+    "THE PAPER",
+    "SEVEN",
+    "NIGHT",
+    "THE GLASS",
+)
+_SUBJECTS = (
+    "HARBOUR",
+    "GARDEN",
+    "RIVER",
+    "MACHINE",
+    "LETTERS",
+    "ISLAND",
+    "ORCHARD",
+    "SIGNAL",
+    "HOUSE",
+    "MEADOW",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +176,12 @@ class _Design:
 def label(seed: int) -> TextureData:
     """Wrap-around label of a bottle or jar; the front is in the middle. 512 x 256."""
     rng = rng_of("label", seed)
-    image = _wrap(int(_SIZE_PX * 1.5), containers.label_aspect("label", seed),
-                  _design(seed, rng, _VOLUMES), rng)
+    image = _wrap(
+        int(_SIZE_PX * 1.5),
+        containers.label_aspect("label", seed),
+        _design(seed, rng, _VOLUMES),
+        rng,
+    )
     return _squeezed(image, _SIZE_PX, _SIZE_PX // 2)
 
 
@@ -89,8 +189,9 @@ def can_label(seed: int) -> TextureData:
     """All around a can; the front is in the middle."""
     rng = rng_of("can_label", seed)
     sizes = _WEIGHTS if containers.can_size(seed).food else ("330 ml", "500 ml")
-    image = _wrap(int(_SIZE_PX * 1.5), containers.label_aspect("can", seed),
-                  _design(seed, rng, sizes), rng)
+    image = _wrap(
+        int(_SIZE_PX * 1.5), containers.label_aspect("can", seed), _design(seed, rng, sizes), rng
+    )
     return _squeezed(image, _SIZE_PX, _SIZE_PX)
 
 
@@ -127,7 +228,10 @@ def _design(seed: int, rng: Rng, sizes: Sequence[str] = _WEIGHTS) -> _Design:
         second, accent = accent, second
     name = pick(_STARTS, rng) + pick(_ENDS, rng)
     return _Design(
-        ground, second, accent, ink,
+        ground,
+        second,
+        accent,
+        ink,
         brand=name.upper() if chance(0.5, rng) else name,
         product=pick(_PRODUCTS, rng),
         note=pick(_NOTES, rng),
@@ -180,8 +284,13 @@ def _front(w: int, h: int, design: _Design, rng: Rng) -> Image:
     on_ground = design.layout in (0, 3)
     if design.layout in (1, 4):
         _panel(image, brand, design.second)
-    _text(image, brand, design.brand, design.ink if on_ground else _readable(design, design.second),
-          design.bold)
+    _text(
+        image,
+        brand,
+        design.brand,
+        design.ink if on_ground else _readable(design, design.second),
+        design.bold,
+    )
     _text(image, product, design.product, design.ink, 1)
     note = (0.05, 0.9, 0.5, 0.97) if tall else (0.05, 0.76, 0.4, 0.88)
     size = (0.68, 0.91, 0.95, 0.97) if tall else (0.44, 0.78, 0.6, 0.88)
@@ -218,10 +327,17 @@ def _picture(image: Image, box: Box, design: _Design, rng: Rng) -> None:
     x0, y0, x1, y1 = _pixels(image, box)
     cx, cy, r = (x0 + x1) // 2, (y0 + y1) // 2, min(x1 - x0, y1 - y0) // 2
     if design.picture == 0:
-        draw.ellipse([cx - r, cy - 0.35 * r, cx + r, cy + 0.25 * r], fill=_blend(design.accent, (255, 255, 255), 0.5))
+        draw.ellipse(
+            [cx - r, cy - 0.35 * r, cx + r, cy + 0.25 * r],
+            fill=_blend(design.accent, (255, 255, 255), 0.5),
+        )
         for _ in range(26):
             turn, reach = between(0, 2 * math.pi, rng), between(0, 0.8, rng) * r
-            px, py, s = cx + reach * math.cos(turn), cy - 0.1 * r + 0.28 * reach * math.sin(turn), 0.13 * r
+            px, py, s = (
+                cx + reach * math.cos(turn),
+                cy - 0.1 * r + 0.28 * reach * math.sin(turn),
+                0.13 * r,
+            )
             shade = _blend((214, 150, 60), (120, 60, 20), between(0.0, 0.7, rng))
             draw.ellipse([px - s, py - 0.7 * s, px + s, py + 0.7 * s], fill=shade)
         draw.pieslice([cx - r, cy - 0.95 * r, cx + r, cy + 0.95 * r], 2, 178, fill=design.accent)
@@ -232,17 +348,28 @@ def _picture(image: Image, box: Box, design: _Design, rng: Rng) -> None:
         for i in range(7):
             turn = math.pi * (i / 6 + 1)
             tip = cx + r * math.cos(turn), cy + 0.5 * r + r * math.sin(turn)
-            _leaf(draw, (cx, cy + 0.5 * r), tip, _blend((60, 130, 60), (20, 80, 40), between(0, 1, rng)))
+            _leaf(
+                draw,
+                (cx, cy + 0.5 * r),
+                tip,
+                _blend((60, 130, 60), (20, 80, 40), between(0, 1, rng)),
+            )
     elif design.picture == 3:
         draw.ellipse([cx - 0.5 * r, cy - 0.9 * r, cx + 0.5 * r, cy + 0.1 * r], fill=design.accent)
         for i, shade in enumerate((0.2, 0.5, 0.8)):
             top = cy + (0.0 + 0.3 * i) * r
-            hills = [(x, top + 0.14 * r * math.sin(3.0 * x / r + 2 * i)) for x in range(x0, x1 + 1, 3)]
-            draw.polygon([(x0, y1), *hills, (x1, y1)], fill=_blend((150, 190, 90), (30, 90, 60), shade))
+            hills = [
+                (x, top + 0.14 * r * math.sin(3.0 * x / r + 2 * i)) for x in range(x0, x1 + 1, 3)
+            ]
+            draw.polygon(
+                [(x0, y1), *hills, (x1, y1)], fill=_blend((150, 190, 90), (30, 90, 60), shade)
+            )
     else:
         for i in range(5, 0, -1):
             s = r * i / 5
-            draw.ellipse([cx - s, cy - s, cx + s, cy + s], fill=design.accent if i % 2 else design.second)
+            draw.ellipse(
+                [cx - s, cy - s, cx + s, cy + s], fill=design.accent if i % 2 else design.second
+            )
 
 
 _FRUIT = ((200, 40, 40), (240, 150, 30), (120, 40, 110), (235, 200, 50), (110, 160, 50))
@@ -285,8 +412,13 @@ def _front_cover(w: int, h: int, design: _Design, rng: Rng) -> Image:
     _text(image, (0.1, 0.09, 0.9, 0.2), pick(_TITLES, rng), design.ink, 2)
     _text(image, (0.1, 0.22, 0.9, 0.34), pick(_SUBJECTS, rng), design.ink, 3)
     _panel(image, (0.0, 0.87, 1.0, 0.97), design.second)
-    _text(image, (0.2, 0.895, 0.8, 0.945), f"{design.brand} {pick(_ENDS, rng).title()}",
-          _readable(design, design.second), 1)
+    _text(
+        image,
+        (0.2, 0.895, 0.8, 0.945),
+        f"{design.brand} {pick(_ENDS, rng).title()}",
+        _readable(design, design.second),
+        1,
+    )
     return image
 
 
@@ -324,12 +456,27 @@ def _panel(image: Image, box: Box, fill: Color) -> None:
 def _burst(image: Image, centre: tuple[float, float], radius: float, design: _Design) -> None:
     """A star with a word in it."""
     cx, cy = centre[0] * image.width, centre[1] * image.height
-    points = [(cx + radius * (1.0 if i % 2 else 0.8) * math.cos(math.pi * i / 12),
-               cy + radius * (1.0 if i % 2 else 0.8) * math.sin(math.pi * i / 12)) for i in range(24)]
+    points = [
+        (
+            cx + radius * (1.0 if i % 2 else 0.8) * math.cos(math.pi * i / 12),
+            cy + radius * (1.0 if i % 2 else 0.8) * math.sin(math.pi * i / 12),
+        )
+        for i in range(24)
+    ]
     _pen(image).polygon(points, fill=design.accent)
     w, h = image.size
-    _text(image, ((cx - 0.6 * radius) / w, (cy - 0.3 * radius) / h,
-                  (cx + 0.6 * radius) / w, (cy + 0.3 * radius) / h), "NEW", design.ground, 2)
+    _text(
+        image,
+        (
+            (cx - 0.6 * radius) / w,
+            (cy - 0.3 * radius) / h,
+            (cx + 0.6 * radius) / w,
+            (cy + 0.3 * radius) / h,
+        ),
+        "NEW",
+        design.ground,
+        2,
+    )
 
 
 def _lines(image: Image, box: Box, ink: Color, rng: Rng) -> None:
@@ -341,8 +488,10 @@ def _lines(image: Image, box: Box, ink: Color, rng: Rng) -> None:
         x = float(x0)
         while x < x1 - 6:
             word = between(4, 22, rng)
-            draw.rectangle([x, y, min(x + word, x1), y + max(1, pitch // 3)],
-                           fill=_blend(ink, image.getpixel((x0, y0))[:3], 0.25))
+            draw.rectangle(
+                [x, y, min(x + word, x1), y + max(1, pitch // 3)],
+                fill=_blend(ink, image.getpixel((x0, y0))[:3], 0.25),
+            )
             x += word + 4
 
 
@@ -356,7 +505,10 @@ def _table(image: Image, box: Box, ink: Color, rng: Rng) -> None:
         y = y0 + (y1 - y0) * i // rows
         draw.line([x0, y, x1, y], fill=(40, 40, 40), width=1)
         h = max(1, (y1 - y0) // rows // 4)
-        draw.rectangle([x0 + 4, y + h, x0 + 4 + between(0.2, 0.5, rng) * (x1 - x0), y + 2 * h], fill=(60, 60, 60))
+        draw.rectangle(
+            [x0 + 4, y + h, x0 + 4 + between(0.2, 0.5, rng) * (x1 - x0), y + 2 * h],
+            fill=(60, 60, 60),
+        )
         draw.rectangle([x1 - 0.2 * (x1 - x0), y + h, x1 - 4, y + 2 * h], fill=(60, 60, 60))
 
 
@@ -371,8 +523,13 @@ def _barcode(image: Image, box: Box, rng: Rng) -> None:
         draw.rectangle([x, y0 + 0.08 * (y1 - y0), x + bar - 1, foot], fill=(15, 15, 15))
         x += bar + gap
     digits = "".join(str(int(between(0, 10, rng))) for _ in range(13))
-    _text(image, (x0 / image.width + 0.02, foot / image.height, x1 / image.width - 0.02, y1 / image.height),
-          digits, (15, 15, 15), 0)
+    _text(
+        image,
+        (x0 / image.width + 0.02, foot / image.height, x1 / image.width - 0.02, y1 / image.height),
+        digits,
+        (15, 15, 15),
+        0,
+    )
 
 
 def _text(image: Image, box: Box, text: str, fill: Color, bold: int) -> None:
@@ -391,8 +548,9 @@ def _text(image: Image, box: Box, text: str, fill: Color, bold: int) -> None:
     scale = min((x1 - x0) / mask.width, (y1 - y0) / mask.height)
     w = int(min(x1 - x0, 1.3 * scale * mask.width))
     h = int(min(y1 - y0, 1.5 * scale * mask.height))
-    small = mask.resize((max(1, w), max(1, h)), Resampling.BOX if scale < 0.5 else
-                        Resampling.BILINEAR)
+    small = mask.resize(
+        (max(1, w), max(1, h)), Resampling.BOX if scale < 0.5 else Resampling.BILINEAR
+    )
     image.paste(fill, ((x0 + x1 - w) // 2, (y0 + y1 - h) // 2), small)
 
 
@@ -400,7 +558,9 @@ def _fruit(pen: ImageDraw, x: float, y: float, r: float, fill: Color) -> None:
     pen.ellipse([x - r, y - r, x + r, y + r], fill=fill)
     light = _blend(fill, (255, 255, 255), 0.45)
     pen.ellipse([x - 0.55 * r, y - 0.6 * r, x - 0.15 * r, y - 0.2 * r], fill=light)
-    pen.line([x, y - 0.8 * r, x + 0.1 * r, y - 1.25 * r], fill=(70, 50, 30), width=max(1, int(0.09 * r)))
+    pen.line(
+        [x, y - 0.8 * r, x + 0.1 * r, y - 1.25 * r], fill=(70, 50, 30), width=max(1, int(0.09 * r))
+    )
     _leaf(pen, (x + 0.05 * r, y - r), (x + 0.7 * r, y - 1.3 * r), (60, 130, 60))
 
 
@@ -443,31 +603,31 @@ def _pixels(image: Image, box: Box) -> tuple[int, int, int, int]:
 
 
 def _pen(image: Image) -> ImageDraw:
-    from PIL import ImageDraw as drawing
+    from PIL.ImageDraw import Draw
 
-    return drawing.Draw(image)
+    return Draw(image)
 
 
 def _canvas(w: int, h: int, fill: Color) -> Image:
-    from PIL import Image as images
+    from PIL.Image import new
 
-    return images.new("RGB", (w, h), fill)
+    return new("RGB", (w, h), fill)
 
 
 def _squeezed(image: Image, w: int, h: int) -> TextureData:
-    from PIL import Image as images
+    from PIL.Image import Resampling
 
-    return TextureData(np.array(image.resize((w, h), images.Resampling.LANCZOS), dtype=np.uint8))
+    return TextureData(np.array(image.resize((w, h), Resampling.LANCZOS), dtype=np.uint8))
 
 
 def _atlas(faces: Mapping[str, Image], places: Mapping[str, UvRect], ground: Color) -> TextureData:
     """The faces squeezed into their places; v points up, rows down."""
-    from PIL import Image as images
+    from PIL.Image import Resampling
 
     sheet = _canvas(_SIZE_PX, _SIZE_PX, ground)
     for name, (u0, v0, u1, v1) in places.items():
         x0, x1 = math.floor(u0 * _SIZE_PX), math.ceil(u1 * _SIZE_PX)
         y0, y1 = math.floor((1 - v1) * _SIZE_PX), math.ceil((1 - v0) * _SIZE_PX)
-        face = faces[name].resize((x1 - x0, y1 - y0), images.Resampling.LANCZOS)
+        face = faces[name].resize((x1 - x0, y1 - y0), Resampling.LANCZOS)
         sheet.paste(face, (x0, y0))
     return TextureData(np.array(sheet, dtype=np.uint8))

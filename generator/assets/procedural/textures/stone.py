@@ -24,13 +24,30 @@ from generator.assets.procedural.textures.images import (
 from generator.core.geometry import Float32, TextureData
 from generator.core.streams import Rng
 
-_MARBLES = (("#eceae6", "#8d8f94"), ("#f1efe9", "#b59a6a"), ("#e2d9c8", "#9b7f5e"),
-            ("#26272a", "#cfcac0"), ("#2f4a3e", "#b7c9bb"), ("#8c4a3c", "#e3cfc2"),
-            ("#d9dcdd", "#5f666e"), ("#3a3330", "#c6a06a"))
+_MARBLES = (
+    ("#eceae6", "#8d8f94"),
+    ("#f1efe9", "#b59a6a"),
+    ("#e2d9c8", "#9b7f5e"),
+    ("#26272a", "#cfcac0"),
+    ("#2f4a3e", "#b7c9bb"),
+    ("#8c4a3c", "#e3cfc2"),
+    ("#d9dcdd", "#5f666e"),
+    ("#3a3330", "#c6a06a"),
+)
 _CHIPS = ("#f2efe8", "#2f2f31", "#8b6b4e", "#b9573c", "#5e7f78", "#d9b36c", "#6e6f74", "#a9b7b0")
 _BRICKS = ("#9c4a35", "#8a3f2d", "#b0623f", "#7b4636", "#c07a52", "#d8d2c6", "#6b4a3f", "#a88768")
-_TILES = ("#f0efeb", "#e6e0d2", "#d7dcdc", "#9fb4b8", "#3f5d6b", "#7e9a80", "#c9a98b", "#b9b4ac",
-          "#55585c", "#efe6d0")
+_TILES = (
+    "#f0efeb",
+    "#e6e0d2",
+    "#d7dcdc",
+    "#9fb4b8",
+    "#3f5d6b",
+    "#7e9a80",
+    "#c9a98b",
+    "#b9b4ac",
+    "#55585c",
+    "#efe6d0",
+)
 
 
 def marble(seed: int) -> TextureData:
@@ -51,7 +68,9 @@ def marble(seed: int) -> TextureData:
 def terrazzo(seed: int) -> TextureData:
     """Stone chips in cement, ground flat; 0.6 m per repeat."""
     rng = rng_of("terrazzo", seed)
-    ground = drawn_color(("#d9d5cc", "#c5c3be", "#e7e2d6", "#6d6e70", "#b8a999", "#dadfdd"), 0.06, rng)
+    ground = drawn_color(
+        ("#d9d5cc", "#c5c3be", "#e7e2d6", "#6d6e70", "#b8a999", "#dadfdd"), 0.06, rng
+    )
     palette = [color(pick(_CHIPS, rng)) for _ in range(pick((2, 3, 4), rng))]
     albedo = ground + 0.02 * fbm((16, 16), 4, rng)[..., None]
     chips_everywhere = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
@@ -84,8 +103,18 @@ def concrete(seed: int) -> TextureData:
 def plaster(seed: int) -> TextureData:
     """Painted wall plaster, smooth to rough-cast; 1.5 m per repeat."""
     rng = rng_of("plaster", seed)
-    codes = ("#efece4", "#f3f1ec", "#e8e2d4", "#dfe3e2", "#e9d9c3", "#d6c7b0", "#cfd8d3", "#e7cfc4",
-             "#b9c4cb", "#d8d4cd")
+    codes = (
+        "#efece4",
+        "#f3f1ec",
+        "#e8e2d4",
+        "#dfe3e2",
+        "#e9d9c3",
+        "#d6c7b0",
+        "#cfd8d3",
+        "#e7cfc4",
+        "#b9c4cb",
+        "#d8d4cd",
+    )
     base = drawn_color(codes, 0.04, rng)
     grain = fbm((40, 40), 4, rng, 0.75)
     strokes = fbm((6, 9), 5, rng, 0.6)
@@ -109,7 +138,9 @@ def brick(seed: int) -> TextureData:
     tone = 0.72 + 0.33 * uniform(bricks, rng)
     tints = (base + (other - base) * pick_other[:, None]) * tone[:, None]
     grit = fbm((48, 48), 4, rng, 0.7)
-    albedo = tints.astype(np.float32)[number] * (1 + 0.13 * grit + 0.1 * fbm((5, 5), 3, rng))[..., None]
+    albedo = (
+        tints.astype(np.float32)[number] * (1 + 0.13 * grit + 0.1 * fbm((5, 5), 3, rng))[..., None]
+    )
     mortar = drawn_color(("#b9b2a6", "#cfcabf", "#8d8a85", "#d9d3c5"), 0.06, rng)
     mortar_image = mortar * (1 + 0.08 * fbm((64, 64), 3, rng))[..., None]
     height = 4.0 * face + 0.8 * grit + (uniform(bricks, rng).astype(np.float32)[number]) * face
@@ -144,7 +175,9 @@ def _folded(cells: tuple[int, int], rng: Rng) -> Float32:
     y, x = rows_and_columns()
     bend = 0.9 * fbm(cells, 4, rng, 0.55)
     down, across = cells
-    wave = np.sin(2 * np.pi * (down * 0.5 * (2 * y) + across * x) + 3.0 * bend + 1.5 * fbm(cells, 3, rng))
+    wave = np.sin(
+        2 * np.pi * (down * 0.5 * (2 * y) + across * x) + 3.0 * bend + 1.5 * fbm(cells, 3, rng)
+    )
     folded: Float32 = (wave + 0.35 * fbm((12, 12), 4, rng)).astype(np.float32)
     return folded
 

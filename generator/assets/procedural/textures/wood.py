@@ -1,4 +1,4 @@
-"""Wood: fine grain of one board, and planks of a floor or table top. Grain runs across the image."""
+"""Wood: one board, and the planks of a floor. The grain runs across the image."""
 
 from __future__ import annotations
 
@@ -18,9 +18,17 @@ from generator.core.geometry import Float32, TextureData
 from generator.core.streams import Rng
 
 # Light and dark wood of: oak, beech, pine, walnut, cherry, ash, teak, wenge, birch.
-_SPECIES = (("#c8a478", "#a67c50"), ("#d2a67c", "#bb8a60"), ("#e0bd88", "#c18f55"),
-            ("#7d5a3e", "#4f3524"), ("#b06f45", "#8a4f2e"), ("#d8c3a0", "#b79c74"),
-            ("#a9763f", "#7a4f26"), ("#4b3629", "#2c1e17"), ("#e3cda6", "#cbb083"))
+_SPECIES = (
+    ("#c8a478", "#a67c50"),
+    ("#d2a67c", "#bb8a60"),
+    ("#e0bd88", "#c18f55"),
+    ("#7d5a3e", "#4f3524"),
+    ("#b06f45", "#8a4f2e"),
+    ("#d8c3a0", "#b79c74"),
+    ("#a9763f", "#7a4f26"),
+    ("#4b3629", "#2c1e17"),
+    ("#e3cda6", "#cbb083"),
+)
 
 
 def wood_grain(seed: int) -> TextureData:
@@ -44,8 +52,10 @@ def wood_planks(seed: int) -> TextureData:
     along = (x + uniform(rows, rng).astype(np.float32)[row]) * per_row
     plank = row * per_row + np.floor(along).astype(np.int64) % per_row
     shift = (uniform((2, rows * per_row), rng) * SIZE_PX).astype(np.int64)
-    at = ((np.arange(SIZE_PX)[:, None] + shift[0][plank]) % SIZE_PX,
-          (np.arange(SIZE_PX)[None, :] + shift[1][plank]) % SIZE_PX)
+    at = (
+        (np.arange(SIZE_PX)[:, None] + shift[0][plank]) % SIZE_PX,
+        (np.arange(SIZE_PX)[None, :] + shift[1][plank]) % SIZE_PX,
+    )
     rings, fibre = rings[at], fibre[at]
     tone = (uniform(rows * per_row, rng).astype(np.float32) - 0.5)[plank]
     albedo = mixed(light, dark, 0.6 * rings + 0.3 * fibre + 0.35 * tone)
@@ -75,5 +85,3 @@ def _grain(rng: Rng) -> tuple[Float32, Float32]:
     tone = 0.22 * fbm((7, 2), 3, rng)
     fibre: Float32 = np.clip(0.45 * streaks + 0.6 * pores, 0.0, 1.0)
     return np.clip(rings + tone, 0.0, 1.0), fibre
-
-
