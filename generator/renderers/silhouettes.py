@@ -1,8 +1,6 @@
-"""Amodal silhouettes: each instance as if nothing stood before it, also beside the image."""
+"""Amodal silhouettes: each instance alone, on a canvas three images wide and high."""
 
 from __future__ import annotations
-
-from typing import Literal
 
 import numpy as np
 import warp as wp
@@ -11,10 +9,14 @@ from numpy.typing import NDArray
 from generator.core.boxes import BoxPx, tight_box
 from generator.core.capture import Silhouette
 from generator.core.scene import Scene
-from generator.renderers.kernels import raster, rays, records
+from generator.renderers.kernels import raster, records
+from generator.renderers.kernels.silhouette import Canvas, draw_silhouettes
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import project
+
+_NOTHING = np.zeros((0, 0), np.bool_)
+_UNSNAPPED = -(2**31)
 
 
 def silhouettes(
@@ -22,95 +24,112 @@ def silhouettes(
     world: PackedWorld,
     view: records.View,
     stock: AssetStock,
-    method: Literal["auto", "raster", "rays"],
+    seen_ids: NDArray[np.uint16],
 ) -> dict[int, Silhouette]:
-    """The silhouette of every instance of the scene, on a canvas of three by three images."""
+    """The silhouette of every annotated instance, by instance id.
+
+    Coverage is the rasteriser's. ``seen_ids``, the image of visible instance ids, is united with
+    it: where rays decide visibility, they may differ from the rasteriser by a pixel at an edge.
+    """
     p_camera, xy = project(world, view, stock)
-    boxes = _instance_boxes(scene, world, xy, view, stock)
-    windows = np.zeros(max(len(scene.bodies), 1), dtype=raster.Window.numpy_dtype())
-    offsets: dict[int, int] = {}
-    size = 0
-    for instance_id, box in boxes.items():
-        offsets[instance_id] = size
-        size += box.width_px * box.height_px
-    for window, body in zip(windows, scene.bodies, strict=False):
-        if body.instance_id in boxes:
-            box = boxes[body.instance_id]
-            window["x0"], window["y0"] = box.x_min, box.y_min
-            window["width"], window["height"] = box.width_px, box.height_px
-            window["offset"] = offsets[body.instance_id]
+    boxes = _boxes_px(scene, world, view, p_camera.numpy(), xy.numpy())
+    canvases, size = _canvases(scene, boxes)
     mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
-    on_device = wp.array(windows, dtype=raster.Window, device=stock.device)
-    if method == "raster" or (method == "auto" and stock.device.is_cpu):
-        inputs = [view, on_device, world.record, p_camera, xy]
-        n = len(scene.bodies)
-        wp.launch(raster.draw_silhouettes, n, inputs, [mask], device=stock.device)
-    else:
-        for b, window in enumerate(windows):
-            pixels = int(window["width"]) * int(window["height"])
-            inputs = [view, on_device, world.record, b, raster.Z_NEAR_M]
-            wp.launch(rays.trace_silhouettes, pixels, inputs, [mask], device=stock.device)
-    flat = mask.numpy().astype(np.bool_)
-    return {
-        instance.instance_id: _cut(instance.instance_id, boxes, offsets, flat)
-        for instance in scene.instances
-    }
+    if len(canvases):
+        drawn_into = wp.array(canvases, dtype=Canvas, device=stock.device)
+        inputs = [view, world.record, p_camera, xy, drawn_into]
+        wp.launch(draw_silhouettes, len(canvases), inputs, [mask], device=stock.device)
+    drawn = mask.numpy()
+    found: dict[int, Silhouette] = {}
+    first = 0
+    for instance_id, box in boxes.items():
+        end = first + box.width_px * box.height_px
+        pixels = drawn[first:end].reshape(box.height_px, box.width_px) > 0
+        _unite(pixels, box, seen_ids, instance_id)
+        found[instance_id] = _tight(instance_id, pixels, box)
+        first = end
+    return found
 
 
-def _instance_boxes(
-    scene: Scene, world: PackedWorld, xy: wp.array, view: records.View, stock: AssetStock
+def _boxes_px(
+    scene: Scene,
+    world: PackedWorld,
+    view: records.View,
+    p_camera: NDArray[np.float32],
+    xy: NDArray[np.int32],
 ) -> dict[int, BoxPx]:
-    """Pixels that each instance may cover, within the canvas; absent where there are none."""
-    n = len(scene.bodies)
-    low = wp.zeros(n, dtype=wp.vec2i, device=stock.device)
-    high = wp.zeros(n, dtype=wp.vec2i, device=stock.device)
-    wp.launch(raster.frame_bodies, n, [world.record, xy], [low, high], device=stock.device)
-    first, last = low.numpy(), high.numpy()
+    """Per annotated instance, the pixels of the canvas that its vertices reach; may be empty."""
     canvas = BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
-    boxes: dict[int, BoxPx] = {}
-    for b, body in enumerate(scene.bodies):
-        if body.instance_id == 0:
-            continue
-        box = canvas
-        if last[b, 0] != raster.UNSNAPPED:
-            (x0, y0), (x1, y1) = first[b].tolist(), last[b].tolist()
-            box = BoxPx(x0, y0, x1 + 1, y1 + 1)
-        so_far = boxes.get(body.instance_id, box)
-        boxes[body.instance_id] = _union(so_far, box)
-    clipped = {i: _intersection(box, canvas) for i, box in boxes.items()}
-    return {i: box for i, box in clipped.items() if box.width_px > 0 and box.height_px > 0}
+    annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
+    boxes = dict.fromkeys(annotated, BoxPx(0, 0, 0, 0))
+    ends = [*world.placed["first_vertex"][1:], world.vertex_count]
+    for body, first, end in zip(scene.bodies, world.placed["first_vertex"], ends, strict=True):
+        if body.instance_id in boxes:
+            reached = _reached(p_camera[first:end], xy[first:end], canvas)
+            boxes[body.instance_id] = _around(boxes[body.instance_id], reached)
+    return boxes
 
 
-def _union(a: BoxPx, b: BoxPx) -> BoxPx:
+def _reached(p_camera: NDArray[np.float32], xy: NDArray[np.int32], canvas: BoxPx) -> BoxPx:
+    if not len(xy) or p_camera[:, 2].max() < raster.Z_NEAR_M:
+        return BoxPx(0, 0, 0, 0)
+    if xy[:, 0].min() == _UNSNAPPED:
+        # A triangle is cut at the camera's plane: it may reach anywhere.
+        return canvas
+    low, high = xy.min(axis=0) >> 8, (xy.max(axis=0) >> 8) + 1
+    x_min, y_min = max(int(low[0]), canvas.x_min), max(int(low[1]), canvas.y_min)
+    x_max, y_max = min(int(high[0]), canvas.x_max), min(int(high[1]), canvas.y_max)
+    return BoxPx(x_min, y_min, max(x_max, x_min), max(y_max, y_min))
+
+
+def _around(a: BoxPx, b: BoxPx) -> BoxPx:
+    """Smallest box around two, of which either may be empty."""
+    if not a.width_px * a.height_px:
+        return b
+    if not b.width_px * b.height_px:
+        return a
     return BoxPx(
-        min(a.x_min, b.x_min),
-        min(a.y_min, b.y_min),
-        max(a.x_max, b.x_max),
-        max(a.y_max, b.y_max),
+        min(a.x_min, b.x_min), min(a.y_min, b.y_min), max(a.x_max, b.x_max), max(a.y_max, b.y_max)
     )
 
 
-def _intersection(a: BoxPx, b: BoxPx) -> BoxPx:
-    return BoxPx(
-        max(a.x_min, b.x_min),
-        max(a.y_min, b.y_min),
-        min(a.x_max, b.x_max),
-        min(a.y_max, b.y_max),
-    )
+def _canvases(scene: Scene, boxes: dict[int, BoxPx]) -> tuple[NDArray[np.void], int]:
+    """One record per body of an instance with a box, and the number of pixels of all masks."""
+    first_pixels, size = {}, 0
+    for instance_id, box in boxes.items():
+        first_pixels[instance_id] = size
+        size += box.width_px * box.height_px
+    drawn = [
+        (number, body.instance_id)
+        for number, body in enumerate(scene.bodies)
+        if body.instance_id in boxes and boxes[body.instance_id].width_px
+    ]
+    values = np.zeros(len(drawn), dtype=Canvas.numpy_dtype())
+    for value, (number, instance_id) in zip(values, drawn, strict=True):
+        box = boxes[instance_id]
+        value["body"] = number
+        value["first_pixel"] = first_pixels[instance_id]
+        value["window"]["x0"], value["window"]["y0"] = box.x_min, box.y_min
+        value["window"]["width"], value["window"]["height"] = box.width_px, box.height_px
+    return values, size
 
 
-def _cut(
-    instance_id: int, boxes: dict[int, BoxPx], offsets: dict[int, int], flat: NDArray[np.bool_]
-) -> Silhouette:
-    nothing = Silhouette(instance_id, 0, 0, np.zeros((0, 0), np.bool_))
-    if instance_id not in boxes:
-        return nothing
-    box, first = boxes[instance_id], offsets[instance_id]
-    mask = flat[first : first + box.width_px * box.height_px]
-    mask = mask.reshape(box.height_px, box.width_px)
-    tight = tight_box(mask, box.x_min, box.y_min)
+def _unite(
+    pixels: NDArray[np.bool_], box: BoxPx, seen_ids: NDArray[np.uint16], instance_id: int
+) -> None:
+    """Set what is seen of an instance in its silhouette, in place."""
+    inside = box.clipped(seen_ids.shape[1], seen_ids.shape[0])
+    if inside is None:
+        return
+    rows = slice(inside.y_min - box.y_min, inside.y_max - box.y_min)
+    columns = slice(inside.x_min - box.x_min, inside.x_max - box.x_min)
+    window = seen_ids[inside.y_min : inside.y_max, inside.x_min : inside.x_max]
+    pixels[rows, columns] |= window == instance_id
+
+
+def _tight(instance_id: int, pixels: NDArray[np.bool_], box: BoxPx) -> Silhouette:
+    tight = tight_box(pixels)
     if tight is None:
-        return nothing
-    rows = slice(tight.y_min - box.y_min, tight.y_max - box.y_min)
-    columns = slice(tight.x_min - box.x_min, tight.x_max - box.x_min)
-    return Silhouette(instance_id, tight.x_min, tight.y_min, mask[rows, columns].copy())
+        return Silhouette(instance_id, 0, 0, _NOTHING)
+    mask = pixels[tight.y_min : tight.y_max, tight.x_min : tight.x_max]
+    return Silhouette(instance_id, box.x_min + tight.x_min, box.y_min + tight.y_min, mask)

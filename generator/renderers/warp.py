@@ -12,7 +12,6 @@ from generator.renderers.labels import label_images
 from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
 from generator.renderers.silhouettes import silhouettes
-from generator.renderers.silhouettes import silhouettes
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import see
 

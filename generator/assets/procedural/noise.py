@@ -82,7 +82,8 @@ def fbm(cells: Cells, octaves: int, rng: Rng, gain: float = 0.5, size_px: int = 
         total += np.float32(weight) * perlin((down, across), rng, size_px)
         weights += weight
         weight, down, across = weight * gain, 2 * down, 2 * across
-    return total / np.float32(math.sqrt(weights))
+    noise: Float32 = total / np.float32(math.sqrt(weights))
+    return noise
 
 
 def worley(cells: Cells, rng: Rng, jitter: float = 1.0, size_px: int = SIZE_PX) -> Worley:

@@ -382,7 +382,8 @@ def triangulated(outline: Array, holes: Sequence[Array] = ()) -> Array:
         start += len(hole)
     for span in sorted(spans, key=lambda s: -float(points[s, 0].max())):
         loop = _bridged(points, loop, span)
-    return points[np.array(_ears(points, loop))]
+    triangles: Array = points[np.array(_ears(points, loop))]
+    return triangles
 
 
 def _bridged(points: Array, loop: list[int], hole: list[int]) -> list[int]:

@@ -26,18 +26,12 @@ Polygon = wp.types.matrix(shape=(9, 3), dtype=wp.float32)
 
 @wp.struct
 class Window:
-    """The rectangle of pixels that is drawn into.
-
-    Attributes:
-        x0, y0: Its first pixel in the image.
-        offset: Where its first pixel lies in the array.
-    """
+    """The rectangle of pixels that is drawn into; ``x0``, ``y0`` in the image."""
 
     x0: int
     y0: int
     width: int
     height: int
-    offset: int
 
 
 @wp.struct
@@ -121,38 +115,6 @@ def project_vertices(
             q = snapped(view, p)
         p_camera[first + i] = p
         xy[first + i] = q
-
-
-@wp.kernel
-def frame_bodies(
-    world: World,
-    xy: wp.array(dtype=wp.vec2i),
-    low: wp.array(dtype=wp.vec2i),
-    high: wp.array(dtype=wp.vec2i),
-):
-    """First and last pixel that each body may cover, one body per thread.
-
-    ``high`` is UNSNAPPED where a vertex has no image: the body may then cover any pixel.
-    """
-    b = wp.tid()
-    first = world.bodies[b].first_vertex
-    x_low = int(2147483647)
-    y_low = int(2147483647)
-    x_high = int(-2147483647)
-    y_high = int(-2147483647)
-    whole = bool(True)
-    for i in range(world.geometries[world.bodies[b].geometry].vertices_m.shape[0]):
-        p = xy[first + i]
-        if p[0] == UNSNAPPED:
-            whole = False
-        x_low = wp.min(x_low, p[0])
-        y_low = wp.min(y_low, p[1])
-        x_high = wp.max(x_high, p[0])
-        y_high = wp.max(y_high, p[1])
-    low[b] = wp.vec2i(first_centre(x_low), first_centre(y_low))
-    high[b] = wp.vec2i(last_centre(x_high), last_centre(y_high))
-    if not whole:
-        high[b] = wp.vec2i(UNSNAPPED, UNSNAPPED)
 
 
 @wp.func
@@ -298,7 +260,7 @@ def draw_nearest(
 
 
 @wp.func
-def draw_coverage(e: Edges, window: Window, mask: wp.array(dtype=wp.uint8)):
+def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array(dtype=wp.uint8)):
     """Write 1 wherever the triangle covers a pixel centre."""
     a = e.a.value
     b = e.b.value
@@ -313,7 +275,7 @@ def draw_coverage(e: Edges, window: Window, mask: wp.array(dtype=wp.uint8)):
         a_here = a + wp.int64(first) * e.a.dx
         b_here = b + wp.int64(first) * e.b.dx
         c_here = c + wp.int64(first) * e.c.dx
-        pixel = window.offset + y * window.width + e.x_first + first
+        pixel = first_pixel + y * stride + e.x_first + first
         for _x in range(first, last + 1):
             if (a_here | b_here | c_here) >= wp.int64(0):
                 mask[pixel] = wp.uint8(1)
@@ -419,40 +381,3 @@ def draw_bodies(
                 e = fan_edges(view, polygon, t, window)
                 if e.covers != 0:
                     draw_nearest(e, plane, b, f, window.width, nearness, hits)
-
-
-@wp.kernel
-def draw_silhouettes(
-    view: View,
-    windows: wp.array(dtype=Window),
-    world: World,
-    p_camera: wp.array(dtype=wp.vec3),
-    xy: wp.array(dtype=wp.vec2i),
-    mask: wp.array(dtype=wp.uint8),
-):
-    """Coverage of each body, by the same rule as ``draw_bodies``.
-
-    Args:
-        windows: Where each body's instance is drawn; of no width where it is not.
-        mask: 0 at first.
-    """
-    b = wp.tid()
-    window = windows[b]
-    if window.width == 0:
-        return
-    geometry = world.geometries[world.bodies[b].geometry]
-    first = world.bodies[b].first_vertex
-    for f in range(geometry.face_slots.shape[0]):
-        i = first + geometry.faces[3 * f]
-        j = first + geometry.faces[3 * f + 1]
-        k = first + geometry.faces[3 * f + 2]
-        if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
-            e = edges_of(xy[i], xy[j], xy[k], window)
-            if e.covers != 0:
-                draw_coverage(e, window, mask)
-        elif not beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
-            polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
-            for t in range(1, corners - 1):
-                e = fan_edges(view, polygon, t, window)
-                if e.covers != 0:
-                    draw_coverage(e, window, mask)

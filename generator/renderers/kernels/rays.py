@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.raster import Window
 from generator.renderers.kernels.records import (
     View,
     World,
@@ -48,24 +47,3 @@ def trace_pixels(view: View, world: World, t_min: float, hits: wp.array(dtype=wp
     y = float(i / view.width) + 0.5
     d = view.R_world_camera @ pixel_direction(view, x, y)
     hits[i] = nearest_hit(world, view.eye_m, d, t_min)
-
-
-@wp.kernel
-def trace_silhouettes(
-    view: View,
-    windows: wp.array(dtype=Window),
-    world: World,
-    b: int,
-    t_min: float,
-    mask: wp.array(dtype=wp.uint8),
-):
-    """Coverage of body b through every pixel centre of its window."""
-    i = wp.tid()
-    window = windows[b]
-    x = float(window.x0 + i % window.width) + 0.5
-    y = float(window.y0 + i / window.width) + 0.5
-    d = view.R_world_camera @ pixel_direction(view, x, y)
-    mesh = world.geometries[world.bodies[b].geometry].mesh
-    o = to_mesh_point(world, b, view.eye_m + d * t_min)
-    if wp.mesh_query_ray_anyhit(mesh, o, to_mesh_vector(world, b, d), FARTHEST):
-        mask[window.offset + i] = wp.uint8(1)

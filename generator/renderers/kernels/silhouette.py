@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels import raster
+from generator.renderers.kernels.raster import (
+    UNSNAPPED,
+    Window,
+    beyond_guard,
+    clip,
+    draw_coverage,
+    edges_of,
+    fan_edges,
+)
 from generator.renderers.kernels.records import View, World
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -21,7 +29,7 @@ class Canvas:
     """
 
     body: int
-    window: raster.Window
+    window: Window
     first_pixel: int
 
 
@@ -39,28 +47,20 @@ def draw_silhouettes(
     Threads only ever write the same value, so bodies of one instance may be drawn at once.
     """
     canvas = canvases[wp.tid()]
-    window = canvas.window
-    body = world.bodies[canvas.body]
-    geometry = world.geometries[body.geometry]
+    geometry = world.geometries[world.bodies[canvas.body].geometry]
+    first = world.bodies[canvas.body].first_vertex
+    stride = canvas.window.width
     for f in range(geometry.face_slots.shape[0]):
-        i = body.first_vertex + geometry.faces[3 * f]
-        j = body.first_vertex + geometry.faces[3 * f + 1]
-        k = body.first_vertex + geometry.faces[3 * f + 2]
-        p = xy[i]
-        q = xy[j]
-        r = xy[k]
-        if p[0] != raster.UNSNAPPED and q[0] != raster.UNSNAPPED and r[0] != raster.UNSNAPPED:
-            e = raster.edges_of(p, q, r, window)
+        i = first + geometry.faces[3 * f]
+        j = first + geometry.faces[3 * f + 1]
+        k = first + geometry.faces[3 * f + 2]
+        if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
+            e = edges_of(xy[i], xy[j], xy[k], canvas.window)
             if e.covers != 0:
-                raster.draw_coverage(e, canvas.first_pixel, window.width, mask)
-        elif not raster.beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
-            polygon, corners = raster.clip(view, p_camera[i], p_camera[j], p_camera[k])
+                draw_coverage(e, canvas.first_pixel, stride, mask)
+        elif not beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
+            polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
             for t in range(1, corners - 1):
-                e = raster.edges_of(
-                    raster.snapped(view, polygon[0]),
-                    raster.snapped(view, polygon[t]),
-                    raster.snapped(view, polygon[t + 1]),
-                    window,
-                )
+                e = fan_edges(view, polygon, t, canvas.window)
                 if e.covers != 0:
-                    raster.draw_coverage(e, canvas.first_pixel, window.width, mask)
+                    draw_coverage(e, canvas.first_pixel, stride, mask)

@@ -49,7 +49,8 @@ def quantised(values: Float32) -> UInt8:
 
 def color(code: str) -> Float32:
     """``#rrggbb`` as sRGB in [0, 1], shape [3]."""
-    return np.array(srgb(code), dtype=np.float32) / np.float32(255.0)
+    channels: Float32 = np.array(srgb(code), dtype=np.float32) / np.float32(255.0)
+    return channels
 
 
 def drawn_color(codes: Sequence[str], spread: float, rng: Rng) -> Float32:

@@ -7,7 +7,7 @@ squeezed into the image, so that letters look right on the object.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
     from PIL.ImageDraw import ImageDraw
 
+_FRUIT = ((200, 40, 40), (240, 150, 30), (120, 40, 110), (235, 200, 50), (110, 160, 50))
 # Ground, second colour, accent, ink.
 _SCHEMES = (
     ("#f6f2e7", "#c8202f", "#f2b705", "#2a1a14"),
@@ -289,7 +290,7 @@ def _front(w: int, h: int, design: _Design, rng: Rng) -> Image:
     art.text(image, note, design.note, design.ink, 0)
     art.text(image, size, design.size, design.ink, 1)
     if tall and chance(0.5, rng):
-        art.burst(image, (0.85, 0.5), 0.11 * w, design)
+        art.burst(image, (0.85, 0.5), 0.11 * w, design.accent, design.ground)
     return image
 
 
@@ -355,8 +356,10 @@ def _landscape(pen: ImageDraw, at: Place, r: float, design: _Design, _: Rng) -> 
     pen.ellipse([cx - 0.5 * r, cy - 0.9 * r, cx + 0.5 * r, cy + 0.1 * r], fill=design.accent)
     for i in range(3):
         top = cy + 0.3 * i * r
-        hills = [(x, top + 0.14 * r * math.sin(3.0 * x / max(r, 1.0) + 2 * i))
-                 for x in range(int(cx - r), int(cx + r) + 1, 3)]
+        hills = [
+            (x, top + 0.14 * r * math.sin(3.0 * x / max(r, 1.0) + 2 * i))
+            for x in range(int(cx - r), int(cx + r) + 1, 3)
+        ]
         grass = art.blend((150, 190, 90), (30, 90, 60), 0.2 + 0.3 * i)
         pen.polygon([(cx - r, cy + r), *hills, (cx + r, cy + r)], fill=grass)
 
@@ -366,11 +369,9 @@ def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: Rng) -> None
     cx, cy = at
     for i in range(5, 0, -1):
         s = r * i / 5
-        pen.ellipse([cx - s, cy - s, cx + s, cy + s],
-                    fill=design.accent if i % 2 else design.second)
-
-
-_FRUIT = ((200, 40, 40), (240, 150, 30), (120, 40, 110), (235, 200, 50), (110, 160, 50))
+        pen.ellipse(
+            [cx - s, cy - s, cx + s, cy + s], fill=design.accent if i % 2 else design.second
+        )
 
 
 def _info(w: int, h: int, design: _Design, rng: Rng) -> Image:
@@ -379,7 +380,7 @@ def _info(w: int, h: int, design: _Design, rng: Rng) -> Image:
     paper = art.blend(design.ground, (255, 255, 255), 0.25)
     ink = (25, 25, 28) if sum(paper) > 330 else (240, 240, 240)
     art.text(image, (0.08, 0.03, 0.92, 0.11), design.brand, ink, 1)
-    art.lines(image, (0.08, 0.14, 0.92, 0.32), ink, rng)
+    art.lines(image, (0.08, 0.14, 0.92, 0.32), ink, paper, rng)
     art.table(image, (0.08, 0.36, 0.92, 0.66), ink, rng)
     art.barcode(image, (0.1, 0.72, 0.9, 0.95), rng)
     return image
@@ -392,13 +393,15 @@ def _side(w: int, h: int, design: _Design, rng: Rng) -> Image:
     turned = art.canvas(int(0.62 * h), max(8, int(0.7 * w)), design.second)
     art.text(turned, (0.0, 0.1, 1.0, 0.9), design.brand, ink, design.bold)
     image.paste(turned.rotate(90, expand=True), (int(0.15 * w), int(0.04 * h)))
-    art.lines(image, (0.1, 0.72, 0.9, 0.95), ink, rng)
+    art.lines(image, (0.1, 0.72, 0.9, 0.95), ink, design.second, rng)
     return image
 
 
 def _strip(w: int, h: int, design: _Design) -> Image:
     image = art.canvas(w, h, design.second)
-    art.text(image, (0.1, 0.2, 0.9, 0.8), design.brand, _readable(design, design.second), design.bold)
+    art.text(
+        image, (0.1, 0.2, 0.9, 0.8), design.brand, _readable(design, design.second), design.bold
+    )
     return image
 
 
@@ -432,7 +435,7 @@ def _spine(w: int, h: int, design: _Design) -> Image:
 def _back_cover(w: int, h: int, design: _Design, rng: Rng) -> Image:
     image = art.canvas(w, h, design.ground)
     art.text(image, (0.1, 0.08, 0.9, 0.15), f"“{design.note.capitalize()}”", design.ink, 1)
-    art.lines(image, (0.1, 0.2, 0.9, 0.62), design.ink, rng)
+    art.lines(image, (0.1, 0.2, 0.9, 0.62), design.ink, design.ground, rng)
     art.barcode(image, (0.52, 0.8, 0.92, 0.94), rng)
     return image
 
@@ -450,5 +453,3 @@ def _readable(design: _Design, ground: Color) -> Color:
     """The design's colour that stands out most from a ground."""
     options: Sequence[Color] = (design.ink, design.ground, (255, 255, 255), (20, 20, 22))
     return max(options, key=lambda c: abs(art.brightness(c) - art.brightness(ground)))
-
-

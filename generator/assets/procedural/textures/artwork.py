@@ -1,0 +1,208 @@
+"""Pens and stamps for printed matter: text that fits, bar codes, small print, simple shapes.
+
+Boxes are (left, top, right, bottom) as fractions of the image, y down.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from generator.assets.procedural.draw import between
+from generator.assets.procedural.shapes import UvRect
+from generator.core.geometry import TextureData
+from generator.core.streams import Rng
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
+
+SIZE_PX = 512
+
+Color = tuple[int, int, int]
+Place = tuple[float, float]
+Box = tuple[float, float, float, float]
+
+
+def canvas(w: int, h: int, fill: Color) -> Image:
+    from PIL.Image import new
+
+    return new("RGB", (w, h), fill)
+
+
+def pen(image: Image) -> ImageDraw:
+    from PIL.ImageDraw import Draw
+
+    return Draw(image)
+
+
+def pixels(image: Image, box: Box) -> tuple[int, int, int, int]:
+    w, h = image.size
+    return (int(box[0] * w), int(box[1] * h), int(box[2] * w), int(box[3] * h))
+
+
+def squeezed(image: Image, w: int, h: int) -> TextureData:
+    from PIL.Image import Resampling
+
+    return TextureData(np.array(image.resize((w, h), Resampling.LANCZOS), dtype=np.uint8))
+
+
+def atlas(faces: Mapping[str, Image], places: Mapping[str, UvRect], ground: Color) -> TextureData:
+    """The faces squeezed into their places; v points up, rows down."""
+    from PIL.Image import Resampling
+
+    sheet = canvas(SIZE_PX, SIZE_PX, ground)
+    for name, (u0, v0, u1, v1) in places.items():
+        x0, x1 = math.floor(u0 * SIZE_PX), math.ceil(u1 * SIZE_PX)
+        y0, y1 = math.floor((1 - v1) * SIZE_PX), math.ceil((1 - v0) * SIZE_PX)
+        face = faces[name].resize((x1 - x0, y1 - y0), Resampling.LANCZOS)
+        sheet.paste(face, (x0, y0))
+    return TextureData(np.array(sheet, dtype=np.uint8))
+
+
+def text(image: Image, box: Box, text: str, fill: Color, bold: int) -> None:
+    """Text fitted into a box (fractions, y down), centred, at most a quarter narrower or wider."""
+    from PIL import ImageFont
+    from PIL.Image import Resampling
+
+    x0, y0, x1, y1 = pixels(image, box)
+    if x1 - x0 < 4 or y1 - y0 < 3:
+        return
+    font = ImageFont.load_default(size=72)
+    left, top, right, bottom = font.getbbox(text, stroke_width=bold)
+    mask = canvas(int(right - left) + 2, int(bottom - top) + 2, (0, 0, 0))
+    pen(mask).text((1 - left, 1 - top), text, fill=(255, 255, 255), font=font, stroke_width=bold)
+    mask = mask.convert("L")
+    scale = min((x1 - x0) / mask.width, (y1 - y0) / mask.height)
+    w = int(min(x1 - x0, 1.3 * scale * mask.width))
+    h = int(min(y1 - y0, 1.5 * scale * mask.height))
+    small = mask.resize(
+        (max(1, w), max(1, h)), Resampling.BOX if scale < 0.5 else Resampling.BILINEAR
+    )
+    image.paste(fill, ((x0 + x1 - w) // 2, (y0 + y1 - h) // 2), small)
+
+
+def lines(image: Image, box: Box, ink: Color, ground: Color, rng: Rng) -> None:
+    """Text too small to read: words as dashes."""
+    draw = pen(image)
+    x0, y0, x1, y1 = pixels(image, box)
+    pitch = max(5, image.height // 45)
+    for y in range(y0, y1 - pitch, pitch):
+        x = float(x0)
+        while x < x1 - 6:
+            word = between(4, 22, rng)
+            draw.rectangle(
+                [x, y, min(x + word, x1), y + max(1, pitch // 3)],
+                fill=blend(ink, ground, 0.25),
+            )
+            x += word + 4
+
+
+def table(image: Image, box: Box, ink: Color, rng: Rng) -> None:
+    """Nutrition facts."""
+    draw = pen(image)
+    x0, y0, x1, y1 = pixels(image, box)
+    draw.rectangle([x0, y0, x1, y1], outline=ink, fill=(248, 248, 246))
+    rows = 7
+    for i in range(1, rows):
+        y = y0 + (y1 - y0) * i // rows
+        draw.line([x0, y, x1, y], fill=(40, 40, 40), width=1)
+        h = max(1, (y1 - y0) // rows // 4)
+        draw.rectangle(
+            [x0 + 4, y + h, x0 + 4 + between(0.2, 0.5, rng) * (x1 - x0), y + 2 * h],
+            fill=(60, 60, 60),
+        )
+        draw.rectangle([x1 - 0.2 * (x1 - x0), y + h, x1 - 4, y + 2 * h], fill=(60, 60, 60))
+
+
+def barcode(image: Image, box: Box, rng: Rng) -> None:
+    draw = pen(image)
+    x0, y0, x1, y1 = pixels(image, box)
+    draw.rectangle([x0, y0, x1, y1], fill=(250, 250, 250))
+    x, end, unit = x0 + 0.08 * (x1 - x0), x1 - 0.08 * (x1 - x0), max(1.0, (x1 - x0) / 75)
+    foot = y1 - 0.18 * (y1 - y0)
+    while x < end:
+        bar, gap = unit * int(between(1, 4, rng)), unit * int(between(1, 4, rng))
+        draw.rectangle([x, y0 + 0.08 * (y1 - y0), x + bar - 1, foot], fill=(15, 15, 15))
+        x += bar + gap
+    digits = "".join(str(int(between(0, 10, rng))) for _ in range(13))
+    text(
+        image,
+        (x0 / image.width + 0.02, foot / image.height, x1 / image.width - 0.02, y1 / image.height),
+        digits,
+        (15, 15, 15),
+        0,
+    )
+
+
+def panel(image: Image, box: Box, fill: Color) -> None:
+    x0, y0, x1, y1 = pixels(image, box)
+    pen(image).rounded_rectangle([x0, y0, x1, y1], radius=max(1, (y1 - y0) // 6), fill=fill)
+
+
+def burst(image: Image, centre: Place, radius: float, fill: Color, ink: Color) -> None:
+    """A star with a word in it."""
+    cx, cy = centre[0] * image.width, centre[1] * image.height
+    points = [
+        (
+            cx + radius * (1.0 if i % 2 else 0.8) * math.cos(math.pi * i / 12),
+            cy + radius * (1.0 if i % 2 else 0.8) * math.sin(math.pi * i / 12),
+        )
+        for i in range(24)
+    ]
+    pen(image).polygon(points, fill=fill)
+    w, h = image.size
+    text(
+        image,
+        (
+            (cx - 0.6 * radius) / w,
+            (cy - 0.3 * radius) / h,
+            (cx + 0.6 * radius) / w,
+            (cy + 0.3 * radius) / h,
+        ),
+        "NEW",
+        ink,
+        2,
+    )
+
+
+def gradient(image: Image, top: Color, bottom: Color) -> None:
+    pen = pen(image)
+    for y in range(image.height):
+        pen.line([0, y, image.width, y], fill=blend(top, bottom, y / image.height))
+
+
+def fruit(pen: ImageDraw, at: Place, r: float, fill: Color) -> None:
+    """A round fruit with a highlight, a stalk and a leaf."""
+    x, y = at
+    pen.ellipse([x - r, y - r, x + r, y + r], fill=fill)
+    light = blend(fill, (255, 255, 255), 0.45)
+    pen.ellipse([x - 0.55 * r, y - 0.6 * r, x - 0.15 * r, y - 0.2 * r], fill=light)
+    pen.line(
+        [x, y - 0.8 * r, x + 0.1 * r, y - 1.25 * r], fill=(70, 50, 30), width=max(1, int(0.09 * r))
+    )
+    leaf(pen, (x + 0.05 * r, y - r), (x + 0.7 * r, y - 1.3 * r), (60, 130, 60))
+
+
+def leaf(pen: ImageDraw, foot: Place, tip: Place, fill: Color) -> None:
+    """A pointed oval."""
+    dx, dy = tip[0] - foot[0], tip[1] - foot[1]
+    edges = []
+    for side in (1.0, -1.0):
+        for i in range(9):
+            t = i / 8 if side > 0 else 1 - i / 8
+            out = side * 0.22 * math.sin(math.pi * t)
+            edges.append((foot[0] + t * dx - out * dy, foot[1] + t * dy + out * dx))
+    pen.polygon(edges, fill=fill)
+
+
+def blend(a: Color, b: Color, t: float) -> Color:
+    r, g, bl = (round(x + (y - x) * t) for x, y in zip(a, b, strict=True))
+    return (r, g, bl)
+
+
+def brightness(c: Color) -> float:
+    return 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2]
