@@ -215,7 +215,7 @@ def _window(hit: Array, side: Array, half: Array, axis: int, sign: float, rng: R
 def _clouds(d: Array, rng: Rng) -> Array:
     """Noise on a flat layer above, in about [-1, 1]; fades towards the horizon."""
     size = 512
-    field = fbm((4, 4), 6, rng, 0.55, size)
+    field = fbm((4, 4), 6, rng, 0.55, size).astype(np.float64)
     up = np.maximum(d[..., 2], 0.0)
     scale = 0.12 * size / (up + 0.12)
     row, column = ((np.floor(d[..., i] * scale).astype(np.int64)) % size for i in (0, 1))

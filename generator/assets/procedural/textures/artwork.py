@@ -28,23 +28,27 @@ Box = tuple[float, float, float, float]
 
 
 def canvas(w: int, h: int, fill: Color) -> Image:
+    """A plain RGB image."""
     from PIL.Image import new
 
     return new("RGB", (w, h), fill)
 
 
 def pen(image: Image) -> ImageDraw:
+    """What draws on an image, in pixels."""
     from PIL.ImageDraw import Draw
 
     return Draw(image)
 
 
 def pixels(image: Image, box: Box) -> tuple[int, int, int, int]:
+    """Left, top, right, bottom of a box in pixels."""
     w, h = image.size
     return (int(box[0] * w), int(box[1] * h), int(box[2] * w), int(box[3] * h))
 
 
 def squeezed(image: Image, w: int, h: int) -> TextureData:
+    """The whole image as a texture of another size."""
     from PIL.Image import Resampling
 
     return TextureData(np.array(image.resize((w, h), Resampling.LANCZOS), dtype=np.uint8))
@@ -119,6 +123,7 @@ def table(image: Image, box: Box, ink: Color, rng: Rng) -> None:
 
 
 def barcode(image: Image, box: Box, rng: Rng) -> None:
+    """Bars of one to three units and thirteen digits."""
     draw = pen(image)
     x0, y0, x1, y1 = pixels(image, box)
     draw.rectangle([x0, y0, x1, y1], fill=(250, 250, 250))
@@ -139,6 +144,7 @@ def barcode(image: Image, box: Box, rng: Rng) -> None:
 
 
 def panel(image: Image, box: Box, fill: Color) -> None:
+    """A rectangle with rounded corners."""
     x0, y0, x1, y1 = pixels(image, box)
     pen(image).rounded_rectangle([x0, y0, x1, y1], radius=max(1, (y1 - y0) // 6), fill=fill)
 
@@ -170,24 +176,25 @@ def burst(image: Image, centre: Place, radius: float, fill: Color, ink: Color) -
 
 
 def gradient(image: Image, top: Color, bottom: Color) -> None:
-    pen = pen(image)
+    """The whole image from one colour above to another below."""
+    draw = pen(image)
     for y in range(image.height):
-        pen.line([0, y, image.width, y], fill=blend(top, bottom, y / image.height))
+        draw.line([0, y, image.width, y], fill=blend(top, bottom, y / image.height))
 
 
-def fruit(pen: ImageDraw, at: Place, r: float, fill: Color) -> None:
+def fruit(draw: ImageDraw, at: Place, r: float, fill: Color) -> None:
     """A round fruit with a highlight, a stalk and a leaf."""
     x, y = at
-    pen.ellipse([x - r, y - r, x + r, y + r], fill=fill)
+    draw.ellipse([x - r, y - r, x + r, y + r], fill=fill)
     light = blend(fill, (255, 255, 255), 0.45)
-    pen.ellipse([x - 0.55 * r, y - 0.6 * r, x - 0.15 * r, y - 0.2 * r], fill=light)
-    pen.line(
+    draw.ellipse([x - 0.55 * r, y - 0.6 * r, x - 0.15 * r, y - 0.2 * r], fill=light)
+    draw.line(
         [x, y - 0.8 * r, x + 0.1 * r, y - 1.25 * r], fill=(70, 50, 30), width=max(1, int(0.09 * r))
     )
-    leaf(pen, (x + 0.05 * r, y - r), (x + 0.7 * r, y - 1.3 * r), (60, 130, 60))
+    leaf(draw, (x + 0.05 * r, y - r), (x + 0.7 * r, y - 1.3 * r), (60, 130, 60))
 
 
-def leaf(pen: ImageDraw, foot: Place, tip: Place, fill: Color) -> None:
+def leaf(draw: ImageDraw, foot: Place, tip: Place, fill: Color) -> None:
     """A pointed oval."""
     dx, dy = tip[0] - foot[0], tip[1] - foot[1]
     edges = []
@@ -196,13 +203,15 @@ def leaf(pen: ImageDraw, foot: Place, tip: Place, fill: Color) -> None:
             t = i / 8 if side > 0 else 1 - i / 8
             out = side * 0.22 * math.sin(math.pi * t)
             edges.append((foot[0] + t * dx - out * dy, foot[1] + t * dy + out * dx))
-    pen.polygon(edges, fill=fill)
+    draw.polygon(edges, fill=fill)
 
 
 def blend(a: Color, b: Color, t: float) -> Color:
+    """``a`` where t is 0, ``b`` where it is 1."""
     r, g, bl = (round(x + (y - x) * t) for x, y in zip(a, b, strict=True))
     return (r, g, bl)
 
 
 def brightness(c: Color) -> float:
+    """Luma (Rec. 601) in [0, 255]."""
     return 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2]

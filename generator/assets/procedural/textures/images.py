@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from generator.assets.procedural.draw import between, pick
 from generator.assets.procedural.materials import srgb
@@ -62,9 +64,9 @@ def drawn_color(codes: Sequence[str], spread: float, rng: Rng) -> Float32:
     return moved
 
 
-def mixed(a: Float32, b: Float32, t: Float32) -> Float32:
+def mixed(a: Float32, b: Float32, t: NDArray[np.floating[Any]]) -> Float32:
     """Colours mixed per pixel: ``a`` where t is 0, ``b`` where it is 1; t has shape [n, n]."""
-    weight = np.clip(t, 0.0, 1.0)[..., None]
+    weight = np.clip(t, 0.0, 1.0).astype(np.float32)[..., None]
     blend: Float32 = a * (1 - weight) + b * weight
     return blend
 
