@@ -86,11 +86,9 @@ FAMILIES: Mapping[str, Family] = _table(
             36,
             0.7,
             stackable=False,
-            build="containers:bottle",
+            build="bottles:bottle",
         ),
-        _household(
-            "can", "can", "container printed", 32, 0.36, stackable=True, build="containers:can"
-        ),
+        _household("can", "can", "container printed", 32, 0.36, stackable=True, build="cans:can"),
         _household(
             "carton",
             "carton",
@@ -98,7 +96,7 @@ FAMILIES: Mapping[str, Family] = _table(
             32,
             0.35,
             stackable=True,
-            build="containers:carton",
+            build="cartons:carton",
         ),
         _household(
             "milk_carton",
@@ -107,10 +105,10 @@ FAMILIES: Mapping[str, Family] = _table(
             16,
             0.8,
             stackable=False,
-            build="containers:milk_carton",
+            build="cartons:milk_carton",
         ),
         _household(
-            "jar", "jar", "container printed", 20, 0.45, stackable=True, build="containers:jar"
+            "jar", "jar", "container printed", 20, 0.45, stackable=True, build="bottles:jar"
         ),
         _household("book", "book", "printed", 32, 0.4, stackable=True, build="books:book"),
         _household("apple", "apple", "food", 16, 0.18, stackable=False, build="fruit:apple"),
@@ -155,7 +153,7 @@ FAMILIES: Mapping[str, Family] = _table(
         _static(
             "backdrop", "furniture:backdrop", size_m=(3.0, 3.0, 2.2), radius_m=0.6, color="white"
         ),
-        _static("room", "furniture:room", size_m=(5.0, 4.0, 2.8), door=1, window=1),
+        _static("room", "room:room", size_m=(5.0, 4.0, 2.8), door=1, window=1),
     )
 )
 

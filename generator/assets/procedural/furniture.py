@@ -16,7 +16,6 @@ from generator.assets.procedural import hulls
 from generator.assets.procedural.family import Solid
 from generator.assets.procedural.materials import (
     ALUMINIUM,
-    STAINLESS,
     metal,
     painted,
     patterned,
@@ -24,7 +23,6 @@ from generator.assets.procedural.materials import (
 from generator.assets.procedural.mesh import Array, Patch, in_place, joined
 from generator.assets.procedural.shapes import along_grain, block, fan, grid, lathe
 from generator.core.errors import AssetError, did_you_mean
-from generator.core.geometry import Material
 from generator.core.se3 import Vec3
 
 Box = tuple[Vec3, Vec3]
@@ -70,7 +68,7 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
     Raises:
         AssetError: if a size or the style is not usable.
     """
-    x, y, z = _checked("table", size_m, 0.2)
+    x, y, z = checked_size("table", size_m, 0.2)
     _known("table", "style", style, TABLE_STYLES)
     thick = 0.03 if style != "bench" else 0.04
     top = (-x / 2, -y / 2, z - thick), (x / 2, y / 2, z)
@@ -99,7 +97,7 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
     Raises:
         AssetError: if a size, the style or the number of levels is not usable.
     """
-    x, y, z = _checked("shelf", size_m, 0.1)
+    x, y, z = checked_size("shelf", size_m, 0.1)
     _known("shelf", "style", style, SHELF_STYLES)
     t = _BOARD_M
     boards = [
@@ -158,7 +156,7 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
     Raises:
         AssetError: if a size or the colour is not usable.
     """
-    x, y, z = _checked("bin", size_m, 0.06)
+    x, y, z = checked_size("bin", size_m, 0.06)
     rim = 0.012
     shell = _bin_shell(x, y, z, rim)
     ribs = [block(low, high, 0.001) for low, high in _bin_ribs(x, y, z, rim)]
@@ -191,7 +189,7 @@ def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> Solid:
     Raises:
         AssetError: if a size or the colour is not usable.
     """
-    x, y, z = _checked("box", size_m, 0.001)
+    x, y, z = checked_size("box", size_m, 0.001)
     corners = (-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)
     bevel = min(0.002, 0.1 * min(x, y, z))
     return in_place(
@@ -205,7 +203,7 @@ def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
     Raises:
         AssetError: if a size is not usable.
     """
-    x, y, z = _checked("pedestal", size_m, 0.05)
+    x, y, z = checked_size("pedestal", size_m, 0.05)
     t = min(0.02, 0.2 * z)
     plates = [((-x / 2, -y / 2, z0), (x / 2, y / 2, z0 + t)) for z0 in (0.0, z - t)]
     body = (-0.38 * x, -0.38 * y, t), (0.38 * x, 0.38 * y, z - t)
@@ -227,7 +225,7 @@ def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
     Raises:
         AssetError: if a size is not usable.
     """
-    x, y, z = _checked("gantry", size_m, 0.3)
+    x, y, z = checked_size("gantry", size_m, 0.3)
     w = 0.04
     posts = [_post(sx * x / 2, sy * y / 2, w, z) for sx in (-1, 1) for sy in (-1, 1)]
     rails = [
@@ -258,8 +256,8 @@ def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
     Raises:
         AssetError: if a size is not usable.
     """
-    x, y, _ = _checked("plane", (*size_m, 1.0), 0.1)
-    ground = _rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0))
+    x, y, _ = checked_size("plane", (*size_m, 1.0), 0.1)
+    ground = rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0))
     slab = hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0))
     return in_place([ground], (patterned("texture/concrete?seed=0", 2.0, 0.8),), [slab])
 
@@ -275,7 +273,7 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
     Raises:
         AssetError: if a size or the colour is not usable.
     """
-    x, y, z = _checked("backdrop", size_m, 0.1)
+    x, y, z = checked_size("backdrop", size_m, 0.1)
     r = min(radius_m, 0.9 * y, 0.9 * z)
     turn = np.linspace(0.0, 0.5 * math.pi, 17)
     ys = np.concatenate([[-y / 2], y / 2 - r + r * np.sin(turn), [y / 2]])
@@ -288,59 +286,6 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
         *_cove(x, y, r),
     ]
     return in_place([sheet], (painted(_color("backdrop", color), 0.85),), parts)
-
-
-def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Solid:
-    """The inside of a room, seen from within.
-
-    Slots: floor, ceiling, walls, skirting, door, frames, window, handle. The door is in the wall
-    at -X, the window in the wall at +Y; both are left out where the wall is too small for them.
-
-    Args:
-        size_m: Inner length, width, height; the floor is at z = 0.
-        door: 1 with a door, 0 without.
-        window: 1 with a window, 0 without.
-
-    Raises:
-        AssetError: if a size is not usable.
-    """
-    x, y, z = _checked("room", size_m, 1.0)
-    has_door = door > 0 and y > 1.6 and z > 2.2
-    has_window = window > 0 and x > 2.0 and z > 2.0
-    patches = [
-        _rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0)),
-        _rectangle((-x / 2, y / 2, z), (x, 0.0, 0.0), (0.0, -y, 0.0)).painted(1),
-        _rectangle((x / 2, -y / 2, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)).flipped().painted(2),
-        _rectangle((-x / 2, -y / 2, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)).painted(2),
-        _rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, 0.0, z)).flipped().painted(2),
-        *_skirting(x, y, 0.55 if has_door else 0.0),
-        *(_door(-x / 2) if has_door else ()),
-        *_window_wall(x, y / 2, z, has_window),
-    ]
-    t = 0.2
-    slabs = [
-        ((-x / 2 - t, -y / 2 - t, -t), (x / 2 + t, y / 2 + t, 0.0)),
-        ((-x / 2 - t, -y / 2 - t, z), (x / 2 + t, y / 2 + t, z + t)),
-        ((-x / 2 - t, -y / 2 - t, 0.0), (-x / 2, y / 2 + t, z)),
-        ((x / 2, -y / 2 - t, 0.0), (x / 2 + t, y / 2 + t, z)),
-        ((-x / 2, -y / 2 - t, 0.0), (x / 2, -y / 2, z)),
-        ((-x / 2, y / 2, 0.0), (x / 2, y / 2 + t, z)),
-    ]
-    return in_place(patches, _room_materials(), [hulls.box(*slab) for slab in slabs])
-
-
-def _room_materials() -> tuple[Material, ...]:
-    pane = Material((0.6, 0.7, 0.8), 0.08, emission_cd_m2=(230.0, 255.0, 290.0))
-    return (
-        patterned("texture/wood_planks?seed=0", 1.6, 0.45),
-        painted("#f2f1ed", 0.9),
-        patterned("texture/plaster?seed=3", 1.5, 0.9),
-        painted("#eceae4", 0.5),
-        painted("#e9e7e1", 0.45),
-        painted("#f3f2ee", 0.4),
-        pane,
-        metal(STAINLESS, 0.3),
-    )
 
 
 def _four_legs(x: float, y: float, z: float) -> list[Box]:
@@ -477,92 +422,14 @@ def _cove(x: float, y: float, r: float) -> list[Array]:
     ]
 
 
-def _skirting(x: float, y: float, door_half: float) -> list[Patch]:
-    """Boards along the walls, 8 cm high; the one at -X leaves out the door."""
-    t, h = 0.012, 0.08
-    spans = [
-        ((x / 2 - t, -y / 2, 0.0), (x / 2, y / 2, h)),
-        ((-x / 2, -y / 2, 0.0), (x / 2, -y / 2 + t, h)),
-        ((-x / 2, y / 2 - t, 0.0), (x / 2, y / 2, h)),
-        ((-x / 2, -y / 2, 0.0), (-x / 2 + t, -door_half, h)),
-        ((-x / 2, door_half, 0.0), (-x / 2 + t, y / 2, h)),
-    ]
-    return [block(low, high, 0.003, 3) for low, high in spans]
-
-
-def _door(wall: float) -> list[Patch]:
-    """A panelled door of 0.9 m x 2.05 m with frame and handle on the wall x = ``wall``."""
-    w, h = 0.45, 2.05
-    leaf = [block((wall, -w, 0.005), (wall + 0.012, w, h), 0.001, 4)]
-    leaf += [
-        block(
-            (wall + 0.012, s * 0.06 - 0.3 * (s < 0), z0),
-            (wall + 0.018, s * 0.06 + 0.3 * (s > 0), z1),
-            0.005,
-            4,
-        )
-        for s in (-1, 1)
-        for z0, z1 in ((0.2, 0.95), (1.15, 1.9))
-    ]
-    frame = [
-        block((wall, -w - 0.08, 0.0), (wall + 0.03, -w, h + 0.08), 0.004, 5),
-        block((wall, w, 0.0), (wall + 0.03, w + 0.08, h + 0.08), 0.004, 5),
-        block((wall, -w, h), (wall + 0.03, w, h + 0.08), 0.004, 5),
-    ]
-    handle = [
-        block((wall + 0.012, 0.37, 0.95), (wall + 0.018, 0.41, 1.15), 0.003, 7),
-        block((wall + 0.018, 0.38, 1.04), (wall + 0.065, 0.40, 1.06), 0.004, 7),
-        block((wall + 0.05, 0.27, 1.04), (wall + 0.07, 0.40, 1.06), 0.007, 7),
-    ]
-    return [*leaf, *frame, *handle]
-
-
-def _window_wall(x: float, wall: float, z: float, window: bool) -> list[Patch]:
-    """The wall y = ``wall``; around a window it is four rectangles, a reveal, frame and pane."""
-    if not window:
-        return [_facing_room(-x / 2, x / 2, 0.0, z, wall)]
-    half, low, high, depth = min(0.8, 0.3 * x), 0.9, min(2.15, z - 0.25), 0.16
-    faces = [
-        _facing_room(-x / 2, -half, 0.0, z, wall),
-        _facing_room(half, x / 2, 0.0, z, wall),
-        _facing_room(-half, half, 0.0, low, wall),
-        _facing_room(-half, half, high, z, wall),
-    ]
-    back = wall + depth
-    reveal = [
-        _rectangle((-half, wall, low), (2 * half, 0, 0), (0, depth, 0)),
-        _rectangle((-half, back, high), (2 * half, 0, 0), (0, -depth, 0)),
-        _rectangle((-half, wall, low), (0, depth, 0), (0, 0, high - low)),
-        _rectangle((half, back, low), (0, -depth, 0), (0, 0, high - low)),
-    ]
-    w, y0 = 0.06, back - 0.05
-    bars = [
-        (-half, -half + w, low, high),
-        (half - w, half, low, high),
-        (-w / 2, w / 2, low, high),
-        (-half + w, half - w, low, low + w),
-        (-half + w, half - w, high - w, high),
-    ]
-    frame = [block((a, y0, c), (b, back, d), 0.004, 5) for a, b, c, d in bars]
-    sill = block(
-        (-half - 0.05, wall - 0.04, low - 0.03), (half + 0.05, wall + 0.02, low + 0.002), 0.004, 5
-    )
-    pane = _facing_room(-half, half, low, high, back - 0.02).painted(6)
-    return [*faces, *(face.painted(2) for face in reveal), *frame, sill, pane]
-
-
-def _facing_room(x0: float, x1: float, z0: float, z1: float, y: float) -> Patch:
-    """A rectangle in the plane of constant y that is seen from -Y."""
-    return _rectangle((x0, y, z0), (x1 - x0, 0.0, 0.0), (0.0, 0.0, z1 - z0)).painted(2)
-
-
-def _rectangle(corner: Vec3, right: Vec3, up: Vec3) -> Patch:
+def rectangle(corner: Vec3, right: Vec3, up: Vec3) -> Patch:
     """Two triangles; outward is right x up."""
     c, r, u = (np.array(v, dtype=np.float64) for v in (corner, right, up))
     return grid(np.stack([np.stack([c, c + r]), np.stack([c + u, c + r + u])]))
 
 
-def _checked(name: str, size_m: Sequence[float], least: float) -> Vec3:
+def checked_size(name: str, size_m: Sequence[float], least: float) -> Vec3:
+    """The size as floats. Raises AssetError if a side is below ``least`` or above 100 m."""
     if len(size_m) != 3 or not all(least <= float(v) <= 100.0 for v in size_m):
         raise AssetError(
             f"{name}: size_m={','.join(str(v) for v in size_m)} is not usable; "

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from generator.assets.procedural import containers
+from generator.assets.procedural import cans, cartons
+from generator.assets.procedural.bottles import LABEL_ASPECT
 from generator.assets.procedural.draw import between, chance, pick, rng_of
 from generator.assets.procedural.materials import srgb
 from generator.assets.procedural.textures import artwork as art
@@ -171,7 +172,7 @@ def label(seed: int) -> TextureData:
     rng = rng_of("label", seed)
     image = _wrap(
         int(art.SIZE_PX * 1.5),
-        containers.label_aspect("label", seed),
+        LABEL_ASPECT,
         _design(seed, rng, _VOLUMES),
         rng,
     )
@@ -181,21 +182,19 @@ def label(seed: int) -> TextureData:
 def can_label(seed: int) -> TextureData:
     """All around a can; the front is in the middle."""
     rng = rng_of("can_label", seed)
-    sizes = _WEIGHTS if containers.can_size(seed).food else ("330 ml", "500 ml")
-    image = _wrap(
-        int(art.SIZE_PX * 1.5), containers.label_aspect("can", seed), _design(seed, rng, sizes), rng
-    )
+    sizes = _WEIGHTS if cans.can_size(seed).food else ("330 ml", "500 ml")
+    image = _wrap(int(art.SIZE_PX * 1.5), cans.label_aspect(seed), _design(seed, rng, sizes), rng)
     return art.squeezed(image, art.SIZE_PX, art.SIZE_PX)
 
 
 def carton(seed: int) -> TextureData:
-    """The six faces of a folding box, laid out by ``containers.CARTON_ATLAS``."""
-    return _box_print("carton", seed, containers.carton_size_m(seed))
+    """The six faces of a folding box, laid out by ``cartons.CARTON_ATLAS``."""
+    return _box_print("carton", seed, cartons.carton_size_m(seed))
 
 
 def milk_label(seed: int) -> TextureData:
-    """The faces of a milk carton, laid out by ``containers.CARTON_ATLAS``."""
-    return _box_print("milk_label", seed, containers.milk_size_m(seed))
+    """The faces of a milk carton, laid out by ``cartons.CARTON_ATLAS``."""
+    return _box_print("milk_label", seed, cartons.milk_size_m(seed))
 
 
 def book_cover(seed: int) -> TextureData:
@@ -249,7 +248,7 @@ def _box_print(name: str, seed: int, size_m: tuple[float, float, float]) -> Text
         "top": art.canvas(w, d, design.second) if name == "milk_label" else _strip(w, d, design),
         "bottom": _strip(w, d, design),
     }
-    return art.atlas(faces, containers.CARTON_ATLAS, design.ground)
+    return art.atlas(faces, cartons.CARTON_ATLAS, design.ground)
 
 
 def _wrap(width: int, aspect: float, design: _Design, rng: Rng) -> Image:
