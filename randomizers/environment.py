@@ -28,7 +28,7 @@ class EnvironmentLight(RandomizerBase):
 
     type: Literal["environment"] = "environment"
     images: tuple[str, ...] = ()
-    luminance_cd_m2: NonNegative = LogUniform(30.0, 150.0)
+    luminance_cd_m2: NonNegative = LogUniform(10.0, 80.0)
     yaw_deg: Scalar = Uniform(0.0, 360.0)
     visible: bool = Field(True)
 

@@ -81,12 +81,13 @@ def _shaded(
     points = lattice.width * lattice.height
     lights = stock.scratch("lights", points, shade.Light)
     frame = [view, world.record, images]
-    inputs = [*frame, lattice.pixel, around.lit, around.open_sky]
-    wp.launch(shade.shade_points, points, inputs, [lights, radiance], device=device)
+    inputs = [*frame, lattice, around.lit, around.open_sky]
+    wp.launch(shade.light_lattice, points, inputs, [lights], device=device)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", n, wp.int32)
     inputs = [*frame, lattice, lights]
-    wp.launch(shade.gather_light, n, inputs, [count, pixels, radiance], device=device)
+    shape = (view.height, view.width)
+    wp.launch(shade.gather_light, shape, inputs, [count, pixels, radiance], device=device)
     listed = int(count.numpy()[0])
     lit = stock.scratch("listed lit", (around.lit.shape[0], n), float)
     open_sky = stock.scratch("listed sky", (1, n), float)
@@ -94,7 +95,6 @@ def _shaded(
     radius_m = settings.ambient_occlusion_radius_m
     inputs = [*frame, lattice, around.lit, around.open_sky, disc, radius_m, pixels]
     wp.launch(shade.look_around, listed, inputs, [lit, open_sky], device=device)
-    lights = stock.scratch("listed lights", n, shade.Light)
     inputs = [*frame, pixels, lit, open_sky]
-    wp.launch(shade.shade_points, listed, inputs, [lights, radiance], device=device)
+    wp.launch(shade.shade_points, listed, inputs, [radiance], device=device)
     return radiance

@@ -16,6 +16,7 @@ from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
 
+_STRIDE_PX = 2
 _TILE = int(occlusion.TILE)
 _LIST_LENGTH = int(occlusion.LIST_LENGTH)
 
@@ -38,7 +39,9 @@ def sampled_lattice(
 ) -> lattice_kernels.Lattice:
     """The lattice of a view."""
     lattice = lattice_kernels.Lattice()
-    lattice.width, lattice.height = (view.width + 1) // 2, (view.height + 1) // 2
+    lattice.stride = _STRIDE_PX
+    lattice.width = (view.width - 1) // _STRIDE_PX + 2
+    lattice.height = (view.height - 1) // _STRIDE_PX + 2
     n = lattice.width * lattice.height
     lattice.body = stock.scratch("lattice body", n, wp.int32)
     lattice.surface = stock.scratch("lattice surface", n, wp.int32)

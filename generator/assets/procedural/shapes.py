@@ -70,6 +70,11 @@ def lathe(
     return grid(points, v=rows, slot=slot)
 
 
+def cone(low: Point2, high: Point2, segments: int = 24, slot: int = 0) -> Patch:
+    """A closed cylinder or truncated cone about Z between two (radius, z)."""
+    return lathe([(0.0, low[1]), low, high, (0.0, high[1])], segments, slot)
+
+
 def sweep(
     path: Array,
     section: Array,

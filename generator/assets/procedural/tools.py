@@ -23,6 +23,7 @@ from generator.assets.procedural.materials import (
 from generator.assets.procedural.mesh import Array, Patch, centred, joined, rotated
 from generator.assets.procedural.shapes import (
     circle,
+    cone,
     extruded,
     fan,
     fillet,
@@ -41,56 +42,14 @@ def screwdriver(seed: int) -> Solid:
     rng = rng_of("screwdriver", seed)
     radius, grip = between(0.011, 0.016, rng), between(0.085, 0.115, rng)
     blade, shaft = between(0.06, 0.15, rng), between(0.0025, 0.0038, rng)
-    flutes = pick((0, 6, 6, 8), rng)
-    t = np.linspace(0.0, 1.0, 22)
-    girth = np.interp(
-        t,
-        [0.0, 0.03, 0.1, 0.3, 0.6, 0.78, 0.88, 0.95, 1.0],
-        [0.55, 0.8, 0.97, 1.0, 0.95, 0.72, 0.66, 0.72, 0.5],
-    )
-    turn = 2 * math.pi * np.arange(32) / 32
-    depth = np.where((t > 0.08) & (t < 0.72), 0.09, 0.0) * (flutes > 0)
-    r = radius * girth[:, None] * (1 - depth[:, None] * np.maximum(np.cos(flutes * turn), 0.0) ** 2)
-    rows = np.stack(
-        [r * np.cos(turn), r * np.sin(turn), np.broadcast_to(grip * t[:, None], r.shape)], axis=2
-    )
-    rows = np.concatenate([rows, rows[:, :1]], axis=1)
-    handle = [grid(rows), fan(rows[0, :0:-1]), fan(rows[-1, :-1])]
+    handle = _fluted_handle(radius, grip, pick((0, 6, 6, 8), rng))
     end = grip + blade
-    rod = lathe(
-        fillet(
-            [(0.0, grip - 0.01), (shaft, grip - 0.01), (shaft, end - 0.012), (0.0, end - 0.012)],
-            0.0,
-        ),
-        16,
-        1,
-    )
-    collar = lathe(
-        [
-            (0.0, grip - 0.001),
-            (0.45 * radius, grip - 0.001),
-            (0.42 * radius, grip + 0.004),
-            (0.0, grip + 0.004),
-        ],
-        20,
-        2,
-    )
-    tip = (
-        _flat_tip(shaft, end)
-        if chance(0.5, rng)
-        else lathe(
-            [
-                (0.0, end - 0.013),
-                (shaft, end - 0.013),
-                (shaft, end - 0.008),
-                (0.3 * shaft, end),
-                (0.0, end),
-            ],
-            8,
-            1,
-        )
-    )
-    patches = [p.rotated("y", _LAID) for p in (*handle, rod, collar, tip)]
+    pieces = [
+        handle,
+        cone((shaft, grip - 0.01), (shaft, end - 0.012), 16, 1),
+        cone((0.45 * radius, grip - 0.001), (0.42 * radius, grip + 0.004), 20, 2),
+        _flat_tip(shaft, end) if chance(0.5, rng) else _pointed_tip(shaft, end),
+    ]
     profile = [
         (0.55 * radius, 0.0),
         (0.97 * radius, 0.1 * grip),
@@ -100,69 +59,27 @@ def screwdriver(seed: int) -> Solid:
     ]
     parts = [*hulls.stack(profile, 16), hulls.frustum((shaft, grip), (shaft, end), 12)]
     materials = (plastic(rng), metal(ZINC, between(0.2, 0.35, rng)), plastic(rng, ("#202124",)))
-    return centred(patches, materials, [rotated(part, "y", _LAID) for part in parts])
+    return centred(
+        [piece.rotated("y", _LAID) for piece in pieces],
+        materials,
+        [rotated(part, "y", _LAID) for part in parts],
+    )
 
 
 def hammer(seed: int) -> Solid:
     """A joiner's hammer with wooden or plastic handle. Slots: handle, head."""
     rng = rng_of("hammer", seed)
     length, size = between(0.26, 0.33, rng), between(0.9, 1.1, rng)
-    stations = [
-        (0.0, 0.9, 1.0),
-        (0.02, 1.05, 1.1),
-        (0.1, 0.95, 1.05),
-        (0.25, 1.05, 1.1),
-        (0.5, 0.8, 0.95),
-        (0.75, 0.72, 0.9),
-        (0.97, 0.75, 0.9),
-    ]
-    t = np.linspace(0.0, 0.97, 18)
-    wide, deep = (np.interp(t, [s[0] for s in stations], [s[i] for s in stations]) for i in (1, 2))
-    path = np.stack([length * t, 0 * t, 0 * t], axis=1)
-    oval = circle(1.0, 18) * np.array([0.011, 0.016])
-    handle = sweep(path, oval, scale=np.stack([wide, deep], axis=1))
-    at = length - 0.005
-    eye = rounded_box((0.03 * size, 0.036 * size, 0.026 * size), 0.003, 1).moved(at)
-    face = lathe(
-        fillet(
-            [
-                (0.0, 0.015),
-                (0.009, 0.015),
-                (0.009, 0.034),
-                (0.0138, 0.04),
-                (0.0138, 0.058),
-                (0.0, 0.0585),
-            ],
-            [0, 0, 0.004, 0.003, 0.0015, 0],
-            2,
-        ),
-        24,
-    )
-    peen = _peen(size)
-    head = [eye, face.scaled(size, size, size).rotated("x", -_LAID).moved(at), peen.moved(at)]
-    wood = chance(0.6, rng)
-    grip = (
-        Material(jittered(linear(pick(WOODS[:4], rng)), 0.1, rng), 0.55)
-        if wood
-        else plastic(rng, PLASTICS)
-    )
+    handle = _hammer_handle(length)
+    head, head_hulls = _hammer_head()
+    wood = Material(jittered(linear(pick(WOODS[:4], rng)), 0.1, rng), 0.55)
+    grip = wood if chance(0.6, rng) else plastic(rng, PLASTICS)
     steel = pick((metal(STEEL, 0.35), metal(BLACK_OXIDE, 0.45)), rng)
-    parts = [
-        hulls.extreme(
-            handle.corners_m[abs(handle.corners_m[:, :, 0].mean(axis=1) / length - m) < 0.2], 40
-        )
-        for m in (0.18, 0.5, 0.8)
-    ]
-    half = 0.5 * size * np.array([0.03, 0.036, 0.026])
-    cylinder = rotated(
-        hulls.frustum((0.0138 * size, 0.015 * size), (0.0138 * size, 0.058 * size), 16), "x", -_LAID
-    )
-    parts += [
-        hulls.box((at - half[0], -half[1], -half[2]), (at + half[0], half[1], half[2])),
-        cylinder + np.array([at, 0.0, 0.0]),
-        hulls.extreme(peen.moved(at).corners_m, 24),
-    ]
-    return centred([handle, *(p.painted(1) for p in head)], (grip, steel), parts)
+    at = length - 0.005
+    share = handle.corners_m[:, :, 0].mean(axis=1) / length
+    parts = [hulls.extreme(handle.corners_m[abs(share - m) < 0.2], 40) for m in (0.18, 0.5, 0.8)]
+    parts += [hull * size + np.array([at, 0.0, 0.0]) for hull in head_hulls]
+    return centred([handle, head.scaled(size, size, size).moved(at)], (grip, steel), parts)
 
 
 def wrench(seed: int) -> Solid:
@@ -234,6 +151,67 @@ def _slab(outline: Array, half: float) -> Array:
     return np.concatenate([np.insert(outline, 2, z, axis=1) for z in (-half, half)])
 
 
+def _fluted_handle(radius: float, length: float, flutes: int) -> Patch:
+    """A screwdriver's handle along Z: a bulb with a waist, grooved over most of its length."""
+    t = np.linspace(0.0, 1.0, 22)
+    girth = np.interp(
+        t,
+        [0.0, 0.03, 0.1, 0.3, 0.6, 0.78, 0.88, 0.95, 1.0],
+        [0.55, 0.8, 0.97, 1.0, 0.95, 0.72, 0.66, 0.72, 0.5],
+    )
+    turn = 2 * math.pi * np.arange(32) / 32
+    depth = np.where((t > 0.08) & (t < 0.72), 0.09, 0.0)[:, None] * (flutes > 0)
+    r = radius * girth[:, None] * (1 - depth * np.maximum(np.cos(flutes * turn), 0.0) ** 2)
+    z = np.broadcast_to(length * t[:, None], r.shape)
+    rows = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=2)
+    rows = np.concatenate([rows, rows[:, :1]], axis=1)
+    return joined([grid(rows), fan(rows[0, :0:-1]), fan(rows[-1, :-1])])
+
+
+def _pointed_tip(radius: float, end: float) -> Patch:
+    """A cross-head tip, as the cone it is ground from."""
+    profile = [
+        (0.0, end - 0.013),
+        (radius, end - 0.013),
+        (radius, end - 0.008),
+        (0.3 * radius, end),
+        (0.0, end),
+    ]
+    return lathe(profile, 8, 1)
+
+
+def _hammer_handle(length: float) -> Patch:
+    """An oval shaft along X that swells in the hand."""
+    at = (0.0, 0.02, 0.1, 0.25, 0.5, 0.75, 0.97)
+    t = np.linspace(0.0, 0.97, 18)
+    wide = np.interp(t, at, (0.9, 1.05, 0.95, 1.05, 0.8, 0.72, 0.75))
+    deep = np.interp(t, at, (1.0, 1.1, 1.05, 1.1, 0.95, 0.9, 0.9))
+    path = np.stack([length * t, 0 * t, 0 * t], axis=1)
+    oval = circle(1.0, 18) * np.array([0.011, 0.016])
+    return sweep(path, oval, scale=np.stack([wide, deep], axis=1))
+
+
+def _hammer_head() -> tuple[Patch, list[Array]]:
+    """Eye at the origin, striking face towards +Y, wedge towards -Y; slot 1."""
+    eye = rounded_box((0.03, 0.036, 0.026), 0.003, 1)
+    profile = [
+        (0.0, 0.015),
+        (0.009, 0.015),
+        (0.009, 0.034),
+        (0.0138, 0.04),
+        (0.0138, 0.058),
+        (0.0, 0.0585),
+    ]
+    face = lathe(fillet(profile, [0.0, 0.0, 0.004, 0.003, 0.0015, 0.0], 2), 24)
+    peen = _peen()
+    parts = [
+        hulls.box((-0.015, -0.018, -0.013), (0.015, 0.018, 0.013)),
+        rotated(hulls.frustum((0.0138, 0.015), (0.0138, 0.058), 16), "x", -_LAID),
+        hulls.extreme(peen.corners_m, 24),
+    ]
+    return joined([eye, face.rotated("x", -_LAID), peen]).painted(1), parts
+
+
 def _flat_tip(radius: float, end: float) -> Patch:
     """Blade of a slotted screwdriver along Z: from round to a wide thin edge."""
     stations = [(-0.014, 1.0, 1.0), (-0.01, 1.35, 0.62), (-0.004, 1.25, 0.3), (0.0, 1.2, 0.16)]
@@ -244,7 +222,7 @@ def _flat_tip(radius: float, end: float) -> Patch:
     )
 
 
-def _peen(size: float) -> Patch:
+def _peen() -> Patch:
     """The wedge at the back of a hammer's head, towards -Y."""
     stations = [
         (0.015, 0.013, 0.011),
@@ -257,5 +235,5 @@ def _peen(size: float) -> Patch:
         rows.append(
             [(a * wide, -y, b * thin) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]
         )
-    loops = size * np.array(rows)
+    loops = np.array(rows)
     return joined([grid(loops), fan(loops[0, :0:-1]), fan(loops[-1, :-1])])

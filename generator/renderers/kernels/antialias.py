@@ -15,17 +15,22 @@ from generator.renderers.kernels.records import (
     View,
     World,
     pixel_direction,
-    surface_index,
     to_mesh_point,
     to_mesh_vector,
 )
 from generator.renderers.kernels.shade import Images
+from generator.renderers.kernels.surface import facet_of
 from generator.renderers.kernels.tone import developed
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 # Faces that meet at less than 25 degrees look like one surface.
 CREASE_COSINE = wp.constant(0.9)
+# Places in a 3 x 3 block, row by row, as hexadecimal digits from the last: centre, sides, corners.
+ORDER = wp.constant(wp.int64(0x862075314))
+
+Vector8 = wp.types.vector(length=8, dtype=wp.float32)
+Vector8i = wp.types.vector(length=8, dtype=wp.int32)
 
 
 @wp.func
@@ -74,66 +79,115 @@ def find_edges(
 
 
 @wp.struct
-class Sight:
-    """What a ray through a part of a pixel meets first."""
+class Parts:
+    """What the parts of one pixel see.
 
-    hit: wp.vec2i
-    t: float
-    normal: wp.vec3
+    Attributes:
+        nearness: 1/z of the nearest surface so far [1/m]; 0 for none.
+        source: Pixel whose centre sees the same surface and lends its colour; -1 for none.
+    """
 
-
-@wp.func
-def look_for(world: World, b: int, origin: wp.vec3, d: wp.vec3, sight: Sight):
-    """The nearer of what was seen so far and body b."""
-    nearer = sight
-    o = to_mesh_point(world, b, origin)
-    e = to_mesh_vector(world, b, d)
-    mesh = world.geometries[world.bodies[b].geometry].mesh
-    answer = wp.mesh_query_ray(mesh, o, e, sight.t)
-    if answer.result:
-        nearer.t = answer.t
-        nearer.hit = wp.vec2i(b, answer.face)
-        n = world.bodies[b].R_world_mesh @ answer.normal
-        nearer.normal = n * wp.where(wp.dot(n, d) > 0.0, -1.0, 1.0)
-    return nearer
+    nearness: Vector8
+    source: Vector8i
 
 
 @wp.func
-def colour_nearby(
+def nearby(view: View, x: int, y: int, k: int):
+    """The k-th pixel of the nine around (x, y): itself, then sides, then corners."""
+    m = int((ORDER >> wp.int64(4 * k)) & wp.int64(15))
+    return clamped_pixel(view, x + m % 3 - 1, y + m / 3 - 1)
+
+
+@wp.func
+def seen_before(view: View, images: Images, x: int, y: int, k: int):
+    """Whether an earlier of the nine pixels sees the same face as the k-th."""
+    hit = images.hits[nearby(view, x, y, k)]
+    before = bool(False)
+    for m in range(k):
+        other = images.hits[nearby(view, x, y, m)]
+        if other[0] == hit[0] and other[1] == hit[1]:
+            before = True
+    return before
+
+
+@wp.func
+def cover(
     view: View,
     world: World,
     images: Images,
-    radiance: wp.array(dtype=wp.vec3),
-    x_px: float,
-    y_px: float,
-    sight: Sight,
+    offsets: wp.array(dtype=wp.vec2),
+    x: int,
+    y: int,
+    source: int,
+    parts: Parts,
 ):
-    """Radiance of the nearest pixel centre on the same surface; fourth value 0 if there is none."""
-    x = int(x_px)
-    y = int(y_px)
-    best = float(1.0e9)
-    found = int(-1)
+    """Give the parts of pixel (x, y) to the face that pixel ``source`` sees where it is nearest."""
+    facet = facet_of(world, images.hits[source])
+    for s in range(offsets.shape[0]):
+        x_px = float(x) + offsets[s][0]
+        y_px = float(y) + offsets[s][1]
+        d = pixel_direction(view, x_px, y_px)
+        det = wp.dot(d, facet.across)
+        # Barycentric weights and depth without a division: all have det for a factor.
+        side = wp.where(det < 0.0, -1.0, 1.0)
+        u = wp.dot(d, facet.along_u) * side
+        v = wp.dot(d, facet.along_v) * side
+        w = det * side
+        if u >= 0.0 and v >= 0.0 and u + v <= w and facet.depth * side > 0.0:
+            nearness = det / facet.depth
+            if nearness > parts.nearness[s]:
+                parts.nearness[s] = nearness
+                parts.source[s] = source
+    return parts
+
+
+@wp.func
+def traced_source(
+    view: View, world: World, images: Images, x: int, y: int, x_px: float, y_px: float, t_min: float
+):
+    """The pixel around (x, y) that sees the body a ray meets first, for faces no centre sees.
+
+    A body that no centre around sees has no colour to lend: it is not looked for.
+    """
+    d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
+    origin = view.eye_m + d * t_min
+    nearest = float(FARTHEST)
+    source = int(-1)
+    normal = wp.vec3(0.0)
+    last = int(-1)
     for k in range(9):
-        j = clamped_pixel(view, x + k % 3 - 1, y + k / 3 - 1)
-        hit = images.hits[j]
-        if hit[0] == sight.hit[0]:
-            dx = float(x + k % 3 - 1) + 0.5 - x_px
-            dy = float(y + k / 3 - 1) + 0.5 - y_px
-            distance = dx * dx + dy * dy
-            if hit[1] != sight.hit[1] and hit[0] >= 0:
-                if surface_index(world, hit) != surface_index(world, sight.hit):
-                    distance += 100.0
-                # The sample's normal is its triangle's own, the pixel's is smooth.
-                if wp.dot(images.normals[j], sight.normal) < 0.7:
-                    distance += 10.0
-            if distance < best:
-                best = distance
+        j = nearby(view, x, y, k)
+        b = images.hits[j][0]
+        if b < 0:
+            if source < 0:
+                source = j
+        elif b != last:
+            last = b
+            mesh = world.geometries[world.bodies[b].geometry].mesh
+            o = to_mesh_point(world, b, origin)
+            answer = wp.mesh_query_ray(mesh, o, to_mesh_vector(world, b, d), nearest)
+            if answer.result:
+                nearest = answer.t
+                source = j
+                normal = world.bodies[b].R_world_mesh @ answer.normal
+    if nearest < FARTHEST:
+        source = most_alike(view, images, x, y, source, normal)
+    return source
+
+
+@wp.func
+def most_alike(view: View, images: Images, x: int, y: int, source: int, normal: wp.vec3):
+    """Of the pixels around (x, y) that see the body of ``source``, the one turned most alike."""
+    best = float(-1.0)
+    found = source
+    for k in range(9):
+        j = nearby(view, x, y, k)
+        if images.hits[j][0] == images.hits[source][0]:
+            cosine = wp.abs(wp.dot(images.normals[j], normal))
+            if cosine > best + 0.05:
+                best = cosine
                 found = j
-    c = wp.vec4(0.0)
-    if found >= 0:
-        r = radiance[found]
-        c = wp.vec4(r[0], r[1], r[2], 1.0)
-    return c
+    return found
 
 
 @wp.kernel
@@ -152,37 +206,29 @@ def antialias(
     """Replace the bytes of listed pixels by the mean over parts of the pixel.
 
     Args:
-        offsets: Sample positions within the pixel, [0, 1).
+        offsets: At most eight sample positions within the pixel, [0, 1).
         t_min: z-depth from which surfaces are seen.
     """
     i = pixels[wp.tid()]
     x = i % view.width
     y = i / view.width
+    parts = Parts()
+    for s in range(offsets.shape[0]):
+        parts.source[s] = -1
+    for k in range(9):
+        j = nearby(view, x, y, k)
+        if images.hits[j][0] >= 0 and not seen_before(view, images, x, y, k):
+            parts = cover(view, world, images, offsets, x, y, j, parts)
     total = wp.vec3(0.0)
     weights = float(0.0)
     for s in range(offsets.shape[0]):
-        x_px = float(x) + offsets[s][0]
-        y_px = float(y) + offsets[s][1]
-        d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
-        origin = view.eye_m + d * t_min
-        sight = Sight()
-        sight.hit = wp.vec2i(-1, -1)
-        sight.t = FARTHEST
-        # A body that no centre around sees has no colour to take: it need not be looked for.
-        b0 = images.hits[i][0]
-        if b0 >= 0:
-            sight = look_for(world, b0, origin, d, sight)
-        b1 = int(-1)
-        b2 = int(-1)
-        for k in range(9):
-            b = images.hits[clamped_pixel(view, x + k % 3 - 1, y + k / 3 - 1)][0]
-            if b >= 0 and b != b0 and b != b1 and b != b2:
-                sight = look_for(world, b, origin, d, sight)
-                b2 = b1
-                b1 = b
-        c = colour_nearby(view, world, images, radiance, x_px, y_px, sight)
-        if c[3] > 0.0:
-            exposed = wp.vec3(c[0], c[1], c[2]) * exposure
+        source = parts.source[s]
+        if source < 0:
+            x_px = float(x) + offsets[s][0]
+            y_px = float(y) + offsets[s][1]
+            source = traced_source(view, world, images, x, y, x_px, y_px, t_min)
+        if source >= 0:
+            exposed = radiance[source] * exposure
             # Bright samples count less, as they would after the tone curve.
             w = 1.0 / (1.0 + 0.2126 * exposed[0] + 0.7152 * exposed[1] + 0.0722 * exposed[2])
             total += exposed * w

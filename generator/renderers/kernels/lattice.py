@@ -1,4 +1,4 @@
-"""The lattice: every second pixel of every second row, where light is gathered first.
+"""The lattice: every few pixels of every few rows, where light is gathered first.
 
 Light changes slowly along a surface. Shadows, ambient occlusion and shading are computed on the
 lattice, and every other pixel takes what lattice points on the same stretch of surface agree on.
@@ -27,6 +27,7 @@ class Lattice:
     """What is seen at the lattice's points, flat, row by row.
 
     Attributes:
+        stride: Pixels from point to point. The last column and row are the image's last.
         body: -1 where nothing is seen.
         surface: Index of the material.
         pixel: Index of the pixel.
@@ -35,6 +36,7 @@ class Lattice:
         skip: The body that cannot shade the point although it lies on it, or -1.
     """
 
+    stride: int
     width: int
     height: int
     body: wp.array(dtype=int)
@@ -89,8 +91,8 @@ def sample_lattice(
 ):
     """Fill in the lattice's points."""
     i = wp.tid()
-    x = 2 * (i % lattice.width)
-    y = 2 * (i / lattice.width)
+    x = wp.min(lattice.stride * (i % lattice.width), view.width - 1)
+    y = wp.min(lattice.stride * (i / lattice.width), view.height - 1)
     pixel = y * view.width + x
     hit = hits[pixel]
     lattice.body[i] = hit[0]

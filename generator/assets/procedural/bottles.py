@@ -1,0 +1,248 @@
+"""Bottles and jars: bodies of revolution with a wrap-around label and a cap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, pick, rng_of
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.materials import (
+    CAPS,
+    STEEL,
+    jittered,
+    linear,
+    metal,
+    plastic,
+    printed,
+)
+from generator.assets.procedural.mesh import Patch, centred
+from generator.assets.procedural.shapes import Point2, fillet, lathe
+from generator.core.geometry import Material
+
+# Width by height of the unrolled label, which the drawing of its texture goes by.
+LABEL_ASPECT = 2.6
+
+# Label paper stands this much proud of the wall.
+_PROUD_M = 0.0003
+_FILLINGS = ("#6d0f1c", "#b34a12", "#d9a02a", "#3b1a12", "#7a8a2a", "#c9b48a", "#4a1030")
+
+
+@dataclass(frozen=True, slots=True)
+class _BottleStyle:
+    """Ranges of one kind of bottle; ``shoulder`` and ``flank`` are fractions.
+
+    Attributes:
+        shoulder: (radius as a share of the body's beyond the neck's, height as a share of the way
+            from label to neck) of the points between body and neck.
+        depth: Extent along Y as a share of that along X.
+        colors: Of the body.
+        caps: Of the cap.
+    """
+
+    height_m: tuple[float, float]
+    radius_m: tuple[float, float]
+    neck_m: float
+    neck_share: tuple[float, float]
+    label_share: tuple[float, float]
+    shoulder: tuple[Point2, ...]
+    cap_m: tuple[float, float]
+    depth: float
+    colors: tuple[str, ...]
+    caps: tuple[str, ...]
+    gloss: tuple[float, float] = (0.06, 0.15)
+
+
+_DARK_GLASS = ("#1d3320", "#26331c", "#3a2413", "#142a25", "#2d1a10", "#4a5a34")
+_CLEAR = ("#b9d3dc", "#c9dfe4", "#a9cbd8", "#cfe3dc", "#9fc4d6")
+BOTTLES: Mapping[str, _BottleStyle] = {
+    "wine": _BottleStyle(
+        (0.29, 0.32),
+        (0.036, 0.039),
+        0.0145,
+        (0.70, 0.74),
+        (0.12, 0.42),
+        ((1.0, 0.25), (0.93, 0.45), (0.45, 0.72), (0.08, 0.92)),
+        (0.0155, 0.055),
+        1.0,
+        _DARK_GLASS,
+        ("#5a1020", "#1a1a1a", "#b08d3a", "#23402f", "#c9c5ba"),
+    ),
+    "beer": _BottleStyle(
+        (0.22, 0.25),
+        (0.029, 0.032),
+        0.0135,
+        (0.68, 0.74),
+        (0.14, 0.42),
+        ((1.0, 0.3), (0.85, 0.5), (0.4, 0.75), (0.1, 0.93)),
+        (0.0145, 0.009),
+        1.0,
+        ("#3a2010", "#2a1508", "#16361d", "#52300f"),
+        CAPS,
+    ),
+    "water": _BottleStyle(
+        (0.2, 0.235),
+        (0.031, 0.0345),
+        0.0125,
+        (0.80, 0.84),
+        (0.38, 0.62),
+        ((1.0, 0.12), (0.92, 0.4), (0.55, 0.75), (0.15, 0.96)),
+        (0.0148, 0.016),
+        1.0,
+        _CLEAR,
+        CAPS,
+    ),
+    "soda": _BottleStyle(
+        (0.215, 0.25),
+        (0.0325, 0.036),
+        0.0125,
+        (0.80, 0.84),
+        (0.33, 0.58),
+        ((1.02, 0.15), (0.9, 0.45), (0.5, 0.75), (0.12, 0.95)),
+        (0.0148, 0.015),
+        1.0,
+        ("#2b120a", "#b34a12", "#2f7a3a", "#1c0d08", "#c9a21a"),
+        CAPS,
+    ),
+    "ketchup": _BottleStyle(
+        (0.17, 0.2),
+        (0.034, 0.038),
+        0.02,
+        (0.78, 0.82),
+        (0.2, 0.62),
+        ((0.97, 0.3), (0.75, 0.7), (0.3, 0.97)),
+        (0.022, 0.03),
+        0.66,
+        ("#a3150f", "#c5281a", "#d9a514", "#e9e4d0", "#5f2a16"),
+        ("#f2f2ee", "#c62828", "#2e7d32", "#e0c020"),
+        (0.2, 0.35),
+    ),
+    "detergent": _BottleStyle(
+        (0.22, 0.26),
+        (0.042, 0.047),
+        0.016,
+        (0.8, 0.85),
+        (0.16, 0.6),
+        ((1.0, 0.25), (0.8, 0.55), (0.35, 0.9)),
+        (0.018, 0.035),
+        0.6,
+        ("#1f6fb5", "#f0f0ec", "#2e9e4f", "#e8629a", "#f2c417", "#7b3fa0"),
+        ("#f2f2ee", "#1f6fb5", "#e8b21c", "#c62828"),
+        (0.2, 0.4),
+    ),
+}
+
+
+def bottle(seed: int) -> Solid:
+    """A bottle of one of the styles in ``BOTTLES``. Slots: body, label, cap."""
+    rng = rng_of("bottle", seed)
+    style = BOTTLES[tuple(BOTTLES)[seed % len(BOTTLES)]]
+    height, radius = between(*style.height_m, rng), between(*style.radius_m, rng)
+    neck_z = height * between(*style.neck_share, rng)
+    z0, z1 = height * style.label_share[0], min(height * style.label_share[1], neck_z - 0.01)
+    shoulder = [
+        (style.neck_m + r * (radius - style.neck_m), z1 + t * (neck_z - z1))
+        for r, t in style.shoulder
+    ]
+    cap_radius, cap_height = style.cap_m
+    cap_z, neck_top = height - cap_height, height - 0.4 * cap_height
+    upper = [*shoulder, (style.neck_m, neck_z), (style.neck_m, neck_top)]
+    patches = [
+        *_labelled(radius, (z0, z1), upper, [0.06] * (len(upper) - 1)),
+        lathe([(style.neck_m, neck_top), (0.0, neck_top)], 32, 0),
+        _cap(cap_radius, cap_z, height),
+    ]
+    stages = [
+        (0.93 * radius, 0.0),
+        (radius, 0.008),
+        (radius, z1),
+        *shoulder,
+        (max(style.neck_m, 0.96 * cap_radius), neck_z + 0.004),
+        (cap_radius, cap_z),
+        (0.97 * cap_radius, height),
+    ]
+    flat = np.array([1.0, style.depth, 1.0])
+    parts = [hull * flat for hull in hulls.stack(_climbing(stages))]
+    body = Material(jittered(linear(pick(style.colors, rng)), 0.1, rng), between(*style.gloss, rng))
+    label = printed(f"texture/label?seed={seed}", between(0.35, 0.6, rng))
+    flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
+    return centred(flattened, (body, label, plastic(rng, style.caps)), parts)
+
+
+def jar(seed: int) -> Solid:
+    """A filled preserving jar with a twist-off lid. Slots: body, label, lid."""
+    rng = rng_of("jar", seed)
+    radius, height = between(0.031, 0.043, rng), between(0.085, 0.14, rng)
+    top, lid_radius, mouth = height - 0.014, 0.9 * radius, 0.86 * radius
+    upper = [(radius, 0.8 * height), (mouth, top - 0.003), (mouth, top + 0.004)]
+    patches = [
+        *_labelled(radius, (0.2 * height, 0.66 * height), upper, [0.02, 0.006]),
+        lathe([(mouth, top + 0.004), (0.0, top + 0.004)], 32, 0),
+        _lid(lid_radius, top, height),
+    ]
+    glass = Material(jittered(linear(pick(_FILLINGS, rng)), 0.15, rng), between(0.06, 0.12, rng))
+    label = printed(f"texture/label?seed={seed + 1000}", between(0.45, 0.65, rng))
+    lid = pick((metal((0.83, 0.69, 0.35), 0.3), metal(STEEL, 0.3), plastic(rng, CAPS)), rng)
+    stages = [
+        (0.92 * radius, 0.0),
+        (radius, 0.008),
+        (radius, 0.8 * height),
+        (lid_radius, top),
+        (lid_radius, height),
+    ]
+    return centred(patches, (glass, label, lid), hulls.stack(stages))
+
+
+def _labelled(radius: float, label: Point2, upper: list[Point2], radii: list[float]) -> list[Patch]:
+    """Bottom and wall up to the last point of ``upper``, with a label between two heights."""
+    z0, z1 = label
+    lower = fillet(
+        [
+            (0.0, 0.004),
+            (0.6 * radius, 0.003),
+            (0.72 * radius, 0.0),
+            (0.93 * radius, 0.0),
+            (radius, 0.008),
+            (radius, z0 - _PROUD_M),
+            (radius + _PROUD_M, z0),
+        ],
+        [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0],
+        3,
+    )
+    rest = [(radius + _PROUD_M, z1), (radius, z1 + _PROUD_M), *upper]
+    return [
+        lathe(lower, 32, 0),
+        lathe([(radius + _PROUD_M, z0), (radius + _PROUD_M, z1)], 32, 1, v=(0.0, 1.0)),
+        lathe(fillet(rest, [0.0, 0.0, *radii, 0.0], 3), 32, 0),
+    ]
+
+
+def _cap(radius: float, low: float, high: float) -> Patch:
+    """A screw cap, closed below."""
+    profile = [(0.0, low), (radius, low), (0.97 * radius, high), (0.0, high)]
+    return lathe(fillet(profile, [0.0, 0.0008, 0.002, 0.0], 2), 24, 2)
+
+
+def _lid(radius: float, low: float, high: float) -> Patch:
+    """A twist-off lid with a sunken panel."""
+    profile = [
+        (0.0, low),
+        (radius, low),
+        (radius, high),
+        (radius - 0.006, high),
+        (radius - 0.008, high - 0.0012),
+        (0.0, high - 0.0012),
+    ]
+    return lathe(fillet(profile, [0.0, 0.001, 0.002, 0.0, 0.0, 0.0], 2), 32, 2)
+
+
+def _climbing(stages: list[Point2]) -> list[Point2]:
+    """The stages without those that do not rise."""
+    kept = stages[:1]
+    for stage in stages[1:]:
+        if stage[1] > kept[-1][1] + 1e-4:
+            kept.append(stage)
+    return kept

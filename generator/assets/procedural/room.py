@@ -1,0 +1,144 @@
+"""The inside of a room: floor, ceiling, walls, skirting, a door and a window with depth."""
+
+from __future__ import annotations
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.furniture import checked_size, rectangle
+from generator.assets.procedural.materials import STAINLESS, metal, painted, patterned
+from generator.assets.procedural.mesh import Patch, in_place
+from generator.assets.procedural.shapes import block
+from generator.core.geometry import Material
+from generator.core.se3 import Vec3
+
+
+def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Solid:
+    """The inside of a room, seen from within.
+
+    Slots: floor, ceiling, walls, skirting, door, frames, window, handle. The door is in the wall
+    at -X, the window in the wall at +Y; both are left out where the wall is too small for them.
+
+    Args:
+        size_m: Inner length, width, height; the floor is at z = 0.
+        door: 1 with a door, 0 without.
+        window: 1 with a window, 0 without.
+
+    Raises:
+        AssetError: if a size is not usable.
+    """
+    x, y, z = checked_size("room", size_m, 1.0)
+    has_door = door > 0 and y > 1.6 and z > 2.2
+    has_window = window > 0 and x > 2.0 and z > 2.0
+    patches = [
+        rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0)),
+        rectangle((-x / 2, y / 2, z), (x, 0.0, 0.0), (0.0, -y, 0.0)).painted(1),
+        rectangle((x / 2, -y / 2, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)).flipped().painted(2),
+        rectangle((-x / 2, -y / 2, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)).painted(2),
+        rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, 0.0, z)).flipped().painted(2),
+        *_skirting(x, y, 0.55 if has_door else 0.0),
+        *(_door(-x / 2) if has_door else ()),
+        *_window_wall(x, y / 2, z, has_window),
+    ]
+    t = 0.2
+    slabs = [
+        ((-x / 2 - t, -y / 2 - t, -t), (x / 2 + t, y / 2 + t, 0.0)),
+        ((-x / 2 - t, -y / 2 - t, z), (x / 2 + t, y / 2 + t, z + t)),
+        ((-x / 2 - t, -y / 2 - t, 0.0), (-x / 2, y / 2 + t, z)),
+        ((x / 2, -y / 2 - t, 0.0), (x / 2 + t, y / 2 + t, z)),
+        ((-x / 2, -y / 2 - t, 0.0), (x / 2, -y / 2, z)),
+        ((-x / 2, y / 2, 0.0), (x / 2, y / 2 + t, z)),
+    ]
+    return in_place(patches, _room_materials(), [hulls.box(*slab) for slab in slabs])
+
+
+def _room_materials() -> tuple[Material, ...]:
+    pane = Material((0.6, 0.7, 0.8), 0.08, emission_cd_m2=(230.0, 255.0, 290.0))
+    return (
+        patterned("texture/wood_planks?seed=0", 1.6, 0.45),
+        painted("#f2f1ed", 0.9),
+        patterned("texture/plaster?seed=3", 1.5, 0.9),
+        painted("#eceae4", 0.5),
+        painted("#e9e7e1", 0.45),
+        painted("#f3f2ee", 0.4),
+        pane,
+        metal(STAINLESS, 0.3),
+    )
+
+
+def _skirting(x: float, y: float, door_half: float) -> list[Patch]:
+    """Boards along the walls, 8 cm high; the one at -X leaves out the door."""
+    t, h = 0.012, 0.08
+    spans = [
+        ((x / 2 - t, -y / 2, 0.0), (x / 2, y / 2, h)),
+        ((-x / 2, -y / 2, 0.0), (x / 2, -y / 2 + t, h)),
+        ((-x / 2, y / 2 - t, 0.0), (x / 2, y / 2, h)),
+        ((-x / 2, -y / 2, 0.0), (-x / 2 + t, -door_half, h)),
+        ((-x / 2, door_half, 0.0), (-x / 2 + t, y / 2, h)),
+    ]
+    return [block(low, high, 0.003, 3) for low, high in spans]
+
+
+def _door(wall: float) -> list[Patch]:
+    """A panelled door of 0.9 m x 2.05 m with frame and handle on the wall x = ``wall``."""
+    w, h = 0.45, 2.05
+    leaf = [block((wall, -w, 0.005), (wall + 0.012, w, h), 0.001, 4)]
+    leaf += [
+        block(
+            (wall + 0.012, s * 0.06 - 0.3 * (s < 0), z0),
+            (wall + 0.018, s * 0.06 + 0.3 * (s > 0), z1),
+            0.005,
+            4,
+        )
+        for s in (-1, 1)
+        for z0, z1 in ((0.2, 0.95), (1.15, 1.9))
+    ]
+    frame = [
+        block((wall, -w - 0.08, 0.0), (wall + 0.03, -w, h + 0.08), 0.004, 5),
+        block((wall, w, 0.0), (wall + 0.03, w + 0.08, h + 0.08), 0.004, 5),
+        block((wall, -w, h), (wall + 0.03, w, h + 0.08), 0.004, 5),
+    ]
+    handle = [
+        block((wall + 0.012, 0.37, 0.95), (wall + 0.018, 0.41, 1.15), 0.003, 7),
+        block((wall + 0.018, 0.38, 1.04), (wall + 0.065, 0.40, 1.06), 0.004, 7),
+        block((wall + 0.05, 0.27, 1.04), (wall + 0.07, 0.40, 1.06), 0.007, 7),
+    ]
+    return [*leaf, *frame, *handle]
+
+
+def _window_wall(x: float, wall: float, z: float, window: bool) -> list[Patch]:
+    """The wall y = ``wall``; around a window it is four rectangles, a reveal, frame and pane."""
+    if not window:
+        return [_facing_room(-x / 2, x / 2, 0.0, z, wall)]
+    half, low, high, depth = min(0.8, 0.3 * x), 0.9, min(2.15, z - 0.25), 0.16
+    faces = [
+        _facing_room(-x / 2, -half, 0.0, z, wall),
+        _facing_room(half, x / 2, 0.0, z, wall),
+        _facing_room(-half, half, 0.0, low, wall),
+        _facing_room(-half, half, high, z, wall),
+    ]
+    back = wall + depth
+    reveal = [
+        rectangle((-half, wall, low), (2 * half, 0, 0), (0, depth, 0)),
+        rectangle((-half, back, high), (2 * half, 0, 0), (0, -depth, 0)),
+        rectangle((-half, wall, low), (0, depth, 0), (0, 0, high - low)),
+        rectangle((half, back, low), (0, -depth, 0), (0, 0, high - low)),
+    ]
+    w, y0 = 0.06, back - 0.05
+    bars = [
+        (-half, -half + w, low, high),
+        (half - w, half, low, high),
+        (-w / 2, w / 2, low, high),
+        (-half + w, half - w, low, low + w),
+        (-half + w, half - w, high - w, high),
+    ]
+    frame = [block((a, y0, c), (b, back, d), 0.004, 5) for a, b, c, d in bars]
+    sill = block(
+        (-half - 0.05, wall - 0.04, low - 0.03), (half + 0.05, wall + 0.02, low + 0.002), 0.004, 5
+    )
+    pane = _facing_room(-half, half, low, high, back - 0.02).painted(6)
+    return [*faces, *(face.painted(2) for face in reveal), *frame, sill, pane]
+
+
+def _facing_room(x0: float, x1: float, z0: float, z1: float, y: float) -> Patch:
+    """A rectangle in the plane of constant y that is seen from -Y."""
+    return rectangle((x0, y, z0), (x1 - x0, 0.0, 0.0), (0.0, 0.0, z1 - z0)).painted(2)
