@@ -13,10 +13,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-import pybullet
-
+from generator.core.quiet import silenced
 from generator.core.se3 import SE3, Array, Vec3
 from generator.physics.shapes import CollisionShape, scale_step
+
+with silenced():  # it tells when it was built
+    import pybullet
 
 GRAVITY_M_S2 = 9.81
 

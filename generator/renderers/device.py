@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 
 import warp as wp
 
 from generator.core.errors import ConfigError
+from generator.core.quiet import silenced
 
 # Not -march=native: fused multiply-adds would give other bytes on other machines. Inlining
 # everything is worth a quarter of all ray time.
@@ -43,23 +40,6 @@ def _start() -> None:
         wp.config.quiet = True
     wp.config.enable_backward = False
     wp.config.cpu_compiler_flags = _COMPILER_FLAGS
-    with _quiet_file_descriptors():
+    with silenced():  # Warp warns about a missing CUDA driver
         wp.init()
 
-
-@contextmanager
-def _quiet_file_descriptors() -> Iterator[None]:
-    """Drop what native code prints: Warp warns on stderr about a missing CUDA driver."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept = [(fd, os.dup(fd)) for fd in (1, 2)]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        for fd, _ in kept:
-            os.dup2(nowhere, fd)
-        yield
-    finally:
-        for fd, copy in kept:
-            os.dup2(copy, fd)
-            os.close(copy)
-        os.close(nowhere)

@@ -106,12 +106,13 @@ def _lit(
         return lit
     disc = wp.array(sunflower(48), dtype=wp.vec2, device=device)
     inputs = [world.record, lattice, columns, lists, disc]
-    wp.launch(occlusion.probe_lamps, n, inputs, [probed], device=device)
+    for parity in (0, 1):
+        wp.launch(occlusion.probe_lamps, n, [*inputs, parity], [probed], device=device)
     classes = _classes(lattice, probed, lamps, stock)
     wp.launch(occlusion.refine_lamps, n, [*inputs, classes, probed], [lit], device=device)
     classes = _classes(lattice, lit, lamps, stock)
     wp.launch(
-        occlusion.smooth_lattice, n, [view, lattice, classes, lit], [probed], device=device
+        occlusion.smooth_lattice, n, [view, lattice, classes, lit, 0], [probed], device=device
     )
     return probed
 
@@ -131,11 +132,11 @@ def _open_sky(
     if radius_m == 0.0:
         open_sky.fill_(1.0)
         return open_sky
-    hemisphere = wp.array(cosine_hemisphere(16), dtype=wp.vec3, device=stock.device)
+    hemisphere = wp.array(cosine_hemisphere(8), dtype=wp.vec3, device=stock.device)
     inputs = [world.record, lattice, columns, lists, hemisphere, radius_m]
     wp.launch(occlusion.probe_ambient, n, inputs, [probed], device=stock.device)
     classes = _classes(lattice, probed, 1, stock)
-    inputs = [view, lattice, classes, probed]
+    inputs = [view, lattice, classes, probed, 1]
     wp.launch(occlusion.smooth_lattice, n, inputs, [open_sky], device=stock.device)
     return open_sky
 

@@ -114,6 +114,8 @@ def _place(
     values["eye_mesh"] = np.einsum("nji,nj->ni", R, eye - t, optimize=False) / scale[:, None]
     values["R_world_mesh"] = R
     values["t_world_mesh"] = t
+    values["B_mesh_world"] = R.transpose(0, 2, 1) / scale[:, None, None]
+    values["t_mesh_world"] = -np.einsum("nji,nj->ni", R, t, optimize=False) / scale[:, None]
     return int(counts.sum())
 
 

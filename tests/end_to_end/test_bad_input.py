@@ -39,8 +39,8 @@ def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts
             ("views_per_scen", "did you mean 'views_per_scene'?"),
         ),
         (
-            ("--config", "tabletop.yaml", *JOB, "--set", f"{COUNT}={{unifrom: [1, 2]}}"),
-            ("unknown distribution 'unifrom'", "did you mean 'uniform"),
+            ("--config", "tabletop.yaml", *JOB, "--set", f"{COUNT}={{uniform_integr: [1, 2]}}"),
+            ("unknown distribution 'uniform_integr'", "did you mean 'uniform_integer'?"),
         ),
         (
             ("--config", "tabletop.yaml", *JOB, "--set", f"{COUNT}={{uniform_integer: [9, 2]}}"),

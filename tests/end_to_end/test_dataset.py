@@ -124,7 +124,7 @@ def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
     for path in sorted((dataset / "coco" / "annotations").glob("instances_*.json")):
         coco = json.loads(path.read_text())
         for image in coco["images"]:
-            index = image["scene_index"] * 5 + image["view_index"]
+            index = image["scene"] * 5 + image["view"]
             shard = dataset / "shards" / f"{index // 5:06d}" / "color" / "instance"
             ids = np.asarray(Image.open(shard / f"{index:09d}.png"))
             for annotation in (a for a in coco["annotations"] if a["image_id"] == image["id"]):

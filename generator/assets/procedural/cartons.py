@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -10,7 +11,7 @@ from generator.assets.procedural import hulls
 from generator.assets.procedural.draw import between, chance, pick, rng_of
 from generator.assets.procedural.family import Solid
 from generator.assets.procedural.materials import CAPS, plastic, printed
-from generator.assets.procedural.mesh import Patch, centred, joined
+from generator.assets.procedural.mesh import Patch, centred, joined, rotated
 from generator.assets.procedural.shapes import UvRect, fillet, grid, lathe, rounded_box
 from generator.core.se3 import Vec3
 
@@ -68,30 +69,27 @@ def milk_carton(seed: int) -> Solid:
     rise, fin = 0.33 * x, 0.016
     roof = _gable(x, y, rise, fin).moved(z=z)
     print_ = printed(f"texture/milk_label?seed={seed}", between(0.35, 0.5, rng))
-    patches = [body, roof]
+    patches, parts = [body, roof], [hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
     if chance(0.7, rng):
-        screw = lathe(
-            fillet(
-                [(0.0, -0.004), (0.013, -0.004), (0.013, 0.009), (0.0, 0.009)],
-                [0.0, 0.0, 0.0015, 0.0],
-                2,
-            ),
-            24,
-            1,
-        )
-        tilt = float(np.arctan2(rise, 0.5 * x))
-        patches.append(screw.rotated("y", tilt).moved(0.27 * x, 0.0, z + 0.46 * rise))
+        tilt = math.atan2(rise, 0.5 * x)
+        at = (0.27 * x, 0.0, z + 0.46 * rise)
+        patches.append(_screw_cap().rotated("y", tilt).moved(*at))
+        cap = hulls.frustum((0.013, -0.004), (0.013, 0.009), 12)
+        parts.append(rotated(cap, "y", tilt) + np.array(at))
     ridge = z + rise
     prism = np.array(
         [(sx * 0.5 * x, sy * 0.5 * y, z) for sx in (-1, 1) for sy in (-1, 1)]
         + [(sx * 0.002, sy * 0.5 * y, ridge) for sx in (-1, 1) for sy in (-1, 1)]
     )
-    parts = [
-        hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)),
-        prism,
-        hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin)),
-    ]
+    fin_hull = hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
+    parts += [prism, fin_hull]
     return centred(patches, (print_, plastic(rng, CAPS)), parts)
+
+
+def _screw_cap() -> Patch:
+    """A flat cap about Z, its foot below z = 0; slot 1."""
+    profile = [(0.0, -0.004), (0.013, -0.004), (0.013, 0.009), (0.0, 0.009)]
+    return lathe(fillet(profile, [0.0, 0.0, 0.0015, 0.0], 2), 24, 1)
 
 
 def _gable(x: float, y: float, rise: float, fin: float) -> Patch:

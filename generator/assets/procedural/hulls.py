@@ -63,11 +63,14 @@ def ring(
     return wedges
 
 
-def extreme(points: Array, count: int = 48) -> Array:
-    """The points that lie furthest along ``count`` even directions: a small hull of a cloud."""
+def extreme(points: Array, count: int = 48, turn_rad: float = 0.0) -> Array:
+    """The points that lie furthest along ``count`` even directions: a small hull of a cloud.
+
+    Directions are Fibonacci's spiral about Z, turned by ``turn_rad``.
+    """
     i = np.arange(count) + 0.5
     z = 1.0 - 2.0 * i / count
-    turn = math.pi * (3.0 - math.sqrt(5.0)) * i
+    turn = math.pi * (3.0 - math.sqrt(5.0)) * i + turn_rad
     radius = np.sqrt(1.0 - z * z)
     directions = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
     reach = np.einsum("dk,nk->dn", directions, points.reshape(-1, 3), optimize=False)

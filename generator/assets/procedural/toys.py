@@ -54,7 +54,9 @@ def ball(seed: int) -> Solid:
     rough = {"tennis": 0.9, "basket": 0.65}.get(kind, between(0.3, 0.5, rng))
     body = sphere(lambda d: radius * d, 22, 36)
     cover = printed(f"texture/ball_cover?seed={seed}", rough)
-    return centred([body], (cover,), [hulls.extreme(body.corners_m)])
+    # One small hull has flat sides that a ball would rest on; four that are turned have not.
+    parts = [hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)]
+    return centred([body], (cover,), parts)
 
 
 def ball_kind(seed: int) -> str:

@@ -3,7 +3,7 @@
 1. Tiles of the lattice find which bodies can come between them and each lamp (shafts, after
    Haines and Wallace, "Shaft culling for efficient ray-traced radiosity", 1991): most tiles
    find none, and their rays need not be cast.
-2. Every point casts one ray per lamp; the sixteen points of a 4 x 4 block aim at sixteen parts of
+2. Points cast one ray per lamp, half of them only where the other half differ; the sixteen points of a 4 x 4 block aim at sixteen parts of
    the lamp (interleaved sampling, Keller and Heidrich 2001).
 3. Where all points of a block's neighbourhood agree, that is the answer. Elsewhere, in penumbrae,
    points cast more rays, and the sixteen neighbours on the same surface are averaged: together
@@ -21,6 +21,8 @@ from generator.renderers.kernels.records import (
     View,
     World,
     corners_of,
+    greater,
+    lesser,
     to_mesh_point,
     to_mesh_vector,
     unit,
@@ -119,8 +121,8 @@ def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
         a = low[k] - grown - shaft.start[k]
         c = high[k] + grown - shaft.start[k]
         inverse = 1.0 / wp.where(wp.abs(shaft.way[k]) < 1.0e-20, 1.0e-20, shaft.way[k])
-        t0 = wp.max(t0, wp.min(a * inverse, c * inverse))
-        t1 = wp.min(t1, wp.max(a * inverse, c * inverse))
+        t0 = greater(t0, lesser(a * inverse, c * inverse))
+        t1 = lesser(t1, greater(a * inverse, c * inverse))
     return t0, t1
 
 
@@ -248,66 +250,78 @@ def list_occluders(
             append(lists, i, lamps, b)
 
 
+@wp.struct
+class Path:
+    """A straight way in the world, from 0 to 1."""
+
+    origin: wp.vec3
+    way: wp.vec3
+    inverse: wp.vec3
+
+
 @wp.func
-def crosses_box(origin: wp.vec3, path: wp.vec3, low: wp.vec3, high: wp.vec3):
-    """Whether a path may cross a box."""
+def path_along(origin: wp.vec3, way: wp.vec3):
+    """The path with the reciprocals that box tests need."""
+    path = Path()
+    path.origin = origin
+    path.way = way
     # A grain instead of zero: its reciprocal is large, and its sign does not matter.
-    x = 1.0 / wp.where(wp.abs(path[0]) < 1.0e-20, 1.0e-20, path[0])
-    y = 1.0 / wp.where(wp.abs(path[1]) < 1.0e-20, 1.0e-20, path[1])
-    z = 1.0 / wp.where(wp.abs(path[2]) < 1.0e-20, 1.0e-20, path[2])
-    a = wp.cw_mul(low - origin, wp.vec3(x, y, z))
-    b = wp.cw_mul(high - origin, wp.vec3(x, y, z))
-    near = wp.min(a, b)
-    far = wp.max(a, b)
-    enters = wp.max(wp.max(near), 0.0)
-    leaves = wp.min(wp.min(far), 1.0)
-    return enters <= leaves * 1.000001 + 1.0e-7
+    x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
+    y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
+    z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
+    path.inverse = wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
+    return path
 
 
 @wp.func
-def blocked_by(world: World, b: int, origin: wp.vec3, path: wp.vec3):
-    """Whether a body cuts the straight path."""
-    g = world.bodies[b].geometry
-    o = to_mesh_point(world, b, origin)
-    d = to_mesh_vector(world, b, path)
-    # Most listed bodies are missed: this test costs a fifth of a query that finds nothing.
-    hit = crosses_box(o, d, world.geometries[g].low_m, world.geometries[g].high_m)
+def enters_box(world: World, b: int, path: Path):
+    """Whether a path may enter a body's box: settles most cases before a query is made."""
+    a = wp.cw_mul(world.bodies[b].low_m - path.origin, path.inverse)
+    c = wp.cw_mul(world.bodies[b].high_m - path.origin, path.inverse)
+    enters = greater(greater(lesser(a[0], c[0]), lesser(a[1], c[1])), lesser(a[2], c[2]))
+    leaves = lesser(lesser(greater(a[0], c[0]), greater(a[1], c[1])), greater(a[2], c[2]))
+    return greater(enters, 0.0) <= lesser(leaves, 1.0)
+
+
+@wp.func
+def blocked_by(world: World, b: int, path: Path):
+    """Whether a body cuts a path."""
+    hit = enters_box(world, b, path)
     if hit:
-        hit = wp.mesh_query_ray_anyhit(world.geometries[g].mesh, o, d, 1.0)
+        o = to_mesh_point(world, b, path.origin)
+        d = to_mesh_vector(world, b, path.way)
+        mesh = world.geometries[world.bodies[b].geometry].mesh
+        hit = wp.mesh_query_ray_anyhit(mesh, o, d, 1.0)
     return hit
 
 
 @wp.func
-def blocked(world: World, origin: wp.vec3, path: wp.vec3):
+def blocked(world: World, path: Path):
     """Whether anything cuts a path."""
     hit = bool(False)
-    candidates = wp.bvh_query_ray(world.tree, origin, path)
+    candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
     b = int(0)
     while wp.bvh_query_next(candidates, b, 1.0):
         if not hit:
-            hit = blocked_by(world, b, origin, path)
+            hit = blocked_by(world, b, path)
     return hit
 
 
 @wp.func
 def blocked_by_listed(
-    world: World,
-    lists: wp.array(dtype=int, ndim=3),
-    tile: int,
-    j: int,
-    skip: int,
-    origin: wp.vec3,
-    path: wp.vec3,
+    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, j: int, skip: int, path: Path
 ):
     """Whether anything but ``skip`` cuts the path from a point of a tile to lamp j."""
     hit = bool(False)
     count = lists[tile, j, 0]
     if count < 0:
-        return blocked(world, origin, path)
+        return blocked(world, path)
     for k in range(count):
         b = lists[tile, j, 1 + k]
-        if not hit and b != skip:
-            hit = blocked_by(world, b, origin, path)
+        if b != skip:
+            hit = blocked_by(world, b, path)
+            if hit:
+                break
     return hit
 
 
@@ -333,7 +347,7 @@ def frame_of(z: wp.vec3):
 
 
 @wp.func
-def path_to_lamp(lamp: Lamp, origin: wp.vec3, part: wp.vec2):
+def way_to_lamp(lamp: Lamp, origin: wp.vec3, part: wp.vec2):
     """From a point to a part of a lamp's disc."""
     to_lamp = lamp.position_m - origin
     radius = lamp.radius
@@ -350,6 +364,24 @@ def tile_index(lattice: Lattice, i: int, tile_columns: int):
     return ((i / lattice.width) / TILE) * tile_columns + (i % lattice.width) / TILE
 
 
+@wp.func
+def settled(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
+    """What the points beside, above and below a point agree on; UNSEEN if they do not.
+
+    Each of them must be there, on the same material.
+    """
+    i = y * lattice.width + x
+    value = float(UNSEEN)
+    if x > 0 and y > 0 and x < lattice.width - 1 and y < lattice.height - 1:
+        own = lattice.surface[i]
+        value = values[j, i - 1]
+        for k in range(4):
+            q = i + wp.where(k < 2, 1, lattice.width) * wp.where((k & 1) == 0, 1, -1)
+            if lattice.surface[q] != own or values[j, q] != value:
+                value = UNSEEN
+    return value
+
+
 @wp.kernel
 def probe_lamps(
     world: World,
@@ -357,34 +389,56 @@ def probe_lamps(
     tile_columns: int,
     lists: wp.array(dtype=int, ndim=3),
     disc: wp.array(dtype=wp.vec2),
+    parity: int,
     lit: wp.array(dtype=float, ndim=2),
 ):
     """One ray per point and lamp: 1, 0, or UNSEEN where the lamp lights nothing anyway.
 
     Args:
         disc: Forty-eight points of the unit disc; a point looks at one of three in a row.
+        parity: 0 to probe the black fields of a chessboard. 1, after that, for the white ones:
+            they are probed only where black ones around them differ.
     """
     i = wp.tid()
-    seen = lattice.body[i] >= 0
+    x = i % lattice.width
+    y = i / lattice.width
+    if ((x + y) & 1) != parity:
+        return
     tile = tile_index(lattice, i, tile_columns)
     for j in range(world.lamps.shape[0]):
         value = float(UNSEEN)
-        if seen:
-            origin = lattice.origin_m[i]
-            beam = beam_from(world.lamps[j], origin)
-            if (
-                wp.dot(beam.direction, lattice.normal[i]) > -beam.spread
-                and wp.max(beam.normal_lux) > 0.0
-            ):
-                value = 1.0
-                if lists[tile, j, 0] != 0:
-                    part = disc[3 * bayer(i % lattice.width, i / lattice.width) + 1]
-                    path = path_to_lamp(world.lamps[j], origin, part)
-                    if blocked_by_listed(
-                        world, lists, tile, j, lattice.skip[i], origin, path
-                    ):
-                        value = 0.0
+        if lattice.body[i] >= 0:
+            if parity == 1:
+                value = settled(lattice, lit, j, x, y)
+            if value == UNSEEN:
+                value = probed(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
         lit[j, i] = value
+
+
+@wp.func
+def probed(
+    world: World,
+    lattice: Lattice,
+    lists: wp.array(dtype=int, ndim=3),
+    tile: int,
+    i: int,
+    j: int,
+    part: wp.vec2,
+):
+    """Whether point i sees a part of lamp j."""
+    value = float(UNSEEN)
+    origin = lattice.origin_m[i]
+    beam = beam_from(world.lamps[j], origin)
+    if (
+        wp.dot(beam.direction, lattice.normal[i]) > -beam.spread
+        and wp.max(beam.normal_lux) > 0.0
+    ):
+        value = 1.0
+        if lists[tile, j, 0] != 0:
+            path = path_along(origin, way_to_lamp(world.lamps[j], origin, part))
+            if blocked_by_listed(world, lists, tile, j, lattice.skip[i], path):
+                value = 0.0
+    return value
 
 
 @wp.kernel
@@ -484,10 +538,8 @@ def refine_lamps(
                 origin = lattice.origin_m[i]
                 for k in range(2):
                     part = disc[3 * bayer(x, y) + 2 * k]
-                    path = path_to_lamp(world.lamps[j], origin, part)
-                    if not blocked_by_listed(
-                        world, lists, tile, j, lattice.skip[i], origin, path
-                    ):
+                    path = path_along(origin, way_to_lamp(world.lamps[j], origin, part))
+                    if not blocked_by_listed(world, lists, tile, j, lattice.skip[i], path):
                         seen += 1.0
                 value = seen / 3.0
         lit[j, i] = value
@@ -505,18 +557,28 @@ def smooth_lattice(
     lattice: Lattice,
     classes: wp.array(dtype=int, ndim=3),
     values: wp.array(dtype=float, ndim=2),
+    fill: int,
     smoothed: wp.array(dtype=float, ndim=2),
 ):
-    """Average the values of neighbours on one surface, wherever they differ."""
+    """Average the values of neighbours on one surface, wherever they differ.
+
+    Args:
+        fill: 1 to give points without a value the mean of those around, too.
+    """
     i = wp.tid()
     x = i % lattice.width
     y = i / lattice.width
     for j in range(values.shape[0]):
         value = values[j, i]
-        if value != UNSEEN:
+        if lattice.surface[i] >= 0 and (fill == 1 or value != UNSEEN):
             found = classes_around(classes, x, y, j)
-            if found != 1 and found != 2:
+            if found == 1 or found == 2:
+                value = float(found - 1)
+            else:
                 value = window_mean(lattice, values, j, i, surface_tolerance(view, lattice.p_m[i]))
+            if fill == 1:
+                # Alone on its surface: nothing is known, and open is the likelier guess.
+                value = wp.where(value == UNSEEN, 1.0, value)
         smoothed[j, i] = value
 
 
@@ -530,14 +592,14 @@ def probe_ambient(
     radius_m: float,
     open_sky: wp.array(dtype=float, ndim=2),
 ):
-    """One short ray per point: 1 where it meets nothing, less the nearer the obstacle.
+    """One short ray per black field of a chessboard: less than 1 the nearer it meets something.
 
     Args:
-        hemisphere: Sixteen directions about +Z with cosine-weighted density.
+        hemisphere: Eight directions about +Z with cosine-weighted density.
     """
     i = wp.tid()
     value = float(UNSEEN)
-    if lattice.body[i] >= 0:
+    if lattice.body[i] >= 0 and ((i % lattice.width + i / lattice.width) & 1) == 0:
         value = 1.0
         lamps = world.lamps.shape[0]
         tile = tile_index(lattice, i, tile_columns)
@@ -545,53 +607,49 @@ def probe_ambient(
             n = lattice.normal[i]
             x, y = frame_of(n)
             h = hemisphere[bayer(i % lattice.width, i / lattice.width)]
-            path = (x * h[0] + y * h[1] + n * h[2]) * radius_m
-            t = free_of_listed(world, lists, tile, lattice.skip[i], lattice.origin_m[i], path)
+            way = (x * h[0] + y * h[1] + n * h[2]) * radius_m
+            path = path_along(lattice.origin_m[i], way)
+            t = free_of_listed(world, lists, tile, lattice.skip[i], path)
             value = t * (2.0 - t)
     open_sky[0, i] = value
 
 
 @wp.func
-def free_path(world: World, origin: wp.vec3, path: wp.vec3):
+def free_path(world: World, path: Path):
     """The part of a path that is free, from 0 to 1."""
     free = float(1.0)
-    candidates = wp.bvh_query_ray(world.tree, origin, path)
+    candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
     b = int(0)
     while wp.bvh_query_next(candidates, b, free):
-        free = freed_by(world, b, origin, path, free)
+        free = freed_by(world, b, path, free)
     return free
 
 
 @wp.func
 def free_of_listed(
-    world: World,
-    lists: wp.array(dtype=int, ndim=3),
-    tile: int,
-    skip: int,
-    origin: wp.vec3,
-    path: wp.vec3,
+    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, skip: int, path: Path
 ):
     """The part of a path from a point of a tile that is free of anything but ``skip``."""
     j = world.lamps.shape[0]
     free = float(1.0)
     count = lists[tile, j, 0]
     if count < 0:
-        return free_path(world, origin, path)
+        return free_path(world, path)
     for k in range(count):
         b = lists[tile, j, 1 + k]
         if b != skip:
-            free = freed_by(world, b, origin, path, free)
+            free = freed_by(world, b, path, free)
     return free
 
 
 @wp.func
-def freed_by(world: World, b: int, origin: wp.vec3, path: wp.vec3, free: float):
+def freed_by(world: World, b: int, path: Path, free: float):
     """The free part of a path before one body, at most ``free``."""
-    g = world.bodies[b].geometry
-    o = to_mesh_point(world, b, origin)
-    d = to_mesh_vector(world, b, path)
-    if crosses_box(o, d, world.geometries[g].low_m, world.geometries[g].high_m):
-        answer = wp.mesh_query_ray(world.geometries[g].mesh, o, d, free)
+    if enters_box(world, b, path):
+        o = to_mesh_point(world, b, path.origin)
+        d = to_mesh_vector(world, b, path.way)
+        mesh = world.geometries[world.bodies[b].geometry].mesh
+        answer = wp.mesh_query_ray(mesh, o, d, free)
         if answer.result:
             free = answer.t
     return free

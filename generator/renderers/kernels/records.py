@@ -63,6 +63,7 @@ class Body:
         B_mesh_camera: Camera direction to mesh direction, scale included.
         eye_mesh: The camera's centre in the mesh frame.
         R_world_mesh, t_world_mesh: Rotation without scale, and position.
+        B_mesh_world, t_mesh_world: World to mesh, scale included.
         low_m, high_m: Box in the world.
     """
 
@@ -76,6 +77,8 @@ class Body:
     eye_mesh: wp.vec3
     R_world_mesh: wp.mat33
     t_world_mesh: wp.vec3
+    B_mesh_world: wp.mat33
+    t_mesh_world: wp.vec3
     low_m: wp.vec3
     high_m: wp.vec3
 
@@ -168,6 +171,18 @@ def unit(v: wp.vec3):
 
 
 @wp.func
+def lesser(a: float, b: float):
+    """The smaller of two numbers; one instruction, where ``wp.min`` also looks for NaN."""
+    return wp.where(a < b, a, b)
+
+
+@wp.func
+def greater(a: float, b: float):
+    """The larger of two numbers."""
+    return wp.where(a > b, a, b)
+
+
+@wp.func
 def floor_int(x: float):
     """The largest integer <= x; ``wp.floor`` is a library call on the plainest processors."""
     i = int(x)
@@ -200,14 +215,13 @@ class World:
 @wp.func
 def to_mesh_point(world: World, b: int, p_world: wp.vec3):
     """World point to the mesh frame of body b."""
-    moved = wp.transpose(world.bodies[b].R_world_mesh) @ (p_world - world.bodies[b].t_world_mesh)
-    return moved * (1.0 / world.bodies[b].scale)
+    return world.bodies[b].B_mesh_world @ p_world + world.bodies[b].t_mesh_world
 
 
 @wp.func
 def to_mesh_vector(world: World, b: int, v_world: wp.vec3):
     """World displacement to the mesh frame of body b."""
-    return (wp.transpose(world.bodies[b].R_world_mesh) @ v_world) * (1.0 / world.bodies[b].scale)
+    return world.bodies[b].B_mesh_world @ v_world
 
 
 @wp.func

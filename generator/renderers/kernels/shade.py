@@ -12,8 +12,9 @@ from generator.renderers.kernels.occlusion import (
     blocked,
     free_path,
     frame_of,
-    path_to_lamp,
+    path_along,
     surface_tolerance,
+    way_to_lamp,
 )
 from generator.renderers.kernels.records import (
     Lamp,
@@ -381,7 +382,7 @@ def seen_part(world: World, lamp: Lamp, origin: wp.vec3, n: wp.vec3, disc: wp.ar
     seen = float(0.0)
     if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
         for k in range(disc.shape[0]):
-            if not blocked(world, origin, path_to_lamp(lamp, origin, disc[k])):
+            if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, disc[k]))):
                 seen += 1.0
     return seen / float(disc.shape[0])
 
@@ -398,6 +399,6 @@ def seen_sky(
     for k in range(disc.shape[0]):
         c = disc[k]
         up = wp.sqrt(1.0 - wp.dot(c, c))
-        t = free_path(world, origin, (x * c[0] + y * c[1] + n * up) * radius_m)
+        t = free_path(world, path_along(origin, (x * c[0] + y * c[1] + n * up) * radius_m))
         total += t * (2.0 - t)
     return total / float(disc.shape[0])

@@ -1,0 +1,88 @@
+"""Environments: mean luminance, orientation, and what must be bright."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from generator.assets.procedural import ENVIRONMENTS
+from generator.assets.procedural.environments import directions, normalised
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+@pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
+@pytest.mark.parametrize("seed", [0, 1, 5])
+def test_mean_luminance_is_one_by_solid_angle(name: str, seed: int) -> None:
+    """Integrated with rows weighted by the sine of their polar angle."""
+    image = ENVIRONMENTS[name].build(seed)
+    rows, columns, channels = image.shape
+    weight = np.sin(np.pi * (np.arange(rows) + 0.5) / rows)
+    luminance = (image.astype(np.float64) * LUMINANCE).sum(axis=2).mean(axis=1)
+
+    assert image.dtype == np.float32
+    assert (columns, channels) == (2 * rows, 3)
+    assert np.isfinite(image).all()
+    assert image.min() >= 0.0
+    assert (luminance * weight).sum() / weight.sum() == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
+def test_equal_seeds_make_equal_environments_and_others_differ(name: str) -> None:
+    """A pure function of the seed."""
+    build = ENVIRONMENTS[name].build
+
+    assert build(1).tobytes() == build(1).tobytes()
+    assert len({build(k).tobytes() for k in range(4)}) == 4
+
+
+def test_columns_grow_clockwise_from_minus_x() -> None:
+    """Row 0 is the zenith, column 0 is -X, the centre +X, three quarters -Y."""
+    d = directions(64)
+
+    assert d[0, 0, 2] > 0.999
+    assert np.allclose(d[32, 0], (-1.0, 0.0, 0.0), atol=0.05)
+    assert np.allclose(d[32, 64], (1.0, 0.0, 0.0), atol=0.05)
+    assert np.allclose(d[32, 96], (0.0, -1.0, 0.0), atol=0.05)
+    assert np.allclose((d**2).sum(axis=2), 1.0)
+
+
+@pytest.mark.parametrize("name", ["overcast", "clear_sky", "sunset"])
+def test_skies_are_brighter_than_the_ground(name: str) -> None:
+    """The upper half outshines the lower."""
+    image = ENVIRONMENTS[name].build(0)
+    half = len(image) // 2
+
+    assert image[:half].mean() > 1.5 * image[half:].mean()
+
+
+def test_an_overcast_zenith_is_about_three_times_the_horizon() -> None:
+    """Moon and Spencer's law, up to the clouds."""
+    image = ENVIRONMENTS["overcast"].build(2) @ LUMINANCE.astype(np.float32)
+    zenith, horizon = image[:8].mean(), image[58:63].mean()
+
+    assert 2.0 < zenith / horizon < 4.5
+
+
+def test_a_clear_sky_is_blue_and_a_sunset_is_warm_at_its_brightest() -> None:
+    """Colour where it matters."""
+    blue = ENVIRONMENTS["clear_sky"].build(0)[:40].mean(axis=(0, 1))
+    sunset = ENVIRONMENTS["sunset"].build(0)
+    glow = sunset.reshape(-1, 3)[sunset.sum(axis=2).argmax()]
+
+    assert blue[2] > 1.3 * blue[0]
+    assert glow[0] > 1.5 * glow[2]
+
+
+def test_studio_light_comes_from_a_few_small_places() -> None:
+    """Soft boxes: a tenth of the directions gives most of the light."""
+    image = ENVIRONMENTS["studio"].build(0) @ LUMINANCE.astype(np.float32)
+    weight = np.sin(np.pi * (np.arange(len(image)) + 0.5) / len(image))[:, None]
+    power = np.sort((image * weight).ravel())[::-1]
+
+    assert power[: power.size // 10].sum() > 0.4 * power.sum()
+
+
+def test_normalising_a_uniform_image_gives_ones() -> None:
+    """The scale of the input does not matter."""
+    assert np.allclose(normalised(np.full((16, 32, 3), 7.0)), 1.0, atol=1e-6)

@@ -1,0 +1,185 @@
+"""Furniture: sizes asked for are sizes got, and things can be put on and in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from generator.assets.procedural import FAMILIES, Solid
+from generator.assets.procedural.furniture import (
+    SLOTS,
+    bin_interior_m,
+    shelf_clearance_m,
+    shelf_levels_m,
+)
+from generator.core.errors import AssetError
+
+FURNITURE = sorted(name for name, family in FAMILIES.items() if not family.variants)
+SIZED = ("table", "shelf", "bin", "box", "pedestal", "gantry")
+
+
+@pytest.mark.parametrize("name", FURNITURE)
+def test_defaults_build_finite_meshes_with_the_documented_slots(name: str) -> None:
+    """Every parametric family stands for itself, with one material per named slot."""
+    mesh = FAMILIES[name].build(**FAMILIES[name].parameters).mesh
+
+    assert np.isfinite(mesh.vertices_m).all()
+    assert np.isfinite(mesh.normals).all()
+    assert len(mesh.materials) == len(SLOTS[name])
+    assert set(np.unique(mesh.face_slots)) == set(range(len(SLOTS[name])))
+
+
+@pytest.mark.parametrize("name", SIZED)
+@pytest.mark.parametrize("size_m", [(1.6, 0.7, 0.9), (0.5, 0.4, 0.7)])
+def test_the_bounding_box_is_the_size_asked_for(
+    name: str, size_m: tuple[float, float, float]
+) -> None:
+    """Centred on its footprint, standing on z = 0; collision agrees."""
+    solid = FAMILIES[name].build(size_m=size_m)
+    low, high = solid.mesh.bounds_m()
+    points = np.concatenate(solid.collision.parts_m)
+
+    assert np.allclose(low, (-size_m[0] / 2, -size_m[1] / 2, 0.0), atol=2e-6)
+    assert np.allclose(high, (size_m[0] / 2, size_m[1] / 2, size_m[2]), atol=2e-6)
+    assert np.abs(points.min(axis=0) - low).max() < 0.003
+    assert np.abs(points.max(axis=0) - high).max() < 0.003
+
+
+@pytest.mark.parametrize("style", ["legs", "trestle", "bench"])
+def test_every_table_style_has_a_flat_top_and_legs_to_the_floor(style: str) -> None:
+    """A ball dropped above the top meets it at its height; the legs reach z = 0."""
+    solid = FAMILIES["table"].build(size_m=(1.2, 0.8, 0.74), style=style)
+
+    assert _highest_at(solid, 0.0, 0.0) == pytest.approx(0.74)
+    assert _highest_at(solid, 0.5, 0.3) == pytest.approx(0.74)
+    assert solid.mesh.bounds_m()[0][2] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("style", ["bookcase", "rack"])
+def test_shelf_levels_are_where_its_boards_are(style: str) -> None:
+    """Each level carries, and the clearance above it is free and no more than free."""
+    size_m, levels = (0.9, 0.32, 1.6), 4
+    solid = FAMILIES["shelf"].build(size_m=size_m, levels=levels, style=style)
+    free = shelf_clearance_m(size_m, levels)
+
+    for z in shelf_levels_m(size_m, levels):
+        assert _inside_any(solid, (0.0, 0.0, z - 0.001))
+        assert not _inside_any(solid, (0.0, 0.0, z + 0.001))
+        assert not _inside_any(solid, (0.0, 0.0, z + free - 0.001))
+        assert _inside_any(solid, (0.0, 0.0, z + free + 0.001))
+
+
+def test_a_shelf_without_room_for_its_levels_says_how_many_fit() -> None:
+    """The message names the field and the remedy."""
+    with pytest.raises(AssetError, match=r"levels=40 .* between 1 and 15"):
+        shelf_levels_m((0.9, 0.3, 1.0), 40)
+
+
+def test_things_fall_into_a_bin_and_stay_in_it() -> None:
+    """Inside is free down to the floor; the floor and four walls are solid."""
+    size_m = (0.6, 0.4, 0.22)
+    solid = FAMILIES["bin"].build(size_m=size_m)
+    length, width, floor = bin_interior_m(size_m)
+
+    for x, y in (
+        (0.0, 0.0),
+        (0.49 * length, 0.0),
+        (0.0, 0.49 * width),
+        (-0.49 * length, -0.49 * width),
+    ):
+        assert not _inside_any(solid, (x, y, floor + 0.002))
+        assert not _inside_any(solid, (x, y, 0.3))
+        assert _inside_any(solid, (x, y, floor - 0.002))
+    for x, y in ((0.51 * length, 0.0), (0.0, -0.51 * width)):
+        assert _inside_any(solid, (x, y, 0.1))
+
+
+def test_a_bin_is_seen_from_inside_too() -> None:
+    """The mesh's inner wall is where collision's is."""
+    mesh = FAMILIES["bin"].build(size_m=(0.6, 0.4, 0.22)).mesh
+    inner = mesh.vertices_m[(mesh.normals[:, 2] > 0.9) & (mesh.vertices_m[:, 2] < 0.03)]
+
+    assert inner[:, 2].min() == pytest.approx(0.008, abs=0.003)
+
+
+def test_a_room_faces_inward_and_its_walls_are_solid_outside() -> None:
+    """A ray from the middle meets every big face from its front; outside is collision."""
+    solid = FAMILIES["room"].build(size_m=(5.0, 4.0, 2.8))
+    mesh = solid.mesh
+    corners = mesh.vertices_m[mesh.faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    to_middle = np.array([0.0, 0.0, 1.4]) - corners.mean(axis=1)
+    shell = mesh.face_slots <= 1
+
+    assert ((cross * to_middle).sum(axis=1)[shell] > 0).all()
+    assert not _inside_any(solid, (0.0, 0.0, 1.4))
+    for outside in (
+        (2.6, 0.0, 1.0),
+        (-2.6, 0.0, 1.0),
+        (0.0, 2.1, 1.0),
+        (0.0, 0.0, -0.1),
+        (0.0, 0.0, 2.9),
+    ):
+        assert _inside_any(solid, outside)
+
+
+def test_a_small_room_has_neither_door_nor_window() -> None:
+    """What does not fit is left out; the walls are then whole."""
+    whole = FAMILIES["room"].build(size_m=(5.0, 4.0, 2.8), door=0, window=0).mesh
+    small = FAMILIES["room"].build(size_m=(1.5, 1.5, 2.0)).mesh
+
+    assert set(np.unique(whole.face_slots)) == set(np.unique(small.face_slots)) == {0, 1, 2, 3}
+
+
+def test_a_backdrop_carries_things_on_its_floor_and_curves_up() -> None:
+    """Solid below its floor, free above, solid behind the wall."""
+    solid = FAMILIES["backdrop"].build(size_m=(3.0, 3.0, 2.2))
+
+    assert _inside_any(solid, (0.0, 0.0, -0.01))
+    assert not _inside_any(solid, (0.0, 0.0, 0.01))
+    assert _inside_any(solid, (0.0, 1.6, 1.0))
+    assert (solid.mesh.normals[:, 2] >= -1e-6).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "message"),
+    [
+        ("table", {"size_m": (1.2, 0.8, 0.0)}, r"table: size_m=1\.2,0\.8,0\.0 .* between 0\.2"),
+        ("table", {"style": "legz"}, r"style=legz .*did you mean 'legs'"),
+        ("box", {"color": "bleu"}, r"color=bleu .*did you mean 'blue'"),
+        ("bin", {"size_m": (500.0, 0.4, 0.2)}, r"bin: size_m"),
+    ],
+)
+def test_unusable_parameters_are_refused_with_a_remedy(
+    name: str, parameters: dict[str, object], message: str
+) -> None:
+    """One clear message: place, fact, what is expected."""
+    with pytest.raises(AssetError, match=message):
+        FAMILIES[name].build(**parameters)
+
+
+def test_wood_grain_runs_along_every_leg() -> None:
+    """On the side of an upright leg the image's horizontal is the world's vertical."""
+    mesh = FAMILIES["table"].build(size_m=(1.2, 0.8, 0.74)).mesh
+    corners = mesh.vertices_m[mesh.faces].astype(np.float64)
+    tall = np.ptp(corners[:, :, 2], axis=1) > 0.5
+    flat = np.ptp(corners, axis=1).min(axis=1) < 1e-6
+    uv = mesh.uvs[mesh.faces].astype(np.float64)[tall & flat]
+
+    assert len(uv)
+    assert (np.ptp(uv[:, :, 0], axis=1) > np.ptp(uv[:, :, 1], axis=1)).all()
+
+
+def _inside_any(solid: Solid, point: tuple[float, float, float]) -> bool:
+    for part in solid.collision.parts_m:
+        planes = ConvexHull(part).equations
+        if (planes[:, :3] @ np.array(point) + planes[:, 3] <= 1e-9).all():
+            return True
+    return False
+
+
+def _highest_at(solid: Solid, x: float, y: float) -> float:
+    """Top of the collision above a place, on a grid of 1 mm."""
+    heights = np.arange(2.0, -0.001, -0.001)
+    return next(float(z) for z in heights if _inside_any(solid, (x, y, float(z) - 5e-4)))

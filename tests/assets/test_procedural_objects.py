@@ -1,0 +1,265 @@
+"""Every family of procedural objects, over several seeds."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from generator.assets.procedural import FAMILIES, TEXTURES, Solid
+from generator.core.geometry import MeshData
+
+SEEDS = (0, 1, 7, 11)
+OBJECTS = sorted(name for name, family in FAMILIES.items() if family.variants)
+
+# Longest side of real ones [m]: catalogues of tableware, ISO 4014/4032/7089, fruit grading rules.
+LONGEST_SIDE_M = {
+    "apple": (0.05, 0.1), "ball": (0.03, 0.25), "banana": (0.14, 0.24), "book": (0.15, 0.32),
+    "bottle": (0.15, 0.34), "bowl": (0.1, 0.28), "bracket": (0.03, 0.1), "can": (0.06, 0.18),
+    "candle": (0.05, 0.2), "carton": (0.1, 0.32), "connector": (0.02, 0.08), "cup": (0.07, 0.15),
+    "flange": (0.05, 0.12), "fork": (0.15, 0.23), "gear": (0.02, 0.1), "hammer": (0.25, 0.36),
+    "hex_bolt": (0.015, 0.13), "jar": (0.08, 0.16), "knife": (0.18, 0.26), "lemon": (0.06, 0.11),
+    "milk_carton": (0.1, 0.26), "mug": (0.09, 0.14), "nut": (0.012, 0.04), "orange": (0.06, 0.1),
+    "pear": (0.08, 0.13), "pipe_elbow": (0.03, 0.09), "plate": (0.15, 0.32),
+    "screwdriver": (0.14, 0.28), "spoon": (0.11, 0.23), "stepped_shaft": (0.04, 0.2), "toy_block": (0.03, 0.1),
+    "vase": (0.13, 0.3), "washer": (0.014, 0.04), "wrench": (0.1, 0.26),
+}  # fmt: skip
+
+# What is open by design: a gable that sits on its box, pipe ends covered by collars.
+OPEN_EDGES = {"milk_carton": 0.02, "pipe_elbow": 0.02, "flange": 0.005}
+
+
+@pytest.fixture(
+    params=[(name, seed) for name in OBJECTS for seed in SEEDS], ids=str, scope="module"
+)
+def built(request: pytest.FixtureRequest) -> tuple[str, Solid]:
+    """One variant of one family."""
+    name, seed = request.param
+    return name, FAMILIES[name].build(seed=seed)
+
+
+def test_every_object_family_has_a_stated_real_size() -> None:
+    """A new family must say how big the real thing is."""
+    assert set(LONGEST_SIDE_M) == set(OBJECTS)
+
+
+def test_objects_have_the_size_of_real_ones(built: tuple[str, Solid]) -> None:
+    """The longest side lies in the range that is measured on real things."""
+    name, solid = built
+    low, high = solid.mesh.bounds_m()
+    longest = max(b - a for a, b in zip(low, high, strict=True))
+
+    assert LONGEST_SIDE_M[name][0] <= longest <= LONGEST_SIDE_M[name][1]
+
+
+def test_the_origin_is_the_centre_of_the_bounding_box(built: tuple[str, Solid]) -> None:
+    """Objects are placed by the centre of their box."""
+    low, high = built[1].mesh.bounds_m()
+
+    assert np.allclose(np.add(low, high), 0.0, atol=3e-6)
+
+
+def test_arrays_are_finite_typed_and_within_the_budget(built: tuple[str, Solid]) -> None:
+    """Shapes and types are the contract's; a mesh has at most 2700 triangles."""
+    mesh = built[1].mesh
+    n, m = len(mesh.vertices_m), len(mesh.faces)
+
+    for array, shape, dtype in (
+        (mesh.vertices_m, (n, 3), np.float32),
+        (mesh.normals, (n, 3), np.float32),
+        (mesh.uvs, (n, 2), np.float32),
+        (mesh.faces, (m, 3), np.int32),
+        (mesh.face_slots, (m,), np.int32),
+    ):
+        assert array.shape == shape
+        assert array.dtype == dtype
+        assert np.isfinite(array).all()
+    assert 60 <= m <= 2700
+    assert set(np.unique(mesh.face_slots)) <= set(range(len(mesh.materials)))
+    assert mesh.faces.min() == 0
+    assert mesh.faces.max() == n - 1
+
+
+def test_texture_coordinates_stay_in_the_image(built: tuple[str, Solid]) -> None:
+    """Labels are never cut off by wrapping around."""
+    uvs = built[1].mesh.uvs
+
+    assert uvs.min() >= 0.0
+    assert uvs.max() <= 1.0
+
+
+def test_surfaces_are_closed(built: tuple[str, Solid]) -> None:
+    """Every edge is walked as often in one direction as in the other."""
+    name, solid = built
+
+    assert _unmatched_edges(solid.mesh) <= OPEN_EDGES.get(name, 0.0)
+
+
+def test_faces_are_wound_outward(built: tuple[str, Solid]) -> None:
+    """The divergence theorem gives a positive volume, smaller than the box."""
+    mesh = built[1].mesh
+    low, high = mesh.bounds_m()
+
+    assert 0.0 < _volume_m3(mesh) < np.prod(np.subtract(high, low))
+
+
+def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
+    """Every face has an area, so that it has a normal."""
+    corners = built[1].mesh.vertices_m[built[1].mesh.faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    assert np.sqrt((cross**2).sum(axis=1)).min() > 1e-13
+
+
+def test_normals_are_unit_and_on_the_side_of_their_faces(built: tuple[str, Solid]) -> None:
+    """Smoothing never turns a normal away from a face it belongs to."""
+    mesh = built[1].mesh
+    corners = mesh.vertices_m[mesh.faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face = cross / np.sqrt((cross**2).sum(axis=1, keepdims=True))
+
+    assert np.allclose((mesh.normals.astype(np.float64) ** 2).sum(axis=1), 1.0, atol=1e-4)
+    assert (face[:, None, :] * mesh.normals[mesh.faces]).sum(axis=2).min() > 0.5
+
+
+def test_collision_is_few_small_convex_parts(built: tuple[str, Solid]) -> None:
+    """At most 24 parts of at most 48 vertices; all of them are vertices of their hull."""
+    parts = built[1].collision.parts_m
+
+    assert 1 <= len(parts) <= 24
+    for part in parts:
+        assert part.dtype == np.float64
+        assert 4 <= len(part) <= 48
+        hull = ConvexHull(part)
+        depth = (part @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
+        assert depth.min() > -2e-4
+
+
+def test_collision_has_the_bounds_of_what_is_seen(built: tuple[str, Solid]) -> None:
+    """Things rest where they seem to rest."""
+    mesh = built[1].mesh
+    points = np.concatenate(built[1].collision.parts_m)
+    low, high = mesh.bounds_m()
+
+    assert np.abs(points.min(axis=0) - low).max() < 0.003
+    assert np.abs(points.max(axis=0) - high).max() < 0.003
+
+
+def test_most_of_what_is_seen_lies_near_the_collision(built: tuple[str, Solid]) -> None:
+    """Nine in ten vertices are inside a part or within 4 mm of one."""
+    vertices = built[1].mesh.vertices_m.astype(np.float64)
+    outside = np.min([_outside_m(part, vertices) for part in built[1].collision.parts_m], axis=0)
+
+    assert np.quantile(outside, 0.9) < 0.004
+
+
+@pytest.mark.parametrize("name", ["mug", "cup", "bowl"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_vessels_are_hollow_in_physics(name: str, seed: int) -> None:
+    """A marble fits on the axis, from just above the floor to the rim."""
+    solid = FAMILIES[name].build(seed=seed)
+    low, high = solid.mesh.bounds_m()
+    heights = np.linspace(low[2] + 0.02, high[2], 8)
+    # The handle shifts the box's centre from the axis: find the axis from the rim.
+    rim = solid.mesh.vertices_m[solid.mesh.vertices_m[:, 2] > high[2] - 0.001]
+    axis = 0.5 * (rim.min(axis=0) + rim.max(axis=0)).astype(np.float64)
+    marble = np.array([(axis[0] + 0.008 * dx, axis[1], z) for z in heights for dx in (-1, 0, 1)])
+
+    for part in solid.collision.parts_m:
+        assert (_outside_m(part, marble) > 0.001).all()
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_equal_seeds_make_equal_bytes_and_others_differ(name: str) -> None:
+    """A variant is a pure function of its seed."""
+    family = FAMILIES[name]
+
+    assert _digest(family.build(seed=3)) == _digest(family.build(seed=3))
+    assert len({_digest(family.build(seed=k)) for k in range(4)}) == 4
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_materials_are_physical_and_their_textures_exist(name: str) -> None:
+    """Values are in range; a texture id names a family of the table; labels are printed."""
+    for seed in SEEDS:
+        for material in FAMILIES[name].build(seed=seed).mesh.materials:
+            assert all(0.0 <= channel <= 1.0 for channel in material.base_color)
+            assert 0.04 <= material.roughness <= 1.0
+            assert material.metallic in (0.0, 0.35, 1.0)
+            if material.texture:
+                prefix, _, rest = material.texture.partition("/")
+                assert prefix == "texture"
+                assert rest.partition("?")[0] in TEXTURES
+                assert material.printed
+
+
+@pytest.mark.parametrize("name", ["bottle", "can", "carton", "milk_carton", "jar", "book"])
+def test_printed_things_carry_a_label(name: str) -> None:
+    """The tag ``printed`` is kept: one slot of the mesh shows a printed texture."""
+    assert "printed" in FAMILIES[name].tags
+    mesh = FAMILIES[name].build(seed=2).mesh
+    printed = [slot for slot, material in enumerate(mesh.materials) if material.printed]
+
+    assert printed
+    assert np.isin(mesh.face_slots, printed).any()
+
+
+def test_labels_are_upright_and_not_mirrored() -> None:
+    """Seen from outside, u grows to the right and v upward on a can, a box's front and a cover."""
+    for name, front in (("can", (1.0, 0.0, 0.0)), ("carton", (1.0, 0.0, 0.0))):
+        mesh = FAMILIES[name].build(seed=0).mesh
+        du, dv = _texture_axes(mesh, np.array(front))
+        assert np.allclose(du, (0.0, 1.0, 0.0), atol=0.15)
+        assert np.allclose(dv, (0.0, 0.0, 1.0), atol=0.15)
+    du, dv = _texture_axes(FAMILIES["book"].build(seed=0).mesh, np.array((0.0, 0.0, 1.0)))
+    assert np.allclose(du, (0.0, 1.0, 0.0), atol=0.15)
+    assert np.allclose(dv, (-1.0, 0.0, 0.0), atol=0.15)
+
+
+def _texture_axes(mesh: MeshData, towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions in which u and v grow on the printed face that faces ``towards`` most."""
+    corners = mesh.vertices_m[mesh.faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    score = cross @ towards * (mesh.face_slots == 0)
+    face = int(score.argmax())
+    uv = mesh.uvs[mesh.faces[face]].astype(np.float64)
+    edges = corners[face, 1:] - corners[face, 0]
+    jacobian = np.linalg.solve(uv[1:] - uv[0], edges)
+    return jacobian[0] / np.linalg.norm(jacobian[0]), jacobian[1] / np.linalg.norm(jacobian[1])
+
+
+def _unmatched_edges(mesh: MeshData) -> float:
+    """Share of directed edges without a partner in the other direction."""
+    cells = np.round(mesh.vertices_m.astype(np.float64) * 1e6).astype(np.int64)
+    _, welded = np.unique(cells, axis=0, return_inverse=True)
+    faces = welded.reshape(-1)[mesh.faces]
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    n = int(faces.max()) + 1
+    there, back = edges[:, 0] * n + edges[:, 1], edges[:, 1] * n + edges[:, 0]
+    keys = np.unique(np.concatenate([there, back]))
+    counts = [np.bincount(np.searchsorted(keys, e), minlength=len(keys)) for e in (there, back)]
+    return float(np.maximum(counts[0] - counts[1], 0).sum() / len(edges))
+
+
+def _volume_m3(mesh: MeshData) -> float:
+    corners = mesh.vertices_m[mesh.faces].astype(np.float64)
+    return float((corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0)
+
+
+def _outside_m(part: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """How far each point is outside the part's planes; negative inside."""
+    hull = ConvexHull(part)
+    return np.asarray((points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1))
+
+
+def _digest(solid: Solid) -> str:
+    digest = hashlib.sha256()
+    mesh = solid.mesh
+    for array in (mesh.vertices_m, mesh.faces, mesh.normals, mesh.uvs, mesh.face_slots):
+        digest.update(array.tobytes())
+    for part in solid.collision.parts_m:
+        digest.update(part.tobytes())
+    digest.update(repr(mesh.materials).encode())
+    return digest.hexdigest()

@@ -1,0 +1,130 @@
+"""Every texture family: it tiles, repeats exactly, and its variants differ."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from generator.assets.procedural import TEXTURES
+from generator.assets.procedural.cans import can_size
+from generator.assets.procedural.noise import fbm, perlin, worley
+from generator.core.geometry import TextureData
+from generator.core.streams import Streams
+
+PRINTED = {"label", "can_label", "carton", "milk_label", "book_cover"}
+FOOD = {"apple_skin", "citrus_peel", "banana_peel", "pear_skin", "ball_cover"}
+TILING = sorted(set(TEXTURES) - PRINTED - FOOD)
+
+
+@pytest.fixture(params=sorted(TEXTURES), scope="module")
+def made(request: pytest.FixtureRequest) -> tuple[str, TextureData]:
+    """The first variant of a family."""
+    return request.param, TEXTURES[request.param].build(0)
+
+
+def test_images_are_8_bit_and_of_one_size(made: tuple[str, TextureData]) -> None:
+    """Albedo, roughness and normals have the shapes of the contract."""
+    texture = made[1]
+    height, width, _ = texture.albedo.shape
+
+    assert texture.albedo.dtype == np.uint8
+    assert (height, width) in ((512, 512), (256, 512))
+    assert texture.roughness is None or texture.roughness.shape == (height, width)
+    assert texture.normal is None or texture.normal.shape == (height, width, 3)
+
+
+def test_images_show_something(made: tuple[str, TextureData]) -> None:
+    """No image is a single colour, nor white or black all over."""
+    albedo = made[1].albedo.astype(np.float64)
+
+    assert albedo.std(axis=(0, 1)).max() > 0.8
+    assert 8 < albedo.mean() < 250
+
+
+def test_normals_point_out_of_the_surface(made: tuple[str, TextureData]) -> None:
+    """Unit vectors within 8 bits, blue side up, level on average."""
+    if made[1].normal is None:
+        pytest.skip("has no normal map")
+    normal = made[1].normal.astype(np.float64) / 127.5 - 1.0
+
+    assert np.allclose((normal**2).sum(axis=2), 1.0, atol=0.03)
+    assert normal[..., 2].min() > 0.05
+    assert np.abs(normal[..., :2].mean(axis=(0, 1))).max() < 0.03
+
+
+@pytest.mark.parametrize("name", TILING)
+@pytest.mark.parametrize("seed", [0, 3])
+def test_surfaces_tile_without_a_seam(name: str, seed: int) -> None:
+    """The step across the image's border is hardly larger than the largest steps inside."""
+    texture = TEXTURES[name].build(seed)
+    images = [texture.albedo, texture.normal if texture.normal is not None else texture.albedo]
+    for image in images:
+        for axis in (0, 1):
+            values = np.moveaxis(image.astype(np.float64), axis, 0)
+            steps = np.abs(values - np.roll(values, 1, axis=0)).mean(axis=(1, 2))
+            assert steps[0] <= max(2.0 * np.quantile(steps[1:], 0.9), 1.1 * steps[1:].max())
+
+
+@pytest.mark.parametrize("name", sorted(TEXTURES))
+def test_equal_seeds_make_equal_images_and_others_differ(name: str) -> None:
+    """A texture is a pure function of its seed."""
+    build = TEXTURES[name].build
+
+    assert build(2).albedo.tobytes() == build(2).albedo.tobytes()
+    assert len({build(k).albedo.tobytes() for k in range(4)}) == 4
+
+
+@pytest.mark.parametrize("name", sorted(PRINTED))
+def test_labels_are_rich_in_edges_and_colours(name: str) -> None:
+    """What makes a label for a detector: letters, bars, and at least three colours."""
+    for seed in range(3):
+        albedo = TEXTURES[name].build(seed).albedo.astype(np.int64)
+        colors, counts = np.unique(albedo.reshape(-1, 3) // 24, axis=0, return_counts=True)
+        steps = np.abs(np.diff(albedo.sum(axis=2), axis=1)) > 90
+
+        assert (counts > 0.01 * albedo.shape[0] * albedo.shape[1]).sum() >= 3
+        assert len(colors) > 10
+        assert steps.mean() > 0.01
+
+
+def test_brand_of_a_can_is_on_its_upper_front() -> None:
+    """Letters are in the upper middle of the image: v up, the front at u = 1/2."""
+    for seed in range(3):
+        albedo = TEXTURES["can_label"].build(seed).albedo.astype(np.int64).sum(axis=2)
+        strokes = np.abs(np.diff(albedo, axis=1)) > 90
+        brand, margin = strokes[40:120, 180:340], strokes[40:120, 128:140]
+        assert brand.mean() > 2 * margin.mean()
+        assert can_size(seed).radius_m < 0.05
+
+
+def test_perlin_noise_is_zero_at_lattice_points_and_bounded() -> None:
+    """Gradient noise vanishes where gradients sit; its range is about [-1, 1]."""
+    noise = perlin((4, 8), Streams(seed=1, scene=0).rng("test"), 512)
+    near_lattice = noise[::128, ::64]
+
+    assert np.abs(near_lattice).max() < 0.05
+    assert 0.4 < np.abs(noise).max() < 1.3
+
+
+def test_noise_repeats_at_the_border() -> None:
+    """One more row would be the first row: the step across the seam is an ordinary step."""
+    rng = Streams(seed=2, scene=0).rng("test")
+    for noise in (fbm((3, 5), 4, rng), worley((7, 4), rng).nearest):
+        for axis in (0, 1):
+            steps = np.abs(noise - np.roll(noise, 1, axis=axis)).mean(axis=1 - axis)
+            assert steps[0] < 1.5 * steps[1:].max()
+
+
+def test_worley_distances_agree_with_brute_force() -> None:
+    """Nearest and second nearest over all points and their periodic copies."""
+    seed = Streams(seed=3, scene=0)
+    points = worley((5, 6), seed.rng("w"), size_px=64)
+    place = 0.5 + (seed.rng("w").random((2, 5, 6)) - 0.5)
+    y = (np.arange(5)[:, None] + place[0]).ravel()
+    x = (np.arange(6)[None, :] + place[1]).ravel()
+    copies = [(y + 5 * i, x + 6 * j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    all_y, all_x = (np.concatenate([c[k] for c in copies]) for k in (0, 1))
+    row, column = (np.arange(64) + 0.5) * 5 / 64, (np.arange(64) + 0.5) * 6 / 64
+    away = np.sqrt((row[:, None, None] - all_y) ** 2 + (column[None, :, None] - all_x) ** 2)
+
+    assert np.allclose(points.nearest, np.sort(away, axis=2)[..., 0], atol=1e-4)
