@@ -16,7 +16,7 @@ from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
 
-_STRIDE_PX = 2
+_STRIDE_PX = 3
 _TILE = int(occlusion.TILE)
 _LIST_LENGTH = int(occlusion.LIST_LENGTH)
 
@@ -112,7 +112,7 @@ def _lit(
     wp.launch(occlusion.refine_lamps, n, [*inputs, classes, probed], [lit], device=device)
     classes = _classes(lattice, lit, lamps, stock)
     wp.launch(
-        occlusion.smooth_lattice, n, [view, lattice, classes, lit, 0], [probed], device=device
+        occlusion.smooth_lattice, n, [view, lattice, classes, lit], [probed], device=device
     )
     return probed
 
@@ -132,11 +132,11 @@ def _open_sky(
     if radius_m == 0.0:
         open_sky.fill_(1.0)
         return open_sky
-    hemisphere = wp.array(cosine_hemisphere(8), dtype=wp.vec3, device=stock.device)
+    hemisphere = wp.array(cosine_hemisphere(16), dtype=wp.vec3, device=stock.device)
     inputs = [world.record, lattice, columns, lists, hemisphere, radius_m]
     wp.launch(occlusion.probe_ambient, n, inputs, [probed], device=stock.device)
     classes = _classes(lattice, probed, 1, stock)
-    inputs = [view, lattice, classes, probed, 1]
+    inputs = [view, lattice, classes, probed]
     wp.launch(occlusion.smooth_lattice, n, inputs, [open_sky], device=stock.device)
     return open_sky
 

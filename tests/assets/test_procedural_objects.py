@@ -23,8 +23,8 @@ LONGEST_SIDE_M = {
     "hex_bolt": (0.015, 0.13), "jar": (0.08, 0.16), "knife": (0.18, 0.26), "lemon": (0.06, 0.11),
     "milk_carton": (0.1, 0.26), "mug": (0.09, 0.14), "nut": (0.012, 0.04), "orange": (0.06, 0.1),
     "pear": (0.08, 0.13), "pipe_elbow": (0.03, 0.09), "plate": (0.15, 0.32),
-    "screwdriver": (0.14, 0.28), "spoon": (0.11, 0.23), "stepped_shaft": (0.04, 0.2), "toy_block": (0.03, 0.1),
-    "vase": (0.13, 0.3), "washer": (0.014, 0.04), "wrench": (0.1, 0.26),
+    "screwdriver": (0.14, 0.28), "spoon": (0.11, 0.23), "stepped_shaft": (0.04, 0.2),
+    "toy_block": (0.03, 0.1), "vase": (0.13, 0.3), "washer": (0.014, 0.04), "wrench": (0.1, 0.26),
 }  # fmt: skip
 
 # What is open by design: a gable that sits on its box, pipe ends covered by collars.
@@ -148,11 +148,12 @@ def test_collision_has_the_bounds_of_what_is_seen(built: tuple[str, Solid]) -> N
 
 
 def test_most_of_what_is_seen_lies_near_the_collision(built: tuple[str, Solid]) -> None:
-    """Nine in ten vertices are inside a part or within 4 mm of one."""
+    """Half of the vertices within 2.5 mm of a part, nine in ten within 3.5 mm."""
     vertices = built[1].mesh.vertices_m.astype(np.float64)
     outside = np.min([_outside_m(part, vertices) for part in built[1].collision.parts_m], axis=0)
 
-    assert np.quantile(outside, 0.9) < 0.004
+    assert np.quantile(outside, 0.5) < 0.0025
+    assert np.quantile(outside, 0.9) < 0.0035
 
 
 @pytest.mark.parametrize("name", ["mug", "cup", "bowl"])

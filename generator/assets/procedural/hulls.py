@@ -6,7 +6,7 @@ Every function returns float64 [n, 3] arrays of hull vertices [m], at most 48 pe
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from itertools import pairwise
 
 import numpy as np
@@ -45,22 +45,35 @@ def ring(
 
     The inner faces are flat: they lie half outside and half inside the true inner surface.
     """
+    factor = 2.0 / (1.0 + math.cos(math.pi / count))
+    profile = [
+        point
+        for inner, outer, z in (low, high)
+        for point in ((min(inner * factor, outer), z), (outer, z))
+    ]
+    return wedges(profile, count, {outer for _, outer, _ in (low, high)})
+
+
+def wedges(
+    profile: Sequence[tuple[float, float]], count: int, round_at: Set[float] = frozenset()
+) -> list[Array]:
+    """A convex cross-section of (radius, z) turned about Z, cut into ``count`` wedges.
+
+    Points whose radius is in ``round_at``, or the largest, have a third vertex between the two
+    cuts, so that the outside is rounder.
+    """
     half = math.pi / count
-    inner_factor = 2.0 / (1.0 + math.cos(half))
-    wedges = []
+    rounded = {max(radius for radius, _ in profile), *round_at}
+    made = []
     for i in range(count):
         middle = 2.0 * math.pi * i / count
         points = [
             (radius * math.cos(middle + turn), radius * math.sin(middle + turn), z)
-            for inner, outer, z in (low, high)
-            for radius, turns in (
-                (min(inner * inner_factor, outer), (-half, half)),
-                (outer, (-half, 0.0, half)),
-            )
-            for turn in turns
+            for radius, z in profile
+            for turn in ((-half, 0.0, half) if radius in rounded else (-half, half))
         ]
-        wedges.append(np.array(points))
-    return wedges
+        made.append(np.array(points))
+    return made
 
 
 def extreme(points: Array, count: int = 48, turn_rad: float = 0.0) -> Array:

@@ -86,15 +86,13 @@ def bowl(seed: int) -> Solid:
     ]
     outside = ceramic(rng)
     inside = outside if chance(0.5, rng) else ceramic(rng, ("#f4f1ea", "#e9e4d8", "#d9dfe2"))
-    k = len(outer) // 2
-    floor = float(inner[0, 1])
-    levels = [
-        (float(inner[i, 0]), float(outer[i, 0]), z)
-        for i, z in ((0, floor - 0.5 * wall), (k, float(outer[k, 1])), (-1, height + 0.5 * wall))
-    ]
+    # The floor lies about as high as the wall's outside after a fifth of its curve.
+    levels = []
+    for i, z in ((2, float(outer[2, 1])), (5, float(outer[5, 1])), (9, height + 0.5 * wall)):
+        levels.append((float(np.interp(z, inner[:, 1], inner[:, 0])), float(outer[i, 0]), z))
     parts = [
-        hulls.frustum((foot, 0.0), (max(foot, levels[0][0]), floor)),
-        *hulls.ring(levels[0], levels[1], 8),
+        hulls.frustum((foot, 0.0), (levels[0][1], levels[0][2])),
+        *hulls.ring(levels[0], levels[1], 9),
         *hulls.ring(levels[1], levels[2], 14),
     ]
     return centred(_two_sided(profile, 40), (outside, inside), parts)
@@ -138,9 +136,14 @@ def plate(seed: int) -> Solid:
         if chance(0.7, rng)
         else Material(jittered(linear(pick(GLAZES, rng)), 0.08, rng), outside.roughness)
     )
-    walls = hulls.ring(
-        (well - 0.004, well + 0.006, 0.001), (radius - 0.003, radius + 0.4 * wall, rise), 20
-    )
+    rim = [
+        (well - 0.004, 0.0015),
+        (well - 0.004, 0.002 + wall),
+        (well + 0.35 * (radius - well), step + 0.002),
+        (radius + 0.4 * wall, rise),
+        (radius + 0.4 * wall, rise - 0.8 * wall),
+    ]
+    walls = hulls.wedges(rim, 20)
     base = hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
     return centred(_two_sided(profile, 48), (outside, inside), [base, *walls])
 

@@ -489,21 +489,42 @@ def window_bits(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int,
 
 
 @wp.func
-def window_mean(
-    lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, i: int, tolerance_m: float
+def window_sum(
+    lattice: Lattice,
+    values: wp.array(dtype=float, ndim=2),
+    j: int,
+    i: int,
+    half: int,
+    tolerance_m: float,
 ):
-    """Mean over the 4 x 4 window around a point, on its own surface."""
+    """Sum and number of the values in a window around a point, on its own surface."""
     x = i % lattice.width
     y = i / lattice.width
     total = float(0.0)
     count = float(0.0)
-    for v in range(wp.max(y - 2, 0), wp.min(y + 2, lattice.height)):
-        for u in range(wp.max(x - 2, 0), wp.min(x + 2, lattice.width)):
+    for v in range(wp.max(y - half, 0), wp.min(y + half, lattice.height)):
+        for u in range(wp.max(x - half, 0), wp.min(x + half, lattice.width)):
             k = v * lattice.width + u
             value = values[j, k]
             if value != UNSEEN and same_surface(lattice, i, k, tolerance_m):
                 total += value
                 count += 1.0
+    return total, count
+
+
+@wp.func
+def window_mean(
+    lattice: Lattice,
+    values: wp.array(dtype=float, ndim=2),
+    j: int,
+    i: int,
+    tolerance_m: float,
+):
+    """Mean over the 4 x 4 window around a point, or 8 x 8 where its surface ends nearby."""
+    total, count = window_sum(lattice, values, j, i, 2, tolerance_m)
+    if count < 12.0:
+        # Half a window has seen half of the lamp, or of the sky.
+        total, count = window_sum(lattice, values, j, i, 4, tolerance_m)
     mean = values[j, i]
     if count > 0.0:
         mean = total / count
@@ -557,28 +578,21 @@ def smooth_lattice(
     lattice: Lattice,
     classes: wp.array(dtype=int, ndim=3),
     values: wp.array(dtype=float, ndim=2),
-    fill: int,
     smoothed: wp.array(dtype=float, ndim=2),
 ):
-    """Average the values of neighbours on one surface, wherever they differ.
-
-    Args:
-        fill: 1 to give points without a value the mean of those around, too.
-    """
+    """Average the values of neighbours on one surface, wherever they differ."""
     i = wp.tid()
     x = i % lattice.width
     y = i / lattice.width
     for j in range(values.shape[0]):
         value = values[j, i]
-        if lattice.surface[i] >= 0 and (fill == 1 or value != UNSEEN):
+        if value != UNSEEN:
             found = classes_around(classes, x, y, j)
             if found == 1 or found == 2:
                 value = float(found - 1)
             else:
-                value = window_mean(lattice, values, j, i, surface_tolerance(view, lattice.p_m[i]))
-            if fill == 1:
-                # Alone on its surface: nothing is known, and open is the likelier guess.
-                value = wp.where(value == UNSEEN, 1.0, value)
+                tolerance_m = surface_tolerance(view, lattice.p_m[i])
+                value = window_mean(lattice, values, j, i, tolerance_m)
         smoothed[j, i] = value
 
 
@@ -592,14 +606,14 @@ def probe_ambient(
     radius_m: float,
     open_sky: wp.array(dtype=float, ndim=2),
 ):
-    """One short ray per black field of a chessboard: less than 1 the nearer it meets something.
+    """One short ray per point: 1 where it meets nothing, less the nearer the obstacle.
 
     Args:
-        hemisphere: Eight directions about +Z with cosine-weighted density.
+        hemisphere: Sixteen directions about +Z with cosine-weighted density.
     """
     i = wp.tid()
     value = float(UNSEEN)
-    if lattice.body[i] >= 0 and ((i % lattice.width + i / lattice.width) & 1) == 0:
+    if lattice.body[i] >= 0:
         value = 1.0
         lamps = world.lamps.shape[0]
         tile = tile_index(lattice, i, tile_columns)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from generator.assets.procedural import cans, cartons
@@ -124,6 +124,7 @@ _NOTES = (
 )
 _VOLUMES = ("330 ml", "500 ml", "750 ml", "1 L")
 _WEIGHTS = ("250 g", "375 g", "400 g", "500 g")
+_PRAISE = ("A quiet triumph", "Impossible to put down", "Warm and wise", "The book of the year")
 _TITLES = (
     "THE LONG",
     "A QUIET",
@@ -202,12 +203,13 @@ def book_cover(seed: int) -> TextureData:
     from generator.assets.procedural import books
 
     rng = rng_of("book_cover", seed)
-    design = _design(seed, rng)
+    words = pick(_TITLES, rng), pick(_SUBJECTS, rng)
+    design = replace(_design(seed, rng), product=" ".join(words), note=pick(_PRAISE, rng))
     length, width, thickness = books.book_size_m(seed)
     scale = 560.0 / length
     h = int(length * scale)
     faces = {
-        "front": _front_cover(int(width * scale), h, design, rng),
+        "front": _front_cover(int(width * scale), h, words, design, rng),
         "spine": _spine(max(24, int(thickness * scale)), h, design),
         "back": _back_cover(int(width * scale), h, design, rng),
     }
@@ -255,11 +257,12 @@ def _wrap(width: int, aspect: float, design: _Design, rng: Rng) -> Image:
     """Front in the middle, information half on each end; the ends meet in the plain ground."""
     height = max(48, int(width / aspect))
     canvas = art.canvas(width, height, design.ground)
-    front = _front(width // 2, height, design, rng)
-    canvas.paste(front, (width // 4, 0))
-    info = _info(int(0.2 * width), height, design, rng)
-    canvas.paste(info, (int(0.78 * width), 0))
-    canvas.paste(_side(int(0.2 * width), height, design, rng), (int(0.02 * width), 0))
+    # What is seen at once of a cylinder is less than half of it.
+    front = _front(int(0.42 * width), height, design, rng)
+    canvas.paste(front, (int(0.29 * width), 0))
+    end = int(0.25 * width)
+    canvas.paste(_info(end, height, design, rng), (int(0.74 * width), 0))
+    canvas.paste(_side(end, height, design, rng), (int(0.01 * width), 0))
     _bands(canvas, design)
     return canvas
 
@@ -404,13 +407,13 @@ def _strip(w: int, h: int, design: _Design) -> Image:
     return image
 
 
-def _front_cover(w: int, h: int, design: _Design, rng: Rng) -> Image:
+def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: Rng) -> Image:
     image = art.canvas(w, h, design.ground)
     _ground(image, design, rng)
     _picture(image, (0.12, 0.4, 0.88, 0.82), design, rng)
     art.panel(image, (0.06, 0.07, 0.94, 0.35), design.ground)
-    art.text(image, (0.1, 0.09, 0.9, 0.2), pick(_TITLES, rng), design.ink, 2)
-    art.text(image, (0.1, 0.22, 0.9, 0.34), pick(_SUBJECTS, rng), design.ink, 3)
+    art.text(image, (0.1, 0.09, 0.9, 0.2), words[0], design.ink, 2)
+    art.text(image, (0.1, 0.22, 0.9, 0.34), words[1], design.ink, 3)
     art.panel(image, (0.0, 0.87, 1.0, 0.97), design.second)
     art.text(
         image,
@@ -433,7 +436,7 @@ def _spine(w: int, h: int, design: _Design) -> Image:
 
 def _back_cover(w: int, h: int, design: _Design, rng: Rng) -> Image:
     image = art.canvas(w, h, design.ground)
-    art.text(image, (0.1, 0.08, 0.9, 0.15), f"“{design.note.capitalize()}”", design.ink, 1)
+    art.text(image, (0.1, 0.08, 0.9, 0.15), f"“{design.note}”", design.ink, 1)
     art.lines(image, (0.1, 0.2, 0.9, 0.62), design.ink, design.ground, rng)
     art.barcode(image, (0.52, 0.8, 0.92, 0.94), rng)
     return image
