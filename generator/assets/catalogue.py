@@ -59,6 +59,8 @@ class MeshEntry(Origin):
     tags: tuple[Word, ...] = ()
     count: Annotated[int, Field(ge=1, le=100_000)] = 1
     """More than 1: a series; in ``id`` and ``file``, ``000`` stands for the number, from 0."""
+    except_for: tuple[Annotated[int, Field(ge=0)], ...] = ()
+    """Numbers that a series leaves out."""
     scale: Annotated[float, Field(gt=0.0)] = 1.0
     """Metres per unit of the file."""
     size_m: Annotated[float, Field(gt=0.0)] | None = None
@@ -251,7 +253,8 @@ def _series(entry: Entry) -> Iterator[Entry]:
     if count == 1:
         yield entry
         return
-    for k in range(count):
+    left_out = frozenset(getattr(entry, "except_for", ()))
+    for k in (k for k in range(count) if k not in left_out):
         number = f"{k:03d}"
         yield entry.model_copy(
             update={

@@ -85,8 +85,10 @@ def _shaded(
     wp.launch(shade.light_lattice, points, inputs, [lights], device=device)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", n, wp.int32)
-    inputs = [*frame, lattice, lights]
-    shape = (view.height, view.width)
+    # One thread per row on the CPU, where threads run one after the other anyway.
+    run = view.width if device.is_cpu else 1
+    inputs = [*frame, lattice, lights, run]
+    shape = (view.height, view.width // run)
     wp.launch(shade.gather_light, shape, inputs, [count, pixels, radiance], device=device)
     listed = int(count.numpy()[0])
     lit = stock.scratch("listed lit", (around.lit.shape[0], n), float)

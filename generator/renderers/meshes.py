@@ -21,7 +21,7 @@ class DeviceMesh:
     """One asset's geometry on the device.
 
     Attributes:
-        record: Value of a Geometry record, to be stacked.
+        record: Value of a Geometry record.
         keep: The device arrays and the hierarchy that the record points to.
         low_m, high_m: Bounds in the mesh frame.
     """
@@ -54,7 +54,7 @@ def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
     # The hierarchy holds two 16-byte nodes per triangle, built from 24-byte boxes.
     nbytes = 32 * len(data.vertices_m) + (16 + 64 + 24) * len(data.faces)
     keep = (vertices, normals, uvs, faces, slots, mesh)
-    return DeviceMesh(record, keep, low, high, len(data.vertices_m), data.materials, nbytes)
+    return DeviceMesh(record.numpy_value(), keep, low, high, len(data.vertices_m), data.materials, nbytes)
 
 
 def is_convex_solid(vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -> bool:

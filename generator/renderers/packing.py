@@ -138,7 +138,7 @@ def _world_boxes(
 def _stacked(items: Sequence[Any], kind: Any) -> NDArray[np.void]:
     values = np.zeros(max(len(items), 1), dtype=kind.numpy_dtype())
     for k, item in enumerate(items):
-        values[k] = item.record.numpy_value()
+        values[k] = item.record
     return values
 
 

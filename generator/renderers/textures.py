@@ -18,7 +18,7 @@ class DeviceTexture:
     """One texture on the device.
 
     Attributes:
-        record: A Texture record, to be stacked.
+        record: Value of a Texture record.
         keep: The device arrays that the record points to.
     """
 
@@ -43,7 +43,7 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     record.texels, record.bumps = on_device
     record.offsets = offsets
     record.has_bumps = int(data.normal is not None)
-    return DeviceTexture(record, (*on_device, offsets), texels.nbytes + bumps.nbytes)
+    return DeviceTexture(record.numpy_value(), (*on_device, offsets), texels.nbytes + bumps.nbytes)
 
 
 def mip_levels(image: Array) -> list[Array]:

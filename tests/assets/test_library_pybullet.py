@@ -93,10 +93,11 @@ def test_meshes_are_in_the_normal_form(library: Library, name: str) -> None:
 
 
 def test_a_thousand_random_shapes_are_found_by_tag(library: Library) -> None:
-    """Every folder of random_urdfs that exists is listed, sorted by id."""
+    """Every folder of random_urdfs is listed, sorted by id, but the one whose mesh has NaNs."""
     found = library.find({"random_shape"})
     folders = sorted(p.name for p in (Path(pybullet_data.getDataPath()) / "random_urdfs").iterdir())
-    assert [a.asset_id for a in found] == [f"random_urdfs/{name}" for name in folders]
+    fit = [name for name in folders if name != "168"]
+    assert [a.asset_id for a in found] == [f"random_urdfs/{name}" for name in fit]
     assert {a.category for a in found} == {"random_object"}
     assert len({a.sha256 for a in found}) == len(found)
 

@@ -97,7 +97,7 @@ def centred(
     patch = joined(patches)
     low, high = patch.bounds_m()
     # On the vertex grid, so that the shift does not change which vertices coincide.
-    x, y, z = (round(float(v) / GRID_M) * GRID_M for v in 0.5 * (low + high))
+    x, y, z = (round(float(v) / GRID_M) * GRID_M for v in settled(0.5 * (low + high)))
     moved = patch.moved(-x, -y, -z)
     hulls = tuple(hull - np.array([x, y, z]) for hull in hulls_m)
     return in_place((moved,), materials, hulls, crease_deg)
@@ -111,15 +111,15 @@ def in_place(
 ) -> Solid:
     """A solid in the frame it was made in (furniture: the centre of the footprint on the floor)."""
     mesh = finished(joined(patches), materials, crease_deg)
-    return Solid(mesh, ConvexParts(tuple(np.round(hull, 6) for hull in hulls_m)))
+    return Solid(mesh, ConvexParts(tuple(np.round(settled(hull), 6) + 0.0 for hull in hulls_m)))
 
 
 def finished(patch: Patch, materials: Sequence[Material], crease_deg: float) -> MeshData:
     """The mesh of a patch, with normals smooth across edges that bend less than ``crease_deg``."""
-    cells = np.round(patch.corners_m / GRID_M).astype(np.int64)
+    cells = np.round(settled(patch.corners_m) / GRID_M).astype(np.int64)
     corners, keep = _whole_triangles(cells)
-    cells, uvs, slots = cells[keep], patch.uvs[keep], patch.slots[keep]
-    normals = _corner_normals(cells.reshape(-1, 3), corners, crease_deg)
+    cells, uvs, slots = cells[keep], settled(patch.uvs[keep]), patch.slots[keep]
+    normals = settled(_corner_normals(cells.reshape(-1, 3), corners, crease_deg))
     key = np.concatenate(
         [
             cells.reshape(-1, 3),
@@ -132,11 +132,22 @@ def finished(patch: Patch, materials: Sequence[Material], crease_deg: float) -> 
     return MeshData(
         vertices_m=(cells.reshape(-1, 3)[first] * GRID_M).astype(np.float32),
         faces=inverse.reshape(-1, 3).astype(np.int32),
-        normals=np.round(normals[first], 6).astype(np.float32),
-        uvs=np.round(uvs.reshape(-1, 2)[first], 6).astype(np.float32),
+        # Adding zero turns -0.0 into 0.0: the sign of nothing differs between processors too.
+        normals=(np.round(normals[first], 6) + 0.0).astype(np.float32),
+        uvs=(np.round(uvs.reshape(-1, 2)[first], 6) + 0.0).astype(np.float32),
         face_slots=slots.astype(np.int32),
         materials=tuple(materials),
     )
+
+
+def settled(values: Array) -> Array:
+    """Values without their last bits, which sine, cosine and powers leave to the processor.
+
+    Rounding twice, here and to a coarser grid, gives the same for values that lie exactly between
+    two points of that grid, as a symmetric shape's do.
+    """
+    rounded: Array = np.round(values, 10)
+    return rounded
 
 
 def _whole_triangles(cells: Indices) -> tuple[Array, NDArray[np.bool_]]:

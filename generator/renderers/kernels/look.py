@@ -12,7 +12,7 @@ from generator.renderers.kernels.records import (
     vertex_at,
 )
 from generator.renderers.kernels.surface import mesh_point
-from generator.renderers.kernels.texturing import albedo_at, bump_at
+from generator.renderers.kernels.texturing import texel_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -48,11 +48,11 @@ def mesh_mapped(
     size = float(world.textures[texture].width * world.textures[texture].height)
     texels = wp.abs(area_uv) * size * footprint_m * footprint_m / wp.max(area_m2, 1.0e-12)
     level = 0.5 * wp.log2(wp.max(texels, 1.0e-6))
-    c = albedo_at(world, texture, uv[0], uv[1], level)
-    look.albedo = wp.cw_mul(look.albedo, wp.vec3(c[0], c[1], c[2]))
-    look.roughness *= c[3]
+    texel = texel_at(world, texture, uv[0], uv[1], level)
+    look.albedo = wp.cw_mul(look.albedo, texel.albedo)
+    look.roughness *= texel.roughness
     if world.textures[texture].has_bumps != 0 and area_uv != 0.0:
-        bump = bump_at(world, texture, uv[0], uv[1], level)
+        bump = texel.bump
         tangent = world.bodies[b].R_world_mesh @ ((e1 * d2[1] - e2 * d1[1]) / area_uv)
         bitangent = world.bodies[b].R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) / area_uv)
         n = look.normal
@@ -108,17 +108,18 @@ def box_mapped(
     w = wp.cw_mul(w, w)
     w = wp.cw_mul(w, w)
     w = w * (1.0 / (w[0] + w[1] + w[2]))
-    c = wp.vec4(0.0)
+    albedo = wp.vec3(0.0)
+    roughness = float(0.0)
     m = wp.vec3(0.0)
     for axis in range(3):
         if w[axis] > 0.004:
             uv = projected(p, axis)
-            c += albedo_at(world, texture, uv[0], uv[1], level) * w[axis]
-            if world.textures[texture].has_bumps != 0:
-                bump = bump_at(world, texture, uv[0], uv[1], level)
-                m += tilted(bump, axis, n) * w[axis]
-    look.albedo = wp.cw_mul(look.albedo, wp.vec3(c[0], c[1], c[2]))
-    look.roughness *= c[3]
+            texel = texel_at(world, texture, uv[0], uv[1], level)
+            albedo += texel.albedo * w[axis]
+            roughness += texel.roughness * w[axis]
+            m += tilted(texel.bump, axis, n) * w[axis]
+    look.albedo = wp.cw_mul(look.albedo, albedo)
+    look.roughness *= roughness
     if world.textures[texture].has_bumps != 0:
         look.normal = unit(world.bodies[b].R_world_mesh @ m)
     return look

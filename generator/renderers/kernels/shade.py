@@ -49,17 +49,24 @@ class Light:
     """Light that leaves a point towards the viewer [cd/m^2].
 
     Attributes:
-        ambient, lamps: Diffusely, of the sky and of lamps; to be multiplied by the albedo.
-        shine: Of lamps, reflected.
-        rest: Of the sky, reflected, and the surface's own.
+        diffuse: To be multiplied by the albedo.
+        rest: Reflected, and the surface's own.
         towards: Where the lamps' light comes from, on average; any length.
+        lamps: Part of ``diffuse`` that comes from lamps.
+        shine: Part of ``rest`` that comes from lamps.
     """
 
-    ambient: wp.vec3
-    lamps: wp.vec3
-    shine: wp.vec3
+    diffuse: wp.vec3
     rest: wp.vec3
     towards: wp.vec3
+    lamps: float
+    shine: float
+
+
+@wp.func
+def part_of(a: wp.vec3, b: wp.vec3):
+    """How much of b is a, over all channels."""
+    return (a[0] + a[1] + a[2]) / wp.max(b[0] + b[1] + b[2], 1.0e-20)
 
 
 @wp.func
@@ -88,6 +95,7 @@ def light_at(
     alpha = brdf.roughness * brdf.roughness
     light = Light()
     lux = wp.vec3(0.0)
+    shine = wp.vec3(0.0)
     for j in range(world.lamps.shape[0]):
         visible = lit[j, k]
         if visible > 0.0:
@@ -99,16 +107,19 @@ def light_at(
                 lobe = specular_lobe(brdf, n, v, l, n_s, 0.5 * beam.spread)
                 arriving = beam.normal_lux * (n_l * visible)
                 lux += arriving
-                light.shine += wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
+                shine += wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
                 light.towards += beam.direction * (arriving[0] + arriving[1] + arriving[2])
     ambient = sky_irradiance(world.sky, n) * open_sky
     # Specular occlusion after Lagarde and de Rousiers 2014, with a fixed exponent.
     open_lobe = brdf.n_v + open_sky
     open_lobe = wp.clamp(open_lobe * open_lobe - 1.0 + open_sky, 0.0, 1.0)
     mirror = sky_reflection(world.sky, mirrored, brdf.roughness)
-    light.ambient = wp.cw_mul(brdf.matte, ambient)
-    light.lamps = wp.cw_mul(brdf.matte, lux) * (1.0 / wp.pi)
-    light.rest = wp.cw_mul(brdf.gloss, mirror) * open_lobe + world.surfaces[surface].emission_cd_m2
+    lux = lux * (1.0 / wp.pi)
+    light.diffuse = wp.cw_mul(brdf.matte, lux + ambient)
+    light.rest = wp.cw_mul(brdf.gloss, mirror) * open_lobe + shine
+    light.rest += world.surfaces[surface].emission_cd_m2
+    light.lamps = part_of(lux, lux + ambient)
+    light.shine = part_of(shine, light.rest)
     return light
 
 
@@ -165,29 +176,41 @@ def shade_points(
     surface = surface_index(world, hit)
     look = look_at_hit(view, world, surface, hit, images.weights[i], images.normals[i], z, v)
     light = light_at(world, surface, look, view.eye_m + d * z, v, lit, open_sky[0, k], k)
-    diffuse = wp.cw_mul(light.ambient + light.lamps, look.albedo)
-    radiance[i] = diffuse + light.shine + light.rest
+    radiance[i] = wp.cw_mul(light.diffuse, look.albedo) + light.rest
 
 
 @wp.struct
-class Corner:
-    """One of the four lattice points around a pixel: its index and bilinear weight."""
+class Cell:
+    """Where a pixel lies between four lattice points.
 
-    q: int
-    weight: float
+    Attributes:
+        first: The upper left of them.
+        right, down: From it to the others, [0, 1).
+    """
+
+    first: int
+    right: float
+    down: float
 
 
 @wp.func
-def corner_at(lattice: Lattice, x: int, y: int, k: int):
-    """The k-th lattice point around a pixel."""
+def cell_at(lattice: Lattice, x: int, y: int):
+    """The cell of a pixel."""
     column = x / lattice.stride
     row = y / lattice.stride
-    wx = float(x - column * lattice.stride) / float(lattice.stride)
-    wy = float(y - row * lattice.stride) / float(lattice.stride)
-    corner = Corner()
-    corner.q = (row + (k >> 1)) * lattice.width + column + (k & 1)
-    corner.weight = wp.where((k & 1) == 1, wx, 1.0 - wx) * wp.where(k >= 2, wy, 1.0 - wy)
-    return corner
+    cell = Cell()
+    cell.first = row * lattice.width + column
+    cell.right = float(x - column * lattice.stride) / float(lattice.stride)
+    cell.down = float(y - row * lattice.stride) / float(lattice.stride)
+    return cell
+
+
+@wp.func
+def corner_of(lattice: Lattice, cell: Cell, k: int):
+    """The k-th lattice point of a cell, and its bilinear weight."""
+    wx = wp.where((k & 1) == 1, cell.right, 1.0 - cell.right)
+    wy = wp.where(k >= 2, cell.down, 1.0 - cell.down)
+    return cell.first + (k & 1) + wp.where(k >= 2, lattice.width, 0), wx * wy
 
 
 @wp.func
@@ -220,56 +243,78 @@ def gatherable(world: World, surface: int):
 
 
 @wp.func
-def gathered(
-    view: View,
-    world: World,
-    images: Images,
-    lattice: Lattice,
-    lights: wp.array(dtype=Light),
-    surface: int,
-    x: int,
-    y: int,
-    p: wp.vec3,
-):
-    """Mean light of the lattice points around a pixel, and their weight; 0 if none agrees."""
-    light = Light()
-    total = float(0.0)
-    for k in range(4):
-        corner = corner_at(lattice, x, y, k)
-        w = corner.weight
-        if w > 0.0:
-            i = y * view.width + x
-            if agreement(view, images, lattice, surface, i, p, corner.q) > SMOOTH_COSINE:
-                light.ambient += lights[corner.q].ambient * w
-                light.lamps += lights[corner.q].lamps * w
-                light.shine += lights[corner.q].shine * w
-                light.rest += lights[corner.q].rest * w
-                light.towards += lights[corner.q].towards * w
-                total += w
-    return light, total
-
-
-@wp.func
 def on_bump(light: Light, look: Look, n: wp.vec3, v: wp.vec3):
-    """Light gathered for a normal, as a normal that a texture tilts would have it.
+    """Factors on diffuse light and on the rest where a texture tilts the normal they are for.
 
     The lamps are taken for one, where their light comes from on average.
     """
-    tilted = light
+    factors = wp.vec2(1.0, 1.0)
     length = wp.length(light.towards)
     if length > 0.0:
         t = light.towards * (1.0 / length)
         before = wp.max(wp.dot(n, t), 0.1)
         after = wp.max(wp.dot(look.normal, t), 0.0)
-        tilted.lamps = light.lamps * wp.min(after / before, 3.0)
         h = unit(t + v)
         alpha = look.roughness * look.roughness
+        narrow = 1.0 - alpha * alpha
         n_h = wp.dot(n, h)
         m_h = wp.dot(look.normal, h)
-        narrow = 1.0 - alpha * alpha
         lobe = (1.0 - n_h * n_h * narrow) / wp.max(1.0 - m_h * m_h * narrow, 1.0e-4)
-        tilted.shine = light.shine * wp.min(lobe * lobe, 8.0)
-    return tilted
+        diffuse = 1.0 + light.lamps * (wp.min(after / before, 3.0) - 1.0)
+        factors = wp.vec2(diffuse, 1.0 + light.shine * (wp.min(lobe * lobe, 8.0) - 1.0))
+    return factors
+
+
+@wp.func
+def gathered_radiance(
+    view: View,
+    world: World,
+    images: Images,
+    lattice: Lattice,
+    lights: wp.array(dtype=Light),
+    cell: Cell,
+    i: int,
+    d: wp.vec3,
+):
+    """Radiance of a pixel from the lattice points around it; negative if none agrees."""
+    hit = images.hits[i]
+    surface = surface_index(world, hit)
+    p = view.eye_m + d * images.z_m[i]
+    texture = world.surfaces[surface].texture
+    bumpy = texture >= 0
+    if bumpy:
+        bumpy = world.textures[texture].has_bumps != 0
+    light = Light()
+    total = float(0.0)
+    if gatherable(world, surface):
+        for k in range(4):
+            q, w = corner_of(lattice, cell, k)
+            if w > 0.0:
+                if agreement(view, images, lattice, surface, i, p, q) > SMOOTH_COSINE:
+                    total += w
+                    light.diffuse += lights[q].diffuse * w
+                    light.rest += lights[q].rest * w
+                    if bumpy:
+                        light.towards += lights[q].towards * w
+                        light.lamps += lights[q].lamps * w
+                        light.shine += lights[q].shine * w
+    if total == 0.0:
+        return wp.vec3(-1.0)
+    share = 1.0 / total
+    albedo = world.surfaces[surface].base_color
+    if texture >= 0:
+        v = unit(-d)
+        n = images.normals[i]
+        z = images.z_m[i]
+        look = look_at_hit(view, world, surface, hit, images.weights[i], n, z, v)
+        albedo = look.albedo
+        if bumpy:
+            light.lamps *= share
+            light.shine *= share
+            factors = on_bump(light, look, n, v)
+            light.diffuse *= factors[0]
+            light.rest *= factors[1]
+    return (wp.cw_mul(light.diffuse, albedo) + light.rest) * share
 
 
 @wp.kernel
@@ -279,6 +324,7 @@ def gather_light(
     images: Images,
     lattice: Lattice,
     lights: wp.array(dtype=Light),
+    run: int,
     count: wp.array(dtype=int),
     pixels: wp.array(dtype=int),
     radiance: wp.array(dtype=wp.vec3),
@@ -286,39 +332,30 @@ def gather_light(
     """Light every pixel from lattice points, or list it to be shaded by itself.
 
     Args:
+        run: Pixels in a row per thread.
         count: Length of the list; 0 at first.
         pixels: The list, in any order.
     """
-    y, x = wp.tid()
-    i = y * view.width + x
-    d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-    hit = images.hits[i]
-    if hit[0] < 0:
-        radiance[i] = wp.vec3(0.0)
-        if world.sky.visible != 0:
-            radiance[i] = sky_image(world.sky, d)
-        return
-    z = images.z_m[i]
-    surface = surface_index(world, hit)
-    found = float(0.0)
-    light = Light()
-    if gatherable(world, surface):
-        p = view.eye_m + d * z
-        light, found = gathered(view, world, images, lattice, lights, surface, x, y, p)
-    if found == 0.0:
-        pixels[wp.atomic_add(count, 0, 1)] = i
-        return
-    texture = world.surfaces[surface].texture
-    albedo = world.surfaces[surface].base_color
-    if texture >= 0:
-        v = unit(-d)
-        n = images.normals[i]
-        look = look_at_hit(view, world, surface, hit, images.weights[i], n, z, v)
-        albedo = look.albedo
-        if world.textures[texture].has_bumps != 0:
-            light = on_bump(light, look, n, v)
-    diffuse = wp.cw_mul(light.ambient + light.lamps, albedo)
-    radiance[i] = (diffuse + light.shine + light.rest) * (1.0 / found)
+    y, segment = wp.tid()
+    x = segment * run
+    cell = cell_at(lattice, x, y)
+    step = 1.0 / float(lattice.stride)
+    for i in range(y * view.width + x, y * view.width + wp.min(x + run, view.width)):
+        d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+        c = wp.vec3(0.0)
+        if images.hits[i][0] >= 0:
+            c = gathered_radiance(view, world, images, lattice, lights, cell, i, d)
+        elif world.sky.visible != 0:
+            c = sky_image(world.sky, d)
+        if c[0] < 0.0:
+            pixels[wp.atomic_add(count, 0, 1)] = i
+        else:
+            radiance[i] = c
+        x += 1
+        cell.right += step
+        if x % lattice.stride == 0:
+            cell.first += 1
+            cell.right = 0.0
 
 
 @wp.kernel
@@ -338,7 +375,7 @@ def look_around(
     """What listed pixels see of lamps and sky: the mean of lattice points, or by rays.
 
     Args:
-        disc: Four points of the unit disc.
+        disc: A few points of the unit disc.
         radius_m: Of ambient occlusion.
     """
     k = wp.tid()
@@ -346,19 +383,20 @@ def look_around(
     x = i % view.width
     y = i / view.width
     d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-    hit = images.hits[i]
     p = view.eye_m + d * images.z_m[i]
-    surface = surface_index(world, hit)
+    cell = cell_at(lattice, x, y)
     found = float(0.0)
     sky = float(0.0)
     for j in range(world.lamps.shape[0]):
         lit[j, k] = 0.0
-    for c in range(4):
-        corner = corner_at(lattice, x, y, c)
-        w = corner.weight
-        q = corner.q
-        if w > 0.0:
-            if agreement(view, images, lattice, surface, i, p, q) > 0.0:
+    # Light and shade change less than looks do: the points need not share the material.
+    column = x / lattice.stride
+    row = y / lattice.stride
+    for v in range(wp.max(row - 1, 0), wp.min(row + 3, lattice.height)):
+        for u in range(wp.max(column - 1, 0), wp.min(column + 3, lattice.width)):
+            q = v * lattice.width + u
+            w = nearness(float(column) + cell.right - float(u), float(row) + cell.down - float(v))
+            if related(view, images, lattice, i, p, q):
                 found += w
                 sky += lattice_sky[0, q] * w
                 for j in range(world.lamps.shape[0]):
@@ -369,10 +407,29 @@ def look_around(
             lit[j, k] = lit[j, k] / found
     else:
         n = images.normals[i]
-        origin = ray_origin(world, hit, images.weights[i], p, d * images.z_m[i])
+        origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
         for j in range(world.lamps.shape[0]):
             lit[j, k] = seen_part(world, world.lamps[j], origin, n, disc)
         open_sky[0, k] = seen_sky(world, origin, n, disc, radius_m)
+
+
+@wp.func
+def nearness(dx: float, dy: float):
+    """Weight of a lattice point, by its distance in cells."""
+    squared = dx * dx + dy * dy
+    return 1.0 / (0.05 + squared * squared)
+
+
+@wp.func
+def related(view: View, images: Images, lattice: Lattice, i: int, p: wp.vec3, q: int):
+    """Whether a lattice point lies on the body of pixel i, near it and turned like it."""
+    same = lattice.body[q] == images.hits[i][0]
+    if same:
+        n = images.normals[i]
+        tolerance_m = 2.0 * surface_tolerance(view, p)
+        same = wp.dot(n, lattice.normal[q]) > 0.8
+        same = same and wp.abs(wp.dot(n, lattice.p_m[q] - p)) < tolerance_m
+    return same
 
 
 @wp.func

@@ -8,92 +8,105 @@ from generator.renderers.kernels.records import World, floor_int
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-
-@wp.func
-def unpacked(texel: wp.uint32):
-    """Four bytes as floats; the lowest first."""
-    return wp.vec4(
-        float(texel & wp.uint32(255)),
-        float((texel >> wp.uint32(8)) & wp.uint32(255)),
-        float((texel >> wp.uint32(16)) & wp.uint32(255)),
-        float(texel >> wp.uint32(24)),
-    )
+EVEN_BYTES = wp.constant(wp.uint32(0x00FF00FF))
+LOW_HALF = wp.constant(wp.uint32(0xFFFF))
+# Four bytes, each times weights that sum to 256.
+FULL = wp.constant(65280.0)
 
 
 @wp.struct
 class Taps:
-    """Addresses and fractions of one bilinear lookup that wraps around."""
+    """Addresses of the four texels around a point, and weights in 1/256."""
 
     a: int
     b: int
     c: int
     d: int
-    fx: float
-    fy: float
+    wa: wp.uint32
+    wb: wp.uint32
+    wc: wp.uint32
+    wd: wp.uint32
+
+
+@wp.struct
+class Texel:
+    """What a texture says at a point: linear albedo, factor on roughness, tangent-space normal."""
+
+    albedo: wp.vec3
+    roughness: float
+    bump: wp.vec3
 
 
 @wp.func
 def taps_at(world: World, texture: int, u: float, v: float, level: int):
-    """The four texels around (u, v); v grows upwards, rows downwards."""
+    """The texels around (u, v), which wraps around; v grows upwards, rows downwards."""
     width = wp.max(world.textures[texture].width >> level, 1)
     height = wp.max(world.textures[texture].height >> level, 1)
     x = (u - float(floor_int(u))) * float(width) - 0.5
     y = (1.0 - (v - float(floor_int(v)))) * float(height) - 0.5
     x0 = floor_int(x)
     y0 = floor_int(y)
-    t = Taps()
-    t.fx = x - float(x0)
-    t.fy = y - float(y0)
+    right = wp.uint32(int((x - float(x0)) * 256.0))
+    down = wp.uint32(int((y - float(y0)) * 256.0))
+    # After rounding, x may be a hair outside [-0.5, width - 0.5].
     x1 = wp.where(x0 + 1 >= width, 0, x0 + 1)
     y1 = wp.where(y0 + 1 >= height, 0, y0 + 1)
-    x0 = wp.where(x0 < 0, width - 1, x0)
+    x0 = wp.where(x0 < 0, width - 1, wp.min(x0, width - 1))
     y0 = wp.where(y0 < 0, height - 1, wp.min(y0, height - 1))
-    x0 = wp.min(x0, width - 1)
     first = world.textures[texture].offsets[level]
+    t = Taps()
     t.a = first + y0 * width + x0
     t.b = first + y0 * width + x1
     t.c = first + y1 * width + x0
     t.d = first + y1 * width + x1
+    t.wd = (right * down) >> wp.uint32(8)
+    t.wb = right - t.wd
+    t.wc = down - t.wd
+    t.wa = wp.uint32(256) - right - t.wc
     return t
 
 
 @wp.func
-def squared_rgb(c: wp.vec4):
-    """Colours are stored as square roots."""
-    return wp.vec4(c[0] * c[0], c[1] * c[1], c[2] * c[2], c[3] * 255.0)
+def mixed(texels: wp.array(dtype=wp.uint32), t: Taps):
+    """Weighted sum of four texels of four bytes each, two bytes per multiplication."""
+    a = texels[t.a]
+    b = texels[t.b]
+    c = texels[t.c]
+    d = texels[t.d]
+    even = (a & EVEN_BYTES) * t.wa + (b & EVEN_BYTES) * t.wb
+    even += (c & EVEN_BYTES) * t.wc + (d & EVEN_BYTES) * t.wd
+    shift = wp.uint32(8)
+    odd = ((a >> shift) & EVEN_BYTES) * t.wa + ((b >> shift) & EVEN_BYTES) * t.wb
+    odd += ((c >> shift) & EVEN_BYTES) * t.wc + ((d >> shift) & EVEN_BYTES) * t.wd
+    half = wp.uint32(16)
+    return wp.vec4(
+        float(int(even & LOW_HALF)),
+        float(int(odd & LOW_HALF)),
+        float(int(even >> half)),
+        float(int(odd >> half)),
+    )
 
 
 @wp.func
-def albedo_at_level(world: World, texture: int, u: float, v: float, level: int):
-    """Linear albedo and roughness factor, both in [0, 255^2]."""
-    t = taps_at(world, texture, u, v, level)
-    top = squared_rgb(unpacked(world.textures[texture].texels[t.a])) * (1.0 - t.fx)
-    top += squared_rgb(unpacked(world.textures[texture].texels[t.b])) * t.fx
-    bottom = squared_rgb(unpacked(world.textures[texture].texels[t.c])) * (1.0 - t.fx)
-    bottom += squared_rgb(unpacked(world.textures[texture].texels[t.d])) * t.fx
-    return top * (1.0 - t.fy) + bottom * t.fy
-
-
-@wp.func
-def albedo_at(world: World, texture: int, u: float, v: float, level: float):
-    """Linear albedo and roughness factor in [0, 1], between two mip levels."""
+def texel_at(world: World, texture: int, u: float, v: float, level: float):
+    """The texture at a point, between two mip levels."""
     bounded = wp.clamp(level, 0.0, float(world.textures[texture].levels - 1))
     lower = int(bounded)
     # Levels are blended over the middle half of their distance only: half the taps elsewhere.
     part = wp.clamp(2.0 * (bounded - float(lower)) - 0.5, 0.0, 1.0)
     if part == 1.0:
         lower += 1
-    c = albedo_at_level(world, texture, u, v, lower)
+    taps = taps_at(world, texture, u, v, lower)
+    c = mixed(world.textures[texture].texels, taps)
+    texel = Texel()
+    if world.textures[texture].has_bumps != 0:
+        m = mixed(world.textures[texture].bumps, taps) * (2.0 / FULL)
+        texel.bump = wp.vec3(m[0] - 1.0, m[1] - 1.0, m[2] - 1.0)
     if part > 0.0 and part < 1.0:
-        c = c * (1.0 - part) + albedo_at_level(world, texture, u, v, lower + 1) * part
-    return c * (1.0 / 65025.0)
-
-
-@wp.func
-def bump_at(world: World, texture: int, u: float, v: float, level: float):
-    """Tangent-space normal at the nearest mip level, not normalised."""
-    t = taps_at(world, texture, u, v, int(wp.clamp(level + 0.5, 0.0, float(world.textures[texture].levels - 1))))
-    top = unpacked(world.textures[texture].bumps[t.a]) * (1.0 - t.fx) + unpacked(world.textures[texture].bumps[t.b]) * t.fx
-    bottom = unpacked(world.textures[texture].bumps[t.c]) * (1.0 - t.fx) + unpacked(world.textures[texture].bumps[t.d]) * t.fx
-    c = (top * (1.0 - t.fy) + bottom * t.fy) * (2.0 / 255.0)
-    return wp.vec3(c[0] - 1.0, c[1] - 1.0, c[2] - 1.0)
+        upper = taps_at(world, texture, u, v, lower + 1)
+        c = c * (1.0 - part) + mixed(world.textures[texture].texels, upper) * part
+    c = c * (1.0 / FULL)
+    # Colours are stored as square roots.
+    texel.albedo = wp.vec3(c[0] * c[0], c[1] * c[1], c[2] * c[2])
+    texel.roughness = c[3]
+    return texel
