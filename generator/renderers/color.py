@@ -11,7 +11,7 @@ from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
 from generator.renderers.kernels import antialias, records, shade, tone
 from generator.renderers.kernels.raster import Z_NEAR_M
-from generator.renderers.occlusion import openness, sampled_lattice, sunflower
+from generator.renderers.occlusion import lamp_parts, openness, sampled_lattice, sunflower
 from generator.renderers.packing import PackedWorld
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
@@ -93,9 +93,10 @@ def _shaded(
     listed = int(count.numpy()[0])
     lit = stock.scratch("listed lit", (around.lit.shape[0], n), float)
     open_sky = stock.scratch("listed sky", (1, n), float)
+    parts = wp.array(lamp_parts(4, settings), dtype=wp.vec2, device=device)
     disc = wp.array(sunflower(4), dtype=wp.vec2, device=device)
     radius_m = settings.ambient_occlusion_radius_m
-    inputs = [*frame, lattice, around.lit, around.open_sky, disc, radius_m, pixels]
+    inputs = [*frame, lattice, around.lit, around.open_sky, parts, disc, radius_m, pixels]
     wp.launch(shade.look_around, listed, inputs, [lit, open_sky], device=device)
     inputs = [*frame, pixels, lit, open_sky]
     wp.launch(shade.shade_points, listed, inputs, [radiance], device=device)

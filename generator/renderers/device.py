@@ -42,4 +42,3 @@ def _start() -> None:
     wp.config.cpu_compiler_flags = _COMPILER_FLAGS
     with silenced():  # Warp warns about a missing CUDA driver
         wp.init()
-

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from generator.core.geometry import Float32
 from generator.core.se3 import Array
@@ -73,11 +72,12 @@ def irradiance_coefficients(image: Float32) -> Array:
     norm = np.array([0.282095, *[0.488603] * 3, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274])
     transfer = np.array([1.0, *[2.0 / 3.0] * 3, *[0.25] * 5])
     moments = np.einsum("khw,hw,hwc->kc", basis, solid, image.astype(np.float64), optimize=False)
-    return moments * (norm * norm * transfer)[:, None]
+    coefficients: Array = moments * (norm * norm * transfer)[:, None]
+    return coefficients
 
 
 def bordered(maps: Float32) -> Float32:
-    """An octahedral map [n, n, 3] with the texels that continue it all around, [n + 2, n + 2, 3]."""
+    """An octahedral map [n, n, 3] with a border that continues it, [n + 2, n + 2, 3]."""
     wide = np.pad(maps, ((1, 1), (1, 1), (0, 0)), mode="edge")
     wide[0, 1:-1], wide[-1, 1:-1] = maps[0, ::-1], maps[-1, ::-1]
     wide[1:-1, 0], wide[1:-1, -1] = maps[::-1, 0], maps[::-1, -1]
@@ -102,7 +102,9 @@ def _smoothed(image: Float32, level: int, device: wp.Device) -> wp.array:
     return smoothed
 
 
-def _shrunk(image: Float32, height: int) -> NDArray[np.float32]:
+def _shrunk(image: Float32, height: int) -> Float32:
     if image.shape[0] <= height:
         return image
-    return cv2.resize(image, (2 * height, height), interpolation=cv2.INTER_AREA)
+    size = (2 * height, height)
+    shrunk: Float32 = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return shrunk

@@ -24,7 +24,7 @@ def exposure_of(ev100: float) -> float:
 
     Saturation-based speed: L_max = 1.2 * 2^EV100 (ISO 12232; Lagarde and de Rousiers 2014).
     """
-    return 1.0 / (1.2 * 2.0**ev100)
+    return float(1.0 / (1.2 * 2.0**ev100))
 
 
 def automatic_ev100(radiance: Float32) -> float:

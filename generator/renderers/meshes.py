@@ -54,7 +54,9 @@ def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
     # The hierarchy holds two 16-byte nodes per triangle, built from 24-byte boxes.
     nbytes = 32 * len(data.vertices_m) + (16 + 64 + 24) * len(data.faces)
     keep = (vertices, normals, uvs, faces, slots, mesh)
-    return DeviceMesh(record.numpy_value(), keep, low, high, len(data.vertices_m), data.materials, nbytes)
+    return DeviceMesh(
+        record.numpy_value(), keep, low, high, len(data.vertices_m), data.materials, nbytes
+    )
 
 
 def is_convex_solid(vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -> bool:

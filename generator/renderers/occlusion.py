@@ -10,15 +10,15 @@ import warp as wp
 
 from generator.core.se3 import Array
 from generator.renderers.kernels import lattice as lattice_kernels
-from generator.renderers.kernels import occlusion, records
+from generator.renderers.kernels import occlusion, records, shafts
 from generator.renderers.packing import PackedWorld
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
 
 _STRIDE_PX = 3
-_TILE = int(occlusion.TILE)
-_LIST_LENGTH = int(occlusion.LIST_LENGTH)
+_TILE = int(shafts.TILE)
+_LIST_LENGTH = int(shafts.LIST_LENGTH)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -69,9 +69,9 @@ def openness(
     lists = stock.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
     radius_m = settings.ambient_occlusion_radius_m
     inputs = [world.record, lattice, columns, radius_m, lists]
-    wp.launch(occlusion.list_occluders, tiles, inputs, device=stock.device)
+    wp.launch(shafts.list_occluders, tiles, inputs, device=stock.device)
     return Openness(
-        _lit(world, view, lattice, lists, columns, stock),
+        _lit(world, view, lattice, lists, columns, lamp_parts(48, settings), stock),
         _open_sky(world, view, lattice, lists, columns, radius_m, stock),
     )
 
@@ -81,6 +81,11 @@ def sunflower(n: int) -> Array:
     k = np.arange(n)
     radius, angle = np.sqrt((k + 0.5) / n), k * math.pi * (3.0 - math.sqrt(5.0))
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def lamp_parts(n: int, settings: RenderSettings) -> Array:
+    """Points of a lamp's disc that shadows look at, shape [n, 2]; all at its centre if hard."""
+    return sunflower(n) * (1.0 if settings.shadows == "soft" else 0.0)
 
 
 def cosine_hemisphere(n: int) -> Array:
@@ -96,6 +101,7 @@ def _lit(
     lattice: lattice_kernels.Lattice,
     lists: wp.array,
     columns: int,
+    parts: Array,
     stock: AssetStock,
 ) -> wp.array:
     device = stock.device
@@ -104,16 +110,14 @@ def _lit(
     lit = stock.scratch("lit", (max(lamps, 1), n), float)
     if lamps == 0:
         return lit
-    disc = wp.array(sunflower(48), dtype=wp.vec2, device=device)
+    disc = wp.array(parts, dtype=wp.vec2, device=device)
     inputs = [world.record, lattice, columns, lists, disc]
     for parity in (0, 1):
         wp.launch(occlusion.probe_lamps, n, [*inputs, parity], [probed], device=device)
     classes = _classes(lattice, probed, lamps, stock)
     wp.launch(occlusion.refine_lamps, n, [*inputs, classes, probed], [lit], device=device)
     classes = _classes(lattice, lit, lamps, stock)
-    wp.launch(
-        occlusion.smooth_lattice, n, [view, lattice, classes, lit], [probed], device=device
-    )
+    wp.launch(occlusion.smooth_lattice, n, [view, lattice, classes, lit], [probed], device=device)
     return probed
 
 
@@ -146,7 +150,5 @@ def _classes(
 ) -> wp.array:
     shape = (-(-lattice.height // 4), -(-lattice.width // 4), rows)
     classes = stock.scratch("classes", shape, wp.int32)
-    wp.launch(
-        occlusion.classify_blocks, shape, [lattice, values], [classes], device=stock.device
-    )
+    wp.launch(occlusion.classify_blocks, shape, [lattice, values], [classes], device=stock.device)
     return classes

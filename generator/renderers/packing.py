@@ -63,7 +63,9 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     nowhere = np.full((1, 3), 1e9, np.float32)
     low = placed["low_m"] if len(placed) else nowhere
     high = placed["high_m"] if len(placed) else nowhere
-    tree = wp.Bvh(upload(np.ascontiguousarray(low), wp.vec3), upload(np.ascontiguousarray(high), wp.vec3))
+    tree = wp.Bvh(
+        upload(np.ascontiguousarray(low), wp.vec3), upload(np.ascontiguousarray(high), wp.vec3)
+    )
     world = records.World()
     world.tree = tree.id
     world.geometries = upload(_stacked(meshes, records.Geometry), records.Geometry)

@@ -24,7 +24,7 @@ class RenderSettings(Strict):
     """
 
     antialias: Literal[1, 2, 4, 8] = 4
-    shadows: Literal["none", "hard", "soft"] = "soft"
+    shadows: Literal["soft", "hard"] = "soft"
     ambient_occlusion_radius_m: float = Field(0.25, ge=0.0)
     exposure_compensation_ev: float = Field(0.0, ge=-10.0, le=10.0)
     tone: Literal["filmic", "srgb"] = "filmic"

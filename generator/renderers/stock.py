@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,7 +61,7 @@ class AssetStock:
             lambda: upload_environment(self.assets.environment(environment_id), self.device),
         )
 
-    def scratch(self, name: str, shape: int | Sequence[int], dtype: Any) -> wp.array:
+    def scratch(self, name: str, shape: int | tuple[int, ...], dtype: Any) -> wp.array:
         """An array with left-over contents: touching fresh memory costs as much as filling it.
 
         One name stands for one array per shape, valid until it is asked for again.

@@ -31,8 +31,12 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     """A texture, ready for kernels."""
     levels = mip_levels(_linear_with_roughness(data))
     # Square roots spend the eight bits as evenly for the eye as sRGB does, and are quick to undo.
-    texels = np.concatenate([_packed(np.concatenate(
-        [np.sqrt(level[..., :3]), level[..., 3:]], axis=-1)) for level in levels])
+    texels = np.concatenate(
+        [
+            _packed(np.concatenate([np.sqrt(level[..., :3]), level[..., 3:]], axis=-1))
+            for level in levels
+        ]
+    )
     sizes = [level.shape[0] * level.shape[1] for level in levels]
     record = Texture()
     record.height, record.width = data.albedo.shape[:2]

@@ -52,13 +52,13 @@ def see(
     run = view.width if stock.device.is_cpu else 1
     outputs = [seen.z_m, seen.weights, seen.normals]
     inputs = [view, world.record, run, seen.hits]
-    wp.launch(surface.resolve, (view.height, view.width // run), inputs, outputs, device=stock.device)
+    wp.launch(
+        surface.resolve, (view.height, view.width // run), inputs, outputs, device=stock.device
+    )
     return seen
 
 
-def project(
-    world: PackedWorld, view: records.View, stock: AssetStock
-) -> tuple[wp.array, wp.array]:
+def project(world: PackedWorld, view: records.View, stock: AssetStock) -> tuple[wp.array, wp.array]:
     """All vertices in the camera frame, and snapped to the image plane."""
     p_camera = wp.zeros(world.vertex_count, dtype=wp.vec3, device=stock.device)
     xy = wp.zeros(world.vertex_count, dtype=wp.vec2i, device=stock.device)
@@ -69,9 +69,7 @@ def project(
     return p_camera, xy
 
 
-def _rasterise(
-    world: PackedWorld, view: records.View, stock: AssetStock, hits: wp.array
-) -> None:
+def _rasterise(world: PackedWorld, view: records.View, stock: AssetStock, hits: wp.array) -> None:
     nearness = stock.scratch("nearness", view.width * view.height, float)
     nearness.zero_()
     hits.fill_(wp.vec2i(-1, -1))

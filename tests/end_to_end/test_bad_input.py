@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from running import SMALL, digest, gen_data
+
+from tests.end_to_end.running import SMALL, digest, gen_data
 
 JOB = ("--n", "2", *SMALL)
 COUNT = "randomizers.clutter.count"

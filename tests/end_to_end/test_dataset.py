@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from running import SMALL, command, digest, environment, gen_data
+
+from tests.end_to_end.running import SMALL, command, digest, environment, gen_data
 
 MAIN_JOB = ("--config", "tabletop.yaml", "--n", "15", "--seed", "1", *SMALL)
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from running import SMALL, gen_data
+
+from tests.end_to_end.running import SMALL, gen_data
 
 
 def test_contact_sheet_of_a_dataset_has_one_tile_per_sample(dataset: Path, tmp_path: Path) -> None:

@@ -19,7 +19,9 @@ from generator.core.geometry import (
 from generator.core.se3 import Vec3
 
 
-def box_mesh(size_m: Vec3 = (1.0, 1.0, 1.0), materials: tuple[Material, ...] = (Material(),)) -> MeshData:
+def box_mesh(
+    size_m: Vec3 = (1.0, 1.0, 1.0), materials: tuple[Material, ...] = (Material(),)
+) -> MeshData:
     """A box around the origin with split edges, 12 triangles."""
     corners, normals, uvs, faces = [], [], [], []
     for axis in range(3):
@@ -39,7 +41,9 @@ def box_mesh(size_m: Vec3 = (1.0, 1.0, 1.0), materials: tuple[Material, ...] = (
     return _mesh(corners, faces, normals, uvs, materials)
 
 
-def room_mesh(size_m: Vec3 = (6.0, 6.0, 3.0), materials: tuple[Material, ...] = (Material(),)) -> MeshData:
+def room_mesh(
+    size_m: Vec3 = (6.0, 6.0, 3.0), materials: tuple[Material, ...] = (Material(),)
+) -> MeshData:
     """A box seen from inside, floor at z = 0."""
     box = box_mesh(size_m, materials)
     vertices = box.vertices_m + np.array([0, 0, 0.5 * size_m[2]], np.float32)
@@ -110,7 +114,7 @@ class FakeLibrary:
     def get(self, asset_id: str) -> Asset:
         raise AssetError(f"unknown asset '{asset_id}'")
 
-    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:  # noqa: ARG002
+    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
         return ()
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:

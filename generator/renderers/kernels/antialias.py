@@ -40,7 +40,7 @@ def clamped_pixel(view: View, x: int, y: int):
 
 
 @wp.func
-def differ(view: View, images: Images, i: int, j: int):
+def differ(images: Images, i: int, j: int):
     """Whether an edge runs between two neighbouring pixels."""
     a = images.hits[i]
     b = images.hits[j]
@@ -57,9 +57,7 @@ def differ(view: View, images: Images, i: int, j: int):
 
 
 @wp.kernel
-def find_edges(
-    view: View, images: Images, count: wp.array(dtype=int), pixels: wp.array(dtype=int)
-):
+def find_edges(view: View, images: Images, count: wp.array(dtype=int), pixels: wp.array(dtype=int)):
     """List the pixels that an edge may cross.
 
     Args:
@@ -70,10 +68,10 @@ def find_edges(
     for x in range(view.width):
         i = y * view.width + x
         if (
-            differ(view, images, i, clamped_pixel(view, x + 1, y))
-            or differ(view, images, i, clamped_pixel(view, x - 1, y))
-            or differ(view, images, i, clamped_pixel(view, x, y + 1))
-            or differ(view, images, i, clamped_pixel(view, x, y - 1))
+            differ(images, i, clamped_pixel(view, x + 1, y))
+            or differ(images, i, clamped_pixel(view, x - 1, y))
+            or differ(images, i, clamped_pixel(view, x, y + 1))
+            or differ(images, i, clamped_pixel(view, x, y - 1))
         ):
             pixels[wp.atomic_add(count, 0, 1)] = i
 

@@ -49,9 +49,7 @@ class Lattice:
 
 
 @wp.func
-def ray_origin(
-    world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d_world: wp.vec3
-):
+def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d_world: wp.vec3):
     """A point just off the surface, on the curved surface that the normals speak of.
 
     Source: Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021.
@@ -126,9 +124,7 @@ def same_surface(lattice: Lattice, i: int, j: int, tolerance_m: float):
     same = bool(False)
     if lattice.surface[i] == lattice.surface[j]:
         same = (
-            agree(
-                lattice.p_m[i], lattice.normal[i], lattice.p_m[j], lattice.normal[j], tolerance_m
-            )
+            agree(lattice.p_m[i], lattice.normal[i], lattice.p_m[j], lattice.normal[j], tolerance_m)
             > 0.0
         )
     return same

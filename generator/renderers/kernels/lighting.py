@@ -15,6 +15,9 @@ SPHERE = wp.constant(0)
 SPOT = wp.constant(1)
 SUN = wp.constant(2)
 
+# Where a sun is taken to be; no scene is larger.
+SUN_DISTANCE_M = wp.constant(1.0e3)
+
 
 @wp.struct
 class Beam:
@@ -39,7 +42,7 @@ def beam_from(lamp: Lamp, p_world: wp.vec3):
     beam = Beam()
     if lamp.kind == SUN:
         beam.direction = -lamp.direction
-        beam.distance_m = 1.0e4
+        beam.distance_m = SUN_DISTANCE_M
         beam.normal_lux = lamp.power
         beam.spread = lamp.radius
         return beam

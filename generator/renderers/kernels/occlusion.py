@@ -1,13 +1,13 @@
 """Soft shadows and ambient occlusion on the lattice, with as few rays as possible.
 
-1. Tiles of the lattice find which bodies can come between them and each lamp (shafts, after
-   Haines and Wallace, "Shaft culling for efficient ray-traced radiosity", 1991): most tiles
-   find none, and their rays need not be cast.
-2. Points cast one ray per lamp, half of them only where the other half differ; the sixteen points of a 4 x 4 block aim at sixteen parts of
-   the lamp (interleaved sampling, Keller and Heidrich 2001).
-3. Where all points of a block's neighbourhood agree, that is the answer. Elsewhere, in penumbrae,
-   points cast more rays, and the sixteen neighbours on the same surface are averaged: together
-   they have seen all parts of the lamp, whatever the position, so that no pattern remains.
+1. Tiles find which bodies may shade them (generator.renderers.kernels.shafts): most find none, and
+   no ray need be cast.
+2. Points cast one ray per lamp, every other point only where those around it differ. The sixteen
+   points of a 4 x 4 block aim at sixteen parts of the lamp (interleaved sampling, Keller and
+   Heidrich, 2001).
+3. Where all points around one agree, that is the answer. Elsewhere, in penumbrae, points cast
+   more rays, and sixteen neighbours on one surface are averaged: together they have looked at all
+   parts of the lamp, wherever they lie, so that no pattern remains.
 """
 
 from __future__ import annotations
@@ -15,314 +15,14 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.lattice import Lattice, same_surface
-from generator.renderers.kernels.lighting import SUN, beam_from
-from generator.renderers.kernels.records import (
-    Lamp,
-    View,
-    World,
-    corners_of,
-    greater,
-    lesser,
-    to_mesh_point,
-    to_mesh_vector,
-    unit,
-    vertex_at,
-)
+from generator.renderers.kernels.lighting import SUN, SUN_DISTANCE_M, beam_from
+from generator.renderers.kernels.rays import blocked_by_listed, free_of_listed, path_along
+from generator.renderers.kernels.records import Lamp, View, World, unit
+from generator.renderers.kernels.shafts import TILE
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-TILE = wp.constant(8)
-LIST_LENGTH = wp.constant(48)
 UNSEEN = wp.constant(-1.0)
-TRIANGLES_LOOKED_AT = wp.constant(64)
-# Where a sun is taken to be; no scene is larger.
-SUN_DISTANCE_M = wp.constant(1.0e3)
-
-
-@wp.struct
-class Tile:
-    """A ball around the points of a tile, and the plane they lie on if they do."""
-
-    count: int
-    centre_m: wp.vec3
-    radius_m: float
-    flat: int
-    normal: wp.vec3
-    height_m: float
-
-
-@wp.func
-def tile_of(lattice: Lattice, column: int, row: int):
-    """Bounds of one tile."""
-    low = wp.vec3(1.0e9)
-    high = wp.vec3(-1.0e9)
-    tile = Tile()
-    tile.flat = 1
-    tile.height_m = -1.0e9
-    for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
-        for x in range(column * TILE, wp.min((column + 1) * TILE, lattice.width)):
-            i = y * lattice.width + x
-            if lattice.body[i] >= 0:
-                p = lattice.p_m[i]
-                low = wp.min(low, p)
-                high = wp.max(high, p)
-                if tile.count == 0:
-                    tile.normal = lattice.normal[i]
-                if wp.dot(lattice.normal[i], tile.normal) < 0.99999:
-                    tile.flat = 0
-                tile.height_m = wp.max(tile.height_m, wp.dot(p, tile.normal))
-                tile.count += 1
-    tile.centre_m = (low + high) * 0.5
-    tile.radius_m = wp.length(high - low) * 0.5
-    return tile
-
-
-@wp.struct
-class Shaft:
-    """All straight ways from a tile to a lamp, in a body's mesh frame.
-
-    Attributes:
-        start, way: From the tile's centre to the lamp's.
-        radius, end_radius: Of a tube around it that holds the tile, and the lamp.
-        normal, height: Plane below which nothing shades the tile, if ``flat``.
-    """
-
-    start: wp.vec3
-    way: wp.vec3
-    radius: float
-    end_radius: float
-    flat: int
-    normal: wp.vec3
-    height: float
-
-
-@wp.func
-def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
-    """The shaft from a tile along a way, to a ball, seen from body b."""
-    shrink = 1.0 / world.bodies[b].scale
-    shaft = Shaft()
-    shaft.start = to_mesh_point(world, b, tile.centre_m)
-    shaft.way = to_mesh_vector(world, b, way)
-    shaft.radius = tile.radius_m * shrink
-    shaft.end_radius = radius_m * shrink
-    shaft.flat = tile.flat
-    shaft.normal = wp.transpose(world.bodies[b].R_world_mesh) @ tile.normal
-    height_m = tile.height_m + 1.0e-4 - wp.dot(world.bodies[b].t_world_mesh, tile.normal)
-    shaft.height = height_m * shrink
-    return shaft
-
-
-@wp.func
-def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
-    """The stretch of a shaft's axis that lies in a grown box; empty if it ends before it begins."""
-    t0 = float(0.0)
-    t1 = float(1.0)
-    for k in range(3):
-        a = low[k] - grown - shaft.start[k]
-        c = high[k] + grown - shaft.start[k]
-        inverse = 1.0 / wp.where(wp.abs(shaft.way[k]) < 1.0e-20, 1.0e-20, shaft.way[k])
-        t0 = greater(t0, lesser(a * inverse, c * inverse))
-        t1 = lesser(t1, greater(a * inverse, c * inverse))
-    return t0, t1
-
-
-@wp.func
-def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
-    """Whether a box may reach into a shaft."""
-    if shaft.flat != 0:
-        top = wp.dot(shaft.normal, (low + high) * 0.5)
-        if top + wp.dot(wp.abs(shaft.normal), (high - low) * 0.5) <= shaft.height:
-            return False
-    # The shaft is as wide as its wider end, then only as wide as where the box may touch it.
-    t0, t1 = overlap(shaft, low, high, wp.max(shaft.radius, shaft.end_radius))
-    for _ in range(2):
-        if t0 <= t1:
-            widening = shaft.end_radius - shaft.radius
-            grown = shaft.radius + wp.max(widening * t0, widening * t1)
-            t0, t1 = overlap(shaft, low, high, grown)
-    return t0 <= t1
-
-
-@wp.func
-def triangles_touch(shaft: Shaft, world: World, g: int):
-    """Whether any triangle may reach into a shaft; True where it is tedious to know.
-
-    Bodies that surround the scene (a room) or are long and slanted have boxes that touch
-    everything; their triangles do not.
-    """
-    here = wp.vec3(shaft.radius, shaft.radius, shaft.radius)
-    there = wp.vec3(shaft.end_radius, shaft.end_radius, shaft.end_radius)
-    end = shaft.start + shaft.way
-    query = wp.mesh_query_aabb(
-        world.geometries[g].mesh,
-        wp.min(shaft.start - here, end - there),
-        wp.max(shaft.start + here, end + there),
-    )
-    found = bool(False)
-    face = int(0)
-    looked_at = int(0)
-    while wp.mesh_query_aabb_next(query, face):
-        corner = corners_of(world, g, face)
-        a = vertex_at(world, g, corner[0])
-        b = vertex_at(world, g, corner[1])
-        c = vertex_at(world, g, corner[2])
-        rises = bool(True)
-        if shaft.flat != 0:
-            top = wp.max(wp.dot(shaft.normal, a), wp.dot(shaft.normal, b))
-            rises = wp.max(top, wp.dot(shaft.normal, c)) > shaft.height
-        looked_at += 1
-        if looked_at > TRIANGLES_LOOKED_AT:
-            found = True
-        elif rises and touches(shaft, wp.min(a, wp.min(b, c)), wp.max(a, wp.max(b, c))):
-            found = True
-        if found:
-            break
-    return found
-
-
-@wp.func
-def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
-    """Whether a body may come between a tile and a ball at the end of a way."""
-    # Box against box first: it settles most cases.
-    here = wp.vec3(tile.radius_m, tile.radius_m, tile.radius_m)
-    there = wp.vec3(radius_m, radius_m, radius_m)
-    end = tile.centre_m + way
-    low = wp.min(tile.centre_m - here, end - there) - world.bodies[b].high_m
-    high = wp.max(tile.centre_m + here, end + there) - world.bodies[b].low_m
-    if wp.max(low) > 0.0 or wp.min(high) < 0.0:
-        return False
-    g = world.bodies[b].geometry
-    shaft = shaft_to(world, b, tile, way, radius_m)
-    shades = touches(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
-    if shades:
-        shades = triangles_touch(shaft, world, g)
-    return shades
-
-
-@wp.func
-def may_shade_from(world: World, b: int, tile: Tile, lamp: Lamp):
-    """Whether a body may come between a tile and a lamp."""
-    way = lamp.position_m - tile.centre_m
-    radius_m = lamp.radius
-    if lamp.kind == SUN:
-        way = lamp.direction * -SUN_DISTANCE_M
-        radius_m = lamp.radius * SUN_DISTANCE_M
-    return may_shade(world, b, tile, way, radius_m)
-
-
-@wp.func
-def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
-    """Put a body on a list, or mark the list as too long."""
-    n = lists[tile, j, 0]
-    if n >= 0 and n < LIST_LENGTH:
-        lists[tile, j, 1 + n] = b
-        lists[tile, j, 0] = n + 1
-    else:
-        lists[tile, j, 0] = -1
-
-
-@wp.kernel
-def list_occluders(
-    world: World,
-    lattice: Lattice,
-    tile_columns: int,
-    ambient_radius_m: float,
-    lists: wp.array(dtype=int, ndim=3),
-):
-    """Bodies that may shade each tile from each lamp; the last list is for ambient occlusion.
-
-    A list begins with its length, which is -1 where it would be too long.
-    """
-    i = wp.tid()
-    tile = tile_of(lattice, i % tile_columns, i / tile_columns)
-    lamps = world.lamps.shape[0]
-    for j in range(lamps + 1):
-        lists[i, j, 0] = 0
-    if tile.count == 0:
-        return
-    near = tile
-    near.radius_m = tile.radius_m + ambient_radius_m
-    for b in range(world.bodies.shape[0]):
-        for j in range(lamps):
-            if may_shade_from(world, b, tile, world.lamps[j]):
-                append(lists, i, j, b)
-        if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
-            append(lists, i, lamps, b)
-
-
-@wp.struct
-class Path:
-    """A straight way in the world, from 0 to 1."""
-
-    origin: wp.vec3
-    way: wp.vec3
-    inverse: wp.vec3
-
-
-@wp.func
-def path_along(origin: wp.vec3, way: wp.vec3):
-    """The path with the reciprocals that box tests need."""
-    path = Path()
-    path.origin = origin
-    path.way = way
-    # A grain instead of zero: its reciprocal is large, and its sign does not matter.
-    x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
-    y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
-    z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
-    path.inverse = wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
-    return path
-
-
-@wp.func
-def enters_box(world: World, b: int, path: Path):
-    """Whether a path may enter a body's box: settles most cases before a query is made."""
-    a = wp.cw_mul(world.bodies[b].low_m - path.origin, path.inverse)
-    c = wp.cw_mul(world.bodies[b].high_m - path.origin, path.inverse)
-    enters = greater(greater(lesser(a[0], c[0]), lesser(a[1], c[1])), lesser(a[2], c[2]))
-    leaves = lesser(lesser(greater(a[0], c[0]), greater(a[1], c[1])), greater(a[2], c[2]))
-    return greater(enters, 0.0) <= lesser(leaves, 1.0)
-
-
-@wp.func
-def blocked_by(world: World, b: int, path: Path):
-    """Whether a body cuts a path."""
-    hit = enters_box(world, b, path)
-    if hit:
-        o = to_mesh_point(world, b, path.origin)
-        d = to_mesh_vector(world, b, path.way)
-        mesh = world.geometries[world.bodies[b].geometry].mesh
-        hit = wp.mesh_query_ray_anyhit(mesh, o, d, 1.0)
-    return hit
-
-
-@wp.func
-def blocked(world: World, path: Path):
-    """Whether anything cuts a path."""
-    hit = bool(False)
-    candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, 1.0):
-        if not hit:
-            hit = blocked_by(world, b, path)
-    return hit
-
-
-@wp.func
-def blocked_by_listed(
-    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, j: int, skip: int, path: Path
-):
-    """Whether anything but ``skip`` cuts the path from a point of a tile to lamp j."""
-    hit = bool(False)
-    count = lists[tile, j, 0]
-    if count < 0:
-        return blocked(world, path)
-    for k in range(count):
-        b = lists[tile, j, 1 + k]
-        if b != skip:
-            hit = blocked_by(world, b, path)
-            if hit:
-                break
-    return hit
 
 
 @wp.func
@@ -429,10 +129,7 @@ def probed(
     value = float(UNSEEN)
     origin = lattice.origin_m[i]
     beam = beam_from(world.lamps[j], origin)
-    if (
-        wp.dot(beam.direction, lattice.normal[i]) > -beam.spread
-        and wp.max(beam.normal_lux) > 0.0
-    ):
+    if wp.dot(beam.direction, lattice.normal[i]) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
         value = 1.0
         if lists[tile, j, 0] != 0:
             path = path_along(origin, way_to_lamp(world.lamps[j], origin, part))
@@ -588,7 +285,7 @@ def smooth_lattice(
         value = values[j, i]
         if value != UNSEEN:
             found = classes_around(classes, x, y, j)
-            if found == 1 or found == 2:
+            if found == 1 or found == 2:  # noqa: PLR1714
                 value = float(found - 1)
             else:
                 tolerance_m = surface_tolerance(view, lattice.p_m[i])
@@ -626,44 +323,3 @@ def probe_ambient(
             t = free_of_listed(world, lists, tile, lattice.skip[i], path)
             value = t * (2.0 - t)
     open_sky[0, i] = value
-
-
-@wp.func
-def free_path(world: World, path: Path):
-    """The part of a path that is free, from 0 to 1."""
-    free = float(1.0)
-    candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, free):
-        free = freed_by(world, b, path, free)
-    return free
-
-
-@wp.func
-def free_of_listed(
-    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, skip: int, path: Path
-):
-    """The part of a path from a point of a tile that is free of anything but ``skip``."""
-    j = world.lamps.shape[0]
-    free = float(1.0)
-    count = lists[tile, j, 0]
-    if count < 0:
-        return free_path(world, path)
-    for k in range(count):
-        b = lists[tile, j, 1 + k]
-        if b != skip:
-            free = freed_by(world, b, path, free)
-    return free
-
-
-@wp.func
-def freed_by(world: World, b: int, path: Path, free: float):
-    """The free part of a path before one body, at most ``free``."""
-    if enters_box(world, b, path):
-        o = to_mesh_point(world, b, path.origin)
-        d = to_mesh_vector(world, b, path.way)
-        mesh = world.geometries[world.bodies[b].geometry].mesh
-        answer = wp.mesh_query_ray(mesh, o, d, free)
-        if answer.result:
-            free = answer.t
-    return free

@@ -7,6 +7,8 @@ import warp as wp
 from generator.renderers.kernels.records import (
     View,
     World,
+    greater,
+    lesser,
     pixel_direction,
     to_mesh_point,
     to_mesh_vector,
@@ -47,3 +49,119 @@ def trace_pixels(view: View, world: World, t_min: float, hits: wp.array(dtype=wp
     y = float(i / view.width) + 0.5
     d = view.R_world_camera @ pixel_direction(view, x, y)
     hits[i] = nearest_hit(world, view.eye_m, d, t_min)
+
+
+@wp.struct
+class Path:
+    """A straight way in the world, from 0 to 1."""
+
+    origin: wp.vec3
+    way: wp.vec3
+    inverse: wp.vec3
+
+
+@wp.func
+def path_along(origin: wp.vec3, way: wp.vec3):
+    """The path with the reciprocals that box tests need."""
+    path = Path()
+    path.origin = origin
+    path.way = way
+    # A grain instead of zero: its reciprocal is large, and its sign does not matter.
+    x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
+    y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
+    z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
+    path.inverse = wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
+    return path
+
+
+@wp.func
+def enters_box(world: World, b: int, path: Path):
+    """Whether a path may enter a body's box: settles most cases before a query is made."""
+    a = wp.cw_mul(world.bodies[b].low_m - path.origin, path.inverse)
+    c = wp.cw_mul(world.bodies[b].high_m - path.origin, path.inverse)
+    enters = greater(greater(lesser(a[0], c[0]), lesser(a[1], c[1])), lesser(a[2], c[2]))
+    leaves = lesser(lesser(greater(a[0], c[0]), greater(a[1], c[1])), greater(a[2], c[2]))
+    return greater(enters, 0.0) <= lesser(leaves, 1.0)
+
+
+@wp.func
+def blocked_by(world: World, b: int, path: Path):
+    """Whether a body cuts a path."""
+    hit = enters_box(world, b, path)
+    if hit:
+        o = to_mesh_point(world, b, path.origin)
+        d = to_mesh_vector(world, b, path.way)
+        mesh = world.geometries[world.bodies[b].geometry].mesh
+        hit = wp.mesh_query_ray_anyhit(mesh, o, d, 1.0)
+    return hit
+
+
+@wp.func
+def blocked(world: World, path: Path):
+    """Whether anything cuts a path."""
+    hit = bool(False)
+    candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
+    b = int(0)
+    while wp.bvh_query_next(candidates, b, 1.0):
+        if not hit:
+            hit = blocked_by(world, b, path)
+    return hit
+
+
+@wp.func
+def blocked_by_listed(
+    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, j: int, skip: int, path: Path
+):
+    """Whether anything but ``skip`` cuts the path from a point of a tile to lamp j."""
+    hit = bool(False)
+    count = lists[tile, j, 0]
+    if count < 0:
+        return blocked(world, path)
+    for k in range(count):
+        b = lists[tile, j, 1 + k]
+        if b != skip:
+            hit = blocked_by(world, b, path)
+            if hit:
+                break
+    return hit
+
+
+@wp.func
+def free_path(world: World, path: Path):
+    """The part of a path that is free, from 0 to 1."""
+    free = float(1.0)
+    candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
+    b = int(0)
+    while wp.bvh_query_next(candidates, b, free):
+        free = freed_by(world, b, path, free)
+    return free
+
+
+@wp.func
+def free_of_listed(
+    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, skip: int, path: Path
+):
+    """The part of a path from a point of a tile that is free of anything but ``skip``."""
+    j = world.lamps.shape[0]
+    free = float(1.0)
+    count = lists[tile, j, 0]
+    if count < 0:
+        return free_path(world, path)
+    for k in range(count):
+        b = lists[tile, j, 1 + k]
+        if b != skip:
+            free = freed_by(world, b, path, free)
+    return free
+
+
+@wp.func
+def freed_by(world: World, b: int, path: Path, free: float):
+    """The free part of a path before one body, at most ``free``."""
+    if enters_box(world, b, path):
+        o = to_mesh_point(world, b, path.origin)
+        d = to_mesh_vector(world, b, path.way)
+        mesh = world.geometries[world.bodies[b].geometry].mesh
+        answer = wp.mesh_query_ray(mesh, o, d, free)
+        if answer.result:
+            free = answer.t
+    return free

@@ -1,4 +1,4 @@
-"""Light at what is seen: fully on the lattice and where surfaces turn sharply, gathered elsewhere."""
+"""Light at what is seen: computed on the lattice and where surfaces turn, gathered elsewhere."""
 
 from __future__ import annotations
 
@@ -8,14 +8,8 @@ from generator.renderers.kernels.brdf import make_brdf, specular_lobe
 from generator.renderers.kernels.lattice import Lattice, agree, ray_origin
 from generator.renderers.kernels.lighting import beam_from, towards_mirror
 from generator.renderers.kernels.look import Look, look_at_hit
-from generator.renderers.kernels.occlusion import (
-    blocked,
-    free_path,
-    frame_of,
-    path_along,
-    surface_tolerance,
-    way_to_lamp,
-)
+from generator.renderers.kernels.occlusion import frame_of, surface_tolerance, way_to_lamp
+from generator.renderers.kernels.rays import blocked, free_path, path_along
 from generator.renderers.kernels.records import (
     Lamp,
     View,
@@ -366,6 +360,7 @@ def look_around(
     lattice: Lattice,
     lattice_lit: wp.array(dtype=float, ndim=2),
     lattice_sky: wp.array(dtype=float, ndim=2),
+    parts: wp.array(dtype=wp.vec2),
     disc: wp.array(dtype=wp.vec2),
     radius_m: float,
     pixels: wp.array(dtype=int),
@@ -375,7 +370,8 @@ def look_around(
     """What listed pixels see of lamps and sky: the mean of lattice points, or by rays.
 
     Args:
-        disc: A few points of the unit disc.
+        parts: Points of the unit disc at which rays to lamps aim.
+        disc: Points of the unit disc under those of the hemisphere at which other rays aim.
         radius_m: Of ambient occlusion.
     """
     k = wp.tid()
@@ -409,7 +405,7 @@ def look_around(
         n = images.normals[i]
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
         for j in range(world.lamps.shape[0]):
-            lit[j, k] = seen_part(world, world.lamps[j], origin, n, disc)
+            lit[j, k] = seen_part(world, world.lamps[j], origin, n, parts)
         open_sky[0, k] = seen_sky(world, origin, n, disc, radius_m)
 
 
@@ -433,15 +429,17 @@ def related(view: View, images: Images, lattice: Lattice, i: int, p: wp.vec3, q:
 
 
 @wp.func
-def seen_part(world: World, lamp: Lamp, origin: wp.vec3, n: wp.vec3, disc: wp.array(dtype=wp.vec2)):
+def seen_part(
+    world: World, lamp: Lamp, origin: wp.vec3, n: wp.vec3, parts: wp.array(dtype=wp.vec2)
+):
     """How much of a lamp a point sees."""
     beam = beam_from(lamp, origin)
     seen = float(0.0)
     if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
-        for k in range(disc.shape[0]):
-            if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, disc[k]))):
+        for k in range(parts.shape[0]):
+            if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, parts[k]))):
                 seen += 1.0
-    return seen / float(disc.shape[0])
+    return seen / float(parts.shape[0])
 
 
 @wp.func

@@ -1,0 +1,241 @@
+"""Which bodies may come between a stretch of surface and a lamp.
+
+Source: Haines and Wallace, "Shaft culling for efficient ray-traced radiosity", 1991.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from generator.renderers.kernels.lattice import Lattice
+from generator.renderers.kernels.lighting import SUN, SUN_DISTANCE_M
+from generator.renderers.kernels.records import (
+    Lamp,
+    World,
+    corners_of,
+    greater,
+    lesser,
+    to_mesh_point,
+    to_mesh_vector,
+    vertex_at,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Lattice points along the edge of a tile.
+TILE = wp.constant(8)
+# Longer lists are not worth their memory: rays then use the hierarchy over all bodies.
+LIST_LENGTH = wp.constant(48)
+TRIANGLES_LOOKED_AT = wp.constant(64)
+
+
+@wp.struct
+class Tile:
+    """A ball around the points of a tile, and the plane they lie on if they do."""
+
+    count: int
+    centre_m: wp.vec3
+    radius_m: float
+    flat: int
+    normal: wp.vec3
+    height_m: float
+
+
+@wp.func
+def tile_of(lattice: Lattice, column: int, row: int):
+    """Bounds of one tile."""
+    low = wp.vec3(1.0e9)
+    high = wp.vec3(-1.0e9)
+    tile = Tile()
+    tile.flat = 1
+    tile.height_m = -1.0e9
+    for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
+        for x in range(column * TILE, wp.min((column + 1) * TILE, lattice.width)):
+            i = y * lattice.width + x
+            if lattice.body[i] >= 0:
+                p = lattice.p_m[i]
+                low = wp.min(low, p)
+                high = wp.max(high, p)
+                if tile.count == 0:
+                    tile.normal = lattice.normal[i]
+                if wp.dot(lattice.normal[i], tile.normal) < 0.99999:
+                    tile.flat = 0
+                tile.height_m = wp.max(tile.height_m, wp.dot(p, tile.normal))
+                tile.count += 1
+    tile.centre_m = (low + high) * 0.5
+    # Rays start a little off the surface.
+    tile.radius_m = wp.length(high - low) * 0.5 + 2.0e-3
+    return tile
+
+
+@wp.struct
+class Shaft:
+    """All straight ways from a tile to a lamp, in a body's mesh frame.
+
+    Attributes:
+        start, way: From the tile's centre to the lamp's.
+        radius, end_radius: Of a tube around it that holds the tile, and the lamp.
+        normal, height: Plane below which nothing shades the tile, if ``flat``.
+    """
+
+    start: wp.vec3
+    way: wp.vec3
+    radius: float
+    end_radius: float
+    flat: int
+    normal: wp.vec3
+    height: float
+
+
+@wp.func
+def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
+    """The shaft from a tile along a way, to a ball, seen from body b."""
+    shrink = 1.0 / world.bodies[b].scale
+    shaft = Shaft()
+    shaft.start = to_mesh_point(world, b, tile.centre_m)
+    shaft.way = to_mesh_vector(world, b, way)
+    shaft.radius = tile.radius_m * shrink
+    shaft.end_radius = radius_m * shrink
+    shaft.flat = tile.flat
+    shaft.normal = wp.transpose(world.bodies[b].R_world_mesh) @ tile.normal
+    height_m = tile.height_m + 1.0e-4 - wp.dot(world.bodies[b].t_world_mesh, tile.normal)
+    shaft.height = height_m * shrink
+    return shaft
+
+
+@wp.func
+def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
+    """The stretch of a shaft's axis that lies in a grown box; empty if it ends before it begins."""
+    t0 = float(0.0)
+    t1 = float(1.0)
+    for k in range(3):
+        a = low[k] - grown - shaft.start[k]
+        c = high[k] + grown - shaft.start[k]
+        inverse = 1.0 / wp.where(wp.abs(shaft.way[k]) < 1.0e-20, 1.0e-20, shaft.way[k])
+        t0 = greater(t0, lesser(a * inverse, c * inverse))
+        t1 = lesser(t1, greater(a * inverse, c * inverse))
+    return t0, t1
+
+
+@wp.func
+def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
+    """Whether a box may reach into a shaft."""
+    if shaft.flat != 0:
+        top = wp.dot(shaft.normal, (low + high) * 0.5)
+        if top + wp.dot(wp.abs(shaft.normal), (high - low) * 0.5) <= shaft.height:
+            return False
+    # The shaft is as wide as its wider end, then only as wide as where the box may touch it.
+    t0, t1 = overlap(shaft, low, high, wp.max(shaft.radius, shaft.end_radius))
+    for _ in range(2):
+        if t0 <= t1:
+            widening = shaft.end_radius - shaft.radius
+            grown = shaft.radius + wp.max(widening * t0, widening * t1)
+            t0, t1 = overlap(shaft, low, high, grown)
+    return t0 <= t1
+
+
+@wp.func
+def triangles_touch(shaft: Shaft, world: World, g: int):
+    """Whether any triangle may reach into a shaft; True where it is tedious to know.
+
+    Bodies that surround the scene (a room) or are long and slanted have boxes that touch
+    everything; their triangles do not.
+    """
+    here = wp.vec3(shaft.radius, shaft.radius, shaft.radius)
+    there = wp.vec3(shaft.end_radius, shaft.end_radius, shaft.end_radius)
+    end = shaft.start + shaft.way
+    query = wp.mesh_query_aabb(
+        world.geometries[g].mesh,
+        wp.min(shaft.start - here, end - there),
+        wp.max(shaft.start + here, end + there),
+    )
+    found = bool(False)
+    face = int(0)
+    looked_at = int(0)
+    while wp.mesh_query_aabb_next(query, face):
+        corner = corners_of(world, g, face)
+        a = vertex_at(world, g, corner[0])
+        b = vertex_at(world, g, corner[1])
+        c = vertex_at(world, g, corner[2])
+        rises = bool(True)
+        if shaft.flat != 0:
+            top = wp.max(wp.dot(shaft.normal, a), wp.dot(shaft.normal, b))
+            rises = wp.max(top, wp.dot(shaft.normal, c)) > shaft.height
+        looked_at += 1
+        if looked_at > TRIANGLES_LOOKED_AT:
+            found = True
+        elif rises and touches(shaft, wp.min(a, wp.min(b, c)), wp.max(a, wp.max(b, c))):
+            found = True
+        if found:
+            break
+    return found
+
+
+@wp.func
+def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
+    """Whether a body may come between a tile and a ball at the end of a way."""
+    # Box against box first: it settles most cases.
+    here = wp.vec3(tile.radius_m, tile.radius_m, tile.radius_m)
+    there = wp.vec3(radius_m, radius_m, radius_m)
+    end = tile.centre_m + way
+    low = wp.min(tile.centre_m - here, end - there) - world.bodies[b].high_m
+    high = wp.max(tile.centre_m + here, end + there) - world.bodies[b].low_m
+    if wp.max(low) > 0.0 or wp.min(high) < 0.0:
+        return False
+    g = world.bodies[b].geometry
+    shaft = shaft_to(world, b, tile, way, radius_m)
+    shades = touches(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
+    if shades:
+        shades = triangles_touch(shaft, world, g)
+    return shades
+
+
+@wp.func
+def may_shade_from(world: World, b: int, tile: Tile, lamp: Lamp):
+    """Whether a body may come between a tile and a lamp."""
+    way = lamp.position_m - tile.centre_m
+    radius_m = lamp.radius
+    if lamp.kind == SUN:
+        way = lamp.direction * -SUN_DISTANCE_M
+        radius_m = lamp.radius * SUN_DISTANCE_M
+    return may_shade(world, b, tile, way, radius_m)
+
+
+@wp.func
+def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
+    """Put a body on a list, or mark the list as too long."""
+    n = lists[tile, j, 0]
+    if n >= 0 and n < LIST_LENGTH:
+        lists[tile, j, 1 + n] = b
+        lists[tile, j, 0] = n + 1
+    else:
+        lists[tile, j, 0] = -1
+
+
+@wp.kernel
+def list_occluders(
+    world: World,
+    lattice: Lattice,
+    tile_columns: int,
+    ambient_radius_m: float,
+    lists: wp.array(dtype=int, ndim=3),
+):
+    """Bodies that may shade each tile from each lamp; the last list is for ambient occlusion.
+
+    A list begins with its length, which is -1 where it would be too long.
+    """
+    i = wp.tid()
+    tile = tile_of(lattice, i % tile_columns, i / tile_columns)
+    lamps = world.lamps.shape[0]
+    for j in range(lamps + 1):
+        lists[i, j, 0] = 0
+    if tile.count == 0:
+        return
+    near = tile
+    near.radius_m = tile.radius_m + ambient_radius_m
+    for b in range(world.bodies.shape[0]):
+        for j in range(lamps):
+            if may_shade_from(world, b, tile, world.lamps[j]):
+                append(lists, i, j, b)
+        if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
+            append(lists, i, lamps, b)
