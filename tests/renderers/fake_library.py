@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -16,7 +17,9 @@ from generator.core.geometry import (
     RobotModel,
     TextureData,
 )
-from generator.core.se3 import Vec3
+from generator.core.intrinsics import Intrinsics
+from generator.core.scene import Camera, Environment
+from generator.core.se3 import SE3, Vec3, look_at
 
 
 def box_mesh(
@@ -137,3 +140,28 @@ class FakeLibrary:
 
     def environment(self, environment_id: str) -> Float32:
         return self.environments[environment_id]
+
+
+def camera_at(
+    eye_m: Vec3,
+    target_m: Vec3,
+    size_px: tuple[int, int] = (64, 48),
+    hfov_deg: float = 60.0,
+    ev100: float | None = None,
+) -> Camera:
+    """A camera that looks at a point."""
+    intrinsics = Intrinsics.from_hfov(*size_px, math.radians(hfov_deg))
+    return Camera("camera", look_at(eye_m, target_m), intrinsics, ev100)
+
+
+def forward_camera(size_px: tuple[int, int] = (64, 48), focal_px: float = 50.0) -> Camera:
+    """A camera at the origin whose frame is the world's: X right, Y down, Z forward."""
+    width_px, height_px = size_px
+    intrinsics = Intrinsics(
+        width_px, height_px, focal_px, focal_px, 0.5 * width_px, 0.5 * height_px
+    )
+    return Camera("camera", SE3(), intrinsics)
+
+
+DARK = Environment(luminance_cd_m2=0.0, visible=False)
+MATTE = Material(base_color=(0.5, 0.5, 0.5), roughness=1.0, specular=0.0)

@@ -79,7 +79,7 @@ def test_sphere_has_its_closed_form_depth(renderer: WarpRenderer) -> None:
     a, b, c = (d * d).sum(-1), -2 * 3.0 * d[..., 2], 3.0**2 - 0.5**2
     root = b * b - 4 * a * c
     expected_m = np.where(root > 0, (-b - np.sqrt(np.maximum(root, 0))) / (2 * a), np.inf)
-    inside = root > 0.1
+    inside = root > 0.4  # where the surface is not seen at a grazing angle
 
     sagitta_m = 0.5 * (1 - math.cos(math.pi / 128))
     assert np.abs(depth_m[inside] - expected_m[inside]).max() < 4 * sagitta_m
