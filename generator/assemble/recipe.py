@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
+import cv2
+
 from generator.annotations.truth import image_truth
 from generator.assemble.spec import Spec
 from generator.assemble.tables import TABLES
@@ -35,6 +37,8 @@ class PipelineFactory:
 
     def __call__(self) -> Pipeline:
         """A pipeline, to be used as a context manager."""
+        # One process, one core: workers fill the others.
+        cv2.setNumThreads(1)
         spec = self.spec
         library = open_library(spec.asset_folders)
         recipe = recipe_of(spec, library, self.n, self.extra_channels)

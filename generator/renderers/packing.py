@@ -75,6 +75,7 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     )
     world.textures = upload(_stacked(textures, records.Texture), records.Texture)
     world.lamps = upload(_lamps(scene.lights), records.Lamp)
+    world.lobes = stock.lobes
     world.sky = _sky(scene.environment, environment)
     return PackedWorld(world, (tree, meshes, textures, environment), placed, vertex_count)
 

@@ -12,6 +12,7 @@ from generator.core.geometry import Material
 from generator.core.interfaces import AssetLibrary
 from generator.renderers.cache import ByteCache
 from generator.renderers.environments import DeviceEnvironment, upload_environment
+from generator.renderers.lobes import lobe_albedo
 from generator.renderers.meshes import DeviceMesh, upload_mesh
 from generator.renderers.textures import DeviceTexture, upload_texture
 
@@ -33,6 +34,7 @@ class AssetStock:
     def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
         self.assets = assets
         self.device = device
+        self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
         self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
         self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)
         self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)

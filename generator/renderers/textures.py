@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from generator.core.geometry import TextureData
+from generator.core.geometry import TextureData, UInt8
 from generator.core.se3 import Array
 from generator.renderers.kernels.records import Texture
+
+Pixels = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -29,20 +33,16 @@ class DeviceTexture:
 
 def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     """A texture, ready for kernels."""
-    levels = mip_levels(_linear_with_roughness(data))
-    # Square roots spend the eight bits as evenly for the eye as sRGB does, and are quick to undo.
-    texels = np.concatenate(
-        [
-            _packed(np.concatenate([np.sqrt(level[..., :3]), level[..., 3:]], axis=-1))
-            for level in levels
-        ]
+    height, width = data.albedo.shape[:2]
+    roughness = (
+        np.full((height, width), 255, np.uint8) if data.roughness is None else data.roughness
     )
-    sizes = [level.shape[0] * level.shape[1] for level in levels]
+    sizes, texels = _texels(data.albedo, roughness)
+    bumps = np.zeros(1, np.uint32) if data.normal is None else _bumps(data.normal)
     record = Texture()
-    record.height, record.width = data.albedo.shape[:2]
-    record.levels = len(levels)
+    record.height, record.width = height, width
+    record.levels = len(sizes)
     offsets = wp.array(np.cumsum([0, *sizes[:-1]]), dtype=wp.int32, device=device)
-    bumps = np.zeros(1, np.uint32) if data.normal is None else _packed_bumps(data.normal)
     on_device = [wp.array(values, dtype=wp.uint32, device=device) for values in (texels, bumps)]
     record.texels, record.bumps = on_device
     record.offsets = offsets
@@ -50,19 +50,15 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     return DeviceTexture(record.numpy_value(), (*on_device, offsets), texels.nbytes + bumps.nbytes)
 
 
-def mip_levels(image: Array) -> list[Array]:
-    """The image, halved again and again down to one texel, shape [h, w, channels] each.
+def halved(image: Array) -> Array:
+    """Means of 2 x 2 blocks of an image [h, w, channels]; a single row or column stays.
 
     Odd sizes drop their last row or column: of a tiling image that is a shift nobody sees.
     """
-    levels = [image]
-    while max(levels[-1].shape[:2]) > 1:
-        last = levels[-1]
-        height, width = max(last.shape[0] // 2, 1), max(last.shape[1] // 2, 1)
-        rows = last[: 2 * height].reshape(height, -1, last.shape[1], last.shape[2]).mean(axis=1)
-        halved = rows[:, : 2 * width].reshape(height, width, -1, last.shape[2]).mean(axis=2)
-        levels.append(halved)
-    return levels
+    height, width = max(image.shape[0] // 2, 1), max(image.shape[1] // 2, 1)
+    even = np.ascontiguousarray(image[: 2 * height, : 2 * width])
+    smaller: Array = cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA)
+    return smaller.reshape(height, width, image.shape[2])
 
 
 def srgb_to_linear(values: Array) -> Array:
@@ -70,21 +66,48 @@ def srgb_to_linear(values: Array) -> Array:
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
-def _linear_with_roughness(data: TextureData) -> Array:
-    table = srgb_to_linear(np.arange(256) / 255.0).astype(np.float32)
-    shape = data.albedo.shape[:2]
-    roughness = np.full(shape, 255, np.uint8) if data.roughness is None else data.roughness
-    grey = roughness.astype(np.float32)[..., None] / np.float32(255)
-    return np.concatenate([table[data.albedo], grey], axis=-1)
+def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint32]]:
+    """Texels per mip level, and all levels packed one after the other.
+
+    Colours are kept as square roots of linear values, which spend the eight bits as evenly for
+    the eye as sRGB does and are quick to undo; roughness is the fourth channel.
+    """
+    linear_of = srgb_to_linear(np.arange(256) / 255.0).astype(np.float32)
+    root_of = np.floor(np.sqrt(linear_of) * 255.0 + 0.5).astype(np.uint8)
+    levels = [_packed(_with_fourth(cv2.LUT(albedo, root_of), roughness))]
+    sizes = [albedo.shape[0] * albedo.shape[1]]
+    image = _with_fourth(cv2.LUT(albedo, linear_of), roughness.astype(np.float32) / 255.0)
+    while max(image.shape[:2]) > 1:
+        image = halved(image)
+        shown = np.sqrt(image)
+        shown[..., 3] = image[..., 3]
+        levels.append(_packed(_in_bytes(shown)))
+        sizes.append(image.shape[0] * image.shape[1])
+    return sizes, np.concatenate(levels)
 
 
-def _packed_bumps(normal: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    opaque = np.full((*normal.shape[:2], 1), 255, np.uint8)
-    image = np.concatenate([normal, opaque], axis=-1).astype(np.float32) / np.float32(255)
-    return np.concatenate([_packed(level) for level in mip_levels(image)])
+def _bumps(normal: UInt8) -> NDArray[np.uint32]:
+    """Normal maps of all mip levels, packed one after the other."""
+    opaque = np.full(normal.shape[:2], 255, np.uint8)
+    whole = _with_fourth(normal, opaque)
+    levels = [_packed(whole)]
+    image = whole.astype(np.float32) * np.float32(1 / 255)
+    while max(image.shape[:2]) > 1:
+        image = halved(image)
+        levels.append(_packed(_in_bytes(image)))
+    return np.concatenate(levels)
 
 
-def _packed(level: Array) -> NDArray[np.uint32]:
-    """Four channels in [0, 1] as one integer per texel, flat; the first channel lowest."""
-    steps = np.clip(np.floor(level * 255.0 + 0.5), 0, 255).astype(np.uint8)
-    return np.ascontiguousarray(steps).reshape(-1, 4).view("<u4").reshape(-1)
+def _with_fourth(three: Pixels, fourth: Pixels) -> Pixels:
+    """Three channels and one more."""
+    return cv2.merge([*cv2.split(three), fourth])
+
+
+def _in_bytes(image: Array) -> UInt8:
+    """Values in [0, 1] as bytes, rounded."""
+    return (image * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
+
+
+def _packed(image: UInt8) -> NDArray[np.uint32]:
+    """Four channels as one integer per texel, flat; the first channel lowest."""
+    return np.ascontiguousarray(image).reshape(-1, 4).view("<u4").reshape(-1)

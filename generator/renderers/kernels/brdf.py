@@ -3,9 +3,8 @@
 Sources: Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007 (GGX);
 Hammon, "PBR diffuse lighting for GGX+Smith microsurfaces", GDC 2017 (height-correlated Smith
 without square roots);
-Burley, "Physically based shading at Disney", 2012 (parameters); Lazarov, "Getting more physical
-in Call of Duty: Black Ops II", 2013, in the form of Karis, "Physically based shading on mobile",
-2014 (fit of the directional albedo); Turquin, "Practical multiple scattering compensation for
+Burley, "Physically based shading at Disney", 2012 (parameters); Karis, "Real shading in
+Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "Practical multiple scattering compensation for
 microfacet models", 2019; Lagarde and de Rousiers, "Moving Frostbite to PBR", 2014 (F90).
 """
 
@@ -41,24 +40,33 @@ class Brdf:
 
 
 @wp.func
-def directional_albedo(roughness: float, n_v: float):
-    """Reflectance of the GGX layer under uniform light: factors on F0 and on F90."""
-    rx = 1.0 - roughness
-    ry = 0.0425 - 0.0275 * roughness
-    # (1 + y / 64)^-64 for the exponential of the fit: 2^(-9.28 n_v).
-    decay = 1.0 / (1.0 + 0.10050566 * n_v)
-    decay = decay * decay
-    decay = decay * decay
-    decay = decay * decay
-    decay = decay * decay
-    decay = decay * decay
-    decay = decay * decay
-    k = wp.min(rx * rx, decay) * rx + ry
-    return -1.04 * k + 1.04 - 0.572 * roughness, 1.04 * k - 0.04 + 0.022 * roughness
+def directional_albedo(table: wp.array(dtype=wp.vec2, ndim=2), roughness: float, n_v: float):
+    """Factors on F0 and on F90 of the GGX layer's reflectance under uniform light.
+
+    Args:
+        table: The factors over [0, 1] x [0, 1], ends included, roughness by row.
+    """
+    last = float(table.shape[0] - 1)
+    x = wp.min(n_v * last, last - 0.001)
+    y = wp.min(roughness * last, last - 0.001)
+    x0 = int(x)
+    y0 = int(y)
+    fx = x - float(x0)
+    fy = y - float(y0)
+    top = table[y0, x0] * (1.0 - fx) + table[y0, x0 + 1] * fx
+    bottom = table[y0 + 1, x0] * (1.0 - fx) + table[y0 + 1, x0 + 1] * fx
+    return top * (1.0 - fy) + bottom * fy
 
 
 @wp.func
-def make_brdf(albedo: wp.vec3, roughness: float, metallic: float, specular: float, n_v: float):
+def make_brdf(
+    table: wp.array(dtype=wp.vec2, ndim=2),
+    albedo: wp.vec3,
+    roughness: float,
+    metallic: float,
+    specular: float,
+    n_v: float,
+):
     """The surface at a point with its view-dependent constants."""
     s = Brdf()
     s.roughness = wp.clamp(roughness, 0.045, 1.0)
@@ -67,10 +75,10 @@ def make_brdf(albedo: wp.vec3, roughness: float, metallic: float, specular: floa
     s.f0 = wp.vec3(dielectric, dielectric, dielectric) + albedo * metallic
     # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
     s.f90 = wp.min(50.0 * wp.max(s.f0[0], wp.max(s.f0[1], s.f0[2])), 1.0)
-    albedo_scale, albedo_bias = directional_albedo(s.roughness, s.n_v)
-    loss = 1.0 / wp.max(albedo_scale + albedo_bias, 0.05) - 1.0
+    part = directional_albedo(table, s.roughness, s.n_v)
+    loss = 1.0 / wp.max(part[0] + part[1], 0.05) - 1.0
     s.boost = wp.vec3(1.0, 1.0, 1.0) + s.f0 * loss
-    s.gloss = wp.cw_mul(s.f0 * albedo_scale + wp.vec3(s.f90, s.f90, s.f90) * albedo_bias, s.boost)
+    s.gloss = wp.cw_mul(s.f0 * part[0] + wp.vec3(s.f90, s.f90, s.f90) * part[1], s.boost)
     s.matte = wp.vec3(1.0 - s.gloss[0], 1.0 - s.gloss[1], 1.0 - s.gloss[2]) * (1.0 - metallic)
     return s
 

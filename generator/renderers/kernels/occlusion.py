@@ -159,25 +159,25 @@ def classify_blocks(
 
 @wp.func
 def classes_around(classes: wp.array(dtype=int, ndim=3), x: int, y: int, j: int):
-    """What the blocks say that a 4 x 4 window around a point touches."""
+    """What the blocks say that a window around a point touches."""
     last_row = classes.shape[0] - 1
     last_column = classes.shape[1] - 1
     x0 = wp.max((x - 2) >> 2, 0)
     y0 = wp.max((y - 2) >> 2, 0)
-    x1 = wp.min((x + 1) >> 2, last_column)
-    y1 = wp.min((y + 1) >> 2, last_row)
+    x1 = wp.min((x + 2) >> 2, last_column)
+    y1 = wp.min((y + 2) >> 2, last_row)
     return classes[y0, x0, j] | classes[y0, x1, j] | classes[y1, x0, j] | classes[y1, x1, j]
 
 
 @wp.func
 def window_bits(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, i: int):
-    """What the points of the same material say in the 4 x 4 window around a point."""
+    """What the points of the same material say in the window around a point."""
     x = i % lattice.width
     y = i / lattice.width
     own = lattice.surface[i]
     found = int(0)
-    for v in range(wp.max(y - 2, 0), wp.min(y + 2, lattice.height)):
-        for u in range(wp.max(x - 2, 0), wp.min(x + 2, lattice.width)):
+    for v in range(wp.max(y - 2, 0), wp.min(y + 3, lattice.height)):
+        for u in range(wp.max(x - 2, 0), wp.min(x + 3, lattice.width)):
             k = v * lattice.width + u
             if lattice.surface[k] == own:
                 value = values[j, k]
@@ -194,18 +194,24 @@ def window_sum(
     half: int,
     tolerance_m: float,
 ):
-    """Sum and number of the values in a window around a point, on its own surface."""
+    """Sum and number of the values in a window around a point, on its own surface.
+
+    The window is twice ``half`` wide; the points on its rim belong to it by half, so that it is
+    centred, and holds every part of a 4 x 4 pattern equally often.
+    """
     x = i % lattice.width
     y = i / lattice.width
     total = float(0.0)
     count = float(0.0)
-    for v in range(wp.max(y - half, 0), wp.min(y + half, lattice.height)):
-        for u in range(wp.max(x - half, 0), wp.min(x + half, lattice.width)):
+    for v in range(wp.max(y - half, 0), wp.min(y + half + 1, lattice.height)):
+        for u in range(wp.max(x - half, 0), wp.min(x + half + 1, lattice.width)):
             k = v * lattice.width + u
             value = values[j, k]
             if value != UNSEEN and same_surface(lattice, i, k, tolerance_m):
-                total += value
-                count += 1.0
+                w = wp.where(wp.abs(u - x) == half, 0.5, 1.0)
+                w *= wp.where(wp.abs(v - y) == half, 0.5, 1.0)
+                total += value * w
+                count += w
     return total, count
 
 

@@ -197,6 +197,7 @@ class World:
 
     Attributes:
         tree: Top-level hierarchy over the bodies' boxes.
+        lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
     """
 
     tree: wp.uint64
@@ -205,6 +206,7 @@ class World:
     surfaces: wp.array(dtype=Surface)
     textures: wp.array(dtype=Texture)
     lamps: wp.array(dtype=Lamp)
+    lobes: wp.array(dtype=wp.vec2, ndim=2)
     sky: Sky
 
 

@@ -84,7 +84,8 @@ def light_at(
     n = look.normal
     n_v = wp.dot(n, v)
     metallic = world.surfaces[surface].metallic
-    brdf = make_brdf(look.albedo, look.roughness, metallic, world.surfaces[surface].specular, n_v)
+    specular = world.surfaces[surface].specular
+    brdf = make_brdf(world.lobes, look.albedo, look.roughness, metallic, specular, n_v)
     mirrored = n * (2.0 * n_v) - v
     alpha = brdf.roughness * brdf.roughness
     light = Light()
@@ -188,15 +189,22 @@ class Cell:
 
 
 @wp.func
-def cell_at(lattice: Lattice, x: int, y: int):
+def cell_at(view: View, lattice: Lattice, x: int, y: int):
     """The cell of a pixel."""
     column = x / lattice.stride
     row = y / lattice.stride
     cell = Cell()
     cell.first = row * lattice.width + column
-    cell.right = float(x - column * lattice.stride) / float(lattice.stride)
-    cell.down = float(y - row * lattice.stride) / float(lattice.stride)
+    cell.right = float(x - column * lattice.stride) * step_at(lattice, x, view.width)
+    cell.down = float(y - row * lattice.stride) * step_at(lattice, y, view.height)
     return cell
+
+
+@wp.func
+def step_at(lattice: Lattice, x: int, width: int):
+    """One pixel as a part of its cell; the last cell of a row or column may be narrower."""
+    first = x - x % lattice.stride
+    return 1.0 / float(wp.max(wp.min(lattice.stride, width - 1 - first), 1))
 
 
 @wp.func
@@ -332,8 +340,8 @@ def gather_light(
     """
     y, segment = wp.tid()
     x = segment * run
-    cell = cell_at(lattice, x, y)
-    step = 1.0 / float(lattice.stride)
+    cell = cell_at(view, lattice, x, y)
+    step = step_at(lattice, x, view.width)
     for i in range(y * view.width + x, y * view.width + wp.min(x + run, view.width)):
         d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
         c = wp.vec3(0.0)
@@ -350,6 +358,7 @@ def gather_light(
         if x % lattice.stride == 0:
             cell.first += 1
             cell.right = 0.0
+            step = step_at(lattice, x, view.width)
 
 
 @wp.kernel
@@ -380,7 +389,7 @@ def look_around(
     y = i / view.width
     d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
     p = view.eye_m + d * images.z_m[i]
-    cell = cell_at(lattice, x, y)
+    cell = cell_at(view, lattice, x, y)
     found = float(0.0)
     sky = float(0.0)
     for j in range(world.lamps.shape[0]):

@@ -49,6 +49,7 @@ def tile_of(lattice: Lattice, column: int, row: int):
     tile = Tile()
     tile.flat = 1
     tile.height_m = -1.0e9
+    lowest_m = float(1.0e9)
     for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
         for x in range(column * TILE, wp.min((column + 1) * TILE, lattice.width)):
             i = y * lattice.width + x
@@ -61,7 +62,11 @@ def tile_of(lattice: Lattice, column: int, row: int):
                 if wp.dot(lattice.normal[i], tile.normal) < 0.99999:
                     tile.flat = 0
                 tile.height_m = wp.max(tile.height_m, wp.dot(p, tile.normal))
+                lowest_m = wp.min(lowest_m, wp.dot(p, tile.normal))
                 tile.count += 1
+    # Parallel surfaces at different heights may shade each other.
+    if tile.height_m - lowest_m > 1.0e-3:
+        tile.flat = 0
     tile.centre_m = (low + high) * 0.5
     # Rays start a little off the surface.
     tile.radius_m = wp.length(high - low) * 0.5 + 2.0e-3

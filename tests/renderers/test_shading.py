@@ -1,0 +1,334 @@
+"""Light in photometric units, against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import warp as wp
+
+from generator.core.capture import Channel
+from generator.core.geometry import Float32, Material, TextureData
+from generator.core.scene import Body, Camera, Environment, Light, Scene
+from generator.core.se3 import SE3, Vec3
+from generator.renderers.device import open_device
+from generator.renderers.kernels.brdf import make_brdf, specular_lobe
+from generator.renderers.lobes import lobe_albedo
+from generator.renderers.settings import RenderSettings
+from generator.renderers.warp import WarpRenderer
+from tests.renderers.fake_library import (
+    DARK,
+    MATTE,
+    FakeLibrary,
+    box_mesh,
+    camera_at,
+    plane_mesh,
+    sphere_mesh,
+)
+
+LINEAR = RenderSettings(tone="srgb", ambient_occlusion_radius_m=0.0)
+EV100 = 8.0
+SATURATION_CD_M2 = 1.2 * 2.0**EV100
+"""Luminance that is white at this exposure, by the saturation-based speed of ISO 12232."""
+
+
+def linear(rgb: np.ndarray) -> np.ndarray:
+    """sRGB bytes to linear values, by IEC 61966-2-1."""
+    v = rgb / 255.0
+    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
+
+
+def luminance_of(
+    scene: Scene,
+    camera: Camera,
+    library: FakeLibrary,
+    settings: RenderSettings = LINEAR,
+) -> np.ndarray:
+    """cd/m^2 of every pixel and channel, from the bytes of an image at fixed exposure."""
+    renderer = WarpRenderer(library, "cpu", settings)
+    reading = renderer.render(scene, camera, frozenset({Channel.RGB}))
+    return linear(reading.channels[Channel.RGB]) * SATURATION_CD_M2
+
+
+def ground(material: Material = MATTE) -> FakeLibrary:
+    return FakeLibrary({"plane": plane_mesh(20.0, (material,)), "box": box_mesh()})
+
+
+def from_above(size_px: tuple[int, int] = (48, 36)) -> Camera:
+    return camera_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), size_px, hfov_deg=20.0, ev100=EV100)
+
+
+def test_a_matte_plane_under_a_sun_has_luminance_e_rho_over_pi() -> None:
+    """Lambert: 2000 lx at 60 degrees on an albedo of 0.5 is 1000 * 0.5 / pi = 159 cd/m^2."""
+    s, c = math.sin(math.radians(60.0)), math.cos(math.radians(60.0))
+    sun = Light("sun", "sun", direction=(s, 0.0, -c), illuminance_lux=2000.0)
+    scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK)
+
+    luminance = luminance_of(scene, from_above(), ground())
+
+    np.testing.assert_allclose(luminance, 1000.0 * 0.5 / math.pi, rtol=0.012)
+
+
+def test_a_lamp_falls_off_with_the_square_of_its_distance() -> None:
+    """I cos / d^2: 800 cd at 2 m straight above is 200 lx below, less at the sides."""
+    lamp = Light("lamp", "sphere", (0.0, 0.0, 2.0), intensity_cd=800.0, radius_m=0.02)
+    scene = Scene("t", (Body("p", "plane"),), lights=(lamp,), environment=DARK)
+    camera = camera_at((0.0, 0.0, 1.9), (0.0, 0.0, 0.0), (48, 36), hfov_deg=90.0, ev100=6.0)
+
+    rgb = WarpRenderer(ground(), "cpu", LINEAR).render(scene, camera, frozenset({Channel.RGB}))
+
+    x = (np.arange(48) + 0.5 - 24.0) / 24.0 * 1.9
+    y = (np.arange(36) + 0.5 - 18.0) / 24.0 * 1.9
+    d2 = x[None] ** 2 + y[:, None] ** 2 + 4.0
+    expected = 800.0 * 2.0 / d2**1.5 * 0.5 / math.pi
+    measured = linear(rgb.channels[Channel.RGB])[..., 1] * 1.2 * 2.0**6
+    assert np.abs(measured / expected - 1.0).max() < 0.03
+
+
+def test_a_spot_lights_its_cone_and_nothing_beside() -> None:
+    """Full within 0.8 of its half angle, dark beyond it."""
+    spot = Light(
+        "spot", "spot", (0.0, 0.0, 2.0), (0.0, 0.0, -1.0), intensity_cd=800.0, cone_rad=0.2
+    )
+    scene = Scene("t", (Body("p", "plane"),), lights=(spot,), environment=DARK)
+
+    luminance = luminance_of(scene, from_above((192, 36)), ground())[18, :, 1]
+
+    # 192 px over 2 * 3 * tan(10 degrees) = 1.058 m; the cone's edge is at 2 * tan(0.2) = 0.405 m.
+    x_m = (np.arange(192) + 0.5 - 96.0) * (6.0 * math.tan(math.radians(10.0)) / 192.0)
+    assert luminance[np.abs(x_m) > 0.42].max() < 0.5
+    centre = luminance[np.abs(x_m) < 2.0 * math.tan(0.16) - 0.02]
+    cosine = 2.0 / np.sqrt(x_m[np.abs(x_m) < 2.0 * math.tan(0.16) - 0.02] ** 2 + 4.0)
+    np.testing.assert_allclose(centre, 200.0 * cosine**3 * 0.5 / math.pi, rtol=0.03)
+
+
+@pytest.mark.parametrize("albedo", [(0.2, 0.5, 0.8), (0.9, 0.9, 0.9)])
+def test_a_matte_ball_under_a_uniform_sky_has_luminance_albedo_times_sky(albedo: Vec3) -> None:
+    """In a furnace a matte surface is seen in its albedo, wherever it faces."""
+    material = Material(base_color=albedo, roughness=1.0, specular=0.0)
+    library = FakeLibrary({"ball": sphere_mesh(0.5, 32, (material,))})
+    scene = Scene("t", (Body("b", "ball"),), environment=Environment(luminance_cd_m2=200.0))
+    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (48, 36), hfov_deg=20.0, ev100=EV100)
+
+    luminance = luminance_of(scene, camera, library)
+
+    expected = np.broadcast_to(200.0 * np.array(albedo), (12, 16, 3))
+    np.testing.assert_allclose(luminance[12:24, 16:32], expected, rtol=0.012)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.4, 0.7, 1.0])
+def test_a_white_metal_vanishes_in_a_furnace(roughness: float) -> None:
+    """With multiple scattering a perfect mirror, however rough, reflects all of a uniform sky."""
+    material = Material(base_color=(1.0, 1.0, 1.0), roughness=roughness, metallic=1.0)
+    library = FakeLibrary({"ball": sphere_mesh(0.5, 32, (material,))})
+    scene = Scene("t", (Body("b", "ball"),), environment=Environment(luminance_cd_m2=200.0))
+    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (48, 36), hfov_deg=20.0, ev100=EV100)
+
+    luminance = luminance_of(scene, camera, library)
+
+    np.testing.assert_allclose(luminance[12:24, 16:32], 200.0, rtol=0.012)
+
+
+@wp.kernel(enable_backward=False)
+def _lobe_albedo(
+    table: wp.array(dtype=wp.vec2, ndim=2),
+    roughness: float,
+    specular: float,
+    metallic: float,
+    n_v: float,
+    fitted: wp.array(dtype=float),
+    summed: wp.array(dtype=float),
+):
+    """Directional albedo of the specular layer: by the table, and by summing over directions."""
+    s = make_brdf(table, wp.vec3(1.0, 1.0, 1.0), roughness, metallic, specular, n_v)
+    n = wp.vec3(0.0, 0.0, 1.0)
+    v = wp.vec3(wp.sqrt(1.0 - n_v * n_v), 0.0, n_v)
+    total = float(0.0)
+    for i in range(400):
+        # Equal steps in sin^2 of the polar angle weight by the cosine.
+        sine2 = (float(i) + 0.5) / 400.0
+        sine = wp.sqrt(sine2)
+        cosine = wp.sqrt(1.0 - sine2)
+        for j in range(400):
+            a = (float(j) + 0.5) / 400.0 * 2.0 * wp.pi
+            light = wp.vec3(sine * wp.cos(a), sine * wp.sin(a), cosine)
+            total += specular_lobe(s, n, v, light, cosine, 0.0)[0]
+    fitted[0] = s.gloss[0]
+    summed[0] = total * wp.pi / 160000.0
+
+
+@pytest.mark.parametrize("n_v", [0.3, 0.6, 0.95])
+@pytest.mark.parametrize("roughness", [0.3, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+def test_lamps_and_sky_see_the_same_reflectance(
+    roughness: float, metallic: float, n_v: float
+) -> None:
+    """The GGX lobe that lamps use sums to the albedo that the sky uses; white metal to 1."""
+    open_device("cpu")
+    fitted, summed = wp.zeros(1, device="cpu"), wp.zeros(1, device="cpu")
+
+    table = wp.array(lobe_albedo(), dtype=wp.vec2, device="cpu")
+    inputs = [table, roughness, 0.5, metallic, n_v]
+    wp.launch(_lobe_albedo, 1, inputs, [fitted, summed], device="cpu")
+
+    tolerance = 0.02 if metallic else 0.004
+    assert abs(float(summed.numpy()[0]) - float(fitted.numpy()[0])) < tolerance
+    if metallic:
+        assert abs(float(fitted.numpy()[0]) - 1.0) < 1e-4
+
+
+def shadow_profile(radius_m: float, settings: RenderSettings) -> tuple[np.ndarray, np.ndarray]:
+    """Luminance on the ground along x behind the edge of a slab 0.5 m up, under a lamp at 2 m."""
+    slab = box_mesh((0.6, 4.0, 0.02))
+    library = FakeLibrary({"plane": plane_mesh(20.0, (MATTE,)), "slab": slab})
+    lamp = Light("lamp", "sphere", (0.0, 0.0, 2.0), intensity_cd=800.0, radius_m=radius_m)
+    bodies = (Body("p", "plane"), Body("slab", "slab", SE3((0.0, 0.0, 0.51))))
+    scene = Scene("t", bodies, lights=(lamp,), environment=DARK)
+    camera = camera_at((0.4, 0.0, 8.0), (0.4, 0.0, 0.0), (320, 60), hfov_deg=7.0, ev100=EV100)
+    luminance = luminance_of(scene, camera, library, settings)[30, :, 1]
+    width_m = 16.0 * math.tan(math.radians(3.5))
+    x = 0.4 + ((np.arange(320) + 0.5) / 320.0 - 0.5) * width_m
+    lit = 800.0 * 2.0 / (x**2 + 4.0) ** 1.5 * 0.5 / math.pi
+    return x, luminance / lit
+
+
+def test_the_penumbra_of_a_ball_has_the_width_of_similar_triangles() -> None:
+    """Edge at x = 0.3 and z = 0.5, lamp of radius 0.2 at z = 2: half shadow at x = 0.4.
+
+    The penumbra is 2 * 0.2 * 0.5 / 1.5 = 0.133 m wide; the part of a disc beyond a line gives
+    its profile. Smoothing may widen it by the window's 12 px = 0.037 m, in quadrature.
+    """
+    x, visible = shadow_profile(0.2, LINEAR)
+
+    s = np.clip((x - 0.4) / (0.2 * 0.5 / 1.5), -1.0, 1.0)
+    expected = 1.0 - (np.arccos(s) - s * np.sqrt(1.0 - s * s)) / math.pi
+    on_ground = x > 0.33
+    assert np.abs(visible - expected)[on_ground].max() < 0.09
+    assert visible[on_ground & (x < 0.33 + 0.003)].max() < 0.03
+    assert visible[x > 0.49].min() > 0.97
+
+
+def test_hard_shadows_have_no_penumbra() -> None:
+    """The same lamp, taken for a point: from dark to light within the smoothing window."""
+    x, visible = shadow_profile(0.2, LINEAR.model_copy(update={"shadows": "hard"}))
+
+    on_ground = x > 0.33
+    assert visible[on_ground & (x < 0.375)].max() < 0.03
+    assert visible[x > 0.425].min() > 0.97
+
+
+def test_a_shadow_touches_what_throws_it() -> None:
+    """A box on the ground, sun at 45 degrees: dark right behind the box, light right before it."""
+    sun = Light("sun", "sun", direction=(0.7071068, 0.0, -0.7071068), illuminance_lux=2000.0)
+    bodies = (Body("p", "plane"), Body("b", "box", SE3((0.0, 0.0, 0.1)), 0.2))
+    library = FakeLibrary({"plane": plane_mesh(20.0, (MATTE,)), "box": box_mesh()})
+    scene = Scene("t", bodies, lights=(sun,), environment=DARK)
+    camera = camera_at((0.0, -0.02, 4.0), (0.0, 0.0, 0.0), (160, 120), hfov_deg=12.0, ev100=EV100)
+    renderer = WarpRenderer(library, "cpu", LINEAR)
+
+    reading = renderer.render(
+        scene, camera, frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.NORMALS})
+    )
+
+    p = camera.T_world_camera.apply(camera.intrinsics.unproject(reading.channels[Channel.Z_DEPTH]))
+    luminance = linear(reading.channels[Channel.RGB])[..., 1]
+    floor = (p[..., 2] < 1e-3) & (np.abs(p[..., 1]) < 0.05)
+    behind = floor & (p[..., 0] > 0.108) & (p[..., 0] < 0.22)
+    before = floor & (p[..., 0] < -0.115)
+    assert behind.any()
+    assert luminance[behind].max() < 0.1 * luminance[before].min()
+
+
+def checkers() -> TextureData:
+    tiles = np.indices((64, 64)).sum(axis=0) % 2 * 255
+    return TextureData(np.repeat(tiles[..., None], 3, axis=-1).astype(np.uint8))
+
+
+def test_a_texture_seen_from_afar_is_its_mean() -> None:
+    """Black and white texels far below a pixel's size are half as bright as white, not noise."""
+    material = Material((1.0, 1.0, 1.0), 1.0, specular=0.0, texture="t", texture_scale_m=0.1)
+    library = FakeLibrary({"plane": plane_mesh(40.0, (material,))}, {"t": checkers()})
+    sun = Light("sun", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=400.0 * math.pi)
+    scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK)
+
+    luminance = luminance_of(scene, from_above(), library)
+
+    np.testing.assert_allclose(luminance, 0.5 * 400.0, rtol=0.02)
+
+
+def halves(size: int = 64) -> TextureData:
+    image = np.zeros((size, size, 3), np.uint8)
+    image[:, : size // 2] = (255, 0, 0)
+    image[: size // 2, size // 2 :] = (0, 255, 0)
+    image[size // 2 :, size // 2 :] = (0, 0, 255)
+    return TextureData(image)
+
+
+def test_mesh_uvs_put_v_0_at_the_bottom_of_the_image() -> None:
+    """Left half red, right half green above blue: u grows to the right, v upwards."""
+    material = Material((1.0, 1.0, 1.0), 1.0, specular=0.0, texture="t")
+    library = FakeLibrary({"plane": plane_mesh(2.0, (material,))}, {"t": halves()})
+    scene = Scene("t", (Body("p", "plane"),), environment=Environment(luminance_cd_m2=200.0))
+    camera = camera_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (64, 64), hfov_deg=28.0, ev100=EV100)
+    reading = WarpRenderer(library, "cpu", LINEAR).render(
+        scene, camera, frozenset({Channel.RGB, Channel.Z_DEPTH})
+    )
+
+    p = camera.T_world_camera.apply(camera.intrinsics.unproject(reading.channels[Channel.Z_DEPTH]))
+    strongest = reading.channels[Channel.RGB].argmax(axis=-1)
+    clear = np.isfinite(p).all(axis=-1) & (np.abs(p[..., :2]) > 0.1).all(axis=-1)
+    clear &= (np.abs(p[..., :2]) < 0.9).all(axis=-1)
+    expected = np.where(p[..., 0] < 0, 0, np.where(p[..., 1] > 0, 1, 2))
+    assert (strongest == expected)[clear].all()
+
+
+def pointing_sky(direction: Vec3) -> Float32:
+    """A sky that is bright within ten degrees of a direction."""
+    height = 64
+    polar = math.pi * (np.arange(height) + 0.5) / height
+    # Column 0 is -X, the centre +X, columns grow clockwise seen from above (towards -Y).
+    clockwise = 2.0 * math.pi * (np.arange(2 * height) + 0.5) / (2 * height)
+    x = -np.sin(polar)[:, None] * np.cos(clockwise)[None]
+    y = np.sin(polar)[:, None] * np.sin(clockwise)[None]
+    z = np.broadcast_to(np.cos(polar)[:, None], x.shape)
+    d = np.stack([x, y, z], axis=-1)
+    bright = (d * np.asarray(direction)).sum(axis=-1) > math.cos(math.radians(10.0))
+    return np.repeat(np.where(bright, 100.0, 0.1)[..., None], 3, axis=-1).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("direction", "yaw_rad", "seen"),
+    [
+        ((1.0, 0.0, 0.0), 0.0, (1.0, 0.0, 0.0)),
+        ((0.0, 1.0, 0.0), 0.0, (0.0, 1.0, 0.0)),
+        ((0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 1.0)),
+        ((1.0, 0.0, 0.0), math.pi / 2, (0.0, 1.0, 0.0)),
+    ],
+)
+@pytest.mark.parametrize("roughness", [0.05, 0.3])
+def test_the_sky_is_seen_and_mirrored_where_it_is(
+    direction: Vec3, yaw_rad: float, seen: Vec3, roughness: float
+) -> None:
+    """Its bright spot, turned about Z, is where pixels look and where a metal ball mirrors it."""
+    metal = Material((1.0, 1.0, 1.0), roughness, 1.0)
+    library = FakeLibrary(
+        {"ball": sphere_mesh(0.5, 64, (metal,))}, environments={"s": pointing_sky(direction)}
+    )
+    scene = Scene("t", (Body("b", "ball"),), environment=Environment("s", 20.0, yaw_rad))
+    # A mirror that faces half-way between eye and spot shows it: here the eye is at 90 degrees.
+    side = np.roll(seen, 1)
+    eye = tuple(float(v) for v in 4.0 * side)
+    camera = camera_at(eye, (0.0, 0.0, 0.0), (96, 96), hfov_deg=16.0, ev100=4.0)
+
+    reading = WarpRenderer(library, "cpu", LINEAR).render(
+        scene, camera, frozenset({Channel.RGB, Channel.NORMALS})
+    )
+
+    brightness = reading.channels[Channel.RGB][..., 1].astype(float)
+    normals = camera.T_world_camera.rotate(reading.channels[Channel.NORMALS])
+    on_ball = np.abs(normals).sum(axis=-1) > 0
+    weights = np.where(on_ball & (brightness > 0.9 * brightness[on_ball].max()), 1.0, 0.0)
+    mean = (normals * weights[..., None]).sum(axis=(0, 1)) / weights.sum()
+    halfway = (np.asarray(seen) + side) / math.sqrt(2.0)
+    assert mean @ halfway / np.linalg.norm(mean) > math.cos(math.radians(6.0))
