@@ -148,20 +148,28 @@ def _measured(points: Array) -> tuple[Hull, float, Array]:
     moment = (volumes[:, None] * triangles.sum(axis=1) / 4.0).sum(axis=0)
     depths = np.einsum("fk,nk->fn", normals, hull.points[kept], optimize=False)
     width_m = float((depths.max(axis=1) - depths.min(axis=1)).min())
-    retreats = np.array([_retreat(normals[(hull.simplices == v).any(axis=1)]) for v in kept])
+    meets = (hull.simplices[None, :, :] == kept[:, None, None]).any(axis=2)
+    retreats = _retreats(normals, meets.astype(np.float64))
     return Hull(points[kept], retreats, width_m), volume_m3, middle + moment / volume_m3
 
 
-def _retreat(normals: Array) -> Array:
-    """Where a vertex goes when its faces move inward by one: ``n . x = -1``, by least squares.
+def _retreats(normals: Array, meets: Array) -> Array:
+    """Where vertices go when their faces move inward by one: ``n . x = -1``, by least squares.
 
-    A trace of damping picks the shortest answer where all faces lie in one plane.
+    A trace of damping picks the shortest answer where all faces of a vertex lie in one plane.
+
+    Args:
+        normals: Of the faces, shape [f, 3].
+        meets: 1 where a vertex belongs to a face, else 0, shape [v, f].
     """
-    a = np.einsum("ni,nj->ij", normals, normals, optimize=False) + 1e-9 * np.eye(3)
-    cofactors = np.stack([np.cross(a[1], a[2]), np.cross(a[2], a[0]), np.cross(a[0], a[1])])
-    x: Array = -_dot(cofactors, normals.sum(axis=0)) / _dot(a[0], cofactors[0])
-    length = math.sqrt(float(_dot(x, x)))
-    return x * min(1.0, _RETREAT_MAX / length)
+    squares = np.einsum("fi,fj->fij", normals, normals, optimize=False)
+    a = np.einsum("vf,fij->vij", meets, squares, optimize=False) + 1e-9 * np.eye(3)
+    b = np.einsum("vf,fi->vi", meets, normals, optimize=False)
+    rows = (np.cross(a[:, 1], a[:, 2]), np.cross(a[:, 2], a[:, 0]), np.cross(a[:, 0], a[:, 1]))
+    cofactors = np.stack(rows, axis=1)
+    x: Array = -_dot(cofactors, b[:, None, :]) / _dot(a[:, 0], cofactors[:, 0])[:, None]
+    lengths = np.sqrt(_dot(x, x))[:, None]
+    return x * np.minimum(1.0, _RETREAT_MAX / lengths)
 
 
 def _dot(a: Array, b: Array) -> Array:

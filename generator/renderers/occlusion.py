@@ -116,8 +116,7 @@ def _lit(
         wp.launch(occlusion.probe_lamps, n, [*inputs, parity], [probed], device=device)
     classes = _classes(lattice, probed, lamps, stock)
     wp.launch(occlusion.refine_lamps, n, [*inputs, classes, probed], [lit], device=device)
-    classes = _classes(lattice, lit, lamps, stock)
-    wp.launch(occlusion.smooth_lattice, n, [view, lattice, classes, lit], [probed], device=device)
+    _smooth(view, lattice, lit, probed, stock)
     return probed
 
 
@@ -139,10 +138,23 @@ def _open_sky(
     hemisphere = wp.array(cosine_hemisphere(16), dtype=wp.vec3, device=stock.device)
     inputs = [world.record, lattice, columns, lists, hemisphere, radius_m]
     wp.launch(occlusion.probe_ambient, n, inputs, [probed], device=stock.device)
-    classes = _classes(lattice, probed, 1, stock)
-    inputs = [view, lattice, classes, probed]
-    wp.launch(occlusion.smooth_lattice, n, inputs, [open_sky], device=stock.device)
+    _smooth(view, lattice, probed, open_sky, stock)
     return open_sky
+
+
+def _smooth(
+    view: records.View,
+    lattice: lattice_kernels.Lattice,
+    values: wp.array,
+    smoothed: wp.array,
+    stock: AssetStock,
+) -> None:
+    rows, n = values.shape
+    classes = _classes(lattice, values, rows, stock)
+    sums = stock.scratch("row sums", (rows, n), wp.vec2)
+    inputs = [view, lattice, classes, values]
+    wp.launch(occlusion.sum_rows, n, [*inputs, 2], [sums], device=stock.device)
+    wp.launch(occlusion.smooth_lattice, n, [*inputs, sums], [smoothed], device=stock.device)
 
 
 def _classes(

@@ -116,15 +116,3 @@ def agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: float):
     if cosine < 0.9 or wp.abs(wp.dot(n, q - p)) > tolerance_m:
         cosine = 0.0
     return cosine
-
-
-@wp.func
-def same_surface(lattice: Lattice, i: int, j: int, tolerance_m: float):
-    """Whether two lattice points share what they see of the world."""
-    same = bool(False)
-    if lattice.surface[i] == lattice.surface[j]:
-        same = (
-            agree(lattice.p_m[i], lattice.normal[i], lattice.p_m[j], lattice.normal[j], tolerance_m)
-            > 0.0
-        )
-    return same

@@ -6,15 +6,15 @@
    points of a 4 x 4 block aim at sixteen parts of the lamp (interleaved sampling, Keller and
    Heidrich, 2001).
 3. Where all points around one agree, that is the answer. Elsewhere, in penumbrae, points cast
-   more rays, and sixteen neighbours on one surface are averaged: together they have looked at all
-   parts of the lamp, wherever they lie, so that no pattern remains.
+   more rays, and sixteen neighbours on one surface are averaged, rows first: together they have
+   looked at all parts of the lamp, wherever they lie, so that no pattern remains.
 """
 
 from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.lattice import Lattice, same_surface
+from generator.renderers.kernels.lattice import Lattice, agree
 from generator.renderers.kernels.lighting import SUN, SUN_DISTANCE_M, beam_from
 from generator.renderers.kernels.rays import blocked_by_listed, free_of_listed, path_along
 from generator.renderers.kernels.records import Lamp, View, World, unit
@@ -185,55 +185,6 @@ def window_bits(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int,
     return found
 
 
-@wp.func
-def window_sum(
-    lattice: Lattice,
-    values: wp.array(dtype=float, ndim=2),
-    j: int,
-    i: int,
-    half: int,
-    tolerance_m: float,
-):
-    """Sum and number of the values in a window around a point, on its own surface.
-
-    The window is twice ``half`` wide; the points on its rim belong to it by half, so that it is
-    centred, and holds every part of a 4 x 4 pattern equally often.
-    """
-    x = i % lattice.width
-    y = i / lattice.width
-    total = float(0.0)
-    count = float(0.0)
-    for v in range(wp.max(y - half, 0), wp.min(y + half + 1, lattice.height)):
-        for u in range(wp.max(x - half, 0), wp.min(x + half + 1, lattice.width)):
-            k = v * lattice.width + u
-            value = values[j, k]
-            if value != UNSEEN and same_surface(lattice, i, k, tolerance_m):
-                w = wp.where(wp.abs(u - x) == half, 0.5, 1.0)
-                w *= wp.where(wp.abs(v - y) == half, 0.5, 1.0)
-                total += value * w
-                count += w
-    return total, count
-
-
-@wp.func
-def window_mean(
-    lattice: Lattice,
-    values: wp.array(dtype=float, ndim=2),
-    j: int,
-    i: int,
-    tolerance_m: float,
-):
-    """Mean over the 4 x 4 window around a point, or 8 x 8 where its surface ends nearby."""
-    total, count = window_sum(lattice, values, j, i, 2, tolerance_m)
-    if count < 12.0:
-        # Half a window has seen half of the lamp, or of the sky.
-        total, count = window_sum(lattice, values, j, i, 4, tolerance_m)
-    mean = values[j, i]
-    if count > 0.0:
-        mean = total / count
-    return mean
-
-
 @wp.kernel
 def refine_lamps(
     world: World,
@@ -275,12 +226,81 @@ def surface_tolerance(view: View, p: wp.vec3):
     return 3.0 * view.pixel_rad * wp.length(p - view.eye_m)
 
 
+@wp.func
+def rim_weight(offset: int, half: int):
+    """Windows are 2 ``half`` wide: the points on their rims belong to them by half.
+
+    So they are centred, and hold every part of a 4 x 4 pattern equally often.
+    """
+    return wp.where(wp.abs(offset) == half, 0.5, 1.0)
+
+
+@wp.func
+def alike(lattice: Lattice, i: int, k: int, tolerance_m: float):
+    """Whether two lattice points lie on one stretch of surface."""
+    same = bool(False)
+    if lattice.surface[i] == lattice.surface[k]:
+        p = lattice.p_m[i]
+        same = agree(p, lattice.normal[i], lattice.p_m[k], lattice.normal[k], tolerance_m) > 0.0
+    return same
+
+
+@wp.kernel
+def sum_rows(
+    view: View,
+    lattice: Lattice,
+    classes: wp.array(dtype=int, ndim=3),
+    values: wp.array(dtype=float, ndim=2),
+    half: int,
+    sums: wp.array(dtype=wp.vec2, ndim=2),
+):
+    """Sum and number of the values beside each point, on its own surface.
+
+    Skipped where all agree; but a window of ``half`` 2 above or below may reach here.
+    """
+    i = wp.tid()
+    x = i % lattice.width
+    y = i / lattice.width
+    for j in range(values.shape[0]):
+        found = classes_around(classes, x, wp.max(y - 2, 0), j)
+        found = found | classes_around(classes, x, wp.min(y + 2, lattice.height - 1), j)
+        total = wp.vec2(0.0, 0.0)
+        if lattice.surface[i] >= 0 and found != 1 and found != 2:
+            tolerance_m = surface_tolerance(view, lattice.p_m[i])
+            for u in range(wp.max(x - half, 0), wp.min(x + half + 1, lattice.width)):
+                k = i + u - x
+                value = values[j, k]
+                if value != UNSEEN and alike(lattice, i, k, tolerance_m):
+                    total += wp.vec2(value, 1.0) * rim_weight(u - x, half)
+        sums[j, i] = total
+
+
+@wp.func
+def column_sum(
+    lattice: Lattice,
+    sums: wp.array(dtype=wp.vec2, ndim=2),
+    j: int,
+    i: int,
+    half: int,
+    tolerance_m: float,
+):
+    """The sums of rows, summed above and below a point, on its own surface."""
+    y = i / lattice.width
+    total = wp.vec2(0.0, 0.0)
+    for v in range(wp.max(y - half, 0), wp.min(y + half + 1, lattice.height)):
+        k = i + (v - y) * lattice.width
+        if alike(lattice, i, k, tolerance_m):
+            total += sums[j, k] * rim_weight(v - y, half)
+    return total
+
+
 @wp.kernel
 def smooth_lattice(
     view: View,
     lattice: Lattice,
     classes: wp.array(dtype=int, ndim=3),
     values: wp.array(dtype=float, ndim=2),
+    sums: wp.array(dtype=wp.vec2, ndim=2),
     smoothed: wp.array(dtype=float, ndim=2),
 ):
     """Average the values of neighbours on one surface, wherever they differ."""
@@ -295,7 +315,12 @@ def smooth_lattice(
                 value = float(found - 1)
             else:
                 tolerance_m = surface_tolerance(view, lattice.p_m[i])
-                value = window_mean(lattice, values, j, i, tolerance_m)
+                total = column_sum(lattice, sums, j, i, 2, tolerance_m)
+                if total[1] < 12.0:
+                    # Where its surface ends, part of a window has seen part of the lamp only.
+                    total = column_sum(lattice, sums, j, i, 4, tolerance_m)
+                if total[1] > 0.0:
+                    value = total[0] / total[1]
         smoothed[j, i] = value
 
 
