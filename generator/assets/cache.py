@@ -29,7 +29,7 @@ Arrays = dict[str, NDArray[Any]]
 
 FORMAT = 1
 """Raised whenever the same sources would be stored as other arrays."""
-_MEMORY_BYTES = 160 * 1024 * 1024
+_MEMORY_BYTES = 96 * 1024 * 1024
 
 
 def content_key(description: Mapping[str, Any]) -> str:

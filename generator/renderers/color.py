@@ -18,6 +18,10 @@ from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
 
 
+# Column of the sample in each row of a pixel, far from that of the rows beside it.
+_ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
+
+
 def color_image(
     camera: Camera,
     world: PackedWorld,
@@ -51,11 +55,8 @@ def color_image(
 
 def pixel_parts(n: int) -> Array:
     """Sample positions in a pixel, [0, 1), shape [n, 2]: no two in one row or column (n-rooks)."""
-    rows = np.arange(n)
-    # Steps of 2 in 4 and of 3 in 8, shifted by half turns, are the rotated grids of graphics cards.
-    step = {1: 1, 2: 1, 4: 2, 8: 3}[n]
-    columns = (rows * step + (rows * step) // n + (1 if n > 1 else 0)) % n
-    return (np.stack([columns, rows], axis=-1) + 0.5) / n
+    columns = _ROOKS[n]
+    return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
 
 
 def _images(seen: Seen) -> shade.Images:

@@ -153,7 +153,7 @@ def _smooth(
     classes = _classes(lattice, values, rows, stock)
     sums = stock.scratch("row sums", (rows, n), wp.vec2)
     inputs = [view, lattice, classes, values]
-    wp.launch(occlusion.sum_rows, n, [*inputs, 2], [sums], device=stock.device)
+    wp.launch(occlusion.sum_rows, n, inputs, [sums], device=stock.device)
     wp.launch(occlusion.smooth_lattice, n, [*inputs, sums], [smoothed], device=stock.device)
 
 

@@ -79,6 +79,7 @@ def _work(number: int, connection: Connection, job: Job) -> None:
         connection.send(Ready(number))
         while (shard := connection.recv()) is not None:
             _make(number, connection, job, pipeline, shard)
+            _give_memory_back()
 
 
 def _make(
@@ -115,6 +116,13 @@ def resident_bytes() -> int:
     except OSError:
         return 0
     return pages * resource.getpagesize()
+
+
+def _give_memory_back() -> None:
+    """Return freed memory to the system: glibc keeps what caches of arrays leave in between."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def _die_with(parent_pid: int) -> None:

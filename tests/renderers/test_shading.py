@@ -34,7 +34,7 @@ SATURATION_CD_M2 = 1.2 * 2.0**EV100
 
 
 def linear(rgb: np.ndarray) -> np.ndarray:
-    """sRGB bytes to linear values, by IEC 61966-2-1."""
+    """SRGB bytes to linear values, by IEC 61966-2-1."""
     v = rgb / 255.0
     return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
 
@@ -139,12 +139,12 @@ def _lobe_albedo(
     n_v: float,
     fitted: wp.array(dtype=float),
     summed: wp.array(dtype=float),
-):
+):  # noqa: ANN202
     """Directional albedo of the specular layer: by the table, and by summing over directions."""
     s = make_brdf(table, wp.vec3(1.0, 1.0, 1.0), roughness, metallic, specular, n_v)
     n = wp.vec3(0.0, 0.0, 1.0)
     v = wp.vec3(wp.sqrt(1.0 - n_v * n_v), 0.0, n_v)
-    total = float(0.0)
+    total = 0.0
     for i in range(400):
         # Equal steps in sin^2 of the polar angle weight by the cosine.
         sine2 = (float(i) + 0.5) / 400.0

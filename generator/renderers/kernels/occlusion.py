@@ -251,12 +251,11 @@ def sum_rows(
     lattice: Lattice,
     classes: wp.array(dtype=int, ndim=3),
     values: wp.array(dtype=float, ndim=2),
-    half: int,
     sums: wp.array(dtype=wp.vec2, ndim=2),
 ):
     """Sum and number of the values beside each point, on its own surface.
 
-    Skipped where all agree; but a window of ``half`` 2 above or below may reach here.
+    Skipped where all agree, and nothing above or below asks.
     """
     i = wp.tid()
     x = i % lattice.width
@@ -267,11 +266,11 @@ def sum_rows(
         total = wp.vec2(0.0, 0.0)
         if lattice.surface[i] >= 0 and found != 1 and found != 2:
             tolerance_m = surface_tolerance(view, lattice.p_m[i])
-            for u in range(wp.max(x - half, 0), wp.min(x + half + 1, lattice.width)):
+            for u in range(wp.max(x - 2, 0), wp.min(x + 3, lattice.width)):
                 k = i + u - x
                 value = values[j, k]
                 if value != UNSEEN and alike(lattice, i, k, tolerance_m):
-                    total += wp.vec2(value, 1.0) * rim_weight(u - x, half)
+                    total += wp.vec2(value, 1.0) * rim_weight(u - x, 2)
         sums[j, i] = total
 
 

@@ -1,0 +1,218 @@
+"""The renderer as a pure function: bytes, memory, devices."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import psutil
+import pytest
+
+from generator.core.capture import Channel, Reading
+from generator.core.errors import ConfigError
+from generator.core.geometry import Material
+from generator.core.scene import Body, Camera, Light, Scene
+from generator.core.se3 import SE3
+from generator.renderers import TABLE
+from generator.renderers.cache import ByteCache
+from generator.renderers.meshes import is_convex_solid
+from generator.renderers.settings import RenderSettings
+from generator.renderers.warp import WarpRenderer
+from tests.renderers.fake_library import (
+    FakeLibrary,
+    box_mesh,
+    camera_at,
+    plane_mesh,
+    room_mesh,
+    sphere_mesh,
+)
+
+EVERYTHING = frozenset(Channel)
+
+
+def library() -> FakeLibrary:
+    meshes = {f"box{k}": box_mesh((0.1 + 0.01 * k, 0.2, 0.1)) for k in range(12)}
+    return FakeLibrary({**meshes, "room": room_mesh(), "ball": sphere_mesh(0.1, 16)})
+
+
+def scene_of(seed: int) -> Scene:
+    rng = np.random.default_rng(seed)
+    bodies = [Body("room", "room")]
+    for k in range(8):
+        x, y = (float(v) for v in rng.uniform(-0.5, 0.5, 2))
+        asset = "ball" if k == 0 else f"box{int(rng.integers(12))}"
+        bodies.append(
+            Body(f"b{k}", asset, SE3.about_z(float(rng.uniform(0, 6)), (x, y, 0.1)), instance_id=k)
+        )
+    lamp = Light("l", "sphere", (0.5, 0.5, 2.0), intensity_cd=300.0, radius_m=0.1)
+    return Scene("t", tuple(bodies), lights=(lamp,))
+
+
+def camera(size_px: tuple[int, int] = (96, 72)) -> Camera:
+    return camera_at((1.2, -0.8, 1.0), (0.0, 0.0, 0.1), size_px)
+
+
+def assert_same(a: Reading, b: Reading) -> None:
+    assert a.channels.keys() == b.channels.keys()
+    for channel, image in a.channels.items():
+        np.testing.assert_array_equal(image, b.channels[channel], err_msg=str(channel))
+    assert a.silhouettes.keys() == b.silhouettes.keys()
+    for instance_id, silhouette in a.silhouettes.items():
+        np.testing.assert_array_equal(silhouette.mask, b.silhouettes[instance_id].mask)
+
+
+def test_the_same_scene_gives_the_same_bytes_whatever_was_rendered_before() -> None:
+    """Twenty other scenes and another image size in between change nothing."""
+    first = WarpRenderer(library(), "cpu").render(scene_of(0), camera(), EVERYTHING)
+    renderer = WarpRenderer(library(), "cpu")
+    for seed in range(1, 21):
+        renderer.render(scene_of(seed), camera((40 + seed, 50)), EVERYTHING)
+
+    assert_same(first, renderer.render(scene_of(0), camera(), EVERYTHING))
+
+
+def test_a_reading_is_not_changed_by_the_next_one() -> None:
+    """What was returned does not share memory with the renderer."""
+    renderer = WarpRenderer(library(), "cpu")
+    reading = renderer.render(scene_of(0), camera(), EVERYTHING)
+    copies = {channel: image.copy() for channel, image in reading.channels.items()}
+
+    renderer.render(scene_of(1), camera(), EVERYTHING)
+
+    for channel, image in reading.channels.items():
+        np.testing.assert_array_equal(image, copies[channel])
+
+
+def test_materials_and_lights_may_change_from_view_to_view() -> None:
+    """Nothing of a scene is remembered: a new colour on the same bodies is seen at once."""
+    renderer = WarpRenderer(library(), "cpu")
+    scene = scene_of(0)
+    before = renderer.render(scene, camera(), EVERYTHING).channels
+    red = Material((0.9, 0.05, 0.05))
+    repainted = replace(
+        scene, bodies=tuple(replace(body, materials=(red,)) for body in scene.bodies)
+    )
+
+    after = renderer.render(repainted, camera(), EVERYTHING).channels
+
+    assert (after[Channel.RGB][..., 0] > after[Channel.RGB][..., 1]).mean() > 0.95
+    np.testing.assert_array_equal(before[Channel.Z_DEPTH], after[Channel.Z_DEPTH])
+
+
+def test_only_what_is_asked_for_is_returned() -> None:
+    """No channel more, no channel less; silhouettes only on request."""
+    wanted = frozenset({Channel.Z_DEPTH, Channel.CATEGORY})
+
+    reading = WarpRenderer(library(), "cpu").render(scene_of(0), camera(), wanted)
+
+    assert reading.channels.keys() == wanted
+    assert not reading.silhouettes
+    assert reading.sensor == "camera"
+
+
+def test_memory_stays_flat_over_many_scenes() -> None:
+    """After a warm-up, sixty scenes add less than 8 MB."""
+    renderer = WarpRenderer(library(), "cpu")
+    process = psutil.Process()
+    for seed in range(30):
+        renderer.render(scene_of(seed), camera(), EVERYTHING)
+    before = process.memory_info().rss
+    for seed in range(30, 90):
+        renderer.render(scene_of(seed), camera(), EVERYTHING)
+
+    assert process.memory_info().rss - before < 8 << 20
+
+
+class Weight:
+    """A value of a given size."""
+
+    def __init__(self, nbytes: int) -> None:
+        self.nbytes = nbytes
+
+
+def test_a_cache_drops_what_was_used_longest_ago() -> None:
+    """Bounded in bytes, by least recent use."""
+    cache: ByteCache[Weight] = ByteCache(10)
+    made: list[str] = []
+
+    def get(name: str, nbytes: int) -> None:
+        def make() -> Weight:
+            made.append(name)
+            return Weight(nbytes)
+
+        cache.get(name, make)
+
+    get("a", 4)
+    get("b", 4)
+    get("a", 4)
+    get("c", 4)
+    get("a", 4)
+    get("b", 4)
+
+    assert made == ["a", "b", "c", "b"]
+
+
+@pytest.mark.parametrize(
+    ("mesh", "convex"),
+    [
+        (box_mesh(), True),
+        (sphere_mesh(0.3, 12), True),
+        (plane_mesh(), True),
+        (room_mesh(), False),
+    ],
+)
+def test_a_solid_is_convex_if_no_vertex_lies_outside_a_face(mesh: object, convex: bool) -> None:
+    """A room seen from within is a cavity, not a solid."""
+    assert is_convex_solid(mesh.vertices_m, mesh.faces) is convex
+
+
+def test_a_device_that_is_not_there_is_an_error_that_names_the_remedy() -> None:
+    """What exists, and what to choose instead."""
+    with pytest.raises(ConfigError, match=r"'cuda:7' does not exist .* Choose 'auto' or 'cpu'"):
+        WarpRenderer(library(), "cuda:7")
+
+
+def test_the_table_loads_the_renderer() -> None:
+    """By its name in YAML."""
+    assert TABLE.load("warp") is WarpRenderer
+
+
+def test_settings_refuse_what_they_do_not_know() -> None:
+    """Strictly: no unknown field, no negative radius."""
+    for wrong in ({"antialias": 3}, {"ambient_occlusion_radius_m": -1.0}, {"glow": True}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            RenderSettings.model_validate(wrong)
+
+
+def test_rendering_prints_nothing() -> None:
+    """Neither Warp's banner nor its warning about a missing driver reaches the terminal."""
+    code = (
+        "from tests.renderers.test_warp_renderer import *\n"
+        "WarpRenderer(library(), 'cpu').render(scene_of(0), camera((16, 12)), EVERYTHING)\n"
+    )
+
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+    )
+
+    assert (run.stdout, run.stderr) == ("", "")
+
+
+def test_instances_up_to_the_largest_id_and_scenes_with_hundreds_of_bodies_are_rendered() -> None:
+    """More bodies than a tile's list of occluders holds, and the last 16-bit id."""
+    bodies = tuple(
+        Body(
+            f"b{k}", "ball", SE3((0.05 * (k % 10), 0.05 * (k // 10 % 10), 0.05 * (k // 100))), 0.3,
+            instance_id=65535 - k,
+        )
+        for k in range(300)
+    )  # fmt: skip
+    scene = replace(scene_of(0), bodies=bodies)
+
+    channels = WarpRenderer(library(), "cpu").render(scene, camera(), EVERYTHING).channels
+
+    seen = np.unique(channels[Channel.INSTANCE])
+    assert seen.max() > 65200
+    assert channels[Channel.RGB].any()
