@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from generator.assemble.recipe import PipelineFactory, open_pipeline
-from generator.runner.identity import licences_text, plan_of
 from generator.assemble.spec import Spec, load_spec
+from generator.runner.identity import licences_text, plan_of
 from generator.runner.run import RunProgress, Summary, run
 
 OVERRIDES = (

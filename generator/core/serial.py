@@ -19,14 +19,18 @@ T = TypeVar("T")
 
 def to_plain(value: Any) -> Any:
     """Dictionaries, lists, strings, numbers, booleans and None of a value."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: to_plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    kind = type(value)
+    if kind in _ATOMS:
+        return value
+    if kind is tuple or kind is list:
+        return [to_plain(item) for item in value]
+    names = _field_names(kind)  # type: ignore[arg-type]
+    if names is not None:
+        return {name: to_plain(getattr(value, name)) for name in names}
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, Mapping):
         return {str(key): to_plain(item) for key, item in value.items()}
-    if isinstance(value, (tuple, list)):
-        return [to_plain(item) for item in value]
     if isinstance(value, (set, frozenset)):
         return sorted(to_plain(item) for item in value)
     return value
@@ -46,6 +50,17 @@ def canonical_json(value: Any) -> str:
     return json.dumps(
         to_plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
     )
+
+
+_ATOMS = frozenset({str, int, float, bool, type(None)})
+
+
+@cache
+def _field_names(kind: type) -> tuple[str, ...] | None:
+    """Names of a dataclass's fields; None for any other type."""
+    if not dataclasses.is_dataclass(kind):
+        return None
+    return tuple(field.name for field in dataclasses.fields(kind))
 
 
 @cache

@@ -17,7 +17,6 @@ from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
 
-
 # Column of the sample in each row of a pixel, far from that of the rows beside it.
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
 

@@ -13,9 +13,10 @@ from generator.core.se3 import Array
 from generator.renderers.kernels.sky import prefilter
 
 _GLOSSY_LEVELS = 4
-_GLOSSY_SIZE = 32
-# Lobes of the sharpest level are wider than the texels of a 128 x 64 image.
-_SOURCE_HEIGHTS = (64, 32, 32, 32)
+_GLOSSY_SIZE = 24
+# Lobes of each level are wider than the texels of an image of that height.
+_SOURCE_HEIGHTS = (48, 24, 24, 24)
+_IRRADIANCE_HEIGHT = 32
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -36,8 +37,9 @@ def upload_environment(image: Float32, device: wp.Device) -> DeviceEnvironment:
             for level in range(1, _GLOSSY_LEVELS + 1)
         ]
     )
+    irradiance = irradiance_coefficients(_shrunk(image, _IRRADIANCE_HEIGHT))
     return DeviceEnvironment(
-        wp.array(irradiance_coefficients(image), dtype=wp.vec3, device=device),
+        wp.array(irradiance, dtype=wp.vec3, device=device),
         wp.array(maps, dtype=wp.vec3, device=device),
         wp.array(image, dtype=wp.vec3, device=device),
         maps.nbytes + image.nbytes,

@@ -100,12 +100,14 @@ def _bumps(normal: UInt8) -> NDArray[np.uint32]:
 
 def _with_fourth(three: Pixels, fourth: Pixels) -> Pixels:
     """Three channels and one more."""
-    return cv2.merge([*cv2.split(three), fourth])
+    four: Pixels = cv2.merge([*cv2.split(three), fourth])
+    return four
 
 
 def _in_bytes(image: Array) -> UInt8:
     """Values in [0, 1] as bytes, rounded."""
-    return (image * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
+    steps: UInt8 = (image * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
+    return steps
 
 
 def _packed(image: UInt8) -> NDArray[np.uint32]:

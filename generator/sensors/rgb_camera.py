@@ -51,10 +51,13 @@ class RgbCamera(Strict):
         return tuple(channel for channel in Channel if channel.value in self.channels)
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with this camera in it, looking at the scene's focus."""
+        """The scene with this camera in it, looking at the scene's focus; as it is if it was."""
+        if any(camera.name == self.name for camera in scene.cameras):
+            return scene
         width_px, height_px = self.size_px
         intrinsics = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
-        pose = _nominal_pose(scene.focus, 0.5 * math.radians(self.hfov_deg))
+        narrower_px = 0.5 * min(width_px, height_px)
+        pose = _nominal_pose(scene.focus, math.atan(narrower_px / intrinsics.fx_px))
         camera = Camera(self.name, pose, intrinsics, self.ev100)
         return replace(scene, cameras=(*scene.cameras, camera))
 

@@ -131,7 +131,7 @@ def test_a_white_metal_vanishes_in_a_furnace(roughness: float) -> None:
 
 
 @wp.kernel(enable_backward=False)
-def _lobe_albedo(
+def _lobe_albedo(  # noqa: ANN202
     table: wp.array(dtype=wp.vec2, ndim=2),
     roughness: float,
     specular: float,
@@ -139,12 +139,12 @@ def _lobe_albedo(
     n_v: float,
     fitted: wp.array(dtype=float),
     summed: wp.array(dtype=float),
-):  # noqa: ANN202
+):
     """Directional albedo of the specular layer: by the table, and by summing over directions."""
     s = make_brdf(table, wp.vec3(1.0, 1.0, 1.0), roughness, metallic, specular, n_v)
     n = wp.vec3(0.0, 0.0, 1.0)
     v = wp.vec3(wp.sqrt(1.0 - n_v * n_v), 0.0, n_v)
-    total = 0.0
+    total = wp.float32(0.0)
     for i in range(400):
         # Equal steps in sin^2 of the polar angle weight by the cosine.
         sine2 = (float(i) + 0.5) / 400.0

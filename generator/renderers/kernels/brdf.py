@@ -2,10 +2,10 @@
 
 Sources: Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007 (GGX);
 Hammon, "PBR diffuse lighting for GGX+Smith microsurfaces", GDC 2017 (height-correlated Smith
-without square roots);
-Burley, "Physically based shading at Disney", 2012 (parameters); Karis, "Real shading in
-Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "Practical multiple scattering compensation for
-microfacet models", 2019; Lagarde and de Rousiers, "Moving Frostbite to PBR", 2014 (F90).
+without square roots); Burley, "Physically based shading at Disney", 2012 (parameters); Karis,
+"Real shading in Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "Practical
+multiple scattering compensation for microfacet models", 2019; Lagarde and de Rousiers, "Moving
+Frostbite to PBR", 2014 (F90).
 """
 
 from __future__ import annotations

@@ -264,7 +264,7 @@ def sum_rows(
         found = classes_around(classes, x, wp.max(y - 2, 0), j)
         found = found | classes_around(classes, x, wp.min(y + 2, lattice.height - 1), j)
         total = wp.vec2(0.0, 0.0)
-        if lattice.surface[i] >= 0 and found != 1 and found != 2:
+        if lattice.surface[i] >= 0 and not (found == 1 or found == 2):  # noqa: PLR1714
             tolerance_m = surface_tolerance(view, lattice.p_m[i])
             for u in range(wp.max(x - 2, 0), wp.min(x + 3, lattice.width)):
                 k = i + u - x

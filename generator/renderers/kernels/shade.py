@@ -278,7 +278,10 @@ def gathered_radiance(
     i: int,
     d: wp.vec3,
 ):
-    """Radiance of a pixel from the lattice points around it; negative if none agrees."""
+    """Radiance of a pixel from the lattice points around it; negative if the surface turns there.
+
+    Points on other surfaces are left out; negative, too, if that leaves none.
+    """
     hit = images.hits[i]
     surface = surface_index(world, hit)
     p = view.eye_m + d * images.z_m[i]
@@ -288,11 +291,15 @@ def gathered_radiance(
         bumpy = world.textures[texture].has_bumps != 0
     light = Light()
     total = float(0.0)
+    turns = bool(False)
     if gatherable(world, surface):
         for k in range(4):
             q, w = corner_of(lattice, cell, k)
             if w > 0.0:
-                if agreement(view, images, lattice, surface, i, p, q) > SMOOTH_COSINE:
+                cosine = agreement(view, images, lattice, surface, i, p, q)
+                if cosine > 0.0 and cosine <= SMOOTH_COSINE:
+                    turns = True
+                if cosine > SMOOTH_COSINE:
                     total += w
                     light.diffuse += lights[q].diffuse * w
                     light.rest += lights[q].rest * w
@@ -300,7 +307,7 @@ def gathered_radiance(
                         light.towards += lights[q].towards * w
                         light.lamps += lights[q].lamps * w
                         light.shine += lights[q].shine * w
-    if total == 0.0:
+    if turns or total == 0.0:
         return wp.vec3(-1.0)
     share = 1.0 / total
     albedo = world.surfaces[surface].base_color

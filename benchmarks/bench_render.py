@@ -1,0 +1,92 @@
+"""CPU milliseconds per rendered frame, by kernel: ``python -m benchmarks.bench_render``.
+
+640x480, the shipped tabletop with the arm and exactly ten objects, two soft-shadow lamps and
+environment light; RGB, depth, instance and category, then amodal silhouettes too. One process,
+one core; scenes are drawn and settled before the clock starts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from benchmarks.bench_tabletop import spec_of
+from generator.assemble.recipe import open_pipeline
+from generator.core.capture import Channel
+from generator.core.interfaces import AssetLibrary
+from generator.core.scene import Scene
+from generator.renderers.warp import WarpRenderer
+
+LABELLED = frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY})
+
+
+def tabletops(count: int) -> tuple[list[Scene], AssetLibrary]:
+    """Settled scenes, and the library that their assets are in."""
+    with open_pipeline(spec_of(1)) as pipeline:
+        return [pipeline.sample(i).scene for i in range(count)], pipeline.assets
+
+
+def frame_ms(
+    renderer: WarpRenderer, scenes: list[Scene], channels: frozenset[Channel], repeats: int
+) -> list[float]:
+    """CPU milliseconds of each scene, the best of some repetitions."""
+    spent = np.zeros((repeats, len(scenes)))
+    for row in spent:
+        for k, scene in enumerate(scenes):
+            started_s = time.process_time()
+            renderer.render(scene, scene.cameras[0], channels)
+            row[k] = 1e3 * (time.process_time() - started_s)
+    best: list[float] = spent.min(axis=0).tolist()
+    return best
+
+
+@contextmanager
+def timed_launches() -> Iterator[dict[str, float]]:
+    """CPU milliseconds by kernel, while the context lasts."""
+    import warp as wp
+
+    spent_ms: dict[str, float] = defaultdict(float)
+    launch = wp.launch
+
+    def timed(kernel: Any, *args: Any, **kwargs: Any) -> None:
+        started_s = time.process_time()
+        launch(kernel, *args, **kwargs)
+        spent_ms[kernel.key] += 1e3 * (time.process_time() - started_s)
+
+    wp.launch = timed
+    try:
+        yield spent_ms
+    finally:
+        wp.launch = launch
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=8)
+    parser.add_argument("--repeats", type=int, default=5)
+    arguments = parser.parse_args()
+
+    scenes, assets = tabletops(arguments.scenes)
+    started_s = time.perf_counter()
+    renderer = WarpRenderer(assets, "cpu")
+    renderer.render(scenes[0], scenes[0].cameras[0], LABELLED)
+    print(f"first frame in this process: {time.perf_counter() - started_s:.1f} s")
+    for name, channels in (("", LABELLED), (" with silhouettes", LABELLED | {Channel.AMODAL})):
+        best = frame_ms(renderer, scenes, channels, arguments.repeats)
+        each = ", ".join(f"{ms:.0f}" for ms in best)
+        print(f"CPU ms per frame{name}: {np.mean(best):.1f} (scenes: {each})")
+    with timed_launches() as spent_ms:
+        frame_ms(renderer, scenes, LABELLED | {Channel.AMODAL}, 1)
+    for kernel, ms in sorted(spent_ms.items(), key=lambda item: -item[1]):
+        print(f"    {kernel:<20} {ms / len(scenes):6.1f} CPU ms")
+
+
+if __name__ == "__main__":
+    main()
