@@ -11,7 +11,6 @@ import argparse
 import platform
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,30 +19,12 @@ import numpy as np
 from generator.assemble.recipe import PipelineFactory, open_pipeline
 from generator.assemble.spec import Spec, load_spec
 from generator.runner.identity import licences_text, plan_of
-from generator.runner.run import RunProgress, Summary, run
+from generator.runner.run import Summary, run
 
 OVERRIDES = (
     "randomizers.clutter.count=10",
     "randomizers.lamps.count=2",
 )
-
-
-@dataclass
-class Peak:
-    """Largest resident memory of any worker seen while a run reports progress [MB]."""
-
-    worker_mb: float = 0.0
-
-    def __call__(self, progress: RunProgress) -> None:
-        """Look at all child processes."""
-        import psutil
-
-        del progress
-        for child in psutil.Process().children(recursive=True):
-            try:
-                self.worker_mb = max(self.worker_mb, child.memory_info().rss / 1e6)
-            except psutil.Error:
-                continue
 
 
 def spec_of(views_per_scene: int) -> Spec:
@@ -52,21 +33,18 @@ def spec_of(views_per_scene: int) -> Spec:
     return load_spec("tabletop.yaml", seed=1, overrides=overrides)
 
 
-def measured_run(views_per_scene: int, n: int, workers: int) -> tuple[Summary, Peak]:
+def measured_run(views_per_scene: int, n: int, workers: int) -> Summary:
     """A whole run into a temporary folder."""
     factory = PipelineFactory(spec_of(views_per_scene), n)
-    peak = Peak()
     with tempfile.TemporaryDirectory() as folder:
-        summary = run(
+        return run(
             plan_of(factory),
             factory,
             Path(folder) / "out",
             workers=workers,
-            progress=peak,
             resume_command="",
             licences=licences_text(factory),
         )
-    return summary, peak
 
 
 def first_sample_s() -> float:
@@ -169,12 +147,13 @@ def main() -> None:
     print(f"first sample in this process: {first_sample_s():.1f} s")
     ours_s = {}
     for views_per_scene in (5, 1):
-        summary, peak = measured_run(views_per_scene, arguments.n, arguments.workers)
+        summary = measured_run(views_per_scene, arguments.n, arguments.workers)
         stages = {stage: 1e3 * seconds for stage, seconds in summary.cpu_s.items()}
         ours_s[views_per_scene] = sum(stages.values()) / 1e3
         print(
             f"views_per_scene {views_per_scene}: {summary.samples_per_s:.1f} samples/s,"
-            f" {sum(stages.values()):.0f} CPU ms/sample, worker peak {peak.worker_mb:.0f} MB"
+            f" {sum(stages.values()):.0f} CPU ms/sample,"
+            f" largest worker {summary.rss_bytes_max / 1e6:.0f} MB"
         )
         for stage, ms in stages.items():
             print(f"    {stage:<10} {ms:7.1f} CPU ms")
