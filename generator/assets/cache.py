@@ -85,16 +85,24 @@ class Store:
         self._bytes = 0
         self._results: OrderedDict[str, tuple[Any, int]] = OrderedDict()
 
-    def get(self, key: str, compute: Callable[[], Arrays], view: Callable[[Arrays], T]) -> T:
+    def get(
+        self,
+        key: str,
+        compute: Callable[[], Arrays],
+        view: Callable[[Arrays], T],
+        *,
+        stored: bool = True,
+    ) -> T:
         """The result under a key of its own.
 
         Args:
             key: Content key of everything that the result depends on.
             compute: Makes its arrays when they are nowhere.
             view: Makes the result of its arrays.
+            stored: Whether the disk keeps it, too.
         """
         if key not in self._results:
-            arrays = self._disk.arrays(key, compute)
+            arrays = self._disk.arrays(key, compute) if stored else compute()
             self._keep(key, view(arrays), sum(array.nbytes for array in arrays.values()))
         self._results.move_to_end(key)
         result: T = self._results[key][0]

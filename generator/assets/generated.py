@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import importlib
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
 from generator.assets.cache import Arrays, Store, content_key
 from generator.assets.ids import AssetId, ParameterValue, shown
 from generator.assets.importer import Imported
 from generator.assets.packing import pack, pack_texture, unpack, unpack_texture
-from generator.assets.procedural import (
-    ENVIRONMENTS,
-    FAMILIES,
-    TEXTURES,
+from generator.assets.procedural.family import (
     EnvironmentFamily,
+    Facts,
     Family,
     TextureFamily,
 )
@@ -24,6 +23,15 @@ _MAX_SEED = 2**31 - 1
 _PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
 
 AnyFamily = Family | TextureFamily | EnvironmentFamily
+TABLES = (
+    "generator.assets.procedural",
+    "generator.assets.roads",
+    "generator.assets.scenery",
+    "generator.assets.vehicles",
+    "generator.assets.people",
+    "generator.assets.skies",
+)
+"""Packages with tables ``FAMILIES``, ``TEXTURES`` or ``ENVIRONMENTS``."""
 T = TypeVar("T")
 
 
@@ -34,7 +42,7 @@ class Generated:
         self._store = store
         self._families: dict[str, AnyFamily] = {
             _PREFIXES[_kind(family)] + name: family
-            for table in (FAMILIES, TEXTURES, ENVIRONMENTS)
+            for table in _tables()
             for name, family in table.items()
         }
 
@@ -61,6 +69,7 @@ class Generated:
     def get(self, asset_id: AssetId) -> Asset:
         """The asset of an id whose name is known. Raises AssetError on wrong parameters."""
         family = self._families[asset_id.name]
+        facts = _facts(asset_id, family)
         return Asset(
             asset_id=str(asset_id),
             kind=_kind(family),
@@ -72,6 +81,8 @@ class Generated:
             sha256=self._key(asset_id, family),
             mass_kg=family.mass_kg if isinstance(family, Family) else 0.0,
             stackable=isinstance(family, Family) and family.stackable,
+            subcategory=facts.subcategory,
+            attributes=tuple(sorted(facts.attributes.items())),
         )
 
     def imported(self, asset_id: AssetId) -> Imported:
@@ -82,7 +93,7 @@ class Generated:
 
         def compute() -> Arrays:
             solid = family.build(**_arguments(asset_id, family))
-            return pack(Imported(solid.mesh, solid.collision, {}))
+            return pack(Imported(solid.mesh, solid.collision, {}, solid.keypoints))
 
         return self._result(asset_id, family, compute, unpack)
 
@@ -94,7 +105,7 @@ class Generated:
         return self._result(
             asset_id,
             family,
-            lambda: pack_texture(family.build(_arguments(asset_id, family)["seed"])),
+            lambda: pack_texture(family.build(**_arguments(asset_id, family))),
             unpack_texture,
         )
 
@@ -108,7 +119,7 @@ class Generated:
         return self._result(
             asset_id,
             family,
-            lambda: {"radiance": family.build(_arguments(asset_id, family)["seed"])},
+            lambda: {"radiance": family.build(**_arguments(asset_id, family))},
             lambda arrays: arrays["radiance"],
         )
 
@@ -120,8 +131,9 @@ class Generated:
         view: Callable[[Arrays], T],
     ) -> T:
         key = self._key(asset_id, family)
+        stored = not isinstance(family, Family) or family.stored
         try:
-            return self._store.get(key, compute, view)
+            return self._store.get(key, compute, view, stored=stored)
         except ValueError as error:
             raise AssetError(f"asset '{asset_id}': cannot be made: {error}") from error
 
@@ -131,6 +143,19 @@ class Generated:
         return content_key(
             {"family": asset_id.name, "version": family.version, "parameters": parameters}
         )
+
+
+def _tables() -> Iterator[Mapping[str, AnyFamily]]:
+    for name in TABLES:
+        module = importlib.import_module(name)
+        for table in ("FAMILIES", "TEXTURES", "ENVIRONMENTS"):
+            yield getattr(module, table, {})
+
+
+def _facts(asset_id: AssetId, family: AnyFamily) -> Facts:
+    if not isinstance(family, Family) or family.facts is None:
+        return Facts()
+    return family.facts(**_arguments(asset_id, family))
 
 
 def _kind(family: AnyFamily) -> Any:
@@ -152,8 +177,7 @@ def _arguments(asset_id: AssetId, family: AnyFamily) -> dict[str, Any]:
     Raises:
         AssetError: if the id has a parameter that the family has not, or of another type.
     """
-    parameters = family.parameters if isinstance(family, Family) else {}
-    defaults: dict[str, Any] = dict(parameters)
+    defaults: dict[str, Any] = dict(family.parameters)
     if family.variants or not isinstance(family, Family):
         defaults.setdefault("seed", 0)
     for key, value in asset_id.parameters.items():

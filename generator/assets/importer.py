@@ -25,7 +25,7 @@ from generator.assets.readers.source import linear_of_srgb
 from generator.assets.soup import Float64, Int64, Slot, Soup, joined
 from generator.assets.urdf import Shape, Urdf, read_urdf
 from generator.core.errors import AssetError
-from generator.core.geometry import ConvexParts, Material, MeshData, UInt8
+from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, UInt8
 from generator.core.se3 import SE3
 
 VERSION = 1
@@ -43,11 +43,13 @@ class Imported:
         collision: None for a robot link that is only seen.
         images: ``{name: uint8 [h, w, 3]}`` of the images inside the file; a material's texture
             ``<asset id>#<name>`` refers to one of these, or to a file of the folder.
+        keypoints: Named points in the asset's frame.
     """
 
     mesh: MeshData | None
     collision: ConvexParts | None
     images: Mapping[str, UInt8]
+    keypoints: tuple[Keypoint, ...] = ()
 
 
 def import_object(folder: Folder, entry: MeshEntry, asset_id: str) -> Imported:

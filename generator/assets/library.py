@@ -15,6 +15,7 @@ from generator.core.geometry import (
     Asset,
     ConvexParts,
     Float32,
+    Keypoint,
     Material,
     MeshData,
     RobotModel,
@@ -77,6 +78,10 @@ class Library:
         if asset_id not in self._bounds_m:
             self._bounds_m[asset_id] = self.mesh(asset_id).bounds_m()
         return self._bounds_m[asset_id]
+
+    def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
+        """Named points of the asset, in its own frame; empty if it has none."""
+        return self._imported(asset_id).keypoints
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is no robot."""

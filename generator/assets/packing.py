@@ -9,7 +9,7 @@ import numpy as np
 
 from generator.assets.cache import Arrays
 from generator.assets.importer import Imported
-from generator.core.geometry import ConvexParts, Material, MeshData, TextureData, UInt8
+from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, TextureData, UInt8
 from generator.core.serial import canonical_json, from_plain
 
 _MESH_ARRAYS = ("vertices_m", "faces", "normals", "uvs", "face_slots")
@@ -26,6 +26,8 @@ def pack(imported: Imported) -> Arrays:
         parts = imported.collision.parts_m
         arrays["part_sizes"] = np.array([len(part) for part in parts], dtype=np.int64)
         arrays["parts_m"] = np.concatenate(parts) if parts else np.zeros((0, 3))
+    if imported.keypoints:
+        arrays["keypoints"] = _text(canonical_json(imported.keypoints))
     return arrays
 
 
@@ -44,7 +46,10 @@ def unpack(arrays: Arrays) -> Imported:
     images: Mapping[str, UInt8] = {
         name.removeprefix(_IMAGE): array for name, array in arrays.items() if _IMAGE in name
     }
-    return Imported(mesh, collision, images)
+    keypoints: tuple[Keypoint, ...] = ()
+    if "keypoints" in arrays:
+        keypoints = from_plain(tuple[Keypoint, ...], json.loads(arrays["keypoints"].tobytes()))
+    return Imported(mesh, collision, images, keypoints)
 
 
 def pack_texture(texture: TextureData) -> Arrays:

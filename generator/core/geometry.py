@@ -30,6 +30,9 @@ class Material:
         emission_cd_m2: Emitted luminance, linear RGB [cd/m^2].
         printed: The texture is part of what the object *is* (a label, a book cover);
             randomizers leave colour and texture alone.
+        role: What the slot is on its object, for randomizers that know more than "any surface":
+            ``paint``, ``glass``, ``headlight``, ``lens_red``, ``skin``, ...; empty = nothing
+            special.
     """
 
     base_color: Vec3 = (0.6, 0.6, 0.6)
@@ -40,6 +43,7 @@ class Material:
     texture_scale_m: float = 0.0
     emission_cd_m2: Vec3 = (0.0, 0.0, 0.0)
     printed: bool = False
+    role: str = ""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -95,6 +99,20 @@ class ConvexParts:
     """
 
     parts_m: tuple[NDArray[np.float64], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Keypoint:
+    """A named point of an object: a joint of a body, the hub of a wheel, a lamp.
+
+    Attributes:
+        position_m: In the asset's frame; in the instance frame once it belongs to an Instance.
+        radius_m: How deep below the visible surface it may lie and still count as seen.
+    """
+
+    name: str
+    position_m: Vec3
+    radius_m: float = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +201,8 @@ class Asset:
         mass_kg: Nominal mass; 0 = unknown.
         sha256: Content hash of the files or of the generator's version and parameters.
         stackable: Flat above and below: may be stacked.
+        subcategory: A finer name than the category (``hatchback``, ``child``); may be empty.
+        attributes: Further facts that labels carry, ``(name, value)``, sorted by name.
     """
 
     asset_id: str
@@ -195,3 +215,5 @@ class Asset:
     sha256: str
     mass_kg: float = 0.0
     stackable: bool = False
+    subcategory: str = ""
+    attributes: tuple[tuple[str, str], ...] = ()

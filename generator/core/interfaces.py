@@ -18,6 +18,7 @@ from generator.core.geometry import (
     Asset,
     ConvexParts,
     Float32,
+    Keypoint,
     Material,
     MeshData,
     RobotModel,
@@ -55,6 +56,10 @@ class AssetIndex(Protocol):
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
+        ...
+
+    def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
+        """Named points of the asset, in its own frame; empty if it has none."""
         ...
 
     def robot(self, asset_id: str) -> RobotModel:

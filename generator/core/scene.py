@@ -10,12 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, TypeVar
 
-from generator.core.geometry import Material
+from generator.core.geometry import Keypoint, Material
 from generator.core.intrinsics import Intrinsics
 from generator.core.se3 import IDENTITY, SE3, Vec3
 
+SharedValue = str | float | int | bool
 Motion = Literal["static", "dynamic", "kinematic"]
-Placement = Literal["drop", "scatter", "grid", "stack"]
+Placement = Literal["drop", "scatter", "grid", "stack", "along"]
+LaneKind = Literal[
+    "driving", "parking", "bicycle", "sidewalk", "crosswalk", "verge", "furniture", "frontage"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +34,9 @@ class Instance:
         parts: Names of its parts; part id ``k`` is ``parts[k - 1]``. Robots: their links.
         T_world_instance: Pose of the instance frame (a body's own frame; a robot's base).
         box_min_m, box_max_m: Tight bounds of the visual geometry in the instance frame [m].
+        subcategory: A finer name than the category; may be empty.
+        attributes: Further facts that labels carry, ``(name, value)``, sorted by name.
+        keypoints: Named points in the instance frame, in the order of their skeleton.
     """
 
     instance_id: int
@@ -42,6 +49,9 @@ class Instance:
     T_world_instance: SE3 = IDENTITY
     box_min_m: Vec3 = (0.0, 0.0, 0.0)
     box_max_m: Vec3 = (0.0, 0.0, 0.0)
+    subcategory: str = ""
+    attributes: tuple[tuple[str, str], ...] = ()
+    keypoints: tuple[Keypoint, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +106,42 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True)
+class Lane:
+    """A strip along which things move or stand; streets are made of them.
+
+    Attributes:
+        kind: ``driving``, ``parking``, ``bicycle``; ``sidewalk`` and ``crosswalk`` for people;
+            ``verge`` for plants, ``furniture`` for lamps and bins, ``frontage`` for the line of
+            house fronts: its left side is the street's.
+        center_m: Points of the centre line, world, in the direction of travel, at most 2 m apart
+            where it bends; Z is the height of the ground.
+        width_m: Across the centre line.
+        road: Name of the template element it belongs to.
+        successors: Names of the lanes that go on where it ends.
+        left, right: Names of the lanes beside it that run the same way; empty = none.
+        speed_m_s: Usual speed; 0 = things stand.
+        junction: Whether it crosses a junction, where nothing may stop.
+    """
+
+    name: str
+    kind: LaneKind
+    center_m: tuple[Vec3, ...]
+    width_m: float
+    road: str = ""
+    successors: tuple[str, ...] = ()
+    left: str = ""
+    right: str = ""
+    speed_m_s: float = 0.0
+    junction: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class ObjectGroup:
-    """What a template asked to be placed on surfaces.
+    """What a template asked to be placed on surfaces or along lanes.
 
     Attributes:
         surfaces: Names of the surfaces it is spread over.
+        lanes: Kinds of the lanes it is spread over (placement ``along``).
         assets: Ids of the assets it may draw from, sorted.
         keep_out: Discs ``(x, y, radius)`` [m], world, where nothing is put (the arm's base).
     """
@@ -112,6 +153,7 @@ class ObjectGroup:
     placement: Placement
     annotated: bool = True
     keep_out: tuple[Vec3, ...] = ()
+    lanes: tuple[LaneKind, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,6 +243,33 @@ class Environment:
 
 
 @dataclass(frozen=True, slots=True)
+class Weather:
+    """What the air and the ground are like. The sun is a Light, the sky an Environment.
+
+    Attributes:
+        fog_extinction_per_m: At the ground; the meteorological range is ``3.912 /`` it
+            (Koschmieder 1924, 2 % contrast).
+        fog_height_m: Height over which fog thins by a factor of e; 0 = evenly thick.
+        rain_mm_h, snow_mm_h: Falling now (snow as the water it melts to).
+        wetness: How wet surfaces open to the sky are, 0 dry to 1 soaked.
+        puddles: Share of level ground under standing water.
+        snow_cover: Share of upward surfaces that lies under snow.
+        lens_drops: Share of the image behind drops on the lens.
+        seed: Of the patterns of puddles, patches, streaks, flakes and drops.
+    """
+
+    fog_extinction_per_m: float = 0.0
+    fog_height_m: float = 0.0
+    rain_mm_h: float = 0.0
+    snow_mm_h: float = 0.0
+    wetness: float = 0.0
+    puddles: float = 0.0
+    snow_cover: float = 0.0
+    lens_drops: float = 0.0
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Camera:
     """A camera mounted in the world.
 
@@ -231,6 +300,8 @@ class Scene:
     Attributes:
         interior_m: Low and high corner of the space in which cameras and lights may be; a room's
             inner walls.
+        lanes: Where things may move or stand, in a street.
+        shared: Values that several draws have in common, ``(name, value)``, sorted by name.
     """
 
     template: str
@@ -244,6 +315,9 @@ class Scene:
     cameras: tuple[Camera, ...] = ()
     focus: Region = field(default_factory=Region)
     interior_m: tuple[Vec3, Vec3] = ((-50.0, -50.0, 0.0), (50.0, 50.0, 50.0))
+    lanes: tuple[Lane, ...] = ()
+    weather: Weather = Weather()
+    shared: tuple[tuple[str, SharedValue], ...] = ()
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""

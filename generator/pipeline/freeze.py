@@ -13,7 +13,7 @@ from generator.core.se3 import SE3, Array, Vec3
 
 
 def frozen_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
-    """The scene with every instance's category id, frame and tight box filled in.
+    """The scene with every instance's category id, facts, frame, keypoints and tight box filled in.
 
     An instance of one body has that body's frame. An instance of several bodies (a robot) has
     the frame of its articulation's base, and the box around all its bodies' vertices.
@@ -24,7 +24,7 @@ def frozen_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, 
     bases = {a.instance_id: a.T_world_base for a in scene.articulations}
     instances = tuple(
         _measured(
-            replace(instance, category_id=category_ids.get(instance.category, 0)),
+            _known(instance, assets, category_ids),
             members.get(instance.instance_id, []),
             bases.get(instance.instance_id),
             assets,
@@ -40,6 +40,18 @@ def with_rounded_cameras(scene: Scene) -> Scene:
     return replace(scene, cameras=cameras)
 
 
+def _known(instance: Instance, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Instance:
+    """The instance with what its asset says about it; its own attributes win."""
+    asset = assets.get(instance.asset)
+    attributes = {**dict(asset.attributes), **dict(instance.attributes)}
+    return replace(
+        instance,
+        category_id=category_ids.get(instance.category, 0),
+        subcategory=instance.subcategory or asset.subcategory,
+        attributes=tuple(sorted(attributes.items())),
+    )
+
+
 def _measured(
     instance: Instance, bodies: list[Body], T_world_base: SE3 | None, assets: AssetLibrary
 ) -> Instance:
@@ -53,6 +65,10 @@ def _measured(
             T_world_instance=body.T_world_body,
             box_min_m=_scaled(low, body.scale),
             box_max_m=_scaled(high, body.scale),
+            keypoints=tuple(
+                replace(point, position_m=_scaled(point.position_m, body.scale))
+                for point in assets.keypoints(body.asset)
+            ),
         )
     T_world_instance = bodies[0].T_world_body if T_world_base is None else T_world_base
     T_instance_world = T_world_instance.inverse()

@@ -12,7 +12,7 @@ import pytest
 
 from generator.core.capture import Channel, Reading
 from generator.core.errors import LayoutRejected, Rejection, SceneRejected
-from generator.core.geometry import MeshData
+from generator.core.geometry import Asset, Keypoint, MeshData
 from generator.core.interfaces import DatasetInfo, Settled, Stage
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth
@@ -200,7 +200,18 @@ def test_splits_have_their_shares_and_do_not_cut_scenes() -> None:
 
 
 class TwoBoxes:
-    """Assets of which every one is a box of 2 x 4 x 6 cm."""
+    """Assets of which every one is a box of 2 x 4 x 6 cm with a point at its top."""
+
+    def get(self, asset_id: str) -> Asset:
+        """Every one is of the kind ``small``."""
+        return Asset(
+            asset_id, "object", "mug", (), "", "", "", "",
+            subcategory="small", attributes=(("lid", "open"), ("state", "new")),
+        )  # fmt: skip
+
+    def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
+        """One."""
+        return (Keypoint("top", (0.0, 0.0, 0.03)),)
 
     def bounds_m(self, asset_id: str) -> Any:
         """Bounds of the box."""
@@ -224,7 +235,10 @@ def test_freezing_fills_ids_frames_and_boxes() -> None:
             Body("arm/a", "box", SE3((0.0, 0.0, 0.0)), instance_id=2, part_id=1),
             Body("arm/b", "box", SE3((0.0, 0.0, 1.0)), instance_id=2, part_id=2),
         ),
-        instances=(Instance(1, "cup", "mug", 0, "box"), Instance(2, "arm", "robot_arm", 0, "arm")),
+        instances=(
+            Instance(1, "cup", "mug", 0, "box", attributes=(("lid", "shut"),)),
+            Instance(2, "arm", "robot_arm", 0, "arm"),
+        ),
         articulations=(Articulation("arm", "arm", 2, SE3((0.0, 0.0, -1.0)), ()),),
     )
 
@@ -233,6 +247,8 @@ def test_freezing_fills_ids_frames_and_boxes() -> None:
     cup, arm = frozen.instances
     assert (cup.category_id, arm.category_id) == (1, 2)
     assert cup.T_world_instance == quarter
+    assert (cup.subcategory, dict(cup.attributes)) == ("small", {"lid": "shut", "state": "new"})
+    assert cup.keypoints == (Keypoint("top", (0.0, 0.0, 0.06)),)
     assert cup.box_max_m == pytest.approx((0.02, 0.04, 0.06))
     assert arm.T_world_instance == SE3((0.0, 0.0, -1.0))
     assert arm.box_min_m == pytest.approx((-0.01, -0.02, 0.97), abs=1e-6)

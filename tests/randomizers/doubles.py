@@ -10,7 +10,7 @@ import numpy as np
 
 from generator.assets.ids import parse
 from generator.core.errors import AssetError, did_you_mean
-from generator.core.geometry import Asset, Gripper, Joint, Material, RobotModel
+from generator.core.geometry import Asset, Gripper, Joint, Keypoint, Material, RobotModel
 from generator.core.scene import Body, ObjectGroup, Scene, Surface
 from generator.core.se3 import SE3, Array, Vec3
 from generator.core.streams import Rng, Streams
@@ -120,6 +120,10 @@ class FakeAssets:
         assert isinstance(given, tuple)
         x, y, *height = (float(v) for v in given)
         return (-x / 2, -y / 2, 0.0), (x / 2, y / 2, height[0] if height else 0.0)
+
+    def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
+        """None of them has any."""
+        return ()
 
     def robot(self, asset_id: str) -> RobotModel:
         """An arm of two links with a parallel gripper that opens 8 cm."""

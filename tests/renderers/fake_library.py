@@ -12,6 +12,7 @@ from generator.core.geometry import (
     Asset,
     ConvexParts,
     Float32,
+    Keypoint,
     Material,
     MeshData,
     RobotModel,
@@ -125,6 +126,9 @@ class FakeLibrary:
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         return self.meshes[asset_id].bounds_m()
+
+    def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
+        return ()
 
     def robot(self, asset_id: str) -> RobotModel:
         raise AssetError(f"'{asset_id}' is no robot")

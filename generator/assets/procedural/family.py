@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from generator.core.geometry import ConvexParts, Float32, MeshData, TextureData
+from generator.core.geometry import ConvexParts, Float32, Keypoint, MeshData, TextureData
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -17,10 +17,25 @@ class Solid:
     Attributes:
         mesh: Visual geometry in the object's frame.
         collision: Convex parts in the same frame.
+        keypoints: Named points in the same frame.
     """
 
     mesh: MeshData
     collision: ConvexParts
+    keypoints: tuple[Keypoint, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What is known of an object without building it.
+
+    Attributes:
+        subcategory: A finer name than the category.
+        attributes: Further facts that labels carry.
+    """
+
+    subcategory: str = ""
+    attributes: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -38,6 +53,8 @@ class Family:
         version: Raised whenever the same arguments make other bytes.
         parameters: ``{name: default}`` of a parametric family.
         build: Pure function of its arguments.
+        facts: Pure and quick function of the same arguments; None = nothing more is known.
+        stored: Whether results are kept on disk; not if making one is quicker than reading it.
     """
 
     name: str
@@ -49,11 +66,13 @@ class Family:
     version: int
     parameters: Mapping[str, object]
     build: Callable[..., Solid]
+    facts: Callable[..., Facts] | None = None
+    stored: bool = True
 
 
 @dataclass(frozen=True)
 class TextureFamily:
-    """A generator of textures; ``build(seed)`` is a pure function.
+    """A generator of textures; ``build(seed, **parameters)`` is a pure function.
 
     Attributes:
         variants: Seeds ``range(variants)`` are offered for selection; any other seed works too.
@@ -63,18 +82,23 @@ class TextureFamily:
     tags: tuple[str, ...]
     variants: int
     version: int
-    build: Callable[[int], TextureData]
+    build: Callable[..., TextureData]
+    parameters: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class EnvironmentFamily:
-    """A generator of equirectangular images of relative luminance; see ``AssetLibrary``."""
+    """A generator of equirectangular images of relative luminance; see ``AssetLibrary``.
+
+    ``build(seed, **parameters)`` is a pure function.
+    """
 
     name: str
     tags: tuple[str, ...]
     variants: int
     version: int
-    build: Callable[[int], Float32]
+    build: Callable[..., Float32]
+    parameters: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -82,7 +106,7 @@ class Lazy:
     """A function named by ``module:function`` and imported when first called.
 
     Attributes:
-        path: Module relative to this package, and the function in it.
+        path: Module relative to this package, or its full name, and the function in it.
     """
 
     path: str
@@ -90,5 +114,6 @@ class Lazy:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the function."""
         module, _, function = self.path.partition(":")
-        package = __name__.rpartition(".")[0]
-        return getattr(importlib.import_module(f"{package}.{module}"), function)(*args, **kwargs)
+        if not module.startswith("generator."):
+            module = f"{__package__}.{module}"
+        return getattr(importlib.import_module(module), function)(*args, **kwargs)
