@@ -13,8 +13,11 @@ from generator.config.document import Node, load, merge, with_override
 from generator.config.problems import Position, Problems
 from generator.core.errors import ConfigError, did_you_mean
 
-SECTIONS = ("render", "physics", "labels", "splits", "assets")
+SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
+
+TEMPLATE_KEYS = ("shared", "elements")
+"""What a template may say."""
 
 LISTS = ("randomizers", "sensors", "annotations", "exporters")
 
@@ -49,7 +52,9 @@ def resolved_document(
         ConfigError: naming the place of what is wrong.
     """
     content = dict(_mapping(document))
-    content["elements"] = _elements(document)
+    template = _template(document)
+    content["elements"] = _elements(document, template)
+    _inherit_shared(content, template)
     for key in SECTIONS:
         content.setdefault(key, _made({}))
     for key in LISTS:
@@ -70,21 +75,50 @@ def config_document(name: str) -> Node:
     return load(found_file(name, configs, "configuration"))
 
 
-def _elements(document: Node) -> Node:
-    """The template's elements, each with the configuration's overrides merged in."""
+def _template(document: Node) -> Node | None:
+    """The template's document; None where the configuration lists its elements itself."""
     given = document.get("elements")
     template = document.get("template")
     if given is not None and isinstance(given.content, tuple):
-        return given
+        return None
     if template is None or not isinstance(template.content, str):
         problems = Problems()
         where = document.position if template is None else template.position
         problems.add(where, "template", "expected the name of a template, or a list of elements")
         problems.raise_if_any()
         raise AssertionError("unreachable")
-    elements = load(found_file(template.content, scene_templates, "template")).get("elements")
+    loaded = load(found_file(template.content, scene_templates, "template"))
+    problems = Problems()
+    for key in _mapping(loaded):
+        if key not in TEMPLATE_KEYS:
+            fact = f"unknown key; a template has {' and '.join(TEMPLATE_KEYS)}"
+            problems.add(loaded.key_position(key), key, fact + did_you_mean(key, TEMPLATE_KEYS))
+    problems.raise_if_any()
+    return loaded
+
+
+def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
+    """The template's shared values, each exchanged where the configuration has its own.
+
+    The template's come first, so that the configuration's may depend on them.
+    """
+    own, inherited = content.get("shared"), template.get("shared") if template else None
+    if inherited is None or (own is not None and not isinstance(own.content, Mapping)):
+        return
+    entries = {**_mapping(inherited), **(_mapping(own) if own else {})}
+    positions = {**inherited.key_positions, **(own.key_positions if own else {})}
+    content["shared"] = Node((own or inherited).position, entries, positions)
+
+
+def _elements(document: Node, template: Node | None) -> Node:
+    """The template's elements, each with the configuration's overrides merged in."""
+    given = document.get("elements")
+    if template is None:
+        assert given is not None
+        return given
+    elements = template.get("elements")
     if elements is None or not isinstance(elements.content, tuple):
-        raise ConfigError(f"{template.content}: a template needs a list of elements")
+        raise ConfigError(f"{template.position.file}: a template needs a list of elements")
     if given is None:
         return elements
     return _overridden(elements, given)

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import cv2
 
 from generator.annotations.truth import image_truth
-from generator.assemble.spec import Spec
+from generator.assemble.spec import Layout, Spec
 from generator.assemble.tables import TABLES
 from generator.assets.library import Library, open_library
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.interfaces import Annotator, AssetIndex, DatasetInfo, Exporter, Renderer
-from generator.core.scene import Scene
+from generator.core.scene import Scene, SharedValue
+from generator.core.streams import Streams
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import Recipe
+from generator.pipeline.pipeline import Blueprint, Recipe
 from scene_templates.builder import build
+
+BLUEPRINTS_KEPT = 32
 
 
 @dataclass(frozen=True)
@@ -64,14 +67,13 @@ def recipe_of(
         ConfigError: when parts do not fit together, such as an exporter whose images no sensor
             writes.
     """
-    nominal = nominal_scene(spec, library)
     annotators = _annotators(spec)
     info = DatasetInfo(
         name=spec.name,
         seed=spec.head.seed,
         n=n,
         views_per_scene=spec.head.views_per_scene,
-        categories=categories_of(nominal, library),
+        categories=categories_of(nominal_scenes(spec, library), library),
         sensors=tuple(sorted(sensor.name for sensor in spec.sensors)),
         media={sensor.name: tuple(sensor.media) for sensor in spec.sensors},
         depth_scale_m=spec.head.depth_scale_m,
@@ -81,8 +83,7 @@ def recipe_of(
     return Recipe(
         seed=spec.head.seed,
         views_per_scene=spec.head.views_per_scene,
-        nominal=nominal,
-        randomizers=spec.randomizers,
+        blueprint=blueprints(spec, library),
         sensors=spec.sensors,
         channels=needed,
         image_truth=partial(image_truth, annotators=annotators, thresholds=spec.head.labels),
@@ -93,12 +94,29 @@ def recipe_of(
     )
 
 
-def nominal_scene(spec: Spec, assets: AssetIndex) -> Scene:
+def blueprints(spec: Spec, assets: AssetIndex) -> Callable[[Streams], Blueprint]:
+    """The function that tells what one scene is made from; it remembers the last few."""
+
+    @lru_cache(maxsize=BLUEPRINTS_KEPT)
+    def made(shared: tuple[tuple[str, SharedValue], ...]) -> Blueprint:
+        layout = spec.layout(shared)
+        return Blueprint(nominal_scene(spec, layout, assets), layout.randomizers)
+
+    return lambda streams: made(spec.shared(streams))
+
+
+def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
     """The template's scene with every sensor mounted."""
-    scene = build(spec.head.template or spec.name, spec.elements, assets)
+    scene = build(spec.head.template or spec.name, layout.elements, assets)
+    scene = replace(scene, shared=layout.shared)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
     return scene
+
+
+def nominal_scenes(spec: Spec, assets: AssetIndex) -> tuple[Scene, ...]:
+    """Nominal scenes that between them hold whatever a scene may hold."""
+    return tuple(nominal_scene(spec, layout, assets) for layout in spec.probes)
 
 
 def _renderer(spec: Spec, library: Library) -> Renderer:
@@ -109,11 +127,12 @@ def _renderer(spec: Spec, library: Library) -> Renderer:
     return renderer
 
 
-def categories_of(scene: Scene, assets: AssetIndex) -> tuple[str, ...]:
+def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...]:
     """Sorted names of all categories that a sample may contain."""
-    placed = {i.category for i in scene.instances if i.annotated}
+    placed = {i.category for scene in scenes for i in scene.instances if i.annotated}
     possible = {
         assets.get(asset_id).category
+        for scene in scenes
         for group in scene.groups
         if group.annotated
         for asset_id in group.assets

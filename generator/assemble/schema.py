@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from generator.assemble.spec import PLUGIN_LISTS, Head
+from generator.assemble.spec import PLUGIN_LISTS, VARYING, Head
 from generator.assemble.tables import TABLES
 from generator.config.schema import json_schema
 
+SHARED: list[dict[str, Any]] = [
+    {"type": "string", "pattern": r"^\$shared\.", "description": "A shared value."},
+    {
+        "type": "object",
+        "required": ["given"],
+        "description": "The entry that a shared value selects.",
+    },
+]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -26,6 +34,10 @@ def config_schema() -> dict[str, Any]:
         "description": "Overrides by element name, or the whole list of elements.",
         "anyOf": [{"type": "object"}, properties["elements"]],
     }
+    properties["shared"] = {
+        "type": "object",
+        "description": "Values drawn once per scene that elements and randomizers refer to.",
+    }
     properties["annotations"] = {
         "type": "array",
         "items": {"enum": list(TABLES["annotation"])},
@@ -41,6 +53,11 @@ def config_schema() -> dict[str, Any]:
 
 def _plugin(kind: str, name: str, definitions: dict[str, Any]) -> dict[str, str]:
     schema = _hoisted(json_schema(TABLES[kind].load(name)), definitions)
+    if f"{kind}s" in VARYING:
+        schema["properties"] = {
+            key: part if key in ("type", "name") else {"anyOf": [part, *SHARED]}
+            for key, part in schema["properties"].items()
+        }
     # ``type`` chooses the plug-in, so it has to be written even where a default exists.
     schema["required"] = sorted({"type", *schema.get("required", ())})
     definitions[f"{kind}.{name}"] = schema

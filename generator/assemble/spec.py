@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,9 +15,12 @@ from generator.assemble.documents import config_document, resolved_document
 from generator.assemble.tables import TABLES
 from generator.config.document import Node, parse
 from generator.config.problems import Problems
+from generator.config.shared import drawn, probes, refers, resolved
 from generator.config.strict import Strict
 from generator.config.validation import validate
 from generator.core.errors import ConfigError, did_you_mean
+from generator.core.scene import SharedValue
+from generator.core.streams import Streams
 from generator.physics import PhysicsConfig
 from generator.renderers.settings import RenderSettings
 
@@ -84,6 +87,19 @@ class Head(Strict):
     assets: AssetFolders = AssetFolders()
 
 
+@dataclass(frozen=True)
+class Layout:
+    """What one scene is built and drawn from: the configuration with its shared values filled in.
+
+    Attributes:
+        shared: Names and values, sorted by name.
+    """
+
+    shared: tuple[tuple[str, SharedValue], ...]
+    elements: tuple[Any, ...]
+    randomizers: tuple[Any, ...]
+
+
 PLUGIN_LISTS = {
     "elements": "element",
     "randomizers": "randomizer",
@@ -91,6 +107,9 @@ PLUGIN_LISTS = {
     "exporters": "exporter",
 }
 """Lists of a configuration and the kind of plug-in they hold."""
+
+VARYING = ("elements", "randomizers")
+"""Lists that may depend on shared values."""
 
 
 @dataclass(frozen=True)
@@ -101,18 +120,45 @@ class Spec:
         name: Of the configuration; names the default output folder.
         resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
             the same Spec again.
-        elements, randomizers, sensors, exporters: Plug-ins, in order.
+        sensors, exporters: Plug-ins, in order.
         annotations: Names of annotators.
+        probes: Layouts that between them show what scenes can be; one where nothing is shared.
+        document: The merged document; layouts are made from it.
     """
 
     name: str
     resolved: Mapping[str, Any]
     head: Head
-    elements: tuple[Any, ...]
-    randomizers: tuple[Any, ...]
     sensors: tuple[Any, ...]
     annotations: tuple[str, ...]
     exporters: tuple[Any, ...]
+    probes: tuple[Layout, ...]
+    document: Node = field(compare=False)
+
+    @property
+    def elements(self) -> tuple[Any, ...]:
+        """The template elements of the first scene."""
+        return self.probes[0].elements
+
+    @property
+    def randomizers(self) -> tuple[Any, ...]:
+        """The randomizers of the first scene."""
+        return self.probes[0].randomizers
+
+    def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
+        """The shared values of one scene, sorted by name."""
+        section = self.document.get("shared")
+        if section is None or not section.content:
+            return ()
+        return tuple(sorted(drawn(section, streams).items()))
+
+    def layout(self, shared: tuple[tuple[str, SharedValue], ...]) -> Layout:
+        """What a scene with these shared values is built and drawn from.
+
+        Raises:
+            ConfigError: they make something invalid.
+        """
+        return _layout(self.document, dict(shared)) if shared else self.probes[0]
 
     @property
     def asset_folders(self) -> tuple[Path, ...]:
@@ -170,23 +216,72 @@ def spec_of_source(
 def _spec(document: Node, name: str) -> Spec:
     assert isinstance(document.content, Mapping)
     problems = Problems()
-    apart = {*PLUGIN_LISTS, "annotations"}
+    apart = {*PLUGIN_LISTS, "annotations", "shared"}
     head_node = Node(
         document.position,
         {key: node for key, node in document.content.items() if key not in apart},
         document.key_positions,
     )
     head = validate(head_node, Head, problems)
+    for key, node in document.content.items():
+        if key not in ("shared", *VARYING) and refers(node):
+            problems.add(node.position, key, f"shared values serve {' and '.join(VARYING)} only")
     plugins = {
         key: _plugins(document.content[key], key, kind, problems)
         for key, kind in PLUGIN_LISTS.items()
+        if key not in VARYING
     }
     annotations = _annotations(document.content["annotations"], problems)
     if not plugins["sensors"] and not len(problems):
         problems.add(document.position, "sensors", "at least one sensor is needed")
+    probes_ = _probed(document, head.seed if head else 0, problems)
     problems.raise_if_any()
     assert head is not None
-    return Spec(name, document.plain(), head, annotations=annotations, **plugins)
+    return Spec(
+        name,
+        document.plain(),
+        head,
+        annotations=annotations,
+        probes=probes_,
+        document=document,
+        **plugins,
+    )
+
+
+def _probed(document: Node, seed: int, problems: Problems) -> tuple[Layout, ...]:
+    """Layouts of everything that shared values can be, each once; faults are told once each."""
+    section = document.get("shared")
+    every = list(probes(section, seed)) if section is not None and section.content else [{}]
+    layouts: list[Layout] = []
+    for shared in every:
+        found = Problems()
+        layout = _layout_or_problems(document, shared, found)
+        if len(found):
+            problems.extend(found)
+            break
+        if layout not in layouts:
+            layouts.append(layout)
+    return tuple(layouts)
+
+
+def _layout(document: Node, shared: Mapping[str, SharedValue]) -> Layout:
+    problems = Problems()
+    layout = _layout_or_problems(document, shared, problems)
+    problems.raise_if_any()
+    return layout
+
+
+def _layout_or_problems(
+    document: Node, shared: Mapping[str, SharedValue], problems: Problems
+) -> Layout:
+    lists = {}
+    for key in VARYING:
+        listed = document.get(key)
+        assert listed is not None
+        if refers(listed):
+            listed = resolved(listed, shared, key)
+        lists[key] = _plugins(listed, key, PLUGIN_LISTS[key], problems)
+    return Layout(tuple(sorted(shared.items())), **lists)
 
 
 def _plugins(listed: Node, key: str, kind: str, problems: Problems) -> tuple[Any, ...]:

@@ -129,7 +129,7 @@ def merge(base: Node, override: Node) -> Node:
     """
     if not isinstance(base.content, Mapping) or not isinstance(override.content, Mapping):
         return override
-    if _is_distribution(base) or _is_distribution(override):
+    if is_distribution(base) or is_distribution(override):
         return override
     content = dict(base.content)
     for key, node in override.content.items():
@@ -138,7 +138,8 @@ def merge(base: Node, override: Node) -> Node:
     return Node(override.position, content, positions)
 
 
-def _is_distribution(node: Node) -> bool:
+def is_distribution(node: Node) -> bool:
+    """Whether a node is a one-key mapping that names a distribution."""
     keys = list(node.content) if isinstance(node.content, Mapping) else []
     return len(keys) == 1 and keys[0] in DISTRIBUTIONS
 

@@ -64,6 +64,11 @@ class Problems:
         """Note a problem; one that is known already is not repeated."""
         self._problems[Problem(position, field, fact)] = None
 
+    def extend(self, others: Problems) -> None:
+        """Note everything that others hold."""
+        for problem in others.sorted():
+            self.add(problem.position, problem.field, problem.fact)
+
     def __len__(self) -> int:
         """How many there are."""
         return len(self._problems)

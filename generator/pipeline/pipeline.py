@@ -30,12 +30,24 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Blueprint:
+    """What one scene is made from.
+
+    Attributes:
+        nominal: The template's scene, with the sensors mounted.
+    """
+
+    nominal: Scene
+    randomizers: Sequence[Randomizer]
+
+
 @dataclass(frozen=True, eq=False)
 class Recipe:
     """What a pipeline does, as data and pure functions.
 
     Attributes:
-        nominal: The template's scene, with the sensors mounted.
+        blueprint: What the scene of these streams is made from: a pure function.
         channels: What the annotators need to have been rendered.
         image_truth: Annotates one reading.
         split_shares: ``{split: share}`` in order; shares sum to 1.
@@ -45,8 +57,7 @@ class Recipe:
 
     seed: int
     views_per_scene: int
-    nominal: Scene
-    randomizers: Sequence[Randomizer]
+    blueprint: Callable[[Streams], Blueprint]
     sensors: Sequence[Sensor]
     channels: frozenset[Channel]
     image_truth: Callable[[Scene, Reading], ImageTruth]
@@ -61,12 +72,14 @@ class AcceptedScene:
     """A scene at rest, and how it came to be.
 
     Attributes:
+        randomizers: What draws its views.
         attempt: Number of the attempt that was accepted, from 0.
         timings_s: CPU seconds by stage, all attempts together.
     """
 
     index: int
     scene: Scene
+    randomizers: Sequence[Randomizer]
     attempt: int
     timings_s: Mapping[str, float]
 
@@ -178,7 +191,8 @@ class Pipeline:
             streams = Streams(self.recipe.seed, scene_index, attempt=attempt, index=scene_index)
             try:
                 with _timed(timings, "randomize"):
-                    scene = self._randomized(self.recipe.nominal, Stage.BUILD, streams)
+                    plan = self.recipe.blueprint(streams)
+                    scene = self._randomized(plan.nominal, plan.randomizers, Stage.BUILD, streams)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
                 continue
@@ -186,7 +200,7 @@ class Pipeline:
                 settled = self._physics.settle(scene)
             if settled.rejection is None:
                 scene = frozen_scene(settled.scene, self.assets, self._category_ids)
-                return AcceptedScene(scene_index, scene, attempt, timings)
+                return AcceptedScene(scene_index, scene, plan.randomizers, attempt, timings)
             rejections.append(settled.rejection)
         raise SceneRejected(scene_index, tuple(rejections))
 
@@ -198,15 +212,17 @@ class Pipeline:
                 self.recipe.seed, accepted.index, view=view_index, attempt=attempt, index=index
             )
             try:
-                scene = self._randomized(accepted.scene, Stage.VIEW, streams)
+                scene = self._randomized(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
                 continue
             return with_rounded_cameras(scene), streams
         raise SceneRejected(accepted.index, tuple(rejections))
 
-    def _randomized(self, scene: Scene, stage: Stage, streams: Streams) -> Scene:
-        for randomizer in self.recipe.randomizers:
+    def _randomized(
+        self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
+    ) -> Scene:
+        for randomizer in randomizers:
             if randomizer.stage is stage:
                 rng = streams.rng(f"randomizer/{randomizer.name}")
                 scene = randomizer(scene, self.assets, rng)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.metadata import PackageNotFoundError, version
 
 from generator import __version__
-from generator.assemble.recipe import PipelineFactory, nominal_scene
+from generator.assemble.recipe import PipelineFactory, nominal_scenes
 from generator.assets.library import open_library
 from generator.core.geometry import Asset
 from generator.core.scene import Scene
@@ -53,8 +53,8 @@ def licences_text(factory: PipelineFactory) -> str:
 def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
     """Every object and robot that a sample may contain, sorted by id."""
     library = open_library(factory.spec.asset_folders)
-    scene = nominal_scene(factory.spec, library)
-    return tuple(library.get(asset_id) for asset_id in sorted(_ids(scene)))
+    ids = {i for scene in nominal_scenes(factory.spec, library) for i in _ids(scene)}
+    return tuple(library.get(asset_id) for asset_id in sorted(ids))
 
 
 def _ids(scene: Scene) -> set[str]:

@@ -20,7 +20,7 @@ from generator.core.scene import Articulation, Body, Camera, Instance, Scene
 from generator.core.se3 import SE3
 from generator.pipeline import Pipeline
 from generator.pipeline.freeze import frozen_scene
-from generator.pipeline.pipeline import Recipe
+from generator.pipeline.pipeline import Blueprint, Recipe
 
 CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(8, 6, 1.0))
 
@@ -102,8 +102,7 @@ def pipeline(
     recipe = Recipe(
         seed=seed,
         views_per_scene=views_per_scene,
-        nominal=sensor.mount(Scene("test")),
-        randomizers=randomizers,
+        blueprint=lambda streams: Blueprint(sensor.mount(Scene("test")), randomizers),
         sensors=(sensor,),
         channels=frozenset(),
         image_truth=lambda scene, reading: ImageTruth(reading.camera, ()),

@@ -1,0 +1,88 @@
+"""Shared values: drawn once per scene, referred to anywhere, selecting what depends on them."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from generator.config.document import parse
+from generator.config.shared import drawn, probes, refers, resolved
+from generator.core.errors import ConfigError
+from generator.core.streams import Streams
+
+SECTION = """
+lanes: {given: road, highway: 3, otherwise: {uniform_integer: [1, 2]}}
+road: {choice: {street: 3, highway: 1}}
+density: {uniform: [0.1, 0.5]}
+wet: {probability: 0.5}
+"""
+
+
+def test_values_follow_their_distributions_and_the_values_they_depend_on() -> None:
+    """3 : 1 within four standard errors of a binomial count; lanes obey the road."""
+    section = parse(SECTION, "test")
+    draws = [drawn(section, Streams(7, scene)) for scene in range(1000)]
+
+    highways = Counter(d["road"] for d in draws)["highway"]
+    assert abs(highways - 250) < 4 * (1000 * 0.25 * 0.75) ** 0.5
+    assert all(d["lanes"] == 3 for d in draws if d["road"] == "highway")
+    assert {d["lanes"] for d in draws if d["road"] == "street"} == {1, 2}
+    assert all(0.1 <= d["density"] <= 0.5 for d in draws)
+    assert {d["wet"] for d in draws} == {True, False}
+
+
+def test_order_of_writing_moves_no_draw() -> None:
+    """Each value has a stream of its own."""
+    lines = SECTION.strip().splitlines()
+    for order in (lines[::-1], [*lines[2:], *lines[:2]]):
+        again = parse("\n".join(order), "test")
+        assert drawn(again, Streams(7, 3)) == drawn(parse(SECTION, "test"), Streams(7, 3))
+
+
+def test_references_and_selections_are_replaced_wherever_they_stand() -> None:
+    """In lists, in mappings, inside selections."""
+    text = """
+    a: $shared.lanes
+    b: [1, {given: road, highway: [$shared.lanes, 9], otherwise: none}]
+    c: {uniform: [0, 1]}
+    """
+    node = parse(text, "test")
+
+    assert refers(node)
+    plain = resolved(node, {"lanes": 3, "road": "highway"}).plain()
+    assert plain == {"a": 3, "b": [1, [3, 9]], "c": {"uniform": [0, 1]}}
+    assert resolved(node, {"lanes": 1, "road": "street"}).plain()["b"] == [1, "none"]
+    assert not refers(parse("c: {uniform: [0, 1]}", "test"))
+
+
+def test_numbers_and_flags_select_by_value() -> None:
+    """Keys are read as YAML reads them."""
+    node = parse("x: {given: k, 1: one, 2: two}\ny: {given: f, true: yes, false: no}", "test")
+    assert resolved(node, {"k": 2, "f": True}).plain() == {"x": "two", "y": "yes"}
+
+
+def test_probes_show_every_outcome_of_every_choice() -> None:
+    """What is rare must be checked, too."""
+    section = parse("road: {choice: {street: 1, alley: 0.000001}}", "test")
+    assert {p["road"] for p in probes(section, 0)} == {"street", "alley"}
+
+
+@pytest.mark.parametrize(
+    ("text", "fact"),
+    [
+        ("x: $shared.raod", "test:1:4: x: there is no shared value 'raod'; expected one of road"),
+        ("x: {given: road, bend: 1}", "test:1:4: x: no entry for road = 'street'"),
+    ],
+)
+def test_a_reference_that_leads_nowhere_is_one_clear_error(text: str, fact: str) -> None:
+    """Place, fact, and what was expected."""
+    with pytest.raises(ConfigError, match=r".") as caught:
+        resolved(parse(text, "test"), {"road": "street"})
+    assert str(caught.value).startswith(fact)
+
+
+def test_values_that_need_one_another_are_refused() -> None:
+    """A circle has no beginning."""
+    with pytest.raises(ConfigError, match="need one another"):
+        drawn(parse("a: $shared.b\nb: $shared.a", "test"), Streams(0, 0))
