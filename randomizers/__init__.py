@@ -7,9 +7,11 @@ from generator.core.plugins import PluginTable
 TABLE = PluginTable(
     "randomizer",
     {
+        "along": "randomizers.along:Along",
         "arm_configuration": "randomizers.arm_configuration:ArmConfiguration",
         "backdrop": "randomizers.backdrop:Backdrop",
         "camera_intrinsics": "randomizers.camera_intrinsics:CameraIntrinsics",
+        "camera_on_lane": "randomizers.camera_on_lane:CameraOnLane",
         "camera_pose": "randomizers.camera_pose:CameraPose",
         "colors": "randomizers.colors:Colors",
         "distractors": "randomizers.distractors:Distractors",

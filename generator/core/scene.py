@@ -142,6 +142,7 @@ class ObjectGroup:
     Attributes:
         surfaces: Names of the surfaces it is spread over.
         lanes: Kinds of the lanes it is spread over (placement ``along``).
+        facing: Where its members' fronts point on lanes: ``along`` the lane, or to its ``left``.
         assets: Ids of the assets it may draw from, sorted.
         keep_out: Discs ``(x, y, radius)`` [m], world, where nothing is put (the arm's base).
     """
@@ -154,6 +155,7 @@ class ObjectGroup:
     annotated: bool = True
     keep_out: tuple[Vec3, ...] = ()
     lanes: tuple[LaneKind, ...] = ()
+    facing: Literal["along", "left"] = "along"
 
 
 @dataclass(frozen=True, slots=True)

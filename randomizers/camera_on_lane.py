@@ -1,0 +1,124 @@
+"""Cameras that ride or stand on lanes: a dash camera, a pedestrian's, one on a pole."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from generator.config.distributions import Bounds, Constant, Flag, Normal, Positive, Scalar
+from generator.core.errors import ConfigError, LayoutRejected, Rejection
+from generator.core.interfaces import AssetIndex
+from generator.core.lanes import LaneLine
+from generator.core.scene import Camera, LaneKind, Scene
+from generator.core.se3 import SE3, look_at
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase
+from randomizers.clearance import is_in_the_open
+from randomizers.footprints import Footprint, Ground, ground_of
+
+TRIES = 64
+
+
+class CameraOnLane(RandomizerBase):
+    """Puts every camera over a lane, looking along it.
+
+    Attributes:
+        lanes: Kinds of the lanes it may be on.
+        height_m: Over the ground.
+        lateral: Across the lane: -1 right edge, 0 middle, 1 left edge.
+        yaw_deg: Turn to the left of the lane's direction.
+        pitch_deg: Upwards.
+        roll_deg: Clockwise about the viewing direction.
+        turned: Whether it looks back.
+        ahead_m: The lane goes on at least this far where it looks; halved for lanes that are
+            shorter than twice as long.
+        free_m: Length and width of the ground around it on which nothing stands: the vehicle it
+            rides on. The camera is at three tenths of the length from its front.
+        clearance_m: It keeps this far from every body.
+    """
+
+    type: Literal["camera_on_lane"] = "camera_on_lane"
+    every: Literal["scene", "view"] = "view"
+    lanes: tuple[LaneKind, ...] = ("driving",)
+    height_m: Positive = Constant(1.65)
+    lateral: Annotated[Scalar, Bounds(-1, 1)] = Constant(0.0)
+    yaw_deg: Scalar = Normal(0.0, 1.0, clip=(-3.0, 3.0))
+    pitch_deg: Annotated[Scalar, Bounds(-89, 89)] = Normal(0.0, 0.7, clip=(-2.0, 2.0))
+    roll_deg: Scalar = Normal(0.0, 0.5, clip=(-2.0, 2.0))
+    turned: Flag = Constant(False)
+    ahead_m: float = Field(40.0, ge=0)
+    free_m: tuple[float, float] = (4.6, 1.9)
+    clearance_m: float = Field(0.3, ge=0)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with all cameras at one place.
+
+        Raises:
+            ConfigError: there is no such lane.
+            LayoutRejected: no free place was found.
+        """
+        lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
+        lines = [line for line in lines if not line.lane.junction]
+        if not lines:
+            known = ", ".join(sorted({lane.kind for lane in scene.lanes})) or "none"
+            raise ConfigError(
+                f"randomizers.{self.name}.lanes: the scene has no lane of kind "
+                f"{' or '.join(self.lanes)}; there is {known}"
+            )
+        groups = {group.name for group in scene.groups}
+        ground = ground_of((b for b in scene.bodies if b.group in groups), assets)
+        for _ in range(TRIES):
+            pose = self._drawn(lines, ground, scene, assets, rng)
+            if pose is not None:
+                cameras = tuple(_moved(camera, pose) for camera in scene.cameras)
+                return replace(scene, cameras=cameras)
+        remedy = f"other lanes, a smaller free_m, or less traffic (randomizers.{self.name})"
+        raise LayoutRejected(Rejection("no free place for a camera on a lane", remedy))
+
+    def _drawn(
+        self, lines: list[LaneLine], ground: Ground, scene: Scene, assets: AssetIndex, rng: Rng
+    ) -> SE3 | None:
+        """``T_world_camera`` of one try; None where something stands."""
+        weights = [line.length_m for line in lines]
+        line = lines[_weighted(weights, float(rng.uniform()))]
+        turned = self.turned.draw(rng)
+        ahead_m = min(self.ahead_m, 0.5 * line.length_m)
+        low, high = (ahead_m, line.length_m) if turned else (0.0, line.length_m - ahead_m)
+        at_m = float(rng.uniform(low, high))
+        left_m = 0.5 * line.lane.width_m * self.lateral.draw(rng)
+        height_m = self.height_m.draw(rng)
+        yaw, pitch, roll = (
+            math.radians(angle.draw(rng)) for angle in (self.yaw_deg, self.pitch_deg, self.roll_deg)
+        )
+        back = math.pi if turned else 0.0
+        T_world_rig = line.pose(at_m, left_m) @ SE3.about_z(back)
+        length_m, width_m = self.free_m
+        T_world_middle = T_world_rig @ SE3((-0.2 * length_m, 0.0, 0.0))
+        half = (0.5 * length_m, 0.5 * width_m)
+        bounds_m = ((-half[0], -half[1], 0.0), (half[0], half[1], 1.0))
+        if not ground.is_free(Footprint.of(T_world_middle, bounds_m)):
+            return None
+        T_world_turned = T_world_rig @ SE3.about_z(yaw)
+        eye = (T_world_turned @ SE3((0.0, 0.0, height_m))).translation_m
+        if not is_in_the_open(eye, scene, assets, self.clearance_m):
+            return None
+        ahead = (math.cos(pitch), 0.0, height_m + math.sin(pitch))
+        target = (T_world_turned @ SE3(ahead)).translation_m
+        return look_at(eye, target, roll)
+
+
+def _weighted(weights: list[float], draw: float) -> int:
+    """Index of one of several, in proportion to its weight."""
+    left = draw * sum(weights)
+    for k, weight in enumerate(weights):
+        left -= weight
+        if left < 0.0:
+            return k
+    return len(weights) - 1
+
+
+def _moved(camera: Camera, T_world_camera: SE3) -> Camera:
+    return replace(camera, T_world_camera=T_world_camera.rounded())

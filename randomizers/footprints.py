@@ -1,0 +1,95 @@
+"""What bodies cover of the ground, and whether rectangles overlap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body
+from generator.core.se3 import SE3, Array, Vec3
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """A rectangle on the ground: centre [m], half extents [m] and the direction of its X."""
+
+    x_m: float
+    y_m: float
+    half_x_m: float
+    half_y_m: float
+    yaw_rad: float
+
+    @classmethod
+    def of(cls, T_world_body: SE3, bounds_m: tuple[Vec3, Vec3], scale: float = 1.0) -> Footprint:
+        """Of an upright body with these bounds in its own frame."""
+        (x0, y0, _), (x1, y1, _) = bounds_m
+        w, _, _, z = T_world_body.quaternion_wxyz
+        center = T_world_body @ SE3((0.5 * scale * (x0 + x1), 0.5 * scale * (y0 + y1), 0.0))
+        x, y, _ = center.translation_m
+        return cls(x, y, 0.5 * scale * (x1 - x0), 0.5 * scale * (y1 - y0), 2.0 * math.atan2(z, w))
+
+    def grown(self, margin_m: float) -> Footprint:
+        """The same with more room around it."""
+        half_x_m, half_y_m = self.half_x_m + margin_m, self.half_y_m + margin_m
+        return Footprint(self.x_m, self.y_m, half_x_m, half_y_m, self.yaw_rad)
+
+    def row(self) -> tuple[float, ...]:
+        """Centre, half extents, cosine and sine of the direction."""
+        c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return (self.x_m, self.y_m, self.half_x_m, self.half_y_m, c, s)
+
+
+@dataclass
+class Ground:
+    """Footprints of all that stands already."""
+
+    _rows: Array = field(default_factory=lambda: np.zeros((64, 6)))
+    _count: int = 0
+
+    def add(self, footprint: Footprint) -> None:
+        """One more."""
+        if self._count == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+        self._rows[self._count] = footprint.row()
+        self._count += 1
+
+    def is_free(self, footprint: Footprint) -> bool:
+        """Whether a rectangle overlaps nothing (separating axes; Gottschalk et al. 1996)."""
+        others = self._rows[: self._count]
+        own = np.array(footprint.row())
+        delta = others[:, :2] - own[:2]
+        reach = np.hypot(others[:, 2], others[:, 3]) + math.hypot(own[2], own[3])
+        near = np.sum(delta * delta, axis=1) < reach * reach
+        return not bool(_overlap(own, others[near], delta[near]).any())
+
+
+def ground_of(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
+    """The ground under bodies."""
+    ground = Ground()
+    for body in bodies:
+        ground.add(Footprint.of(body.T_world_body, assets.bounds_m(body.asset), body.scale))
+    return ground
+
+
+def _overlap(own: Array, others: Array, delta: Array) -> NDArray[np.bool_]:
+    """Whether each of the others overlaps a rectangle; rows as ``Footprint.row`` gives them."""
+    c = own[4] * others[:, 4] + own[5] * others[:, 5]
+    s = own[4] * others[:, 5] - own[5] * others[:, 4]
+    c, s = np.abs(c), np.abs(s)
+    mine_x = delta[:, 0] * own[4] + delta[:, 1] * own[5]
+    mine_y = delta[:, 1] * own[4] - delta[:, 0] * own[5]
+    their_x = delta[:, 0] * others[:, 4] + delta[:, 1] * others[:, 5]
+    their_y = delta[:, 1] * others[:, 4] - delta[:, 0] * others[:, 5]
+    hx, hy = others[:, 2], others[:, 3]
+    overlap: NDArray[np.bool_] = (
+        (np.abs(mine_x) < own[2] + hx * c + hy * s)
+        & (np.abs(mine_y) < own[3] + hx * s + hy * c)
+        & (np.abs(their_x) < hx + own[2] * c + own[3] * s)
+        & (np.abs(their_y) < hy + own[2] * s + own[3] * c)
+    )
+    return overlap

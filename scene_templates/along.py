@@ -1,0 +1,95 @@
+"""A group of things along lanes: traffic, people, houses, trees, lamps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetIndex
+from generator.core.lanes import LaneLine, standing_on_lane
+from generator.core.scene import Body, Instance, LaneKind, ObjectGroup, Scene
+from generator.core.se3 import SE3
+from scene_templates.element import Element, next_instance_id
+from scene_templates.objects import AssetChoice
+
+
+class Along(Element):
+    """Things along lanes; the ``along`` randomizer of the same name draws them.
+
+    Attributes:
+        lanes: Kinds of the lanes they are spread over.
+        assets: Which there may be.
+        count: How many there are nominally, evenly spread.
+        facing: Whether fronts point along the lane, or to its left, where a street is for all
+            lanes that are not driven on.
+        annotate: Whether labels are written for them.
+    """
+
+    type: Literal["along"] = "along"
+    lanes: tuple[LaneKind, ...] = Field(min_length=1)
+    assets: AssetChoice
+    count: int = Field(0, ge=0, le=2000)
+    facing: Literal["along", "left"] = "along"
+    annotate: bool = True
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """The group, and its things evenly along the lanes.
+
+        Raises:
+            ConfigError: the template has no lane of these kinds before this element.
+        """
+        lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
+        if not lines and self.count:
+            known = ", ".join(sorted({lane.kind for lane in scene.lanes})) or "none"
+            raise ConfigError(
+                f"elements.{self.name}.lanes: there is no lane of kind {' or '.join(self.lanes)}; "
+                f"there is {known}: list the road before what stands along it"
+            )
+        group = ObjectGroup(
+            name=self.name,
+            surfaces=(),
+            assets=self.assets.resolved(assets, f"elements.{self.name}.assets"),
+            count=self.count,
+            placement="along",
+            annotated=self.annotate,
+            lanes=self.lanes,
+            facing=self.facing,
+        )
+        scene = replace(scene, groups=(*scene.groups, group))
+        total_m = sum(line.length_m for line in lines)
+        for number in range(self.count):
+            line, at_m = _place(lines, total_m * (number + 0.5) / self.count)
+            asset = group.assets[(number * len(group.assets)) // self.count]
+            bounds_m = assets.bounds_m(asset)
+            pose = standing_on_lane(line.pose(at_m), line.lane, bounds_m, self.facing)
+            scene = self._with_member(scene, assets, number, asset, pose)
+        return scene
+
+    def _with_member(
+        self, scene: Scene, assets: AssetIndex, number: int, asset: str, T_world_body: SE3
+    ) -> Scene:
+        instance_id = next_instance_id(scene)
+        body = Body(
+            name=f"{self.name}/{number}",
+            asset=asset,
+            T_world_body=T_world_body.rounded(),
+            instance_id=instance_id,
+            group=self.name,
+            collides=False,
+        )
+        instance = Instance(
+            instance_id, body.name, assets.get(asset).category, 0, asset, annotated=self.annotate
+        )
+        return replace(scene, bodies=(*scene.bodies, body), instances=(*scene.instances, instance))
+
+
+def _place(lines: list[LaneLine], at_m: float) -> tuple[LaneLine, float]:
+    """The line and the place on it at an arc length along all lines together."""
+    for line in lines[:-1]:
+        if at_m < line.length_m:
+            return line, at_m
+        at_m -= line.length_m
+    return lines[-1], at_m
