@@ -16,7 +16,7 @@ from generator.core.scene import Camera, LaneKind, Scene
 from generator.core.se3 import SE3, look_at
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
-from randomizers.clearance import is_in_the_open
+from randomizers.clearance import is_clear
 from randomizers.footprints import Footprint, Ground, ground_of
 
 TRIES = 64
@@ -103,7 +103,7 @@ class CameraOnLane(RandomizerBase):
             return None
         T_world_turned = T_world_rig @ SE3.about_z(yaw)
         eye = (T_world_turned @ SE3((0.0, 0.0, height_m))).translation_m
-        if not is_in_the_open(eye, scene, assets, self.clearance_m):
+        if not is_clear(eye, scene, assets, self.clearance_m):
             return None
         ahead = (math.cos(pitch), 0.0, height_m + math.sin(pitch))
         target = (T_world_turned @ SE3(ahead)).translation_m

@@ -13,12 +13,15 @@ def is_inside(point_m: Vec3, low_m: Vec3, high_m: Vec3) -> bool:
 
 
 def is_in_the_open(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -> bool:
-    """Whether a point is inside the scene's interior and no nearer than ``margin_m`` to a body.
+    """Whether a point is inside the scene's interior and no nearer than ``margin_m`` to a body."""
+    return is_inside(point_m, *scene.interior_m) and is_clear(point_m, scene, assets, margin_m)
+
+
+def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -> bool:
+    """Whether a point is no nearer than ``margin_m`` to a body.
 
     Bodies count with their bounding boxes; the background (the room itself) does not.
     """
-    if not is_inside(point_m, *scene.interior_m):
-        return False
     for body in scene.bodies:
         if body.instance_id == 0:
             continue

@@ -14,7 +14,7 @@ from generator.config.describe import describe
 from generator.config.schema import json_schema
 from generator.core.interfaces import Stage
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera, Scene
+from generator.core.scene import Camera, Lane, ObjectGroup, Scene
 from generator.core.se3 import look_at
 from generator.core.serial import canonical_json, from_plain, to_plain
 from randomizers import TABLE
@@ -33,7 +33,7 @@ GIVEN: dict[str, dict[str, Any]] = {
 }
 """Fields without which a randomizer cannot be made, or may leave a scene as it is."""
 
-PHYSICS_BOUND = ("arm_configuration", "distractors", "objects", "physics_properties")
+PHYSICS_BOUND = ("along", "arm_configuration", "distractors", "objects", "physics_properties")
 """Randomizers whose draws physics has to see."""
 
 
@@ -51,7 +51,10 @@ def nominal_scene() -> Scene:
     cameras = tuple(
         Camera(name, look_at((1.0, 0.0, 1.5), (0.0, 0.0, 0.8)), lens) for name in ("left", "right")
     )
-    return replace(build("test", elements, FakeAssets()), cameras=cameras)
+    lanes = (Lane("lane", "driving", ((-40.0, 5.0, 0.0), (40.0, 5.0, 0.0)), 3.5, road="street"),)
+    group = ObjectGroup("along", (), ("brick", "can?seed=0"), 2, "along", lanes=("driving",))
+    scene = build("test", elements, FakeAssets())
+    return replace(scene, cameras=cameras, lanes=lanes, groups=(*scene.groups, group))
 
 
 def made(kind: str) -> Any:

@@ -1,0 +1,164 @@
+"""Things along lanes, and cameras that ride there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from generator.config.distributions import Constant, Probability, Uniform
+from generator.core.errors import ConfigError, LayoutRejected
+from generator.core.intrinsics import Intrinsics
+from generator.core.scene import Body, Camera, Lane, ObjectGroup, Scene
+from generator.core.se3 import SE3
+from randomizers.along import Along
+from randomizers.camera_on_lane import CameraOnLane
+from randomizers.footprints import Footprint, Ground
+from tests.randomizers.doubles import FakeAssets, rng_of
+
+BRICK_M = (0.06, 0.03)
+
+
+def street(**group: Any) -> Scene:
+    """Two lanes of 40 m in opposite directions, 3 m apart."""
+    there = Lane("a", "driving", ((0.0, -1.5, 0.0), (40.0, -1.5, 0.0)), 3.0, road="street")
+    back = Lane("b", "driving", ((40.0, 1.5, 0.0), (0.0, 1.5, 0.0)), 3.0, road="street")
+    things = ObjectGroup("things", (), ("brick",), 0, "along", lanes=("driving",), **group)
+    camera = Camera("color", SE3(), Intrinsics.from_hfov(64, 48, 1.0))
+    return Scene("test", groups=(things,), lanes=(there, back), cameras=(camera,))
+
+
+def drawn(scene: Scene, stream: str = "stream", **fields: Any) -> Scene:
+    """After one draw."""
+    return Along(name="things", **fields)(scene, FakeAssets(), rng_of(stream))
+
+
+def test_rows_have_the_gaps_that_were_asked_for() -> None:
+    """Bricks of 6 cm with 1.94 m between them: one every 2 m on both lanes."""
+    scene = drawn(street(), gap_m=Constant(1.94))
+
+    for y, sign in ((-1.5, 1), (1.5, -1)):
+        row = sorted(
+            b.T_world_body.translation_m[0] * sign
+            for b in scene.bodies
+            if b.T_world_body.translation_m[1] == pytest.approx(y)
+        )
+        assert len(row) in (19, 20)
+        assert np.diff(row) == pytest.approx(2.0, abs=1e-5)
+
+
+def test_things_face_the_way_of_their_lane_or_its_left() -> None:
+    """X of the body in the world."""
+    for facing, turn in (("along", 0.0), ("left", 90.0)):
+        scene = drawn(street(facing=facing))
+        for body in scene.bodies:
+            lane_deg = 0.0 if body.T_world_body.translation_m[1] < 0 else 180.0
+            ahead = body.T_world_body.rotation()[:, 0]
+            yaw = math.degrees(math.atan2(ahead[1], ahead[0]))
+            assert (yaw - lane_deg - turn + 180.0) % 360.0 == pytest.approx(180.0, abs=1e-3)
+
+
+def test_share_of_used_places_is_that_of_the_distribution() -> None:
+    """400 places at 30 %: within four standard errors."""
+    full = drawn(street(), gap_m=Constant(0.14), spare_m=0.1)
+    some = drawn(street(), gap_m=Constant(0.14), spare_m=0.1, used=Probability(0.3))
+    n = len(full.bodies)
+
+    assert n == pytest.approx(400, abs=4)
+    assert abs(len(some.bodies) - 0.3 * n) < 4 * (n * 0.3 * 0.7) ** 0.5
+
+
+def test_count_is_a_choice_of_all_places_and_ids_are_unique() -> None:
+    """Ten of about forty."""
+    scene = drawn(street(), gap_m=Constant(1.94), count=Constant(10))
+    ids = [i.instance_id for i in scene.instances]
+
+    assert len(scene.bodies) == len(set(ids)) == 10
+    assert {b.instance_id for b in scene.bodies} == set(ids)
+
+
+@pytest.mark.parametrize("scattered", [False, True])
+def test_nothing_overlaps_even_when_lanes_are_walked_often(scattered: bool) -> None:
+    """Every pair of rectangles is separated along one of their axes."""
+    scene = drawn(
+        street(),
+        gap_m=Uniform(0.0, 0.1),
+        rows=4,
+        lateral=Uniform(-1.0, 1.0),
+        yaw_deg=Uniform(-180.0, 180.0),
+        count=Constant(120),
+        scattered=scattered,
+    )
+    prints = [Footprint.of(b.T_world_body, FakeAssets().bounds_m(b.asset)) for b in scene.bodies]
+
+    assert len(prints) == 120
+    for k, one in enumerate(prints):
+        ground = Ground()
+        ground.add(one)
+        assert all(ground.is_free(other) for other in prints[k + 1 :])
+
+
+def test_too_many_scattered_things_are_refused_by_name() -> None:
+    """A square of 10 cm has room for few bricks."""
+    lane = Lane("a", "driving", ((0.0, 0.0, 0.0), (0.1, 0.1, 0.0)), 0.1)
+    with pytest.raises(LayoutRejected, match="no room left"):
+        drawn(replace(street(), lanes=(lane,)), count=Constant(500), scattered=True)
+
+
+def test_the_camera_rides_where_nothing_stands() -> None:
+    """A brick on every metre but for 10 m: the camera is in that gap, 1.65 m up, looking along."""
+    bodies = tuple(
+        Body(f"things/{k}", "brick", SE3((float(k), y, 0.02)), instance_id=1, group="things")
+        for k in range(41)
+        for y in (-1.5, 1.5)
+        if not (15 < k < 25 and y < 0)
+    )
+    scene = replace(street(), bodies=bodies)
+    level = {"pitch_deg": Constant(0.0), "yaw_deg": Constant(0.0), "roll_deg": Constant(0.0)}
+    for k in range(10):
+        rider = CameraOnLane(name="dash", ahead_m=15.0, **level)
+        camera = rider(scene, FakeAssets(), rng_of(f"{k}")).camera("color")
+        x, y, z = camera.T_world_camera.translation_m
+        assert (y, z) == pytest.approx((-1.5, 1.65))
+        assert 15.0 < x < 25.0
+        assert camera.T_world_camera.rotation()[:, 2] == pytest.approx((1.0, 0.0, 0.0), abs=1e-5)
+
+
+def test_a_street_without_such_a_lane_is_one_clear_error() -> None:
+    """It tells which there are."""
+    with pytest.raises(ConfigError, match="no lane of kind sidewalk; there is driving"):
+        CameraOnLane(name="walk", lanes=("sidewalk",))(street(), FakeAssets(), rng_of())
+
+
+sizes = st.floats(0.1, 3.0)
+
+
+@given(
+    x=st.floats(-4, 4),
+    y=st.floats(-4, 4),
+    yaw=st.floats(0, 6.3),
+    a=sizes,
+    b=sizes,
+    c=sizes,
+    d=sizes,
+)
+def test_overlap_agrees_with_points_inside_both(
+    x: float, y: float, yaw: float, a: float, b: float, c: float, d: float
+) -> None:
+    """Where a grid of points of one rectangle meets the other, they overlap."""
+    ground = Ground()
+    ground.add(Footprint(0.0, 0.0, a, b, 0.0))
+    other = Footprint(x, y, c, d, yaw)
+    u, v = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41))
+    px = x + c * u * math.cos(yaw) - d * v * math.sin(yaw)
+    py = y + c * u * math.sin(yaw) + d * v * math.cos(yaw)
+    if ((np.abs(px) < a) & (np.abs(py) < b)).any():
+        assert not ground.is_free(other)
+    reach = math.hypot(a, b) + math.hypot(c, d)
+    if math.hypot(x, y) > reach:
+        assert ground.is_free(other)
