@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,14 +12,11 @@ from typing import Any, Protocol
 from generator.core.capture import Capture, Reading
 from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.sample import Sample
-from generator.core.serial import canonical_json
 from generator.runner.plan import Plan
+from generator.runner.provenance import SCENES_NAME, scene_line
 from generator.runner.record import ShardRecord, describe_shard
 from generator.runner.store import LocalStore
 from generator.runner.unforeseen import explaining
-
-SCENES_NAME = "scenes.jsonl"
-"""One line per sample: where it came from, and its final scene."""
 
 MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
 
@@ -104,7 +101,9 @@ def make_shard(
     with job.store.errors():
         folder = job.store.scratch_dir()
     try:
-        samples = [_written(job, pipeline, index, folder, on_sample) for index in indices]
+        samples: list[Sample] = []
+        for index in indices:
+            samples.append(_written(job, pipeline, index, folder, samples, on_sample))
         started_s = time.process_time()
         for name in sorted(pipeline.exporters):
             with explaining(f"shard {shard}, exporter {name}"), job.store.errors():
@@ -124,33 +123,24 @@ def _written(
     pipeline: PipelineLike,
     index: int,
     folder: Path,
+    before: Sequence[Sample],
     on_sample: Callable[[Sample], None],
 ) -> Sample:
-    """One sample without its pixels, after they and its scene are in files."""
+    """One sample without its pixels, after they and its scene are in files.
+
+    ``before`` are the shard's samples before it.
+    """
     with explaining(f"sample {index}", job.store.reproduce_command(index)):
         sample = pipeline.sample(index)
         started_s = time.process_time()
         with job.store.errors():
             job.write_media(pipeline.info, sample, folder)
             with (folder / SCENES_NAME).open("a", encoding="utf-8") as scenes:
-                scenes.write(scene_line(sample) + "\n")
+                base = next((s for s in before if s.scene_index == sample.scene_index), None)
+                scenes.write(scene_line(sample, base) + "\n")
         encode_s = time.process_time() - started_s
     on_sample(replace(sample, timings_s={**sample.timings_s, "encode": encode_s}))
     return without_pixels(sample)
-
-
-def scene_line(sample: Sample) -> str:
-    """The provenance of a sample: rendering this scene again gives its images."""
-    return canonical_json(
-        {
-            "index": sample.index,
-            "scene_index": sample.scene_index,
-            "view_index": sample.view_index,
-            "split": sample.split,
-            "attempts": sample.attempts,
-            "scene": sample.scene,
-        }
-    )
 
 
 def without_pixels(sample: Sample) -> Sample:

@@ -104,17 +104,15 @@ def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
     from generator.assemble.recipe import PipelineFactory
     from generator.assemble.spec import spec_of_source
     from generator.core.capture import Channel
-    from generator.core.scene import Scene
-    from generator.core.serial import from_plain
+    from generator.runner.provenance import kept_scenes
 
-    lines = (dataset / "shards" / "000002" / "scenes.jsonl").read_text().splitlines()
-    kept = json.loads(lines[3])
-    scene = from_plain(Scene, kept["scene"])
+    kept = list(kept_scenes(dataset / "shards" / "000002" / "scenes.jsonl"))[3]
+    scene = kept.scene
     pipeline = PipelineFactory(spec_of_source(str(dataset)), n=15)()
 
     reading = pipeline.renderer.render(scene, scene.camera("color"), frozenset({Channel.RGB}))
 
-    name = f"{kept['index']:09d}.png"
+    name = f"{kept.index:09d}.png"
     path = dataset / "shards" / "000002" / "color" / "rgb" / name
     assert np.array_equal(np.asarray(Image.open(path)), reading.channels[Channel.RGB])
 

@@ -15,9 +15,15 @@ from pathlib import Path
 
 import pytest
 
+from generator.core.capture import Capture
 from generator.core.errors import DeterminismError, StorageError
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import Sample
+from generator.core.scene import Body, Camera, Scene
+from generator.core.se3 import SE3
 from generator.runner import files
 from generator.runner.plan import load_plan
+from generator.runner.provenance import kept_scenes, scene_line
 from generator.runner.run import Settings, run
 from generator.runner.shard import Job, make_shard
 from generator.runner.store import FolderState, LocalStore
@@ -128,6 +134,23 @@ def test_provenance_has_one_line_per_sample_in_order(tmp_path: Path) -> None:
     ]
     assert [row["split"] for row in rows] == ["train", "train", "val", "val"]
     assert rows[0]["scene"]["instances"][0]["name"] == "thing-4"
+    assert [row["base"] for row in rows] == [None, 4, None, 6]
+
+
+def test_views_keep_what_differs_and_read_back_complete(tmp_path: Path) -> None:
+    """The second line of a scene has no field that the first line says already."""
+    one = Scene("test", bodies=(Body("a", "mug"),))
+    other = replace(one, cameras=(Camera("c", SE3(), Intrinsics.from_hfov(64, 48, 1.0)),))
+    first, second = (
+        Sample(4 + view, 2, view, "train", scene, Capture({}), {})
+        for view, scene in enumerate((one, other))
+    )
+    path = tmp_path / "scenes.jsonl"
+    path.write_text(f"{scene_line(first, None)}\n{scene_line(second, first)}\n")
+
+    assert set(json.loads(path.read_text().splitlines()[1])["scene"]) == {"cameras"}
+    assert [kept.scene for kept in kept_scenes(path)] == [first.scene, second.scene]
+    assert [(kept.index, kept.view_index) for kept in kept_scenes(path)] == [(4, 0), (5, 1)]
 
 
 def test_exporters_see_no_pixels(tmp_path: Path) -> None:
