@@ -14,8 +14,8 @@ from generator.config.describe import describe
 from generator.config.schema import json_schema
 from generator.core.interfaces import Stage
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera, Scene
-from generator.core.se3 import look_at
+from generator.core.scene import Body, Camera, Scene
+from generator.core.se3 import SE3, look_at
 from generator.core.serial import canonical_json, from_plain, to_plain
 from randomizers import TABLE
 from scene_templates.builder import build
@@ -29,6 +29,7 @@ GIVEN: dict[str, dict[str, Any]] = {
     "distractors": {"count": {"uniform_integer": [1, 4]}},
     "colors": {"probability": True},
     "materials": {"probability": True},
+    "street_lights": {"when": "always"},
     "textures": {"textures": ["wood"], "probability": True},
 }
 """Fields without which a randomizer cannot be made, or may leave a scene as it is."""
@@ -38,7 +39,7 @@ PHYSICS_BOUND = ("arm_configuration", "distractors", "objects", "physics_propert
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, distractors and two cameras."""
+    """A room with a table, an arm, objects, distractors, a street lamp and two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -51,7 +52,9 @@ def nominal_scene() -> Scene:
     cameras = tuple(
         Camera(name, look_at((1.0, 0.0, 1.5), (0.0, 0.0, 0.8)), lens) for name in ("left", "right")
     )
-    return replace(build("test", elements, FakeAssets()), cameras=cameras)
+    scene = build("test", elements, FakeAssets())
+    lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
+    return replace(scene, bodies=(*scene.bodies, lamp), cameras=cameras)
 
 
 def made(kind: str) -> Any:
