@@ -131,7 +131,7 @@ class Generated:
         view: Callable[[Arrays], T],
     ) -> T:
         key = self._key(asset_id, family)
-        stored = not isinstance(family, Family) or family.stored
+        stored = isinstance(family, TextureFamily) or family.stored
         try:
             return self._store.get(key, compute, view, stored=stored)
         except ValueError as error:

@@ -14,8 +14,8 @@ from generator.config.describe import describe
 from generator.config.schema import json_schema
 from generator.core.interfaces import Stage
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera, Lane, ObjectGroup, Scene
-from generator.core.se3 import look_at
+from generator.core.scene import Body, Camera, Lane, ObjectGroup, Scene
+from generator.core.se3 import SE3, look_at
 from generator.core.serial import canonical_json, from_plain, to_plain
 from randomizers import TABLE
 from scene_templates.builder import build
@@ -29,6 +29,7 @@ GIVEN: dict[str, dict[str, Any]] = {
     "distractors": {"count": {"uniform_integer": [1, 4]}},
     "colors": {"probability": True},
     "materials": {"probability": True},
+    "street_lights": {"when": "always"},
     "textures": {"textures": ["wood"], "probability": True},
 }
 """Fields without which a randomizer cannot be made, or may leave a scene as it is."""
@@ -38,7 +39,7 @@ PHYSICS_BOUND = ("along", "arm_configuration", "distractors", "objects", "physic
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, distractors and two cameras."""
+    """A room with a table, an arm, objects, distractors, a street lamp and two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -54,7 +55,14 @@ def nominal_scene() -> Scene:
     lanes = (Lane("lane", "driving", ((-40.0, 5.0, 0.0), (40.0, 5.0, 0.0)), 3.5, road="street"),)
     group = ObjectGroup("along", (), ("brick", "can?seed=0"), 2, "along", lanes=("driving",))
     scene = build("test", elements, FakeAssets())
-    return replace(scene, cameras=cameras, lanes=lanes, groups=(*scene.groups, group))
+    lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
+    return replace(
+        scene,
+        bodies=(*scene.bodies, lamp),
+        cameras=cameras,
+        lanes=lanes,
+        groups=(*scene.groups, group),
+    )
 
 
 def made(kind: str) -> Any:

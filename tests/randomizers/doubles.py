@@ -24,6 +24,7 @@ FURNITURE_M: dict[str, Vec3] = {
     "pedestal": (0.3, 0.3, 0.7),
     "plane": (4.0, 4.0, 0.0),
     "backdrop": (3.0, 3.0, 2.2),
+    "street_lamp": (0.4, 0.4, 6.0),
 }
 SLOTS = {"room": 7, "table": 2, "shelf": 2}
 
@@ -122,8 +123,8 @@ class FakeAssets:
         return (-x / 2, -y / 2, 0.0), (x / 2, y / 2, height[0] if height else 0.0)
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
-        """None of them has any."""
-        return ()
+        """A street lamp has its lamp at the top; nothing else has any."""
+        return (Keypoint("lamp", (1.5, 0.0, 6.0)),) if asset_id == "street_lamp" else ()
 
     def robot(self, asset_id: str) -> RobotModel:
         """An arm of two links with a parallel gripper that opens 8 cm."""

@@ -91,6 +91,9 @@ class EnvironmentFamily:
     """A generator of equirectangular images of relative luminance; see ``AssetLibrary``.
 
     ``build(seed, **parameters)`` is a pure function.
+
+    Attributes:
+        stored: Whether images are kept on disk; not if hardly any is asked for twice.
     """
 
     name: str
@@ -99,6 +102,7 @@ class EnvironmentFamily:
     version: int
     build: Callable[..., Float32]
     parameters: Mapping[str, object] = field(default_factory=dict)
+    stored: bool = True
 
 
 @dataclass(frozen=True)

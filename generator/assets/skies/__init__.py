@@ -4,6 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from generator.assets.procedural.family import EnvironmentFamily
+from generator.assets.procedural.family import EnvironmentFamily, Lazy
 
-ENVIRONMENTS: Mapping[str, EnvironmentFamily] = {}
+ENVIRONMENTS: Mapping[str, EnvironmentFamily] = {
+    # Not offered for selection: a sky without the sun that belongs to it is wrong.
+    "sky": EnvironmentFamily(
+        "sky",
+        ("outdoor",),
+        0,
+        1,
+        Lazy("generator.assets.skies.sky:sky"),
+        {
+            "sun_altitude_deg": 40.0,
+            "turbidity": 2.5,
+            "cloudiness": 0.0,
+            "ground_albedo": 0.18,
+        },
+        stored=False,
+    )
+}

@@ -1,0 +1,128 @@
+"""A layer of clouds over a curved earth, seen from below.
+
+The layer is a square that repeats. What is seen near the horizon is averaged over many
+kilometres, so the layer is kept at many sizes, each half as fine as the one before.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.assets.procedural.noise import fbm, perlin, smoothstep
+from generator.core.geometry import Float32
+from generator.core.streams import Rng
+
+Array = NDArray[np.float64]
+
+_TILE_PX = 512
+_TILE_M = 12_000.0
+_HEIGHT_M = 1_400.0
+_EARTH_RADIUS_M = 6.371e6
+_HAZE_M = 28_000.0
+"""Way through the air after which clouds have lost all but 1/e of their contrast."""
+_HEAPING = 0.14
+"""Clouds are as high as they are wide: low in the sky they look less flat than a layer would."""
+_OCTAVES = 7
+
+
+def cloud_layer(
+    d: Array, cloudiness: float, sun_altitude_rad: float, rng: Rng
+) -> tuple[Array, Array]:
+    """How much of each direction clouds hide, and how bright they are there.
+
+    Args:
+        d: Unit directions of the upper hemisphere [rows, columns, 3], one elevation per row.
+        cloudiness: Share of the sky under clouds.
+        sun_altitude_rad: Of a sun in the direction of +X.
+        rng: Draws the clouds.
+
+    Returns:
+        Cover in [0, 1], 0 below the horizon; brightness relative to that of a white cloud in
+        full light, 0 where there is none. Shape [rows, columns].
+    """
+    cover, light = _seen_from_below(cloudiness, sun_altitude_rad, rng)
+    levels = _halvings(np.stack([cover, cover * light], axis=-1))
+    up = d[:, 0, 2]
+    way_m = _way_to_layer(np.maximum(up, 0.0))
+    seen = np.zeros((*d.shape[:2], 2))
+    level_of_row = _levels_of(up, len(levels), 2 * d.shape[0])
+    for k, level in enumerate(levels):
+        near = np.clip(1.0 - np.abs(level_of_row - k), 0.0, 1.0)
+        rows = np.flatnonzero((near > 0.0) & (up > 0.0))
+        if rows.size:
+            flat_m = _HEIGHT_M / (up[rows, None, None] + _HEAPING)
+            place = d[rows, :, :2] * flat_m / _TILE_M
+            seen[rows] += near[rows, None, None] * _sampled(level, place)
+    clear = np.exp(-way_m / _HAZE_M)[:, None]
+    brightness = seen[..., 1] / np.maximum(seen[..., 0], 1e-6)
+    return seen[..., 0] * clear, brightness
+
+
+def _seen_from_below(
+    cloudiness: float, sun_altitude_rad: float, rng: Rng
+) -> tuple[Float32, Float32]:
+    """Cover and brightness of the layer: thin rims shine, thick middles are dark below."""
+    field = _heaps(rng)
+    ordered = np.sort(field, axis=None)
+    threshold = float(ordered[int((1.0 - min(cloudiness, 1.0)) * (ordered.size - 1))])
+    depth = np.maximum(field - np.float32(threshold), np.float32(0.0))
+    cover = smoothstep(0.0, 0.16, depth)
+    # The way of the light through the layer, towards the sun: a lower one passes more cloud.
+    reach_px = min(3.0 / max(math.tan(max(sun_altitude_rad, 0.0)), 0.15), 14.0)
+    passed = sum(
+        (np.roll(depth, -round(reach_px * k / 2.0), axis=1) for k in range(1, 5)),
+        start=np.zeros_like(depth),
+    )
+    sunlit = np.exp(np.float32(-1.6) * passed)
+    base = np.exp(np.float32(-2.4) * depth)
+    light: Float32 = np.float32(0.26) + np.float32(0.34) * base + np.float32(0.40) * sunlit
+    return cover, light
+
+
+def _heaps(rng: Rng) -> Float32:
+    """Where there is much cloud: large masses with billows on them, in about [-1, 1]."""
+    masses = fbm((3, 3), _OCTAVES, rng, 0.52, _TILE_PX)
+    billows = np.zeros_like(masses)
+    for k, cells in enumerate((12, 24, 48)):
+        bumps = 1.0 - 2.0 * np.abs(perlin((cells, cells), rng, _TILE_PX))
+        billows += np.float32(0.5**k) * bumps.astype(np.float32)
+    heaps: Float32 = masses + np.float32(0.22) * billows
+    return heaps
+
+
+def _way_to_layer(up: Array) -> Array:
+    """Distance to the layer [m] along directions with that sine of elevation."""
+    level = _EARTH_RADIUS_M * up
+    return np.sqrt(level * level + 2.0 * _EARTH_RADIUS_M * _HEIGHT_M + _HEIGHT_M**2) - level
+
+
+def _levels_of(up: Array, levels: int, rows: int) -> Array:
+    """The size of the layer, as a number of halvings, that suits each row of the image."""
+    flat_m = _HEIGHT_M / (np.maximum(up, 0.0) + _HEAPING)
+    footprint_m = flat_m * (math.pi / rows) / (np.maximum(up, 0.0) + _HEAPING)
+    return np.clip(np.log2(footprint_m / (_TILE_M / _TILE_PX)), 0.0, levels - 1.0)
+
+
+def _halvings(layer: Float32) -> list[Float32]:
+    levels = [layer]
+    while levels[-1].shape[0] > 1:
+        n = levels[-1].shape[0] // 2
+        levels.append(levels[-1].reshape(n, 2, n, 2, -1).mean(axis=(1, 3), dtype=np.float32))
+    return levels
+
+
+def _sampled(layer: Float32, place: Array) -> Array:
+    """The repeating layer at places in units of its length, bilinear."""
+    size = layer.shape[0]
+    position = place * size - 0.5
+    first = np.floor(position).astype(np.int64)
+    part = position - first
+    (x0, y0), (x1, y1) = (((first[..., 0] + s) % size, (first[..., 1] + s) % size) for s in (0, 1))
+    fx, fy = part[..., 0, None], part[..., 1, None]
+    lower = layer[y0, x0] * (1.0 - fx) + layer[y0, x1] * fx
+    upper = layer[y1, x0] * (1.0 - fx) + layer[y1, x1] * fx
+    mixed: Array = lower * (1.0 - fy) + upper * fy
+    return mixed

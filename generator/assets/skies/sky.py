@@ -1,0 +1,278 @@
+"""The sky at any time of day, under any clouds, as an environment.
+
+The sun stands in the direction of +X and is not in the image: it is a Light. Luminances are those
+of the real sky: the light on level ground is what ``daylight.sky_illuminance_lux`` says.
+
+Sources: Preetham, Shirley and Smits, "A practical analytic model for daylight", SIGGRAPH 1999
+(clear sky: Perez' formula for luminance and chromaticity); CIE S 011/E:2003 (overcast sky).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.assets.procedural.draw import rng_of
+from generator.assets.procedural.environments import directions, normalised
+from generator.assets.procedural.noise import smoothstep
+from generator.assets.skies import daylight
+from generator.assets.skies.clouds import cloud_layer
+from generator.core.geometry import Float32
+
+Array = NDArray[np.float64]
+
+_ROWS = 512
+_MEAN_ROWS = 64
+# Less light than this share of the rest is not computed.
+_NEGLIGIBLE = 1e-3
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+# XYZ (D65) to linear sRGB, IEC 61966-2-1.
+_RGB_OF_XYZ = np.array(
+    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
+)
+# Perez coefficients A to E as [factor on turbidity, constant]: luminance, x, y (Preetham, A.2).
+_PEREZ_LUMINANCE = (
+    (0.1787, -1.4630), (-0.3554, 0.4275), (-0.0227, 5.3251), (0.1206, -2.5771), (-0.0670, 0.3703),
+)  # fmt: skip
+_PEREZ_X = (
+    (-0.0193, -0.2592), (-0.0665, 0.0008), (-0.0004, 0.2125), (-0.0641, -0.8989), (-0.0033, 0.0452),
+)  # fmt: skip
+_PEREZ_Y = (
+    (-0.0167, -0.2608), (-0.0950, 0.0092), (-0.0079, 0.2102), (-0.0441, -1.6537), (-0.0109, 0.0529),
+)  # fmt: skip
+# Zenith chromaticity: rows for turbidity squared, turbidity, 1; columns for the sun's zenith
+# distance cubed, squared, itself, 1.
+_ZENITH_X = np.array(
+    [
+        [0.00166, -0.00375, 0.00209, 0.0],
+        [-0.02903, 0.06377, -0.03202, 0.00394],
+        [0.11693, -0.21196, 0.06052, 0.25886],
+    ]
+)
+_ZENITH_Y = np.array(
+    [
+        [0.00275, -0.00610, 0.00317, 0.0],
+        [-0.04214, 0.08970, -0.04153, 0.00516],
+        [0.15346, -0.26756, 0.06670, 0.26688],
+    ]
+)
+# A cloud deck (about 6600 K), the clear horizon, a city's glow, clean night air, land from afar.
+_DECK = np.array((0.967, 1.0, 1.097))
+_HORIZON = np.array((0.89, 1.0, 1.32))
+_CITY = np.array((1.45, 0.93, 0.37))
+_AIRGLOW = np.array((0.62, 0.95, 2.6))
+_SOIL = np.array((1.05, 1.02, 0.80))
+
+
+@dataclass(frozen=True, slots=True)
+class SkyModel:
+    """What a sky depends on.
+
+    Attributes:
+        seed: Of the clouds.
+        sun_altitude_deg: Over the horizon; negative at night.
+        turbidity: 2 very clear, 3 usual, 6 hazy.
+        cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
+        ground_albedo: Of the land below the horizon.
+    """
+
+    seed: int = 0
+    sun_altitude_deg: float = 40.0
+    turbidity: float = 2.5
+    cloudiness: float = 0.0
+    ground_albedo: float = 0.18
+
+    @property
+    def sun_altitude_rad(self) -> float:
+        """Of the sun."""
+        return math.radians(self.sun_altitude_deg)
+
+
+def sky(
+    seed: int,
+    sun_altitude_deg: float,
+    turbidity: float,
+    cloudiness: float,
+    ground_albedo: float,
+) -> Float32:
+    """Relative luminance, mean 1; float32 [512, 1024, 3].
+
+    Raises:
+        ValueError: a parameter is outside its range.
+    """
+    model = SkyModel(seed, sun_altitude_deg, turbidity, cloudiness, ground_albedo)
+    return normalised(luminance_cd_m2(model, _ROWS))
+
+
+def mean_luminance_cd_m2(model: SkyModel) -> float:
+    """Mean over the whole sphere: what ``Environment.luminance_cd_m2`` has to be."""
+    image = luminance_cd_m2(model, _MEAN_ROWS)
+    weights = _row_weights(_MEAN_ROWS)
+    rows = np.einsum("hwc,c->h", image, _LUMINANCE, optimize=False) / image.shape[1]
+    return float((rows * weights).sum())
+
+
+def luminance_cd_m2(model: SkyModel, rows: int) -> Array:
+    """Luminance of sky and land, linear RGB [rows, 2 * rows, 3].
+
+    Raises:
+        ValueError: a parameter is outside its range.
+    """
+    _check(model)
+    d = directions(rows)
+    above, below = d[: rows // 2], d[rows // 2 :]
+    night_lux = daylight.night_illuminance_lux(model.cloudiness)
+    day_lux = daylight.sky_illuminance_lux(model.sun_altitude_rad, model.cloudiness) - night_lux
+    image = np.zeros_like(above)
+    if day_lux > _NEGLIGIBLE * night_lux:
+        image += _scaled(_daylit(above, model), day_lux)
+    if night_lux > _NEGLIGIBLE * day_lux:
+        image += _scaled(_night(above, model), night_lux)
+    return np.concatenate([image, _land(image, below, model)])
+
+
+def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
+    """Relative luminance of the clear sky by day, linear RGB, zenith about 1; Preetham 1999."""
+    zenith_distance = 0.5 * math.pi - sun_altitude_rad
+    up = np.maximum(d[..., 2], 0.012)
+    towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
+    angle = np.arccos(np.clip(towards, -1.0, 1.0))
+
+    def relative(coefficients: tuple[tuple[float, float], ...]) -> Array:
+        c = [factor * turbidity + constant for factor, constant in coefficients]
+        at_zenith = _perez(np.ones(1), np.full(1, zenith_distance), c)
+        return _perez(up, angle, c) / at_zenith
+
+    powers = np.array([zenith_distance**3, zenith_distance**2, zenith_distance, 1.0])
+    turbidities = np.array([turbidity**2, turbidity, 1.0])
+    terms = turbidities[:, None] * powers
+    x = float((_ZENITH_X * terms).sum()) * relative(_PEREZ_X)
+    y = float((_ZENITH_Y * terms).sum()) * relative(_PEREZ_Y)
+    luminance = relative(_PEREZ_LUMINANCE)
+    xyz = np.stack([x / y, np.ones_like(x), (1.0 - x - y) / y], axis=-1)
+    rgb = np.maximum(np.einsum("hwc,kc->hwk", xyz, _RGB_OF_XYZ, optimize=False), 0.02)
+    # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
+    pale = np.exp(-up / 0.22)[..., None] * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
+    rgb /= np.einsum("hwc,c->hw", rgb, _LUMINANCE, optimize=False)[..., None]
+    rgb += pale * (_HORIZON - rgb)
+    sky_rgb: Array = rgb * luminance[..., None]
+    return sky_rgb
+
+
+def overcast_sky(d: Array) -> Array:
+    """Relative luminance of the overcast sky, zenith 1: CIE standard overcast sky."""
+    graded: Array = (1.0 + 2.0 * np.maximum(d[..., 2:], 0.0)) / 3.0 * _DECK
+    return graded
+
+
+def _perez(up: Array, angle: Array, c: list[float]) -> Array:
+    gradation = 1.0 + c[0] * np.exp(c[1] / up)
+    luminance: Array = gradation * (1.0 + c[2] * np.exp(c[3] * angle) + c[4] * np.cos(angle) ** 2)
+    return luminance
+
+
+def _daylit(d: Array, model: SkyModel) -> Array:
+    """What the sun lights, any unit: clear air, clouds in it, a closed deck."""
+    altitude = model.sun_altitude_rad
+    by_day = clear_sky(d, max(altitude, math.radians(1.5)), model.turbidity)
+    dusk = 1.0 - _ramp(-1.0, 6.0, model.sun_altitude_deg)
+    by_day = _scaled(by_day, 1.0) * (1.0 - dusk) + _scaled(_twilight(d, model), 1.0) * dusk
+    if model.cloudiness == 0.0:
+        return by_day
+    rng = rng_of("sky", model.seed)
+    cover, light = cloud_layer(d, model.cloudiness, altitude, rng)
+    # A white cloud sends back what sun and sky throw on it.
+    clear_lux = daylight.sky_illuminance_lux(altitude)
+    sun_lux = daylight.sun_illuminance_lux(altitude, model.turbidity) * max(math.sin(altitude), 0.1)
+    warm = np.array(daylight.sun_color(max(altitude, 0.01), model.turbidity))
+    lit = (0.7 * sun_lux * warm + 1.3 * clear_lux * _DECK) / (math.pi * clear_lux)
+    towards = (d[..., 0] * math.cos(altitude) + d[..., 2] * math.sin(altitude))[..., None]
+    rim = 1.0 + 0.9 * np.exp((towards - 1.0) / 0.03)
+    clouds = light[..., None] * lit * rim
+    broken = by_day + cover[..., None] * (clouds - by_day)
+    deck = overcast_sky(d) * (0.72 + 0.5 * np.where(cover > 0.0, light, 0.5))[..., None]
+    closed = _ramp(0.6, 0.95, model.cloudiness)
+    return _scaled(broken, 1.0) * (1.0 - closed) + _scaled(deck, 1.0) * closed
+
+
+def _twilight(d: Array, model: SkyModel) -> Array:
+    """A band of glow over the place where the sun is below the horizon, blue above.
+
+    A painter's fit to photographs, not a simulation: only its total follows a source.
+    """
+    up = np.maximum(d[..., 2:], 0.0)
+    level = np.sqrt(np.maximum(1.0 - d[..., 2:] ** 2, 1e-9))
+    ahead = 0.5 + 0.5 * d[..., :1] / level
+    sunk = _ramp(2.0, -9.0, model.sun_altitude_deg)
+    zenith = np.array((0.30, 0.42, 0.78)) * (1.0 - sunk) + np.array((0.15, 0.27, 0.75)) * sunk
+    glow = np.array((1.9, 0.95, 0.42)) * (1.0 - sunk) + np.array((1.7, 0.80, 0.38)) * sunk
+    away = np.array((0.62, 0.50, 0.62)) * (1.0 - sunk) + np.array((0.28, 0.33, 0.60)) * sunk
+    low = np.exp(-up / (0.20 - 0.09 * sunk))
+    band = np.exp(-up / (0.42 - 0.22 * sunk)) * ahead**2
+    image: Array = zenith * (0.45 + 0.55 * ahead * np.exp(-up / 0.7))
+    image = image + (away - 0.5 * zenith) * low * (1.0 - ahead)
+    return image + glow * band * (1.1 + 2.6 * low * ahead**3)
+
+
+def _night(d: Array, model: SkyModel) -> Array:
+    """Airglow, and a city's lights scattered back: strongest low, or from the clouds' bases."""
+    up = np.maximum(d[..., 2:], 0.0)
+    glow = (0.35 + 0.65 * np.exp(-up / 0.22)) * _CITY
+    clear = 0.22 * _AIRGLOW + glow
+    if model.cloudiness == 0.0:
+        return clear
+    cover, light = cloud_layer(d, model.cloudiness, 1.0, rng_of("sky", model.seed))
+    clouds = 5.0 * _CITY * (0.4 + 0.6 * light[..., None]) * (0.6 + 0.4 * np.exp(-up / 0.4))
+    return clear + cover[..., None] * (clouds - clear)
+
+
+def _land(image: Array, d: Array, model: SkyModel) -> Array:
+    """What lies below the horizon: land that sun and sky light, hazy where it is far."""
+    altitude = model.sun_altitude_rad
+    sun_lux = daylight.sun_illuminance_lux(altitude, model.turbidity, model.cloudiness)
+    sun = sun_lux * max(math.sin(altitude), 0.0) * np.array(daylight.sun_color(altitude))
+    light = np.einsum("hwc,h->c", image, _cosine_weights(len(image)), optimize=False) + sun
+    soil = _SOIL if model.ground_albedo < 0.5 else np.ones(3)
+    land = model.ground_albedo / math.pi * light * soil
+    far = np.exp(d[..., 2:] / 0.02)
+    hazy: Array = land + (image[-1:] - land) * far
+    return hazy
+
+
+def _scaled(image: Array, lux: float) -> Array:
+    """A sky that gives that illuminance on level ground."""
+    light = np.einsum("hwc,h->c", image, _cosine_weights(len(image)), optimize=False)
+    scaled: Array = image * (lux / float((light * _LUMINANCE).sum()))
+    return scaled
+
+
+def _cosine_weights(rows: int) -> Array:
+    """Solid angle times cosine of the pixels of each row of a hemisphere, zenith first."""
+    edges = np.cos(0.5 * math.pi * np.arange(rows + 1) / rows)
+    weights: Array = math.pi * (edges[:-1] ** 2 - edges[1:] ** 2) / (4 * rows)
+    return weights
+
+
+def _row_weights(rows: int) -> Array:
+    edges = np.cos(math.pi * np.arange(rows + 1) / rows)
+    weights: Array = (edges[:-1] - edges[1:]) / 2.0
+    return weights
+
+
+def _ramp(low: float, high: float, x: float) -> float:
+    return float(smoothstep(low, high, np.full(1, x, np.float64))[0])
+
+
+def _check(model: SkyModel) -> None:
+    limits = (
+        ("sun_altitude_deg", model.sun_altitude_deg, -90.0, 90.0),
+        ("turbidity", model.turbidity, 1.8, 8.0),
+        ("cloudiness", model.cloudiness, 0.0, 1.0),
+        ("ground_albedo", model.ground_albedo, 0.0, 1.0),
+    )
+    for name, value, low, high in limits:
+        if not low <= value <= high:
+            raise ValueError(f"{name} is {value:g}; expected a number in [{low:g}, {high:g}]")

@@ -1,0 +1,110 @@
+"""Sun and sky that belong together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from generator.assets.skies.daylight import sun_color, sun_illuminance_lux, sun_radius_rad
+from generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2
+from generator.core.scene import Environment, Light, Scene
+from generator.core.streams import Rng
+
+SUN = "sun"
+"""Name of the sun among the lights."""
+_CLOUD_SEEDS = 4096
+_FAINTEST_LUX = 0.5
+_SNOW_ALBEDO = 0.7
+_LAND_ALBEDO = 0.18
+
+
+@dataclass(frozen=True, slots=True)
+class Daylight:
+    """What the light outdoors depends on.
+
+    Attributes:
+        sun_altitude_deg: Over the horizon; negative at night.
+        sun_azimuth_deg: From +X towards +Y.
+        cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
+        turbidity: Of clear air: 2 very clear, 6 hazy.
+        seed: Of the clouds.
+        snow: Whether the land lies under snow.
+    """
+
+    sun_altitude_deg: float
+    sun_azimuth_deg: float
+    cloudiness: float
+    turbidity: float
+    seed: int
+    snow: bool = False
+
+
+def cloud_seed(rng: Rng) -> int:
+    """A seed for a sky's clouds."""
+    return int(rng.integers(_CLOUD_SEEDS))
+
+
+def with_daylight(scene: Scene, light: Daylight) -> Scene:
+    """The scene under that sun and sky; other suns are taken away, lamps stay."""
+    altitude_deg, cloudiness = round(light.sun_altitude_deg, 2), round(light.cloudiness, 3)
+    turbidity = round(light.turbidity, 2)
+    albedo = _SNOW_ALBEDO if light.snow else _LAND_ALBEDO
+    model = SkyModel(light.seed, altitude_deg, turbidity, cloudiness, albedo)
+    yaw = round(math.radians(light.sun_azimuth_deg % 360.0), 6)
+    image = (
+        f"environment/sky?cloudiness={cloudiness:g}&ground_albedo={albedo:g}&seed={light.seed}"
+        f"&sun_altitude_deg={altitude_deg:g}&turbidity={turbidity:g}"
+    )
+    environment = Environment(image, _significant(mean_luminance_cd_m2(model)), yaw)
+    lamps = tuple(lamp for lamp in scene.lights if lamp.kind != "sun")
+    return with_shared(
+        replace(scene, lights=(*_sun(model, yaw), *lamps), environment=environment),
+        cloudiness=cloudiness,
+        sun_altitude_deg=altitude_deg,
+    )
+
+
+def with_shared(scene: Scene, **values: float) -> Scene:
+    """The scene with values that later draws have in common with these."""
+    merged = {**dict(scene.shared), **values}
+    return replace(scene, shared=tuple(sorted(merged.items())))
+
+
+def shared_number(scene: Scene, name: str) -> float | None:
+    """A shared value; None if nothing has been said about it."""
+    value = dict(scene.shared).get(name)
+    return float(value) if isinstance(value, (int, float)) else None
+
+
+def is_dark(scene: Scene) -> bool:
+    """Whether the sun has set."""
+    altitude_deg = shared_number(scene, "sun_altitude_deg")
+    return altitude_deg is not None and altitude_deg < 0.0
+
+
+def _sun(model: SkyModel, yaw_rad: float) -> tuple[Light, ...]:
+    altitude = model.sun_altitude_rad
+    lux = sun_illuminance_lux(altitude, model.turbidity, model.cloudiness)
+    if lux < _FAINTEST_LUX:
+        return ()
+    level = math.cos(altitude)
+    direction = (
+        round(-level * math.cos(yaw_rad), 6),
+        round(-level * math.sin(yaw_rad), 6),
+        round(-math.sin(altitude), 6),
+    )
+    return (
+        Light(
+            SUN,
+            "sun",
+            direction=direction,
+            color=sun_color(altitude, model.turbidity),
+            illuminance_lux=_significant(lux),
+            angular_radius_rad=round(sun_radius_rad(model.cloudiness), 6),
+        ),
+    )
+
+
+def _significant(value: float) -> float:
+    """Five digits: what is written down is what is rendered."""
+    return float(f"{value:.5g}")

@@ -1,0 +1,54 @@
+"""Sun and sky through the day and the night."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from generator.config.distributions import Bounds, Scalar, Uniform, UnitInterval
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase
+from randomizers.daylight import Daylight, cloud_seed, shared_number, with_daylight
+
+Altitude = Annotated[Scalar, Bounds(-90, 90)]
+Turbidity = Annotated[Scalar, Bounds(1.8, 8.0)]
+
+
+class TimeOfDay(RandomizerBase):
+    """Draws where the sun stands; light, colours and the sky follow from it.
+
+    Attributes:
+        sun_altitude_deg: Over the horizon: 60 a summer's noon, 0 sunset, -6 the end of dusk,
+            below -12 night.
+        sun_azimuth_deg: Direction around the vertical, from +X towards +Y.
+        cloudiness: 0 clear, 0.5 broken clouds, 1 overcast; without it what the weather said,
+            else anything up to broken clouds.
+        turbidity: Haze of clear air: 2 very clear, 6 hazy.
+    """
+
+    type: Literal["time_of_day"] = "time_of_day"
+    sun_altitude_deg: Altitude = Uniform(5.0, 60.0)
+    sun_azimuth_deg: Scalar = Uniform(0.0, 360.0)
+    cloudiness: UnitInterval | None = Field(None)
+    turbidity: Turbidity = Uniform(2.0, 4.0)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene at another time."""
+        del assets
+        altitude_deg = self.sun_altitude_deg.draw(rng)
+        azimuth_deg = self.sun_azimuth_deg.draw(rng)
+        turbidity, seed = self.turbidity.draw(rng), cloud_seed(rng)
+        given = shared_number(scene, "cloudiness")
+        if self.cloudiness is not None:
+            cloudiness = self.cloudiness.draw(rng)
+        elif given is not None:
+            cloudiness = given
+        else:
+            cloudiness = Uniform(0.0, 0.6).draw(rng)
+        snow = scene.weather.snow_cover > 0.0
+        return with_daylight(
+            scene, Daylight(altitude_deg, azimuth_deg, cloudiness, turbidity, seed, snow)
+        )

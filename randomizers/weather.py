@@ -1,0 +1,116 @@
+"""The weather, and the sun and sky that go with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+from pydantic import Field, field_validator
+
+from generator.config.distributions import (
+    Choice,
+    Malformed,
+    Name,
+    NonNegative,
+    Scalar,
+    Uniform,
+    UnitInterval,
+)
+from generator.config.distributions.fields import custom_error
+from generator.core.errors import did_you_mean
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase
+from randomizers.daylight import Daylight, cloud_seed, with_daylight
+from randomizers.time_of_day import Altitude, Turbidity
+from randomizers.weather_presets import PRESETS, Range
+
+_FIELDS = (
+    "fog_extinction_per_m",
+    "fog_height_m",
+    "rain_mm_h",
+    "snow_mm_h",
+    "wetness",
+    "puddles",
+    "snow_cover",
+    "lens_drops",
+)
+_PATTERNS = 2**31
+
+
+class Weather(RandomizerBase):
+    """Draws a named kind of weather; fields that are given replace what the name stands for.
+
+    Attributes:
+        preset: Condition and time in one name: ClearNoon, WetCloudySunset, HardRainNight,
+            FoggyMorning, SoftSnowDusk. Conditions: Clear, Cloudy, Wet, WetCloudy, SoftRain,
+            MidRain, HardRain, Misty, Foggy, DenseFog, Snowy, SoftSnow, HardSnow, DustStorm.
+            Times: Noon, Morning, Sunset, Dusk, Night.
+        sun_altitude_deg: Over the horizon; negative at night.
+        sun_azimuth_deg: Direction around the vertical, from +X towards +Y.
+        cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
+        turbidity: Haze of clear air: 2 very clear, 6 hazy.
+        fog_extinction_per_m: At the ground; 3.912 over it is the meteorological range.
+        fog_height_m: Height over which fog thins by a factor of e; 0 = evenly thick.
+        rain_mm_h: Rain that is falling.
+        snow_mm_h: Snow that is falling, as water.
+        wetness: Of surfaces open to the sky, 0 dry to 1 soaked.
+        puddles: Share of level ground under water.
+        snow_cover: Share of upward surfaces under snow.
+        lens_drops: Share of the image behind drops on the lens.
+    """
+
+    type: Literal["weather"] = "weather"
+    preset: Name = Choice(("ClearNoon", "CloudyNoon", "ClearSunset", "WetNoon"))
+    sun_altitude_deg: Altitude | None = Field(None)
+    sun_azimuth_deg: Scalar = Uniform(0.0, 360.0)
+    cloudiness: UnitInterval | None = Field(None)
+    turbidity: Turbidity | None = Field(None)
+    fog_extinction_per_m: NonNegative | None = Field(None)
+    fog_height_m: NonNegative | None = Field(None)
+    rain_mm_h: NonNegative | None = Field(None)
+    snow_mm_h: NonNegative | None = Field(None)
+    wetness: UnitInterval | None = Field(None)
+    puddles: UnitInterval | None = Field(None)
+    snow_cover: UnitInterval | None = Field(None)
+    lens_drops: UnitInterval | None = Field(None)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene in other weather."""
+        del assets
+        preset = PRESETS[self.preset.draw(rng)]
+        condition = preset.condition
+        light = Daylight(
+            _drawn(self.sun_altitude_deg, preset.sun_altitude_deg, rng),
+            self.sun_azimuth_deg.draw(rng),
+            _drawn(self.cloudiness, condition.cloudiness, rng),
+            _drawn(self.turbidity, condition.turbidity, rng),
+            cloud_seed(rng),
+        )
+        values: dict[str, Any] = {"seed": int(rng.integers(_PATTERNS))}
+        for name in _FIELDS:
+            given: Scalar | None = getattr(self, name)
+            if given is not None:
+                values[name] = round(given.draw(rng), 6)
+        weather = replace(condition.weather, **values)
+        light = replace(light, snow=weather.snow_cover > 0.0)
+        return with_daylight(replace(scene, weather=weather), light)
+
+    @field_validator("preset")
+    @classmethod
+    def _known(cls, preset: Name) -> Name:
+        """Refuse names that stand for nothing."""
+        for name in preset.outcomes():
+            if name not in PRESETS:
+                raise custom_error(
+                    Malformed(
+                        f"there is no weather '{name}'; expected a condition and a time such as "
+                        f"ClearNoon{did_you_mean(name, PRESETS)}"
+                    )
+                )
+        return preset
+
+
+def _drawn(given: Scalar | None, usual: Range, rng: Rng) -> float:
+    return (given or Uniform(*usual)).draw(rng)
