@@ -28,6 +28,11 @@ def _building(style: str, variants: int = 16) -> Family:
     )
 
 
+def _tree(species: str, variants: int = 8) -> Family:
+    name = f"tree/{species}"
+    return _family(name, "tree", "tree", variants, "trees:tree", species=species, leaves=1.0)
+
+
 def _texture(name: str, build: str, tags: str, variants: int, **parameters: object) -> TextureFamily:
     path = Lazy(f"{__name__}.textures.{build}")
     return TextureFamily(name, tuple(sorted(tags.split())), variants, 1, path, parameters)
@@ -45,6 +50,12 @@ FAMILIES: Mapping[str, Family] = _table(
         _building("commercial"),
         _building("house"),
         _family("garage", "building", "building", 8, "buildings:garage"),
+        _tree("broad"),
+        _tree("round"),
+        _tree("columnar"),
+        _tree("birch"),
+        _tree("young"),
+        _tree("conifer"),
     )
 )
 
