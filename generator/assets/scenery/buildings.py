@@ -1,0 +1,301 @@
+"""Buildings: a facade grammar over a design.
+
+A building is four walls and a roof. Each wall is split into floors, floors into bays, and every
+bay gets an opening that is filled by what belongs there. Origin: the centre of the walls'
+footprint on the ground; the front wall lies at x = depth / 2 and faces +X. Sills, cornices,
+balconies and awnings reach beyond it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, chance, pick, rng_of
+from generator.assets.procedural.family import Facts, Solid
+from generator.assets.procedural.mesh import Patch, joined
+from generator.assets.procedural.shapes import block
+from generator.assets.scenery import facade, roofs
+from generator.assets.scenery.designs import Design, design, materials_of
+from generator.assets.scenery.facade import BASE, FACADE, METAL, TRIM, Opening
+from generator.assets.scenery.forms import post, quad, solid
+from generator.core.streams import Rng
+
+_DOOR_M = (1.15, 2.5)
+_EAVES_M = 0.45
+
+
+def building(seed: int, style: str) -> Solid:
+    """A building of a style; see ``facade`` for its material slots."""
+    plan = design(style, seed)
+    rng = rng_of(f"building/{style}/details", seed)
+    turned = ((0.0, _front(plan, rng), plan.depth_m), (math.pi, _back(plan, rng), plan.depth_m))
+    ends = [(k * 0.5 * math.pi, _side(plan, rng), plan.width_m) for k in (1, -1)]
+    walls = [
+        wall.moved(0.5 * across).rotated("z", turn) for turn, wall, across in (*turned, *ends)
+    ]
+    x, y = 0.5 * plan.depth_m, 0.5 * plan.width_m
+    floor = quad([(-x, -y, 0.0), (-x, y, 0.0), (x, y, 0.0), (x, -y, 0.0)], BASE)
+    roof = _roof(plan, rng).moved(z=plan.eaves_m)
+    hull = hulls.box((-x, -y, 0.0), (x, y, plan.eaves_m + 0.5))
+    return solid([*walls, floor, roof], materials_of(plan, seed), [hull])
+
+
+def building_facts(seed: int, style: str) -> Facts:
+    """Style and number of floors, without building it."""
+    return Facts(style, {"floors": str(design(style, seed).floors)})
+
+
+def garage(seed: int) -> Solid:
+    """A garage for one or two cars; the doors face +X."""
+    rng = rng_of("garage", seed)
+    doors, deep, high = pick((1, 1, 2), rng), between(5.6, 6.5, rng), between(2.5, 2.9, rng)
+    half = 0.5 * (doors * 3.0 + 0.2)
+    plan = design("house", seed)
+    holes = [
+        Opening((-half + 0.35 + 3.0 * k, -half + 2.85 + 3.0 * k), (0.02, 2.15), 0.12)
+        for k in range(doors)
+    ]
+    front = [facade.perforated((-half, half), (0.0, high), holes)]
+    front += [facade.garage_door(hole) for hole in holes]
+    plain = facade.perforated((-half, half), (0.0, high))
+    side = facade.perforated((-0.5 * deep, 0.5 * deep), (0.0, high))
+    walls = [
+        joined(front).moved(0.5 * deep),
+        plain.moved(0.5 * deep).rotated("z", math.pi),
+        side.moved(half).rotated("z", 0.5 * math.pi),
+        side.moved(half).rotated("z", -0.5 * math.pi),
+    ]
+    x = 0.5 * deep
+    floor = quad([(-x, -half, 0.0), (-x, half, 0.0), (x, half, 0.0), (x, -half, 0.0)], BASE)
+    roof = block((-x - 0.05, -half - 0.05, high), (x + 0.12, half + 0.05, high + 0.16), slot=METAL)
+    hull = hulls.box((-x, -half, 0.0), (x, half, high + 0.16))
+    return solid([*walls, floor, roof], materials_of(plan, seed), [hull])
+
+
+def garage_facts(seed: int) -> Facts:  # noqa: ARG001
+    """What every garage is."""
+    return Facts("garage")
+
+
+def _front(plan: Design, rng: Rng) -> Patch:
+    """The street side: ground floor, upper floors, and what separates them."""
+    half = 0.5 * plan.width_m
+    ground = _shops(plan, rng) if plan.shops else _dwelling(plan, rng)
+    holes, upper = _upper(plan, rng)
+    wall = facade.perforated((-half, half), (plan.ground_m, plan.eaves_m), holes)
+    return joined([ground, *([wall] if plan.floors > 1 else []), *upper, *_bands(plan, rng)])
+
+
+def _dwelling(plan: Design, rng: Rng) -> Patch:
+    """A ground floor of windows and one entrance."""
+    half, entrance = 0.5 * plan.width_m, int(rng.random() * plan.bays)
+    plinth = 0.15 if plan.style in ("modern", "commercial") else pick((0.35, 0.5, 0.6), rng)
+    w, h = plan.window_m
+    holes, parts = [], []
+    for k, y in enumerate(_bay_centres(plan)):
+        if k == entrance:
+            top = min(0.15 + _DOOR_M[1], plan.ground_m - 0.35)
+            hole = Opening((y - 0.5 * _DOOR_M[0], y + 0.5 * _DOOR_M[0]), (0.15, top), 0.22)
+            parts.append(facade.door(hole, rng))
+            parts += _canopy(plan, y, top, rng)
+        else:
+            sill = max(plan.sill_m, plinth) + 0.12
+            top = min(sill + h, plan.ground_m - 0.3)
+            hole = _window(plan, y, sill, (w, top - sill))
+            parts.append(_dressed(plan, hole, rng))
+        holes.append(hole)
+    slot = BASE if plan.trimmed else FACADE
+    wall = facade.perforated((-half, half), (0.0, plan.ground_m), holes, slot, (plinth, BASE))
+    return joined([wall, *parts])
+
+
+def _shops(plan: Design, rng: Rng) -> Patch:
+    """A ground floor of display windows, shop doors, signs and awnings."""
+    half, margin = 0.5 * plan.width_m, 0.45
+    count = max(2, round((plan.width_m - 2 * margin) / between(2.8, 3.6, rng)))
+    pitch = (plan.width_m - 2 * margin) / count
+    top = plan.ground_m - between(1.0, 1.25, rng)
+    doors = {int(rng.random() * count), count - 1}
+    slot = BASE if plan.trimmed else FACADE
+    holes, parts = [], []
+    for k in range(count):
+        y0, y1 = -half + margin + k * pitch + 0.18, -half + margin + (k + 1) * pitch - 0.18
+        if k in doors:
+            y1 = y0 + 1.1
+            hole = Opening((y0, y1), (0.03, top), 0.3)
+            parts.append(facade.door(hole, rng, slot))
+        else:
+            hole = Opening((y0, y1), (0.03, top), 0.18, upright=pick((1, 2), rng))
+            parts.append(facade.shop_front(hole, rng, slot))
+        holes.append(hole)
+    wall = facade.perforated((-half, half), (0.0, plan.ground_m), holes, slot)
+    return joined([wall, *parts, *_shop_signs(plan, top, rng)])
+
+
+def _shop_signs(plan: Design, top_m: float, rng: Rng) -> list[Patch]:
+    """A name above the windows of one or two shops, and awnings."""
+    half = 0.5 * plan.width_m - 0.5
+    split = between(-0.2, 0.2, rng) * plan.width_m if plan.width_m > 13.0 else half
+    parts = []
+    for y0, y1 in ((-half, split - 0.3), (split + 0.3, half)):
+        if y1 - y0 < 3.0:
+            continue
+        long = min(y1 - y0, between(3.0, 5.0, rng))
+        middle = 0.5 * (y0 + y1)
+        z = (top_m + 0.12, top_m + 0.12 + 0.18 * long)
+        # Signs are four times as wide as they are high, or so.
+        z = (z[0], min(z[1], plan.ground_m - 0.1))
+        parts.append(facade.sign_board((middle - 0.5 * long, middle + 0.5 * long), z))
+        if chance(0.4, rng):
+            parts.append(facade.awning((y0, y1), top_m + 0.08, between(0.9, 1.3, rng)))
+    return parts
+
+
+def _upper(plan: Design, rng: Rng) -> tuple[list[Opening], list[Patch]]:
+    """Windows of the upper floors, all in line, and balconies before some of them."""
+    centres = _bay_centres(plan)
+    outside = {int(rng.random() * plan.bays), int(rng.random() * plan.bays)}
+    holes, parts = [], []
+    for floor in range(1, plan.floors):
+        level = plan.ground_m + (floor - 1) * plan.storey_m
+        for k, y in enumerate(centres):
+            tall = plan.balconies != "none" and k in outside
+            hole = _window(plan, y, level + (0.1 if tall else plan.sill_m), plan.window_m)
+            if tall:
+                head = level + plan.sill_m + plan.window_m[1]
+                hole = _window(plan, y, level + 0.1, (plan.window_m[0], head - level - 0.1))
+            holes.append(hole)
+            parts.append(_dressed(plan, hole, rng, bare=tall))
+            if tall:
+                parts.append(_balcony(plan, y, level + 0.08, rng))
+    return holes, parts
+
+
+def _balcony(plan: Design, y: float, level: float, rng: Rng) -> Patch:
+    w = plan.window_m[0]
+    if plan.balconies == "french":
+        return facade.railing((y - 0.5 * w - 0.05, y + 0.5 * w + 0.05), level, 0.04)
+    half = min(0.5 * plan.width_m / plan.bays + 0.2, 0.5 * w + 0.8)
+    half = min(half, 0.5 * plan.width_m - abs(y))
+    closed = plan.style == "modern" or plan.floors * plan.bays > 20
+    return facade.balcony((y - half, y + half), level, between(1.1, 1.4, rng), solid=closed)
+
+
+def _dressed(plan: Design, hole: Opening, rng: Rng, *, bare: bool = False) -> Patch:
+    """A window with its sill, lintel and shutters."""
+    parts = [facade.window(hole, rng)]
+    if not bare:
+        parts.append(facade.sill(hole))
+    if plan.trimmed:
+        parts.append(facade.lintel(hole))
+    if plan.shutters == "leaves" and not bare and _room_beside(plan) > 0.5 * hole.width_m:
+        parts.append(facade.leaves(hole))
+    if plan.shutters == "roller" and chance(0.35, rng):
+        parts.append(facade.roller(hole, pick((0.2, 0.35, 0.6, 0.96), rng)))
+    return joined(parts)
+
+
+def _bands(plan: Design, rng: Rng) -> list[Patch]:
+    """String courses, cornice and a downpipe on the street side."""
+    half = 0.5 * plan.width_m
+    parts = []
+    if plan.trimmed or plan.shops:
+        level = plan.ground_m - 0.02
+        parts.append(block((0.0, -half, level), (0.1, half, level + 0.16), slot=TRIM))
+    if plan.trimmed:
+        top = plan.eaves_m
+        parts.append(block((0.0, -half, top - 0.42), (0.14, half, top - 0.3), slot=TRIM))
+        parts.append(block((0.0, -half, top - 0.3), (0.3, half, top - 0.08), slot=TRIM))
+    if plan.roof != "flat":
+        side = pick((-1.0, 1.0), rng) * (half - 0.15)
+        pipe = post(0.05, (0.0, plan.eaves_m - 0.1), (0.08, side, 0.0), 6)
+        parts.append(pipe.painted(METAL))
+    return parts
+
+
+def _canopy(plan: Design, y: float, top: float, rng: Rng) -> list[Patch]:
+    if plan.trimmed or not chance(0.5, rng):
+        return []
+    low, high = (0.0, y - 0.85, top + 0.1), (between(0.8, 1.1, rng), y + 0.85, top + 0.2)
+    return [block(low, high, slot=METAL)]
+
+
+def _back(plan: Design, rng: Rng) -> Patch:
+    """The rear: plain windows in every second bay or so."""
+    return _plain_wall(plan, plan.width_m, max(2, plan.bays - 2), rng)
+
+
+def _side(plan: Design, rng: Rng) -> Patch:
+    """A side wall: blank where the next house of the row stands."""
+    if not plan.sided:
+        half = 0.5 * plan.depth_m
+        return facade.perforated((-half, half), (0.0, plan.eaves_m))
+    return _plain_wall(plan, plan.depth_m, 2, rng)
+
+
+def _plain_wall(plan: Design, width_m: float, bays: int, rng: Rng) -> Patch:
+    half, w = 0.5 * width_m, min(1.1, plan.window_m[0])
+    h = min(1.4, plan.window_m[1])
+    holes = []
+    for floor in range(plan.floors):
+        level = plan.ground_m + (floor - 1) * plan.storey_m if floor else 0.2
+        for k in range(bays):
+            y = -half + width_m * (k + 0.5) / bays
+            hole = Opening((y - 0.5 * w, y + 0.5 * w), (level + 0.9, level + 0.9 + h), 0.12)
+            holes.append(hole)
+    wall = facade.perforated((-half, half), (0.0, plan.eaves_m), holes)
+    return joined([wall, *(facade.window(hole, rng) for hole in holes)])
+
+
+def _roof(plan: Design, rng: Rng) -> Patch:
+    if plan.roof == "flat":
+        unit = roofs.unit(
+            between(-0.2, 0.1, rng) * plan.depth_m,
+            between(-0.25, 0.25, rng) * plan.width_m,
+            (between(2.0, 3.5, rng), between(2.5, 4.0, rng), between(1.2, 2.4, rng)),
+        )
+        return joined([roofs.flat(plan.depth_m, plan.width_m, between(0.35, 0.8, rng)), unit])
+    if plan.roof == "hip":
+        pitch, depth_m = 0.85 * plan.pitch_rad, min(plan.depth_m, plan.width_m)
+        shell = roofs.hip(plan.depth_m, plan.width_m, pitch, _EAVES_M)
+        ridge = 0.5 * depth_m * math.tan(pitch)
+        return joined([shell, roofs.chimney(-0.5, 0.4, (0.6 * ridge, ridge + 0.6))])
+    if plan.roof == "mansard":
+        rise = between(2.5, 2.9, rng)
+        profile = roofs.mansard_profile(plan.depth_m, rise, 0.3)
+        slope = 0.36
+    else:
+        profile = roofs.gable_profile(plan.depth_m, plan.pitch_rad, _EAVES_M)
+        slope = 1.0 / math.tan(plan.pitch_rad)
+    shell = roofs.over_profile(profile, plan.width_m, plan.verge_m, 0.24)
+    ridge = max(z for _, z in profile)
+    y = between(-0.3, 0.3, rng) * plan.width_m
+    stack = roofs.chimney(-0.8, y, (ridge - 1.4, ridge + between(0.5, 0.9, rng)))
+    return joined([shell, stack, *_dormers(plan, slope, rng)])
+
+
+def _dormers(plan: Design, slope: float, rng: Rng) -> list[Patch]:
+    """Dormers on the street side; ``slope`` is how far the roof recedes per metre of height."""
+    foot = 0.45
+    x = 0.5 * plan.depth_m - slope * foot - 0.05
+    reach = min(slope * 2.2 + 0.3, x)
+    at = [plan.width_m * ((k + 0.5) / plan.dormers - 0.5) for k in range(plan.dormers)]
+    return [roofs.dormer(x, y, foot, reach, rng) for y in at]
+
+
+def _window(plan: Design, y: float, z0: float, size_m: tuple[float, float]) -> Opening:
+    w, h = size_m
+    upright, level = plan.panes
+    return Opening((y - 0.5 * w, y + 0.5 * w), (z0, z0 + h), plan.recess_m, upright, level)
+
+
+def _bay_centres(plan: Design) -> Sequence[float]:
+    pitch = plan.width_m / plan.bays
+    return [(k + 0.5) * pitch - 0.5 * plan.width_m for k in range(plan.bays)]
+
+
+def _room_beside(plan: Design) -> float:
+    """Width of wall between two windows that one shutter may cover."""
+    return 0.5 * (plan.width_m / plan.bays - plan.window_m[0]) - 0.02

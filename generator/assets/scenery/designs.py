@@ -1,0 +1,294 @@
+"""What a building is like: drawn once from its style and seed, then built.
+
+Sizes follow German practice: storeys of 2.7-3.0 m in post-war and 3.4-3.8 m in nineteenth-century
+houses, windows of 1.0-1.5 m by 1.2-1.9 m, sills 0.8-0.95 m above the floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from generator.assets.procedural.draw import between, chance, pick, rng_of
+from generator.assets.procedural.materials import jittered, linear
+from generator.core.errors import AssetError, did_you_mean
+from generator.core.geometry import Material
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+
+STYLES = ("residential", "old_town", "modern", "commercial", "house")
+RoofKind = Literal["gable", "hip", "mansard", "flat"]
+Cladding = Literal["plaster", "brick", "concrete", "stone"]
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """Everything that the parts of one building have in common.
+
+    Attributes:
+        bays: Windows per floor on the street side.
+        ground_m, storey_m: Heights of the ground floor and of the others.
+        window_m: Width and height of an ordinary window.
+        sill_m: Height of window sills over the floor.
+        panes: Panes beside and above one another.
+        shops: Whether the ground floor is shops.
+        trimmed: Whether windows have lintels and storeys are parted by string courses.
+        shutters: ``none``, ``roller`` or ``leaves``.
+        balconies: ``none``, ``french`` (railings before tall windows) or ``slab``.
+        verge_m: How far the roof reaches over the side walls; 0 in a row of houses.
+        sided: Whether side walls have windows.
+    """
+
+    style: str
+    width_m: float
+    depth_m: float
+    floors: int
+    bays: int
+    ground_m: float
+    storey_m: float
+    window_m: tuple[float, float]
+    sill_m: float
+    recess_m: float
+    panes: tuple[int, int]
+    roof: RoofKind
+    cladding: Cladding
+    shops: bool = False
+    trimmed: bool = False
+    shutters: Literal["none", "roller", "leaves"] = "none"
+    balconies: Literal["none", "french", "slab"] = "none"
+    pitch_rad: float = 0.7
+    verge_m: float = 0.0
+    dormers: int = 0
+    sided: bool = False
+
+    @property
+    def eaves_m(self) -> float:
+        """Height of the walls."""
+        return self.ground_m + (self.floors - 1) * self.storey_m
+
+
+def design(style: str, seed: int) -> Design:
+    """The design of variant ``seed`` of a style. Raises AssetError for an unknown style."""
+    if style not in _DRAWN:
+        raise AssetError(
+            f"building: there is no style '{style}'{did_you_mean(style, STYLES)}; expected one of "
+            f"{', '.join(STYLES)}"
+        )
+    return _DRAWN[style](rng_of(f"building/{style}", seed))
+
+
+def _residential(rng: Rng) -> Design:
+    floors = pick((2, 3, 3, 4, 4, 5), rng)
+    bays, bay_m = pick((3, 4, 5, 6, 7), rng), between(2.5, 3.1, rng)
+    return Design(
+        style="residential",
+        width_m=max(8.0, round(bays * bay_m, 2)),
+        depth_m=round(between(10.0, 13.0, rng), 2),
+        floors=floors,
+        bays=bays,
+        ground_m=round(between(3.0, 3.5, rng), 2),
+        storey_m=round(between(2.75, 3.0, rng), 2),
+        window_m=(round(between(1.1, 1.5, rng), 2), round(between(1.25, 1.5, rng), 2)),
+        sill_m=0.9,
+        recess_m=round(between(0.12, 0.2, rng), 3),
+        panes=(pick((1, 2, 2), rng), 1),
+        roof=pick(("gable", "gable", "gable", "mansard"), rng),
+        cladding=pick(("plaster", "plaster", "plaster", "plaster", "brick"), rng),
+        shutters=pick(("roller", "roller", "none"), rng),
+        balconies=pick(("none", "none", "slab"), rng),
+        pitch_rad=between(0.6, 0.82, rng),
+        dormers=pick((0, 0, 1, 2, 3), rng),
+    )
+
+
+def _old_town(rng: Rng) -> Design:
+    bays, bay_m = pick((3, 4, 5, 6, 7), rng), between(2.1, 2.5, rng)
+    return Design(
+        style="old_town",
+        width_m=max(8.0, round(bays * bay_m, 2)),
+        depth_m=round(between(10.0, 14.0, rng), 2),
+        floors=pick((3, 4, 4, 5), rng),
+        bays=bays,
+        ground_m=round(between(3.9, 4.4, rng), 2),
+        storey_m=round(between(3.3, 3.7, rng), 2),
+        window_m=(round(between(1.0, 1.15, rng), 2), round(between(1.75, 2.05, rng), 2)),
+        sill_m=0.8,
+        recess_m=round(between(0.16, 0.25, rng), 3),
+        panes=(2, 2),
+        roof=pick(("mansard", "mansard", "gable"), rng),
+        cladding=pick(("plaster", "plaster", "brick", "stone"), rng),
+        shops=chance(0.6, rng),
+        trimmed=True,
+        shutters=pick(("none", "none", "leaves"), rng),
+        balconies=pick(("none", "french"), rng),
+        pitch_rad=between(0.7, 0.9, rng),
+        dormers=pick((1, 2, 3), rng),
+    )
+
+
+def _modern(rng: Rng) -> Design:
+    bays, bay_m = pick((3, 4, 5, 6), rng), between(3.0, 3.7, rng)
+    tall = chance(0.5, rng)
+    return Design(
+        style="modern",
+        width_m=round(min(24.0, max(9.0, bays * bay_m)), 2),
+        depth_m=round(between(11.0, 14.0, rng), 2),
+        floors=pick((3, 4, 5, 6), rng),
+        bays=bays,
+        ground_m=round(between(3.1, 3.6, rng), 2),
+        storey_m=round(between(2.95, 3.1, rng), 2),
+        window_m=(round(between(1.4, 2.2, rng), 2), 2.3 if tall else round(between(1.4, 1.6, rng), 2)),
+        sill_m=0.12 if tall else 0.85,
+        recess_m=round(between(0.16, 0.24, rng), 3),
+        panes=(2, 1),
+        roof="flat",
+        cladding=pick(("plaster", "plaster", "plaster", "brick", "concrete"), rng),
+        shutters=pick(("roller", "none"), rng),
+        balconies=pick(("slab", "french" if tall else "slab", "slab"), rng),
+        sided=True,
+    )
+
+
+def _commercial(rng: Rng) -> Design:
+    bays, bay_m = pick((4, 5, 6, 7), rng), between(2.8, 3.4, rng)
+    return Design(
+        style="commercial",
+        width_m=round(min(24.0, bays * bay_m), 2),
+        depth_m=round(between(12.0, 14.0, rng), 2),
+        floors=pick((2, 3, 4, 5, 6, 7), rng),
+        bays=bays,
+        ground_m=round(between(4.0, 4.6, rng), 2),
+        storey_m=round(between(3.1, 3.4, rng), 2),
+        window_m=(round(bay_m - between(0.35, 0.9, rng), 2), round(between(1.7, 2.1, rng), 2)),
+        sill_m=0.8,
+        recess_m=round(between(0.12, 0.25, rng), 3),
+        panes=(pick((2, 3), rng), 1),
+        roof="flat",
+        cladding=pick(("plaster", "concrete", "concrete", "brick", "stone"), rng),
+        shops=True,
+    )
+
+
+def _house(rng: Rng) -> Design:
+    bays, bay_m = pick((2, 3, 3, 4), rng), between(2.9, 3.5, rng)
+    return Design(
+        style="house",
+        width_m=max(8.0, round(bays * bay_m, 2)),
+        depth_m=round(between(8.0, 10.5, rng), 2),
+        floors=pick((1, 2, 2), rng),
+        bays=bays,
+        ground_m=round(between(2.9, 3.3, rng), 2),
+        storey_m=round(between(2.7, 2.9, rng), 2),
+        window_m=(round(between(1.1, 1.5, rng), 2), round(between(1.2, 1.4, rng), 2)),
+        sill_m=0.95,
+        recess_m=round(between(0.1, 0.18, rng), 3),
+        panes=(pick((1, 2), rng), 1),
+        roof=pick(("gable", "gable", "hip"), rng),
+        cladding=pick(("plaster", "plaster", "plaster", "brick"), rng),
+        shutters=pick(("roller", "leaves", "none"), rng),
+        pitch_rad=between(0.62, 0.85, rng),
+        verge_m=round(between(0.25, 0.5, rng), 2),
+        dormers=pick((0, 0, 1), rng),
+        sided=True,
+    )
+
+
+_DRAWN = {
+    "residential": _residential,
+    "old_town": _old_town,
+    "modern": _modern,
+    "commercial": _commercial,
+    "house": _house,
+}
+
+# Muted tints of mineral paint, sRGB; the texture's own near-white multiplies them.
+_PLASTERS = {
+    "residential": "#d9d2c0 #e3dccb #cfc6b0 #d8c9a3 #c9b99a #c7ccc6 #b9bfb7 #d3bfae #e2e0da #bfae95",
+    "old_town": "#d6c294 #cdb07f #c9a78c #b98e76 #d9cdb5 #b9b49e #a9b0a2 #c2b7ac #dcd3c2 #b7a184",
+    "modern": "#e8e7e3 #dcdbd6 #c7c7c4 #b4b3af #8f8e8b #e3ddd0 #6f6e6c #d5d0c6",
+    "commercial": "#cfcbc2 #b8b5ae #d9d5cb #a5a39e #c4bba8 #8f9294",
+    "house": "#e6e2d8 #ded5bf #d8c7a0 #cdbda5 #d9d8d2 #c9b7a6 #bcc3bd #e4d9c6",
+}
+_STONES = "#b08a72 #a3735c #b7a58a #c2b59b #9f978a"
+_ROOFS = "#8a4a38 #7b3f30 #93563f #6b3a30 #57504b #4a4a4c #6a4f45"
+_SHUTTERS = "#5a6b5d #6d5a48 #8b8f8c #d9d7d0 #7f3f36 #4d5b66 #a99a80 #b9b6ae"
+_DOORS = "#5c4434 #3f4a44 #7a2f2a #4a4f55 #8c6b4a #e4e2dc #2e3d4d"
+_FRAMES = {"modern": ("#3c3e40", "#55585a", "#e6e6e3"), "commercial": ("#45484a", "#6c6f71")}
+
+
+def materials_of(plan: Design, seed: int) -> tuple[Material, ...]:
+    """The materials of a building, one per slot of ``facade``."""
+    rng = rng_of(f"building/{plan.style}/materials", seed)
+    wall = _wall(plan.cladding, _PLASTERS[plan.style], rng)
+    base = _base(plan, wall, rng)
+    trim_code = pick(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"), rng)
+    trim_code = pick(("#b98d74", "#b7a58a", trim_code), rng) if plan.trimmed else trim_code
+    frame = pick(_FRAMES.get(plan.style, ("#eceae4", "#e4e2db", "#e8e6df", "#6b5443")), rng)
+    curtains = [jittered(linear(code), 0.1, rng) for code in ("#8d8a82", "#6a6862")]
+    seam = "#77797a" if plan.roof == "flat" else pick(("#8a8c8d", "#7d5f4c", "#9a9c9b"), rng)
+    return (
+        wall,
+        base,
+        _plain(trim_code, 0.85, "trim"),
+        _plain(frame, 0.45, "trim"),
+        _glass((0.012, 0.016, 0.019), 0.04),
+        _glass((0.03, 0.034, 0.036), 0.06),
+        _glass(curtains[0], 0.08),
+        _glass(curtains[1], 0.08),
+        _plain(pick(_DOORS.split(), rng), 0.5, "trim"),
+        Material(linear(seam), roughness=0.5, metallic=0.6, role="chrome"),
+        _roof(rng),
+        Material(
+            (1.0, 1.0, 1.0),
+            roughness=0.5,
+            texture=f"texture/shop_sign?seed={seed % 12}",
+            printed=True,
+            role="sign",
+        ),
+        _plain(pick(_SHUTTERS.split(), rng), 0.7, "trim"),
+        _textured("brick", 1, (0.8, 0.78, 0.76), 1.2, "trim"),
+    )
+
+
+def _wall(cladding: Cladding, tints: str, rng: Rng) -> Material:
+    if cladding == "brick":
+        seed, level = pick((1, 3, 6), rng), between(0.75, 1.0, rng)
+        return _textured("brick", seed, (level, level, level), 1.1, "facade")
+    if cladding == "concrete":
+        level = between(0.8, 1.0, rng)
+        return _textured("concrete", pick((0, 3), rng), (level, level, level), 2.6, "facade")
+    if cladding == "stone":
+        return _textured("ashlar", 0, jittered(linear(pick(_STONES.split(), rng)), 0.06, rng), 2.4)
+    return _textured("plaster", 5, jittered(linear(pick(tints.split(), rng)), 0.05, rng), 2.5)
+
+
+def _base(plan: Design, wall: Material, rng: Rng) -> Material:
+    if plan.trimmed or plan.cladding == "stone":
+        return _textured("ashlar", 0, jittered(linear(pick(_STONES.split(), rng)), 0.06, rng), 2.4)
+    if chance(0.4, rng):
+        return _textured("concrete", 3, (0.72, 0.71, 0.7), 2.2)
+    darker = between(0.5, 0.7, rng)
+    r, g, b = wall.base_color
+    color = (darker * r, darker * g, darker * b)
+    return Material(color, 0.9, texture=wall.texture, texture_scale_m=wall.texture_scale_m)
+
+
+def _roof(rng: Rng) -> Material:
+    color = jittered(linear(pick(_ROOFS.split(), rng)), 0.08, rng)
+    texture = f"texture/roof_tiles?seed={pick((0, 1), rng)}"
+    return Material(color, roughness=0.85, texture=texture, role="roof")
+
+
+def _plain(code: str, roughness: float, role: str) -> Material:
+    return Material(linear(code), roughness=roughness, role=role)
+
+
+def _glass(color: Vec3, roughness: float) -> Material:
+    return Material(color, roughness=roughness, specular=0.7, role="window")
+
+
+def _textured(
+    name: str, seed: int, color: Vec3, scale_m: float, role: str = "facade"
+) -> Material:
+    texture = f"texture/{name}?seed={seed}"
+    return Material(color, roughness=0.92, texture=texture, texture_scale_m=scale_m, role=role)

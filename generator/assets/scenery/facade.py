@@ -1,0 +1,309 @@
+"""Walls with holes, and what fills the holes: windows, doors, shop fronts, railings.
+
+A wall's own frame: its outer plane is x = 0, +X points outward, y to the right of who stands
+before it, z up. Recesses lie at negative x.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from generator.assets.procedural.draw import between, chance, pick
+from generator.assets.procedural.mesh import Patch, joined
+from generator.assets.procedural.shapes import block, grid
+from generator.assets.scenery.forms import Span, facing, quad
+from generator.core.streams import Rng
+
+(
+    FACADE,
+    BASE,
+    TRIM,
+    FRAME,
+    GLASS,
+    GLASS_TOO,
+    CURTAIN,
+    CURTAIN_TOO,
+    DOOR,
+    METAL,
+    ROOF,
+    SIGN,
+    AWNING,
+    CHIMNEY,
+) = range(14)
+
+GLASS_SETBACK_M = 0.03
+"""Panes lie this far behind the front of their frame."""
+_FRAME_WIDTH_M = 0.07
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A rectangular hole in a wall.
+
+    Attributes:
+        y_m, z_m: Its extent in the wall's frame.
+        recess_m: How far the frame lies behind the wall's plane.
+        upright, level: Number of panes beside and above one another.
+    """
+
+    y_m: Span
+    z_m: Span
+    recess_m: float = 0.16
+    upright: int = 2
+    level: int = 1
+
+    @property
+    def width_m(self) -> float:
+        """Clear width."""
+        return self.y_m[1] - self.y_m[0]
+
+    @property
+    def height_m(self) -> float:
+        """Clear height."""
+        return self.z_m[1] - self.z_m[0]
+
+
+def perforated(
+    y_m: Span,
+    z_m: Span,
+    openings: Sequence[Opening] = (),
+    slot: int = FACADE,
+    base: tuple[float, int] | None = None,
+) -> Patch:
+    """A wall without its openings.
+
+    Args:
+        y_m, z_m: Extent of the wall.
+        openings: Holes, apart from one another.
+        slot: Material slot.
+        base: Height up to which the wall has another slot, and that slot.
+    """
+    levels = [z for o in openings for z in o.z_m] + ([base[0]] if base else [])
+    y = np.unique([*y_m, *(side for o in openings for side in o.y_m)])
+    z = np.unique([*z_m, *(level for level in levels if z_m[0] < level < z_m[1])])
+    cells = []
+    for z0, z1 in pairwise(z.tolist()):
+        row = base[1] if base and z1 <= base[0] + 1e-9 else slot
+        cells += [
+            facing(0.0, (y0, y1), (z0, z1), row)
+            for y0, y1 in pairwise(y.tolist())
+            if not any(_holds(o, 0.5 * (y0 + y1), 0.5 * (z0 + z1)) for o in openings)
+        ]
+    return joined(cells)
+
+
+def reveal(opening: Opening, depth_m: float, slot: int = FACADE) -> Patch:
+    """The four sides of a hole, from the wall's plane inwards."""
+    (y0, y1), (z0, z1) = opening.y_m, opening.z_m
+    loop = [(y0, z0), (y1, z0), (y1, z1), (y0, z1), (y0, z0)]
+    return grid(np.array([[(x, y, z) for y, z in loop] for x in (0.0, -depth_m)]), slot=slot)
+
+
+def window(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
+    """Reveal, frame with bars, and panes; behind some of them hang curtains."""
+    depth_m = opening.recess_m + GLASS_SETBACK_M
+    return joined(
+        [
+            reveal(opening, depth_m, slot),
+            frame(opening),
+            panes(opening, rng, -depth_m),
+        ]
+    )
+
+
+def frame(opening: Opening, slot: int = FRAME) -> Patch:
+    """The window's frame and glazing bars, flat at the bottom of the recess."""
+    (y0, y1), (z0, z1) = opening.y_m, opening.z_m
+    x, w = -opening.recess_m, min(_FRAME_WIDTH_M, 0.2 * opening.width_m)
+    parts = [
+        facing(x, (y0, y0 + w), (z0, z1), slot),
+        facing(x, (y1 - w, y1), (z0, z1), slot),
+        facing(x, (y0 + w, y1 - w), (z0, z0 + w), slot),
+        facing(x, (y0 + w, y1 - w), (z1 - w, z1), slot),
+    ]
+    for k in range(1, opening.upright):
+        middle = y0 + opening.width_m * k / opening.upright
+        parts.append(facing(x, (middle - 0.5 * w, middle + 0.5 * w), (z0 + w, z1 - w), slot))
+    for k in range(1, opening.level):
+        # Transoms sit high: the lower sash is the tall one.
+        middle = z0 + opening.height_m * (0.42 + 0.58 * k / opening.level)
+        parts.append(
+            facing(x + 0.004, (y0 + w, y1 - w), (middle - 0.4 * w, middle + 0.4 * w), slot)
+        )
+    return joined(parts)
+
+
+def panes(opening: Opening, rng: Rng, x: float) -> Patch:
+    """Glass: dark where a room lies behind, lighter where a curtain hangs."""
+    (y0, y1), z = opening.y_m, opening.z_m
+    glass, curtain = pick((GLASS, GLASS, GLASS_TOO), rng), pick((CURTAIN, CURTAIN_TOO), rng)
+    drawn = pick(("open", "open", "sides", "all", "blind"), rng)
+    if drawn == "sides":
+        w = between(0.12, 0.3, rng) * opening.width_m
+        strips = ((y0, y0 + w, curtain), (y0 + w, y1 - w, glass), (y1 - w, y1, curtain))
+        return joined([facing(x, (a, b), z, slot) for a, b, slot in strips])
+    if drawn == "blind":
+        level = z[1] - between(0.15, 0.6, rng) * opening.height_m
+        return joined(
+            [facing(x, (y0, y1), (z[0], level), glass), facing(x, (y0, y1), (level, z[1]), curtain)]
+        )
+    return facing(x, (y0, y1), z, curtain if drawn == "all" else glass)
+
+
+def sill(opening: Opening, out_m: float = 0.05, slot: int = TRIM) -> Patch:
+    """A ledge below a window; its back lies in the recess."""
+    (y0, y1), z0 = opening.y_m, opening.z_m[0]
+    return joined(
+        [
+            block((0.0, y0 - 0.06, z0 - 0.06), (out_m, y1 + 0.06, z0 + 0.005), slot=slot),
+            quad(_level(z0 + 0.005, (-opening.recess_m, 0.0), (y0, y1)), slot),
+        ]
+    )
+
+
+def lintel(opening: Opening, out_m: float = 0.05, height_m: float = 0.16) -> Patch:
+    """A stone band above an opening."""
+    (y0, y1), z1 = opening.y_m, opening.z_m[1]
+    return block((0.0, y0 - 0.12, z1), (out_m, y1 + 0.12, z1 + height_m), slot=TRIM)
+
+
+def leaves(opening: Opening) -> Patch:
+    """Hinged shutters, folded back against the wall on both sides."""
+    (y0, y1), z = opening.y_m, opening.z_m
+    w = 0.5 * opening.width_m
+    return joined(
+        [
+            block((0.005, a, z[0]), (0.045, b, z[1]), slot=AWNING)
+            for a, b in ((y0 - w, y0 - 0.02), (y1 + 0.02, y1 + w))
+        ]
+    )
+
+
+def roller(opening: Opening, share: float) -> Patch:
+    """A roller shutter, lowered over the given share of the window, just before the frame."""
+    z1 = opening.z_m[1]
+    x = 0.03 - opening.recess_m
+    foot = z1 - share * opening.height_m
+    low, high = (x - 0.015, opening.y_m[0] + 0.01, foot), (x, opening.y_m[1] - 0.01, z1)
+    return block(low, high, slot=AWNING)
+
+
+def door(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
+    """An entrance: reveal, leaf with a glazed or panelled field, light above, handle, step."""
+    (y0, y1), (z0, z1) = opening.y_m, opening.z_m
+    x = -opening.recess_m
+    head = min(z1 - 0.12, z0 + 2.15)
+    inset = 0.2 * opening.width_m
+    field = GLASS if chance(0.5, rng) else DOOR
+    low = z0 + (0.25 if field == GLASS and chance(0.5, rng) else 1.0)
+    step = block((x, y0, 0.0), (0.25, y1, z0 + 0.01), slot=BASE)
+    return joined(
+        [
+            *([step] if z0 > 0.05 else []),
+            reveal(opening, opening.recess_m + GLASS_SETBACK_M, slot),
+            facing(x, (y0, y1), (z0, head), DOOR),
+            facing(x, (y0, y1), (head, head + 0.06), FRAME),
+            facing(x - GLASS_SETBACK_M, (y0, y1), (head + 0.06, z1), GLASS),
+            block((x, y0 + inset, low), (x + 0.012, y1 - inset, head - 0.2), slot=field),
+            block((x, y1 - 0.16, z0 + 0.95), (x + 0.06, y1 - 0.12, z0 + 1.2), slot=METAL),
+        ]
+    )
+
+
+def shop_front(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
+    """A display window: stall riser, frame, large panes."""
+    (y0, y1), (z0, z1) = opening.y_m, opening.z_m
+    riser = z0 + between(0.12, 0.5, rng)
+    glazed = Opening((y0, y1), (riser, z1), opening.recess_m, opening.upright, opening.level)
+    depth_m = opening.recess_m + GLASS_SETBACK_M
+    shown = [(GLASS, z1), (pick((GLASS_TOO, CURTAIN), rng), riser + 0.28 * (z1 - riser))]
+    return joined(
+        [
+            reveal(opening, depth_m, slot),
+            facing(-opening.recess_m, (y0, y1), (z0, riser), FRAME),
+            frame(glazed),
+            facing(-depth_m, (y0, y1), (shown[1][1], z1), shown[0][0]),
+            facing(-depth_m, (y0, y1), (riser, shown[1][1]), shown[1][0]),
+        ]
+    )
+
+
+def garage_door(opening: Opening, slot: int = FACADE) -> Patch:
+    """An up-and-over door of level panels."""
+    z0, z1 = opening.z_m
+    rows = 5
+    panels = [
+        facing(
+            -opening.recess_m + (0.0 if k % 2 else 0.012),
+            opening.y_m,
+            (z0 + (z1 - z0) * k / rows, z0 + (z1 - z0) * (k + 1) / rows - 0.012),
+            DOOR,
+        )
+        for k in range(rows)
+    ]
+    back = facing(-opening.recess_m - 0.01, opening.y_m, opening.z_m, METAL)
+    return joined([reveal(opening, opening.recess_m + 0.01, slot), back, *panels])
+
+
+def railing(y_m: Span, z0: float, x: float, height_m: float = 0.95, pitch_m: float = 0.14) -> Patch:
+    """Upright bars between two rails, in the plane x."""
+    count = max(2, round((y_m[1] - y_m[0]) / pitch_m))
+    at = np.linspace(y_m[0] + 0.02, y_m[1] - 0.02, count)
+    bars = [facing(x, (y - 0.008, y + 0.008), (z0 + 0.08, z0 + height_m), METAL) for y in at]
+    rails = [
+        block((x - 0.02, y_m[0], z), (x + 0.02, y_m[1], z + 0.035), slot=METAL)
+        for z in (z0 + 0.06, z0 + height_m)
+    ]
+    return joined([*bars, *rails])
+
+
+def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
+    """A slab with a parapet or a railing on its three open sides; its back is the wall."""
+    (y0, y1), t = y_m, 0.06
+    slab = block((0.0, y0, z0 - 0.18), (out_m, y1, z0), slot=TRIM)
+    if solid:
+        sides = [
+            block((out_m - t, y0, z0), (out_m, y1, z0 + 0.95), slot=AWNING),
+            block((0.0, y0, z0), (out_m - t, y0 + t, z0 + 0.95), slot=AWNING),
+            block((0.0, y1 - t, z0), (out_m - t, y1, z0 + 0.95), slot=AWNING),
+        ]
+        return joined([slab, *sides])
+    side = railing((-out_m + 0.04, 0.0), z0, 0.0, pitch_m=0.2).rotated("z", 0.5 * math.pi)
+    ends = [side.moved(y=y) for y in (y0 + 0.02, y1 - 0.02)]
+    return joined([slab, railing(y_m, z0, out_m - 0.04), *ends])
+
+
+def awning(y_m: Span, z1: float, out_m: float) -> Patch:
+    """A cloth roof over a shop window, with a short valance."""
+    (y0, y1), low = y_m, z1 - 0.32 * out_m
+    cloth = [(0.02, y0, z1), (out_m, y0, low), (out_m, y1, low), (0.02, y1, z1)]
+    lip = facing(out_m, y_m, (low - 0.18, low), AWNING)
+    ends = [
+        quad([(0.02, y, z1 - 0.12), (out_m, y, low - 0.18), (out_m, y, low), (0.02, y, z1)], AWNING)
+        for y in (y0, y1)
+    ]
+    return joined([quad(cloth, AWNING), lip, *ends])
+
+
+def sign_board(y_m: Span, z_m: Span, out_m: float = 0.1) -> Patch:
+    """A shop's name on a board; the whole image lies on its front."""
+    low, high = (0.0, y_m[0], z_m[0]), (out_m, y_m[1], z_m[1])
+    board = block(low, high, slot=METAL)
+    face = facing(out_m + 0.004, y_m, z_m, SIGN)
+    return joined([board, face])
+
+
+def _holds(opening: Opening, y: float, z: float) -> bool:
+    (y0, y1), (z0, z1) = opening.y_m, opening.z_m
+    return y0 < y < y1 and z0 < z < z1
+
+
+def _level(z: float, x_m: Span, y_m: Span) -> list[tuple[float, float, float]]:
+    """Corners of a level rectangle that faces up."""
+    (x0, x1), (y0, y1) = x_m, y_m
+    return [(x1, y0, z), (x1, y1, z), (x0, y1, z), (x0, y0, z)]

@@ -1,0 +1,127 @@
+"""Leaves as geometry: small triangles, shaded as if the crown were one soft body.
+
+Every triangle stands for a spray of leaves. Its front faces outward and its normals lean away from
+the middle of its crown, so that a crown is lit as a whole and not glittering leaf by leaf.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.assets.procedural.mesh import GRID_M, Array, Indices, settled
+from generator.assets.procedural.noise import uniform
+from generator.core.geometry import Material, MeshData
+from generator.core.streams import Rng
+
+OUTWARD = 0.65
+"""Share of the outward direction in a leaf's normal; the rest is its own."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sprays:
+    """Sprays of leaves, one triangle each.
+
+    Attributes:
+        at_m: Where each is attached, [n, 3].
+        outward: Unit direction away from the crown's middle, [n, 3].
+        along: Unit direction in which it grows, [n, 3].
+        length_m: From its foot to its tip, [n].
+        slots: Material of each, [n].
+    """
+
+    at_m: Array
+    outward: Array
+    along: Array
+    length_m: Array
+    slots: Indices
+
+
+def leaf_mesh(sprays: Sprays, materials: Sequence[Material], width: float, rng: Rng) -> MeshData:
+    """Triangles ``width`` times as wide as long, turned about their own axis by chance."""
+    across = _unit(np.cross(sprays.along, sprays.outward + 0.9 * _directions(len(sprays.slots), rng)))
+    half = 0.5 * width * sprays.length_m[:, None] * across
+    # A third of the way along a spray is widest: a kite that lost one wing reads as foliage.
+    skew = (uniform((len(sprays.slots), 1), rng) - 0.5) * sprays.length_m[:, None] * sprays.along
+    tip = sprays.at_m + sprays.length_m[:, None] * sprays.along
+    corners = np.stack([sprays.at_m + half + 0.4 * skew, tip, sprays.at_m - half - 0.4 * skew], axis=1)
+    corners = np.round(settled(corners) / GRID_M) * GRID_M
+    own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = (own * sprays.outward).sum(axis=1) < 0.0
+    corners[inward] = corners[inward][:, ::-1]
+    own = _unit(np.where(inward[:, None], -own, own))
+    normals = _unit(OUTWARD * sprays.outward + (1.0 - OUTWARD) * own)
+    n = len(corners)
+    return MeshData(
+        vertices_m=corners.reshape(-1, 3).astype(np.float32),
+        faces=np.arange(3 * n, dtype=np.int32).reshape(-1, 3),
+        normals=(np.round(settled(np.repeat(normals, 3, axis=0)), 6) + 0.0).astype(np.float32),
+        uvs=np.zeros((3 * n, 2), dtype=np.float32),
+        face_slots=sprays.slots.astype(np.int32),
+        materials=tuple(materials),
+    )
+
+
+def sprays_about(
+    anchors_m: Array,
+    centre_m: Array,
+    count: int,
+    length_m: float,
+    spread_m: float,
+    shades: int,
+    rng: Rng,
+    droop: float = 0.15,
+) -> Sprays:
+    """Sprays in clusters about anchors.
+
+    Args:
+        anchors_m: Ends of twigs, [k, 3].
+        centre_m: Middle of the crown, [3].
+        count: How many sprays.
+        length_m: Mean length of a spray.
+        spread_m: Radius of the cluster about an anchor.
+        shades: Number of materials; the first is the deepest in the crown.
+        rng: Draws places and directions.
+        droop: How much sprays hang.
+    """
+    which = np.arange(count) % len(anchors_m)
+    offset = _directions(count, rng) * spread_m * uniform((count, 1), rng) ** 0.5
+    at = anchors_m[which] + offset
+    outward = _unit(at - centre_m + 0.25 * offset)
+    along = _unit(0.55 * outward + 0.8 * _directions(count, rng) - np.array([0.0, 0.0, droop]))
+    length = length_m * (0.7 + 0.6 * uniform(count, rng))
+    reach = np.sqrt(((at - centre_m) ** 2).sum(axis=1))
+    depth = reach / max(float(reach.max()), 1e-9) + 0.12 * offset[:, 2] / spread_m
+    lit = depth + 0.25 * (uniform(count, rng) - 0.5)
+    slots = np.clip(np.floor((lit - 0.35) / 0.65 * shades), 0, shades - 1).astype(np.int64)
+    return Sprays(at, outward, along, length, slots)
+
+
+def merged(first: MeshData, second: MeshData) -> MeshData:
+    """Both meshes as one; the second's slots follow the first's."""
+    return MeshData(
+        vertices_m=np.concatenate([first.vertices_m, second.vertices_m]),
+        faces=np.concatenate([first.faces, second.faces + np.int32(len(first.vertices_m))]),
+        normals=np.concatenate([first.normals, second.normals]),
+        uvs=np.concatenate([first.uvs, second.uvs]),
+        face_slots=np.concatenate(
+            [first.face_slots, second.face_slots + np.int32(len(first.materials))]
+        ),
+        materials=(*first.materials, *second.materials),
+    )
+
+
+def _directions(count: int, rng: Rng) -> Array:
+    """Unit vectors, even over the sphere, [count, 3]."""
+    z = 2.0 * uniform(count, rng) - 1.0
+    turn = 2.0 * math.pi * uniform(count, rng)
+    flat = np.sqrt(1.0 - z * z)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+
+
+def _unit(vectors: Array) -> Array:
+    unit: Array = vectors / np.maximum(np.sqrt((vectors**2).sum(axis=-1, keepdims=True)), 1e-12)
+    return unit

@@ -1,0 +1,1 @@
+"""Generators of the street's own textures: ``function(seed, **parameters) -> TextureData``."""

@@ -1,0 +1,93 @@
+"""Surfaces of houses and plants. All are near-white: the material's colour tints them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.assets.procedural.draw import between, rng_of
+from generator.assets.procedural.noise import (
+    blurred,
+    fbm,
+    rows_and_columns,
+    smoothstep,
+    uniform,
+    warped,
+    worley,
+)
+from generator.assets.procedural.textures.images import texture
+from generator.core.geometry import TextureData
+
+
+def roof_tiles(seed: int) -> TextureData:
+    """Clay or concrete tiles, the eaves below; 1.8 m per repeat."""
+    rng = rng_of("roof_tiles", seed)
+    courses, per_course = (6, 8) if seed % 2 == 0 else (8, 10)
+    y, x = rows_and_columns()
+    row = np.floor(y * courses).astype(np.int64)
+    down = y * courses - row
+    along = x * per_course + 0.5 * (row % 2)
+    column = np.floor(along).astype(np.int64) % per_course
+    across = along - np.floor(along)
+    # A pantile: a roll on one side, a trough on the other.
+    roll = 0.5 + 0.5 * np.cos(2 * np.pi * (across - 0.25))
+    joint = smoothstep(0.06, 0.0, np.abs(across - 0.75))
+    lip = smoothstep(0.86, 1.0, down)
+    tone = 0.78 + 0.2 * uniform(courses * per_course, rng)
+    grime = 0.06 * fbm((4, 4), 5, rng) + 0.05 * fbm((40, 40), 3, rng)
+    shade = tone.astype(np.float32)[row * per_course + column] * (1 + grime)
+    shade = shade * (1 - 0.55 * lip) * (1 - 0.3 * joint) * (0.8 + 0.2 * roll)
+    height = 5.0 * roll + 5.0 * down - 3.0 * joint
+    lichen = 0.1 * smoothstep(0.3, 0.9, fbm((7, 7), 5, rng))
+    albedo = shade[..., None] * np.array([1.0, 0.98, 0.96]) + lichen[..., None]
+    return texture(albedo.astype(np.float32), None, blurred(height.astype(np.float32)), 0.6)
+
+
+def ashlar(seed: int) -> TextureData:
+    """Dressed stone blocks with thin joints; 2.4 m per repeat."""
+    rng = rng_of("ashlar", seed)
+    courses, per_course = 6, 4
+    y, x = rows_and_columns()
+    row = np.floor(y * courses).astype(np.int64)
+    along = x * per_course + 0.5 * (row % 2)
+    column = np.floor(along).astype(np.int64) % per_course
+    side = np.abs(along - np.round(along)) / per_course
+    bed = np.abs(y * courses - np.round(y * courses)) / courses
+    edge = 512.0 * np.minimum(side, bed)
+    face = smoothstep(1.0, 3.0, edge)
+    tone = 0.8 + 0.18 * uniform(courses * per_course, rng)
+    grain = fbm((60, 60), 3, rng)
+    shade = tone.astype(np.float32)[row * per_course + column]
+    shade = shade * (1 + 0.05 * fbm((5, 5), 4, rng) + 0.06 * grain) * (0.62 + 0.38 * face)
+    height = 3.0 * smoothstep(0.0, 6.0, edge) + 0.5 * grain
+    albedo = shade[..., None] * np.array([1.0, 0.985, 0.96])
+    return texture(albedo.astype(np.float32), None, height.astype(np.float32))
+
+
+def bark(seed: int) -> TextureData:
+    """Furrowed bark, the trunk upright; 0.8 m per repeat."""
+    rng = rng_of("bark", seed)
+    bend = 10.0 * fbm((6, 3), 4, rng)
+    ridges = worley((5, 16), rng, 0.9)
+    furrow = smoothstep(0.28, 0.0, ridges.second - ridges.nearest)
+    furrow = warped(furrow.astype(np.float32), 0 * bend, bend)
+    fine = fbm((20, 60), 3, rng)
+    depth = between(0.45, 0.65, rng)
+    shade = (0.85 + 0.1 * fbm((4, 4), 4, rng) + 0.12 * fine) * (1 - depth * furrow)
+    albedo = shade[..., None] * np.array([1.0, 0.97, 0.93])
+    return texture(albedo.astype(np.float32), None, (1.5 * fine - 4.0 * furrow).astype(np.float32))
+
+
+def foliage(seed: int) -> TextureData:
+    """Dense small leaves, as of a clipped hedge; 0.8 m per repeat."""
+    rng = rng_of("foliage", seed)
+    shade = np.full((512, 512), 0.12, dtype=np.float32)
+    height = np.zeros((512, 512), dtype=np.float32)
+    for cells, level in ((14, 0.35), (20, 0.6), (26, 0.95)):
+        points = worley((cells, cells), rng)
+        size = 0.28 + 0.25 * uniform(points.count, rng)
+        leaf = smoothstep(0.0, 0.1, points.of_each(size) - points.nearest).astype(np.float32)
+        tone = points.of_each(level * (0.65 + 0.5 * uniform(points.count, rng)))
+        shade = (shade * (1 - leaf) + leaf * tone * (1.0 - 0.5 * points.nearest)).astype(np.float32)
+        height = height * (1 - leaf) + leaf * np.float32(4.0 * level)
+    albedo = shade[..., None] * np.array([0.95, 1.0, 0.9])
+    return texture(albedo.astype(np.float32), None, blurred(height))

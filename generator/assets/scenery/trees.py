@@ -1,0 +1,284 @@
+"""Trees: trunk and branches that grow into a crown, leaves in clusters at the twigs' ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, pick, rng_of
+from generator.assets.procedural.family import Facts, Solid
+from generator.assets.procedural.materials import jittered, linear
+from generator.assets.procedural.mesh import Array, Patch, finished
+from generator.assets.procedural.noise import uniform
+from generator.assets.procedural.shapes import circle, sweep
+from generator.assets.scenery.branching import Lobe, Skeleton, grown, points_in, wood
+from generator.assets.scenery.foliage import Sprays, leaf_mesh, merged, sprays_about
+from generator.core.errors import AssetError, did_you_mean
+from generator.core.geometry import ConvexParts, Material, MeshData
+from generator.core.streams import Rng
+
+SPECIES = ("broad", "round", "columnar", "birch", "young", "conifer")
+
+_LEAVES = 4200
+"""Triangles of foliage on a tree in full leaf."""
+_TWIGS = 2400
+_OPTICAL_DEPTH = 2.3
+"""Layers of leaves that a line of sight meets on its way through a crown."""
+_LEAF_WIDTH = 0.62
+_ATTRACTORS = 900
+_STEP = 0.12
+"""Length of an internode, of the widest lobe's radius."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What a tree is like.
+
+    Attributes:
+        height_m: Overall.
+        clear_m: From the ground to the lowest branches.
+        trunk_m: Radius of the trunk at its foot.
+        lobes: What the crown fills.
+        green: sRGB of the leaves, from the crown's depth to its surface.
+        bark: sRGB of the bark.
+    """
+
+    height_m: float
+    clear_m: float
+    trunk_m: float
+    lobes: tuple[Lobe, ...]
+    green: tuple[str, ...]
+    bark: str
+    droop: float = 0.15
+
+
+def tree(seed: int, species: str, leaves: float) -> Solid:
+    """A tree; its trunk stands on the origin. Slots: bark, then four shades of leaf.
+
+    Args:
+        seed: Variant.
+        species: One of ``SPECIES``.
+        leaves: Share of the leaves that it wears, 0 in winter to 1 in summer.
+
+    Raises:
+        AssetError: for an unknown species or a share outside of [0, 1].
+    """
+    if species not in SPECIES:
+        raise AssetError(
+            f"tree: there is no species '{species}'{did_you_mean(species, SPECIES)}; expected one "
+            f"of {', '.join(SPECIES)}"
+        )
+    if not 0.0 <= leaves <= 1.0:
+        raise AssetError(f"tree: leaves={leaves} is not a share between 0 and 1")
+    rng = rng_of(f"tree/{species}", seed)
+    return _conifer(rng) if species == "conifer" else _broadleaf(_SHAPES[species](rng), leaves, rng)
+
+
+def tree_facts(seed: int, species: str, leaves: float) -> Facts:  # noqa: ARG001
+    """Species, and whether it is bare."""
+    return Facts(species, {"foliage": "bare" if leaves < 0.05 else "leafy"})
+
+
+def _broadleaf(shape: Shape, leaves: float, rng: Rng) -> Solid:
+    trunk = _trunk(shape, rng)
+    points = points_in(shape.lobes, _ATTRACTORS, rng)
+    step_m = min(max(0.1, _STEP * max(lobe.axes_m[0] for lobe in shape.lobes)), 0.35)
+    skeleton = grown(trunk, points, step_m, shape.trunk_m)
+    bark = _bark(shape.bark)
+    # Thin twigs hide behind leaves; without leaves they are the crown.
+    thinnest = 0.0 if leaves < 0.05 else 0.2 * shape.trunk_m
+    mesh = finished(_flared(wood(skeleton, thinnest, 2)), (bark,), 60.0)
+    hull = hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
+    count = round(_LEAVES * leaves)
+    if count:
+        greens = _greens(shape.green, rng)
+        sprays = _crown(shape, skeleton, count, len(greens), rng)
+        mesh = merged(mesh, leaf_mesh(sprays, greens, _LEAF_WIDTH, rng))
+    else:
+        mesh = merged(mesh, _bare_twigs(shape, skeleton, bark, rng))
+    return Solid(mesh, ConvexParts((np.round(hull, 6),)))
+
+
+def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: Rng) -> Sprays:
+    """Leaves at the twigs' ends, as large as it takes to fill the crown."""
+    outer = np.array([lobe.centre_m for lobe in shape.lobes]).mean(axis=0)
+    radius = np.sqrt(
+        max(lobe.axes_m[0] for lobe in shape.lobes) * max(lobe.axes_m[2] for lobe in shape.lobes)
+    )
+    width = max(abs(lobe.centre_m[0]) + lobe.axes_m[0] for lobe in shape.lobes)
+    area = math.pi * float(max(radius, 0.7 * width)) ** 2
+    # Half of a leaf's area faces a line of sight, on average.
+    each = 2.0 * _OPTICAL_DEPTH * area / _LEAVES
+    length = math.sqrt(2.0 * each / _LEAF_WIDTH)
+    middle = outer - np.array([0.0, 0.0, 0.25 * float(radius)])
+    anchors = skeleton.twigs()
+    return sprays_about(anchors, middle, count, length, 1.6 * length, shades, rng, shape.droop)
+
+
+def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: Rng) -> MeshData:
+    """The finest twigs of a winter crown, each a thin sliver."""
+    middle = np.array([0.0, 0.0, shape.clear_m])
+    length = 0.13 * (shape.height_m - shape.clear_m)
+    sprays = sprays_about(skeleton.twigs(), middle, _TWIGS, length, 0.1 * length, 1, rng, -0.3)
+    return leaf_mesh(sprays, (bark,), 0.03, rng)
+
+
+def _trunk(shape: Shape, rng: Rng) -> Array:
+    """Centre line from the ground to the first branches, gently bent."""
+    count = max(4, round(shape.clear_m / 0.4))
+    t = np.linspace(0.0, 1.0, count)
+    sway = 0.05 * shape.clear_m
+    x = sway * (uniform(1, rng) - 0.5) * np.sin(2.4 * t) * t
+    y = sway * (uniform(1, rng) - 0.5) * np.sin(2.9 * t) * t
+    return np.round(np.stack([x, y, t * shape.clear_m], axis=1), 4)
+
+
+def _flared(patch: Patch) -> Patch:
+    """Wood with a root flare: wider by half at the ground."""
+    z = patch.corners_m[..., 2:]
+    factor = 1.0 + 0.45 * np.clip(1.0 - z / 0.5, 0.0, 1.0) ** 2
+    return replace(patch, corners_m=patch.corners_m * np.concatenate([factor, factor, 0 * z + 1], 2))
+
+
+def _conifer(rng: Rng) -> Solid:
+    """A spruce: whorls of drooping branches along a straight trunk, evergreen."""
+    height, base_m = between(6.0, 12.0, rng), between(0.1, 0.17, rng)
+    clear, spread = between(0.2, 0.9, rng), between(0.17, 0.24, rng) * height
+    line = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * height), (0.0, 0.0, height)])
+    trunk = sweep(line, circle(base_m, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.0, 0.5, 0.08]))
+    whorls = 20
+    at, along, lengths = [], [], []
+    for level in range(whorls):
+        share = (level + 0.2 * uniform(1, rng)[0]) / whorls
+        z = clear + (height - clear) * share**0.9
+        reach = spread * (1.0 - share) ** 0.85 + 0.12
+        for k in range(9):
+            turn = 2.0 * math.pi * (k + 0.5 * (level % 2) + 0.5 * between(-0.5, 0.5, rng)) / 9
+            made = _fan(z, turn, reach * between(0.75, 1.1, rng), 0.5 - share, rng)
+            for target, part in zip((at, along, lengths), made, strict=True):
+                target.append(part)
+    places, growth = np.concatenate(at), np.concatenate(along)
+    reach_m = np.concatenate(lengths)
+    # The lowest sprays rest on the ground.
+    growth[:, 2] = np.maximum(growth[:, 2], (0.03 - places[:, 2]) / reach_m)
+    axis = places * np.array([1.0, 1.0, 0.0])
+    outward = axis / np.sqrt((axis**2).sum(axis=1, keepdims=True)) * 0.85 + np.array([0, 0, 0.53])
+    depth = np.sqrt((axis**2).sum(axis=1)) / (spread * np.clip(1 - places[:, 2] / height, 0.1, 1.0))
+    slots = np.clip(np.floor(depth * 3.2 + uniform(len(depth), rng) - 0.5), 0, 3).astype(np.int64)
+    sprays = Sprays(places, outward, growth, reach_m, slots)
+    greens = _greens(("#1f2b1c", "#2a3a25", "#35472d", "#425537"), rng)
+    mesh = merged(
+        finished(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng)
+    )
+    hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
+    return Solid(mesh, ConvexParts((np.round(hull, 6),)))
+
+
+def _fan(z: float, turn: float, reach: float, sag: float, rng: Rng) -> tuple[Array, Array, Array]:
+    """Sprays of needles along one branch: feet, directions and lengths."""
+    count = 24
+    t = np.sqrt(np.arange(1, count + 1) / count)
+    out = np.array([math.cos(turn), math.sin(turn), 0.0])
+    side = np.array([-math.sin(turn), math.cos(turn), 0.0])
+    dip = np.maximum(-0.28 * (0.6 + sag) * reach * t**1.5, 0.15 - z)
+    wing = np.where(np.arange(count) % 2 == 0, 1.0, -1.0) * (0.3 + 0.7 * uniform(count, rng))
+    spread = (0.26 * reach * t * (1.15 - t))[:, None] * (wing[:, None] * side)
+    at = (reach * t)[:, None] * out + spread + np.stack([0 * t, 0 * t, z + dip], axis=1)
+    growth = out + 0.9 * wing[:, None] * side + np.array([0.0, 0.0, -0.45]) * (
+        0.4 + uniform((count, 1), rng)
+    )
+    growth = growth / np.sqrt((growth**2).sum(axis=1, keepdims=True))
+    return at, growth, (0.22 + 0.2 * reach) * (0.7 + 0.5 * uniform(count, rng))
+
+
+def _bark(code: str) -> Material:
+    texture = "texture/bark?seed=0"
+    return Material(linear(code), roughness=0.95, texture=texture, texture_scale_m=0.8, role="bark")
+
+
+def _greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
+    """Shades of leaf that vary together from tree to tree."""
+    r, g, b = jittered((1.0, 1.0, 1.0), 0.0, rng)
+    warm, level = between(0.85, 1.18, rng), between(0.85, 1.15, rng)
+    return tuple(
+        Material(
+            (level * warm * c[0] * r, level * c[1] * g, level * c[2] * b),
+            roughness=0.75,
+            specular=0.35,
+            role="leaf",
+        )
+        for c in (linear(code) for code in codes)
+    )
+
+
+_LIME = ("#37442a", "#465634", "#566a3d", "#687c49")
+_MAPLE = ("#334028", "#40512f", "#506438", "#627645")
+_BIRCH = ("#45522f", "#56663a", "#697a45", "#7d8c54")
+
+
+def _lobed(radius: float, height: float, centre_z: float, count: int, rng: Rng) -> tuple[Lobe, ...]:
+    """A crown of one body and several overlapping boughs around it."""
+    lobes = [Lobe((0.0, 0.0, centre_z), (0.72 * radius, 0.72 * radius, 0.42 * height))]
+    for k in range(count):
+        turn = 2.0 * math.pi * (k + between(-0.3, 0.3, rng)) / count
+        away, r = between(0.42, 0.6, rng) * radius, between(0.4, 0.55, rng) * radius
+        z = centre_z + between(-0.24, 0.26, rng) * height
+        lobes.append(Lobe((away * math.cos(turn), away * math.sin(turn), z), (r, r, 0.8 * r)))
+    return tuple(lobes)
+
+
+def _broad(rng: Rng) -> Shape:
+    height, clear = between(8.0, 12.0, rng), between(2.4, 3.2, rng)
+    crown = height - clear + 0.4
+    radius = crown * between(0.42, 0.54, rng)
+    lobes = _lobed(radius, crown, height - 0.52 * crown, 7, rng)
+    green = pick((_LIME, _MAPLE), rng)
+    return Shape(height, clear, between(0.16, 0.26, rng), lobes, green, "#7d7263")
+
+
+def _round(rng: Rng) -> Shape:
+    height, clear = between(5.0, 6.5, rng), between(2.2, 2.6, rng)
+    r = 0.5 * (height - clear + 0.2)
+    lobes = (Lobe((0.0, 0.0, height - r), (1.02 * r, 1.02 * r, r)),)
+    return Shape(height, clear, between(0.1, 0.15, rng), lobes, _MAPLE, "#75695b")
+
+
+def _columnar(rng: Rng) -> Shape:
+    height, clear = between(8.0, 12.0, rng), between(1.6, 2.4, rng)
+    crown = height - clear + 0.3
+    r = crown * between(0.15, 0.21, rng)
+    lobes = tuple(
+        Lobe((0.0, 0.0, clear + crown * z), (w * r, w * r, 0.24 * crown))
+        for z, w in ((0.22, 0.85), (0.48, 1.0), (0.74, 0.72))
+    )
+    return Shape(height, clear, between(0.13, 0.19, rng), lobes, _LIME, "#7a7062", 0.0)
+
+
+def _birch(rng: Rng) -> Shape:
+    height, clear = between(8.0, 11.5, rng), between(2.0, 3.0, rng)
+    crown = height - clear + 0.3
+    radius = crown * between(0.26, 0.34, rng)
+    lobes = _lobed(radius, crown, height - 0.5 * crown, 5, rng)
+    return Shape(height, clear, between(0.1, 0.15, rng), lobes, _BIRCH, "#cfccc4", 0.7)
+
+
+def _young(rng: Rng) -> Shape:
+    height, clear = between(3.6, 4.8, rng), between(1.8, 2.2, rng)
+    r = 0.5 * (height - clear)
+    wide = between(0.55, 0.75, rng)
+    lobes = (Lobe((0.0, 0.0, height - r), (wide * r, wide * r, r)),)
+    green = pick((_LIME, _MAPLE, _BIRCH), rng)
+    return Shape(height, clear, between(0.04, 0.06, rng), lobes, green, "#80746a")
+
+
+_SHAPES: dict[str, Callable[[Rng], Shape]] = {
+    "broad": _broad,
+    "round": _round,
+    "columnar": _columnar,
+    "birch": _birch,
+    "young": _young,
+}
