@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -69,7 +70,8 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str) -> Imported:
     else:
         collision = convex_parts(_solid_of(mesh, entry.max_faces), place, entry.parts)
     decoded = {name: decode(data, f"{place}#{name}") for name, data in images.items()}
-    return Imported(mesh, collision, decoded)
+    keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
+    return Imported(mesh, collision, decoded, keypoints)
 
 
 def import_link(
@@ -178,7 +180,7 @@ def _finished(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str
     """Slots with the entry's finishes, textures named by their owner, and no impossible whites."""
     slots = []
     for slot in soup.slots:
-        finish = finishes.get(slot.name, finishes.get("*"))
+        finish = _finish_of(slot.name, finishes)
         if slot.missing_library and not slot.from_file and finish is None:
             raise AssetError(
                 f"{place}: material '{slot.name}' should be in {slot.missing_library}, which is "
@@ -195,8 +197,18 @@ def _finished(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str
     return replace(soup, slots=tuple(slots))
 
 
+def _finish_of(name: str, finishes: Mapping[str, Finish]) -> Finish | None:
+    """The finish under a material's name, else under the longest pattern that fits it."""
+    if name in finishes:
+        return finishes[name]
+    fitting = [pattern for pattern in finishes if fnmatchcase(name, pattern)]
+    return finishes[max(fitting, key=len)] if fitting else None
+
+
 def _with_finish(material: Material, finish: Finish) -> Material:
     changes = {k: v for k, v in finish.model_dump().items() if v is not None}
+    if changes.pop("textured", None) is False:
+        changes["texture"] = ""
     return replace(material, **changes)
 
 
