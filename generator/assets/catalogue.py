@@ -55,6 +55,17 @@ class Point(Strict):
     radius_m: Annotated[float, Field(gt=0.0)] = 0.05
 
 
+class Region(Strict):
+    """Triangles of a material that are something of their own: a lamp in a textured body."""
+
+    material: str
+    """Pattern of the material's name in the file."""
+    low_m: tuple[float, float, float]
+    high_m: tuple[float, float, float]
+    """Corners of the box that holds their centres, in the frame of the finished asset."""
+    finish: Finish
+
+
 class Origin(Strict):
     """Licence, author and source; an entry inherits from its document what it does not give."""
 
@@ -99,6 +110,8 @@ class MeshEntry(Origin):
     materials: dict[str, Finish] = Field(default_factory=dict)
     """By the material's name in the file, or a pattern of it (``*`` = every other); the name
     itself goes before patterns, long patterns before short ones."""
+    regions: tuple[Region, ...] = ()
+    """Applied in this order, after ``materials``."""
     keypoints: tuple[Point, ...] = ()
 
     @model_validator(mode="after")

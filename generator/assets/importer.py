@@ -8,13 +8,13 @@ of the URDF. Mesh and collision parts always share one frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 
-from generator.assets.catalogue import Finish, MeshEntry, RobotEntry
+from generator.assets.catalogue import Finish, MeshEntry, Region, RobotEntry
 from generator.assets.convex import convex_parts, one_hull
 from generator.assets.decimate import decimated
 from generator.assets.folder import Folder
@@ -29,7 +29,7 @@ from generator.core.errors import AssetError
 from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, UInt8
 from generator.core.se3 import SE3
 
-VERSION = 1
+VERSION = 2
 """Raised whenever the same files would come out as other geometry."""
 _WHITEST = 0.85
 """Files say 1 for white; no matt surface reflects more than fresh snow does (about 0.85)."""
@@ -61,7 +61,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str) -> Imported:
     matrix = _upright(entry)
     soup = soup.transformed(matrix)
     scale, shift = _scale_and_shift(soup, entry, place)
-    soup = soup.transformed(_scaling(scale, shift))
+    soup = _with_regions(soup.transformed(_scaling(scale, shift)), entry.regions)
     mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
     if collides:
         solid = joined(collides).transformed(matrix).transformed(_scaling(scale, shift))
@@ -203,6 +203,23 @@ def _finish_of(name: str, finishes: Mapping[str, Finish]) -> Finish | None:
         return finishes[name]
     fitting = [pattern for pattern in finishes if fnmatchcase(name, pattern)]
     return finishes[max(fitting, key=len)] if fitting else None
+
+
+def _with_regions(soup: Soup, regions: Sequence[Region]) -> Soup:
+    """The soup with a slot of its own for the triangles of each region."""
+    for region in regions:
+        centers = soup.corners.mean(axis=1)
+        inside = ((centers >= region.low_m) & (centers <= region.high_m)).all(axis=1)
+        for k, slot in enumerate(soup.slots):
+            chosen = inside & (soup.face_slots == k)
+            if fnmatchcase(slot.name, region.material) and chosen.any():
+                material = _with_finish(slot.material, region.finish)
+                soup = replace(
+                    soup,
+                    face_slots=np.where(chosen, len(soup.slots), soup.face_slots),
+                    slots=(*soup.slots, Slot("", material, from_file=True)),
+                )
+    return soup
 
 
 def _with_finish(material: Material, finish: Finish) -> Material:

@@ -8,7 +8,7 @@ fast. Installing is ``generator.packs``' business.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -27,8 +27,13 @@ TAG = "pack"
 
 @dataclass(frozen=True, slots=True)
 class StoredFile:
-    """What one installed file should be."""
+    """What one installed file should be.
 
+    Attributes:
+        path: Below the pack's folder.
+    """
+
+    path: str
     size: int
     sha256: str
 
@@ -41,7 +46,7 @@ class Record:
         version: Of the package it comes from.
         revision: Of the conversion, raised whenever the same package gives other files.
         archive_sha256: Of the package's archive.
-        files: ``{path below the pack's folder: what it should be}``, the record itself excepted.
+        files: All files but the record itself, sorted by path.
     """
 
     name: str
@@ -50,7 +55,7 @@ class Record:
     archive_sha256: str
     licence: str
     source: str
-    files: Mapping[str, StoredFile]
+    files: tuple[StoredFile, ...]
 
     @property
     def digest(self) -> str:
@@ -60,7 +65,7 @@ class Record:
     @property
     def size(self) -> int:
         """Bytes of all files."""
-        return sum(file.size for file in self.files.values())
+        return sum(file.size for file in self.files)
 
 
 def installed(folder: Path) -> tuple[Record, ...]:

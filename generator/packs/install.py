@@ -81,9 +81,10 @@ def verify(name: str, folder: Path) -> Record:
     _must_be_there(name, folder)
     pack = folder / name
     record = read_record(pack)
-    found = {path: digest for path, digest in _files(pack).items() if path != RECORD_NAME}
-    for path in sorted({*record.files, *found}):
-        expected, actual = record.files.get(path), found.get(path)
+    should = {file.path: file for file in record.files}
+    found = {file.path: file for file in _files(pack) if file.path != RECORD_NAME}
+    for path in sorted({*should, *found}):
+        expected, actual = should.get(path), found.get(path)
         if expected != actual:
             what = "was not installed" if expected is None else "missing"
             raise VerificationError(
@@ -112,12 +113,12 @@ def _record(pack: Pack, target: Path) -> Record:
     )
 
 
-def _files(folder: Path) -> dict[str, StoredFile]:
-    paths = sorted(path for path in folder.rglob("*") if path.is_file() or path.is_symlink())
-    return {
-        path.relative_to(folder).as_posix(): StoredFile(path.stat().st_size, file_digest(path))
+def _files(folder: Path) -> tuple[StoredFile, ...]:
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    return tuple(
+        StoredFile(path.relative_to(folder).as_posix(), path.stat().st_size, file_digest(path))
         for path in paths
-    }
+    )
 
 
 def _exchange(new: Path, final: Path, old: Path) -> None:
