@@ -37,8 +37,33 @@ class Finish(Strict):
     """Linear RGB."""
     roughness: Fraction | None = None
     metallic: Fraction | None = None
+    specular: Fraction | None = None
     printed: bool | None = None
     """The image is part of what the object is: randomizers leave it alone."""
+    textured: Literal[False] | None = None
+    """False: without the image that the file gives it."""
+    role: Word | None = None
+    """What it is on its object: paint, glass, tyre, ...; see ``generator.core.geometry``."""
+
+
+class Point(Strict):
+    """A keypoint; see ``generator.core.geometry``."""
+
+    name: Word
+    position_m: tuple[float, float, float]
+    """In the frame of the finished asset."""
+    radius_m: Annotated[float, Field(gt=0.0)] = 0.05
+
+
+class Region(Strict):
+    """Triangles of a material that are something of their own: a lamp in a textured body."""
+
+    material: str
+    """Pattern of the material's name in the file."""
+    low_m: tuple[float, float, float]
+    high_m: tuple[float, float, float]
+    """Corners of the box that holds their centres, in the frame of the finished asset."""
+    finish: Finish
 
 
 class Origin(Strict):
@@ -56,6 +81,10 @@ class MeshEntry(Origin):
     file: str
     """Mesh or URDF file, relative to the folder."""
     category: Annotated[str, Field(min_length=1, max_length=60)]
+    subcategory: str = ""
+    """A finer name than the category."""
+    attributes: dict[Word, Word] = Field(default_factory=dict)
+    """Further facts that labels carry."""
     tags: tuple[Word, ...] = ()
     count: Annotated[int, Field(ge=1, le=100_000)] = 1
     """More than 1: a series; in ``id`` and ``file``, ``000`` stands for the number, from 0."""
@@ -79,7 +108,11 @@ class MeshEntry(Origin):
     """Bound on the convex parts that a concave mesh without a collision file is cut into."""
     max_faces: Annotated[int, Field(ge=100)] = 20_000
     materials: dict[str, Finish] = Field(default_factory=dict)
-    """By the material's name in the file; ``*`` = every other."""
+    """By the material's name in the file, or a pattern of it (``*`` = every other); the name
+    itself goes before patterns, long patterns before short ones."""
+    regions: tuple[Region, ...] = ()
+    """Applied in this order, after ``materials``."""
+    keypoints: tuple[Point, ...] = ()
 
     @model_validator(mode="after")
     def _one_size(self) -> MeshEntry:

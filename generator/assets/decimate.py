@@ -14,10 +14,10 @@ _CALM = 3.0
 
 
 def decimated(soup: Soup, max_faces: int) -> Soup:
-    """About ``max_faces`` triangles by quadric edge collapse; UVs and normals are lost.
+    """About ``max_faces`` triangles by quadric edge collapse; normals are lost.
 
     Each material is thinned out by itself, by the same share, and its border stays as it is: no
-    colour moves and no gap opens. Groups are lost.
+    colour moves and no gap opens. So do the seams of textures. Groups are lost.
 
     Source: Garland and Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH
     1997.
@@ -27,13 +27,17 @@ def decimated(soup: Soup, max_faces: int) -> Soup:
     first_slot = np.array([materials.index(material) for material in materials])[soup.face_slots]
     parts = []
     for k in np.unique(first_slot):
-        corners = soup.corners[first_slot == k]
-        thinned = _collapsed(corners, max(int(len(corners) * share), 4))
-        parts.append(Soup.of(thinned, soup.slots[k]))
+        slot, chosen = soup.slots[k], soup.kept(first_slot == k)
+        uvs = chosen.uvs if slot.material.texture else None
+        corners, uvs = _collapsed(chosen.corners, uvs, max(int(len(chosen) * share), 4))
+        parts.append(replace(Soup.of(corners, slot), uvs=uvs))
     return replace(joined(parts), face_groups=np.zeros(sum(map(len, parts)), dtype=np.int64))
 
 
-def _collapsed(corners: Float64, max_faces: int) -> Float64:
+def _collapsed(
+    corners: Float64, uvs: Float64 | None, max_faces: int
+) -> tuple[Float64, Float64 | None]:
+    """Corners and UVs of fewer triangles. Corners that differ in UV are never taken for one."""
     import fast_simplification
 
     flat = corners.reshape(-1, 3)
@@ -41,13 +45,28 @@ def _collapsed(corners: Float64, max_faces: int) -> Float64:
     low = flat.min(axis=0)
     scale = float((flat.max(axis=0) - low).max())
     unit = (flat - low) / scale
-    vertex, first = first_occurrences(np.rint(unit * 1e7).astype(np.int64))
-    points, faces = fast_simplification.simplify(
+    keys = np.rint(unit * 1e7).astype(np.int64)
+    if uvs is not None:
+        keys = np.concatenate([keys, np.rint(uvs.reshape(-1, 2) * 1e5).astype(np.int64)], axis=1)
+    vertex, first = first_occurrences(keys)
+    triangles = vertex.reshape(-1, 3).astype(np.int32)
+    _, _, collapses = fast_simplification.simplify(
         unit[first],
-        vertex.reshape(-1, 3).astype(np.int32),
+        triangles,
         target_count=max_faces,
         agg=_CALM,
+        return_collapses=True,
         preserve_border=True,
     )
-    collapsed: Float64 = (points.astype(np.float64) * scale + low)[faces]
-    return collapsed
+    points, faces, merged = fast_simplification.replay_simplification(
+        unit[first], triangles, collapses
+    )
+    kept: Float64 = (points.astype(np.float64) * scale + low)[faces]
+    if uvs is None:
+        return kept, None
+    # Borders of the charts stay, so that all that was merged lies in one chart.
+    counts = np.bincount(merged, minlength=len(points))[:, None]
+    sums = np.zeros((len(points), 2))
+    np.add.at(sums, merged, uvs.reshape(-1, 2)[first])
+    mean: Float64 = (sums / np.maximum(counts, 1))[faces]
+    return kept, mean

@@ -1,4 +1,4 @@
-"""Assets that lie in files: pybullet's and the user's."""
+"""Assets that lie in files: pybullet's, those of installed packs, and the user's."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from generator.assets.folder import Folder
 from generator.assets.images import decode, decode_radiance
 from generator.assets.importer import VERSION, Imported, import_link, import_object
 from generator.assets.packing import pack, unpack
+from generator.assets.packs import pack_assets
 from generator.assets.robots import robot_model
 from generator.assets.urdf import Urdf, read_urdf
 from generator.core.errors import AssetError
@@ -40,7 +41,10 @@ class Files:
     an image that an asset's materials refer to.
     """
 
-    def __init__(self, user_roots: Sequence[Path], disk: DiskCache, store: Store) -> None:
+    def __init__(
+        self, packs: Path, user_roots: Sequence[Path], disk: DiskCache, store: Store
+    ) -> None:
+        self._packs = packs
         self._user_roots = tuple(user_roots)
         self._store = store
         self._digests = Digests(disk)
@@ -152,7 +156,7 @@ class Files:
     def _all(self) -> dict[str, Listed]:
         if self._listed is None:
             self._listed = {}
-            for one in _everything(self._user_roots):
+            for one in _everything(self._packs, self._user_roots):
                 if one.asset_id in self._listed:
                     raise AssetError(
                         f"asset '{one.asset_id}': both {self._listed[one.asset_id].root} and "
@@ -187,6 +191,10 @@ class Files:
             sha256=self._key(one),
             mass_kg=entry.mass_kg if isinstance(entry, MeshEntry) else 0.0,
             stackable=isinstance(entry, MeshEntry) and entry.stackable,
+            subcategory=entry.subcategory if isinstance(entry, MeshEntry) else "",
+            attributes=tuple(sorted(entry.attributes.items()))
+            if isinstance(entry, MeshEntry)
+            else (),
         )
 
     def _key(self, one: Listed) -> str:
@@ -215,8 +223,9 @@ class Files:
                 raise AssetError(f"{folder.root / name}: changed while it was read; start again")
 
 
-def _everything(user_roots: Sequence[Path]) -> Iterator[Listed]:
+def _everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[Listed]:
     yield from listed(read_index(_BUILT_IN), _pybullet_data())
+    yield from pack_assets(packs)
     for root in user_roots:
         yield from user_folder(root)
 

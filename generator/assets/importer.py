@@ -8,12 +8,13 @@ of the URDF. Mesh and collision parts always share one frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 
-from generator.assets.catalogue import Finish, MeshEntry, RobotEntry
+from generator.assets.catalogue import Finish, MeshEntry, Region, RobotEntry
 from generator.assets.convex import convex_parts, one_hull
 from generator.assets.decimate import decimated
 from generator.assets.folder import Folder
@@ -28,7 +29,7 @@ from generator.core.errors import AssetError
 from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, UInt8
 from generator.core.se3 import SE3
 
-VERSION = 1
+VERSION = 2
 """Raised whenever the same files would come out as other geometry."""
 _WHITEST = 0.85
 """Files say 1 for white; no matt surface reflects more than fresh snow does (about 0.85)."""
@@ -60,7 +61,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str) -> Imported:
     matrix = _upright(entry)
     soup = soup.transformed(matrix)
     scale, shift = _scale_and_shift(soup, entry, place)
-    soup = soup.transformed(_scaling(scale, shift))
+    soup = _with_regions(soup.transformed(_scaling(scale, shift)), entry.regions)
     mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
     if collides:
         solid = joined(collides).transformed(matrix).transformed(_scaling(scale, shift))
@@ -69,7 +70,8 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str) -> Imported:
     else:
         collision = convex_parts(_solid_of(mesh, entry.max_faces), place, entry.parts)
     decoded = {name: decode(data, f"{place}#{name}") for name, data in images.items()}
-    return Imported(mesh, collision, decoded)
+    keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
+    return Imported(mesh, collision, decoded, keypoints)
 
 
 def import_link(
@@ -178,7 +180,7 @@ def _finished(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str
     """Slots with the entry's finishes, textures named by their owner, and no impossible whites."""
     slots = []
     for slot in soup.slots:
-        finish = finishes.get(slot.name, finishes.get("*"))
+        finish = _finish_of(slot.name, finishes)
         if slot.missing_library and not slot.from_file and finish is None:
             raise AssetError(
                 f"{place}: material '{slot.name}' should be in {slot.missing_library}, which is "
@@ -195,8 +197,35 @@ def _finished(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str
     return replace(soup, slots=tuple(slots))
 
 
+def _finish_of(name: str, finishes: Mapping[str, Finish]) -> Finish | None:
+    """The finish under a material's name, else under the longest pattern that fits it."""
+    if name in finishes:
+        return finishes[name]
+    fitting = [pattern for pattern in finishes if fnmatchcase(name, pattern)]
+    return finishes[max(fitting, key=len)] if fitting else None
+
+
+def _with_regions(soup: Soup, regions: Sequence[Region]) -> Soup:
+    """The soup with a slot of its own for the triangles of each region."""
+    for region in regions:
+        centers = soup.corners.mean(axis=1)
+        inside = ((centers >= region.low_m) & (centers <= region.high_m)).all(axis=1)
+        for k, slot in enumerate(soup.slots):
+            chosen = inside & (soup.face_slots == k)
+            if fnmatchcase(slot.name, region.material) and chosen.any():
+                material = _with_finish(slot.material, region.finish)
+                soup = replace(
+                    soup,
+                    face_slots=np.where(chosen, len(soup.slots), soup.face_slots),
+                    slots=(*soup.slots, Slot("", material, from_file=True)),
+                )
+    return soup
+
+
 def _with_finish(material: Material, finish: Finish) -> Material:
     changes = {k: v for k, v in finish.model_dump().items() if v is not None}
+    if changes.pop("textured", None) is False:
+        changes["texture"] = ""
     return replace(material, **changes)
 
 

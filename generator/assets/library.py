@@ -10,6 +10,7 @@ from generator.assets.files import Files
 from generator.assets.generated import Generated
 from generator.assets.ids import parse
 from generator.assets.importer import Imported
+from generator.assets.paths import packs_dir
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import (
     Asset,
@@ -24,16 +25,20 @@ from generator.core.geometry import (
 from generator.core.se3 import Vec3
 
 
-def open_library(user_roots: Sequence[Path] = (), cache_dir: Path | None = None) -> Library:
-    """A library of the procedural assets, pybullet's, and those in the user's folders.
+def open_library(
+    user_roots: Sequence[Path] = (), cache_dir: Path | None = None, packs: Path | None = None
+) -> Library:
+    """A library of procedural assets, pybullet's, installed packs', and the user's own.
 
     Nothing is read before it is asked for.
 
     Args:
         user_roots: Folders with or without an ``assets.yaml``; their ids start with ``user/``.
         cache_dir: Where normal forms are kept; by default the user's cache folder.
+        packs: Folder of installed packs; by default the user's.
     """
-    return Library(tuple(Path(root) for root in user_roots), cache_dir or default_cache_dir())
+    roots = tuple(Path(root) for root in user_roots)
+    return Library(roots, cache_dir or default_cache_dir(), packs or packs_dir())
 
 
 class Library:
@@ -43,11 +48,11 @@ class Library:
     whose files change while a process runs keeps the content that was read first.
     """
 
-    def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path) -> None:
+    def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path, packs: Path) -> None:
         disk = DiskCache(cache_dir)
         store = Store(disk)
         self._generated = Generated(store)
-        self._files = Files(user_roots, disk, store)
+        self._files = Files(packs, user_roots, disk, store)
         self._entries: dict[str, Asset] = {}
         self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
         self._bounds_m: dict[str, tuple[Vec3, Vec3]] = {}

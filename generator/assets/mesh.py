@@ -31,7 +31,7 @@ class NormalForm:
 
     Attributes:
         crease_deg: Edges whose faces differ by more in direction stay sharp.
-        max_faces: Triangle budget of meshes without textures; textured ones are left whole.
+        max_faces: Triangle budget.
     """
 
     crease_deg: float = CREASE_DEG
@@ -61,7 +61,7 @@ def normal_form(soup: Soup, place: str, form: NormalForm = NormalForm()) -> Mesh
         raise AssetError(
             f"{place}: {len(soup)} textured triangles, at most {MAX_TEXTURED_FACES}; decimate it"
         )
-    if not textured and len(soup) > form.max_faces:
+    if len(soup) > form.max_faces:
         soup, faces = _welded(decimated(soup, form.max_faces))
     soup, faces = _outward(soup, faces)
     soup = replace(soup, uvs=soup.uvs if textured else None)

@@ -30,6 +30,7 @@ class LateCommands(click.Group):
     modules = {  # noqa: RUF012
         "preview": "generator.cli.look:preview",
         "contact-sheet": "generator.cli.look:contact_sheet",
+        "assets": "generator.cli.assets:assets",
         "verify": "generator.cli.inform:verify",
         "describe": "generator.cli.inform:describe",
         "schema": "generator.cli.inform:schema",
@@ -38,6 +39,7 @@ class LateCommands(click.Group):
     summaries = {  # noqa: RUF012
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
         "contact-sheet": "Draw samples with their labels on one PNG.",
+        "assets": "Install, list, show, verify and remove packs of assets.",
         "verify": "Check a data set against its manifest.",
         "describe": "Explain a plug-in: what it does, its fields, an example.",
         "schema": "Print the JSON Schema of configurations.",

@@ -1,0 +1,157 @@
+"""``gen-data assets``: packs of assets that are fetched once and then simply there."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from generator.core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from generator.core.geometry import Asset
+
+_EVERY = "all"
+
+
+@click.group()
+def assets() -> None:
+    """Install, list, verify and remove packs of assets; show what the library holds."""
+
+
+@assets.command()
+@click.argument("names", nargs=-1, required=True, metavar="PACK...")
+@click.option(
+    "--from",
+    "archive",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="The package's archive, instead of fetching it; for one pack.",
+)
+@click.option("--again", is_flag=True, help="Also what is installed already.")
+def install(names: tuple[str, ...], archive: Path | None, again: bool) -> None:
+    """Install packs, or `all`: fetch the pinned package, check its sha256, convert it."""
+    from generator.assets.paths import packs_dir
+    from generator.packs.install import install as install_pack
+    from generator.packs.install import is_installed
+    from generator.packs.table import PACKS, find_pack
+
+    packs = PACKS if _EVERY in names else tuple(find_pack(name) for name in names)
+    if archive is not None and len(packs) != 1:
+        raise ConfigError(f"--from is the archive of one pack; {len(packs)} packs were named")
+    folder = packs_dir()
+    for pack in packs:
+        if is_installed(pack, folder) and not again:
+            click.echo(f"{pack.name}: {pack.source} is installed")
+            continue
+        started_s = time.perf_counter()
+        record = install_pack(pack, folder, archive)
+        click.echo(
+            f"{pack.name}: {pack.source}, {len(record.files)} files, {_mb(record.size)}, "
+            f"{time.perf_counter() - started_s:.0f} s, licence {pack.licence}"
+        )
+
+
+@assets.command("list")
+@click.argument("tags", nargs=-1)
+def list_(tags: tuple[str, ...]) -> None:
+    """List all packs; with TAGS, the objects, robots and environments that carry all of them."""
+    if tags:
+        _list_assets(tags)
+        return
+    from generator.assets.packs import installed
+    from generator.assets.paths import packs_dir
+    from generator.packs.install import is_installed
+    from generator.packs.table import PACKS
+
+    folder = packs_dir()
+    records = {record.name: record for record in installed(folder)}
+    for pack in PACKS:
+        record = records.get(pack.name)
+        state = "-"
+        if record is not None:
+            state = _mb(record.size) if is_installed(pack, folder) else "out of date"
+        click.echo(f"{pack.name:<10} {state:>12}  {pack.summary} ({pack.source}, {pack.licence})")
+    click.echo(f"folder: {folder}")
+
+
+@assets.command()
+@click.argument("asset_id", metavar="ID")
+def show(asset_id: str) -> None:
+    """Show an asset of the library: category, tags, licence, author, size."""
+    from generator.assets.library import open_library
+
+    library = open_library()
+    asset = library.get(asset_id)
+    for name, value in _facts(asset).items():
+        click.echo(f"{name:<12} {value}")
+    if asset.kind != "object":
+        return
+    low, high = library.bounds_m(asset_id)
+    size = " x ".join(f"{b - a:.3f}" for a, b in zip(low, high, strict=True))
+    mesh = library.mesh(asset_id)
+    click.echo(f"{'size_m':<12} {size}")
+    click.echo(f"{'triangles':<12} {len(mesh.faces)}")
+    roles = sorted({material.role for material in mesh.materials} - {""})
+    click.echo(f"{'materials':<12} {len(mesh.materials)}, roles: {', '.join(roles) or 'none'}")
+    points = ", ".join(point.name for point in library.keypoints(asset_id))
+    click.echo(f"{'keypoints':<12} {points or 'none'}")
+
+
+@assets.command()
+@click.argument("names", nargs=-1, metavar="[PACK]...")
+def verify(names: tuple[str, ...]) -> None:
+    """Hash every file of installed packs again; without PACK, of all that are installed."""
+    from generator.assets.packs import installed
+    from generator.assets.paths import packs_dir
+    from generator.packs.install import verify as verify_pack
+
+    folder = packs_dir()
+    chosen = names or tuple(record.name for record in installed(folder))
+    for name in chosen:
+        record = verify_pack(name, folder)
+        click.echo(f"{name}: {len(record.files)} files as installed")
+
+
+@assets.command()
+@click.argument("names", nargs=-1, required=True, metavar="PACK...")
+def remove(names: tuple[str, ...]) -> None:
+    """Remove installed packs."""
+    from generator.assets.paths import packs_dir
+    from generator.packs.install import remove as remove_pack
+    from generator.packs.table import find_pack
+
+    for name in names:
+        remove_pack(find_pack(name).name, packs_dir())
+        click.echo(f"{name}: removed")
+
+
+def _list_assets(tags: tuple[str, ...]) -> None:
+    from generator.assets.library import open_library
+
+    library = open_library()
+    for kind in ("object", "robot", "environment"):
+        for asset in library.find(tags, kind):
+            click.echo(f"{asset.asset_id}  {asset.category}  [{' '.join(asset.tags)}]")
+
+
+def _facts(asset: Asset) -> dict[str, str]:
+    facts = {
+        "id": asset.asset_id,
+        "kind": asset.kind,
+        "category": asset.category,
+        "subcategory": asset.subcategory,
+        "attributes": ", ".join(f"{name}={value}" for name, value in asset.attributes),
+        "tags": " ".join(asset.tags),
+        "mass_kg": f"{asset.mass_kg:g}" if asset.mass_kg else "",
+        "licence": asset.licence,
+        "author": asset.author,
+        "source": asset.source,
+        "sha256": asset.sha256,
+    }
+    return {name: value for name, value in facts.items() if value}
+
+
+def _mb(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"

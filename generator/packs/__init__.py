@@ -1,0 +1,1 @@
+"""Asset packs: published packages, fetched in a pinned version and converted once."""

@@ -1,0 +1,171 @@
+"""Install, verify and remove packs: whole or not at all.
+
+Everything happens in a scratch folder beside the installed packs and ends with one rename. A lock
+keeps two installations apart; scratch folders of processes that were killed go with the next one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from generator.assets.packs import RECORD_NAME, Record, StoredFile, read_record
+from generator.core.errors import AssetError, GenDataError, StorageError, VerificationError
+from generator.core.serial import canonical_json
+from generator.packs.archives import extract
+from generator.packs.fetch import check_archive, fetch, file_digest
+from generator.packs.table import Pack
+
+_SCRATCH = ".scratch-"
+_LOCK = ".lock"
+
+
+def install(pack: Pack, folder: Path, archive: Path | None = None) -> Record:
+    """Fetch, convert and install a pack; one that is installed already is exchanged.
+
+    Args:
+        pack: From the table.
+        folder: Of installed packs; made if it is missing.
+        archive: The package's archive, where it need not be fetched.
+
+    Returns:
+        The record of what was installed.
+
+    Raises:
+        AssetError: it cannot be fetched, is not the pinned archive, or cannot be converted.
+        StorageError: the folder cannot be written, or another process is installing.
+    """
+    with _storage(folder), _scratch(folder) as scratch:
+        if archive is None:
+            archive = fetch(pack, _made(scratch / "archive"))
+        check_archive(pack, archive)
+        source, target = _made(scratch / "source"), _made(scratch / "target")
+        extract(archive, pack.wanted, source)
+        pack.convert(source, target)
+        record = _record(pack, target)
+        (target / RECORD_NAME).write_text(canonical_json(record) + "\n", encoding="utf-8")
+        # A pack that survives a power cut must not be one of empty files.
+        os.sync()
+        _exchange(target, folder / pack.name, scratch / "old")
+    return record
+
+
+def is_installed(pack: Pack, folder: Path) -> bool:
+    """Whether the pack is there in the version and conversion that the table means."""
+    if not (folder / pack.name / RECORD_NAME).exists():
+        return False
+    record = read_record(folder / pack.name)
+    return (record.archive_sha256, record.revision) == (pack.sha256, pack.revision)
+
+
+def remove(name: str, folder: Path) -> None:
+    """Remove an installed pack at one stroke. Raises AssetError if it is not installed."""
+    installed = folder / name
+    _must_be_there(name, folder)
+    with _storage(folder), _scratch(folder) as scratch:
+        installed.rename(scratch / "old")
+
+
+def verify(name: str, folder: Path) -> Record:
+    """Hash every file of a pack again.
+
+    Raises:
+        AssetError: the pack is not installed.
+        VerificationError: a file is missing, changed, or was not installed.
+    """
+    _must_be_there(name, folder)
+    pack = folder / name
+    record = read_record(pack)
+    should = {file.path: file for file in record.files}
+    found = {file.path: file for file in _files(pack) if file.path != RECORD_NAME}
+    for path in sorted({*should, *found}):
+        expected, actual = should.get(path), found.get(path)
+        if expected != actual:
+            what = "was not installed" if expected is None else "missing"
+            raise VerificationError(
+                f"{pack / path}: {'changed' if expected and actual else what}; install the pack "
+                f"again: gen-data assets install {name}"
+            )
+    return record
+
+
+def _must_be_there(name: str, folder: Path) -> None:
+    if not (folder / name / RECORD_NAME).is_file():
+        raise AssetError(
+            f"pack '{name}': not installed in {folder}; gen-data assets install {name}"
+        )
+
+
+def _record(pack: Pack, target: Path) -> Record:
+    return Record(
+        name=pack.name,
+        version=pack.version,
+        revision=pack.revision,
+        archive_sha256=pack.sha256,
+        licence=pack.licence,
+        source=pack.source,
+        files=_files(target),
+    )
+
+
+def _files(folder: Path) -> tuple[StoredFile, ...]:
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    return tuple(
+        StoredFile(path.relative_to(folder).as_posix(), path.stat().st_size, file_digest(path))
+        for path in paths
+    )
+
+
+def _exchange(new: Path, final: Path, old: Path) -> None:
+    if final.exists():
+        final.rename(old)
+    try:
+        new.rename(final)
+    except OSError:
+        if old.exists():
+            old.rename(final)
+        raise
+
+
+@contextlib.contextmanager
+def _scratch(folder: Path) -> Iterator[Path]:
+    """A folder for unfinished work on the same file system, for one process at a time."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / _LOCK).open("a") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise StorageError(
+                f"{folder}: another process is installing or removing packs; wait for it"
+            ) from None
+        for left_behind in sorted(folder.glob(f"{_SCRATCH}*")):
+            shutil.rmtree(left_behind)
+        scratch = Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=folder))
+        try:
+            yield scratch
+        finally:
+            shutil.rmtree(scratch)
+
+
+@contextlib.contextmanager
+def _storage(folder: Path) -> Iterator[None]:
+    """What the file system refuses, in words."""
+    try:
+        yield
+    except GenDataError:
+        raise
+    except OSError as error:
+        place = error.filename or folder
+        raise StorageError(
+            f"{place}: {error.strerror}; make room or set GEN_DATA_ASSETS to another folder"
+        ) from None
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
