@@ -10,7 +10,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.lattice import Cell, Lattice, agree, cell_at, corner_of, step_at
-from generator.renderers.kernels.look import Look, look_at_hit
+from generator.renderers.kernels.look import look_at_hit
 from generator.renderers.kernels.occlusion import surface_tolerance
 from generator.renderers.kernels.patch import Patch, patch_at
 from generator.renderers.kernels.records import View, World, pixel_direction, surface_index, unit
