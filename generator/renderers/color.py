@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from generator.core.scene import Camera
 from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
-from generator.renderers.kernels import antialias, records, shade, tone
+from generator.renderers.kernels import antialias, gather, records, shade, tone
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.occlusion import lamp_parts, openness, sampled_lattice, sunflower
 from generator.renderers.packing import PackedWorld
@@ -86,10 +86,11 @@ def _shaded(
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", n, wp.int32)
     # One thread per row on the CPU, where threads run one after the other anyway.
-    run = view.width if device.is_cpu else 1
+    cells = lattice.width - 1
+    run = cells if device.is_cpu else 1
     inputs = [*frame, lattice, lights, run]
-    shape = (view.height, view.width // run)
-    wp.launch(shade.gather_light, shape, inputs, [count, pixels, radiance], device=device)
+    shape = (lattice.height - 1, cells // run)
+    wp.launch(gather.gather_light, shape, inputs, [count, pixels, radiance], device=device)
     listed = int(count.numpy()[0])
     lit = stock.scratch("listed lit", (around.lit.shape[0], n), float)
     open_sky = stock.scratch("listed sky", (1, n), float)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,14 +51,14 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     return DeviceTexture(record.numpy_value(), (*on_device, offsets), texels.nbytes + bumps.nbytes)
 
 
-def halved(image: Array) -> Array:
+def halved(image: Pixels) -> Pixels:
     """Means of 2 x 2 blocks of an image [h, w, channels]; a single row or column stays.
 
     Odd sizes drop their last row or column: of a tiling image that is a shift nobody sees.
     """
     height, width = max(image.shape[0] // 2, 1), max(image.shape[1] // 2, 1)
     even = np.ascontiguousarray(image[: 2 * height, : 2 * width])
-    smaller: Array = cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA)
+    smaller: Pixels = cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA)
     return smaller.reshape(height, width, image.shape[2])
 
 
@@ -70,46 +71,51 @@ def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint
     """Texels per mip level, and all levels packed one after the other.
 
     Colours are kept as square roots of linear values, which spend the eight bits as evenly for
-    the eye as sRGB does and are quick to undo; roughness is the fourth channel.
+    the eye as sRGB does and are quick to undo. Roughness is the fourth channel: its square, the
+    width of a highlight, is what coarser levels average.
     """
-    linear_of = srgb_to_linear(np.arange(256) / 255.0).astype(np.float32)
+    linear_of = srgb_to_linear(np.arange(256) / 255.0)
     root_of = np.floor(np.sqrt(linear_of) * 255.0 + 0.5).astype(np.uint8)
-    levels = [_packed(_with_fourth(cv2.LUT(albedo, root_of), roughness))]
-    sizes = [albedo.shape[0] * albedo.shape[1]]
-    image = _with_fourth(cv2.LUT(albedo, linear_of), roughness.astype(np.float32) / 255.0)
-    while max(image.shape[:2]) > 1:
-        image = halved(image)
-        shown = np.sqrt(image)
-        shown[..., 3] = image[..., 3]
-        levels.append(_packed(_in_bytes(shown)))
-        sizes.append(image.shape[0] * image.shape[1])
-    return sizes, np.concatenate(levels)
+    finest = _with_fourth(cv2.LUT(albedo, root_of), roughness)
+    levels = [finest]
+    if max(finest.shape[:2]) > 1:
+        squared = halved(cv2.multiply(finest, finest, dtype=cv2.CV_16U))
+        image = squared.astype(np.float32) * np.float32(255.0**-2)
+        levels += [_in_bytes(cv2.sqrt(level)) for level in _halvings(image)]
+    return [level.shape[0] * level.shape[1] for level in levels], _packed(levels)
 
 
 def _bumps(normal: UInt8) -> NDArray[np.uint32]:
     """Normal maps of all mip levels, packed one after the other."""
-    opaque = np.full(normal.shape[:2], 255, np.uint8)
-    whole = _with_fourth(normal, opaque)
-    levels = [_packed(whole)]
-    image = whole.astype(np.float32) * np.float32(1 / 255)
-    while max(image.shape[:2]) > 1:
-        image = halved(image)
-        levels.append(_packed(_in_bytes(image)))
-    return np.concatenate(levels)
+    finest = _with_fourth(normal, np.full(normal.shape[:2], 255, np.uint8))
+    levels = [finest]
+    if max(finest.shape[:2]) > 1:
+        image = halved(finest).astype(np.float32) * np.float32(1.0 / 255.0)
+        levels += [_in_bytes(level) for level in _halvings(image)]
+    return _packed(levels)
+
+
+def _halvings(image: Pixels) -> list[Pixels]:
+    """An image, and its halves down to one texel."""
+    images = [image]
+    while max(images[-1].shape[:2]) > 1:
+        images.append(halved(images[-1]))
+    return images
 
 
 def _with_fourth(three: Pixels, fourth: Pixels) -> Pixels:
     """Three channels and one more."""
-    four: Pixels = cv2.merge([*cv2.split(three), fourth])
+    four = np.zeros((*fourth.shape, 4), fourth.dtype)
+    cv2.mixChannels([three, fourth], [four], [0, 0, 1, 1, 2, 2, 3, 3])
     return four
 
 
-def _in_bytes(image: Array) -> UInt8:
+def _in_bytes(image: Pixels) -> Pixels:
     """Values in [0, 1] as bytes, rounded."""
-    steps: UInt8 = (image * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
+    steps: Pixels = cv2.convertScaleAbs(image, alpha=255.0).reshape(image.shape)
     return steps
 
 
-def _packed(image: UInt8) -> NDArray[np.uint32]:
-    """Four channels as one integer per texel, flat; the first channel lowest."""
-    return np.ascontiguousarray(image).reshape(-1, 4).view("<u4").reshape(-1)
+def _packed(levels: Sequence[Pixels]) -> NDArray[np.uint32]:
+    """Four bytes of each texel as one integer, level after level; the first byte lowest."""
+    return np.concatenate([level.reshape(-1) for level in levels]).view("<u4")

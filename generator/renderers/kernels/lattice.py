@@ -116,3 +116,44 @@ def agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: float):
     if cosine < 0.9 or wp.abs(wp.dot(n, q - p)) > tolerance_m:
         cosine = 0.0
     return cosine
+
+
+@wp.struct
+class Cell:
+    """Where a pixel lies between four lattice points.
+
+    Attributes:
+        first: The upper left of them.
+        right, down: From it to the others, [0, 1).
+    """
+
+    first: int
+    right: float
+    down: float
+
+
+@wp.func
+def cell_at(view: View, lattice: Lattice, x: int, y: int):
+    """The cell of a pixel."""
+    column = x / lattice.stride
+    row = y / lattice.stride
+    cell = Cell()
+    cell.first = row * lattice.width + column
+    cell.right = float(x - column * lattice.stride) * step_at(lattice, x, view.width)
+    cell.down = float(y - row * lattice.stride) * step_at(lattice, y, view.height)
+    return cell
+
+
+@wp.func
+def step_at(lattice: Lattice, x: int, width: int):
+    """One pixel as a part of its cell; the last cell of a row or column may be narrower."""
+    first = x - x % lattice.stride
+    return 1.0 / float(wp.max(wp.min(lattice.stride, width - 1 - first), 1))
+
+
+@wp.func
+def corner_of(lattice: Lattice, cell: Cell, k: int):
+    """The k-th lattice point of a cell, and its bilinear weight."""
+    wx = wp.where((k & 1) == 1, cell.right, 1.0 - cell.right)
+    wy = wp.where(k >= 2, cell.down, 1.0 - cell.down)
+    return cell.first + (k & 1) + wp.where(k >= 2, lattice.width, 0), wx * wy

@@ -12,7 +12,7 @@ from generator.renderers.kernels.records import (
     vertex_at,
 )
 from generator.renderers.kernels.surface import mesh_point
-from generator.renderers.kernels.texturing import texel_at
+from generator.renderers.kernels.texturing import sampler_of, texel_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -48,10 +48,11 @@ def mesh_mapped(
     size = float(world.textures[texture].width * world.textures[texture].height)
     texels = wp.abs(area_uv) * size * footprint_m * footprint_m / wp.max(area_m2, 1.0e-12)
     level = 0.5 * wp.log2(wp.max(texels, 1.0e-6))
-    texel = texel_at(world, texture, uv[0], uv[1], level)
+    bumpy = world.textures[texture].has_bumps != 0
+    texel = texel_at(world, texture, sampler_of(world, texture, level), uv[0], uv[1], bumpy)
     look.albedo = wp.cw_mul(look.albedo, texel.albedo)
     look.roughness *= texel.roughness
-    if world.textures[texture].has_bumps != 0 and area_uv != 0.0:
+    if bumpy and area_uv != 0.0:
         bump = texel.bump
         tangent = world.bodies[b].R_world_mesh @ ((e1 * d2[1] - e2 * d1[1]) / area_uv)
         bitangent = world.bodies[b].R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) / area_uv)
@@ -102,7 +103,8 @@ def box_mapped(
     n = wp.transpose(world.bodies[b].R_world_mesh) @ look.normal
     p = p_mesh * (world.bodies[b].scale / scale_m)
     texels = footprint_m / scale_m * float(world.textures[texture].width)
-    level = wp.log2(wp.max(texels, 1.0e-3))
+    sampler = sampler_of(world, texture, wp.log2(wp.max(texels, 1.0e-3)))
+    bumpy = world.textures[texture].has_bumps != 0
     # Eighth powers: projections meet in a narrow band only.
     w = wp.cw_mul(n, n)
     w = wp.cw_mul(w, w)
@@ -114,13 +116,13 @@ def box_mapped(
     for axis in range(3):
         if w[axis] > 0.004:
             uv = projected(p, axis)
-            texel = texel_at(world, texture, uv[0], uv[1], level)
+            texel = texel_at(world, texture, sampler, uv[0], uv[1], bumpy)
             albedo += texel.albedo * w[axis]
             roughness += texel.roughness * w[axis]
             m += tilted(texel.bump, axis, n) * w[axis]
     look.albedo = wp.cw_mul(look.albedo, albedo)
     look.roughness *= roughness
-    if world.textures[texture].has_bumps != 0:
+    if bumpy:
         look.normal = unit(world.bodies[b].R_world_mesh @ m)
     return look
 

@@ -1,11 +1,11 @@
-"""Light at what is seen: computed on the lattice and where surfaces turn, gathered elsewhere."""
+"""Light at what is seen: computed on the lattice, and where it cannot be gathered from there."""
 
 from __future__ import annotations
 
 import warp as wp
 
 from generator.renderers.kernels.brdf import make_brdf, specular_lobe
-from generator.renderers.kernels.lattice import Lattice, agree, ray_origin
+from generator.renderers.kernels.lattice import Lattice, cell_at, ray_origin
 from generator.renderers.kernels.lighting import beam_from, towards_mirror
 from generator.renderers.kernels.look import Look, look_at_hit
 from generator.renderers.kernels.occlusion import frame_of, surface_tolerance, way_to_lamp
@@ -18,12 +18,10 @@ from generator.renderers.kernels.records import (
     surface_index,
     unit,
 )
-from generator.renderers.kernels.sky import sky_image, sky_irradiance, sky_reflection
+from generator.renderers.kernels.sky import sky_irradiance, sky_reflection
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Light of two points may be mixed if their normals differ by less than eight degrees.
-SMOOTH_COSINE = wp.constant(0.99)
 # Highlights of smoother surfaces are too small to be gathered.
 GATHERED_ROUGHNESS = wp.constant(0.25)
 
@@ -174,66 +172,6 @@ def shade_points(
     radiance[i] = wp.cw_mul(light.diffuse, look.albedo) + light.rest
 
 
-@wp.struct
-class Cell:
-    """Where a pixel lies between four lattice points.
-
-    Attributes:
-        first: The upper left of them.
-        right, down: From it to the others, [0, 1).
-    """
-
-    first: int
-    right: float
-    down: float
-
-
-@wp.func
-def cell_at(view: View, lattice: Lattice, x: int, y: int):
-    """The cell of a pixel."""
-    column = x / lattice.stride
-    row = y / lattice.stride
-    cell = Cell()
-    cell.first = row * lattice.width + column
-    cell.right = float(x - column * lattice.stride) * step_at(lattice, x, view.width)
-    cell.down = float(y - row * lattice.stride) * step_at(lattice, y, view.height)
-    return cell
-
-
-@wp.func
-def step_at(lattice: Lattice, x: int, width: int):
-    """One pixel as a part of its cell; the last cell of a row or column may be narrower."""
-    first = x - x % lattice.stride
-    return 1.0 / float(wp.max(wp.min(lattice.stride, width - 1 - first), 1))
-
-
-@wp.func
-def corner_of(lattice: Lattice, cell: Cell, k: int):
-    """The k-th lattice point of a cell, and its bilinear weight."""
-    wx = wp.where((k & 1) == 1, cell.right, 1.0 - cell.right)
-    wy = wp.where(k >= 2, cell.down, 1.0 - cell.down)
-    return cell.first + (k & 1) + wp.where(k >= 2, lattice.width, 0), wx * wy
-
-
-@wp.func
-def agreement(
-    view: View, images: Images, lattice: Lattice, surface: int, i: int, p: wp.vec3, q: int
-):
-    """Cosine between the normals of pixel i and lattice point q; 0 if on other surfaces.
-
-    One triangle is taken to be flat.
-    """
-    cosine = float(0.0)
-    if lattice.surface[q] == surface:
-        hit = images.hits[lattice.pixel[q]]
-        if hit[0] == images.hits[i][0] and hit[1] == images.hits[i][1]:
-            cosine = 1.0
-        else:
-            tolerance_m = surface_tolerance(view, p)
-            cosine = agree(p, images.normals[i], lattice.p_m[q], lattice.normal[q], tolerance_m)
-    return cosine
-
-
 @wp.func
 def gatherable(world: World, surface: int):
     """Whether a material's light changes slowly enough to be taken from the lattice."""
@@ -242,130 +180,6 @@ def gatherable(world: World, surface: int):
     if smooth and texture >= 0:
         smooth = world.surfaces[surface].metallic < 0.05
     return smooth
-
-
-@wp.func
-def on_bump(light: Light, look: Look, n: wp.vec3, v: wp.vec3):
-    """Factors on diffuse light and on the rest where a texture tilts the normal they are for.
-
-    The lamps are taken for one, where their light comes from on average.
-    """
-    factors = wp.vec2(1.0, 1.0)
-    length = wp.length(light.towards)
-    if length > 0.0:
-        t = light.towards * (1.0 / length)
-        before = wp.max(wp.dot(n, t), 0.1)
-        after = wp.max(wp.dot(look.normal, t), 0.0)
-        h = unit(t + v)
-        alpha = look.roughness * look.roughness
-        narrow = 1.0 - alpha * alpha
-        n_h = wp.dot(n, h)
-        m_h = wp.dot(look.normal, h)
-        lobe = (1.0 - n_h * n_h * narrow) / wp.max(1.0 - m_h * m_h * narrow, 1.0e-4)
-        diffuse = 1.0 + light.lamps * (wp.min(after / before, 3.0) - 1.0)
-        factors = wp.vec2(diffuse, 1.0 + light.shine * (wp.min(lobe * lobe, 8.0) - 1.0))
-    return factors
-
-
-@wp.func
-def gathered_radiance(
-    view: View,
-    world: World,
-    images: Images,
-    lattice: Lattice,
-    lights: wp.array(dtype=Light),
-    cell: Cell,
-    i: int,
-    d: wp.vec3,
-):
-    """Radiance of a pixel from the lattice points around it; negative if the surface turns there.
-
-    Points on other surfaces are left out; negative, too, if that leaves none.
-    """
-    hit = images.hits[i]
-    surface = surface_index(world, hit)
-    p = view.eye_m + d * images.z_m[i]
-    texture = world.surfaces[surface].texture
-    bumpy = texture >= 0
-    if bumpy:
-        bumpy = world.textures[texture].has_bumps != 0
-    light = Light()
-    total = float(0.0)
-    turns = bool(False)
-    if gatherable(world, surface):
-        for k in range(4):
-            q, w = corner_of(lattice, cell, k)
-            if w > 0.0:
-                cosine = agreement(view, images, lattice, surface, i, p, q)
-                if cosine > 0.0 and cosine <= SMOOTH_COSINE:
-                    turns = True
-                if cosine > SMOOTH_COSINE:
-                    total += w
-                    light.diffuse += lights[q].diffuse * w
-                    light.rest += lights[q].rest * w
-                    if bumpy:
-                        light.towards += lights[q].towards * w
-                        light.lamps += lights[q].lamps * w
-                        light.shine += lights[q].shine * w
-    if turns or total == 0.0:
-        return wp.vec3(-1.0)
-    share = 1.0 / total
-    albedo = world.surfaces[surface].base_color
-    if texture >= 0:
-        v = unit(-d)
-        n = images.normals[i]
-        z = images.z_m[i]
-        look = look_at_hit(view, world, surface, hit, images.weights[i], n, z, v)
-        albedo = look.albedo
-        if bumpy:
-            light.lamps *= share
-            light.shine *= share
-            factors = on_bump(light, look, n, v)
-            light.diffuse *= factors[0]
-            light.rest *= factors[1]
-    return (wp.cw_mul(light.diffuse, albedo) + light.rest) * share
-
-
-@wp.kernel
-def gather_light(
-    view: View,
-    world: World,
-    images: Images,
-    lattice: Lattice,
-    lights: wp.array(dtype=Light),
-    run: int,
-    count: wp.array(dtype=int),
-    pixels: wp.array(dtype=int),
-    radiance: wp.array(dtype=wp.vec3),
-):
-    """Light every pixel from lattice points, or list it to be shaded by itself.
-
-    Args:
-        run: Pixels in a row per thread.
-        count: Length of the list; 0 at first.
-        pixels: The list, in any order.
-    """
-    y, segment = wp.tid()
-    x = segment * run
-    cell = cell_at(view, lattice, x, y)
-    step = step_at(lattice, x, view.width)
-    for i in range(y * view.width + x, y * view.width + wp.min(x + run, view.width)):
-        d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-        c = wp.vec3(0.0)
-        if images.hits[i][0] >= 0:
-            c = gathered_radiance(view, world, images, lattice, lights, cell, i, d)
-        elif world.sky.visible != 0:
-            c = sky_image(world.sky, d)
-        if c[0] < 0.0:
-            pixels[wp.atomic_add(count, 0, 1)] = i
-        else:
-            radiance[i] = c
-        x += 1
-        cell.right += step
-        if x % lattice.stride == 0:
-            cell.first += 1
-            cell.right = 0.0
-            step = step_at(lattice, x, view.width)
 
 
 @wp.kernel

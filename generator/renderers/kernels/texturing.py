@@ -37,11 +37,45 @@ class Texel:
     bump: wp.vec3
 
 
+@wp.struct
+class Sampler:
+    """Where a texture is looked up for one size of footprint.
+
+    Attributes:
+        first, width, height: Of the mip level.
+        coarser_first: Of the next level, which is mixed in by ``part``; not looked at if that is 0.
+    """
+
+    first: int
+    width: int
+    height: int
+    coarser_first: int
+    part: float
+
+
 @wp.func
-def taps_at(world: World, texture: int, u: float, v: float, level: int):
-    """The texels around (u, v), which wraps around; v grows upwards, rows downwards."""
-    width = wp.max(world.textures[texture].width >> level, 1)
-    height = wp.max(world.textures[texture].height >> level, 1)
+def sampler_of(world: World, texture: int, level: float):
+    """The sampler between two mip levels."""
+    bounded = wp.clamp(level, 0.0, float(world.textures[texture].levels - 1))
+    lower = int(bounded)
+    # Levels are blended over the middle half of their distance only: half the taps elsewhere.
+    part = wp.clamp(2.0 * (bounded - float(lower)) - 0.5, 0.0, 1.0)
+    if part == 1.0:
+        lower += 1
+        part = 0.0
+    s = Sampler()
+    s.first = world.textures[texture].offsets[lower]
+    s.width = wp.max(world.textures[texture].width >> lower, 1)
+    s.height = wp.max(world.textures[texture].height >> lower, 1)
+    s.part = part
+    if part > 0.0:
+        s.coarser_first = world.textures[texture].offsets[lower + 1]
+    return s
+
+
+@wp.func
+def taps_at(first: int, width: int, height: int, u: float, v: float):
+    """The texels of a level around (u, v), which wraps around; v grows upwards, rows downwards."""
     x = (u - float(floor_int(u))) * float(width) - 0.5
     y = (1.0 - (v - float(floor_int(v)))) * float(height) - 0.5
     x0 = floor_int(x)
@@ -51,9 +85,8 @@ def taps_at(world: World, texture: int, u: float, v: float, level: int):
     # After rounding, x may be a hair outside [-0.5, width - 0.5].
     x1 = wp.where(x0 + 1 >= width, 0, x0 + 1)
     y1 = wp.where(y0 + 1 >= height, 0, y0 + 1)
-    x0 = wp.where(x0 < 0, width - 1, wp.min(x0, width - 1))
-    y0 = wp.where(y0 < 0, height - 1, wp.min(y0, height - 1))
-    first = world.textures[texture].offsets[level]
+    x0 = wp.where(x0 < 0, width - 1, wp.where(x0 < width, x0, width - 1))
+    y0 = wp.where(y0 < 0, height - 1, wp.where(y0 < height, y0, height - 1))
     t = Taps()
     t.a = first + y0 * width + x0
     t.b = first + y0 * width + x1
@@ -88,23 +121,19 @@ def mixed(texels: wp.array(dtype=wp.uint32), t: Taps):
 
 
 @wp.func
-def texel_at(world: World, texture: int, u: float, v: float, level: float):
-    """The texture at a point, between two mip levels."""
-    bounded = wp.clamp(level, 0.0, float(world.textures[texture].levels - 1))
-    lower = int(bounded)
-    # Levels are blended over the middle half of their distance only: half the taps elsewhere.
-    part = wp.clamp(2.0 * (bounded - float(lower)) - 0.5, 0.0, 1.0)
-    if part == 1.0:
-        lower += 1
-    taps = taps_at(world, texture, u, v, lower)
+def texel_at(world: World, texture: int, s: Sampler, u: float, v: float, bumpy: bool):
+    """The texture at a point; normals only if they are asked for."""
+    taps = taps_at(s.first, s.width, s.height, u, v)
     c = mixed(world.textures[texture].texels, taps)
     texel = Texel()
-    if world.textures[texture].has_bumps != 0:
+    if bumpy:
         m = mixed(world.textures[texture].bumps, taps) * (2.0 / FULL)
         texel.bump = wp.vec3(m[0] - 1.0, m[1] - 1.0, m[2] - 1.0)
-    if part > 0.0 and part < 1.0:
-        upper = taps_at(world, texture, u, v, lower + 1)
-        c = c * (1.0 - part) + mixed(world.textures[texture].texels, upper) * part
+    if s.part > 0.0:
+        width = wp.max(s.width >> 1, 1)
+        height = wp.max(s.height >> 1, 1)
+        upper = taps_at(s.coarser_first, width, height, u, v)
+        c = c * (1.0 - s.part) + mixed(world.textures[texture].texels, upper) * s.part
     c = c * (1.0 / FULL)
     # Colours are stored as square roots.
     texel.albedo = wp.vec3(c[0] * c[0], c[1] * c[1], c[2] * c[2])

@@ -1,0 +1,361 @@
+"""Light of most pixels: what the four lattice points around them agree on.
+
+A cell lies between four lattice points. Where all four lie on one smooth stretch of surface, the
+cell's pixels share what they have in common: mixing light takes a few multiplications, and looking
+up a texture takes its addresses and its texels. Elsewhere each pixel asks each point.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from generator.renderers.kernels.lattice import Cell, Lattice, agree, cell_at, corner_of, step_at
+from generator.renderers.kernels.look import look_at_hit
+from generator.renderers.kernels.occlusion import surface_tolerance
+from generator.renderers.kernels.patch import Patch, patch_at
+from generator.renderers.kernels.records import View, World, pixel_direction, surface_index, unit
+from generator.renderers.kernels.shade import Images, Light, gatherable
+from generator.renderers.kernels.sky import sky_image
+from generator.renderers.kernels.texturing import Sampler, sampler_of, texel_at
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Light of two points may be mixed if their normals differ by less than eight degrees.
+SMOOTH_COSINE = wp.constant(0.99)
+
+
+@wp.func
+def agreement(
+    view: View, images: Images, lattice: Lattice, surface: int, i: int, p: wp.vec3, q: int
+):
+    """Cosine between the normals of pixel i and lattice point q; 0 if on other surfaces.
+
+    One triangle is taken to be flat.
+    """
+    cosine = float(0.0)
+    if lattice.surface[q] == surface:
+        hit = images.hits[lattice.pixel[q]]
+        if hit[0] == images.hits[i][0] and hit[1] == images.hits[i][1]:
+            cosine = 1.0
+        else:
+            tolerance_m = surface_tolerance(view, p)
+            cosine = agree(p, images.normals[i], lattice.p_m[q], lattice.normal[q], tolerance_m)
+    return cosine
+
+
+@wp.struct
+class Quad:
+    """A cell whose corners lie on one smooth stretch of surface, if ``smooth``.
+
+    Attributes:
+        face: (body, face) of the first corner.
+        normal: Mean of the corners', unit, world frame.
+        normal_camera, height: ``dot(normal_camera, d) * z - height`` is how far the point at
+            depth z along a pixel's direction is from the mean plane [m].
+        tolerance_m: Bound on it.
+        to_viewer: Unit, from the middle.
+    """
+
+    smooth: int
+    face: wp.vec2i
+    normal: wp.vec3
+    normal_camera: wp.vec3
+    height: float
+    tolerance_m: float
+    to_viewer: wp.vec3
+
+
+@wp.func
+def quad_at(view: View, world: World, images: Images, lattice: Lattice, q: int):
+    """The cell to the right of and below lattice point q."""
+    quad = Quad()
+    surface = lattice.surface[q]
+    if surface < 0:
+        return quad
+    if not gatherable(world, surface):
+        return quad
+    quad.face = images.hits[lattice.pixel[q]]
+    p = lattice.p_m[q]
+    n = lattice.normal[q]
+    quad.tolerance_m = surface_tolerance(view, p)
+    middle = p
+    mean = n
+    smooth = bool(True)
+    for k in range(1, 4):
+        r = q + (k & 1) + wp.where(k >= 2, lattice.width, 0)
+        if smooth:
+            smooth = False
+            if lattice.surface[r] == surface:
+                other = images.hits[lattice.pixel[r]]
+                smooth = other[0] == quad.face[0] and other[1] == quad.face[1]
+                if not smooth:
+                    cosine = agree(p, n, lattice.p_m[r], lattice.normal[r], quad.tolerance_m)
+                    smooth = cosine > SMOOTH_COSINE
+                middle += lattice.p_m[r]
+                mean += lattice.normal[r]
+    if smooth:
+        quad.smooth = 1
+        middle = middle * 0.25
+        quad.normal = unit(mean)
+        quad.normal_camera = wp.transpose(view.R_world_camera) @ quad.normal
+        quad.height = wp.dot(quad.normal, middle - view.eye_m)
+        quad.to_viewer = unit(view.eye_m - middle)
+    return quad
+
+
+@wp.struct
+class Tilt:
+    """How light of a cell changes with the normal: see on_bump.
+
+    Attributes:
+        towards: Where lamps' light comes from, unit; 0 for none.
+        half: Between it and the viewer.
+        before: Cosine between it and the surface's normal.
+        n_h: Cosine between ``half`` and the surface's normal.
+        lamps, shine: As in Light.
+    """
+
+    towards: wp.vec3
+    half: wp.vec3
+    before: float
+    n_h: float
+    lamps: float
+    shine: float
+
+
+@wp.func
+def tilt_of(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3):
+    """What on_bump needs, from the sum of the light's directions, normal and viewer."""
+    tilt = Tilt()
+    if wp.dot(towards, towards) > 0.0:
+        tilt.towards = unit(towards)
+        tilt.half = unit(tilt.towards + v)
+        tilt.before = wp.max(wp.dot(n, tilt.towards), 0.1)
+        tilt.n_h = wp.dot(n, tilt.half)
+        tilt.lamps = lamps
+        tilt.shine = shine
+    return tilt
+
+
+@wp.func
+def on_bump(tilt: Tilt, roughness: float, m: wp.vec3):
+    """Factors on diffuse light and on the rest where a texture tilts the normal to m.
+
+    The lamps are taken for one, where their light comes from on average.
+    """
+    after = wp.max(wp.dot(m, tilt.towards), 0.0)
+    alpha = roughness * roughness
+    narrow = 1.0 - alpha * alpha
+    m_h = wp.dot(m, tilt.half)
+    lobe = (1.0 - tilt.n_h * tilt.n_h * narrow) / wp.max(1.0 - m_h * m_h * narrow, 1.0e-4)
+    diffuse = 1.0 + tilt.lamps * (wp.min(after / tilt.before, 3.0) - 1.0)
+    return wp.vec2(diffuse, 1.0 + tilt.shine * (wp.min(lobe * lobe, 8.0) - 1.0))
+
+
+@wp.func
+def quad_tilt(lattice: Lattice, lights: wp.array(dtype=Light), q: int, quad: Quad):
+    """The tilt of a whole cell."""
+    a = lights[q]
+    b = lights[q + 1]
+    c = lights[q + lattice.width]
+    d = lights[q + lattice.width + 1]
+    towards = a.towards + b.towards + c.towards + d.towards
+    lamps = 0.25 * (a.lamps + b.lamps + c.lamps + d.lamps)
+    shine = 0.25 * (a.shine + b.shine + c.shine + d.shine)
+    return tilt_of(towards, lamps, shine, quad.normal, quad.to_viewer)
+
+
+@wp.func
+def gathered_radiance(
+    view: View,
+    world: World,
+    images: Images,
+    lattice: Lattice,
+    lights: wp.array(dtype=Light),
+    cell: Cell,
+    i: int,
+    d: wp.vec3,
+):
+    """Radiance of a pixel from the lattice points around it; negative if the surface turns there.
+
+    Points on other surfaces are left out; negative, too, if that leaves none.
+    """
+    hit = images.hits[i]
+    surface = surface_index(world, hit)
+    p = view.eye_m + d * images.z_m[i]
+    texture = world.surfaces[surface].texture
+    bumpy = texture >= 0
+    if bumpy:
+        bumpy = world.textures[texture].has_bumps != 0
+    light = Light()
+    total = float(0.0)
+    turns = bool(False)
+    if gatherable(world, surface):
+        for k in range(4):
+            q, w = corner_of(lattice, cell, k)
+            if w > 0.0:
+                cosine = agreement(view, images, lattice, surface, i, p, q)
+                if cosine > 0.0 and cosine <= SMOOTH_COSINE:
+                    turns = True
+                if cosine > SMOOTH_COSINE:
+                    total += w
+                    light.diffuse += lights[q].diffuse * w
+                    light.rest += lights[q].rest * w
+                    if bumpy:
+                        light.towards += lights[q].towards * w
+                        light.lamps += lights[q].lamps * w
+                        light.shine += lights[q].shine * w
+    if turns or total == 0.0:
+        return wp.vec3(-1.0)
+    share = 1.0 / total
+    albedo = world.surfaces[surface].base_color
+    if texture >= 0:
+        v = unit(-d)
+        n = images.normals[i]
+        z = images.z_m[i]
+        look = look_at_hit(view, world, surface, hit, images.weights[i], n, z, v)
+        albedo = look.albedo
+        if bumpy:
+            tilt = tilt_of(light.towards, light.lamps * share, light.shine * share, n, v)
+            factors = on_bump(tilt, look.roughness, look.normal)
+            light.diffuse *= factors[0]
+            light.rest *= factors[1]
+    return (wp.cw_mul(light.diffuse, albedo) + light.rest) * share
+
+
+@wp.func
+def one_face(view: View, images: Images, face: wp.vec2i, x0: int, x1: int, y0: int, y1: int):
+    """Whether all pixels of a rectangle see one face."""
+    same = bool(True)
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            hit = images.hits[y * view.width + x]
+            if hit[0] != face[0] or hit[1] != face[1]:
+                same = False
+    return same
+
+
+@wp.func
+def light_patch(
+    view: View,
+    world: World,
+    images: Images,
+    lattice: Lattice,
+    lights: wp.array(dtype=Light),
+    quad: Quad,
+    patch: Patch,
+    column: int,
+    row: int,
+    radiance: wp.array(dtype=wp.vec3),
+):
+    """Light a smooth cell all of whose pixels see one face."""
+    q = row * lattice.width + column
+    x0 = column * lattice.stride
+    y0 = row * lattice.stride
+    x1 = wp.min(x0 + lattice.stride, view.width)
+    y1 = wp.min(y0 + lattice.stride, view.height)
+    right_step = step_at(lattice, x0, view.width)
+    down_step = step_at(lattice, y0, view.height)
+    surface = lattice.surface[q]
+    texture = world.surfaces[surface].texture
+    albedo = world.surfaces[surface].base_color
+    roughness = world.surfaces[surface].roughness
+    sampler = Sampler()
+    tilt = Tilt()
+    if texture >= 0:
+        texels = images.z_m[lattice.pixel[q]] * view.pixel_rad * patch.texels_per_m
+        slant = wp.max(wp.dot(quad.normal, quad.to_viewer), 0.05)
+        sampler = sampler_of(world, texture, wp.log2(texels / wp.sqrt(slant)))
+        if world.textures[texture].has_bumps != 0:
+            tilt = quad_tilt(lattice, lights, q, quad)
+    bumpy = tilt.before > 0.0
+    below = q + lattice.width
+    for y in range(y0, y1):
+        down = float(y - y0) * down_step
+        up = 1.0 - down
+        diffuse = lights[q].diffuse * up + lights[below].diffuse * down
+        rest = lights[q].rest * up + lights[below].rest * down
+        diffuse_step = lights[q + 1].diffuse * up + lights[below + 1].diffuse * down
+        rest_step = lights[q + 1].rest * up + lights[below + 1].rest * down
+        diffuse_step = (diffuse_step - diffuse) * right_step
+        rest_step = (rest_step - rest) * right_step
+        for x in range(x0, x1):
+            i = y * view.width + x
+            lit = diffuse
+            shine = rest
+            if texture >= 0:
+                d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+                z = images.z_m[i]
+                u = patch.u + wp.dot(patch.to_u, d) * z
+                v = patch.v + wp.dot(patch.to_v, d) * z
+                texel = texel_at(world, texture, sampler, u, v, bumpy)
+                lit = wp.cw_mul(lit, texel.albedo)
+                if bumpy:
+                    b = texel.bump
+                    m = patch.tangent * b[0] + patch.bitangent * b[1]
+                    m = unit(m + patch.normal * wp.max(b[2], 0.1))
+                    factors = on_bump(tilt, roughness * texel.roughness, m)
+                    lit = lit * factors[0]
+                    shine = shine * factors[1]
+            radiance[i] = wp.cw_mul(lit, albedo) + shine
+            diffuse += diffuse_step
+            rest += rest_step
+
+
+@wp.kernel
+def gather_light(
+    view: View,
+    world: World,
+    images: Images,
+    lattice: Lattice,
+    lights: wp.array(dtype=Light),
+    run: int,
+    count: wp.array(dtype=int),
+    pixels: wp.array(dtype=int),
+    radiance: wp.array(dtype=wp.vec3),
+):
+    """Light every pixel from lattice points, or list it to be shaded by itself.
+
+    Args:
+        run: Cells in a row per thread.
+        count: Length of the list; 0 at first.
+        pixels: The list, in any order.
+    """
+    row, segment = wp.tid()
+    y0 = row * lattice.stride
+    y1 = wp.min(y0 + lattice.stride, view.height)
+    for column in range(segment * run, wp.min((segment + 1) * run, lattice.width - 1)):
+        x0 = column * lattice.stride
+        x1 = wp.min(x0 + lattice.stride, view.width)
+        quad = quad_at(view, world, images, lattice, row * lattice.width + column)
+        whole = quad.smooth != 0
+        if whole:
+            whole = one_face(view, images, quad.face, x0, x1, y0, y1)
+        if whole:
+            surface = lattice.surface[row * lattice.width + column]
+            patch = Patch()
+            if world.surfaces[surface].texture >= 0:
+                patch = patch_at(world, surface, quad.face, quad.normal)
+                whole = patch.flat != 0
+            if whole:
+                light_patch(
+                    view, world, images, lattice, lights, quad, patch, column, row, radiance
+                )
+        if not whole:
+            for y in range(y0, y1):
+                for x in range(x0, x1):
+                    i = y * view.width + x
+                    d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+                    d_world = view.R_world_camera @ d
+                    c = wp.vec3(0.0)
+                    if images.hits[i][0] >= 0:
+                        cell = cell_at(view, lattice, x, y)
+                        c = gathered_radiance(
+                            view, world, images, lattice, lights, cell, i, d_world
+                        )
+                    elif world.sky.visible != 0:
+                        c = sky_image(world.sky, d_world)
+                    if c[0] < 0.0:
+                        pixels[wp.atomic_add(count, 0, 1)] = i
+                    else:
+                        radiance[i] = c
