@@ -7,6 +7,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -49,7 +50,7 @@ def generate(choice: Choice, n: int, *, out: Path | None, workers: int | None) -
             workers=workers,
             progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
-            licences=licences_text(factory),
+            licences=partial(licences_text, factory),
         )
     _print_summary(console, folder, summary)
 

@@ -6,7 +6,7 @@ Done again after a kill it gives the same bytes: nothing here is taken from an e
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from generator.core.errors import StorageError
@@ -27,6 +27,9 @@ from generator.runner.shard import PipelineLike
 from generator.runner.store import LICENCES_NAME, MANIFEST_NAME, SHARDS_NAME, SUMS_NAME, LocalStore
 from generator.runner.unforeseen import explaining
 
+LicencesOf = Callable[[Sequence[str]], str]
+"""Makes the text about the assets with these ids."""
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -37,10 +40,12 @@ class Entry:
     sha256: str
 
 
-def finalize(plan: Plan, store: LocalStore, pipeline: PipelineLike, licences: str) -> str:
+def finalize(
+    plan: Plan, store: LocalStore, pipeline: PipelineLike, licences: LicencesOf | None
+) -> str:
     """Merge, sum up and seal a data set whose shards are all committed.
 
-    ``licences`` is the text of ``LICENSES-ASSETS.md``; empty = no such file.
+    ``licences`` makes the text of ``LICENSES-ASSETS.md``; None = no such file.
 
     Returns:
         The data set's id: sha256 over its sums, of which ``dataset_id`` has the definition.
@@ -56,8 +61,9 @@ def finalize(plan: Plan, store: LocalStore, pipeline: PipelineLike, licences: st
             with explaining(f"exporter {name}, merging"), store.errors():
                 _merge(plan, store, pipeline, name, known)
         scratch = store.scratch_dir()
-        if licences:
-            write_durably(store.root / LICENCES_NAME, licences.encode(), scratch)
+        if licences is not None:
+            used = sorted({asset for record in records for asset in record.assets})
+            write_durably(store.root / LICENCES_NAME, licences(used).encode(), scratch)
         entries = sorted(_entries(plan, store, records, names, known), key=_by_path)
         sums = sums_text(entries)
         manifest = _manifest(plan, pipeline.info, records, entries)

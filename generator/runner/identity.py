@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 from generator import __version__
@@ -35,10 +36,11 @@ def plan_of(factory: PipelineFactory) -> Plan:
     )
 
 
-def licences_text(factory: PipelineFactory) -> str:
-    """Markdown table of the assets that may appear, grouped by where they come from."""
+def licences_text(factory: PipelineFactory, used: Sequence[str]) -> str:
+    """Markdown table of the assets with these ids, grouped by where they come from."""
+    library = open_library(factory.spec.asset_folders)
     groups: dict[tuple[str, str, str], list[str]] = {}
-    for asset in possible_assets(factory):
+    for asset in (library.get(asset_id) for asset_id in used):
         family = asset.asset_id.partition("?")[0]
         members = groups.setdefault((asset.source, asset.licence, asset.author), [])
         if family not in members:
@@ -46,7 +48,7 @@ def licences_text(factory: PipelineFactory) -> str:
     lines = ["# Assets of this data set", "", "| source | licence | author | assets |"]
     lines += ["|---|---|---|---|"]
     for (source, licence, author), members in sorted(groups.items()):
-        lines.append(f"| {source} | {licence} | {author} | {_listed(members)} |")
+        lines.append(f"| {source} | {licence} | {author} | {', '.join(members)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -64,11 +66,6 @@ def _ids(scene: Scene) -> set[str]:
     bodies = {b.asset for b in scene.bodies if not any(b.name.startswith(p) for p in links)}
     drawn = {asset_id for group in scene.groups for asset_id in group.assets}
     return placed | robots | bodies | drawn
-
-
-def _listed(members: list[str], most: int = 12) -> str:
-    shown = ", ".join(members[:most])
-    return shown if len(members) <= most else f"{shown} and {len(members) - most} more"
 
 
 def _release(package: str) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from generator.core.errors import StorageError
 from generator.core.sample import Sample
+from generator.core.scene import Scene
 from generator.core.serial import canonical_json, from_plain
 from generator.runner.files import IRREGULAR, sha256_of_file, tree_sizes
 
@@ -41,6 +42,7 @@ class ShardRecord:
         scenes: Scenes whose first view lies in this shard.
         rejections: Layouts refused before those scenes were accepted.
         splits: Counts, sorted by split.
+        assets: Ids of all objects, robots, textures and environments in its samples, sorted.
         files: Sorted by path.
     """
 
@@ -50,6 +52,7 @@ class ShardRecord:
     scenes: int
     rejections: int
     splits: tuple[SplitCount, ...]
+    assets: tuple[str, ...]
     files: tuple[FileRecord, ...]
 
     @property
@@ -80,7 +83,9 @@ def describe_shard(
     """
     scenes, rejections = 0, 0
     counts = []
+    assets: set[str] = set()
     for sample in samples:
+        assets |= _assets_in(sample.scene)
         if sample.view_index == 0:
             scenes += 1
             rejections += sample.attempts - 1
@@ -95,7 +100,14 @@ def describe_shard(
         FileRecord(path, size, sha256_of_file(folder / path)) for path, size in sizes.items()
     )
     return ShardRecord(
-        shard, indices.start, indices.stop, scenes, rejections, summed(counts), files
+        shard,
+        indices.start,
+        indices.stop,
+        scenes,
+        rejections,
+        summed(counts),
+        tuple(sorted(assets)),
+        files,
     )
 
 
@@ -110,6 +122,19 @@ def summed(counts: Iterable[SplitCount]) -> tuple[SplitCount, ...]:
         SplitCount(split, samples[split], dict(sorted(objects[split].items())))
         for split in sorted(samples)
     )
+
+
+def _assets_in(scene: Scene) -> set[str]:
+    """Ids of what a scene shows; a robot's links go by the robot's id."""
+    links = tuple(f"{articulation.name}/" for articulation in scene.articulations)
+    bodies = [b for b in scene.bodies if not (links and b.name.startswith(links))]
+    materials = (material for body in scene.bodies for material in body.materials)
+    return {
+        scene.environment.image,
+        *(articulation.asset for articulation in scene.articulations),
+        *(body.asset for body in bodies),
+        *(material.texture.partition("#")[0] for material in materials if material.texture),
+    }
 
 
 def _count(sample: Sample) -> SplitCount:

@@ -11,7 +11,7 @@ from pathlib import Path
 from generator.core.errors import GenDataError
 from generator.core.sample import Sample
 from generator.runner.events import SampleDone
-from generator.runner.finalize import finalize
+from generator.runner.finalize import LicencesOf, finalize
 from generator.runner.interruption import Interruption
 from generator.runner.plan import Plan
 from generator.runner.processes import drive
@@ -56,7 +56,7 @@ def run(  # noqa: PLR0913  (the front door: each argument is a question only the
     workers: int,
     resume_command: str,
     progress: Callable[[RunProgress], None] = _silent,
-    licences: str = "",
+    licences: LicencesOf | None = None,
     settings: Settings | None = None,
 ) -> Summary:
     """Make a data set, or what is missing of it.
@@ -68,7 +68,7 @@ def run(  # noqa: PLR0913  (the front door: each argument is a question only the
         workers: Processes that make shards; 0 makes them in this process, for debugging.
         resume_command: What a user types to go on after a fault; part of messages.
         progress: Called at each sample and shard.
-        licences: Text of ``LICENSES-ASSETS.md``; empty = no such file.
+        licences: Makes the text of ``LICENSES-ASSETS.md``; None = no such file.
         settings: How to work; None = the defaults.
 
     Raises:
@@ -96,7 +96,7 @@ class _Run:
     settings: Settings
     interruption: Interruption
 
-    def to_the_end(self, licences: str) -> Summary:
+    def to_the_end(self, licences: LicencesOf | None) -> Summary:
         """Make what is missing, merge, seal."""
         plan, store = self.job.plan, self.job.store
         with self.interruption.immediate():

@@ -53,6 +53,9 @@ def test_imports_point_downward() -> None:
     assert_clean(run_tool("lint-imports"))
 
 
+@pytest.mark.skipif(
+    sys.version_info < (3, 11), reason="numpy's type hints are older and vaguer on Python 3.10"
+)
 def test_types_are_strict() -> None:
     """Mypy accepts every package in strict mode."""
     assert_clean(run_tool("mypy"))

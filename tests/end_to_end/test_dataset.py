@@ -135,3 +135,19 @@ def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
                 assert annotation["area"] == len(rows)
                 found += 1
     assert found > 30
+
+
+def test_licences_name_what_was_used_and_nothing_else(dataset: Path) -> None:
+    """The families in LICENSES-ASSETS.md are those of the scenes that were kept."""
+    from generator.runner.provenance import kept_scenes
+
+    used = set()
+    for path in sorted((dataset / "shards").glob("*/scenes.jsonl")):
+        for kept in kept_scenes(path):
+            used |= {b.asset for b in kept.scene.bodies if not b.name.startswith("arm/")}
+            used |= {m.texture for b in kept.scene.bodies for m in b.materials if m.texture}
+            used |= {a.asset for a in kept.scene.articulations} | {kept.scene.environment.image}
+    rows = (dataset / "LICENSES-ASSETS.md").read_text().splitlines()[4:]
+    listed = {name for row in rows for name in row.split("|")[4].strip().split(", ")}
+
+    assert listed == {asset.partition("#")[0].partition("?")[0] for asset in used}

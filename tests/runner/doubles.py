@@ -206,7 +206,7 @@ def make(
         out,
         workers=workers,
         resume_command=RESUME,
-        licences="# Assets\n\nnone\n",
+        licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
         settings=settings or Settings(write_media=write_raw_images),
     )
 

@@ -33,7 +33,9 @@ def _tree(species: str, variants: int = 8) -> Family:
     return _family(name, "tree", "tree", variants, "trees:tree", species=species, leaves=1.0)
 
 
-def _texture(name: str, build: str, tags: str, variants: int, **parameters: object) -> TextureFamily:
+def _texture(
+    name: str, build: str, tags: str, variants: int, **parameters: object
+) -> TextureFamily:
     path = Lazy(f"{__name__}.textures.{build}")
     return TextureFamily(name, tuple(sorted(tags.split())), variants, 1, path, parameters)
 
