@@ -1,0 +1,75 @@
+"""PNG files, written quickly and with the same bytes on every machine.
+
+Rows are filtered by numpy and compressed by libdeflate, whose output depends on its version and
+the level only, never on the processor. Source: W3C, "Portable Network Graphics (PNG)
+Specification (Third Edition)", 2025, sections 5 (chunks) and 9 (filters).
+"""
+
+from __future__ import annotations
+
+import struct
+from enum import IntEnum
+from typing import Any
+
+import deflate
+import numpy as np
+from numpy.typing import NDArray
+
+UInt8 = NDArray[np.uint8]
+
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_GREY, _RGB = 0, 2
+
+
+class RowFilter(IntEnum):
+    """What is taken from each byte before compression; the numbers are PNG's own."""
+
+    SUB = 1
+    """The byte of the same sample, one pixel to the left."""
+    UP = 2
+    """The byte above."""
+
+
+def encode_png(pixels: NDArray[Any], row_filter: RowFilter, level: int) -> bytes:
+    """A grey or RGB image of 8 or 16 bits as a PNG file.
+
+    Args:
+        pixels: uint8 or uint16, shape [h, w] or [h, w, 3].
+        row_filter: Used for every row.
+        level: libdeflate's compression level, 1 (fastest) to 12.
+
+    Raises:
+        ValueError: if the pixels are of another type or shape.
+    """
+    if pixels.dtype not in (np.uint8, np.uint16) or pixels.shape[2:] not in ((), (3,)):
+        raise ValueError(f"no PNG of {pixels.dtype} pixels of shape {pixels.shape}")
+    height, width = pixels.shape[:2]
+    bit_depth = 8 * pixels.dtype.itemsize
+    header = struct.pack(
+        ">IIBBBBB", width, height, bit_depth, _RGB if pixels.ndim == 3 else _GREY, 0, 0, 0
+    )
+    data = deflate.zlib_compress(_filtered(pixels, row_filter), level)
+    return b"".join(
+        [SIGNATURE, *_chunk(b"IHDR", header), *_chunk(b"IDAT", data), *_chunk(b"IEND", b"")]
+    )
+
+
+def _filtered(pixels: NDArray[Any], row_filter: RowFilter) -> UInt8:
+    """Rows of bytes, most significant first, each behind the number of its filter."""
+    big_endian = pixels.astype(pixels.dtype.newbyteorder(">"), copy=False)
+    rows = np.ascontiguousarray(big_endian).reshape(pixels.shape[0], -1).view(np.uint8)
+    filtered = np.zeros((rows.shape[0], 1 + rows.shape[1]), np.uint8)
+    filtered[:, 0] = row_filter
+    if row_filter is RowFilter.UP:
+        filtered[0, 1:] = rows[0]
+        np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
+    else:
+        step = pixels.dtype.itemsize * (3 if pixels.ndim == 3 else 1)
+        filtered[:, 1 : 1 + step] = rows[:, :step]
+        np.subtract(rows[:, step:], rows[:, :-step], out=filtered[:, 1 + step :])
+    return filtered
+
+
+def _chunk(kind: bytes, data: bytes | bytearray) -> list[bytes | bytearray]:
+    check = deflate.crc32(data, deflate.crc32(kind))
+    return [struct.pack(">I", len(data)), kind, data, struct.pack(">I", check)]
