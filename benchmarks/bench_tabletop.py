@@ -11,6 +11,7 @@ import argparse
 import platform
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ def measured_run(views_per_scene: int, n: int, workers: int) -> Summary:
             Path(folder) / "out",
             workers=workers,
             resume_command="",
-            licences=licences_text(factory),
+            licences=partial(licences_text, factory),
         )
 
 
