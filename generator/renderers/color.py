@@ -16,6 +16,7 @@ from generator.renderers.packing import PackedWorld
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
+from generator.renderers.weather import expose_ground, fill_air
 
 # Column of the sample in each row of a pixel, far from that of the rows beside it.
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
@@ -33,6 +34,7 @@ def color_image(
     device, n = stock.device, view.width * view.height
     images = _images(seen)
     radiance = _shaded(world, view, seen, images, stock, settings)
+    fill_air(world, view, images, radiance, stock)
     ev100 = camera.ev100
     if ev100 is None:
         ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
@@ -75,6 +77,7 @@ def _shaded(
 ) -> wp.array:
     """Luminance at all pixel centres [cd/m^2], linear RGB, flat."""
     device, n = stock.device, view.width * view.height
+    expose_ground(world, view, images, stock)
     radiance = stock.scratch("radiance", n, wp.vec3)
     lattice = sampled_lattice(world, view, seen, stock)
     around = openness(world, view, lattice, stock, settings)

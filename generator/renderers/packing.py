@@ -12,7 +12,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.geometry import Material
-from generator.core.scene import Body, Camera, Environment, Light, Scene
+from generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
 from generator.renderers.environments import DeviceEnvironment
 from generator.renderers.kernels import records
 from generator.renderers.meshes import DeviceMesh
@@ -30,12 +30,14 @@ class PackedWorld:
         keep: Everything on the device that the record points to.
         placed: Body records on the host, structured array [n].
         vertex_count: Of all bodies together.
+        weather: Of the scene.
     """
 
     record: records.World
     keep: tuple[object, ...]
     placed: NDArray[np.void]
     vertex_count: int
+    weather: Weather
 
 
 def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
@@ -77,7 +79,7 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     world.lamps = upload(_lamps(scene.lights), records.Lamp)
     world.lobes = stock.lobes
     world.sky = _sky(scene.environment, environment)
-    return PackedWorld(world, (tree, meshes, textures, environment), placed, vertex_count)
+    return PackedWorld(world, (tree, meshes, textures, environment), placed, vertex_count, scene.weather)
 
 
 def pack_view(camera: Camera) -> records.View:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.ground import weathered
 from generator.renderers.kernels.lattice import Cell, Lattice, agree, cell_at, corner_of, step_at
 from generator.renderers.kernels.look import look_at_hit
 from generator.renderers.kernels.occlusion import surface_tolerance
@@ -209,11 +210,13 @@ def gathered_radiance(
         return wp.vec3(-1.0)
     share = 1.0 / total
     albedo = world.surfaces[surface].base_color
-    if texture >= 0:
+    if texture >= 0 or world.ground.covered != 0:
         v = unit(-d)
         n = images.normals[i]
         z = images.z_m[i]
         look = look_at_hit(view, world, surface, hit, images.weights[i], n, z, v)
+        if world.ground.covered != 0:
+            look = weathered(world, surface, look, n, p, i)
         albedo = look.albedo
         if bumpy:
             tilt = tilt_of(light.towards, light.lamps * share, light.shine * share, n, v)
@@ -328,7 +331,7 @@ def gather_light(
         x0 = column * lattice.stride
         x1 = wp.min(x0 + lattice.stride, view.width)
         quad = quad_at(view, world, images, lattice, row * lattice.width + column)
-        whole = quad.smooth != 0
+        whole = quad.smooth != 0 and world.ground.covered == 0
         if whole:
             whole = one_face(view, images, quad.face, x0, x1, y0, y1)
         if whole:

@@ -23,6 +23,8 @@ class Look:
 
     albedo: wp.vec3
     roughness: float
+    metallic: float
+    specular: float
     normal: wp.vec3
 
 
@@ -128,6 +130,18 @@ def box_mapped(
 
 
 @wp.func
+def plain_look(world: World, surface: int, normal: wp.vec3):
+    """The material of a surface without its textures."""
+    look = Look()
+    look.albedo = world.surfaces[surface].base_color
+    look.roughness = world.surfaces[surface].roughness
+    look.metallic = world.surfaces[surface].metallic
+    look.specular = world.surfaces[surface].specular
+    look.normal = normal
+    return look
+
+
+@wp.func
 def look_at_hit(
     view: View,
     world: World,
@@ -139,10 +153,7 @@ def look_at_hit(
     v: wp.vec3,
 ):
     """The material at a pixel, with its textures looked up; ``v`` points to the viewer."""
-    look = Look()
-    look.albedo = world.surfaces[surface].base_color
-    look.roughness = world.surfaces[surface].roughness
-    look.normal = normal
+    look = plain_look(world, surface, normal)
     texture = world.surfaces[surface].texture
     if texture >= 0:
         # Half-way between the short and the long axis of the footprint's ellipse.

@@ -158,6 +158,28 @@ class Sky:
     visible: int
 
 
+@wp.struct
+class Ground:
+    """What weather has left on surfaces.
+
+    Attributes:
+        covered: 0 where everything is dry and bare: then nothing else is read.
+        wetness, puddles, snow_cover: As in ``generator.core.scene.Weather``.
+        puddle_level, snow_level: Levels of the noise above which there is water, snow.
+        seed: Of the noise.
+        exposed: Share of what falls that reaches each pixel's point, flat.
+    """
+
+    covered: int
+    wetness: float
+    puddles: float
+    puddle_level: float
+    snow_cover: float
+    snow_level: float
+    seed: int
+    exposed: wp.array(dtype=float)
+
+
 @wp.func
 def pixel_direction(view: View, x_px: float, y_px: float):
     """Direction in the camera frame, with z = 1, so that a ray's parameter is its z-depth."""
@@ -208,6 +230,7 @@ class World:
     lamps: wp.array(dtype=Lamp)
     lobes: wp.array(dtype=wp.vec2, ndim=2)
     sky: Sky
+    ground: Ground
 
 
 # Functions take a World and an index rather than a Body or a Geometry: a record that is copied

@@ -5,9 +5,10 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.brdf import make_brdf, specular_lobe
+from generator.renderers.kernels.ground import weathered
 from generator.renderers.kernels.lattice import Lattice, cell_at, ray_origin
 from generator.renderers.kernels.lighting import beam_from, towards_mirror
-from generator.renderers.kernels.look import Look, look_at_hit
+from generator.renderers.kernels.look import Look, look_at_hit, plain_look
 from generator.renderers.kernels.occlusion import frame_of, surface_tolerance, way_to_lamp
 from generator.renderers.kernels.rays import blocked, free_path, path_along
 from generator.renderers.kernels.records import (
@@ -81,9 +82,9 @@ def light_at(
     """
     n = look.normal
     n_v = wp.dot(n, v)
-    metallic = world.surfaces[surface].metallic
-    specular = world.surfaces[surface].specular
-    brdf = make_brdf(world.lobes, look.albedo, look.roughness, metallic, specular, n_v)
+    brdf = make_brdf(
+        world.lobes, look.albedo, look.roughness, look.metallic, look.specular, n_v
+    )
     mirrored = n * (2.0 * n_v) - v
     alpha = brdf.roughness * brdf.roughness
     light = Light()
@@ -136,13 +137,13 @@ def light_lattice(
     i = lattice.pixel[k]
     p = lattice.p_m[k]
     v = unit(view.eye_m - p)
-    look = Look()
-    look.albedo = world.surfaces[surface].base_color
-    look.roughness = world.surfaces[surface].roughness
+    look = plain_look(world, surface, lattice.normal[k])
     if world.surfaces[surface].texture >= 0:
         z = images.z_m[i]
         weight = images.weights[i]
         look = look_at_hit(view, world, surface, images.hits[i], weight, lattice.normal[k], z, v)
+    if world.ground.covered != 0:
+        look = weathered(world, surface, look, lattice.normal[k], p, i)
     look.normal = lattice.normal[k]
     lights[k] = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
 
@@ -168,7 +169,10 @@ def shade_points(
     z = images.z_m[i]
     surface = surface_index(world, hit)
     look = look_at_hit(view, world, surface, hit, images.weights[i], images.normals[i], z, v)
-    light = light_at(world, surface, look, view.eye_m + d * z, v, lit, open_sky[0, k], k)
+    p = view.eye_m + d * z
+    if world.ground.covered != 0:
+        look = weathered(world, surface, look, images.normals[i], p, i)
+    light = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
     radiance[i] = wp.cw_mul(light.diffuse, look.albedo) + light.rest
 
 

@@ -1,0 +1,312 @@
+"""What weather does to what is seen: shelter from it, water that mirrors, fog.
+
+Sources: Koschmieder, "Theorie der horizontalen Sichtweite", 1924 (Beer and Lambert's law with
+airlight); Henyey and Greenstein, Astrophysical Journal 93, 1941 (forward scattering); Kulla and
+Fajardo, "Importance sampling techniques for path tracing in participating media", EGSR 2012
+(equiangular points on a ray that passes a lamp).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from generator.renderers.kernels.ground import (
+    lumps,
+    patches,
+    porosity_of,
+    puddle_at,
+    smooth,
+    snow_at,
+)
+from generator.renderers.kernels.lattice import ray_origin
+from generator.renderers.kernels.lighting import SUN, beam_from
+from generator.renderers.kernels.rays import blocked, path_along
+from generator.renderers.kernels.records import (
+    Lamp,
+    View,
+    World,
+    pixel_direction,
+    surface_index,
+    to_mesh_point,
+    to_mesh_vector,
+    unit,
+)
+from generator.renderers.kernels.shade import Images
+from generator.renderers.kernels.sky import sky_image, sky_irradiance
+from generator.renderers.kernels.texturing import texel_at
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# What is lower than this over a surface keeps rain and snow off it.
+SHELTER_M = wp.constant(2.5)
+# Fresnel reflectance of water at normal incidence.
+WATER_F0 = wp.constant(0.02)
+# Asymmetry of scattering by fog.
+FORWARD = wp.constant(0.75)
+LAMP_POINTS = wp.constant(4)
+FAR_M = wp.constant(1.0e9)
+
+
+@wp.kernel
+def find_shelter(view: View, world: World, images: Images, exposed: wp.array(dtype=float)):
+    """Share of what falls that reaches each pixel's point: a ray straight up, a little astray."""
+    i = wp.tid()
+    exposed[i] = 1.0
+    hit = images.hits[i]
+    if hit[0] < 0:
+        return
+    n = images.normals[i]
+    if n[2] <= 0.1:
+        return
+    d = view.R_world_camera @ pixel_direction(
+        view, float(i % view.width) + 0.5, float(i / view.width) + 0.5
+    )
+    offset = d * images.z_m[i]
+    origin = ray_origin(world, hit, images.weights[i], view.eye_m + offset, offset)
+    east = 0.35 * lumps(origin[0] * 5.0, origin[1] * 5.0, 7)
+    north = 0.35 * lumps(origin[0] * 5.0, origin[1] * 5.0, 8)
+    if blocked(world, path_along(origin, wp.vec3(east, north, 1.0) * SHELTER_M)):
+        exposed[i] = 0.0
+
+
+@wp.func
+def water_at(world: World, surface: int, p: wp.vec3, n: wp.vec3, exposed: float):
+    """How much of a point is a mirror of water, and how rough that mirror is."""
+    porous = porosity_of(world, surface)
+    puddle = puddle_at(world, p, n, exposed) * porous
+    film = world.ground.wetness * wp.clamp(n[2], 0.0, 1.0) * exposed * porous
+    # A film follows the grain of the ground: half of it mirrors, and not sharply.
+    share = wp.max(puddle, 0.5 * film) * (1.0 - snow_at(world, p, n, exposed))
+    return wp.vec2(share, 0.16 * (1.0 - puddle) * (1.0 - puddle))
+
+
+@wp.func
+def mean_color(world: World, surface: int):
+    """A material's colour without the detail of its texture."""
+    color = world.surfaces[surface].base_color
+    texture = world.surfaces[surface].texture
+    if texture >= 0:
+        color = wp.cw_mul(color, texel_at(world, texture, 0.5, 0.5, 30.0).albedo)
+    return color
+
+
+@wp.func
+def mirrored_sky(world: World, origin: wp.vec3, d: wp.vec3, width: float):
+    """Sky in one direction, with the suns that are blurred over an angle."""
+    c = sky_image(world.sky, d)
+    for j in range(world.lamps.shape[0]):
+        if world.lamps[j].kind == SUN:
+            away = wp.max(1.0 - wp.dot(d, -world.lamps[j].direction), 0.0)
+            spread = 0.5 * (width * width + world.lamps[j].radius * world.lamps[j].radius)
+            c += world.lamps[j].power * (wp.exp(-away / spread) / (2.0 * wp.pi * spread))
+    return c
+
+
+@wp.func
+def mirrored_body(
+    view: View,
+    world: World,
+    images: Images,
+    radiance: wp.array(dtype=wp.vec3),
+    origin: wp.vec3,
+    d: wp.vec3,
+    t: float,
+    hit: wp.vec2i,
+    normal: wp.vec3,
+):
+    """Light of what a mirrored ray meets: as the image shows it, else without shadows."""
+    p = origin + d * t
+    q = wp.transpose(view.R_world_camera) @ (p - view.eye_m)
+    c = wp.vec3(-1.0)
+    if q[2] > 0.05:
+        x = int(q[0] / q[2] * view.fx + view.cx)
+        y = int(q[1] / q[2] * view.fy + view.cy)
+        if x >= 0 and x < view.width and y >= 0 and y < view.height:
+            j = y * view.width + x
+            if images.hits[j][0] == hit[0] and wp.abs(images.z_m[j] - q[2]) < 0.05 + 0.02 * q[2]:
+                c = radiance[j]
+    if c[0] < 0.0:
+        surface = surface_index(world, hit)
+        n = normal
+        if wp.dot(n, d) > 0.0:
+            n = -n
+        light = sky_irradiance(world.sky, n) * 0.7
+        for j in range(world.lamps.shape[0]):
+            beam = beam_from(world.lamps[j], p)
+            light += beam.normal_lux * (wp.max(wp.dot(n, beam.direction), 0.0) / wp.pi)
+        c = wp.cw_mul(light, mean_color(world, surface)) + world.surfaces[surface].emission_cd_m2
+    return c
+
+
+@wp.func
+def mirrored(
+    view: View,
+    world: World,
+    images: Images,
+    radiance: wp.array(dtype=wp.vec3),
+    origin: wp.vec3,
+    d: wp.vec3,
+    width: float,
+):
+    """Radiance along a mirrored ray."""
+    nearest = float(1.0e3)
+    hit = wp.vec2i(-1, -1)
+    normal = wp.vec3(0.0)
+    candidates = wp.bvh_query_ray(world.tree, origin, d)
+    b = int(0)
+    while wp.bvh_query_next(candidates, b, nearest):
+        mesh = world.geometries[world.bodies[b].geometry].mesh
+        o = to_mesh_point(world, b, origin)
+        answer = wp.mesh_query_ray(mesh, o, to_mesh_vector(world, b, d), nearest)
+        if answer.result:
+            nearest = answer.t
+            hit = wp.vec2i(b, answer.face)
+            normal = world.bodies[b].R_world_mesh @ answer.normal
+    if hit[0] < 0:
+        return mirrored_sky(world, origin, d, width)
+    return mirrored_body(view, world, images, radiance, origin, d, nearest, hit, normal)
+
+
+@wp.kernel
+def mirror_in_water(
+    view: View,
+    world: World,
+    images: Images,
+    radiance: wp.array(dtype=wp.vec3),
+    ripples: float,
+    rays: int,
+    wet: wp.array(dtype=wp.vec3),
+):
+    """Lay the reflection in puddles and wet films over what is seen.
+
+    Args:
+        ripples: Slope of waves on puddles.
+        rays: Per pixel, on rough films.
+    """
+    i = wp.tid()
+    wet[i] = radiance[i]
+    hit = images.hits[i]
+    if hit[0] < 0:
+        return
+    n = images.normals[i]
+    if n[2] < 0.5:
+        return
+    x = i % view.width
+    y = i / view.width
+    way = (view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)) * images.z_m[i]
+    p = view.eye_m + way
+    water = water_at(world, surface_index(world, hit), p, n, world.ground.exposed[i])
+    if water[0] < 0.01:
+        return
+    d = unit(way)
+    origin = ray_origin(world, hit, images.weights[i], p, way)
+    wave_x = patches(p[0], p[1], 0.09, world.ground.seed + 48) * ripples
+    wave_y = patches(p[0], p[1], 0.09, world.ground.seed + 52) * ripples
+    count = wp.where(water[1] > 0.01, rays, 1)
+    total = wp.vec3(0.0)
+    reflectance = float(0.0)
+    for k in range(count):
+        # A smooth spread over slopes, another one in each pixel: 4 x 4 ordered by place.
+        u = float((x % 4) * 4 + (y % 4)) / 16.0 + float(k) * 0.6180339 + 0.03
+        v = float(((x + 2 * y) % 5)) / 5.0 + float(k) * 0.7548777
+        angle = 2.0 * wp.pi * (u - float(int(u)))
+        slope = water[1] * wp.sqrt(v - float(int(v)))
+        m = unit(n + wp.vec3(wave_x + slope * wp.cos(angle), wave_y + slope * wp.sin(angle), 0.0))
+        c = wp.max(-wp.dot(d, m), 0.02)
+        r = d + m * (2.0 * c)
+        r = unit(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
+        grazing = 1.0 - c
+        squared = grazing * grazing
+        fresnel = WATER_F0 + (1.0 - WATER_F0) * squared * squared * grazing
+        total += mirrored(view, world, images, radiance, origin, r, 0.02 + water[1]) * fresnel
+        reflectance += fresnel
+    share = water[0] / float(count)
+    wet[i] = radiance[i] * (1.0 - share * reflectance) + total * share
+
+
+@wp.struct
+class Fog:
+    """Fog of a scene.
+
+    Attributes:
+        extinction_per_m: At height 0.
+        height_m: Over which it thins by a factor of e; 0 = evenly thick.
+    """
+
+    extinction_per_m: float
+    height_m: float
+
+
+@wp.func
+def optical_depth(fog: Fog, z_m: float, up: float, distance_m: float):
+    """Extinction summed along a way that starts at height z and rises by ``up`` per metre."""
+    if fog.height_m <= 0.0:
+        return fog.extinction_per_m * distance_m
+    s = up / fog.height_m
+    x = s * distance_m
+    # (1 - exp(-x)) / s, and its limit on level ways.
+    way_m = distance_m * (1.0 - 0.5 * x)
+    if wp.abs(x) > 1.0e-3:
+        way_m = (1.0 - wp.exp(wp.clamp(-x, -60.0, 60.0))) / s
+    return fog.extinction_per_m * wp.exp(-z_m / fog.height_m) * way_m
+
+
+@wp.func
+def scattering(cosine: float):
+    """Part of the light scattered per steradian at an angle; Henyey and Greenstein."""
+    g = FORWARD
+    q = 1.0 + g * g - 2.0 * g * cosine
+    return (1.0 - g * g) / (4.0 * wp.pi * q * wp.sqrt(q))
+
+
+@wp.func
+def glow_of_lamp(fog: Fog, lamp: Lamp, eye: wp.vec3, d: wp.vec3, distance_m: float):
+    """Light of one lamp that the fog along a ray sends to the eye, without shadows."""
+    nearest_m = wp.dot(lamp.position_m - eye, d)
+    off = lamp.position_m - eye - d * nearest_m
+    apart_m = wp.max(wp.length(off), wp.max(lamp.radius, 0.05))
+    start = wp.atan2(-nearest_m, apart_m)
+    end = wp.atan2(distance_m - nearest_m, apart_m)
+    total = wp.vec3(0.0)
+    for k in range(LAMP_POINTS):
+        angle = start + (end - start) * (float(k) + 0.5) / float(LAMP_POINTS)
+        t = nearest_m + apart_m * wp.tan(angle)
+        p = eye + d * t
+        beam = beam_from(lamp, p)
+        depth = optical_depth(fog, eye[2], d[2], t)
+        depth += fog.extinction_per_m * beam.distance_m
+        local = fog.extinction_per_m
+        if fog.height_m > 0.0:
+            local = local * wp.exp(-p[2] / fog.height_m)
+        # The equiangular density cancels the inverse square of the distance.
+        squared = apart_m * apart_m + (t - nearest_m) * (t - nearest_m)
+        part = local * wp.exp(-depth) * scattering(-wp.dot(d, -beam.direction)) * squared
+        total += beam.normal_lux * part
+    return total * ((end - start) / (apart_m * float(LAMP_POINTS)))
+
+
+@wp.kernel
+def fill_with_fog(
+    view: View, world: World, images: Images, fog: Fog, radiance: wp.array(dtype=wp.vec3)
+):
+    """Dim every pixel by the fog before it, and add the light that the fog scatters."""
+    i = wp.tid()
+    d = view.R_world_camera @ pixel_direction(
+        view, float(i % view.width) + 0.5, float(i / view.width) + 0.5
+    )
+    length = wp.length(d)
+    distance_m = float(FAR_M)
+    if images.hits[i][0] >= 0:
+        distance_m = images.z_m[i] * length
+    d = d * (1.0 / length)
+    clear = wp.exp(-wp.min(optical_depth(fog, view.eye_m[2], d[2], distance_m), 80.0))
+    # The mean over the sphere: the first coefficient of irradiance.
+    air = world.sky.irradiance[0] * world.sky.luminance
+    glow = wp.vec3(0.0)
+    for j in range(world.lamps.shape[0]):
+        if world.lamps[j].kind == SUN:
+            air += world.lamps[j].power * scattering(-wp.dot(d, world.lamps[j].direction))
+        else:
+            reach_m = wp.min(distance_m, 300.0)
+            glow += glow_of_lamp(fog, world.lamps[j], view.eye_m, d, reach_m)
+    radiance[i] = radiance[i] * clear + air * (1.0 - clear) + glow

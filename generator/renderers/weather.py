@@ -1,0 +1,76 @@
+"""Weather in the image: surfaces, air, what falls, and the lens.
+
+Every function returns at once where the scene's weather has nothing for it to do.
+"""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+
+import warp as wp
+
+from generator.core.scene import Weather
+from generator.renderers.kernels import records, shade
+from generator.renderers.kernels import weather as kernels
+from generator.renderers.packing import PackedWorld
+from generator.renderers.stock import AssetStock
+
+# Standard deviation of kernels.ground.patches; it is close to normal.
+_PATCH_DEVIATION = 0.40
+_FILM_RAYS = 3
+
+
+def expose_ground(
+    world: PackedWorld, view: records.View, images: shade.Images, stock: AssetStock
+) -> None:
+    """Prepare the world's surfaces for being wet or under snow."""
+    weather = world.weather
+    if not weather.wetness + weather.puddles + weather.snow_cover:
+        return
+    n = view.width * view.height
+    exposed = stock.scratch("exposed", n, float)
+    inputs = [view, world.record, images]
+    wp.launch(kernels.find_shelter, n, inputs, [exposed], device=stock.device)
+    ground = records.Ground()
+    ground.covered = 1
+    ground.wetness = weather.wetness
+    ground.puddles, ground.puddle_level = weather.puddles, _level(weather.puddles)
+    ground.snow_cover, ground.snow_level = weather.snow_cover, _level(weather.snow_cover)
+    ground.seed = weather.seed % (1 << 30)
+    ground.exposed = exposed
+    world.record.ground = ground
+
+
+def fill_air(
+    world: PackedWorld,
+    view: records.View,
+    images: shade.Images,
+    radiance: wp.array,
+    stock: AssetStock,
+) -> None:
+    """Reflections in water, then fog; in place."""
+    weather, n = world.weather, view.width * view.height
+    if weather.wetness + weather.puddles > 0.0:
+        wet = stock.scratch("wet", n, wp.vec3)
+        ripples = min(0.004 * weather.rain_mm_h, 0.05)
+        inputs = [view, world.record, images, radiance, ripples, _FILM_RAYS]
+        wp.launch(kernels.mirror_in_water, n, inputs, [wet], device=stock.device)
+        wp.copy(radiance, wet)
+    if weather.fog_extinction_per_m > 0.0:
+        inputs = [view, world.record, images, fog_of(weather)]
+        wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=stock.device)
+
+
+def fog_of(weather: Weather) -> kernels.Fog:
+    """The Fog record."""
+    fog = kernels.Fog()
+    fog.extinction_per_m = weather.fog_extinction_per_m
+    fog.height_m = weather.fog_height_m
+    return fog
+
+
+def _level(share: float) -> float:
+    """Level that the noise exceeds on that share of the ground."""
+    if share <= 0.0 or share >= 1.0:
+        return 9.0 if share <= 0.0 else -9.0
+    return -_PATCH_DEVIATION * NormalDist().inv_cdf(share)
