@@ -32,9 +32,7 @@ def building(seed: int, style: str) -> Solid:
     rng = rng_of(f"building/{style}/details", seed)
     turned = ((0.0, _front(plan, rng), plan.depth_m), (math.pi, _back(plan, rng), plan.depth_m))
     ends = [(k * 0.5 * math.pi, _side(plan, rng), plan.width_m) for k in (1, -1)]
-    walls = [
-        wall.moved(0.5 * across).rotated("z", turn) for turn, wall, across in (*turned, *ends)
-    ]
+    walls = [wall.moved(0.5 * across).rotated("z", turn) for turn, wall, across in (*turned, *ends)]
     x, y = 0.5 * plan.depth_m, 0.5 * plan.width_m
     floor = quad([(-x, -y, 0.0), (-x, y, 0.0), (x, y, 0.0), (x, -y, 0.0)], BASE)
     roof = _roof(plan, rng).moved(z=plan.eaves_m)
@@ -72,11 +70,6 @@ def garage(seed: int) -> Solid:
     roof = block((-x - 0.05, -half - 0.05, high), (x + 0.12, half + 0.05, high + 0.16), slot=METAL)
     hull = hulls.box((-x, -half, 0.0), (x, half, high + 0.16))
     return solid([*walls, floor, roof], materials_of(plan, seed), [hull])
-
-
-def garage_facts(seed: int) -> Facts:  # noqa: ARG001
-    """What every garage is."""
-    return Facts("garage")
 
 
 def _front(plan: Design, rng: Rng) -> Patch:

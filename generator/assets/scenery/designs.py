@@ -137,7 +137,10 @@ def _modern(rng: Rng) -> Design:
         bays=bays,
         ground_m=round(between(3.1, 3.6, rng), 2),
         storey_m=round(between(2.95, 3.1, rng), 2),
-        window_m=(round(between(1.4, 2.2, rng), 2), 2.3 if tall else round(between(1.4, 1.6, rng), 2)),
+        window_m=(
+            round(between(1.4, 2.2, rng), 2),
+            2.3 if tall else round(between(1.4, 1.6, rng), 2),
+        ),
         sill_m=0.12 if tall else 0.85,
         recess_m=round(between(0.16, 0.24, rng), 3),
         panes=(2, 1),
@@ -287,8 +290,6 @@ def _glass(color: Vec3, roughness: float) -> Material:
     return Material(color, roughness=roughness, specular=0.7, role="window")
 
 
-def _textured(
-    name: str, seed: int, color: Vec3, scale_m: float, role: str = "facade"
-) -> Material:
+def _textured(name: str, seed: int, color: Vec3, scale_m: float, role: str = "facade") -> Material:
     texture = f"texture/{name}?seed={seed}"
     return Material(color, roughness=0.92, texture=texture, texture_scale_m=scale_m, role=role)

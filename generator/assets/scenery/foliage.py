@@ -42,12 +42,18 @@ class Sprays:
 
 def leaf_mesh(sprays: Sprays, materials: Sequence[Material], width: float, rng: Rng) -> MeshData:
     """Triangles ``width`` times as wide as long, turned about their own axis by chance."""
-    across = _unit(np.cross(sprays.along, sprays.outward + 0.9 * _directions(len(sprays.slots), rng)))
+    across = _unit(
+        np.cross(sprays.along, sprays.outward + 0.9 * _directions(len(sprays.slots), rng))
+    )
     half = 0.5 * width * sprays.length_m[:, None] * across
     # A third of the way along a spray is widest: a kite that lost one wing reads as foliage.
     skew = (uniform((len(sprays.slots), 1), rng) - 0.5) * sprays.length_m[:, None] * sprays.along
     tip = sprays.at_m + sprays.length_m[:, None] * sprays.along
-    corners = np.stack([sprays.at_m + half + 0.4 * skew, tip, sprays.at_m - half - 0.4 * skew], axis=1)
+    corners = np.stack(
+        [sprays.at_m + half + 0.4 * skew, tip, sprays.at_m - half - 0.4 * skew], axis=1
+    )
+    # Nothing grows into the ground.
+    corners[..., 2] = np.maximum(corners[..., 2], 0.0)
     corners = np.round(settled(corners) / GRID_M) * GRID_M
     own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     inward = (own * sprays.outward).sum(axis=1) < 0.0

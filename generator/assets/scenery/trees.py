@@ -95,7 +95,7 @@ def _broadleaf(shape: Shape, leaves: float, rng: Rng) -> Solid:
     hull = hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
     count = round(_LEAVES * leaves)
     if count:
-        greens = _greens(shape.green, rng)
+        greens = leaf_greens(shape.green, rng)
         sprays = _crown(shape, skeleton, count, len(greens), rng)
         mesh = merged(mesh, leaf_mesh(sprays, greens, _LEAF_WIDTH, rng))
     else:
@@ -141,7 +141,9 @@ def _flared(patch: Patch) -> Patch:
     """Wood with a root flare: wider by half at the ground."""
     z = patch.corners_m[..., 2:]
     factor = 1.0 + 0.45 * np.clip(1.0 - z / 0.5, 0.0, 1.0) ** 2
-    return replace(patch, corners_m=patch.corners_m * np.concatenate([factor, factor, 0 * z + 1], 2))
+    return replace(
+        patch, corners_m=patch.corners_m * np.concatenate([factor, factor, 0 * z + 1], 2)
+    )
 
 
 def _conifer(rng: Rng) -> Solid:
@@ -170,10 +172,8 @@ def _conifer(rng: Rng) -> Solid:
     depth = np.sqrt((axis**2).sum(axis=1)) / (spread * np.clip(1 - places[:, 2] / height, 0.1, 1.0))
     slots = np.clip(np.floor(depth * 3.2 + uniform(len(depth), rng) - 0.5), 0, 3).astype(np.int64)
     sprays = Sprays(places, outward, growth, reach_m, slots)
-    greens = _greens(("#1f2b1c", "#2a3a25", "#35472d", "#425537"), rng)
-    mesh = merged(
-        finished(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng)
-    )
+    greens = leaf_greens(("#1f2b1c", "#2a3a25", "#35472d", "#425537"), rng)
+    mesh = merged(finished(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng))
     hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
@@ -188,8 +188,10 @@ def _fan(z: float, turn: float, reach: float, sag: float, rng: Rng) -> tuple[Arr
     wing = np.where(np.arange(count) % 2 == 0, 1.0, -1.0) * (0.3 + 0.7 * uniform(count, rng))
     spread = (0.26 * reach * t * (1.15 - t))[:, None] * (wing[:, None] * side)
     at = (reach * t)[:, None] * out + spread + np.stack([0 * t, 0 * t, z + dip], axis=1)
-    growth = out + 0.9 * wing[:, None] * side + np.array([0.0, 0.0, -0.45]) * (
-        0.4 + uniform((count, 1), rng)
+    growth = (
+        out
+        + 0.9 * wing[:, None] * side
+        + np.array([0.0, 0.0, -0.45]) * (0.4 + uniform((count, 1), rng))
     )
     growth = growth / np.sqrt((growth**2).sum(axis=1, keepdims=True))
     return at, growth, (0.22 + 0.2 * reach) * (0.7 + 0.5 * uniform(count, rng))
@@ -200,7 +202,7 @@ def _bark(code: str) -> Material:
     return Material(linear(code), roughness=0.95, texture=texture, texture_scale_m=0.8, role="bark")
 
 
-def _greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
+def leaf_greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
     """Shades of leaf that vary together from tree to tree."""
     r, g, b = jittered((1.0, 1.0, 1.0), 0.0, rng)
     warm, level = between(0.85, 1.18, rng), between(0.85, 1.15, rng)
