@@ -20,5 +20,6 @@ TABLE = PluginTable(
         "objects": "randomizers.objects:Objects",
         "physics_properties": "randomizers.physics_properties:PhysicsProperties",
         "textures": "randomizers.textures:Textures",
+        "traffic_lights": "randomizers.traffic_lights:TrafficLights",
     },
 )

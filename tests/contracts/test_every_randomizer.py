@@ -14,8 +14,8 @@ from generator.config.describe import describe
 from generator.config.schema import json_schema
 from generator.core.interfaces import Stage
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera, Scene
-from generator.core.se3 import look_at
+from generator.core.scene import Body, Camera, Scene
+from generator.core.se3 import SE3, look_at
 from generator.core.serial import canonical_json, from_plain, to_plain
 from randomizers import TABLE
 from scene_templates.builder import build
@@ -38,7 +38,7 @@ PHYSICS_BOUND = ("arm_configuration", "distractors", "objects", "physics_propert
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, distractors and two cameras."""
+    """A room with a table, an arm, objects, distractors, a traffic light and two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -51,7 +51,9 @@ def nominal_scene() -> Scene:
     cameras = tuple(
         Camera(name, look_at((1.0, 0.0, 1.5), (0.0, 0.0, 0.8)), lens) for name in ("left", "right")
     )
-    return replace(build("test", elements, FakeAssets()), cameras=cameras)
+    scene = build("test", elements, FakeAssets())
+    signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
+    return replace(scene, bodies=(*scene.bodies, signal), cameras=cameras)
 
 
 def made(kind: str) -> Any:

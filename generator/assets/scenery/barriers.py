@@ -114,7 +114,8 @@ def _jersey(seed: int) -> Solid:
     # The section's first axis has become Z, the extrusion runs along -X: turn it to Y.
     lying = prism.rotated("z", 0.5 * np.pi)
     low, high = lying.bounds_m()
-    body = lying.moved(*(-0.5 * (low + high))[:2].tolist(), -float(low[2]))
+    x, y, _ = (0.5 * (low + high)).tolist()
+    body = lying.moved(-x, -y, -float(low[2]))
     concrete = patterned("texture/concrete?seed=3", 2.0, 0.92, (0.95, 0.94, 0.92))
     hull = hulls.extreme(body.corners_m, 32)
     return solid([body], (concrete,), [hull])

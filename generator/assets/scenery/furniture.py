@@ -167,8 +167,8 @@ def bollard(seed: int) -> Solid:
             band.painted(1),
         ]
     paint = painted(pick((*_IRON_PAINTS, "#7b7f82"), rng), 0.45)
-    band = painted(pick(("#b3201b", "#e8e7e2"), rng), 0.35)
-    return solid(parts, (paint, band), [hulls.frustum((1.2 * r, 0.0), (r, h), 12)])
+    stripe = painted(pick(("#b3201b", "#e8e7e2"), rng), 0.35)
+    return solid(parts, (paint, stripe), [hulls.frustum((1.2 * r, 0.0), (r, h), 12)])
 
 
 def bollard_facts(seed: int) -> Facts:
@@ -243,8 +243,8 @@ def bus_stop(seed: int) -> Solid:
         for y in (-0.4 * half, 0.4 * half)
     ]
     panel = block((-x + 0.05, -half - 0.05, 0.3), (x - 0.3, -half + 0.05, 2.1), 0.01)
-    poster = [facing(0.0, (-0.5, 0.5), (0.4, 2.0)).rotated("z", turn).moved(-0.15, -half + side * 0.055)
-              for turn, side in ((0.5 * math.pi, 1), (-0.5 * math.pi, -1))]  # fmt: skip
+    poster = [facing(0.0, (-0.5, 0.5), (0.4, 2.0)).rotated("z", turn).moved(-0.15, -half + side)
+              for turn, side in ((0.5 * math.pi, 0.055), (-0.5 * math.pi, -0.055))]  # fmt: skip
     glass = Material((0.05, 0.06, 0.06), roughness=0.05, specular=0.7, role="glass")
     parts = [*posts, *(p.painted(1) for p in panes), roof.painted(2), seat.painted(3), *feet, panel]
     parts += [p.painted(4) for p in poster]

@@ -13,7 +13,7 @@ from generator.assets.procedural.materials import linear, patterned
 from generator.assets.procedural.mesh import Array, Patch, finished, joined
 from generator.assets.procedural.noise import uniform
 from generator.assets.procedural.shapes import ball, block, rounded_box
-from generator.assets.scenery.foliage import leaf_mesh, merged, sprays_about
+from generator.assets.scenery.foliage import Habit, leaf_mesh, merged, sprays_about
 from generator.assets.scenery.trees import leaf_greens
 from generator.core.geometry import ConvexParts, Material
 from generator.core.streams import Rng
@@ -86,7 +86,7 @@ def planter(seed: int) -> Solid:
         blossom = Material(linear(pick(_FLOWERS, rng)), roughness=0.8, role="leaf")
         greens = (*greens[:3], blossom)
     mesh = finished(core, (pick(stuff, rng), _core_material(greens)), 50.0)
-    sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), 700, 0.09, 0.07, 4, rng)
+    sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), Habit(700, 0.09, 0.07), rng)
     return Solid(
         merged(mesh, leaf_mesh(sprays, greens, 0.7, rng)), ConvexParts((np.round(hull, 6),))
     )
@@ -97,7 +97,7 @@ def _leafy(
 ) -> Solid:
     greens = _shades(rng)
     mesh = finished(core, (_core_material(greens),), 70.0)
-    sprays = sprays_about(anchors, middle, count, length, 0.6 * length, len(greens), rng)
+    sprays = sprays_about(anchors, middle, Habit(count, length, 0.6 * length), rng)
     leaves = leaf_mesh(sprays, greens, 0.7, rng)
     return Solid(merged(mesh, leaves), ConvexParts((np.round(hull, 6),)))
 
@@ -139,7 +139,9 @@ def _shell(x: float, y: float, z: float, r: float, count: int, rng: Rng) -> Arra
     turn = 2.0 * math.pi * uniform(count, rng)
     flat = np.sqrt(1.0 - level**2)
     ball_points = np.stack([flat * np.cos(turn), flat * np.sin(turn), level], axis=1)
-    return np.maximum(np.array([x, y, z]) + r * ball_points, np.array([-np.inf, -np.inf, 0.05]))
+    points: Array = np.array([x, y, z]) + r * ball_points
+    points[:, 2] = np.maximum(points[:, 2], 0.05)
+    return points
 
 
 def _round(x: float, y: float, z: float, r: float) -> Patch:

@@ -16,7 +16,7 @@ from generator.assets.procedural.mesh import Array, Patch, finished
 from generator.assets.procedural.noise import uniform
 from generator.assets.procedural.shapes import circle, sweep
 from generator.assets.scenery.branching import Lobe, Skeleton, grown, points_in, wood
-from generator.assets.scenery.foliage import Sprays, leaf_mesh, merged, sprays_about
+from generator.assets.scenery.foliage import Habit, Sprays, leaf_mesh, merged, sprays_about
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import ConvexParts, Material, MeshData
 from generator.core.streams import Rng
@@ -116,14 +116,18 @@ def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: Rng) 
     length = math.sqrt(2.0 * each / _LEAF_WIDTH)
     middle = outer - np.array([0.0, 0.0, 0.25 * float(radius)])
     anchors = skeleton.twigs()
-    return sprays_about(anchors, middle, count, length, 1.6 * length, shades, rng, shape.droop)
+    return sprays_about(
+        anchors, middle, Habit(count, length, 1.6 * length, shades, shape.droop), rng
+    )
 
 
 def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: Rng) -> MeshData:
     """The finest twigs of a winter crown, each a thin sliver."""
     middle = np.array([0.0, 0.0, shape.clear_m])
     length = 0.13 * (shape.height_m - shape.clear_m)
-    sprays = sprays_about(skeleton.twigs(), middle, _TWIGS, length, 0.1 * length, 1, rng, -0.3)
+    sprays = sprays_about(
+        skeleton.twigs(), middle, Habit(_TWIGS, length, 0.1 * length, 1, -0.3), rng
+    )
     return leaf_mesh(sprays, (bark,), 0.03, rng)
 
 
@@ -134,7 +138,7 @@ def _trunk(shape: Shape, rng: Rng) -> Array:
     sway = 0.05 * shape.clear_m
     x = sway * (uniform(1, rng) - 0.5) * np.sin(2.4 * t) * t
     y = sway * (uniform(1, rng) - 0.5) * np.sin(2.9 * t) * t
-    return np.round(np.stack([x, y, t * shape.clear_m], axis=1), 4)
+    return np.stack([np.round(axis, 4) for axis in (x, y, t * shape.clear_m)], axis=1)
 
 
 def _flared(patch: Patch) -> Patch:
@@ -153,18 +157,15 @@ def _conifer(rng: Rng) -> Solid:
     line = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * height), (0.0, 0.0, height)])
     trunk = sweep(line, circle(base_m, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.0, 0.5, 0.08]))
     whorls = 20
-    at, along, lengths = [], [], []
+    fans: list[tuple[Array, Array, Array]] = []
     for level in range(whorls):
         share = (level + 0.2 * uniform(1, rng)[0]) / whorls
         z = clear + (height - clear) * share**0.9
         reach = spread * (1.0 - share) ** 0.85 + 0.12
         for k in range(9):
             turn = 2.0 * math.pi * (k + 0.5 * (level % 2) + 0.5 * between(-0.5, 0.5, rng)) / 9
-            made = _fan(z, turn, reach * between(0.75, 1.1, rng), 0.5 - share, rng)
-            for target, part in zip((at, along, lengths), made, strict=True):
-                target.append(part)
-    places, growth = np.concatenate(at), np.concatenate(along)
-    reach_m = np.concatenate(lengths)
+            fans.append(_fan(z, turn, reach * between(0.75, 1.1, rng), 0.5 - share, rng))
+    places, growth, reach_m = (np.concatenate(part) for part in zip(*fans, strict=True))
     # The lowest sprays rest on the ground.
     growth[:, 2] = np.maximum(growth[:, 2], (0.03 - places[:, 2]) / reach_m)
     axis = places * np.array([1.0, 1.0, 0.0])
