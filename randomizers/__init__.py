@@ -25,5 +25,6 @@ TABLE = PluginTable(
         "textures": "randomizers.textures:Textures",
         "time_of_day": "randomizers.time_of_day:TimeOfDay",
         "weather": "randomizers.weather:Weather",
+        "traffic_lights": "randomizers.traffic_lights:TrafficLights",
     },
 )

@@ -39,7 +39,7 @@ PHYSICS_BOUND = ("along", "arm_configuration", "distractors", "objects", "physic
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, distractors, a street lamp and two cameras."""
+    """A room with a table, an arm, objects, distractors, a street lamp, a traffic light and two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -56,9 +56,10 @@ def nominal_scene() -> Scene:
     group = ObjectGroup("along", (), ("brick", "can?seed=0"), 2, "along", lanes=("driving",))
     scene = build("test", elements, FakeAssets())
     lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
+    signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
     return replace(
         scene,
-        bodies=(*scene.bodies, lamp),
+        bodies=(*scene.bodies, lamp, signal),
         cameras=cameras,
         lanes=lanes,
         groups=(*scene.groups, group),

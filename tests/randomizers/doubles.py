@@ -46,6 +46,7 @@ class Thing:
 
 
 PRINTED = Material(texture="texture/label?seed=1", printed=True)
+LENSES = tuple(Material(role=f"lens_{color}") for color in ("red", "yellow", "green"))
 THINGS = {
     "brick": Thing("brick", (0.06, 0.03, 0.02), stackable=True),
     "can?seed=0": Thing("can", (0.066, 0.066, 0.12), stackable=True, materials=(PRINTED,)),
@@ -54,6 +55,7 @@ THINGS = {
     "ball": Thing("ball", (0.2, 0.2, 0.2), ("household", "toy")),
     "bolt": Thing("bolt", (0.02, 0.02, 0.05), ("part",), 0.05),
     "nut": Thing("nut", (0.03, 0.03, 0.015), ("part",), 0.02, stackable=True),
+    "signal": Thing("traffic_light", (0.3, 0.3, 3.0), ("street_furniture",), materials=LENSES),
     "odd": Thing("odd", (0.05, 0.07, 0.09), ("random_shape",)),
 }
 TEXTURES = {

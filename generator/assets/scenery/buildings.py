@@ -72,11 +72,6 @@ def garage(seed: int) -> Solid:
     return solid([*walls, floor, roof], materials_of(plan, seed), [hull])
 
 
-def garage_facts(seed: int) -> Facts:  # noqa: ARG001
-    """What every garage is."""
-    return Facts("garage")
-
-
 def _front(plan: Design, rng: Rng) -> Patch:
     """The street side: ground floor, upper floors, and what separates them."""
     half = 0.5 * plan.width_m

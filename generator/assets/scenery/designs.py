@@ -206,7 +206,7 @@ _DRAWN = {
 
 # Muted tints of mineral paint, sRGB; the texture's own near-white multiplies them.
 _PLASTERS = {
-    "residential": "#d9d2c0 #e3dccb #cfc6b0 #d8c9a3 #c9b99a #c7ccc6 #b9bfb7 #d3bfae #e2e0da #bfae95",
+    "residential": "#d9d2c0 #e3dccb #cfc6b0 #d8c9a3 #c9b99a #c7ccc6 #b9bfb7 #d3bfae #e2e0da",
     "old_town": "#d6c294 #cdb07f #c9a78c #b98e76 #d9cdb5 #b9b49e #a9b0a2 #c2b7ac #dcd3c2 #b7a184",
     "modern": "#e8e7e3 #dcdbd6 #c7c7c4 #b4b3af #8f8e8b #e3ddd0 #6f6e6c #d5d0c6",
     "commercial": "#cfcbc2 #b8b5ae #d9d5cb #a5a39e #c4bba8 #8f9294",

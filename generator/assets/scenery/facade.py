@@ -78,7 +78,8 @@ def perforated(
     """A wall without its openings.
 
     Args:
-        y_m, z_m: Extent of the wall.
+        y_m: Extent to the sides.
+        z_m: Extent in height.
         openings: Holes, apart from one another.
         slot: Material slot.
         base: Height up to which the wall has another slot, and that slot.

@@ -52,6 +52,8 @@ def leaf_mesh(sprays: Sprays, materials: Sequence[Material], width: float, rng: 
     corners = np.stack(
         [sprays.at_m + half + 0.4 * skew, tip, sprays.at_m - half - 0.4 * skew], axis=1
     )
+    # Nothing grows into the ground.
+    corners[..., 2] = np.maximum(corners[..., 2], 0.0)
     corners = np.round(settled(corners) / GRID_M) * GRID_M
     own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     inward = (own * sprays.outward).sum(axis=1) < 0.0
@@ -69,36 +71,45 @@ def leaf_mesh(sprays: Sprays, materials: Sequence[Material], width: float, rng: 
     )
 
 
-def sprays_about(
-    anchors_m: Array,
-    centre_m: Array,
-    count: int,
-    length_m: float,
-    spread_m: float,
-    shades: int,
-    rng: Rng,
-    droop: float = 0.15,
-) -> Sprays:
+@dataclass(frozen=True, slots=True)
+class Habit:
+    """How a plant wears its leaves.
+
+    Attributes:
+        count: How many sprays.
+        length_m: Mean length of a spray.
+        spread_m: Radius of the cluster about an anchor.
+        shades: Number of materials; the first is the deepest in the crown.
+        droop: How much sprays hang; below 0, they rise.
+    """
+
+    count: int
+    length_m: float
+    spread_m: float
+    shades: int = 4
+    droop: float = 0.15
+
+
+def sprays_about(anchors_m: Array, centre_m: Array, habit: Habit, rng: Rng) -> Sprays:
     """Sprays in clusters about anchors.
 
     Args:
         anchors_m: Ends of twigs, [k, 3].
         centre_m: Middle of the crown, [3].
-        count: How many sprays.
-        length_m: Mean length of a spray.
-        spread_m: Radius of the cluster about an anchor.
-        shades: Number of materials; the first is the deepest in the crown.
+        habit: How many, how large, how dense.
         rng: Draws places and directions.
-        droop: How much sprays hang.
     """
+    count, shades = habit.count, habit.shades
     which = np.arange(count) % len(anchors_m)
-    offset = _directions(count, rng) * spread_m * uniform((count, 1), rng) ** 0.5
+    offset = _directions(count, rng) * habit.spread_m * uniform((count, 1), rng) ** 0.5
     at = anchors_m[which] + offset
     outward = _unit(at - centre_m + 0.25 * offset)
-    along = _unit(0.55 * outward + 0.8 * _directions(count, rng) - np.array([0.0, 0.0, droop]))
-    length = length_m * (0.7 + 0.6 * uniform(count, rng))
+    along = _unit(
+        0.55 * outward + 0.8 * _directions(count, rng) - np.array([0.0, 0.0, habit.droop])
+    )
+    length = habit.length_m * (0.7 + 0.6 * uniform(count, rng))
     reach = np.sqrt(((at - centre_m) ** 2).sum(axis=1))
-    depth = reach / max(float(reach.max()), 1e-9) + 0.12 * offset[:, 2] / spread_m
+    depth = reach / max(float(reach.max()), 1e-9) + 0.12 * offset[:, 2] / habit.spread_m
     lit = depth + 0.25 * (uniform(count, rng) - 0.5)
     slots = np.clip(np.floor((lit - 0.35) / 0.65 * shades), 0, shades - 1).astype(np.int64)
     return Sprays(at, outward, along, length, slots)

@@ -138,7 +138,9 @@ def dormer(x: float, y: float, z0: float, reach_m: float, rng: Rng) -> Patch:
     """A small window house that looks out of a slope towards +X.
 
     Args:
-        x, y, z0: Foot of its front.
+        x: Where its front stands.
+        y: Middle of its front.
+        z0: Foot of its front.
         reach_m: How far it goes back into the roof.
         rng: Draws its curtains.
     """

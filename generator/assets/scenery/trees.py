@@ -16,7 +16,7 @@ from generator.assets.procedural.mesh import Array, Patch, finished
 from generator.assets.procedural.noise import uniform
 from generator.assets.procedural.shapes import circle, sweep
 from generator.assets.scenery.branching import Lobe, Skeleton, grown, points_in, wood
-from generator.assets.scenery.foliage import Sprays, leaf_mesh, merged, sprays_about
+from generator.assets.scenery.foliage import Habit, Sprays, leaf_mesh, merged, sprays_about
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import ConvexParts, Material, MeshData
 from generator.core.streams import Rng
@@ -95,7 +95,7 @@ def _broadleaf(shape: Shape, leaves: float, rng: Rng) -> Solid:
     hull = hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
     count = round(_LEAVES * leaves)
     if count:
-        greens = _greens(shape.green, rng)
+        greens = leaf_greens(shape.green, rng)
         sprays = _crown(shape, skeleton, count, len(greens), rng)
         mesh = merged(mesh, leaf_mesh(sprays, greens, _LEAF_WIDTH, rng))
     else:
@@ -116,14 +116,18 @@ def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: Rng) 
     length = math.sqrt(2.0 * each / _LEAF_WIDTH)
     middle = outer - np.array([0.0, 0.0, 0.25 * float(radius)])
     anchors = skeleton.twigs()
-    return sprays_about(anchors, middle, count, length, 1.6 * length, shades, rng, shape.droop)
+    return sprays_about(
+        anchors, middle, Habit(count, length, 1.6 * length, shades, shape.droop), rng
+    )
 
 
 def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: Rng) -> MeshData:
     """The finest twigs of a winter crown, each a thin sliver."""
     middle = np.array([0.0, 0.0, shape.clear_m])
     length = 0.13 * (shape.height_m - shape.clear_m)
-    sprays = sprays_about(skeleton.twigs(), middle, _TWIGS, length, 0.1 * length, 1, rng, -0.3)
+    sprays = sprays_about(
+        skeleton.twigs(), middle, Habit(_TWIGS, length, 0.1 * length, 1, -0.3), rng
+    )
     return leaf_mesh(sprays, (bark,), 0.03, rng)
 
 
@@ -134,7 +138,7 @@ def _trunk(shape: Shape, rng: Rng) -> Array:
     sway = 0.05 * shape.clear_m
     x = sway * (uniform(1, rng) - 0.5) * np.sin(2.4 * t) * t
     y = sway * (uniform(1, rng) - 0.5) * np.sin(2.9 * t) * t
-    return np.round(np.stack([x, y, t * shape.clear_m], axis=1), 4)
+    return np.stack([np.round(axis, 4) for axis in (x, y, t * shape.clear_m)], axis=1)
 
 
 def _flared(patch: Patch) -> Patch:
@@ -153,18 +157,15 @@ def _conifer(rng: Rng) -> Solid:
     line = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * height), (0.0, 0.0, height)])
     trunk = sweep(line, circle(base_m, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.0, 0.5, 0.08]))
     whorls = 20
-    at, along, lengths = [], [], []
+    fans: list[tuple[Array, Array, Array]] = []
     for level in range(whorls):
         share = (level + 0.2 * uniform(1, rng)[0]) / whorls
         z = clear + (height - clear) * share**0.9
         reach = spread * (1.0 - share) ** 0.85 + 0.12
         for k in range(9):
             turn = 2.0 * math.pi * (k + 0.5 * (level % 2) + 0.5 * between(-0.5, 0.5, rng)) / 9
-            made = _fan(z, turn, reach * between(0.75, 1.1, rng), 0.5 - share, rng)
-            for target, part in zip((at, along, lengths), made, strict=True):
-                target.append(part)
-    places, growth = np.concatenate(at), np.concatenate(along)
-    reach_m = np.concatenate(lengths)
+            fans.append(_fan(z, turn, reach * between(0.75, 1.1, rng), 0.5 - share, rng))
+    places, growth, reach_m = (np.concatenate(part) for part in zip(*fans, strict=True))
     # The lowest sprays rest on the ground.
     growth[:, 2] = np.maximum(growth[:, 2], (0.03 - places[:, 2]) / reach_m)
     axis = places * np.array([1.0, 1.0, 0.0])
@@ -172,7 +173,7 @@ def _conifer(rng: Rng) -> Solid:
     depth = np.sqrt((axis**2).sum(axis=1)) / (spread * np.clip(1 - places[:, 2] / height, 0.1, 1.0))
     slots = np.clip(np.floor(depth * 3.2 + uniform(len(depth), rng) - 0.5), 0, 3).astype(np.int64)
     sprays = Sprays(places, outward, growth, reach_m, slots)
-    greens = _greens(("#1f2b1c", "#2a3a25", "#35472d", "#425537"), rng)
+    greens = leaf_greens(("#1f2b1c", "#2a3a25", "#35472d", "#425537"), rng)
     mesh = merged(finished(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng))
     hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
@@ -202,7 +203,7 @@ def _bark(code: str) -> Material:
     return Material(linear(code), roughness=0.95, texture=texture, texture_scale_m=0.8, role="bark")
 
 
-def _greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
+def leaf_greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
     """Shades of leaf that vary together from tree to tree."""
     r, g, b = jittered((1.0, 1.0, 1.0), 0.0, rng)
     warm, level = between(0.85, 1.18, rng), between(0.85, 1.15, rng)

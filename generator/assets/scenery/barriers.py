@@ -1,0 +1,179 @@
+"""What keeps traffic and people apart: guard rails, jersey barriers, work-site barriers, fences.
+
+Pieces run along Y, so that they line a street whose traffic they face with +X; sections of equal
+length join end to end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, pick, rng_of
+from generator.assets.procedural.family import Facts, Solid
+from generator.assets.procedural.materials import painted, patterned
+from generator.assets.procedural.mesh import Patch
+from generator.assets.procedural.shapes import block, extruded, grid
+from generator.assets.scenery.forms import facing, post, solid
+from generator.assets.scenery.furniture import GALVANISED
+from generator.core.geometry import Material
+from generator.core.se3 import Vec3
+
+BARRIERS = ("guard_rail", "jersey", "construction")
+FENCES = ("pickets", "panel", "wall", "mesh")
+
+
+def barrier(seed: int, style: str) -> Solid:
+    """A barrier section; ``style`` ``any`` leaves the choice to the seed."""
+    kind = barrier_facts(seed, style).subcategory
+    return {"guard_rail": _guard_rail, "jersey": _jersey}.get(kind, _construction)(seed)
+
+
+def barrier_facts(seed: int, style: str) -> Facts:
+    """Its kind."""
+    return Facts(BARRIERS[seed % len(BARRIERS)] if style == "any" else style)
+
+
+def fence(seed: int, style: str) -> Solid:
+    """A fence or garden wall section of 2-3 m."""
+    kind = fence_facts(seed, style).subcategory
+    rng = rng_of("fence", seed)
+    half, h = 0.5 * between(2.0, 3.0, rng), between(0.9, 1.4, rng)
+    hull = hulls.box((-0.06, -half, 0.0), (0.06, half, h))
+    if kind == "wall":
+        return _garden_wall(half, h, seed)
+    posts = [
+        block((-0.035, y - 0.035, 0.0), (0.035, y + 0.035, h)) for y in (-half + 0.04, half - 0.04)
+    ]
+    if kind == "pickets":
+        bars = np.linspace(-half + 0.14, half - 0.14, round(2 * half / 0.13))
+        parts = [block((0.03, y - 0.04, 0.06), (0.05, y + 0.04, h)) for y in bars]
+        parts += [block((-0.01, -half, z), (0.03, half, z + 0.07)) for z in (0.25, h - 0.3)]
+        wood = patterned(
+            "texture/wood_grain?seed=5", 1.2, 0.8, pick(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)), rng)
+        )
+        return solid([*posts, *parts], (wood,), [hull])
+    if kind == "panel":
+        panel = block((-0.015, -half + 0.08, 0.08), (0.015, half - 0.08, h + 0.3))
+        tall = [
+            block((-0.04, y - 0.04, 0.0), (0.04, y + 0.04, h + 0.34))
+            for y in (-half + 0.04, half - 0.04)
+        ]
+        wood = patterned("texture/wood_planks?seed=2", 1.4, 0.8, (0.7, 0.66, 0.62))
+        return solid(
+            [panel, *(p.painted(1) for p in tall)], (wood, painted("#5b4a3c", 0.7)), [hull]
+        )
+    wires = [
+        facing(0.0, (y - 0.004, y + 0.004), (0.05, h))
+        for y in np.arange(-half + 0.1, half - 0.05, 0.06)
+    ]
+    wires += [
+        block((-0.008, -half, z), (0.008, half, z + 0.012)) for z in np.linspace(0.06, h - 0.03, 5)
+    ]
+    paint = painted(pick(("#2f4236", "#3b3d3f"), rng), 0.5)
+    return solid([*posts, *wires], (paint,), [hull])
+
+
+def fence_facts(seed: int, style: str) -> Facts:
+    """Its kind."""
+    return Facts(FENCES[seed % len(FENCES)] if style == "any" else style)
+
+
+def _guard_rail(seed: int) -> Solid:
+    """A W-beam on posts, 4 m long, 0.75 m high (EN 1317 systems)."""
+    half = 2.0
+    wave = [(0.0, 0.44), (0.05, 0.47), (0.08, 0.5), (0.05, 0.55), (0.0, 0.595),
+            (0.05, 0.64), (0.08, 0.69), (0.05, 0.72), (0.0, 0.75)]  # fmt: skip
+    rows = np.array([[(0.1 + x, y, z) for y in (-half, half)] for x, z in wave])
+    back = np.array([[(0.096 + x, y, z) for y in (half, -half)] for x, z in wave])
+    posts = [block((-0.05, y - 0.03, 0.0), (0.05, y + 0.03, 0.72)) for y in (-1.0, 1.0)]
+    spacers = [block((0.05, y - 0.05, 0.52), (0.1, y + 0.05, 0.68)) for y in (-1.0, 1.0)]
+    hull = hulls.box((-0.05, -half, 0.0), (0.18, half, 0.75))
+    parts = [grid(rows), grid(back), *posts, *spacers]
+    shade = patterned("texture/brushed_metal?seed=1", 1.0, 0.6, (0.62, 0.63, 0.64))
+    return solid(parts, (shade if seed % 2 else GALVANISED,), [hull])
+
+
+def _jersey(seed: int) -> Solid:
+    """A concrete safety shape, 2 m long: foot 0.6 m, 0.8-0.9 m high."""
+    rng = rng_of("barrier/jersey", seed)
+    half, h = 1.0, between(0.8, 0.9, rng)
+    section = np.array(
+        [
+            (0.0, -0.3),
+            (0.08, -0.3),
+            (0.33, -0.17),
+            (h, -0.09),
+            (h, 0.09),
+            (0.33, 0.17),
+            (0.08, 0.3),
+            (0.0, 0.3),
+        ]
+    )
+    prism = extruded(section, 2 * half, 0.008).rotated("y", -0.5 * np.pi)
+    # The section's first axis has become Z, the extrusion runs along -X: turn it to Y.
+    lying = prism.rotated("z", 0.5 * np.pi)
+    low, high = lying.bounds_m()
+    x, y, _ = (0.5 * (low + high)).tolist()
+    body = lying.moved(-x, -y, -float(low[2]))
+    concrete = patterned("texture/concrete?seed=3", 2.0, 0.92, (0.95, 0.94, 0.92))
+    hull = hulls.extreme(body.corners_m, 32)
+    return solid([body], (concrete,), [hull])
+
+
+def _construction(seed: int) -> Solid:
+    """A work-site barrier: a red and white board on two feet, lamps on some."""
+    rng = rng_of("barrier/construction", seed)
+    half, z, fields = 0.5 * between(1.2, 2.0, rng), 0.85, 8
+    boards = []
+    for low in ((z, z + 0.2), (0.25, 0.35))[: pick((1, 2, 2), rng)]:
+        boards += _striped(half, low, fields)
+    legs = [
+        block((-0.02, y - 0.02, 0.05), (0.01, y + 0.02, 1.1)) for y in (-half + 0.15, half - 0.15)
+    ]
+    feet = [
+        block((-0.4, y - 0.13, 0.0), (0.4, y + 0.13, 0.1), 0.01)
+        for y in (-half + 0.15, half - 0.15)
+    ]
+    parts = [*boards, *(p.painted(2) for p in legs), *(p.painted(3) for p in feet)]
+    for y in (-half + 0.15, half - 0.15) if seed % 2 else ():
+        parts.append(post(0.075, (1.1, 1.26), (0.0, y, 0.0), 12).painted(4))
+    slots = (
+        painted("#b9261c", 0.4),
+        painted("#e8e7e2", 0.4),
+        GALVANISED,
+        painted("#242526", 0.85),
+        Material((0.85, 0.42, 0.05), roughness=0.2, role="lamp"),
+    )
+    return solid(parts, slots, [hulls.box((-0.4, -half, 0.0), (0.4, half, z + 0.2))])
+
+
+def _striped(half: float, z_m: tuple[float, float], fields: int) -> list[Patch]:
+    """A board of slanted red and white fields; slots 0 and 1, its back is white."""
+    (z0, z1), step = z_m, 2 * half / fields
+    lean = 0.35 * step
+    board = block((0.012, -half, z0), (0.03, half, z1), slot=1)
+    stripes = []
+    for k in range(0, fields, 2):
+        a, b = -half + k * step, -half + (k + 1) * step
+        corners = np.array(
+            [[(0.032, a, z0), (0.032, b, z0)], [(0.032, a + lean, z1), (0.032, b + lean, z1)]]
+        )
+        stripes.append(grid(np.clip(corners, None, np.array([1.0, half, 2.0]))))
+    return [board, *stripes]
+
+
+def _garden_wall(half: float, h: float, seed: int) -> Solid:
+    """A low wall with a coping."""
+    low: Vec3 = (-0.12, -half, 0.0)
+    body = block(low, (0.12, half, h - 0.06))
+    cap = block((-0.16, -half, h - 0.06), (0.16, half, h), 0.01).painted(1)
+    kind = (
+        ("brick", 1, 1.1, (0.9, 0.88, 0.86))
+        if seed % 8 < 4
+        else ("plaster", 5, 2.5, (0.62, 0.58, 0.5))
+    )
+    name, k, scale, color = kind
+    skin = patterned(f"texture/{name}?seed={k}", scale, 0.92, color)
+    stone = patterned("texture/concrete?seed=3", 1.5, 0.9)
+    return solid([body, cap], (skin, stone), [hulls.box(low, (0.12, half, h))])

@@ -1,0 +1,167 @@
+"""Traffic signs: shaped plates on poles, their faces drawn by ``textures.sign_faces``.
+
+Shapes and meanings: Vienna Convention on Road Signs and Signals, 1968. Sizes: German VwV-StVO,
+size 2 (discs of 600 mm, triangles with sides of 900 mm). Faces look to +X.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, rng_of
+from generator.assets.procedural.family import Facts, Solid
+from generator.assets.procedural.materials import painted
+from generator.assets.procedural.mesh import Array, Patch, joined
+from generator.assets.procedural.shapes import circle, grid
+from generator.assets.scenery.forms import post, solid
+from generator.assets.scenery.furniture import GALVANISED
+from generator.core.errors import AssetError, did_you_mean
+from generator.core.geometry import Material
+
+Shape = Literal["disc", "octagon", "triangle", "yield", "diamond", "square", "wide"]
+Kind = Literal["regulatory", "mandatory", "warning", "information"]
+
+
+@dataclass(frozen=True, slots=True)
+class Sign:
+    """What a sign's plate is like.
+
+    Attributes:
+        kind: Its group in the convention.
+        size_m: Width of the square that its image fills.
+    """
+
+    shape: Shape
+    kind: Kind
+    size_m: float = 0.6
+
+
+SIGNS: Mapping[str, Sign] = {
+    "speed_limit_30": Sign("disc", "regulatory"),
+    "speed_limit_50": Sign("disc", "regulatory"),
+    "speed_limit_70": Sign("disc", "regulatory"),
+    "speed_limit_100": Sign("disc", "regulatory"),
+    "no_entry": Sign("disc", "regulatory"),
+    "no_vehicles": Sign("disc", "regulatory"),
+    "no_stopping": Sign("disc", "regulatory"),
+    "no_parking": Sign("disc", "regulatory"),
+    "stop": Sign("octagon", "regulatory", 0.75),
+    "yield": Sign("yield", "regulatory", 0.9),
+    "priority_road": Sign("diamond", "regulatory", 0.72),
+    "straight_ahead": Sign("disc", "mandatory"),
+    "turn_right": Sign("disc", "mandatory"),
+    "keep_right": Sign("disc", "mandatory"),
+    "roundabout": Sign("disc", "mandatory"),
+    "cycle_path": Sign("disc", "mandatory"),
+    "foot_path": Sign("disc", "mandatory"),
+    "danger": Sign("triangle", "warning", 0.9),
+    "right_curve": Sign("triangle", "warning", 0.9),
+    "pedestrians": Sign("triangle", "warning", 0.9),
+    "signals_ahead": Sign("triangle", "warning", 0.9),
+    "crossroads": Sign("triangle", "warning", 0.9),
+    "parking": Sign("square", "information"),
+    "pedestrian_crossing": Sign("square", "information"),
+    "dead_end": Sign("square", "information"),
+    "zone_30": Sign("square", "regulatory"),
+    "one_way": Sign("wide", "information", 0.8),
+}
+
+_THICK_M = 0.004
+_ROOT3 = math.sqrt(3.0)
+
+
+def traffic_sign(seed: int, sign: str) -> Solid:
+    """A sign on its pole; ``sign`` ``any`` leaves the choice to the seed. Slots: face, back, pole.
+
+    Raises:
+        AssetError: for an unknown sign.
+    """
+    name = sign_name(seed, sign)
+    made = SIGNS[name]
+    rng = rng_of("traffic_sign", seed)
+    outline = plate_outline(made.shape) * made.size_m
+    half_high = float(outline[:, 1].max())
+    foot = float(-outline[:, 1].min())
+    # Over a pavement the lower edge hangs 2.0-2.2 m high, so that people walk below.
+    centre_z = between(2.0, 2.2, rng) + foot
+    face = _plate(outline, made.size_m).moved(0.045, 0.0, centre_z)
+    pole = post(0.03, (0.0, centre_z + half_high - 0.02), sides=10).painted(2)
+    image = Material(
+        (1.0, 1.0, 1.0),
+        roughness=0.35,
+        texture=f"texture/traffic_sign?seed={seed % 3}&sign={name}",
+        printed=True,
+        role="sign",
+    )
+    hull = hulls.frustum((0.03, 0.0), (0.03, centre_z + half_high - 0.02), 8)
+    return solid([face, pole], (image, painted("#8c8f90", 0.6), GALVANISED), [hull])
+
+
+def traffic_sign_facts(seed: int, sign: str) -> Facts:
+    """Its group, and which sign it is."""
+    name = sign_name(seed, sign)
+    return Facts(SIGNS[name].kind, {"sign": name})
+
+
+def sign_name(seed: int, sign: str) -> str:
+    """The name of a sign; by seed for ``any``. Raises AssetError for an unknown one."""
+    if sign == "any":
+        return list(SIGNS)[seed % len(SIGNS)]
+    if sign not in SIGNS:
+        raise AssetError(
+            f"traffic_sign: there is no sign '{sign}'{did_you_mean(sign, SIGNS)}; expected any or "
+            f"one of {', '.join(SIGNS)}"
+        )
+    return sign
+
+
+def plate_outline(shape: Shape) -> Array:
+    """Counter-clockwise outline within a unit square about the origin (right, up), [n, 2]."""
+    if shape == "octagon":
+        return circle(0.5 / math.cos(math.pi / 8), 8, phase=0.5)
+    if shape in ("triangle", "yield"):
+        sign = 1.0 if shape == "triangle" else -1.0
+        height = 0.5 * _ROOT3
+        corners = np.array([(-0.5, -0.5 * height), (0.5, -0.5 * height), (0.0, 0.5 * height)])
+        return _blunted(corners * np.array([1.0, sign]), 0.045)[:: round(sign)]
+    if shape == "diamond":
+        return _blunted(np.array([(0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)]), 0.04)
+    if shape in ("square", "wide"):
+        high = 0.5 if shape == "square" else 0.15
+        corners = np.array([(-0.5, -high), (0.5, -high), (0.5, high), (-0.5, high)])
+        return _blunted(corners, 0.03)
+    return circle(0.5, 28)
+
+
+def _plate(outline: Array, size_m: float) -> Patch:
+    """A thin plate whose front shows the image; slot 0 in front, 1 at rim and back."""
+    front = np.concatenate([np.full((len(outline), 1), _THICK_M), outline], axis=1)
+    back = front * np.array([0.0, 1.0, 1.0])
+    n = len(outline)
+    centre = np.array([_THICK_M, 0.0, 0.0])
+    corners = np.stack([np.broadcast_to(centre, (n, 3)), front, np.roll(front, -1, axis=0)], axis=1)
+    uvs = corners[..., 1:] / size_m + 0.5
+    face = Patch(corners, uvs, np.zeros(n, dtype=np.int64))
+    rear = Patch(corners * np.array([0.0, 1.0, 1.0]), uvs, np.zeros(n, dtype=np.int64)).flipped()
+    rim = grid(np.stack([np.concatenate([ring, ring[:1]]) for ring in (back, front)]))
+    return joined([face, rear.painted(1), rim.painted(1)])
+
+
+def _blunted(corners: Array, radius: float) -> Array:
+    """A polygon with its corners cut off by short arcs, [n * 4, 2]."""
+    made = []
+    for before, corner, after in zip(
+        np.roll(corners, 1, axis=0), corners, np.roll(corners, -1, axis=0), strict=True
+    ):
+        a = (before - corner) / np.sqrt(((before - corner) ** 2).sum())
+        b = (after - corner) / np.sqrt(((after - corner) ** 2).sum())
+        for t in (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0):
+            # A quadratic curve from one side to the other.
+            made.append(corner + radius * (a * (1 - t) ** 2 + b * t**2))
+    return np.array(made)

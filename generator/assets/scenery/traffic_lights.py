@@ -1,0 +1,146 @@
+"""Traffic lights: lenses that are dark until they are lit by their role.
+
+Lenses face +X, towards the traffic they are for. Lens diameters of 200 and 300 mm and heights above
+the road follow EN 12368 and the German RiLSA.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, chance, pick, rng_of
+from generator.assets.procedural.family import Facts, Solid
+from generator.assets.procedural.materials import painted
+from generator.assets.procedural.mesh import Patch, joined
+from generator.assets.procedural.shapes import block, grid, lathe, rounded_box
+from generator.assets.scenery.forms import post, solid, tube
+from generator.assets.scenery.furniture import GALVANISED
+from generator.core.errors import AssetError, did_you_mean
+from generator.core.geometry import Material
+from generator.core.se3 import Vec3
+
+MOUNTS = ("pole", "mast_arm")
+HOUSING, POLE, BOARD = 0, 1, 2
+_FIRST_LENS = 3
+VEHICLE_LENSES = ("lens_red", "lens_yellow", "lens_green")
+PEDESTRIAN_LENSES = ("lens_stop", "lens_walk")
+_OFF: dict[str, Vec3] = {
+    "lens_red": (0.09, 0.008, 0.006),
+    "lens_yellow": (0.11, 0.06, 0.006),
+    "lens_green": (0.006, 0.06, 0.035),
+    "lens_stop": (0.09, 0.008, 0.006),
+    "lens_walk": (0.006, 0.06, 0.035),
+}
+
+
+def traffic_light(seed: int, mount: str) -> Solid:
+    """A signal for vehicles, on a pole or also on an arm over the road.
+
+    The arm reaches towards -Y: to the left of who drives towards the lenses.
+    Slots: housing, pole, board, and one per lens by its role.
+
+    Raises:
+        AssetError: for an unknown mount.
+    """
+    rng = rng_of("traffic_light", seed)
+    arm = _mount(seed, mount) == "mast_arm"
+    lens_m = 0.15 if arm else pick((0.1, 0.1, 0.15), rng)
+    low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(0.11, 0.0, between(2.15, 2.5, rng))
+    radius = 0.09 if arm else 0.055
+    top = between(5.6, 6.2, rng) if arm else float(low.bounds_m()[1][2]) + 0.1
+    parts = [low, post(radius, (0.0, top), sides=12).painted(POLE)]
+    if arm:
+        reach = between(3.5, 5.5, rng)
+        path = [(0.0, 0.0, top - 0.1), (0.0, -0.6 * reach, top + 0.05), (0.0, -reach, top + 0.1)]
+        high = head(VEHICLE_LENSES, lens_m)
+        plate = _backboard(high)
+        parts += [tube(path, 0.055, 8).painted(POLE)]
+        parts += [part.moved(0.1, -reach + 0.25, top - 0.75) for part in (high, plate)]
+    elif chance(0.35, rng):
+        parts.append(_backboard(low))
+    hull = hulls.frustum((radius, 0.0), (radius, top), 10)
+    return solid(parts, _materials(VEHICLE_LENSES, pick(("#262829", "#2f4236"), rng)), [hull])
+
+
+def traffic_light_facts(seed: int, mount: str) -> Facts:
+    """For vehicles; how it is mounted."""
+    return Facts("vehicle", {"mount": _mount(seed, mount)})
+
+
+def pedestrian_signal(seed: int) -> Solid:
+    """A red and green signal for people, with a push button. Slots as above."""
+    rng = rng_of("pedestrian_signal", seed)
+    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, between(2.1, 2.3, rng))
+    top = float(signal.bounds_m()[1][2]) + 0.1
+    button = rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
+    parts = [signal, button, post(0.052, (0.0, top), sides=12).painted(POLE)]
+    hull = hulls.frustum((0.052, 0.0), (0.052, top), 10)
+    materials = list(_materials(PEDESTRIAN_LENSES, "#262829"))
+    materials[BOARD] = painted("#d9a520", 0.5)
+    return solid(parts, materials, [hull])
+
+
+def head(lenses: Sequence[str], lens_m: float) -> Patch:
+    """Chambers above one another, the first lens on top; the lowest edge at z = 0.
+
+    Args:
+        lenses: Roles, from top to bottom.
+        lens_m: Radius of a lens.
+    """
+    cell, half, deep = 2.7 * lens_m, 1.4 * lens_m, 0.16
+    parts = []
+    for k in range(len(lenses)):
+        z = cell * (len(lenses) - k - 0.5)
+        chamber = rounded_box((deep, 2 * half, cell - 0.006), 0.025, 1).moved(0.0, 0.0, z)
+        x = 0.5 * deep
+        # A lens bulges out of a ring.
+        bulge = lathe(
+            [(lens_m, 0.004), (0.8 * lens_m, 0.016), (0.45 * lens_m, 0.026), (0.0, 0.03)], 20
+        )
+        parts += [
+            chamber,
+            bulge.rotated("y", 0.5 * math.pi).moved(x, 0.0, z).painted(_FIRST_LENS + k),
+            _visor(1.08 * lens_m, 1.7 * lens_m).moved(x - 0.002, 0.0, z),
+        ]
+    return joined(parts)
+
+
+def _visor(radius: float, reach: float) -> Patch:
+    """A tube that is open below, cut back towards its lower ends."""
+    turn = np.linspace(-0.2 * math.pi, 1.2 * math.pi, 15)
+    y, z = radius * np.cos(turn), radius * np.sin(turn)
+    tip = reach * (0.45 + 0.55 * np.clip(0.5 + z / radius, 0.0, 1.0))
+    rows = [np.stack([0.0 * y, y, z], axis=1), np.stack([tip, y, z], axis=1)]
+    return grid(np.stack(rows)).flipped()
+
+
+def _backboard(signal: Patch) -> Patch:
+    """A dark plate behind a head, wider than it, so that lenses stand out against the sky."""
+    low, high = (bound.tolist() for bound in signal.bounds_m())
+    x, rim = float(low[0]) - 0.012, 0.14
+    outer = block((x, low[1] - rim, low[2] - rim), (x + 0.01, high[1] + rim, high[2] + rim))
+    inner = block(
+        (x + 0.003, low[1] - rim + 0.03, low[2] - rim + 0.03),
+        (x + 0.013, high[1] + rim - 0.03, high[2] + rim - 0.03),
+    )
+    return joined([outer.painted(BOARD), inner.painted(HOUSING)])
+
+
+def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
+    lit = (Material(_OFF[role], roughness=0.25, specular=0.5, role=role) for role in lenses)
+    return (painted(housing, 0.5), GALVANISED, painted("#e9e8e3", 0.4), *lit)
+
+
+def _mount(seed: int, mount: str) -> str:
+    if mount == "any":
+        return MOUNTS[1] if seed % 4 == 2 else MOUNTS[0]
+    if mount not in MOUNTS:
+        raise AssetError(
+            f"traffic_light: there is no mount '{mount}'{did_you_mean(mount, MOUNTS)}; expected "
+            f"any, {', '.join(MOUNTS)}"
+        )
+    return mount

@@ -1,0 +1,147 @@
+"""What traffic lights show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+from generator.config.distributions import Choice, Constant, Name, Positive, Uniform
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.geometry import Material
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body, Instance, Scene
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase, materials_of
+
+LIT: Mapping[str, tuple[str, ...]] = {
+    "red": ("lens_red", "lens_stop"),
+    "red_yellow": ("lens_red", "lens_yellow", "lens_stop"),
+    "yellow": ("lens_yellow", "lens_stop"),
+    "green": ("lens_green", "lens_walk"),
+}
+"""Roles that emit light in each state; people wait while vehicles do, and when these clear."""
+
+COLORS: Mapping[str, Vec3] = {
+    "lens_red": (4.35, 0.1, 0.03),
+    "lens_stop": (4.35, 0.1, 0.03),
+    "lens_yellow": (2.55, 0.64, 0.0),
+    "lens_green": (0.12, 1.3, 0.62),
+    "lens_walk": (0.12, 1.3, 0.62),
+}
+"""Linear RGB of luminance 1 within the chromaticity regions of EN 12368, as far as sRGB reaches."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Signal:
+    """A traffic light's body, where it stands, and the axis of the traffic that it is for."""
+
+    body: Body
+    at_m: Vec3
+    axis: tuple[float, float]
+
+
+class TrafficLights(RandomizerBase):
+    """Draws a state per junction; crossing directions never have green together.
+
+    Signals that stand close together are one junction. Its first signal shows the drawn state, as
+    do all along the same axis; signals across it show red, or green while the first shows red.
+    Signals for people follow the traffic that goes their way.
+
+    Attributes:
+        state: Of a junction's first axis: red, red_yellow, green or yellow.
+        luminance_cd_m2: Of a lit lens; 200 cd from a lens of 200 mm are 6400 cd/m^2.
+        junction_m: Signals nearer to one another than this belong to one junction.
+    """
+
+    type: Literal["traffic_lights"] = "traffic_lights"
+    state: Name = Choice({"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04})
+    luminance_cd_m2: Positive = Uniform(5000.0, 10000.0)
+    junction_m: Positive = Constant(40.0)
+
+    ROLES: ClassVar[frozenset[str]] = frozenset(COLORS)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with every lens lit or dark, and its state among the labels' attributes."""
+        signals = [_signal(body) for body in scene.bodies if _has_lenses(body, assets, self.ROLES)]
+        bodies: list[Body] = []
+        states: dict[int, str] = {}
+        for junction in _junctions(signals, self.junction_m.draw(rng)):
+            state, luminance = self._state(rng), round(self.luminance_cd_m2.draw(rng), 2)
+            for signal in junction:
+                shown = state if _along(junction[0], signal) else _crossing(state)
+                bodies.append(_shown(signal.body, assets, shown, luminance))
+                states[signal.body.instance_id] = shown
+        instances = tuple(
+            _told(instance, states[instance.instance_id])
+            if instance.instance_id in states
+            else instance
+            for instance in scene.instances
+        )
+        return replace(scene, instances=instances).with_bodies(*bodies)
+
+    def _state(self, rng: Rng) -> str:
+        state = self.state.draw(rng)
+        if state not in LIT:
+            raise ConfigError(
+                f"randomizers.{self.name}.state: unknown state '{state}'; expected one of "
+                f"{', '.join(LIT)}{did_you_mean(state, LIT)}"
+            )
+        return state
+
+
+def _crossing(state: str) -> str:
+    """What the other axis shows. All red would be safe as well, but is rare."""
+    return "green" if state == "red" else "red"
+
+
+def _junctions(signals: Sequence[_Signal], radius_m: float) -> Iterator[list[_Signal]]:
+    """Signals in groups that are linked by distances below ``radius_m``, in order."""
+    waiting = list(signals)
+    while waiting:
+        group, frontier = [waiting[0]], [waiting.pop(0)]
+        while frontier:
+            here = frontier.pop()
+            near = [s for s in waiting if math.dist(s.at_m[:2], here.at_m[:2]) < radius_m]
+            waiting = [s for s in waiting if s not in near]
+            group += near
+            frontier += near
+        yield group
+
+
+def _along(first: _Signal, other: _Signal) -> bool:
+    """Whether two signals are for traffic along the same axis, within 45 degrees."""
+    (ax, ay), (bx, by) = first.axis, other.axis
+    return abs(ax * bx + ay * by) >= abs(ax * by - ay * bx)
+
+
+def _signal(body: Body) -> _Signal:
+    x, y, _ = body.T_world_body.rotation()[:, 0].tolist()
+    return _Signal(body, body.T_world_body.translation_m, (x, y))
+
+
+def _has_lenses(body: Body, assets: AssetIndex, roles: frozenset[str]) -> bool:
+    return any(material.role in roles for material in materials_of(body, assets))
+
+
+def _shown(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: float) -> Body:
+    """The body with the lenses of a state lit and all others dark."""
+
+    def lit(material: Material) -> Material:
+        if material.role not in COLORS:
+            return material
+        level = luminance_cd_m2 if material.role in LIT[state] else 0.0
+        r, g, b = (round(level * channel, 2) for channel in COLORS[material.role])
+        return replace(material, emission_cd_m2=(r, g, b))
+
+    return replace(body, materials=tuple(lit(m) for m in materials_of(body, assets)))
+
+
+def _told(instance: Instance, state: str) -> Instance:
+    """The instance with its state among its attributes; for people: stop or walk."""
+    if instance.subcategory == "pedestrian":
+        state = "walk" if state == "green" else "stop"
+    facts = {**dict(instance.attributes), "state": state}
+    return replace(instance, attributes=tuple(sorted(facts.items())))
