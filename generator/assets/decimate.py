@@ -11,6 +11,10 @@ from generator.assets.welding import first_occurrences
 
 _CALM = 3.0
 """How boldly edges are collapsed, from 1 to 10: slower and smoother than the library's 7."""
+_TOLERATED = 1.25
+"""Times the budget."""
+_FEW = 40
+"""Materials of so few triangles are left alone: each one may be a whole side of a box."""
 
 
 def decimated(soup: Soup, max_faces: int) -> Soup:
@@ -28,8 +32,9 @@ def decimated(soup: Soup, max_faces: int) -> Soup:
     parts = []
     for k in np.unique(first_slot):
         slot, chosen = soup.slots[k], soup.kept(first_slot == k)
-        uvs = chosen.uvs if slot.material.texture else None
-        corners, uvs = _collapsed(chosen.corners, uvs, max(int(len(chosen) * share), 4))
+        corners, uvs = chosen.corners, chosen.uvs if slot.material.texture else None
+        if len(chosen) > _FEW:
+            corners, uvs = _collapsed(corners, uvs, max(int(len(chosen) * share), _FEW))
         parts.append(replace(Soup.of(corners, slot), uvs=uvs))
     return replace(joined(parts), face_groups=np.zeros(sum(map(len, parts)), dtype=np.int64))
 
@@ -49,24 +54,32 @@ def _collapsed(
     if uvs is not None:
         keys = np.concatenate([keys, np.rint(uvs.reshape(-1, 2) * 1e5).astype(np.int64)], axis=1)
     vertex, first = first_occurrences(keys)
-    triangles = vertex.reshape(-1, 3).astype(np.int32)
-    _, _, collapses = fast_simplification.simplify(
-        unit[first],
+    points, triangles = unit[first], vertex.reshape(-1, 3).astype(np.int32)
+    fewer_points, faces, collapses = fast_simplification.simplify(
+        points,
         triangles,
         target_count=max_faces,
         agg=_CALM,
         return_collapses=True,
         preserve_border=True,
     )
-    points, faces, merged = fast_simplification.replay_simplification(
-        unit[first], triangles, collapses
-    )
-    kept: Float64 = (points.astype(np.float64) * scale + low)[faces]
     if uvs is None:
-        return kept, None
+        if len(faces) > _TOLERATED * max_faces:
+            # Loose sheets are all border: then borders have to give way, too.
+            fewer_points, faces = fast_simplification.simplify(
+                fewer_points, faces.astype(np.int32), target_count=max_faces, agg=_CALM
+            )
+        return _placed(fewer_points, scale, low)[faces], None
+    # Where each vertex went. (The points of a replay are single precision: unfit.)
+    _, _, merged = fast_simplification.replay_simplification(points, triangles, collapses)
     # Borders of the charts stay, so that all that was merged lies in one chart.
-    counts = np.bincount(merged, minlength=len(points))[:, None]
-    sums = np.zeros((len(points), 2))
+    counts = np.bincount(merged, minlength=len(fewer_points))[:, None]
+    sums = np.zeros((len(fewer_points), 2))
     np.add.at(sums, merged, uvs.reshape(-1, 2)[first])
     mean: Float64 = (sums / np.maximum(counts, 1))[faces]
-    return kept, mean
+    return _placed(fewer_points, scale, low)[faces], mean
+
+
+def _placed(unit: Float64, scale: float, low: Float64) -> Float64:
+    placed: Float64 = unit.astype(np.float64) * scale + low
+    return placed

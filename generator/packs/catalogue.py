@@ -61,6 +61,8 @@ class Shared(Strict):
     max_faces: Annotated[int, Field(ge=100)] | None = None
     mass_kg: Annotated[float, Field(gt=0.0)] | None = None
     """By default guessed from the size."""
+    parts: Annotated[int, Field(ge=1, le=24)] | None = None
+    """Bound on the convex parts that it collides with."""
     materials: dict[str, str] = Field(default_factory=dict)
     """Name of a finish by pattern of the material's name."""
 
@@ -180,6 +182,7 @@ def mesh_entry(
         mass_kg=_first(choice.mass_kg, group.mass_kg, float(f"{guess_kg:.2g}")),
         stackable=choice.stackable,
         max_faces=choice.max_faces or group.max_faces or 4000,
+        parts=choice.parts or group.parts or 8,
         materials={pattern: finishes[name] for pattern, name in named.items()},
         keypoints=tuple(
             p for name, place in choice.keypoints.items() for p in _points(name, place)

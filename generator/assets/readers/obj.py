@@ -74,6 +74,9 @@ def _statements(text: str) -> _Statements:
             s.normals.append(rest)
         elif key == "f":
             tokens = rest.split()
+            if len(tokens) == 2:
+                # An edge that an exporter left behind.
+                continue
             if "-" in rest:
                 tokens = [_absolute(token, s) for token in tokens]
             s.corners += tokens

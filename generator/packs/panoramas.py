@@ -1,0 +1,120 @@
+"""The hdri pack: panoramas in OpenEXR, wrapped in JavaScript, to Radiance files.
+
+Radiance (Ward, "Real pixels", Graphics Gems II, 1991) keeps the range and 1 % of precision, and is
+what panoramas of users come in: the library needs no second reader.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import re
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from generator.assets.catalogue import ImageEntry, Index
+from generator.assets.packs import INDEX_NAME, TAG
+from generator.core.errors import AssetError
+from generator.core.geometry import Float32
+
+_DATA_URL = re.compile(rb"base64,([A-Za-z0-9+/=]+)")
+_SUFFIX = ".exr.js"
+
+TAGS: dict[str, tuple[str, ...]] = {
+    "apartment": ("indoor",),
+    "bridge": ("indoor",),
+    "city": ("outdoor", "urban"),
+    "dawn": ("outdoor", "sunset"),
+    "esplanade": ("indoor",),
+    "forest": ("outdoor", "nature"),
+    "hall": ("indoor",),
+    "lab": ("indoor", "industrial"),
+    "lobby": ("indoor",),
+    "night": ("outdoor", "night", "nature"),
+    "park": ("outdoor", "nature"),
+    "sky": ("outdoor", "nature"),
+    "studio": ("indoor", "studio"),
+    "sunrise": ("outdoor", "sunset"),
+    "sunset": ("outdoor", "sunset"),
+    "venice": ("outdoor", "sunset", "urban"),
+    "warehouse": ("indoor", "industrial"),
+    "workshop": ("indoor", "industrial"),
+}
+
+
+def convert(source: Path, target: Path) -> None:
+    """Write every panorama as Radiance .hdr, and their index.
+
+    Raises:
+        AssetError: a panorama is missing or unreadable.
+    """
+    found = {path.name.removesuffix(_SUFFIX): path for path in source.rglob(f"*{_SUFFIX}")}
+    entries = []
+    for name, tags in TAGS.items():
+        if name not in found:
+            raise AssetError(f"{source}: holds no panorama '{name}'")
+        place = str(found[name])
+        (target / f"{name}.hdr").write_bytes(
+            radiance_file(read_exr(exr_bytes(found[name].read_bytes(), place), place))
+        )
+        entries.append(ImageEntry(id=name, file=f"{name}.hdr", tags=tuple(sorted((*tags, TAG)))))
+    index = Index(
+        licence="CC0-1.0",
+        author="Poly Haven",
+        source="npm @pmndrs/assets 1.7.0",
+        environments=tuple(entries),
+    )
+    text = index.model_dump_json(exclude_defaults=True)
+    (target / INDEX_NAME).write_text(text, encoding="utf-8")
+
+
+def exr_bytes(script: bytes, place: str) -> bytes:
+    """The file that a JavaScript module holds as a data URL. Raises AssetError if it has none."""
+    match = _DATA_URL.search(script)
+    try:
+        return base64.b64decode(match[1] if match else b"=", validate=True)
+    except binascii.Error:
+        raise AssetError(f"{place}: holds no base64 data URL") from None
+
+
+def read_exr(data: bytes, place: str) -> Float32:
+    """RGB pixels of an OpenEXR image, float32 [height, width, 3].
+
+    Raises:
+        AssetError: if it is unreadable or lacks a colour.
+    """
+    import OpenEXR
+
+    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
+        file.write(data)
+        file.flush()
+        try:
+            channels = OpenEXR.File(file.name).channels()
+        except (RuntimeError, ValueError, OSError) as error:
+            raise AssetError(f"{place}: unreadable OpenEXR image ({error})") from None
+    for name in ("RGB", "RGBA"):
+        if name in channels:
+            return np.ascontiguousarray(channels[name].pixels[..., :3], dtype=np.float32)
+    if not {"R", "G", "B"} <= set(channels):
+        raise AssetError(f"{place}: has no channels R, G, B")
+    return np.stack([channels[name].pixels for name in "RGB"], axis=-1).astype(np.float32)
+
+
+def radiance_file(rgb: Float32) -> bytes:
+    """A Radiance .hdr file of an image, uncompressed.
+
+    Source: Ward's ``color.c``: the largest component gives the shared exponent, e = 128 biased.
+    """
+    height, width = rgb.shape[:2]
+    rgb = np.maximum(rgb.astype(np.float64), 0.0)
+    brightest = rgb.max(axis=2)
+    mantissa, exponent = np.frexp(brightest)
+    visible = brightest > 1e-32
+    scale = np.where(visible, mantissa * 256.0 / np.where(visible, brightest, 1.0), 0.0)
+    pixels = np.zeros((height, width, 4), dtype=np.uint8)
+    pixels[..., :3] = np.minimum(np.rint(rgb * scale[..., None]), 255.0).astype(np.uint8)
+    pixels[..., 3] = np.where(visible, exponent + 128, 0).astype(np.uint8)
+    header = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
+    return header.encode() + pixels.tobytes()
