@@ -79,6 +79,11 @@ def _above_hairline(p: Array) -> Array:
     return np.asarray(p[:, 2] - np.interp(p[:, 0], x, z))
 
 
+def _neck_hole(p: Array) -> Array:
+    """Positive within the neckline of a garment."""
+    return np.minimum(0.074 - np.hypot(p[:, 0] - 0.012, p[:, 1]), p[:, 2] - 0.48)
+
+
 def _ellipse(y_m: float, z_m: float, half_y_m: float, half_z_m: float, bend: float = 0.0) -> Level:
     """Positive within an upright ellipse on the front of the head, one on either side."""
 
@@ -128,7 +133,7 @@ EYES: Sequence[Cut] = (Cut("eyes", "irises", lambda p: np.asarray(p[:, 0] - 0.13
 TIGHTS: Sequence[Cut] = (
     Cut("hips", "sleeves", _arm_beyond(_SHORT_SLEEVE_M)),
     Cut("hips", "torso", _above(0.13)),
-    Cut("torso", "", _above(0.567, -0.3)),
+    Cut("torso", "", _neck_hole),
     Cut("hips", "thighs", _below(-0.01)),
     Cut("thighs", "shins", _below(-0.31)),
     Cut("shins", "ankles", _below(-0.7)),
