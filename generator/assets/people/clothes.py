@@ -113,7 +113,7 @@ def _hair(person: Person) -> tuple[Layer, ...]:
     hair = Material(person.hair, 0.55, specular=0.5, role="hair")
     if person.haircut in ("bob", "long"):
         zones = ("hair", "hair_end") if person.haircut == "long" else ("hair",)
-        made.append(Layer(tuple((zone, hair) for zone in zones), ((0.0, 0.002),), 0.004, 14.0))
+        made.append(Layer(tuple((zone, hair) for zone in zones), ((0.0, 0.001),), 0.005, 11.0))
     if person.outfit.hat:
         hat = person.outfit.hat_material
         made.append(Layer((("scalp", hat),), ((0.66, 0.008), (0.8, 0.012), (0.85, 0.022))))
@@ -149,7 +149,7 @@ def _tops(outfit: Outfit) -> tuple[Layer, ...]:
     off = {"tshirt": 0.009, "shirt": 0.01, "jacket": 0.018, "coat": 0.018, "dress": 0.006}
     thick = off[outfit.top]
     folds = 0.35 if outfit.top in ("jacket", "coat") else 0.3
-    profile = ((-0.02, thick + 0.008), (0.12, thick + 0.004), (0.5, thick), (0.56, 0.6 * thick))
+    profile = ((-0.02, thick + 0.008), (0.12, thick + 0.004), (0.48, thick), (0.54, 0.3 * thick))
     return (Layer(tuple((zone, material) for zone in zones), profile, folds * thick, 5.0),)
 
 

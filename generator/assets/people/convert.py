@@ -29,7 +29,7 @@ from generator.assets.people.body import (
     four_strongest,
     save,
 )
-from generator.assets.people.cutting import Rows, cut, rows_of, thinned
+from generator.assets.people.cutting import Rows, cut, grid_faces, rows_of, thinned
 from generator.core.errors import AssetError
 
 _RIG = "game_engine"
@@ -37,6 +37,7 @@ _SEXES = ("female", "male")
 _AGES = ("child", "young", "old")
 _ORIGINS = ("african", "asian", "caucasian")
 _METRES_PER_UNIT = 0.1
+_STRANDS = 6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -106,11 +107,34 @@ def _parts(base: _Base) -> Iterator[Rows]:
     yield _cut(base, ("helper-l-eye", "helper-r-eye"), "eyes", zones.EYES)
     yield _cut(base, ("helper-tights",), "hips", zones.TIGHTS)
     yield _cut(base, ("helper-skirt",), "skirt_top", zones.SKIRT)
-    yield _cut(base, ("helper-hair",), "hair", zones.HAIR)
+    yield _divided(_curtain(base), zones.HAIR)
 
 
 def _cut(base: _Base, groups: Sequence[str], zone: str, cuts: Sequence[zones.Cut]) -> Rows:
-    rows = rows_of(base.values, np.concatenate([base.groups[group] for group in groups]), zone)
+    faces = np.concatenate([base.groups[group] for group in groups])
+    return _divided(rows_of(base.values, faces, zone), cuts)
+
+
+def _curtain(base: _Base) -> Rows:
+    """Long hair as one sheet behind the ears.
+
+    The base mesh's own hair is made of strips that hang over the face and part when they are
+    moved; the sheet takes over the shapes and weights of its nearest vertices.
+    """
+    turn = np.linspace(-1.0, 1.0, zones.CURTAIN_COLUMNS) * zones.CURTAIN_REACH_RAD
+    z, length, width = (column[:, None] for column in np.array(zones.CURTAIN_M).T)
+    x = zones.CURTAIN_X_M - length * np.cos(turn)
+    places = np.stack(np.broadcast_arrays(x, width * np.sin(turn), z), axis=2).reshape(-1, 3)
+    strands = base.values[np.unique(base.groups["helper-hair"])]
+    squared = ((places[:, None] - strands[None, :, :3]) ** 2).sum(axis=2)
+    # The mean of the nearest few: neighbours then move alike.
+    nearest = np.argsort(squared, axis=1, kind="stable")[:, :_STRANDS]
+    values = strands[nearest].mean(axis=1)
+    values[:, :3] = places
+    return rows_of(values, grid_faces(*z.shape[:1], zones.CURTAIN_COLUMNS), "hair")
+
+
+def _divided(rows: Rows, cuts: Sequence[zones.Cut]) -> Rows:
     for step in cuts:
         rows = cut(rows, step.zone, step.into, step.level)
     return rows

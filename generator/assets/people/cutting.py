@@ -42,6 +42,14 @@ def rows_of(values: Array, faces: Indices, zone: str) -> Rows:
     return Rows(values, faces, np.full(len(faces), zone, dtype="U16"))
 
 
+def grid_faces(rows: int, columns: int) -> Indices:
+    """Triangles of a grid of points, row by row; seen from the side where rows go down and
+    columns to the right."""
+    i = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
 def cut(rows: Rows, zone: str, into: str, level: Level) -> Rows:
     """Split a zone along a level line; its positive side becomes the zone ``into``."""
     heights = level(rows.values[:, :3])

@@ -68,8 +68,8 @@ def _beyond_wrist(shift_m: float) -> Level:
 def _mouth_inside(p: Array) -> Array:
     """Positive behind the lips and within the cheeks."""
     p = _one_side(p)
-    sides = np.minimum(0.034 - p[:, 1], np.minimum(p[:, 2] - 0.634, 0.7 - p[:, 2]))
-    front = 0.149 - 15.0 * p[:, 1] ** 2 - p[:, 0]
+    sides = np.minimum(0.034 - p[:, 1], np.minimum(p[:, 2] - 0.636, 0.7 - p[:, 2]))
+    front = 0.149 - 40.0 * p[:, 1] ** 2 - p[:, 0]
     return np.minimum(np.minimum(sides, front), p[:, 0] - 0.05)
 
 
@@ -81,7 +81,7 @@ def _above_hairline(p: Array) -> Array:
 
 def _neck_hole(p: Array) -> Array:
     """Positive within the neckline of a garment."""
-    return np.minimum(0.074 - np.hypot(p[:, 0] - 0.012, p[:, 1]), p[:, 2] - 0.48)
+    return np.minimum(0.074 - np.hypot(p[:, 0] - 0.012, p[:, 1]), p[:, 2] - 0.545 + 0.5 * p[:, 0])
 
 
 def _ellipse(y_m: float, z_m: float, half_y_m: float, half_z_m: float, bend: float = 0.0) -> Level:
@@ -94,13 +94,6 @@ def _ellipse(y_m: float, z_m: float, half_y_m: float, half_z_m: float, bend: flo
         return np.minimum((1.0 - np.hypot(y, z)) * half_z_m, p[:, 0] - 0.1)
 
     return level
-
-
-def _before_the_face(p: Array) -> Array:
-    """Positive where hair would hang over ears and face: the front edge recedes downwards."""
-    z = (0.5, 0.7, 0.76, 0.79, 0.806, 0.815)
-    x = (0.03, 0.048, 0.068, 0.092, 0.13, 0.4)
-    return np.asarray(p[:, 0] - np.interp(p[:, 2], z, x))
 
 
 def _one_side(p: Array) -> Array:
@@ -145,11 +138,25 @@ SKIRT: Sequence[Cut] = (
     Cut("skirt_middle", "skirt_end", _below(-0.41)),
     Cut("skirt_end", "", _below(-0.62)),
 )
-HAIR: Sequence[Cut] = (
-    Cut("hair", "", _before_the_face),
-    Cut("hair", "hair_end", _below(0.57)),
-    Cut("hair_end", "", _below(0.44)),
+HAIR: Sequence[Cut] = (Cut("hair", "hair_end", _below(0.57)),)
+
+CURTAIN_M = (
+    (0.785, 0.079, 0.082),
+    (0.75, 0.084, 0.088),
+    (0.71, 0.086, 0.092),
+    (0.67, 0.086, 0.095),
+    (0.63, 0.086, 0.099),
+    (0.6, 0.088, 0.104),
+    (0.57, 0.095, 0.109),
+    (0.53, 0.11, 0.112),
+    (0.49, 0.119, 0.112),
+    (0.44, 0.123, 0.106),
 )
+"""Long hair: height, half length and half width of the ellipses that it hangs along."""
+CURTAIN_X_M = 0.03
+CURTAIN_REACH_RAD = 1.75
+"""From the back of the head to the hair's front edge, behind the ears."""
+CURTAIN_COLUMNS = 15
 
 MAX_FACES = {
     "face": 1200,
@@ -172,7 +179,5 @@ MAX_FACES = {
     "skirt_top": 240,
     "skirt_middle": 140,
     "skirt_end": 140,
-    "hair": 300,
-    "hair_end": 120,
 }
 """Triangles of a zone, both sides together; a zone with fewer keeps what it has."""
