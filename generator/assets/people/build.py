@@ -1,0 +1,132 @@
+"""A person as a mesh: shaped, dressed, posed, set on the ground."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.assets.people import props
+from generator.assets.people.body import LANDMARKS, Array, Body, Indices
+from generator.assets.people.clothes import displaced, layers
+from generator.assets.people.gait import stance
+from generator.assets.people.person import Person
+from generator.assets.people.pose import rotations_of
+from generator.assets.people.skinning import bone_transforms, skinned, vertex_normals
+from generator.assets.procedural.draw import rng_of
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.hulls import extreme
+from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData
+
+_GRID_M = 1e-5
+"""Vertices lie on this grid, so that the last bits of sines do not reach the mesh."""
+_PHASES = 7
+_HULL_POINTS = 40
+
+KEYPOINTS: tuple[tuple[str, str, float], ...] = (
+    ("nose", "nose", 0.02),
+    ("left_eye", "left_eye", 0.03),
+    ("right_eye", "right_eye", 0.03),
+    ("left_ear", "left_ear", 0.03),
+    ("right_ear", "right_ear", 0.03),
+    ("left_shoulder", "upperarm_l", 0.1),
+    ("right_shoulder", "upperarm_r", 0.1),
+    ("left_elbow", "lowerarm_l", 0.08),
+    ("right_elbow", "lowerarm_r", 0.08),
+    ("left_wrist", "hand_l", 0.06),
+    ("right_wrist", "hand_r", 0.06),
+    ("left_hip", "thigh_l", 0.16),
+    ("right_hip", "thigh_r", 0.16),
+    ("left_knee", "calf_l", 0.1),
+    ("right_knee", "calf_r", 0.1),
+    ("left_ankle", "foot_l", 0.09),
+    ("right_ankle", "foot_r", 0.09),
+)
+"""COCO's 17 names in COCO's order; the bone head or landmark of each; its depth under the surface
+of a grown person [m], clothes included."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Sheet:
+    """A finished piece of surface."""
+
+    vertices_m: Array
+    normals: Array
+    faces: Indices
+    slots: Indices
+    materials: tuple[Material, ...]
+
+
+def built(person: Person, body: Body) -> Solid:
+    """The mesh of a person; the origin is on the ground between the feet, +X is ahead."""
+    points = body.shaped(person.figure)
+    scale = person.height_m / float(
+        points[body.landmark("crown"), 2] - points[body.landmark("sole"), 2]
+    )
+    points *= scale
+    bones = len(body.bones)
+    rotations = rotations_of(body, points[:bones], stance(person.pose, person.step))
+    transforms = bone_transforms(body, points[:bones], rotations)
+    sheets = _sheets(person, body, points, transforms)
+    marks = slice(0, bones + len(LANDMARKS))
+    posed = skinned(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
+    sheets += [
+        _Sheet(prop.vertices_m, prop.normals, prop.faces, prop.slots, prop.materials)
+        for prop in props.carried(person, body, posed, transforms, scale)
+    ]
+    mesh, shift = _grounded(sheets, body, posed)
+    keypoints = tuple(
+        Keypoint(name, _vec(posed[_index(body, mark)] + shift), round(radius * scale, 4))
+        for name, mark, radius in KEYPOINTS
+    )
+    hull = extreme(mesh.vertices_m.astype(np.float64), _HULL_POINTS)
+    return Solid(mesh, ConvexParts((hull,)), keypoints)
+
+
+def _sheets(person: Person, body: Body, points: Array, transforms: Array) -> list[_Sheet]:
+    rng = rng_of("person/folds", person.seed)
+    made = []
+    for layer in layers(person):
+        phases = 2.0 * math.pi * np.array([rng.random() for _ in range(_PHASES)])
+        used, places, faces, slots = displaced(body, layer, points, phases)
+        moved = skinned(places, body.weight_bones[used], body.weights[used], transforms)
+        materials = tuple(material for _, material in layer.zones)
+        made.append(_Sheet(moved, vertex_normals(moved, faces), faces, slots, materials))
+    return made
+
+
+def _grounded(sheets: list[_Sheet], body: Body, posed: Array) -> tuple[MeshData, Array]:
+    """The sheets as one mesh whose lowest vertex has z = 0, and the shift that took it there."""
+    vertices = np.concatenate([sheet.vertices_m for sheet in sheets])
+    # Between the ankles lies the origin: a stride reaches as far ahead as behind.
+    middle = 0.5 * (posed[body.bone("foot_l")] + posed[body.bone("foot_r")])
+    shift = np.array([-middle[0], -middle[1], -vertices[:, 2].min()])
+    counts = np.cumsum([0, *(len(sheet.vertices_m) for sheet in sheets)])
+    first_slots = np.cumsum([0, *(len(sheet.materials) for sheet in sheets)])
+    faces = [sheet.faces + first for sheet, first in zip(sheets, counts[:-1], strict=True)]
+    slots = [sheet.slots + first for sheet, first in zip(sheets, first_slots[:-1], strict=True)]
+    return (
+        MeshData(
+            vertices_m=(np.rint((vertices + shift) / _GRID_M) * _GRID_M + 0.0).astype(np.float32),
+            faces=np.concatenate(faces).astype(np.int32),
+            normals=_rounded(np.concatenate([sheet.normals for sheet in sheets])),
+            uvs=np.zeros((len(vertices), 2), np.float32),
+            face_slots=np.concatenate(slots).astype(np.int32),
+            materials=tuple(material for sheet in sheets for material in sheet.materials),
+        ),
+        shift,
+    )
+
+
+def _rounded(normals: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
+    return (np.round(normals, 5) + 0.0).astype(np.float32)
+
+
+def _index(body: Body, mark: str) -> int:
+    return body.landmark(mark) if mark in LANDMARKS else body.bone(mark)
+
+
+def _vec(values: Array) -> tuple[float, float, float]:
+    x, y, z = (round(float(v), 5) + 0.0 for v in values)
+    return (x, y, z)

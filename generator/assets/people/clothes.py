@@ -1,0 +1,183 @@
+"""Layers over a body: skin where it shows, garments that stand off it, hair."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from generator.assets.people.body import Array, Body, Indices
+from generator.assets.people.person import Person
+from generator.assets.people.skinning import vertex_normals
+from generator.assets.people.wardrobe import Outfit
+from generator.core.geometry import Material
+from generator.core.se3 import Vec3
+
+Profile = Sequence[tuple[float, float]]
+"""(height in the template [m], distance from the body [m]), heights rising."""
+
+_SKIN_LIKE = ("face", "lips", "brows", "arms", "hands", "legs")
+_WAVES = 7
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Layer:
+    """Zones of the template that form one sheet.
+
+    Attributes:
+        zones: Each zone and its material.
+        profile: How far the sheet stands off the template.
+        folds_m: Height of its wrinkles.
+        waves_per_m: Of the wrinkles.
+        tapered: Whether the sheet's edge lies on the body (hair).
+    """
+
+    zones: tuple[tuple[str, Material], ...]
+    profile: Profile = ((0.0, 0.0),)
+    folds_m: float = 0.0
+    waves_per_m: float = 6.0
+    tapered: bool = False
+
+
+def layers(person: Person) -> tuple[Layer, ...]:
+    """Everything that is seen of a person, from the skin outwards."""
+    outfit = person.outfit
+    return (
+        _skin(person),
+        *_hair(person),
+        *_bottoms(outfit),
+        *_tops(outfit),
+        _shoes(outfit),
+    )
+
+
+def displaced(
+    body: Body, layer: Layer, points_m: Array, phases: Array
+) -> tuple[Indices, Array, Indices, Indices]:
+    """One layer on a body that is not posed yet.
+
+    Args:
+        body: The template.
+        layer: What to make.
+        points_m: The template in the person's shape [m], shape [points, 3].
+        phases: Of the wrinkles [rad], shape [7].
+
+    Returns:
+        Points used, int64 [n]; their places [m], [n, 3]; faces into them, [m, 3]; the index
+        into ``layer.zones`` of each face, [m].
+    """
+    parts = [(k, body.faces[zone]) for k, (zone, _) in enumerate(layer.zones) if zone in body.faces]
+    faces = np.concatenate([part for _, part in parts])
+    slots = np.concatenate([np.full(len(part), k, dtype=np.int64) for k, part in parts])
+    used = np.zeros(len(body.points_m), dtype=bool)
+    used[faces] = True
+    number = np.cumsum(used) - 1
+    local = number[faces]
+    places = points_m[used]
+    if any(distance for _, distance in layer.profile):
+        heights, distances = zip(*layer.profile, strict=True)
+        template = body.points_m[used]
+        off = np.interp(template[:, 2], heights, distances)
+        if layer.folds_m:
+            off += layer.folds_m * _wrinkles(template * layer.waves_per_m, phases)
+        if layer.tapered:
+            off[_border(local)] = 0.0
+        places = places + off[:, None] * vertex_normals(places, local)
+    return np.flatnonzero(used), places, local, slots
+
+
+def _skin(person: Person) -> Layer:
+    outfit = person.outfit
+    skin = Material(base_color=person.skin, roughness=0.5, specular=0.4, role="skin")
+    r, g, b = person.skin
+    lips = replace(skin, base_color=(0.82 * r, 0.55 * g, 0.55 * b), roughness=0.4)
+    brows = Material(base_color=_mixed(person.hair, person.skin, 0.25), roughness=0.8, role="hair")
+    zones = [("face", skin), ("lips", lips), ("brows", brows), ("hands", skin)]
+    if person.haircut == "bald" and not outfit.hat:
+        zones.append(("scalp", skin))
+    if not outfit.sleeves:
+        zones.append(("arms", skin))
+    if outfit.bottom in ("shorts", "skirt", "none"):
+        stockings = Material((0.02, 0.02, 0.024), 0.7, specular=0.3, role="bottom")
+        bare = outfit.bottom == "shorts" or not outfit.stockings
+        zones.append(("legs", skin if bare else stockings))
+    return Layer(tuple(zones))
+
+
+def _hair(person: Person) -> tuple[Layer, ...]:
+    white = Material((0.72, 0.7, 0.68), 0.15, role="eyes")
+    iris = Material((0.035, 0.022, 0.014), 0.1, role="eyes")
+    made = [Layer((("eyes", white), ("irises", iris)))]
+    hair = Material(person.hair, 0.55, specular=0.5, role="hair")
+    if person.haircut in ("bob", "long"):
+        zones = ("hair", "hair_end") if person.haircut == "long" else ("hair",)
+        made.append(Layer(tuple((zone, hair) for zone in zones), ((0.0, 0.001),), 0.005, 11.0))
+    if person.outfit.hat:
+        hat = person.outfit.hat_material
+        made.append(Layer((("scalp", hat),), ((0.66, 0.008), (0.8, 0.012), (0.85, 0.022))))
+    elif person.haircut != "bald":
+        thick = 0.006 if person.haircut == "cropped" else 0.016
+        profile = ((0.66, 0.6 * thick), (0.76, 0.7 * thick), (0.84, 1.4 * thick))
+        made.append(Layer((("scalp", hair),), profile, 0.22 * thick, 16.0, tapered=True))
+    return tuple(made)
+
+
+def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
+    material = outfit.bottom_material
+    if outfit.bottom == "trousers":
+        zones = ("hips", "thighs", "shins", "ankles")
+        profile = ((-0.78, 0.024), (-0.7, 0.018), (-0.36, 0.013), (0.0, 0.008), (0.12, 0.005))
+        return (Layer(tuple((zone, material) for zone in zones), profile, 0.0028, 5.0),)
+    if outfit.bottom == "shorts":
+        profile = ((-0.31, 0.022), (0.0, 0.01), (0.12, 0.005))
+        return (Layer((("hips", material), ("thighs", material)), profile, 0.003),)
+    if outfit.bottom == "skirt":
+        zones = ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
+        return (Layer(tuple((zone, material) for zone in zones), ((0.0, 0.001),), 0.001),)
+    return ()
+
+
+def _tops(outfit: Outfit) -> tuple[Layer, ...]:
+    material = outfit.top_material
+    zones = ["torso", *(("sleeves",) if outfit.sleeves else ())]
+    if outfit.top in ("tshirt", "shirt", "jacket"):
+        zones.append("hips")
+    if outfit.top in ("dress", "coat"):
+        zones += ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
+    off = {"tshirt": 0.009, "shirt": 0.01, "jacket": 0.018, "coat": 0.018, "dress": 0.006}
+    thick = off[outfit.top]
+    folds = 0.35 if outfit.top in ("jacket", "coat") else 0.3
+    profile = ((-0.02, thick + 0.008), (0.12, thick + 0.004), (0.48, thick), (0.54, 0.3 * thick))
+    return (Layer(tuple((zone, material) for zone in zones), profile, folds * thick, 5.0),)
+
+
+def _shoes(outfit: Outfit) -> Layer:
+    sole = Material((0.03, 0.03, 0.03), 0.85, role="shoes")
+    zones = (("ankles", outfit.shoe_material), ("shoes", outfit.shoe_material), ("soles", sole))
+    return Layer(zones[0 if outfit.bottom == "trousers" else 1 :], ((-0.8, 0.012), (-0.74, 0.006)))
+
+
+def _wrinkles(p: Array, phases: Array) -> Array:
+    """Soft folds in [-1, 1], shape [n]: a few plane waves whose directions are a golden spiral."""
+    total = np.zeros(len(p))
+    for k in range(_WAVES):
+        turn = 2.399963 * k
+        z = 1.0 - (2.0 * k + 1.0) / _WAVES
+        r = math.sqrt(1.0 - z * z)
+        wave = p[:, 0] * (r * math.cos(turn)) + p[:, 1] * (r * math.sin(turn)) + p[:, 2] * z
+        total += np.sin(2.0 * math.pi * wave + phases[k])
+    return total / _WAVES
+
+
+def _border(faces: Indices) -> Indices:
+    """Vertices on edges that only one face has."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    unique, counts = np.unique(edges, axis=0, return_counts=True)
+    return np.unique(unique[counts == 1])
+
+
+def _mixed(a: Vec3, b: Vec3, share: float) -> Vec3:
+    x, y, z = ((1.0 - share) * p + share * q for p, q in zip(a, b, strict=True))
+    return (x, y, z)

@@ -1,0 +1,182 @@
+"""Who a person is: drawn from a seed, before anything is built."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, cast
+
+from generator.assets.people.gait import BEHAVIOURS, PHASES, POSES, PoseName
+from generator.assets.people.wardrobe import Outfit, drawn_outfit
+from generator.assets.procedural.draw import between, chance, pick, rng_of
+from generator.assets.procedural.family import Facts
+from generator.assets.procedural.materials import jittered, linear
+from generator.core.errors import did_you_mean
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+
+Sex = Literal["female", "male"]
+AgeGroup = Literal["child", "adult", "senior"]
+
+_CHILD_SHARE, _SENIOR_SHARE = 0.1, 0.14
+# Mean and standard deviation [m] of adults: Fryar, Carroll, Gu, Afful and Ogden, "Anthropometric
+# reference data for children and adults: United States, 2015-2018", NCHS 2021, tables 9 to 12.
+_HEIGHT_M = {"female": (1.613, 0.07), "male": (1.753, 0.075)}
+_ADULT_M = (1.5, 1.95)
+# Median from 6 to 12 years: de Onis et al., "Development of a WHO growth reference for school-aged
+# children and adolescents", Bulletin of the WHO 85(9), 2007.
+_CHILD_M = (1.16, 1.5)
+
+# Light to dark, after the six types of Fitzpatrick, Archives of Dermatology 124(6), 1988.
+_SKIN = ("#f0cdb8", "#e3b797", "#cf9f78", "#b07f57", "#80543a", "#4f3527")
+_HAIR = ("#14100e", "#1f1713", "#32221a", "#4a3223", "#6b4a2f", "#8f6b42", "#b8935c", "#6d3a22")
+_GREY = ("#6f6c69", "#9b9894", "#c9c6c1")
+_HAIRCUTS = {
+    "female": ("long", "long", "bob", "bob", "short", "long"),
+    "male": ("short", "short", "short", "cropped", "cropped", "bald"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """A person's looks and what they do.
+
+    Attributes:
+        figure: Strength of each word of the body's shapes.
+        haircut: ``bald``, ``cropped``, ``short``, ``bob`` or ``long``.
+        step: Sixteenth of the stride of the left leg.
+    """
+
+    seed: int
+    sex: Sex
+    age_group: AgeGroup
+    height_m: float
+    figure: Mapping[str, float]
+    skin: Vec3
+    hair: Vec3
+    haircut: str
+    outfit: Outfit
+    pose: PoseName
+    step: int
+
+
+def drawn_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
+    """The person of a seed.
+
+    Args:
+        seed: Of everything that is left open.
+        pose: One of ``POSES``; empty = drawn.
+        phase: Of the stride, in [0, 1), rounded to sixteenths; negative = drawn.
+
+    Raises:
+        ValueError: on a pose that does not exist or a phase that is no number.
+    """
+    if pose and pose not in POSES:
+        raise ValueError(
+            f"pose '{pose}' is none of {', '.join(POSES)}{did_you_mean(pose, POSES)}"
+        )
+    rng = rng_of("person", seed)
+    sex: Sex = "female" if chance(0.5, rng) else "male"
+    age_group = _drawn_age(rng)
+    height_m = _drawn_height_m(sex, age_group, rng)
+    tone = min(int(rng.random() * len(_SKIN)), len(_SKIN) - 1)
+    figure = _drawn_figure(sex, age_group, height_m, tone, rng)
+    return Person(
+        seed=seed,
+        sex=sex,
+        age_group=age_group,
+        height_m=height_m,
+        figure=figure,
+        skin=jittered(linear(_SKIN[tone]), 0.07, rng),
+        hair=_drawn_hair(age_group, tone, rng),
+        haircut=pick(_HAIRCUTS[sex], rng),
+        outfit=drawn_outfit(sex, age_group == "child", rng),
+        **_drawn_action(seed, pose, phase),
+    )
+
+
+def facts(seed: int, pose: str, phase: float) -> Facts:
+    """What labels say of the person of a seed."""
+    person = drawn_person(seed, pose, phase)
+    return Facts(
+        "child" if person.age_group == "child" else "adult",
+        {
+            "sex": person.sex,
+            "age_group": person.age_group,
+            "pose": person.pose,
+            "behaviour": BEHAVIOURS[person.pose],
+            "height_m": f"{person.height_m:.2f}",
+        },
+    )
+
+
+def _drawn_age(rng: Rng) -> AgeGroup:
+    draw = float(rng.random())
+    if draw < _CHILD_SHARE:
+        return "child"
+    return "senior" if draw < _CHILD_SHARE + _SENIOR_SHARE else "adult"
+
+
+def _drawn_height_m(sex: Sex, age_group: AgeGroup, rng: Rng) -> float:
+    """A height [m], whole centimetres."""
+    if age_group == "child":
+        return round(between(*_CHILD_M, rng), 2)
+    mean, deviation = _HEIGHT_M[sex]
+    # Irwin and Hall: twelve uniforms add up to nearly a normal, exactly alike everywhere.
+    normal = sum(float(rng.random()) for _ in range(12)) - 6.0
+    return round(min(max(mean + deviation * normal, _ADULT_M[0]), _ADULT_M[1]), 2)
+
+
+def _drawn_figure(
+    sex: Sex, age_group: AgeGroup, height_m: float, tone: int, rng: Rng
+) -> dict[str, float]:
+    """Strength of every word that names of shapes use."""
+    figure = {"universal": 1.0, sex: 1.0}
+    grown = 0.0
+    if age_group == "child":
+        grown = 0.75 * max(0.0, (height_m - 1.3) / (_CHILD_M[1] - 1.3))
+        figure |= {"child": 1.0 - grown, "young": grown}
+    else:
+        old = between(0.55, 1.0, rng) if age_group == "senior" else between(0.0, 0.35, rng)
+        figure |= {"old": old, "young": 1.0 - old}
+    figure |= _three("muscle", between(-0.5, 0.6 if sex == "male" else 0.2, rng))
+    figure |= _three("weight", between(-0.7, 0.8, rng) if age_group != "child" else -0.1)
+    if age_group != "child":
+        mean, _ = _HEIGHT_M[sex]
+        tall = max(-0.6, min(0.6, (height_m - mean) / 0.3))
+        figure |= {"maxheight": max(0.0, tall), "minheight": max(0.0, -tall)}
+    main = ("caucasian", "asian", "african")[0 if tone < 2 else 1 if tone < 4 else 2]
+    other = pick(("caucasian", "asian", "african"), rng)
+    share = between(0.0, 0.4, rng)
+    figure[main] = 1.0 - share
+    figure[other] = figure.get(other, 0.0) + share
+    return figure
+
+
+def _three(word: str, value: float) -> dict[str, float]:
+    """Strengths of least, average and most for a value in [-1, 1]."""
+    return {
+        f"min{word}": max(0.0, -value),
+        f"average{word}": 1.0 - abs(value),
+        f"max{word}": max(0.0, value),
+    }
+
+
+def _drawn_hair(age_group: AgeGroup, tone: int, rng: Rng) -> Vec3:
+    if age_group == "senior" and chance(0.8, rng):
+        return jittered(linear(pick(_GREY, rng)), 0.1, rng)
+    # Fair hair belongs to fair skin.
+    return jittered(linear(pick(_HAIR[: 8 if tone < 2 else 4 if tone < 4 else 2], rng)), 0.12, rng)
+
+
+def _drawn_action(seed: int, pose: str, phase: float) -> dict[str, object]:
+    """Pose and step; they have a stream of their own, so that the same person can do anything."""
+    rng = rng_of("person/pose", seed)
+    drawn = pick(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3, rng)
+    step = min(int(rng.random() * PHASES), PHASES - 1)
+    if not math.isfinite(phase):
+        raise ValueError("phase is no number")
+    if phase >= 0.0:
+        step = round(phase * PHASES) % PHASES
+    return {"pose": cast(PoseName, pose or drawn), "step": step}

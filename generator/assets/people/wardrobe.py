@@ -1,0 +1,127 @@
+"""What people wear: garments, colours and patterns as streets show them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from generator.assets.procedural.draw import between, chance, pick
+from generator.assets.procedural.materials import jittered, linear
+from generator.core.geometry import Material
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+
+_DARK = ("#1b1c1f", "#23262e", "#2c2f36", "#1d2740", "#26324a", "#39404d", "#3b3530")
+_JACKETS = (*_DARK, "#1b1c1f", "#4a5260", "#4d4a3a", "#5a4636", "#7c7468", "#6e1f24", "#35506e")
+_TOPS = (
+    "#e9e7e2",
+    "#d9d6cf",
+    "#9aa0a6",
+    "#5c6670",
+    "#1f2023",
+    "#22304c",
+    "#3f6a96",
+    "#7fa3c4",
+    "#7d2a2f",
+    "#b4443a",
+    "#3f5f46",
+    "#c9a23e",
+    "#c48a92",
+    "#5b4668",
+)
+_BRIGHT = ("#d63a2f", "#e8a020", "#f0d32c", "#2f9a58", "#2774c4", "#e56aa0", "#30a7b0")
+_DENIM = ("#2a3a57", "#3c5274", "#5f7898", "#22283a", "#1f2229")
+_TROUSERS = (*_DARK, "#1b1c1f", "#4a4640", "#6d6454", "#8b8271", "#3f4a3c", "#5d5f63")
+_SKIRTS = (*_DARK, "#6e2433", "#4d5d48", "#8d7f6d", "#3a567c", "#a35a4e")
+_SHOES = ("#141416", "#1d1a18", "#33241a", "#5a3d28", "#e4e2de", "#c9c7c2", "#4a4d54", "#26344f")
+_BAGS = ("#17181b", "#2a2522", "#5b3a24", "#26344a", "#6b6f74", "#7a2a2c", "#3d4a35")
+_WARM_FABRICS = tuple(f"texture/fabric?seed={k}" for k in (2, 5, 9))
+_STRIPES = tuple(f"texture/stripes?seed={k}" for k in (3, 6))
+"""Few textures, shared by everybody: each one that a picture uses costs its upload."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outfit:
+    """What one person wears.
+
+    Attributes:
+        top: ``tshirt``, ``shirt``, ``jacket``, ``coat`` or ``dress``.
+        bottom: ``trousers``, ``shorts``, ``skirt`` or, under a dress, ``none``.
+        skirt_zones: How many of the skirt's three zones skirt, dress or coat reach down to.
+        bag: ``""``, ``backpack`` or ``handbag``.
+        hat: Whether a knitted hat is worn.
+        stockings: Whether legs that show are covered.
+    """
+
+    top: str
+    bottom: str
+    skirt_zones: int
+    sleeves: bool
+    bag: str
+    hat: bool
+    stockings: bool
+    top_material: Material
+    bottom_material: Material
+    shoe_material: Material
+    bag_material: Material
+    hat_material: Material
+
+
+def drawn_outfit(sex: str, child: bool, rng: Rng) -> Outfit:
+    """An outfit that suits."""
+    woman = sex == "female"
+    tops = ("jacket",) * 5 + ("shirt",) * 4 + ("tshirt",) * 3 + ("coat",) * (0 if child else 3)
+    top = pick(tops + ("dress",) * (3 if woman else 0), rng)
+    bottoms = ("trousers",) * 9 + ("shorts",) * (2 if top in ("tshirt", "shirt") else 0)
+    bottom = pick(bottoms + ("skirt",) * (3 if woman else 0), rng)
+    if top == "dress":
+        bottom = "none"
+    reach = pick((1, 2, 2, 3), rng)
+    return Outfit(
+        top=top,
+        bottom=bottom,
+        skirt_zones=min(reach, 2) if top == "coat" else reach,
+        sleeves=top in ("shirt", "jacket", "coat") or (top == "dress" and chance(0.4, rng)),
+        bag=pick(("", "", "", "backpack", "handbag" if woman and not child else ""), rng),
+        hat=top in ("jacket", "coat") and chance(0.2, rng),
+        stockings=top == "coat" or chance(0.5, rng),
+        top_material=_top(top, child, rng),
+        bottom_material=_bottom(bottom, rng),
+        shoe_material=_plain(_SHOES, between(0.35, 0.7, rng), "shoes", rng),
+        bag_material=_plain(_BAGS, between(0.45, 0.8, rng), "bag", rng),
+        hat_material=_plain((*_DARK, *_TOPS), 0.95, "hat", rng),
+    )
+
+
+def _top(kind: str, child: bool, rng: Rng) -> Material:
+    if kind in ("jacket", "coat"):
+        colors = _BRIGHT if chance(0.35 if child else 0.1, rng) else _JACKETS
+        return _plain(colors, between(0.55, 0.9, rng), "top", rng)
+    pattern, seed = float(rng.random()), float(rng.random())
+    if kind != "tshirt" and pattern < 0.12:
+        return _patterned(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22, "top")
+    if pattern < 0.12:
+        return _patterned(_STRIPES[int(seed * len(_STRIPES))], 0.3, "top")
+    colors = _BRIGHT if chance(0.4 if child else 0.15, rng) else _TOPS
+    return _plain(colors, between(0.75, 0.95, rng), "top", rng)
+
+
+def _bottom(kind: str, rng: Rng) -> Material:
+    colors = _SKIRTS if kind == "skirt" else _DENIM if chance(0.42, rng) else _TROUSERS
+    return _plain(colors, between(0.75, 0.95, rng), "bottom", rng)
+
+
+def _plain(colors: Sequence[str], roughness: float, role: str, rng: Rng) -> Material:
+    color: Vec3 = jittered(linear(pick(colors, rng)), 0.12, rng)
+    return Material(base_color=color, roughness=roughness, specular=0.35, role=role)
+
+
+def _patterned(texture: str, scale_m: float, role: str) -> Material:
+    return Material(
+        base_color=(0.9, 0.9, 0.9),
+        roughness=0.9,
+        specular=0.35,
+        texture=texture,
+        texture_scale_m=scale_m,
+        role=role,
+    )
