@@ -79,8 +79,9 @@ def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint
     finest = _with_fourth(cv2.LUT(albedo, root_of), roughness)
     levels = [finest]
     if max(finest.shape[:2]) > 1:
-        squared = halved(cv2.multiply(finest, finest, dtype=cv2.CV_16U))
-        image = squared.astype(np.float32) * np.float32(255.0**-2)
+        squared = finest.astype(np.uint16)
+        squared *= squared
+        image = halved(squared).astype(np.float32) * np.float32(255.0**-2)
         levels += [_in_bytes(cv2.sqrt(level)) for level in _halvings(image)]
     return [level.shape[0] * level.shape[1] for level in levels], _packed(levels)
 
@@ -105,8 +106,7 @@ def _halvings(image: Pixels) -> list[Pixels]:
 
 def _with_fourth(three: Pixels, fourth: Pixels) -> Pixels:
     """Three channels and one more."""
-    four = np.zeros((*fourth.shape, 4), fourth.dtype)
-    cv2.mixChannels([three, fourth], [four], [0, 0, 1, 1, 2, 2, 3, 3])
+    four: Pixels = cv2.merge([*cv2.split(three), fourth])
     return four
 
 

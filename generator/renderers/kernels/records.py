@@ -37,6 +37,7 @@ class Geometry:
 
     Attributes:
         faces: Three vertex indices per face, flat.
+        box_lows_m, box_highs_m: Corners of boxes that together hold all faces.
         convex: 1 where the mesh is a convex solid: seen from outside it never shades itself.
     """
 
@@ -46,6 +47,8 @@ class Geometry:
     uvs: wp.array(dtype=wp.vec2)
     faces: wp.array(dtype=wp.int32)
     face_slots: wp.array(dtype=wp.int32)
+    box_lows_m: wp.array(dtype=wp.vec3)
+    box_highs_m: wp.array(dtype=wp.vec3)
     low_m: wp.vec3
     high_m: wp.vec3
     convex: int

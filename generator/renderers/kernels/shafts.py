@@ -9,15 +9,14 @@ import warp as wp
 
 from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.lighting import SUN, SUN_DISTANCE_M
+from generator.renderers.kernels.rays import path_along
 from generator.renderers.kernels.records import (
     Lamp,
     World,
-    corners_of,
     greater,
     lesser,
     to_mesh_point,
     to_mesh_vector,
-    vertex_at,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -26,7 +25,6 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 TILE = wp.constant(8)
 # Longer lists are not worth their memory: rays then use the hierarchy over all bodies.
 LIST_LENGTH = wp.constant(48)
-TRIANGLES_LOOKED_AT = wp.constant(64)
 
 
 @wp.struct
@@ -79,12 +77,14 @@ class Shaft:
 
     Attributes:
         start, way: From the tile's centre to the lamp's.
+        inverse: Reciprocals of ``way``.
         radius, end_radius: Of a tube around it that holds the tile, and the lamp.
         normal, height: Plane below which nothing shades the tile, if ``flat``.
     """
 
     start: wp.vec3
     way: wp.vec3
+    inverse: wp.vec3
     radius: float
     end_radius: float
     flat: int
@@ -99,6 +99,7 @@ def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     shaft = Shaft()
     shaft.start = to_mesh_point(world, b, tile.centre_m)
     shaft.way = to_mesh_vector(world, b, way)
+    shaft.inverse = path_along(shaft.start, shaft.way).inverse
     shaft.radius = tile.radius_m * shrink
     shaft.end_radius = radius_m * shrink
     shaft.flat = tile.flat
@@ -111,15 +112,12 @@ def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
 @wp.func
 def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
     """The stretch of a shaft's axis that lies in a grown box; empty if it ends before it begins."""
-    t0 = float(0.0)
-    t1 = float(1.0)
-    for k in range(3):
-        a = low[k] - grown - shaft.start[k]
-        c = high[k] + grown - shaft.start[k]
-        inverse = 1.0 / wp.where(wp.abs(shaft.way[k]) < 1.0e-20, 1.0e-20, shaft.way[k])
-        t0 = greater(t0, lesser(a * inverse, c * inverse))
-        t1 = lesser(t1, greater(a * inverse, c * inverse))
-    return t0, t1
+    margin = wp.vec3(grown, grown, grown)
+    a = wp.cw_mul(low - shaft.start - margin, shaft.inverse)
+    c = wp.cw_mul(high - shaft.start + margin, shaft.inverse)
+    t0 = greater(greater(lesser(a[0], c[0]), lesser(a[1], c[1])), lesser(a[2], c[2]))
+    t1 = lesser(lesser(greater(a[0], c[0]), greater(a[1], c[1])), greater(a[2], c[2]))
+    return greater(t0, 0.0), lesser(t1, 1.0)
 
 
 @wp.func
@@ -140,38 +138,17 @@ def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
 
 
 @wp.func
-def triangles_touch(shaft: Shaft, world: World, g: int):
-    """Whether any triangle may reach into a shaft; True where it is tedious to know.
+def boxes_touch(shaft: Shaft, world: World, g: int):
+    """Whether any of a mesh's boxes may reach into a shaft.
 
-    Bodies that surround the scene (a room) or are long and slanted have boxes that touch
-    everything; their triangles do not.
+    Bodies that surround the scene (a room), have holes or are long and slanted have one box that
+    touches everything; the many boxes around their faces do not.
     """
-    here = wp.vec3(shaft.radius, shaft.radius, shaft.radius)
-    there = wp.vec3(shaft.end_radius, shaft.end_radius, shaft.end_radius)
-    end = shaft.start + shaft.way
-    query = wp.mesh_query_aabb(
-        world.geometries[g].mesh,
-        wp.min(shaft.start - here, end - there),
-        wp.max(shaft.start + here, end + there),
-    )
     found = bool(False)
-    face = int(0)
-    looked_at = int(0)
-    while wp.mesh_query_aabb_next(query, face):
-        corner = corners_of(world, g, face)
-        a = vertex_at(world, g, corner[0])
-        b = vertex_at(world, g, corner[1])
-        c = vertex_at(world, g, corner[2])
-        rises = bool(True)
-        if shaft.flat != 0:
-            top = wp.max(wp.dot(shaft.normal, a), wp.dot(shaft.normal, b))
-            rises = wp.max(top, wp.dot(shaft.normal, c)) > shaft.height
-        looked_at += 1
-        if looked_at > TRIANGLES_LOOKED_AT:
+    for k in range(world.geometries[g].box_lows_m.shape[0]):
+        low = world.geometries[g].box_lows_m[k]
+        if touches(shaft, low, world.geometries[g].box_highs_m[k]):
             found = True
-        elif rises and touches(shaft, wp.min(a, wp.min(b, c)), wp.max(a, wp.max(b, c))):
-            found = True
-        if found:
             break
     return found
 
@@ -191,7 +168,7 @@ def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     shaft = shaft_to(world, b, tile, way, radius_m)
     shades = touches(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
     if shades:
-        shades = triangles_touch(shaft, world, g)
+        shades = boxes_touch(shaft, world, g)
     return shades
 
 
