@@ -24,9 +24,10 @@ from generator.core.scene import Body, Light, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase, materials_of
-from randomizers.color_space import linear_of_temperature
+from randomizers.color_space import LUMINANCE, linear_of_temperature
 from randomizers.daylight import is_dark
 
+_WHITE_K = 3400.0
 LAMP, WINDOW = "lamp", "window"
 """Roles of material slots, and the keypoint of a lamp's light."""
 
@@ -41,7 +42,7 @@ class StreetLights(RandomizerBase):
         when: dark: when time_of_day or weather, listed before it, has put the sun below the
             horizon. always: by day, too.
         flux_lm: Luminous flux of one lamp.
-        temperature_k: Of all lamps of a scene: 2000 sodium, 3000 to 4000 LED.
+        temperature_k: Of all lamps of a scene: 2300 sodium, 3000 to 4000 LED.
         cone_deg: Half angle of the cone in which a lamp sends its light down.
         broken: Whether a lamp stays dark.
         lamp_luminance_cd_m2: Of a lamp's glowing part.
@@ -54,20 +55,20 @@ class StreetLights(RandomizerBase):
     when: Literal["dark", "always"] = "dark"
     flux_lm: Positive = Uniform(4000.0, 10_000.0)
     temperature_k: Annotated[Scalar, Bounds(1667, 25_000)] = Choice(
-        {2000.0: 2.0, 3000.0: 3.0, 4000.0: 2.0}
+        {2300.0: 2.0, 3000.0: 3.0, 4000.0: 2.0}
     )
     cone_deg: Annotated[Scalar, Bounds(10, 85)] = Uniform(62.0, 74.0)
     broken: Flag = Probability(0.03)
     lamp_luminance_cd_m2: Positive = LogUniform(8000.0, 30_000.0)
     windows: Flag = Probability(0.35)
-    window_luminance_cd_m2: Positive = LogUniform(4.0, 40.0)
+    window_luminance_cd_m2: Positive = LogUniform(2.0, 20.0)
     window_temperature_k: Annotated[Scalar, Bounds(1667, 25_000)] = Uniform(2400.0, 4500.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with its lamps on; by day the scene as it is."""
         if self.when == "dark" and not is_dark(scene):
             return scene
-        color = linear_of_temperature(self.temperature_k.draw(rng))
+        color = balanced_color(self.temperature_k.draw(rng))
         flux_lm, cone_rad = self.flux_lm.draw(rng), math.radians(self.cone_deg.draw(rng))
         glow = _times(color, self.lamp_luminance_cd_m2.draw(rng))
         lights, bodies = list(scene.lights), []
@@ -86,8 +87,21 @@ class StreetLights(RandomizerBase):
         return replace(scene, bodies=tuple(bodies), lights=tuple(lights))
 
     def _window(self, rng: Rng) -> Vec3:
-        color = linear_of_temperature(self.window_temperature_k.draw(rng))
+        color = balanced_color(self.window_temperature_k.draw(rng))
         return _times(color, self.window_luminance_cd_m2.draw(rng))
+
+
+def balanced_color(temperature_k: float) -> Vec3:
+    """Colour of a lamp for a camera half adapted to a street at night, luminance 1.
+
+    Images are balanced for daylight; no camera leaves it at that under sodium lamps.
+    """
+    lamp = linear_of_temperature(temperature_k)
+    white = linear_of_temperature(_WHITE_K)
+    rgb = [part / reference**0.5 for part, reference in zip(lamp, white, strict=True)]
+    luminance = sum(weight * part for weight, part in zip(LUMINANCE, rgb, strict=True))
+    red, green, blue = (round(part / luminance, 6) for part in rgb)
+    return (red, green, blue)
 
 
 def spot_intensity_cd(flux_lm: float, cone_rad: float) -> float:

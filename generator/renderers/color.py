@@ -11,8 +11,11 @@ from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
 from generator.renderers.kernels import antialias, gather, records, shade, tone
 from generator.renderers.kernels.raster import Z_NEAR_M
+from generator.renderers.lamps import keep_main_lamps
+from generator.renderers.lens import add_glare, wet_lens
 from generator.renderers.occlusion import lamp_parts, openness, sampled_lattice, sunflower
 from generator.renderers.packing import PackedWorld
+from generator.renderers.precipitation import draw_precipitation
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
@@ -33,11 +36,15 @@ def color_image(
     """sRGB, uint8 [h, w, 3]."""
     device, n = stock.device, view.width * view.height
     images = _images(seen)
+    keep_main_lamps(world, view, seen, stock, settings.max_lamps)
     radiance = _shaded(world, view, seen, images, stock, settings)
     fill_air(world, view, images, radiance, stock)
     ev100 = camera.ev100
     if ev100 is None:
         ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
+    draw_precipitation(world, camera, view, seen.z_m, radiance, ev100=ev100, stock=stock)
+    wet_lens(world.weather, camera, view, radiance, stock)
+    add_glare(view, settings.glare, radiance, stock)
     exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
     curve = wp.array(tone_curve(settings.tone), dtype=wp.uint8, device=device)
     rgb = wp.zeros((n, 3), dtype=wp.uint8, device=device)

@@ -79,7 +79,9 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     world.lamps = upload(_lamps(scene.lights), records.Lamp)
     world.lobes = stock.lobes
     world.sky = _sky(scene.environment, environment)
-    return PackedWorld(world, (tree, meshes, textures, environment), placed, vertex_count, scene.weather)
+    return PackedWorld(
+        world, (tree, meshes, textures, environment), placed, vertex_count, scene.weather
+    )
 
 
 def pack_view(camera: Camera) -> records.View:

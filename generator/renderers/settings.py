@@ -19,6 +19,9 @@ class RenderSettings(Strict):
             switches ambient occlusion off.
         exposure_compensation_ev: Added to the exposure, in stops; positive is brighter.
         tone: ``filmic`` has a soft shoulder and toe; ``srgb`` clips at white.
+        glare: Share of the light that the lens scatters around bright sources; 0.02 suits a clean
+            lens, 0.1 a dirty one.
+        max_lamps: Of a scene's lights, as many as give most of the light at what is seen.
         visibility: How the surface at a pixel centre is found: ``raster`` (CPU only), ``rays``,
             or the faster one on the device.
     """
@@ -28,4 +31,6 @@ class RenderSettings(Strict):
     ambient_occlusion_radius_m: float = Field(0.25, ge=0.0)
     exposure_compensation_ev: float = Field(0.0, ge=-10.0, le=10.0)
     tone: Literal["filmic", "srgb"] = "filmic"
+    glare: float = Field(0.0, ge=0.0, le=0.5)
+    max_lamps: int = Field(16, ge=1)
     visibility: Literal["auto", "raster", "rays"] = "auto"

@@ -16,7 +16,7 @@ from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
 
 # Standard deviation of kernels.ground.patches; it is close to normal.
-_PATCH_DEVIATION = 0.40
+_PATCH_DEVIATION = 0.513
 _FILM_RAYS = 3
 
 
@@ -51,11 +51,13 @@ def fill_air(
     """Reflections in water, then fog; in place."""
     weather, n = world.weather, view.width * view.height
     if weather.wetness + weather.puddles > 0.0:
-        wet = stock.scratch("wet", n, wp.vec3)
+        water = stock.scratch("water", n, wp.vec2)
+        mirror = stock.scratch("mirror", n, wp.vec4)
         ripples = min(0.004 * weather.rain_mm_h, 0.05)
         inputs = [view, world.record, images, radiance, ripples, _FILM_RAYS]
-        wp.launch(kernels.mirror_in_water, n, inputs, [wet], device=stock.device)
-        wp.copy(radiance, wet)
+        wp.launch(kernels.mirror_in_water, n, inputs, [water, mirror], device=stock.device)
+        inputs = [view, images, water, mirror]
+        wp.launch(kernels.lay_water, n, inputs, [radiance], device=stock.device)
     if weather.fog_extinction_per_m > 0.0:
         inputs = [view, world.record, images, fog_of(weather)]
         wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=stock.device)

@@ -62,9 +62,11 @@ _ZENITH_Y = np.array(
 # A cloud deck (about 6600 K), the clear horizon, a city's glow, clean night air, land from afar.
 _DECK = np.array((0.967, 1.0, 1.097))
 _HORIZON = np.array((0.89, 1.0, 1.32))
-_CITY = np.array((1.45, 0.93, 0.37))
+_CITY = np.array((1.22, 0.97, 0.65))
 _AIRGLOW = np.array((0.62, 0.95, 2.6))
 _SOIL = np.array((1.05, 1.02, 0.80))
+# A lit city from above: about 5 lx (EN 13201-2, class P3) on an albedo of an eighth.
+_STREETS_CD_M2 = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,12 +223,13 @@ def _night(d: Array, model: SkyModel) -> Array:
     """Airglow, and a city's lights scattered back: strongest low, or from the clouds' bases."""
     up = np.maximum(d[..., 2:], 0.0)
     glow = (0.35 + 0.65 * np.exp(-up / 0.22)) * _CITY
-    clear = 0.22 * _AIRGLOW + glow
+    clear: Array = 0.22 * _AIRGLOW + glow
     if model.cloudiness == 0.0:
         return clear
     cover, light = cloud_layer(d, model.cloudiness, 1.0, rng_of("sky", model.seed))
     clouds = 5.0 * _CITY * (0.4 + 0.6 * light[..., None]) * (0.6 + 0.4 * np.exp(-up / 0.4))
-    return clear + cover[..., None] * (clouds - clear)
+    mixed: Array = clear + cover[..., None] * (clouds - clear)
+    return mixed
 
 
 def _land(image: Array, d: Array, model: SkyModel) -> Array:
@@ -237,6 +240,7 @@ def _land(image: Array, d: Array, model: SkyModel) -> Array:
     light = np.einsum("hwc,h->c", image, _cosine_weights(len(image)), optimize=False) + sun
     soil = _SOIL if model.ground_albedo < 0.5 else np.ones(3)
     land = model.ground_albedo / math.pi * light * soil
+    land = land + _STREETS_CD_M2 * _ramp(-1.0, -8.0, model.sun_altitude_deg) * _CITY
     far = np.exp(d[..., 2:] / 0.02)
     hazy: Array = land + (image[-1:] - land) * far
     return hazy

@@ -57,7 +57,7 @@ def lumps(x: float, y: float, seed: int):
 
 @wp.func
 def patches(x_m: float, y_m: float, size_m: float, seed: int):
-    """Noise of four octaves; its mean is 0, its deviation PATCH_DEVIATION."""
+    """Noise of four octaves; its mean is 0, its standard deviation 0.513."""
     x = x_m / size_m
     y = y_m / size_m
     # Octaves are turned, so that their lattices do not line up.
@@ -106,7 +106,7 @@ def weathered(world: World, surface: int, look: Look, n: wp.vec3, p: wp.vec3, i:
     porous = porosity_of(world, surface)
     puddle = puddle_at(world, p, n, exposed) * porous
     facing = WALL_SHARE + (1.0 - WALL_SHARE) * wp.clamp(n[2], 0.0, 1.0)
-    wet = wp.max(world.ground.wetness * facing * exposed * wp.where(n[2] > -0.2, 1.0, 0.0), puddle)
+    wet = wp.max(world.ground.wetness * facing * exposed * smooth(-0.5, 0.2, n[2]), puddle)
     factor = 1.0 - 0.8 * porous
     gloss = 1.0 - look.roughness
     look.albedo = look.albedo * (1.0 + (factor - 1.0) * wet)

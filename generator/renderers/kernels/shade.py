@@ -82,9 +82,7 @@ def light_at(
     """
     n = look.normal
     n_v = wp.dot(n, v)
-    brdf = make_brdf(
-        world.lobes, look.albedo, look.roughness, look.metallic, look.specular, n_v
-    )
+    brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, look.specular, n_v)
     mirrored = n * (2.0 * n_v) - v
     alpha = brdf.roughness * brdf.roughness
     light = Light()

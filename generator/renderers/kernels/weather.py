@@ -15,7 +15,6 @@ from generator.renderers.kernels.ground import (
     patches,
     porosity_of,
     puddle_at,
-    smooth,
     snow_at,
 )
 from generator.renderers.kernels.lattice import ray_origin
@@ -43,6 +42,8 @@ SHELTER_M = wp.constant(2.5)
 WATER_F0 = wp.constant(0.02)
 # Asymmetry of scattering by fog.
 FORWARD = wp.constant(0.75)
+# Films smoother than this mirror like puddles.
+SHARP = wp.constant(0.02)
 LAMP_POINTS = wp.constant(4)
 FAR_M = wp.constant(1.0e9)
 
@@ -91,7 +92,7 @@ def mean_color(world: World, surface: int):
 
 
 @wp.func
-def mirrored_sky(world: World, origin: wp.vec3, d: wp.vec3, width: float):
+def mirrored_sky(world: World, d: wp.vec3, width: float):
     """Sky in one direction, with the suns that are blurred over an angle."""
     c = sky_image(world.sky, d)
     for j in range(world.lamps.shape[0]):
@@ -163,7 +164,7 @@ def mirrored(
             hit = wp.vec2i(b, answer.face)
             normal = world.bodies[b].R_world_mesh @ answer.normal
     if hit[0] < 0:
-        return mirrored_sky(world, origin, d, width)
+        return mirrored_sky(world, d, width)
     return mirrored_body(view, world, images, radiance, origin, d, nearest, hit, normal)
 
 
@@ -175,16 +176,19 @@ def mirror_in_water(
     radiance: wp.array(dtype=wp.vec3),
     ripples: float,
     rays: int,
-    wet: wp.array(dtype=wp.vec3),
+    water: wp.array(dtype=wp.vec2),
+    mirror: wp.array(dtype=wp.vec4),
 ):
-    """Lay the reflection in puddles and wet films over what is seen.
+    """Trace what water on the ground mirrors.
 
     Args:
         ripples: Slope of waves on puddles.
         rays: Per pixel, on rough films.
+        water: Share of each pixel that is water, and how rough it is.
+        mirror: What it mirrors [cd/m^2], and its reflectance, for a pixel all of water.
     """
     i = wp.tid()
-    wet[i] = radiance[i]
+    water[i] = wp.vec2(0.0)
     hit = images.hits[i]
     if hit[0] < 0:
         return
@@ -193,24 +197,26 @@ def mirror_in_water(
         return
     x = i % view.width
     y = i / view.width
-    way = (view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)) * images.z_m[i]
+    d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+    way = d * images.z_m[i]
     p = view.eye_m + way
-    water = water_at(world, surface_index(world, hit), p, n, world.ground.exposed[i])
-    if water[0] < 0.01:
+    wet = water_at(world, surface_index(world, hit), p, n, world.ground.exposed[i])
+    if wet[0] < 0.01:
         return
-    d = unit(way)
+    water[i] = wet
+    d = unit(d)
     origin = ray_origin(world, hit, images.weights[i], p, way)
     wave_x = patches(p[0], p[1], 0.09, world.ground.seed + 48) * ripples
     wave_y = patches(p[0], p[1], 0.09, world.ground.seed + 52) * ripples
-    count = wp.where(water[1] > 0.01, rays, 1)
-    total = wp.vec3(0.0)
+    count = wp.where(wet[1] > SHARP, rays, 1)
+    limit = 60.0 * wp.max(radiance[i]) + 4.0 * wp.max(world.sky.irradiance[0]) * world.sky.luminance
+    seen = wp.vec3(0.0)
     reflectance = float(0.0)
     for k in range(count):
-        # A smooth spread over slopes, another one in each pixel: 4 x 4 ordered by place.
-        u = float((x % 4) * 4 + (y % 4)) / 16.0 + float(k) * 0.6180339 + 0.03
-        v = float(((x + 2 * y) % 5)) / 5.0 + float(k) * 0.7548777
-        angle = 2.0 * wp.pi * (u - float(int(u)))
-        slope = water[1] * wp.sqrt(v - float(int(v)))
+        # The sixteen pixels of any square of four share one even spread of slopes.
+        place = float(((x % 4) * 4 + y % 4) * count + k) + 0.5
+        slope = wet[1] * wp.sqrt(place / float(16 * count))
+        angle = 2.39996323 * place
         m = unit(n + wp.vec3(wave_x + slope * wp.cos(angle), wave_y + slope * wp.sin(angle), 0.0))
         c = wp.max(-wp.dot(d, m), 0.02)
         r = d + m * (2.0 * c)
@@ -218,10 +224,62 @@ def mirror_in_water(
         grazing = 1.0 - c
         squared = grazing * grazing
         fresnel = WATER_F0 + (1.0 - WATER_F0) * squared * squared * grazing
-        total += mirrored(view, world, images, radiance, origin, r, 0.02 + water[1]) * fresnel
+        c_seen = mirrored(view, world, images, radiance, origin, r, 0.02 + wet[1])
+        if wet[1] > SHARP:
+            # A few rays do not find small bright lamps evenly; their lobes are shaded already.
+            c_seen = c_seen * wp.min(limit / wp.max(wp.max(c_seen), 1.0e-9), 1.0)
+        seen += c_seen * fresnel
         reflectance += fresnel
-    share = water[0] / float(count)
-    wet[i] = radiance[i] * (1.0 - share * reflectance) + total * share
+    seen = seen * (1.0 / float(count))
+    mirror[i] = wp.vec4(seen[0], seen[1], seen[2], reflectance / float(count))
+
+
+@wp.func
+def film_around(
+    view: View,
+    images: Images,
+    water: wp.array(dtype=wp.vec2),
+    mirror: wp.array(dtype=wp.vec4),
+    i: int,
+):
+    """What the rough film around a pixel mirrors, in the mean over four by four pixels."""
+    x = i % view.width
+    y = i / view.width
+    total = mirror[i] * 1.0e-3
+    weights = float(1.0e-3)
+    for dy in range(-2, 3):
+        for dx in range(-2, 3):
+            u = x + dx
+            v = y + dy
+            if u >= 0 and u < view.width and v >= 0 and v < view.height:
+                j = v * view.width + u
+                near = wp.abs(images.z_m[j] - images.z_m[i]) < 0.15 * images.z_m[i]
+                if near and water[j][1] > SHARP:
+                    # Halves at the ends: every place of a square of four counts alike.
+                    w = wp.where(wp.abs(dx) == 2, 0.5, 1.0) * wp.where(wp.abs(dy) == 2, 0.5, 1.0)
+                    total += mirror[j] * w
+                    weights += w
+    return total * (1.0 / weights)
+
+
+@wp.kernel
+def lay_water(
+    view: View,
+    images: Images,
+    water: wp.array(dtype=wp.vec2),
+    mirror: wp.array(dtype=wp.vec4),
+    radiance: wp.array(dtype=wp.vec3),
+):
+    """Lay what water mirrors over what is seen."""
+    i = wp.tid()
+    share = water[i][0]
+    if share == 0.0:
+        return
+    seen = mirror[i]
+    if water[i][1] > SHARP:
+        seen = film_around(view, images, water, mirror, i)
+    seen = seen * share
+    radiance[i] = radiance[i] * (1.0 - seen[3]) + wp.vec3(seen[0], seen[1], seen[2])
 
 
 @wp.struct
@@ -280,7 +338,7 @@ def glow_of_lamp(fog: Fog, lamp: Lamp, eye: wp.vec3, d: wp.vec3, distance_m: flo
             local = local * wp.exp(-p[2] / fog.height_m)
         # The equiangular density cancels the inverse square of the distance.
         squared = apart_m * apart_m + (t - nearest_m) * (t - nearest_m)
-        part = local * wp.exp(-depth) * scattering(-wp.dot(d, -beam.direction)) * squared
+        part = local * wp.exp(-depth) * scattering(wp.dot(d, beam.direction)) * squared
         total += beam.normal_lux * part
     return total * ((end - start) / (apart_m * float(LAMP_POINTS)))
 

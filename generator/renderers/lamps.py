@@ -1,0 +1,83 @@
+"""Which of many lamps light a view: every lamp costs as much as the next, however dim."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from generator.core.se3 import Array
+from generator.renderers.kernels import records
+from generator.renderers.packing import PackedWorld
+from generator.renderers.stock import AssetStock
+from generator.renderers.visibility import Seen
+
+_STRIDE_PX = 11
+_SPOT, _SUN = 1, 2
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+# Light that is taken for granted, so that lamps are not ranked by what they do in the dark [lx].
+_DIM_LUX = 0.05
+# A lamp also matters for what is turned away from it: its glow, its reflections.
+_TURNED_AWAY = 0.1
+
+
+def keep_main_lamps(
+    world: PackedWorld, view: records.View, seen: Seen, stock: AssetStock, lamps_max: int
+) -> None:
+    """Leave the world the lamps that give most of the light at what is seen."""
+    lamps = world.record.lamps.numpy()
+    if len(lamps) <= lamps_max:
+        return
+    points, normals = _sparse_points(view, seen)
+    chosen = main_lamps(lamps, points, normals, lamps_max)
+    world.record.lamps = wp.array(lamps[chosen], dtype=records.Lamp, device=stock.device)
+
+
+def main_lamps(
+    lamps: NDArray[np.void], points_m: Array, normals: Array, lamps_max: int
+) -> NDArray[np.int64]:
+    """Numbers of at most that many lamps, ascending: suns, then those with the largest shares.
+
+    Args:
+        lamps: Lamp records.
+        points_m: What is seen, world frame, shape [n, 3].
+        normals: Unit, there.
+        lamps_max: How many.
+    """
+    lux = np.stack([_illuminance(lamp, points_m, normals) for lamp in lamps])
+    shares = (lux / (_DIM_LUX + lux.sum(axis=0))).sum(axis=1)
+    shares = np.where(lamps["kind"] == _SUN, np.inf, shares)
+    order = np.argsort(-shares, kind="stable")
+    return np.sort(order[:lamps_max])
+
+
+def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Array:
+    """Of one lamp at points [lx], without shadows."""
+    if lamp["kind"] == _SUN:
+        return np.zeros(len(points_m))
+    to_lamp = lamp["position_m"].astype(np.float64) - points_m
+    squared = np.maximum((to_lamp * to_lamp).sum(axis=1), 1e-2)
+    direction = to_lamp / np.sqrt(squared)[:, None]
+    cosine = np.maximum((direction * normals).sum(axis=1), _TURNED_AWAY)
+    lux: Array = float((lamp["power"] * _LUMINANCE).sum()) * cosine / squared
+    if lamp["kind"] == _SPOT:
+        down = -(direction * lamp["direction"]).sum(axis=1)
+        span = max(float(lamp["cos_inner"] - lamp["cos_outer"]), 1e-4)
+        fade = np.clip((down - lamp["cos_outer"]) / span, 0.0, 1.0)
+        lux = lux * fade * fade * (3.0 - 2.0 * fade)
+    return lux
+
+
+def _sparse_points(view: records.View, seen: Seen) -> tuple[Array, Array]:
+    """Points and normals at every few pixels that see something, world frame."""
+    shape = (view.height, view.width)
+    z = seen.z_m.numpy().reshape(shape)[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
+    normals = seen.normals.numpy().reshape(*shape, 3)[::_STRIDE_PX, ::_STRIDE_PX]
+    rows, columns = np.nonzero(np.isfinite(z))
+    x = (columns * _STRIDE_PX + 0.5 - view.cx) * view.inverse_fx
+    y = (rows * _STRIDE_PX + 0.5 - view.cy) * view.inverse_fy
+    p_camera = np.stack([x, y, np.ones_like(x)], axis=-1) * z[rows, columns, None]
+    R = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
+    eye = np.array(view.eye_m, dtype=np.float64)
+    points = np.einsum("ij,nj->ni", R, p_camera, optimize=False) + eye
+    return points, normals[rows, columns].astype(np.float64)
