@@ -13,6 +13,7 @@ TABLE = PluginTable(
         "light": "scene_templates.light:LightElement",
         "objects": "scene_templates.objects:Objects",
         "prop": "scene_templates.prop:Prop",
+        "road": "scene_templates.road:Road",
         "robot": "scene_templates.robot:Robot",
         "room": "scene_templates.room:Room",
         "shelf": "scene_templates.shelf:Shelf",

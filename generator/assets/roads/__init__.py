@@ -1,9 +1,55 @@
-"""Roads and junctions: lane graphs, their surfaces, and OpenDRIVE files."""
+"""Roads and junctions: their surfaces, and what those are made of."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 
-from generator.assets.procedural.family import Family
+from generator.assets.procedural.family import Family, Lazy, TextureFamily
+from generator.roads.profile import RoadShape
 
-FAMILIES: Mapping[str, Family] = {}
+
+def _surface(name: str, **parameters: object) -> Family:
+    build = Lazy(f"generator.assets.roads.{name}:{name}")
+    return Family(name, name, ("street",), 0, 0.0, False, 1, parameters, build)
+
+
+def _texture(name: str, variants: int = 4, **parameters: object) -> TextureFamily:
+    build = Lazy(f"generator.assets.roads.textures:{name}")
+    return TextureFamily(name, ("ground", "street"), variants, 1, build, parameters)
+
+
+_SHAPE = {field.name: field.default for field in fields(RoadShape)}
+_LOOKS: dict[str, object] = {"seed": 0, "wear": 0.3, "paving": "paving", "ground": "grass"}
+
+FAMILIES: Mapping[str, Family] = {
+    family.name: family
+    for family in (
+        _surface(
+            "road",
+            **_SHAPE,
+            **_LOOKS,
+            markings="dashed",
+            edge_lines="none",
+            dash_m=(3.0, 6.0),
+            line_m=0.12,
+            apron_m=6.0,
+            rails=(0.0, 0.0),
+        ),
+    )
+}
+
+TEXTURES: Mapping[str, TextureFamily] = {
+    texture.name: texture
+    for texture in (
+        _texture("asphalt", 9, wear=0.3),
+        _texture("paving"),
+        _texture("cobbles"),
+        _texture("grass"),
+        _texture("gravel"),
+        _texture("earth"),
+        _texture("road_paint", 3, wear=0.3),
+        _texture("manhole", 1),
+        _texture("drain", 1),
+    )
+}

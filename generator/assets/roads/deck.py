@@ -1,0 +1,110 @@
+"""The surface of a road, and things that lie on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.assets.procedural.mesh import Array, Patch
+from generator.assets.roads.materials import SCALES_M
+from generator.roads.geometry import ReferenceLine
+
+PAINT_LIFT_M = 0.003
+SAGITTA_M = 0.008
+"""How far a chord of the mesh may stray from the curve."""
+ROW_M = 8.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Deck:
+    """A reference line with a cross section that is made of straight pieces.
+
+    Attributes:
+        line: The reference line.
+        t_m: Distances to the left of it, rising, shape [k].
+        z_m: Heights at them, shape [k].
+        bend_per_m: Largest curvature of the line.
+        slots: Number of each material slot by name.
+    """
+
+    line: ReferenceLine
+    t_m: Array
+    z_m: Array
+    bend_per_m: float
+    slots: dict[str, int]
+
+    def at(self, s_m: Array, t_m: Array, lift_m: float = 0.0) -> Array:
+        """Points [..., 3] on the surface, or over it."""
+        flat = self.line.points(s_m.ravel(), t_m.ravel())
+        z = np.interp(t_m.ravel(), self.t_m, self.z_m) + lift_m
+        return np.column_stack([flat, z]).reshape(*s_m.shape, 3)
+
+    def rows(self, start_m: float, end_m: float) -> Array:
+        """Arc lengths from start to end, as close as the bend asks for."""
+        step = ROW_M
+        if self.bend_per_m > 0.0:
+            step = min(step, math.sqrt(8.0 * SAGITTA_M / self.bend_per_m))
+        count = max(1, math.ceil((end_m - start_m) / step - 1e-9))
+        return np.linspace(start_m, end_m, count + 1)
+
+    def ribbon(
+        self, span_m: tuple[float, float], t_m: Sequence[float], slot: str, lift_m: float = 0.0
+    ) -> Patch:
+        """A strip along the road between two arc lengths; ``t_m`` rises across it."""
+        s, t = np.meshgrid(self.rows(*span_m), np.array(t_m), indexing="ij")
+        return self.sheet(s, t, slot, lift_m)
+
+    def sheet(self, s_m: Array, t_m: Array, slot: str, lift_m: float = 0.0) -> Patch:
+        """A grid of points given by arc length and distance, both [rows, columns]."""
+        return surface(
+            self.at(s_m, t_m, lift_m), np.stack([s_m, t_m], axis=2), slot, self.slots[slot]
+        )
+
+    def path(self, s_m: Array, t_m: Array, width_m: float, slot: str, lift_m: float) -> Patch:
+        """A line of a width along points in (s, t)."""
+        along = np.stack([np.gradient(s_m), np.gradient(t_m)], axis=1)
+        along /= np.sqrt((along * along).sum(axis=1, keepdims=True))
+        across = 0.5 * width_m * np.stack([along[:, 1], -along[:, 0]], axis=1)
+        s = np.stack([s_m + across[:, 0], s_m - across[:, 0]], axis=1)
+        t = np.stack([t_m + across[:, 1], t_m - across[:, 1]], axis=1)
+        return self.sheet(s, t, slot, lift_m)
+
+    def disc(
+        self, s_m: float, t_m: float, radius_m: float, slot: str, lift_m: float, sides: int = 20
+    ) -> Patch:
+        """A disc on the road, its texture once across it."""
+        turn = 2.0 * math.pi * np.arange(sides + 1) / sides
+        ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        st = np.array([s_m, t_m]) + radius_m * ring
+        rim = self.at(st[:, 0], st[:, 1], lift_m)
+        center = self.at(np.array([s_m]), np.array([t_m]), lift_m)[0]
+        corners = [np.stack([center, a, b]) for a, b in zip(rim[:-1], rim[1:], strict=True)]
+        uv = 0.5 + 0.5 * ring
+        uvs = [np.stack([np.array([0.5, 0.5]), a, b]) for a, b in zip(uv[:-1], uv[1:], strict=True)]
+        slots = np.full(sides, self.slots[slot], dtype=np.int64)
+        return Patch(np.stack(corners), np.stack(uvs), slots)
+
+
+def surface(points: Array, plan_m: Array, slot: str, number: int) -> Patch:
+    """A grid of points [rows, columns, 3]; its texture follows the plan [rows, columns, 2].
+
+    Slots without a scale show their texture once.
+    """
+    if slot in SCALES_M:
+        uv = plan_m / SCALES_M[slot]
+    else:
+        low, high = plan_m.min(axis=(0, 1)), plan_m.max(axis=(0, 1))
+        uv = (plan_m - low) / np.maximum(high - low, 1e-9)
+    corners, uvs = (_triangles(grid) for grid in (points, uv))
+    return Patch(corners, uvs, np.full(len(corners), number, dtype=np.int64))
+
+
+def _triangles(grid: Array) -> Array:
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    width = grid.shape[2]
+    quads = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
+    triangles: Array = quads.reshape(-1, 3, width)
+    return triangles

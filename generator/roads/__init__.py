@@ -1,0 +1,1 @@
+"""Roads as geometry: reference lines, cross sections, lane graphs, OpenDRIVE files."""

@@ -1,0 +1,206 @@
+"""A stretch of road, and the lanes on and beside it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from pydantic import Field
+
+from generator.assets.ids import parse
+from generator.config.strict import Strict
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Lane, Scene
+from generator.core.se3 import SE3
+from generator.roads.lanes import linked, road_lanes
+from generator.roads.profile import RoadShape
+from scene_templates.element import Element, parametric, with_static
+
+T = TypeVar("T")
+Width = float
+PARKING_M = 2.2
+"""Width of a parking strip (EAR 05: 2.00 to 2.30 m)."""
+
+Ground = Literal["grass", "paving", "cobbles", "gravel", "earth", "asphalt"]
+
+
+class RoadLooks(Strict):
+    """What roads, junctions and parking areas are made of.
+
+    Attributes:
+        wear: 0 freshly laid to 1 worn out: ruts, patches, sealed cracks, flaking paint.
+        paving: What sidewalks are paved with.
+        ground: What the land beside is covered with.
+        seed: Of patches, cracks, covers and textures.
+    """
+
+    wear: float = Field(0.3, ge=0, le=1)
+    paving: Ground = "paving"
+    ground: Ground = "grass"
+    seed: int = Field(0, ge=0, le=1_000_000)
+
+    def looks(self) -> dict[str, Any]:
+        """The parameters of an asset that differ from the default."""
+        default = RoadLooks()
+        named = ((name, getattr(self, name)) for name in RoadLooks.model_fields)
+        return {name: value for name, value in named if value != getattr(default, name)}
+
+
+class Road(RoadLooks, Element):
+    """A road along +X from its place; pairs are (left, right) as seen along it.
+
+    Attributes:
+        after: Name of the road whose end, or ``<junction>/<arm>``, it goes on from; empty = it
+            starts at ``at_m``.
+        at_m: Where it starts, in the middle of the road; a third number lifts it.
+        yaw_deg: Direction in which it starts.
+        length_m: Along its middle.
+        curvature_per_m: 1 / radius, positive to the left; 0 = straight.
+        lanes: Numbers of lanes against its direction and along it.
+        lane_width_m: Of each driving lane.
+        median_m: Strip between the directions; 0 = only a line.
+        bicycle_m, shoulder_m: Width of bicycle lanes and of hard shoulders; 0 = none.
+        parking: Whether cars park along the kerb, in strips of 2.2 m.
+        verge_m: Planted strips between kerb and sidewalk; 0 = none.
+        sidewalk_m: Width of the sidewalks; 0 = none.
+        kerb_m: Height of the kerbs; 0 = a country road or a motorway, which has none.
+        crown: Slope of the carriageway from its middle to its gutters.
+        traffic: Side that is driven on.
+        markings: The line in the middle.
+        edge_lines: Whether the outer edges of the lanes are lined.
+        dash_m: Length of dashes and of the gaps between them: 3, 6 in towns; 4, 8 on country
+            roads; 6, 12 on motorways.
+        line_m: Width of narrow lines: 0.12, on motorways 0.15.
+        rails: Whether there are guard rails.
+        apron_m: Land beside the road that belongs to it and slopes down to the ground.
+        speed_m_s: Usual speed.
+    """
+
+    type: Literal["road"] = "road"
+    after: str = ""
+    at_m: tuple[float, float] | tuple[float, float, float] = (0.0, 0.0)
+    yaw_deg: float = 0.0
+    length_m: float = Field(160.0, ge=1, le=2000)
+    curvature_per_m: float = Field(0.0, ge=-0.2, le=0.2)
+    lanes: tuple[int, int] = (1, 1)
+    lane_width_m: float = Field(3.5, ge=2, le=6)
+    median_m: float = Field(0.0, ge=0, le=30)
+    bicycle_m: tuple[Width, Width] = (0.0, 0.0)
+    shoulder_m: tuple[Width, Width] = (0.0, 0.0)
+    parking: tuple[bool, bool] = (False, False)
+    verge_m: tuple[Width, Width] = (0.0, 0.0)
+    sidewalk_m: tuple[Width, Width] = (2.5, 2.5)
+    kerb_m: float = Field(0.12, ge=0, le=0.3)
+    crown: float = Field(0.02, ge=0, le=0.08)
+    traffic: Literal["right", "left"] = "right"
+    markings: Literal["dashed", "solid", "double", "none"] = "dashed"
+    edge_lines: bool = False
+    dash_m: tuple[float, float] = (3.0, 6.0)
+    line_m: float = Field(0.12, ge=0.05, le=0.5)
+    rails: tuple[bool, bool] = (False, False)
+    apron_m: float = Field(6.0, ge=0, le=100)
+    speed_m_s: float = Field(13.9, ge=0, le=60)
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """The road is background; its lanes join those of the roads that it meets."""
+        shape = self.shape()
+        pose = self._pose(scene)
+        options: dict[str, Any] = {
+            "markings": (self.markings, "dashed"),
+            "edge_lines": ("solid" if self.edge_lines else "none", "none"),
+            "dash_m": (self.dash_m, (3.0, 6.0)),
+            "line_m": (self.line_m, 0.12),
+            "rails": (_numbers(self.rails), (0.0, 0.0)),
+            "apron_m": (self.apron_m, 6.0),
+        }
+        given = {name: value for name, (value, default) in options.items() if value != default}
+        asset = parametric("road", **shape.changed(), **given, **self.looks())
+        return with_street(
+            scene,
+            assets,
+            self.name,
+            asset,
+            pose,
+            road_lanes(shape, self.name, pose, self.speed_m_s),
+        )
+
+    def shape(self) -> RoadShape:
+        """Its cross section and course. Raises ConfigError if they make no road."""
+        values = {f.name: getattr(self, f.name) for f in fields(RoadShape) if f.name != "parking_m"}
+        values["lanes"] = _numbers(self.lanes)
+        values["parking_m"] = tuple(PARKING_M * flag for flag in self.parking)
+        shape = RoadShape(**values)
+        where = f"elements.{self.name}"
+        check_widths(where, shape)
+        reach = max(shape.carriageway_m(side) for side in (1, -1)) + 6.0
+        if abs(shape.curvature_per_m) * reach >= 1.0:
+            raise ConfigError(
+                f"{where}.curvature_per_m: a radius of {1 / abs(shape.curvature_per_m):.1f} m is "
+                f"less than the road is wide; expected less than {1 / reach:.3g}"
+            )
+        if abs(shape.curvature_per_m) * shape.length_m >= math.tau:
+            raise ConfigError(f"{where}.length_m: the bend closes on itself; make it shorter")
+        return shape
+
+    def _pose(self, scene: Scene) -> SE3:
+        if self.after:
+            return port(scene, self.after, f"elements.{self.name}.after")
+        x, y, *lift = self.at_m
+        return SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+
+
+def check_widths(where: str, shape: RoadShape) -> None:
+    """Raises ConfigError if a cross section has no lane or a negative width."""
+    if shape.lanes[0] + shape.lanes[1] < 1 or min(shape.lanes) < 0 or max(shape.lanes) > 8:
+        raise ConfigError(f"{where}.lanes: {shape.lanes[0]:g}, {shape.lanes[1]:g}; expected 1 to 8")
+    for name in ("bicycle_m", "shoulder_m", "verge_m", "sidewalk_m"):
+        if not all(0.0 <= width <= 50.0 for width in getattr(shape, name)):
+            raise ConfigError(f"{where}.{name}: expected two widths from 0 to 50 m")
+
+
+def with_street(
+    scene: Scene,
+    assets: AssetIndex,
+    name: str,
+    asset: str,
+    T_world_body: SE3,
+    lanes: tuple[Lane, ...],
+) -> Scene:
+    """The scene with a surface as background, and its lanes linked to those it meets."""
+    scene = with_static(
+        scene, assets, name=name, asset=asset, T_world_body=T_world_body, unlabelled=True
+    )
+    return replace(scene, lanes=linked((*scene.lanes, *lanes)))
+
+
+def road_of(scene: Scene, name: str, field: str) -> tuple[RoadShape, dict[str, Any], SE3]:
+    """Shape, all parameters and pose of a road that is in the scene already.
+
+    Raises:
+        ConfigError: there is no such road.
+    """
+    roads = {b.name: b for b in scene.bodies if b.asset.partition("?")[0] == "road"}
+    if name not in roads:
+        known = ", ".join(sorted(roads)) or "none: list the road before what belongs to it"
+        raise ConfigError(
+            f"{field}: there is no road '{name}'; expected one of {known}"
+            f"{did_you_mean(name, roads)}"
+        )
+    parameters = dict(parse(roads[name].asset).parameters)
+    names = {f.name for f in fields(RoadShape)}
+    shape = RoadShape(**{k: v for k, v in parameters.items() if k in names})  # type: ignore[arg-type]
+    return shape, parameters, roads[name].T_world_body
+
+
+def port(scene: Scene, name: str, field: str) -> SE3:
+    """Where a road goes on: the end of another one. Raises ConfigError if there is none."""
+    shape, _, T_world_road = road_of(scene, name, field)
+    x, y, heading = (float(v) for v in shape.line().poses(np.array([shape.length_m]))[0])
+    return T_world_road @ SE3.about_z(heading, (x, y, 0.0))
+
+
+def _numbers(pair: tuple[Any, Any]) -> tuple[float, float]:
+    return (float(pair[0]), float(pair[1]))
