@@ -169,7 +169,7 @@ def _garden_wall(half: float, h: float, seed: int) -> Solid:
     body = block(low, (0.12, half, h - 0.06))
     cap = block((-0.16, -half, h - 0.06), (0.16, half, h), 0.01).painted(1)
     kind = (
-        ("brick", 1, 1.1, (0.9, 0.88, 0.86))
+        ("brick", 4, 1.1, (0.9, 0.88, 0.86))
         if seed % 8 < 4
         else ("plaster", 5, 2.5, (0.62, 0.58, 0.5))
     )

@@ -124,7 +124,7 @@ def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: Rng) 
 def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: Rng) -> MeshData:
     """The finest twigs of a winter crown, each a thin sliver."""
     middle = np.array([0.0, 0.0, shape.clear_m])
-    length = 0.13 * (shape.height_m - shape.clear_m)
+    length = 0.1 * (shape.height_m - shape.clear_m)
     sprays = sprays_about(
         skeleton.twigs(), middle, Habit(_TWIGS, length, 0.1 * length, 1, -0.3), rng
     )
@@ -218,8 +218,8 @@ def leaf_greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
     )
 
 
-_LIME = ("#37442a", "#465634", "#566a3d", "#687c49")
-_MAPLE = ("#334028", "#40512f", "#506438", "#627645")
+_LIME = ("#3b4829", "#4d5d35", "#61743f", "#75884c")
+_MAPLE = ("#374328", "#475830", "#5a6d39", "#6e8247")
 _BIRCH = ("#45522f", "#56663a", "#697a45", "#7d8c54")
 
 
