@@ -77,8 +77,10 @@ def _front(plan: Design, rng: Rng) -> Patch:
     half = 0.5 * plan.width_m
     ground = _shops(plan, rng) if plan.shops else _dwelling(plan, rng)
     holes, upper = _upper(plan, rng)
-    wall = facade.perforated((-half, half), (plan.ground_m, plan.eaves_m), holes)
-    return joined([ground, *([wall] if plan.floors > 1 else []), *upper, *_bands(plan, rng)])
+    parts = [ground, *upper, *_bands(plan, rng)]
+    if plan.floors > 1:
+        parts.append(facade.perforated((-half, half), (plan.ground_m, plan.eaves_m), holes))
+    return joined(parts)
 
 
 def _dwelling(plan: Design, rng: Rng) -> Patch:

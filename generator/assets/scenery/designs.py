@@ -173,7 +173,7 @@ def _commercial(rng: Rng) -> Design:
 
 
 def _house(rng: Rng) -> Design:
-    bays, bay_m = pick((2, 3, 3, 4), rng), between(2.9, 3.5, rng)
+    bays, bay_m = pick((3, 3, 3, 4), rng), between(2.8, 3.4, rng)
     return Design(
         style="house",
         width_m=max(8.0, round(bays * bay_m, 2)),

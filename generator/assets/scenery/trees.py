@@ -142,12 +142,11 @@ def _trunk(shape: Shape, rng: Rng) -> Array:
 
 
 def _flared(patch: Patch) -> Patch:
-    """Wood with a root flare: wider by half at the ground."""
-    z = patch.corners_m[..., 2:]
+    """Wood with a root flare: wider by half at the ground, on which it stands level."""
+    z = patch.corners_m[..., 2]
     factor = 1.0 + 0.45 * np.clip(1.0 - z / 0.5, 0.0, 1.0) ** 2
-    return replace(
-        patch, corners_m=patch.corners_m * np.concatenate([factor, factor, 0 * z + 1], 2)
-    )
+    x, y = factor * patch.corners_m[..., 0], factor * patch.corners_m[..., 1]
+    return replace(patch, corners_m=np.stack([x, y, np.where(z < 0.05, 0.0, z)], axis=2))
 
 
 def _conifer(rng: Rng) -> Solid:
