@@ -207,12 +207,12 @@ _DRAWN = {
 # Muted tints of mineral paint, sRGB; the texture's own near-white multiplies them.
 _PLASTERS = {
     "residential": "#d9d2c0 #e3dccb #cfc6b0 #d8c9a3 #c9b99a #c7ccc6 #b9bfb7 #d3bfae #e2e0da",
-    "old_town": "#d6c294 #cdb07f #c9a78c #b98e76 #d9cdb5 #b9b49e #a9b0a2 #c2b7ac #dcd3c2 #b7a184",
+    "old_town": "#d3c5a3 #c9b48f #c6ab95 #b49583 #d9cfba #b9b5a2 #aab0a4 #c2b8ae #dcd4c5 #b6a48c",
     "modern": "#e8e7e3 #dcdbd6 #c7c7c4 #b4b3af #8f8e8b #e3ddd0 #6f6e6c #d5d0c6",
     "commercial": "#cfcbc2 #b8b5ae #d9d5cb #a5a39e #c4bba8 #8f9294",
     "house": "#e6e2d8 #ded5bf #d8c7a0 #cdbda5 #d9d8d2 #c9b7a6 #bcc3bd #e4d9c6",
 }
-_STONES = "#b08a72 #a3735c #b7a58a #c2b59b #9f978a"
+_STONES = "#a38b7b #97796b #b0a38f #bbb09d #9c958b"
 _ROOFS = "#80564a #754a3e #8a6353 #6b463b #57504b #4a4a4c #665048 #5d4a42"
 _CLOTHS = {
     "none": "#8b8f8c #d4d1c8 #b9b6ae #a7a294",
@@ -230,7 +230,7 @@ def materials_of(plan: Design, seed: int) -> tuple[Material, ...]:
     wall = _wall(plan.cladding, _PLASTERS[plan.style], rng)
     base = _base(plan, wall, rng)
     trim_code = pick(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"), rng)
-    trim_code = pick(("#b98d74", "#b7a58a", trim_code), rng) if plan.trimmed else trim_code
+    trim_code = pick(("#a98d7c", "#b3a48e", trim_code), rng) if plan.trimmed else trim_code
     frame = pick(_FRAMES.get(plan.style, ("#eceae4", "#e4e2db", "#e8e6df", "#6b5443")), rng)
     curtains = [jittered(linear(code), 0.1, rng) for code in ("#8d8a82", "#6a6862")]
     seam = "#77797a" if plan.roof == "flat" else pick(("#8a8c8d", "#7d5f4c", "#9a9c9b"), rng)

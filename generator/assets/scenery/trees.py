@@ -217,8 +217,8 @@ def leaf_greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
     )
 
 
-_LIME = ("#3b4829", "#4d5d35", "#61743f", "#75884c")
-_MAPLE = ("#374328", "#475830", "#5a6d39", "#6e8247")
+_LIME = ("#3c4726", "#4f5d30", "#637339", "#778746")
+_MAPLE = ("#384225", "#49572b", "#5d6c34", "#718141")
 _BIRCH = ("#45522f", "#56663a", "#697a45", "#7d8c54")
 
 
@@ -234,8 +234,8 @@ def _lobed(radius: float, height: float, centre_z: float, count: int, rng: Rng) 
 
 
 def _broad(rng: Rng) -> Shape:
-    height, clear = between(8.0, 12.0, rng), between(2.4, 3.2, rng)
-    crown = height - clear + 0.4
+    height, clear = between(8.5, 12.0, rng), between(2.9, 3.6, rng)
+    crown = height - clear + 0.3
     radius = crown * between(0.42, 0.54, rng)
     lobes = _lobed(radius, crown, height - 0.52 * crown, 7, rng)
     green = pick((_LIME, _MAPLE), rng)
