@@ -6,6 +6,8 @@ length join end to end.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from generator.assets.procedural import hulls
@@ -16,6 +18,7 @@ from generator.assets.procedural.mesh import Patch
 from generator.assets.procedural.shapes import block, extruded, grid
 from generator.assets.scenery.forms import facing, post, solid
 from generator.assets.scenery.furniture import GALVANISED
+from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import Material
 from generator.core.se3 import Vec3
 
@@ -30,8 +33,8 @@ def barrier(seed: int, style: str) -> Solid:
 
 
 def barrier_facts(seed: int, style: str) -> Facts:
-    """Its kind."""
-    return Facts(BARRIERS[seed % len(BARRIERS)] if style == "any" else style)
+    """Its kind. Raises AssetError for an unknown style."""
+    return Facts(_chosen("barrier", seed, style, BARRIERS))
 
 
 def fence(seed: int, style: str) -> Solid:
@@ -75,8 +78,19 @@ def fence(seed: int, style: str) -> Solid:
 
 
 def fence_facts(seed: int, style: str) -> Facts:
-    """Its kind."""
-    return Facts(FENCES[seed % len(FENCES)] if style == "any" else style)
+    """Its kind. Raises AssetError for an unknown style."""
+    return Facts(_chosen("fence", seed, style, FENCES))
+
+
+def _chosen(family: str, seed: int, style: str, styles: Sequence[str]) -> str:
+    if style == "any":
+        return styles[seed % len(styles)]
+    if style not in styles:
+        raise AssetError(
+            f"{family}: there is no style '{style}'{did_you_mean(style, styles)}; expected any, "
+            f"{', '.join(styles)}"
+        )
+    return style
 
 
 def _guard_rail(seed: int) -> Solid:
@@ -169,7 +183,7 @@ def _garden_wall(half: float, h: float, seed: int) -> Solid:
     body = block(low, (0.12, half, h - 0.06))
     cap = block((-0.16, -half, h - 0.06), (0.16, half, h), 0.01).painted(1)
     kind = (
-        ("brick", 1, 1.1, (0.9, 0.88, 0.86))
+        ("brick", 4, 1.1, (0.9, 0.88, 0.86))
         if seed % 8 < 4
         else ("plaster", 5, 2.5, (0.62, 0.58, 0.5))
     )

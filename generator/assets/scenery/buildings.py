@@ -77,8 +77,10 @@ def _front(plan: Design, rng: Rng) -> Patch:
     half = 0.5 * plan.width_m
     ground = _shops(plan, rng) if plan.shops else _dwelling(plan, rng)
     holes, upper = _upper(plan, rng)
-    wall = facade.perforated((-half, half), (plan.ground_m, plan.eaves_m), holes)
-    return joined([ground, *([wall] if plan.floors > 1 else []), *upper, *_bands(plan, rng)])
+    parts = [ground, *upper, *_bands(plan, rng)]
+    if plan.floors > 1:
+        parts.append(facade.perforated((-half, half), (plan.ground_m, plan.eaves_m), holes))
+    return joined(parts)
 
 
 def _dwelling(plan: Design, rng: Rng) -> Patch:
@@ -149,7 +151,9 @@ def _shop_signs(plan: Design, top_m: float, rng: Rng) -> list[Patch]:
 def _upper(plan: Design, rng: Rng) -> tuple[list[Opening], list[Patch]]:
     """Windows of the upper floors, all in line, and balconies before some of them."""
     centres = _bay_centres(plan)
-    outside = {int(rng.random() * plan.bays), int(rng.random() * plan.bays)}
+    first, out_m = int(rng.random() * plan.bays), between(1.1, 1.4, rng)
+    mirrored = plan.bays - 1 - first
+    outside = {first, mirrored if abs(mirrored - first) > 1 else first}
     holes, parts = [], []
     for floor in range(1, plan.floors):
         level = plan.ground_m + (floor - 1) * plan.storey_m
@@ -162,18 +166,18 @@ def _upper(plan: Design, rng: Rng) -> tuple[list[Opening], list[Patch]]:
             holes.append(hole)
             parts.append(_dressed(plan, hole, rng, bare=tall))
             if tall:
-                parts.append(_balcony(plan, y, level + 0.08, rng))
+                parts.append(_balcony(plan, y, level + 0.08, out_m))
     return holes, parts
 
 
-def _balcony(plan: Design, y: float, level: float, rng: Rng) -> Patch:
+def _balcony(plan: Design, y: float, level: float, out_m: float) -> Patch:
     w = plan.window_m[0]
     if plan.balconies == "french":
         return facade.railing((y - 0.5 * w - 0.05, y + 0.5 * w + 0.05), level, 0.04)
     half = min(0.5 * plan.width_m / plan.bays + 0.2, 0.5 * w + 0.8)
     half = min(half, 0.5 * plan.width_m - abs(y))
     closed = plan.style == "modern" or plan.floors * plan.bays > 20
-    return facade.balcony((y - half, y + half), level, between(1.1, 1.4, rng), solid=closed)
+    return facade.balcony((y - half, y + half), level, out_m, solid=closed)
 
 
 def _dressed(plan: Design, hole: Opening, rng: Rng, *, bare: bool = False) -> Patch:

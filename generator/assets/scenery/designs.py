@@ -107,7 +107,7 @@ def _old_town(rng: Rng) -> Design:
         style="old_town",
         width_m=max(8.0, round(bays * bay_m, 2)),
         depth_m=round(between(10.0, 14.0, rng), 2),
-        floors=pick((3, 4, 4, 5), rng),
+        floors=pick((3, 3, 4, 4, 5), rng),
         bays=bays,
         ground_m=round(between(3.9, 4.4, rng), 2),
         storey_m=round(between(3.3, 3.7, rng), 2),
@@ -173,7 +173,7 @@ def _commercial(rng: Rng) -> Design:
 
 
 def _house(rng: Rng) -> Design:
-    bays, bay_m = pick((2, 3, 3, 4), rng), between(2.9, 3.5, rng)
+    bays, bay_m = pick((3, 3, 3, 4), rng), between(2.8, 3.4, rng)
     return Design(
         style="house",
         width_m=max(8.0, round(bays * bay_m, 2)),
@@ -207,14 +207,19 @@ _DRAWN = {
 # Muted tints of mineral paint, sRGB; the texture's own near-white multiplies them.
 _PLASTERS = {
     "residential": "#d9d2c0 #e3dccb #cfc6b0 #d8c9a3 #c9b99a #c7ccc6 #b9bfb7 #d3bfae #e2e0da",
-    "old_town": "#d6c294 #cdb07f #c9a78c #b98e76 #d9cdb5 #b9b49e #a9b0a2 #c2b7ac #dcd3c2 #b7a184",
+    "old_town": "#d3c5a3 #c9b48f #c6ab95 #b49583 #d9cfba #b9b5a2 #aab0a4 #c2b8ae #dcd4c5 #b6a48c",
     "modern": "#e8e7e3 #dcdbd6 #c7c7c4 #b4b3af #8f8e8b #e3ddd0 #6f6e6c #d5d0c6",
     "commercial": "#cfcbc2 #b8b5ae #d9d5cb #a5a39e #c4bba8 #8f9294",
     "house": "#e6e2d8 #ded5bf #d8c7a0 #cdbda5 #d9d8d2 #c9b7a6 #bcc3bd #e4d9c6",
 }
-_STONES = "#b08a72 #a3735c #b7a58a #c2b59b #9f978a"
-_ROOFS = "#8a4a38 #7b3f30 #93563f #6b3a30 #57504b #4a4a4c #6a4f45"
-_SHUTTERS = "#5a6b5d #6d5a48 #8b8f8c #d9d7d0 #7f3f36 #4d5b66 #a99a80 #b9b6ae"
+_STONES = "#a38b7b #97796b #b0a38f #bbb09d #9c958b"
+_ROOFS = "#80564a #754a3e #8a6353 #6b463b #57504b #4a4a4c #665048 #5d4a42"
+_CLOTHS = {
+    "none": "#8b8f8c #d4d1c8 #b9b6ae #a7a294",
+    "roller": "#a9a69c #d4d1c8 #b9b6ae #8f8c84 #6f6a62",
+    "leaves": "#5a6b5d #6d5a48 #4f6157 #7a4a3c #4d5b66",
+    "shops": "#7a3b34 #3a5145 #8b8f8c #cfc6ae #3c4c5c",
+}
 _DOORS = "#5c4434 #3f4a44 #7a2f2a #4a4f55 #8c6b4a #e4e2dc #2e3d4d"
 _FRAMES = {"modern": ("#3c3e40", "#55585a", "#e6e6e3"), "commercial": ("#45484a", "#6c6f71")}
 
@@ -225,7 +230,7 @@ def materials_of(plan: Design, seed: int) -> tuple[Material, ...]:
     wall = _wall(plan.cladding, _PLASTERS[plan.style], rng)
     base = _base(plan, wall, rng)
     trim_code = pick(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"), rng)
-    trim_code = pick(("#b98d74", "#b7a58a", trim_code), rng) if plan.trimmed else trim_code
+    trim_code = pick(("#a98d7c", "#b3a48e", trim_code), rng) if plan.trimmed else trim_code
     frame = pick(_FRAMES.get(plan.style, ("#eceae4", "#e4e2db", "#e8e6df", "#6b5443")), rng)
     curtains = [jittered(linear(code), 0.1, rng) for code in ("#8d8a82", "#6a6862")]
     seam = "#77797a" if plan.roof == "flat" else pick(("#8a8c8d", "#7d5f4c", "#9a9c9b"), rng)
@@ -248,14 +253,14 @@ def materials_of(plan: Design, seed: int) -> tuple[Material, ...]:
             printed=True,
             role="sign",
         ),
-        _plain(pick(_SHUTTERS.split(), rng), 0.7, "trim"),
-        _textured("brick", 1, (0.8, 0.78, 0.76), 1.2, "trim"),
+        _plain(pick(_CLOTHS["shops" if plan.shops else plan.shutters].split(), rng), 0.7, "trim"),
+        _textured("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
     )
 
 
 def _wall(cladding: Cladding, tints: str, rng: Rng) -> Material:
     if cladding == "brick":
-        seed, level = pick((1, 3, 6), rng), between(0.75, 1.0, rng)
+        seed, level = pick((4, 9, 12), rng), between(0.75, 1.0, rng)
         return _textured("brick", seed, (level, level, level), 1.1, "facade")
     if cladding == "concrete":
         level = between(0.8, 1.0, rng)

@@ -17,7 +17,7 @@ from generator.assets.procedural.noise import uniform
 from generator.core.geometry import Material, MeshData
 from generator.core.streams import Rng
 
-OUTWARD = 0.65
+OUTWARD = 0.78
 """Share of the outward direction in a leaf's normal; the rest is its own."""
 
 
@@ -107,10 +107,12 @@ def sprays_about(anchors_m: Array, centre_m: Array, habit: Habit, rng: Rng) -> S
     along = _unit(
         0.55 * outward + 0.8 * _directions(count, rng) - np.array([0.0, 0.0, habit.droop])
     )
-    length = habit.length_m * (0.7 + 0.6 * uniform(count, rng))
     reach = np.sqrt(((at - centre_m) ** 2).sum(axis=1))
     depth = reach / max(float(reach.max()), 1e-9) + 0.12 * offset[:, 2] / habit.spread_m
-    lit = depth + 0.25 * (uniform(count, rng) - 0.5)
+    # Deep sprays are large and close the crown, outer ones are small and draw its outline.
+    size = np.clip(1.6 - 0.85 * depth, 0.7, 1.5)
+    length = habit.length_m * size * (0.75 + 0.5 * uniform(count, rng))
+    lit = depth + 0.2 * (uniform(count, rng) - 0.5)
     slots = np.clip(np.floor((lit - 0.35) / 0.65 * shades), 0, shades - 1).astype(np.int64)
     return Sprays(at, outward, along, length, slots)
 

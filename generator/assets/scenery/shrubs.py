@@ -86,7 +86,7 @@ def planter(seed: int) -> Solid:
         blossom = Material(linear(pick(_FLOWERS, rng)), roughness=0.8, role="leaf")
         greens = (*greens[:3], blossom)
     mesh = finished(core, (pick(stuff, rng), _core_material(greens)), 50.0)
-    sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), Habit(700, 0.09, 0.07), rng)
+    sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), Habit(620, 0.095, 0.07), rng)
     return Solid(
         merged(mesh, leaf_mesh(sprays, greens, 0.7, rng)), ConvexParts((np.round(hull, 6),))
     )
@@ -145,4 +145,4 @@ def _shell(x: float, y: float, z: float, r: float, count: int, rng: Rng) -> Arra
 
 
 def _round(x: float, y: float, z: float, r: float) -> Patch:
-    return ball(lambda d: r * d + np.array([x, y, z]), 8, 12)
+    return ball(lambda d: r * d + np.array([x, y, z]), 7, 10)

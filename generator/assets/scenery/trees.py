@@ -124,7 +124,7 @@ def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: Rng) 
 def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: Rng) -> MeshData:
     """The finest twigs of a winter crown, each a thin sliver."""
     middle = np.array([0.0, 0.0, shape.clear_m])
-    length = 0.13 * (shape.height_m - shape.clear_m)
+    length = 0.1 * (shape.height_m - shape.clear_m)
     sprays = sprays_about(
         skeleton.twigs(), middle, Habit(_TWIGS, length, 0.1 * length, 1, -0.3), rng
     )
@@ -142,12 +142,11 @@ def _trunk(shape: Shape, rng: Rng) -> Array:
 
 
 def _flared(patch: Patch) -> Patch:
-    """Wood with a root flare: wider by half at the ground."""
-    z = patch.corners_m[..., 2:]
+    """Wood with a root flare: wider by half at the ground, on which it stands level."""
+    z = patch.corners_m[..., 2]
     factor = 1.0 + 0.45 * np.clip(1.0 - z / 0.5, 0.0, 1.0) ** 2
-    return replace(
-        patch, corners_m=patch.corners_m * np.concatenate([factor, factor, 0 * z + 1], 2)
-    )
+    x, y = factor * patch.corners_m[..., 0], factor * patch.corners_m[..., 1]
+    return replace(patch, corners_m=np.stack([x, y, np.where(z < 0.05, 0.0, z)], axis=2))
 
 
 def _conifer(rng: Rng) -> Solid:
@@ -218,8 +217,8 @@ def leaf_greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
     )
 
 
-_LIME = ("#37442a", "#465634", "#566a3d", "#687c49")
-_MAPLE = ("#334028", "#40512f", "#506438", "#627645")
+_LIME = ("#3c4726", "#4f5d30", "#637339", "#778746")
+_MAPLE = ("#384225", "#49572b", "#5d6c34", "#718141")
 _BIRCH = ("#45522f", "#56663a", "#697a45", "#7d8c54")
 
 
@@ -235,8 +234,8 @@ def _lobed(radius: float, height: float, centre_z: float, count: int, rng: Rng) 
 
 
 def _broad(rng: Rng) -> Shape:
-    height, clear = between(8.0, 12.0, rng), between(2.4, 3.2, rng)
-    crown = height - clear + 0.4
+    height, clear = between(8.5, 12.0, rng), between(2.9, 3.6, rng)
+    crown = height - clear + 0.3
     radius = crown * between(0.42, 0.54, rng)
     lobes = _lobed(radius, crown, height - 0.52 * crown, 7, rng)
     green = pick((_LIME, _MAPLE), rng)

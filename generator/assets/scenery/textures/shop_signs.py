@@ -9,7 +9,7 @@ from generator.core.geometry import TextureData
 
 _TRADES = (
     "BAKERY",
-    "Café Linden",
+    "CAFE LINDEN",
     "PHARMACY",
     "FLOWERS",
     "BOOKS",

@@ -66,15 +66,15 @@ def ashlar(seed: int) -> TextureData:
 def bark(seed: int) -> TextureData:
     """Furrowed bark, the trunk upright; 0.8 m per repeat."""
     rng = rng_of("bark", seed)
-    bend = 10.0 * fbm((6, 3), 4, rng)
-    ridges = worley((5, 16), rng, 0.9)
-    furrow = smoothstep(0.28, 0.0, ridges.second - ridges.nearest)
-    furrow = warped(furrow.astype(np.float32), 0 * bend, bend)
-    fine = fbm((20, 60), 3, rng)
+    bend = 14.0 * fbm((5, 4), 4, rng)
+    ridge = np.abs(fbm((4, 12), 4, rng, 0.55))
+    furrow = smoothstep(0.2, 0.02, warped(ridge, 0 * bend, bend))
+    fine = fbm((16, 64), 3, rng)
     depth = between(0.45, 0.65, rng)
-    shade = (0.85 + 0.1 * fbm((4, 4), 4, rng) + 0.12 * fine) * (1 - depth * furrow)
+    shade = (0.8 + 0.1 * fbm((4, 4), 4, rng) + 0.1 * fine) * (1 - depth * furrow)
     albedo = shade[..., None] * np.array([1.0, 0.97, 0.93])
-    return texture(albedo.astype(np.float32), None, (1.5 * fine - 4.0 * furrow).astype(np.float32))
+    height = 1.2 * fine - 5.0 * furrow
+    return texture(albedo.astype(np.float32), None, blurred(height.astype(np.float32)))
 
 
 def foliage(seed: int) -> TextureData:

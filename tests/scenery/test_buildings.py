@@ -1,0 +1,128 @@
+"""Buildings: facades with depth, storeys at real heights, and no way to look in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from generator.assets.procedural.family import Solid
+from generator.assets.scenery.buildings import building, building_facts
+from generator.assets.scenery.designs import STYLES, design
+from tests.scenery.rays import cast
+
+SEEDS = (0, 1, 2, 5, 9)
+
+
+@pytest.fixture(params=[(s, k) for s in STYLES for k in SEEDS], ids=str, scope="module")
+def built(request: pytest.FixtureRequest) -> tuple[str, int, Solid]:
+    """Some buildings of every style."""
+    style, seed = request.param
+    return style, seed, building(seed, style)
+
+
+def window_faces(solid: Solid) -> np.ndarray:
+    """Whether each face is glass."""
+    slots = [k for k, m in enumerate(solid.mesh.materials) if m.role == "window"]
+    return np.isin(solid.mesh.face_slots, slots)
+
+
+def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int, Solid]) -> None:
+    """Rays along -X through the front panes meet glass 0.1-0.35 m behind the wall's plane."""
+    style, seed, solid = built
+    front_x = 0.5 * design(style, seed).depth_m
+    corners = solid.mesh.vertices_m[solid.mesh.faces].astype(np.float64)
+    pane = window_faces(solid) & (corners[..., 0].min(axis=1) > front_x - 0.5)
+    pane &= corners[..., 2].max(axis=1) < design(style, seed).eaves_m
+    centres = corners[pane].mean(axis=1)
+    eyes = centres * [0.0, 1.0, 1.0] + [front_x + 6.0, 0.0, 0.0]
+
+    distance, face, _ = cast(solid.mesh, eyes, np.tile([-1.0, 0.0, 0.0], (len(eyes), 1)))
+    seen = np.isin(face, np.flatnonzero(pane))
+    depth = distance[seen] - 6.0
+
+    assert len(centres) >= 6
+    # Balconies, awnings, shutters and railings hide some.
+    assert seen.mean() > 0.4
+    assert depth.min() > 0.1
+    assert depth.max() < 0.36
+
+
+def test_windows_have_the_size_and_sills_of_real_ones(built: tuple[str, int, Solid]) -> None:
+    """German building practice: 1.0-2.9 m wide, 1.2-2.4 m high, storeys of 2.7-4.7 m."""
+    style, seed, _ = built
+    plan = design(style, seed)
+
+    assert 1.0 <= plan.window_m[0] <= 2.95
+    assert 1.2 <= plan.window_m[1] <= 2.4
+    assert 2.7 <= plan.storey_m <= 3.8
+    assert 2.8 <= plan.ground_m <= 4.7
+    assert 8.0 <= plan.width_m <= 24.0
+    assert 8.0 <= plan.depth_m <= 14.0
+    assert 1 <= plan.floors <= 7
+
+
+def test_who_looks_at_it_from_outside_never_sees_an_inside(built: tuple[str, int, Solid]) -> None:
+    """Rays from all around meet the front of a face first; thin railings excepted."""
+    style, seed, solid = built
+    plan = design(style, seed)
+    turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    height = np.linspace(0.4, plan.eaves_m + 1.0, 23)
+    eye = np.array([(60 * np.cos(t), 60 * np.sin(t), 1.65) for t in turn for _ in height])
+    aim = np.array([(0.0, (k % 5 - 2) * 0.15 * plan.width_m, z) for k, _ in enumerate(turn)
+                    for z in height])  # fmt: skip
+    direction = aim - eye
+
+    _, face, normal = cast(solid.mesh, eye, direction)
+
+    facing = (normal * direction).sum(axis=1) < 0.0
+    assert (face >= 0).mean() > 0.9
+    assert facing[face >= 0].mean() > 0.985
+
+
+def test_walls_are_closed_below_and_roofs_above(built: tuple[str, int, Solid]) -> None:
+    """A ray up from below the ground meets the floor, a ray down from the sky the roof."""
+    style, seed, solid = built
+    plan = design(style, seed)
+    spread = np.linspace(-0.45, 0.45, 7)
+    points = np.array([(a * plan.depth_m, b * plan.width_m) for a in spread for b in spread])
+    n = len(points)
+    below = np.column_stack([points, np.full(n, -1.0)])
+    above = np.column_stack([points, np.full(n, 60.0)])
+
+    floor_m, _, floor = cast(solid.mesh, below, np.tile([0.0, 0.0, 1.0], (n, 1)))
+    roof_m, _, roof = cast(solid.mesh, above, np.tile([0.0, 0.0, -1.0], (n, 1)))
+
+    assert np.allclose(floor_m, 1.0, atol=1e-3)
+    assert (floor[:, 2] < 0.0).all()
+    assert (60.0 - roof_m > plan.eaves_m - 0.05).all()
+    assert (roof[:, 2] > 0.0).all()
+
+
+def test_the_front_faces_plus_x(built: tuple[str, int, Solid]) -> None:
+    """There is more glass towards +X than towards any other side."""
+    solid = built[2]
+    corners = solid.mesh.vertices_m[solid.mesh.faces].astype(np.float64)[window_faces(solid)]
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    towards = [area[:, 0].clip(0).sum(), -area[:, 0].clip(None, 0).sum()]
+    towards += [area[:, 1].clip(0).sum(), -area[:, 1].clip(None, 0).sum()]
+    assert np.argmax(towards) == 0
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_style_has_varied_buildings(style: str) -> None:
+    """Sixteen seeds differ in width, floors and colour of the facade."""
+    plans = [design(style, seed) for seed in range(16)]
+    colors = {building(seed, style).mesh.materials[0].base_color for seed in range(8)}
+
+    assert len({plan.width_m for plan in plans}) >= 8
+    assert len({(plan.floors, plan.roof) for plan in plans}) >= 2
+    assert len(colors) >= 5
+
+
+def test_facts_name_style_and_floors() -> None:
+    """What labels carry agrees with what is built."""
+    facts = building_facts(3, "old_town")
+
+    assert facts.subcategory == "old_town"
+    assert facts.attributes == {"floors": str(design("old_town", 3).floors)}

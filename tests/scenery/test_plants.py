@@ -1,0 +1,95 @@
+"""Trees: wood that thins out, leaves in clusters, and light that passes between them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from generator.assets.procedural.draw import rng_of
+from generator.assets.scenery.branching import Lobe, grown, points_in
+from generator.assets.scenery.trees import SPECIES, tree
+from generator.core.geometry import MeshData
+from tests.scenery.rays import cast
+
+LEAFY = [name for name in SPECIES if name != "conifer"]
+
+
+def leaves_of(mesh: MeshData) -> np.ndarray:
+    """Whether each face is a leaf."""
+    slots = [k for k, m in enumerate(mesh.materials) if m.role == "leaf"]
+    return np.isin(mesh.face_slots, slots)
+
+
+@pytest.mark.parametrize("species", LEAFY)
+def test_leaves_come_and_go_but_the_trunk_stays(species: str) -> None:
+    """The share of leaves is what it says; the trunk of the same tree is the same."""
+    full, half, bare = (tree(3, species, share).mesh for share in (1.0, 0.5, 0.0))
+
+    assert leaves_of(half).sum() == pytest.approx(0.5 * leaves_of(full).sum(), abs=2)
+    assert not leaves_of(bare).any()
+    trunks = [m.vertices_m[m.vertices_m[:, 2] < 0.01] for m in (full, bare)]
+    assert np.allclose(trunks[0], trunks[1])
+
+
+@pytest.mark.parametrize("species", LEAFY)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_crown_is_dense_but_not_a_ball(species: str, seed: int) -> None:
+    """Level rays through the middle of the crown: most meet a leaf, some pass."""
+    mesh = tree(seed, species, 1.0).mesh
+    crown = mesh.vertices_m[mesh.faces[leaves_of(mesh)]].reshape(-1, 3).astype(np.float64)
+    middle, spread = crown.mean(axis=0), crown.std(axis=0)
+    y, z = (g.ravel() for g in np.meshgrid(np.linspace(-1, 1, 25), np.linspace(-1, 1, 25)))
+    eyes = np.column_stack([0 * y + 20.0, middle[1] + y * spread[1], middle[2] + z * spread[2]])
+
+    _, face, _ = cast(mesh, eyes, np.tile([-1.0, 0.0, 0.0], (len(eyes), 1)))
+
+    assert 0.6 < (face >= 0).mean() < 0.995
+
+
+@pytest.mark.parametrize("species", SPECIES)
+def test_leaf_normals_point_away_from_the_crowns_middle(species: str) -> None:
+    """Soft shading: normals lean outward, and lie on their face's front."""
+    mesh = tree(1, species, 1.0).mesh
+    faces = mesh.faces[leaves_of(mesh)]
+    corners = mesh.vertices_m[faces].astype(np.float64)
+    axis = corners.mean(axis=1) * [1.0, 1.0, 0.0]
+    far = (axis**2).sum(axis=1) > 0.3 * (axis**2).sum(axis=1).max()
+    own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = mesh.normals[faces].mean(axis=1)
+
+    assert ((normals * axis).sum(axis=1)[far] > 0.0).mean() > 0.9
+    assert ((normals * own).sum(axis=1) > 0.0).all()
+
+
+def test_branches_obey_the_pipe_model() -> None:
+    """At every fork, the children's r^2.3 add up to the parent's (Shinozaki 1964)."""
+    rng = rng_of("test", 0)
+    points = points_in((Lobe((0.0, 0.0, 4.0), (1.5, 1.5, 1.5)),), 200, rng)
+    trunk = np.array([(0.0, 0.0, 0.5 * k) for k in range(6)])
+
+    skeleton = grown(trunk, points, 0.25, 0.15)
+
+    area = skeleton.radii_m**2.3
+    inner = np.unique(skeleton.parents[1:])
+    sums = np.bincount(skeleton.parents[1:], area[1:], len(area))
+    assert len(area) > 60
+    assert skeleton.radii_m[0] == pytest.approx(0.15)
+    # Every node adds its own unit of flow, tips nothing else.
+    unit = area[skeleton.radii_m == skeleton.radii_m.min()][0]
+    assert np.allclose(area[inner] - sums[inner], unit, rtol=1e-6) or np.allclose(
+        area[inner], sums[inner], rtol=1e-6
+    )
+    assert (skeleton.parents[1:] < np.arange(1, len(area))).all()
+
+
+def test_attraction_points_lie_in_their_lobes() -> None:
+    """Inside the ellipsoid and not in its core."""
+    lobe = Lobe((1.0, 2.0, 3.0), (2.0, 1.0, 0.5))
+
+    points = points_in((lobe,), 100, rng_of("test", 1))
+
+    scaled = (points - lobe.centre_m) / lobe.axes_m
+    r2 = (scaled**2).sum(axis=1)
+    assert len(points) == 100
+    assert r2.max() < 1.0
+    assert r2.min() > 0.12

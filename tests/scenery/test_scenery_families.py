@@ -1,0 +1,184 @@
+"""Everything that lines a street: sizes, budgets, frames, facts and bytes."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from generator.assets.generated import TABLES, _tables
+from generator.assets.procedural.family import Solid
+from generator.assets.scenery import FAMILIES, TEXTURES
+from generator.core.errors import AssetError
+
+# Height range [m] of real ones, and the largest number of triangles that a street affords.
+LIMITS = {
+    "building/residential": (8.0, 24.0, 6000), "building/old_town": (12.0, 28.0, 6000),
+    "building/modern": (9.0, 24.0, 6000), "building/commercial": (7.0, 30.0, 6000),
+    "building/house": (5.0, 13.0, 6000), "garage": (2.5, 3.2, 6000),
+    "tree/broad": (7.0, 13.5, 6000), "tree/round": (4.5, 7.5, 6000),
+    "tree/columnar": (7.0, 13.5, 6000), "tree/birch": (7.0, 13.0, 6000),
+    "tree/young": (3.2, 5.5, 6000), "tree/conifer": (5.5, 12.5, 6000),
+    "hedge": (0.7, 2.1, 6000), "bush": (0.6, 2.2, 6000), "planter": (0.5, 1.2, 1500),
+    "street_light": (6.0, 9.0, 1500), "litter_bin": (0.8, 1.4, 1500), "bench": (0.4, 1.0, 1500),
+    "hydrant": (0.7, 1.0, 1500), "bollard": (0.6, 1.1, 1500), "cone": (0.45, 0.8, 1500),
+    "post_box": (1.1, 1.6, 1500), "bus_stop": (2.3, 2.8, 1500), "utility_pole": (8.0, 10.5, 1500),
+    "cabinet": (0.9, 1.4, 1500), "bike_rack": (0.7, 0.9, 1500), "barrier": (0.7, 1.3, 1500),
+    "fence": (0.85, 1.8, 1500), "traffic_light": (2.6, 7.0, 1600),
+    "pedestrian_signal": (2.4, 3.3, 1500), "traffic_sign": (2.1, 3.3, 1500),
+}  # fmt: skip
+
+ROLES = {
+    "", "facade", "window", "roof", "trim", "chrome", "sign", "bark", "leaf", "lamp", "glass",
+    "lens_red", "lens_yellow", "lens_green", "lens_stop", "lens_walk",
+}  # fmt: skip
+
+
+def variant(name: str, seed: int) -> Solid:
+    """One variant, with the other parameters at their defaults."""
+    return FAMILIES[name].build(seed=seed, **FAMILIES[name].parameters)
+
+
+@pytest.fixture(
+    params=[(name, seed) for name in FAMILIES for seed in range(4)], ids=str, scope="module"
+)
+def built(request: pytest.FixtureRequest) -> tuple[str, Solid]:
+    """The first variants of every family."""
+    name, seed = request.param
+    return name, variant(name, seed)
+
+
+def test_every_family_has_a_stated_height_and_budget() -> None:
+    """A new family must say how high the real thing is and what it may cost."""
+    assert set(LIMITS) == set(FAMILIES)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_every_variant_is_as_high_as_real_ones_and_within_its_budget(name: str) -> None:
+    """All seeds that are offered for selection."""
+    low, high, triangles = LIMITS[name]
+    for seed in range(FAMILIES[name].variants):
+        mesh = variant(name, seed).mesh
+        assert low <= mesh.bounds_m()[1][2] <= high, seed
+        assert 30 <= len(mesh.faces) <= triangles, seed
+
+
+def test_it_stands_on_the_ground_around_its_origin(built: tuple[str, Solid]) -> None:
+    """Nothing reaches below z = 0, something touches it, and the origin is under the thing."""
+    name, solid = built
+    low, high = solid.mesh.bounds_m()
+
+    assert low[2] == pytest.approx(0.0, abs=0.03 if name.startswith(("bush", "hedge")) else 1e-5)
+    assert low[2] >= -1e-6
+    assert low[0] < 0.0 < high[0]
+    assert low[1] < 0.0 < high[1]
+
+
+def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> None:
+    """Shapes and types are the contract's."""
+    mesh = built[1].mesh
+    n = len(mesh.vertices_m)
+
+    assert mesh.normals.shape == (n, 3)
+    assert mesh.uvs.shape == (n, 2)
+    assert mesh.vertices_m.dtype == mesh.normals.dtype == mesh.uvs.dtype == np.float32
+    assert mesh.faces.dtype == mesh.face_slots.dtype == np.int32
+    assert np.isfinite(mesh.vertices_m).all()
+    assert np.allclose((mesh.normals.astype(np.float64) ** 2).sum(axis=1), 1.0, atol=1e-4)
+    assert set(np.unique(mesh.face_slots)) == set(range(len(mesh.materials)))
+
+
+def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
+    """Every face has an area."""
+    corners = built[1].mesh.vertices_m[built[1].mesh.faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    assert np.sqrt((cross**2).sum(axis=1)).min() > 1e-10
+
+
+def test_materials_have_known_roles_and_textures_that_exist(built: tuple[str, Solid]) -> None:
+    """Randomizers look for roles; a texture's family must be in one of the tables."""
+    textures = {name for table in _tables() for name in table}
+
+    assert TABLES
+    for material in built[1].mesh.materials:
+        assert material.role in ROLES
+        assert all(0.0 <= channel <= 1.0 for channel in material.base_color)
+        assert material.emission_cd_m2 == (0.0, 0.0, 0.0)
+        if material.texture:
+            assert material.texture.removeprefix("texture/").partition("?")[0] in textures
+
+
+def test_collision_lies_within_the_mesh_bounds(built: tuple[str, Solid]) -> None:
+    """Nothing collides that is not there."""
+    name, solid = built
+    low, high = solid.mesh.bounds_m()
+    points = np.concatenate(solid.collision.parts_m)
+
+    assert (points >= np.array(low) - 0.1).all(), name
+    assert (points <= np.array(high) + 0.1).all(), name
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_variant_has_the_same_bytes_every_time_and_others_than_its_neighbour(name: str) -> None:
+    """A pure function of family and seed."""
+    assert digest(variant(name, 1)) == digest(variant(name, 1))
+    assert digest(variant(name, 1)) != digest(variant(name, 2))
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_facts_are_known_without_building(name: str) -> None:
+    """Every variant says what it is."""
+    family = FAMILIES[name]
+    assert family.facts is not None
+    for seed in range(family.variants):
+        facts = family.facts(seed=seed, **family.parameters)
+        assert facts.subcategory
+        assert all(isinstance(value, str) for value in facts.attributes.values())
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("building/house", {"style": "huose"}),
+        ("tree/birch", {"species": "palm", "leaves": 1.0}),
+        ("tree/birch", {"species": "birch", "leaves": 1.5}),
+        ("traffic_sign", {"sign": "stopp"}),
+        ("traffic_light", {"mount": "poel"}),
+        ("barrier", {"style": "jersy"}),
+        ("fence", {"style": "pickts"}),
+    ],
+)
+def test_unknown_parameters_are_refused_by_name(name: str, parameters: dict[str, object]) -> None:
+    """The message says what was given."""
+    wrong = next(str(v) for v in parameters.values() if v not in ("birch", 1.0))
+    with pytest.raises(AssetError, match=wrong):
+        FAMILIES[name].build(seed=0, **parameters)
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+def test_textures_are_repeatable_images(name: str) -> None:
+    """8 bits per channel; two builds are equal; all maps have one size."""
+    family = TEXTURES[name]
+    first, second = (family.build(seed=0, **family.parameters) for _ in range(2))
+
+    assert first.albedo.dtype == np.uint8
+    assert first.albedo.ndim == 3
+    assert (first.albedo == second.albedo).all()
+    assert first.albedo.std() > 3.0
+    if first.normal is not None:
+        assert first.normal.shape == first.albedo.shape
+
+
+def digest(solid: Solid) -> str:
+    """Hash of everything a solid holds."""
+    mesh = solid.mesh
+    sha = hashlib.sha256()
+    for array in (mesh.vertices_m, mesh.faces, mesh.normals, mesh.uvs, mesh.face_slots):
+        sha.update(array.tobytes())
+    sha.update(repr(mesh.materials).encode())
+    sha.update(repr(solid.keypoints).encode())
+    for part in solid.collision.parts_m:
+        sha.update(part.tobytes())
+    return sha.hexdigest()

@@ -1,0 +1,164 @@
+"""Traffic lights: what is lit, how often, and never green for both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from scipy.stats import chisquare
+
+from generator.assets.library import Library, open_library
+from generator.assets.scenery.traffic_lights import (
+    PEDESTRIAN_LENSES,
+    VEHICLE_LENSES,
+    pedestrian_signal,
+    traffic_light,
+)
+from generator.core.errors import ConfigError
+from generator.core.scene import Body, Instance, Scene
+from generator.core.se3 import SE3
+from generator.core.streams import Rng, Streams
+from randomizers.traffic_lights import COLORS, TrafficLights
+
+Draw = Callable[..., Scene]
+WEIGHTS = {"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04}
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """All assets, with a cache of its own."""
+    return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture
+def draw(library: Library) -> Draw:
+    """The scene after one draw of a randomizer with the given fields."""
+
+    def drawn(scene: Scene, index: int, **fields: object) -> Scene:
+        made = TrafficLights.model_validate({"name": "lights", **fields})
+        return made(scene, library, rng(index))
+
+    return drawn
+
+
+def rng(scene: int) -> Rng:
+    """The stream of one scene."""
+    return Streams(seed=5, scene=scene).rng("lights")
+
+
+def scene_of(*signals: tuple[str, float, float, float]) -> Scene:
+    """Signals of (asset, x, y, yaw in degrees), one instance each."""
+    bodies, instances = [], []
+    for k, (asset, x, y, yaw_deg) in enumerate(signals, 1):
+        kind = "pedestrian" if asset.startswith("pedestrian") else "vehicle"
+        pose = SE3.about_z(math.radians(yaw_deg), (x, y, 0.0))
+        bodies.append(Body(f"signal/{k}", asset, pose, instance_id=k))
+        instances.append(Instance(k, f"signal/{k}", "traffic_light", 1, asset, subcategory=kind))
+    return Scene("street", bodies=tuple(bodies), instances=tuple(instances))
+
+
+def states(scene: Scene) -> list[str]:
+    """What each signal shows, by its label."""
+    return [dict(instance.attributes)["state"] for instance in scene.instances]
+
+
+def test_states_of_single_signals_come_as_often_as_their_weights_say(draw: Draw) -> None:
+    """Chi-square goodness of fit over 2000 scenes."""
+    scene = scene_of(("traffic_light?seed=0", 0.0, 0.0, 0.0))
+    seen = [states(draw(scene, k))[0] for k in range(2000)]
+
+    counts = [seen.count(state) for state in WEIGHTS]
+    assert sum(counts) == 2000
+    assert chisquare(counts, [2000 * w for w in WEIGHTS.values()]).pvalue > 0.001
+
+
+def test_crossing_directions_never_have_green_together(draw: Draw) -> None:
+    """A junction of four: opposite signals agree, crossing ones do not conflict."""
+    scene = scene_of(
+        ("traffic_light?seed=0", 8.0, 6.0, 0.0),
+        ("traffic_light?seed=1", -8.0, -6.0, 180.0),
+        ("traffic_light?seed=3", -6.0, 8.0, 90.0),
+        ("traffic_light?seed=4", 6.0, -8.0, -90.0),
+    )
+    pairs = set()
+    for k in range(300):
+        east, west, north, south = states(draw(scene, k))
+        assert east == west
+        assert north == south
+        pairs.add((east, north))
+
+    assert pairs == {
+        ("red", "green"), ("green", "red"), ("yellow", "red"), ("red_yellow", "red"),
+    }  # fmt: skip
+
+
+def test_junctions_far_apart_are_independent(draw: Draw) -> None:
+    """Two signals 100 m apart disagree in some scenes and agree in others."""
+    scene = scene_of(
+        ("traffic_light?seed=0", 0.0, 0.0, 0.0), ("traffic_light?seed=0", 100.0, 0.0, 0.0)
+    )
+    agree = {len(set(states(draw(scene, k)))) for k in range(40)}
+
+    assert agree == {1, 2}
+
+
+@pytest.mark.parametrize(
+    ("state", "lit"),
+    [
+        ("red", {"lens_red"}),
+        ("red_yellow", {"lens_red", "lens_yellow"}),
+        ("yellow", {"lens_yellow"}),
+        ("green", {"lens_green"}),
+    ],
+)
+def test_exactly_the_lenses_of_a_state_emit_light(draw: Draw, state: str, lit: set[str]) -> None:
+    """With the luminance that was asked for; everything else is dark."""
+    scene = scene_of(("traffic_light?seed=2", 0.0, 0.0, 0.0))
+    body = draw(scene, 0, state=state, luminance_cd_m2=6400.0).bodies[0]
+
+    glowing = {m.role: m.emission_cd_m2 for m in body.materials if any(m.emission_cd_m2)}
+    assert set(glowing) == lit
+    for r, g, b in glowing.values():
+        assert 0.2126 * r + 0.7152 * g + 0.0722 * b == pytest.approx(6400.0, rel=0.01)
+
+
+def test_people_walk_along_with_green_traffic_and_stop_otherwise(draw: Draw) -> None:
+    """A pedestrian signal follows the axis that it faces."""
+    scene = scene_of(
+        ("traffic_light?seed=0", 0.0, 0.0, 0.0), ("pedestrian_signal?seed=0", 3.0, 0.0, 180.0)
+    )
+
+    assert states(draw(scene, 0, state="green")) == ["green", "walk"]
+    for state in ("red", "yellow", "red_yellow"):
+        assert states(draw(scene, 0, state=state)) == [state, "stop"]
+
+
+def test_an_unknown_state_is_refused_with_the_nearest_one(draw: Draw) -> None:
+    """The message names the field."""
+    scene = scene_of(("traffic_light?seed=0", 0.0, 0.0, 0.0))
+    with pytest.raises(ConfigError, match=r"lights\.state: unknown state 'gren'.*'green'"):
+        draw(scene, 0, state="gren")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_red_is_above_yellow_is_above_green_and_all_face_plus_x(seed: int) -> None:
+    """By the height of the lowest lens of each colour."""
+    mesh = traffic_light(seed, "any").mesh
+    heights = []
+    for role in VEHICLE_LENSES:
+        slot = next(k for k, m in enumerate(mesh.materials) if m.role == role)
+        vertices = mesh.faces[mesh.face_slots == slot].ravel()
+        heights.append(float(mesh.vertices_m[vertices][:, 2].min()))
+        assert mesh.normals[vertices][:, 0].min() > 0.0
+
+    assert heights[0] > heights[1] > heights[2] > 2.1
+
+
+def test_signals_for_people_have_a_stop_and_a_walk_lens() -> None:
+    """And none of the others."""
+    roles = {m.role for m in pedestrian_signal(1).mesh.materials}
+
+    assert set(PEDESTRIAN_LENSES) <= roles
+    assert not roles & set(VEHICLE_LENSES)
+    assert set(COLORS) == {*PEDESTRIAN_LENSES, *VEHICLE_LENSES}
