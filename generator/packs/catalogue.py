@@ -184,7 +184,9 @@ def mesh_entry(
         max_faces=choice.max_faces or group.max_faces or 4000,
         parts=choice.parts or group.parts or 8,
         materials={pattern: finishes[name] for pattern, name in named.items()},
-        keypoints=tuple(p for name, place in choice.keypoints.items() for p in _points(name, place)),
+        keypoints=tuple(
+            p for name, place in choice.keypoints.items() for p in _points(name, place)
+        ),
         regions=tuple(region for lamp in choice.lamps for region in _regions(lamp, finishes)),
         licence=model.licence,
         author=model.creator,
