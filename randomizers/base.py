@@ -33,6 +33,11 @@ class RandomizerBase(Strict):
         """When it runs."""
         return Stage(self.every)
 
+    def may_draw(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the assets that only it may bring into a scene: they belong to the data set."""
+        del assets
+        return ()
+
     @abstractmethod
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """A new scene; the given one stays as it is."""

@@ -32,6 +32,10 @@ class EnvironmentLight(RandomizerBase):
     yaw_deg: Scalar = Uniform(0.0, 360.0)
     visible: bool = Field(True)
 
+    def may_draw(self, assets: AssetIndex) -> tuple[str, ...]:
+        """The images it draws from."""
+        return self._options(assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene in another light."""
         environment = Environment(

@@ -29,7 +29,7 @@ from generator.core.errors import AssetError
 from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, UInt8
 from generator.core.se3 import SE3
 
-VERSION = 2
+VERSION = 3
 """Raised whenever the same files would come out as other geometry."""
 _WHITEST = 0.85
 """Files say 1 for white; no matt surface reflects more than fresh snow does (about 0.85)."""

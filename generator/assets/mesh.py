@@ -21,6 +21,7 @@ from generator.core.geometry import Material, MeshData
 CREASE_DEG = 40.0
 MAX_TEXTURED_FACES = 1_000_000
 _MIN_EXTENT_M, _MAX_EXTENT_M, _MAX_COORDINATE_M = 1e-4, 1e3, 1e4
+_MAX_UV = 1e4
 _WELD = 1e-6
 """Vertices nearer than this fraction of the largest extent are one."""
 
@@ -64,9 +65,14 @@ def normal_form(soup: Soup, place: str, form: NormalForm = NormalForm()) -> Mesh
     if len(soup) > form.max_faces:
         soup, faces = _welded(decimated(soup, form.max_faces))
     soup, faces = _outward(soup, faces)
-    soup = replace(soup, uvs=soup.uvs if textured else None)
+    soup = replace(soup, uvs=_sane_uvs(soup.uvs) if textured else None)
     own = _sane_normals(soup)
     return mesh_of(soup, _creased(soup, faces, form.crease_deg) if own is None else own)
+
+
+def _sane_uvs(uvs: Float64 | None) -> Float64 | None:
+    """UVs; those that no repetition explains, which exporters leave on loose corners, are zero."""
+    return None if uvs is None else np.where(np.abs(uvs) > _MAX_UV, 0.0, uvs)
 
 
 def check_coordinates(soup: Soup, place: str) -> None:

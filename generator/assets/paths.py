@@ -1,16 +1,19 @@
-"""Where things lie that belong to the user and not to a data set."""
+"""Where asset packs are installed."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-ASSETS_VARIABLE = "GEN_DATA_ASSETS"
+VARIABLE = "GEN_DATA_ASSETS"
+"""Environment variable that names another folder for installed assets."""
 
 
 def packs_dir() -> Path:
-    """The folder of installed asset packs: below $GEN_DATA_ASSETS, or the user's data folder."""
-    from platformdirs import user_data_path
+    """The folder that holds one folder per installed asset pack; it need not exist."""
+    chosen = os.environ.get(VARIABLE)
+    if chosen:
+        return Path(chosen) / "packs"
+    import platformdirs
 
-    chosen = os.environ.get(ASSETS_VARIABLE)
-    return (Path(chosen) if chosen else user_data_path("gen-data")) / "packs"
+    return Path(platformdirs.user_data_path("gen-data")) / "packs"

@@ -51,6 +51,7 @@ def install(names: tuple[str, ...], archive: Path | None, again: bool) -> None:
             f"{pack.name}: {pack.source}, {len(record.files)} files, {_mb(record.size)}, "
             f"{time.perf_counter() - started_s:.0f} s, licence {pack.licence}"
         )
+        _prepare(pack.name)
 
 
 @assets.command("list")
@@ -125,6 +126,20 @@ def remove(names: tuple[str, ...]) -> None:
     for name in names:
         remove_pack(find_pack(name).name, packs_dir())
         click.echo(f"{name}: removed")
+
+
+def _prepare(pack: str) -> None:
+    """Import a pack's objects now, so that no run has to: the cache keeps their normal form."""
+    from generator.assets.library import open_library
+
+    library = open_library()
+    started_s = time.perf_counter()
+    objects = [a.asset_id for a in library.find(()) if a.asset_id.startswith(f"{pack}/")]
+    with click.progressbar(objects, label=f"{pack}: preparing {len(objects)} objects") as bar:
+        for asset_id in bar:
+            library.mesh(asset_id)
+    if objects:
+        click.echo(f"{pack}: prepared in {time.perf_counter() - started_s:.0f} s")
 
 
 def _list_assets(tags: tuple[str, ...]) -> None:

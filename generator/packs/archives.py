@@ -19,8 +19,9 @@ import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
-from typing import IO
+from typing import IO, cast
 
 from generator.core.errors import AssetError
 
@@ -162,7 +163,7 @@ def _walk_zip(job: _Extraction, file: IO[bytes], prefix: str, depth: int) -> Non
             plain = not info.is_dir() and (stat.S_IFMT(mode) in (0, stat.S_IFREG))
             job.count(info.file_size)
             if not info.is_dir():
-                _take(job, name, info.file_size, plain, lambda i=info: archive.open(i), depth)
+                _take(job, name, info.file_size, plain, partial(archive.open, info), depth)
 
 
 def _walk_tar(job: _Extraction, file: IO[bytes], prefix: str, depth: int) -> None:
@@ -171,7 +172,7 @@ def _walk_tar(job: _Extraction, file: IO[bytes], prefix: str, depth: int) -> Non
             name = prefix + info.name.removeprefix("./")
             job.count(info.size)
             if not info.isdir():
-                _take(job, name, info.size, info.isreg(), lambda i=info: _opened(archive, i), depth)
+                _take(job, name, info.size, info.isreg(), partial(_opened, archive, info), depth)
 
 
 def _opened(archive: tarfile.TarFile, info: tarfile.TarInfo) -> IO[bytes]:
@@ -220,7 +221,7 @@ def _debian_data(job: _Extraction, file: IO[bytes]) -> IO[bytes]:
     while len(header := file.read(60)) == 60:
         name, size = header[:16].decode("ascii").strip().rstrip("/"), int(header[48:58])
         if name.startswith("data.tar"):
-            return _Window(file, size)
+            return cast(IO[bytes], _Window(file, size))
         file.seek(size + size % 2, io.SEEK_CUR)
     raise job.refuse("holds no data.tar and is no Debian package")
 

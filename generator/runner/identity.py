@@ -8,9 +8,12 @@ from importlib.metadata import PackageNotFoundError, version
 from generator import __version__
 from generator.assemble.recipe import PipelineFactory, nominal_scenes
 from generator.assets.library import open_library
+from generator.assets.packs import TAG, installed
+from generator.assets.paths import packs_dir
 from generator.core.geometry import Asset
 from generator.core.scene import Scene
 from generator.runner.plan import Plan
+from randomizers.base import RandomizerBase
 
 BYTES_DEPEND_ON = (
     "numpy",
@@ -25,14 +28,19 @@ BYTES_DEPEND_ON = (
 def plan_of(factory: PipelineFactory) -> Plan:
     """The identity of the data set that a factory makes."""
     spec = factory.spec
+    assets = possible_assets(factory)
     return Plan(
         config=spec.resolved,
         name=spec.name,
         seed=spec.head.seed,
         n=factory.n,
         shard_size=spec.head.shard_size,
-        versions={"gen-data": __version__, **{name: _release(name) for name in BYTES_DEPEND_ON}},
-        assets={asset.asset_id: asset.sha256 for asset in possible_assets(factory)},
+        versions={
+            "gen-data": __version__,
+            **{name: _release(name) for name in BYTES_DEPEND_ON},
+            **_packs(assets),
+        },
+        assets={asset.asset_id: asset.sha256 for asset in assets},
     )
 
 
@@ -53,10 +61,28 @@ def licences_text(factory: PipelineFactory, used: Sequence[str]) -> str:
 
 
 def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
-    """Every object and robot that a sample may contain, sorted by id."""
+    """Every object, robot and panorama that a sample may contain, sorted by id."""
     library = open_library(factory.spec.asset_folders)
-    ids = {i for scene in nominal_scenes(factory.spec, library) for i in _ids(scene)}
-    return tuple(library.get(asset_id) for asset_id in sorted(ids))
+    scenes = nominal_scenes(factory.spec, library)
+    ids = {asset_id for scene in scenes for asset_id in _ids(scene)}
+    drawn = {
+        asset_id
+        for layout in factory.spec.probes
+        for randomizer in layout.randomizers
+        if isinstance(randomizer, RandomizerBase)
+        for asset_id in randomizer.may_draw(library)
+    }
+    return tuple(library.get(asset_id) for asset_id in sorted(ids | drawn))
+
+
+def _packs(assets: tuple[Asset, ...]) -> dict[str, str]:
+    """Installed packs, if a sample may contain anything of any of them."""
+    if not any(TAG in asset.tags for asset in assets):
+        return {}
+    return {
+        f"pack {record.name}": f"{record.version} {record.digest[:16]}"
+        for record in installed(packs_dir())
+    }
 
 
 def _ids(scene: Scene) -> set[str]:

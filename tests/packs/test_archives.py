@@ -1,0 +1,168 @@
+"""Only wanted plain files inside the folder come out of an archive, and never too many bytes."""
+
+from __future__ import annotations
+
+import io
+import tarfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from generator.core.errors import AssetError
+from generator.packs.archives import Limits, extract
+
+Maker = Callable[[Path, dict[str, bytes]], Path]
+CONTENT = {"data/a.txt": b"alpha", "data/sub/b.txt": b"beta", "code/evil.py": b"print()"}
+
+
+def zipped(folder: Path, members: dict[str, bytes]) -> Path:
+    """A zip of the members."""
+    path = folder / "archive.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    return path
+
+
+def tarred(folder: Path, members: dict[str, bytes], mode: str = "w:xz") -> Path:
+    """A tar of the members, with the leading ``./`` that dpkg writes."""
+    path = folder / "archive.tar"
+    with tarfile.open(path, mode) as archive:  # type: ignore[call-overload]
+        for name, data in members.items():
+            info = tarfile.TarInfo(f"./{name}")
+            info.size = len(data)
+            archive.addfile(info, io.BytesIO(data))
+    return path
+
+
+def debian(folder: Path, members: dict[str, bytes]) -> Path:
+    """A Debian package: an ar archive of three members, each at an even offset."""
+    data = tarred(folder, members).read_bytes()
+    path = folder / "archive.deb"
+    with path.open("wb") as file:
+        file.write(b"!<arch>\n")
+        for name, content in (
+            ("debian-binary", b"2.0\n"),
+            ("control.tar.xz", b"odd"),
+            ("data.tar.xz", data),
+        ):
+            file.write(f"{name:<16}{0:<12}{0:<6}{0:<6}{100644:<8}{len(content):<10}`\n".encode())
+            file.write(content + b"\n" * (len(content) % 2))
+    return path
+
+
+def files_in(folder: Path) -> dict[str, bytes]:
+    """Everything below a folder."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.mark.parametrize("make", [zipped, tarred, debian])
+def test_exactly_the_wanted_members_come_out(make: Maker, tmp_path: Path) -> None:
+    """Of every kind of archive; paths are kept, nothing else is written anywhere."""
+    target = tmp_path / "out"
+    names = extract(make(tmp_path, CONTENT), ("data/*",), target)
+    assert set(names) == {"data/a.txt", "data/sub/b.txt"}
+    assert files_in(target) == {"data/a.txt": b"alpha", "data/sub/b.txt": b"beta"}
+
+
+def test_members_of_an_archive_inside_an_archive_follow_its_path(tmp_path: Path) -> None:
+    """As in the furniture package: zips in the tar of a Debian package."""
+    inner = zipped(tmp_path, {"car/car.obj": b"v 0 0 0", "car/readme.html": b"no"}).read_bytes()
+    package = debian(tmp_path, {"usr/share/cars.sh3f": inner, "usr/share/doc": b"text"})
+    extract(package, ("usr/share/*.sh3f/*.obj",), tmp_path / "out")
+    assert files_in(tmp_path / "out") == {"usr/share/cars.sh3f/car/car.obj": b"v 0 0 0"}
+
+
+@pytest.mark.parametrize("make", [zipped, tarred])
+@pytest.mark.parametrize("name", ["../evil.txt", "data/../../evil.txt", "/evil.txt", "a\\evil.txt"])
+def test_a_member_outside_its_folder_is_refused(make: Maker, name: str, tmp_path: Path) -> None:
+    """And nothing is written beside the folder."""
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    archive = make(inside, {name: b"x"})
+    with pytest.raises(AssetError, match="outside its folder"):
+        extract(archive, ("*",), inside / "out")
+    assert not (tmp_path / "evil.txt").exists()
+    assert not (inside / "evil.txt").exists()
+
+
+@pytest.mark.parametrize("kind", [tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.CHRTYPE])
+def test_links_and_devices_are_refused(kind: bytes, tmp_path: Path) -> None:
+    """A wanted name must be a plain file."""
+    path = tmp_path / "archive.tar"
+    with tarfile.open(path, "w") as archive:
+        info = tarfile.TarInfo("data/link")
+        info.type, info.linkname = kind, "/etc/passwd"
+        archive.addfile(info)
+    with pytest.raises(AssetError, match="a link or a device"):
+        extract(path, ("data/*",), tmp_path / "out")
+
+
+def test_a_symbolic_link_in_a_zip_is_refused(tmp_path: Path) -> None:
+    """Zips keep the Unix mode in the upper half of the external attributes."""
+    path = tmp_path / "archive.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        info = zipfile.ZipInfo("data/link")
+        info.external_attr = 0o120777 << 16
+        archive.writestr(info, "/etc/passwd")
+    with pytest.raises(AssetError, match="a link or a device"):
+        extract(path, ("data/*",), tmp_path / "out")
+
+
+@pytest.mark.parametrize("make", [zipped, tarred])
+@pytest.mark.parametrize("wanted", ["data/*", "other/*"])
+def test_a_bomb_is_refused_before_it_fills_the_disk(
+    make: Maker, wanted: str, tmp_path: Path
+) -> None:
+    """Forty megabytes of zeros shrink a thousandfold; unwanted ones cost time, too."""
+    archive = make(tmp_path, {"data/zeros": bytes(40_000_000)})
+    with pytest.raises(AssetError, match="times its size"):
+        extract(archive, (wanted,), tmp_path / "out")
+    assert files_in(tmp_path / "out") == {}
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        (Limits(members=1), "more than 1 members"),
+        (Limits(file_bytes=4), "at most 4"),
+        (Limits(total_bytes=6), "exceed 6 bytes"),
+    ],
+)
+def test_every_limit_is_kept(limits: Limits, message: str, tmp_path: Path) -> None:
+    """Number of members, size of one, size of all."""
+    with pytest.raises(AssetError, match=message):
+        extract(zipped(tmp_path, CONTENT), ("data/*",), tmp_path / "out", limits)
+
+
+def test_a_name_that_occurs_twice_is_refused(tmp_path: Path) -> None:
+    """Which of the two would it be?"""
+    path = tmp_path / "archive.tar"
+    with tarfile.open(path, "w") as archive:
+        for data in (b"one", b"two"):
+            info = tarfile.TarInfo("data/a")
+            info.size = len(data)
+            archive.addfile(info, io.BytesIO(data))
+    with pytest.raises(AssetError, match="twice"):
+        extract(path, ("data/*",), tmp_path / "out")
+
+
+@pytest.mark.parametrize("data", [b"", b"PK\x03\x04 no zip at all", b"!<arch>\nno", b"\x00" * 600])
+def test_what_is_no_archive_is_an_error_in_words(data: bytes, tmp_path: Path) -> None:
+    """Empty, cut off, or something else."""
+    path = tmp_path / "archive"
+    path.write_bytes(data)
+    with pytest.raises(AssetError, match="nothing was installed"):
+        extract(path, ("*",), tmp_path / "out")
+
+
+def test_an_archive_without_wanted_members_is_an_error(tmp_path: Path) -> None:
+    """It is the wrong archive."""
+    with pytest.raises(AssetError, match="none of the wanted members"):
+        extract(zipped(tmp_path, CONTENT), ("models/*",), tmp_path / "out")

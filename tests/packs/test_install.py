@@ -1,0 +1,257 @@
+"""Packs are installed whole or not at all, from exactly the archive that the table means."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import stat
+import zipfile
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from generator.assets.library import Library, open_library
+from generator.assets.packs import installed
+from generator.core.errors import AssetError, StorageError, VerificationError
+from generator.packs.install import install, is_installed, remove, verify
+from generator.packs.table import PACKS, ClientName, Pack, find_pack
+from tests.packs.converters import BOX
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Path:
+    """A package with one model and some code."""
+    path = tmp_path / "package-1.0.zip"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("data/box.obj", BOX)
+        file.writestr("package/__init__.py", "raise SystemExit('imported')")
+    return path
+
+
+@pytest.fixture
+def pack(archive: Path) -> Pack:
+    """The package in the table."""
+    return Pack(
+        name="boxes",
+        summary="a box",
+        client="pip",
+        package="package",
+        version="1.0",
+        sha256=sha256(archive.read_bytes()).hexdigest(),
+        licence="CC-BY-3.0",
+        wanted=("data/*",),
+        converter="tests.packs.converters:box",
+    )
+
+
+def fake_client(folder: Path, program: str, script: str) -> None:
+    """A program of that name, first and last on PATH."""
+    folder.mkdir(exist_ok=True)
+    path = folder / program
+    path.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+
+
+def library_with(folder: Path, tmp_path: Path) -> Library:
+    """A library that sees the packs in a folder."""
+    return open_library(cache_dir=tmp_path / "cache", packs=folder)
+
+
+def names_in(folder: Path) -> set[str]:
+    """What lies in a folder, its lock aside."""
+    return {path.name for path in folder.iterdir()} - {".lock"}
+
+
+def test_an_installed_pack_joins_the_library(pack: Pack, archive: Path, tmp_path: Path) -> None:
+    """Under ids that start with its name, with its own licence and author."""
+    record = install(pack, tmp_path / "packs", archive)
+    assert {file.path for file in record.files} == {"box.obj", "index.json"}
+    library = library_with(tmp_path / "packs", tmp_path)
+    asset = library.get("boxes/box")
+    assert (asset.category, asset.licence, asset.author) == ("box", "CC-BY-3.0", "A. Modeller")
+    assert asset in library.find(("pack", "household"))
+    assert library.bounds_m("boxes/box") == ((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))
+
+
+def test_without_packs_the_library_is_as_before(tmp_path: Path) -> None:
+    """A folder that does not exist costs nothing and is not made."""
+    library = library_with(tmp_path / "packs", tmp_path)
+    assert library.find(("pack",)) == ()
+    assert not (tmp_path / "packs").exists()
+
+
+def test_another_archive_is_refused_and_nothing_installed(
+    pack: Pack, archive: Path, tmp_path: Path
+) -> None:
+    """One byte is enough; both sums are told."""
+    archive.write_bytes(archive.read_bytes() + b"\0")
+    with pytest.raises(AssetError, match=f"expected {pack.sha256}"):
+        install(pack, tmp_path / "packs", archive)
+    assert names_in(tmp_path / "packs") == set()
+
+
+@pytest.mark.parametrize(
+    ("client", "program"), [("pip", "pip"), ("apt", "apt-get"), ("npm", "npm")]
+)
+def test_the_client_fetches_the_pinned_version(
+    client: ClientName, program: str, pack: Pack, archive: Path, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """It is called with package and version, in a folder of its own."""
+    fake_client(tmp_path / "bin", program,
+                f'/bin/echo "$@" > {tmp_path}/called; /bin/cp {archive} .')  # fmt: skip
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    install(replace(pack, client=client), tmp_path / "packs")
+    called = (tmp_path / "called").read_text(encoding="utf-8")
+    assert "package" in called and "1.0" in called
+    assert names_in(tmp_path / "packs") == {"boxes"}
+
+
+def test_a_missing_client_is_named(
+    pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With what to do instead."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(AssetError, match=r"'npm' is not on PATH.*--from FILE"):
+        install(replace(pack, client="npm"), tmp_path / "packs")
+    assert names_in(tmp_path / "packs") == set()
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("npm error code ENOTFOUND", "found no network"),
+        ("E: Could not resolve 'deb.debian.org'", "found no network"),
+        ("ERROR: No matching distribution found", "failed: ERROR: No matching distribution"),
+    ],
+)
+def test_no_network_and_other_failures_are_told_apart(
+    said: str, told: str, pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the client says is shown unless the reason is plain."""
+    fake_client(tmp_path / "bin", "pip", f'echo "{said}" >&2; exit 1')
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    with pytest.raises(AssetError, match=told):
+        install(pack, tmp_path / "packs")
+    assert names_in(tmp_path / "packs") == set()
+
+
+def test_a_killed_installation_leaves_nothing_behind(
+    pack: Pack, archive: Path, tmp_path: Path
+) -> None:
+    """No pack is seen, and the next installation sweeps up."""
+    folder = tmp_path / "packs"
+    dying = replace(pack, converter="tests.packs.converters:killed")
+    process = multiprocessing.get_context("fork").Process(
+        target=install, args=(dying, folder, archive)
+    )
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+    assert installed(folder) == ()
+    assert library_with(folder, tmp_path).find(("pack",)) == ()
+    install(pack, folder, archive)
+    assert names_in(folder) == {"boxes"}
+
+
+def test_a_failed_exchange_keeps_the_old_pack(pack: Pack, archive: Path, tmp_path: Path) -> None:
+    """A converter that cannot cope changes nothing."""
+    folder = tmp_path / "packs"
+    install(pack, folder, archive)
+    with pytest.raises(AssetError, match="none of the wanted"):
+        install(replace(pack, wanted=("models/*",)), folder, archive)
+    verify("boxes", folder)
+
+
+def test_two_installations_at_once_are_kept_apart(
+    pack: Pack, archive: Path, tmp_path: Path
+) -> None:
+    """The second one is told to wait."""
+    import fcntl
+
+    folder = tmp_path / "packs"
+    folder.mkdir()
+    with (folder / ".lock").open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with pytest.raises(StorageError, match="another process"):
+            install(pack, folder, archive)
+
+
+@pytest.mark.parametrize("damage", ["changed", "missing", "was not installed"])
+def test_verify_finds_every_difference(
+    damage: str, pack: Pack, archive: Path, tmp_path: Path
+) -> None:
+    """One byte, one file less, one file more."""
+    folder = tmp_path / "packs"
+    install(pack, folder, archive)
+    assert len(verify("boxes", folder).files) == 2
+    model = folder / "boxes" / "box.obj"
+    if damage == "changed":
+        model.write_text(BOX.replace("v 1", "v 2", 1), encoding="utf-8")
+    elif damage == "missing":
+        model.unlink()
+    else:
+        (folder / "boxes" / "more.obj").write_text(BOX, encoding="utf-8")
+    with pytest.raises(VerificationError, match=damage):
+        verify("boxes", folder)
+
+
+def test_a_removed_pack_is_gone(pack: Pack, archive: Path, tmp_path: Path) -> None:
+    """With all of its files; a second removal is an error."""
+    folder = tmp_path / "packs"
+    install(pack, folder, archive)
+    remove("boxes", folder)
+    assert names_in(folder) == set()
+    with pytest.raises(AssetError, match="not installed"):
+        remove("boxes", folder)
+
+
+def test_a_new_revision_of_the_conversion_is_out_of_date(
+    pack: Pack, archive: Path, tmp_path: Path
+) -> None:
+    """So that an upgrade of gen-data asks for it."""
+    folder = tmp_path / "packs"
+    assert not is_installed(pack, folder)
+    install(pack, folder, archive)
+    assert is_installed(pack, folder)
+    assert not is_installed(replace(pack, revision=pack.revision + 1), folder)
+
+
+def test_installing_twice_gives_the_same_digest(pack: Pack, archive: Path, tmp_path: Path) -> None:
+    """The digest names the pack in a data set's plan."""
+    digests = {install(pack, tmp_path / name, archive).digest for name in ("one", "two")}
+    assert len(digests) == 1
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_rights_is_told(pack: Pack, archive: Path, tmp_path: Path) -> None:
+    """With the way out."""
+    tmp_path.joinpath("packs").mkdir(mode=0o500)
+    with pytest.raises(StorageError, match="GEN_DATA_ASSETS"):
+        install(pack, tmp_path / "packs", archive)
+
+
+def test_a_damaged_record_says_what_to_do(pack: Pack, archive: Path, tmp_path: Path) -> None:
+    """Install again."""
+    folder = tmp_path / "packs"
+    install(pack, folder, archive)
+    (folder / "boxes" / "pack.json").write_text("{", encoding="utf-8")
+    with pytest.raises(AssetError, match="install the pack again"):
+        installed(folder)
+
+
+def test_an_unknown_pack_is_answered_with_the_nearest() -> None:
+    """And with all names."""
+    with pytest.raises(Exception, match="did you mean 'catalogue'"):
+        find_pack("catalog")
+
+
+def test_every_pack_is_pinned() -> None:
+    """A version, a sum of 64 digits, a licence, patterns below a folder."""
+    for pack in PACKS:
+        assert pack.version and pack.licence
+        assert len(bytes.fromhex(pack.sha256)) == 32
+        assert all("/" in pattern for pattern in pack.wanted)
