@@ -114,7 +114,7 @@ FAMILIES: Mapping[str, Family] = _table(
 TEXTURES: Mapping[str, TextureFamily] = _table(
     (
         _texture("roof_tiles", "surfaces:roof_tiles", "roof", 4),
-        _texture("ashlar", "surfaces:ashlar", "stone wall", 4),
+        _texture("ashlar", "surfaces:ashlar", "facade", 4),
         _texture("bark", "surfaces:bark", "plant", 4),
         _texture("foliage", "surfaces:foliage", "plant", 2),
         _texture("shop_sign", "shop_signs:shop_sign", "printed", 12),

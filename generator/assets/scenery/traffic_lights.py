@@ -7,7 +7,7 @@ the road follow EN 12368 and the German RiLSA.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from generator.assets.procedural.draw import between, chance, pick, rng_of
 from generator.assets.procedural.family import Facts, Solid
 from generator.assets.procedural.materials import painted
 from generator.assets.procedural.mesh import Patch, joined
-from generator.assets.procedural.shapes import block, grid, lathe, rounded_box
+from generator.assets.procedural.shapes import block, circle, fan, grid, lathe, rounded_box
 from generator.assets.scenery.forms import post, solid, tube
 from generator.assets.scenery.furniture import GALVANISED
 from generator.core.errors import AssetError, did_you_mean
@@ -28,6 +28,20 @@ HOUSING, POLE, BOARD = 0, 1, 2
 _FIRST_LENS = 3
 VEHICLE_LENSES = ("lens_red", "lens_yellow", "lens_green")
 PEDESTRIAN_LENSES = ("lens_stop", "lens_walk")
+# Convex outlines (right, up) in lens radii, counter-clockwise.
+FIGURES: Mapping[str, Sequence[Sequence[tuple[float, float]]]] = {
+    "lens_stop": (
+        ((-0.36, -0.12), (-0.22, -0.14), (0.22, -0.14), (0.36, -0.12), (0.2, 0.42), (-0.2, 0.42)),
+        ((-0.17, -0.85), (0.17, -0.85), (0.2, -0.13), (-0.2, -0.13)),
+    ),
+    "lens_walk": (
+        ((-0.16, -0.2), (0.16, -0.18), (0.18, 0.42), (-0.14, 0.42)),
+        ((0.18, -0.85), (0.42, -0.82), (0.16, -0.17), (-0.06, -0.19)),
+        ((-0.5, -0.8), (-0.27, -0.82), (0.06, -0.19), (-0.16, -0.21)),
+        ((0.18, 0.22), (0.46, -0.04), (0.5, 0.06), (0.16, 0.42)),
+        ((-0.46, 0.0), (-0.36, -0.08), (-0.13, 0.2), (-0.14, 0.42)),
+    ),
+}
 _OFF: dict[str, Vec3] = {
     "lens_red": (0.09, 0.008, 0.006),
     "lens_yellow": (0.11, 0.06, 0.006),
@@ -93,20 +107,29 @@ def head(lenses: Sequence[str], lens_m: float) -> Patch:
     """
     cell, half, deep = 2.7 * lens_m, 1.4 * lens_m, 0.16
     parts = []
-    for k in range(len(lenses)):
+    for k, role in enumerate(lenses):
         z = cell * (len(lenses) - k - 0.5)
         chamber = rounded_box((deep, 2 * half, cell - 0.006), 0.025, 1).moved(0.0, 0.0, z)
         x = 0.5 * deep
-        # A lens bulges out of a ring.
-        bulge = lathe(
-            [(lens_m, 0.004), (0.8 * lens_m, 0.016), (0.45 * lens_m, 0.026), (0.0, 0.03)], 20
-        )
+        lens = _figure(lens_m, role) if role in FIGURES else _bulge(lens_m)
         parts += [
             chamber,
-            bulge.rotated("y", 0.5 * math.pi).moved(x, 0.0, z).painted(_FIRST_LENS + k),
+            lens.moved(x, 0.0, z).painted(_FIRST_LENS + k),
             _visor(1.08 * lens_m, 1.7 * lens_m).moved(x - 0.002, 0.0, z),
         ]
     return joined(parts)
+
+
+def _bulge(radius: float) -> Patch:
+    """A lens that curves out of its chamber."""
+    profile = [(radius, 0.004), (0.8 * radius, 0.016), (0.45 * radius, 0.026), (0.0, 0.03)]
+    return lathe(profile, 20).rotated("y", 0.5 * math.pi)
+
+
+def _figure(radius: float, role: str) -> Patch:
+    """The luminous figure of a signal for people: its head, and convex pieces of its body."""
+    pieces = [circle(0.17, 12, (0.0, 0.62)), *(np.array(piece) for piece in FIGURES[role])]
+    return joined(fan(np.column_stack([np.full(len(p), 0.006), radius * p])) for p in pieces)
 
 
 def _visor(radius: float, reach: float) -> Patch:
