@@ -32,6 +32,7 @@ class Layer:
         folds_m: Height of its wrinkles.
         waves_per_m: Of the wrinkles.
         tapered: Whether the sheet's edge lies on the body (hair).
+        smoothings: How often each point moves to the middle of its neighbours: cloth spans hollows.
     """
 
     zones: tuple[tuple[str, Material], ...]
@@ -39,6 +40,7 @@ class Layer:
     folds_m: float = 0.0
     waves_per_m: float = 6.0
     tapered: bool = False
+    smoothings: int = 0
 
 
 def layers(person: Person) -> tuple[Layer, ...]:
@@ -76,6 +78,8 @@ def displaced(
     number = np.cumsum(used) - 1
     local = number[faces]
     places = points_m[used]
+    if layer.smoothings:
+        places = _smoothed(places, local, layer.smoothings)
     if any(distance for _, distance in layer.profile):
         heights, distances = zip(*layer.profile, strict=True)
         template = body.points_m[used]
@@ -129,34 +133,48 @@ def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
     if outfit.bottom == "trousers":
         zones = ("hips", "thighs", "shins", "ankles")
         profile = ((-0.78, 0.024), (-0.7, 0.018), (-0.36, 0.013), (0.0, 0.008), (0.12, 0.005))
-        return (Layer(tuple((zone, material) for zone in zones), profile, 0.0028, 5.0),)
+        return (Layer(tuple((zone, material) for zone in zones), profile, 0.0028, 5.0, smoothings=1),)
     if outfit.bottom == "shorts":
         profile = ((-0.31, 0.022), (0.0, 0.01), (0.12, 0.005))
         return (Layer((("hips", material), ("thighs", material)), profile, 0.003),)
     if outfit.bottom == "skirt":
         zones = ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
-        return (Layer(tuple((zone, material) for zone in zones), ((0.0, 0.001),), 0.001),)
+        return (Layer(tuple((zone, material) for zone in zones), ((0.1, 0.004), (0.18, 0.01)), 0.001),)
     return ()
 
 
 def _tops(outfit: Outfit) -> tuple[Layer, ...]:
     material = outfit.top_material
     zones = ["torso", *(("sleeves",) if outfit.sleeves else ())]
-    if outfit.top in ("tshirt", "shirt", "jacket"):
+    tucked = outfit.bottom == "skirt"
+    if outfit.top in ("tshirt", "shirt", "jacket") and not tucked:
         zones.append("hips")
     if outfit.top in ("dress", "coat"):
         zones += ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
     off = {"tshirt": 0.009, "shirt": 0.01, "jacket": 0.018, "coat": 0.018, "dress": 0.006}
     thick = off[outfit.top]
     folds = 0.35 if outfit.top in ("jacket", "coat") else 0.3
-    profile = ((-0.02, thick + 0.008), (0.12, thick + 0.004), (0.48, thick), (0.54, 0.3 * thick))
-    return (Layer(tuple((zone, material) for zone in zones), profile, folds * thick, 5.0),)
+    low = 0.002 if tucked and outfit.top != "coat" else thick + 0.006
+    profile = ((-0.02, thick + 0.009), (0.14, low), (0.22, thick), (0.48, thick), (0.54, 0.3 * thick))
+    return (Layer(tuple((zone, material) for zone in zones), profile, folds * thick, 5.0, smoothings=4),)
 
 
 def _shoes(outfit: Outfit) -> Layer:
     sole = Material((0.03, 0.03, 0.03), 0.85, role="shoes")
     zones = (("ankles", outfit.shoe_material), ("shoes", outfit.shoe_material), ("soles", sole))
     return Layer(zones[0 if outfit.bottom == "trousers" else 1 :], ((-0.8, 0.012), (-0.74, 0.006)))
+
+
+def _smoothed(places: Array, faces: Indices, times: int) -> Array:
+    """Points moved halfway to the mean of their neighbours; those on an edge stay."""
+    start, end = faces.T.reshape(-1), np.roll(faces, -1, axis=1).T.reshape(-1)
+    counts = np.bincount(start, minlength=len(places))[:, None]
+    inner = np.ones((len(places), 1))
+    inner[_border(faces)] = 0.0
+    for _ in range(times):
+        sums = [np.bincount(start, places[end, axis], len(places)) for axis in range(3)]
+        places = places + 0.5 * inner * (np.stack(sums, axis=1) / counts - places)
+    return places
 
 
 def _wrinkles(p: Array, phases: Array) -> Array:
@@ -173,9 +191,11 @@ def _wrinkles(p: Array, phases: Array) -> Array:
 
 def _border(faces: Indices) -> Indices:
     """Vertices on edges that only one face has."""
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    unique, counts = np.unique(edges, axis=0, return_counts=True)
-    return np.unique(unique[counts == 1])
+    start, end = faces.T.reshape(-1), np.roll(faces, -1, axis=1).T.reshape(-1)
+    size = int(faces.max()) + 1
+    edges, counts = np.unique(np.minimum(start, end) * size + np.maximum(start, end), return_counts=True)
+    alone = edges[counts == 1]
+    return np.unique(np.concatenate([alone // size, alone % size]))
 
 
 def _mixed(a: Vec3, b: Vec3, share: float) -> Vec3:

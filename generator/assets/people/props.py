@@ -41,7 +41,7 @@ def carried(
     material = person.outfit.bag_material
     if person.outfit.bag == "backpack":
         trunk = transforms[body.bone("spine_03"), :, :3]
-        middle = posed_m[body.bone("spine_03")] + trunk @ (np.array([-0.235, 0.0, 0.02]) * scale)
+        middle = posed_m[body.bone("spine_03")] + trunk @ (np.array([-0.172, 0.0, 0.03]) * scale)
         size = np.array([0.17, 0.3, 0.42]) * scale
         made.append(_pillow(middle, size, trunk, material))
     if person.pose == "carry" or (person.outfit.bag == "handbag" and person.pose != "phone"):

@@ -111,6 +111,12 @@ def _to_segment(p: Array, a: Array, b: Array) -> Array:
     return np.sqrt(((p - nearest) ** 2).sum(axis=1))
 
 
+HAIRLINE = Cut("face", "scalp", _above_hairline)
+WAIST = Cut("hips", "torso", _above(0.13))
+KNEE = Cut("thighs", "shins", _below(-0.31))
+CUFF = Cut("shins", "ankles", _below(-0.7))
+SOLE = Cut("shoes", "soles", _below(-0.803))
+
 BODY: Sequence[Cut] = (
     Cut("face", "hands", _beyond_wrist(-0.02)),
     Cut("face", "arms", _arm_beyond(_SHORT_SLEEVE_M - 0.04)),
@@ -118,20 +124,20 @@ BODY: Sequence[Cut] = (
     Cut("legs", "", _below(-0.75)),
     Cut("face", "", _below(0.535, -0.3)),
     Cut("face", "", _mouth_inside),
-    Cut("face", "scalp", _above_hairline),
+    HAIRLINE,
     Cut("face", "brows", _ellipse(0.033, 0.752, 0.022, 0.0042, 4.0)),
     Cut("face", "lips", _ellipse(0.0, 0.6615, 0.025, 0.0105)),
 )
 EYES: Sequence[Cut] = (Cut("eyes", "irises", lambda p: np.asarray(p[:, 0] - 0.1375)),)
 TIGHTS: Sequence[Cut] = (
     Cut("hips", "sleeves", _arm_beyond(_SHORT_SLEEVE_M)),
-    Cut("hips", "torso", _above(0.13)),
+    WAIST,
     Cut("torso", "", _neck_hole),
     Cut("hips", "thighs", _below(-0.01)),
-    Cut("thighs", "shins", _below(-0.31)),
-    Cut("shins", "ankles", _below(-0.7)),
+    KNEE,
+    CUFF,
     Cut("ankles", "shoes", _below(-0.752, 0.25)),
-    Cut("shoes", "soles", _below(-0.803)),
+    SOLE,
 )
 SKIRT: Sequence[Cut] = (
     Cut("skirt_top", "skirt_middle", _below(-0.24)),
