@@ -32,7 +32,7 @@ from generator.renderers.kernels.records import (
 )
 from generator.renderers.kernels.shade import Images
 from generator.renderers.kernels.sky import sky_image, sky_irradiance
-from generator.renderers.kernels.texturing import texel_at
+from generator.renderers.kernels.texturing import sampler_of, texel_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -87,7 +87,7 @@ def mean_color(world: World, surface: int):
     color = world.surfaces[surface].base_color
     texture = world.surfaces[surface].texture
     if texture >= 0:
-        color = wp.cw_mul(color, texel_at(world, texture, 0.5, 0.5, 30.0).albedo)
+        color = wp.cw_mul(color, texel_at(world, texture, sampler_of(world, texture, 30.0), 0.5, 0.5, False).albedo)
     return color
 
 
