@@ -143,16 +143,21 @@ def _entries(section: Node) -> Mapping[str, Node]:
 
 def _kind_of(node: Node) -> Kind[Any]:
     """What a value is, from how it is written."""
-    outcomes = _outcomes(node) or ((node.content,) if not isinstance(node.content, Mapping) else ())
+    outcomes = _outcomes(node)
+    if not outcomes and isinstance(node.content, (str, int, float)):
+        outcomes = (node.content,)
     if any(isinstance(value, str) for value in outcomes):
         return NAME
-    if is_distribution(node):
-        assert isinstance(node.content, Mapping)
-        whole = "uniform_integer" in node.content
+    if isinstance(node.content, Mapping):
         if "probability" in node.content:
             return FLAG
-        return WHOLE_NUMBER if whole else NUMBER
-    return FLAG if isinstance(node.content, bool) else NUMBER
+        if "uniform_integer" in node.content:
+            return WHOLE_NUMBER
+    if outcomes and all(isinstance(value, bool) for value in outcomes):
+        return FLAG
+    if outcomes and all(isinstance(value, int) for value in outcomes):
+        return WHOLE_NUMBER
+    return NUMBER
 
 
 def _outcomes(node: Node) -> tuple[SharedValue, ...]:

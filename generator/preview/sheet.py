@@ -36,7 +36,7 @@ def tiles(
 
 
 def arranged(images: Sequence[Image], columns: int) -> Image:
-    """Tiles in rows of ``columns``, with a small gap.
+    """Tiles in rows of ``columns``, with a small gap; 0 = as many as make a sheet of 4 to 3.
 
     Raises:
         ConfigError: if there is no tile.
@@ -45,6 +45,7 @@ def arranged(images: Sequence[Image], columns: int) -> Image:
         raise ConfigError("a contact sheet needs at least one sample")
     height = max(image.shape[0] for image in images)
     width = max(image.shape[1] for image in images)
+    columns = columns or max(1, round(math.sqrt(len(images) * 4.0 / 3.0 * height / width)))
     rows = math.ceil(len(images) / columns)
     columns = min(columns, len(images))
     sheet = np.full(

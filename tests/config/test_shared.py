@@ -32,6 +32,26 @@ def test_values_follow_their_distributions_and_the_values_they_depend_on() -> No
     assert {d["wet"] for d in draws} == {True, False}
 
 
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("{choice: {1: 2, 2: 1}}", int),
+        ("{choice: [0.5, 1]}", float),
+        ("{choice: {a: 1, 2: 1}}", str),
+        ("{choice: [true, false]}", bool),
+        ("{probability: 0.5}", bool),
+        ("{uniform_integer: [1, 3]}", int),
+        ("{uniform: [1, 3]}", float),
+        ("3", int),
+        ("3.5", float),
+        ("word", str),
+    ],
+)
+def test_a_value_is_of_the_kind_it_is_written_as(text: str, kind: type) -> None:
+    """Whole numbers stay whole: they count lanes."""
+    assert type(drawn(parse(f"x: {text}", "test"), Streams(0, 1))["x"]) is kind
+
+
 def test_order_of_writing_moves_no_draw() -> None:
     """Each value has a stream of its own."""
     lines = SECTION.strip().splitlines()
