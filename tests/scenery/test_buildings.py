@@ -33,6 +33,8 @@ def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int,
     corners = solid.mesh.vertices_m[solid.mesh.faces].astype(np.float64)
     pane = window_faces(solid) & (corners[..., 0].min(axis=1) > front_x - 0.5)
     pane &= corners[..., 2].max(axis=1) < design(style, seed).eaves_m
+    # Oriels have walls of their own, before the front.
+    pane &= corners[..., 0].max(axis=1) < front_x
     centres = corners[pane].mean(axis=1)
     eyes = centres * [0.0, 1.0, 1.0] + [front_x + 6.0, 0.0, 0.0]
 

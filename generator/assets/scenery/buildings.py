@@ -158,6 +158,8 @@ def _upper(plan: Design, rng: Rng) -> tuple[list[Opening], list[Patch]]:
     for floor in range(1, plan.floors):
         level = plan.ground_m + (floor - 1) * plan.storey_m
         for k, y in enumerate(centres):
+            if k == plan.oriel:
+                continue
             tall = plan.balconies != "none" and k in outside
             hole = _window(plan, y, level + (0.1 if tall else plan.sill_m), plan.window_m)
             if tall:
@@ -167,7 +169,19 @@ def _upper(plan: Design, rng: Rng) -> tuple[list[Opening], list[Patch]]:
             parts.append(_dressed(plan, hole, rng, bare=tall))
             if tall:
                 parts.append(_balcony(plan, y, level + 0.08, out_m))
+    if plan.oriel >= 0 and plan.floors > 1:
+        parts.append(_oriel(plan, centres[plan.oriel], rng))
     return holes, parts
+
+
+def _oriel(plan: Design, y: float, rng: Rng) -> Patch:
+    """A bay that stands out over all upper floors, with a window on each."""
+    half, out_m = 0.46 * plan.width_m / plan.bays, between(0.6, 0.9, rng)
+    levels = [plan.ground_m + k * plan.storey_m for k in range(plan.floors - 1)]
+    w = min(1.25 * plan.window_m[0], 2.0 * half - 0.4)
+    holes = [_window(plan, y, z + plan.sill_m, (w, plan.window_m[1])) for z in levels]
+    span = (levels[0] + 0.2, plan.eaves_m - 0.55)
+    return facade.oriel((y - half, y + half), span, out_m, holes, rng)
 
 
 def _balcony(plan: Design, y: float, level: float, out_m: float) -> Patch:
@@ -256,7 +270,7 @@ def _roof(plan: Design, rng: Rng) -> Patch:
         return joined([roofs.flat(plan.depth_m, plan.width_m, between(0.35, 0.8, rng)), unit])
     if plan.roof == "hip":
         pitch, depth_m = 0.85 * plan.pitch_rad, min(plan.depth_m, plan.width_m)
-        shell = roofs.hip(plan.depth_m, plan.width_m, pitch, _EAVES_M)
+        shell = roofs.hip(plan.depth_m, plan.width_m, pitch, 0.32)
         ridge = 0.5 * depth_m * math.tan(pitch)
         return joined([shell, roofs.chimney(-0.5, 0.4, (0.6 * ridge, ridge + 0.6))])
     if plan.roof == "mansard":
@@ -266,11 +280,24 @@ def _roof(plan: Design, rng: Rng) -> Patch:
     else:
         profile = roofs.gable_profile(plan.depth_m, plan.pitch_rad, _EAVES_M)
         slope = 1.0 / math.tan(plan.pitch_rad)
+    if plan.gable_front:
+        return _gable_front(plan, rng)
     shell = roofs.over_profile(profile, plan.width_m, plan.verge_m, 0.24)
     ridge = max(z for _, z in profile)
     y = between(-0.3, 0.3, rng) * plan.width_m
     stack = roofs.chimney(-0.8, y, (ridge - 1.4, ridge + between(0.5, 0.9, rng)))
     return joined([shell, stack, *_dormers(plan, slope, rng)])
+
+
+def _gable_front(plan: Design, rng: Rng) -> Patch:
+    """A gable roof whose ridge runs along X, with a window in the gable."""
+    profile = roofs.gable_profile(plan.width_m, plan.pitch_rad, _EAVES_M)
+    shell = roofs.over_profile(profile, plan.depth_m, plan.verge_m, 0.24)
+    ridge = max(z for _, z in profile)
+    low = 0.22 * ridge
+    attic = facade.attic_window((-0.55, 0.55), (low, low + min(1.3, 0.4 * ridge)), rng)
+    stack = roofs.chimney(-0.2 * plan.depth_m, 0.6, (ridge - 1.4, ridge + 0.6))
+    return joined([shell.rotated("z", 0.5 * math.pi), attic.moved(0.5 * plan.depth_m), stack])
 
 
 def _dormers(plan: Design, slope: float, rng: Rng) -> list[Patch]:

@@ -37,6 +37,8 @@ class Design:
         balconies: ``none``, ``french`` (railings before tall windows) or ``slab``.
         verge_m: How far the roof reaches over the side walls; 0 in a row of houses.
         sided: Whether side walls have windows.
+        oriel: Number of the bay that projects over the pavement on the upper floors; -1 = none.
+        gable_front: Whether the ridge runs across the street and the gable looks at it.
     """
 
     style: str
@@ -60,6 +62,8 @@ class Design:
     verge_m: float = 0.0
     dormers: int = 0
     sided: bool = False
+    oriel: int = -1
+    gable_front: bool = False
 
     @property
     def eaves_m(self) -> float:
@@ -123,6 +127,7 @@ def _old_town(rng: Rng) -> Design:
         balconies=pick(("none", "french"), rng),
         pitch_rad=between(0.7, 0.9, rng),
         dormers=pick((1, 2, 3), rng),
+        oriel=pick((-1, bays // 2, bays - 2), rng),
     )
 
 
@@ -193,6 +198,7 @@ def _house(rng: Rng) -> Design:
         verge_m=round(between(0.25, 0.5, rng), 2),
         dormers=pick((0, 0, 1), rng),
         sided=True,
+        gable_front=chance(0.4, rng),
     )
 
 

@@ -279,6 +279,34 @@ def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
     return joined([slab, railing(y_m, z0, out_m - 0.04), *ends])
 
 
+def oriel(y_m: Span, z_m: Span, out_m: float, openings: Sequence[Opening], rng: Rng) -> Patch:
+    """A box before the wall, with windows in its front, a corbel below and a lid."""
+    (y0, y1), (z0, z1) = y_m, z_m
+    front = [perforated(y_m, z_m, openings), *(window(o, rng) for o in openings)]
+    front += [sill(o) for o in openings]
+    lid = block((0.0, y0 - 0.08, z1), (out_m + 0.1, y1 + 0.08, z1 + 0.14), slot=TRIM)
+    corbel = block((0.0, y0 + 0.1, z0 - 0.3), (0.7 * out_m, y1 - 0.1, z0), slot=TRIM)
+    return joined(
+        [
+            joined(front).moved(out_m),
+            quad([(0.0, y0, z0), (out_m, y0, z0), (out_m, y0, z1), (0.0, y0, z1)]),
+            quad([(out_m, y1, z0), (0.0, y1, z0), (0.0, y1, z1), (out_m, y1, z1)]),
+            quad([(0.0, y0, z0), (0.0, y1, z0), (out_m, y1, z0), (out_m, y0, z0)], TRIM),
+            lid,
+            corbel,
+        ]
+    )
+
+
+def attic_window(y_m: Span, z_m: Span, rng: Rng) -> Patch:
+    """A small window set on a gable: pane between the bars of a frame that stands out."""
+    (y0, y1), (z0, z1) = y_m, z_m
+    bars = [((y0, y0 + 0.08), z_m), ((y1 - 0.08, y1), z_m)]
+    bars += [((y0 + 0.08, y1 - 0.08), span) for span in ((z0, z0 + 0.08), (z1 - 0.08, z1))]
+    frames = [block((0.0, a, c), (0.06, b, d), slot=FRAME) for (a, b), (c, d) in bars]
+    return joined([*frames, panes(Opening(y_m, z_m, 0.0), rng, 0.012)])
+
+
 def awning(y_m: Span, z1: float, out_m: float) -> Patch:
     """A cloth roof over a shop window, with a short valance."""
     (y0, y1), low = y_m, z1 - 0.32 * out_m

@@ -94,7 +94,7 @@ def hip(depth_m: float, width_m: float, pitch_rad: float, eaves_m: float) -> Pat
     if depth_m > width_m:
         return hip(width_m, depth_m, pitch_rad, eaves_m).rotated("z", 0.5 * math.pi)
     x, y = 0.5 * depth_m + eaves_m, 0.5 * width_m + eaves_m
-    low, thick = -eaves_m * math.tan(pitch_rad), 0.2
+    low, thick = -eaves_m * math.tan(pitch_rad), 0.12
     top, ridge = low + x * math.tan(pitch_rad), y - x
     slope = x / math.cos(pitch_rad) / TILE_REPEAT_M
     u = (0.0, 2 * y / TILE_REPEAT_M)
