@@ -14,7 +14,7 @@ from generator.config.describe import describe
 from generator.config.schema import json_schema
 from generator.core.interfaces import Stage
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Lane, ObjectGroup, Scene
+from generator.core.scene import Body, Camera, Instance, Lane, ObjectGroup, Scene
 from generator.core.se3 import SE3, look_at
 from generator.core.serial import canonical_json, from_plain, to_plain
 from randomizers import TABLE
@@ -39,7 +39,7 @@ PHYSICS_BOUND = ("along", "arm_configuration", "distractors", "objects", "physic
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, distractors, a street lamp, a traffic light and two cameras."""
+    """A room with a table, an arm, objects, lamps, a car, and two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -53,13 +53,16 @@ def nominal_scene() -> Scene:
         Camera(name, look_at((1.0, 0.0, 1.5), (0.0, 0.0, 0.8)), lens) for name in ("left", "right")
     )
     lanes = (Lane("lane", "driving", ((-40.0, 5.0, 0.0), (40.0, 5.0, 0.0)), 3.5, road="street"),)
-    group = ObjectGroup("along", (), ("brick", "can?seed=0"), 2, "along", lanes=("driving",))
+    group = ObjectGroup("along", (), ("wagon",), 1, "along", lanes=("driving",))
+    wagon = Body("along/0", "wagon", SE3((0.0, 5.0, 0.75)), instance_id=99, group="along")
+    labelled = Instance(99, "along/0", "car", 0, "wagon")
     scene = build("test", elements, FakeAssets())
     lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
     signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
     return replace(
         scene,
-        bodies=(*scene.bodies, lamp, signal),
+        bodies=(*scene.bodies, lamp, signal, wagon),
+        instances=(*scene.instances, labelled),
         cameras=cameras,
         lanes=lanes,
         groups=(*scene.groups, group),

@@ -47,6 +47,13 @@ class Thing:
 
 PRINTED = Material(texture="texture/label?seed=1", printed=True)
 LENSES = tuple(Material(role=f"lens_{color}") for color in ("red", "yellow", "green"))
+WAGON = tuple(
+    Material(role=role)
+    for role in (
+        "paint", "glass", "tyre", "headlight", "taillight", "brakelight", "indicator_left",
+        "indicator_right",
+    )
+)  # fmt: skip
 THINGS = {
     "brick": Thing("brick", (0.06, 0.03, 0.02), stackable=True),
     "can?seed=0": Thing("can", (0.066, 0.066, 0.12), stackable=True, materials=(PRINTED,)),
@@ -56,6 +63,7 @@ THINGS = {
     "bolt": Thing("bolt", (0.02, 0.02, 0.05), ("part",), 0.05),
     "nut": Thing("nut", (0.03, 0.03, 0.015), ("part",), 0.02, stackable=True),
     "signal": Thing("traffic_light", (0.3, 0.3, 3.0), ("street_furniture",), materials=LENSES),
+    "wagon": Thing("car", (4.4, 1.8, 1.5), ("vehicle",), 1300.0, materials=WAGON),
     "odd": Thing("odd", (0.05, 0.07, 0.09), ("random_shape",)),
 }
 TEXTURES = {
@@ -125,7 +133,12 @@ class FakeAssets:
         return (-x / 2, -y / 2, 0.0), (x / 2, y / 2, height[0] if height else 0.0)
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
-        """A street lamp has its lamp at the top; nothing else has any."""
+        """A street lamp has its lamp at the top, a wagon its headlights in front."""
+        if asset_id == "wagon":
+            return (
+                Keypoint("headlight_left", (2.2, 0.7, -0.1)),
+                Keypoint("headlight_right", (2.2, -0.7, -0.1)),
+            )
         return (Keypoint("lamp", (1.5, 0.0, 6.0)),) if asset_id == "street_lamp" else ()
 
     def robot(self, asset_id: str) -> RobotModel:

@@ -1,0 +1,145 @@
+"""Head, tail, brake and indicator lights of vehicles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.config.distributions import Choice, Flag, Name, Positive, Probability, Uniform
+from generator.core.geometry import Material
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body, Instance, Light, Scene
+from generator.core.se3 import SE3, Vec3
+from generator.core.streams import Rng
+from randomizers.base import LookRandomizer, materials_of
+from randomizers.daylight import is_dark
+
+_WHITE: Vec3 = (1.02, 1.0, 0.94)
+_RED: Vec3 = (4.2, 0.14, 0.06)
+_AMBER: Vec3 = (2.35, 0.66, 0.02)
+"""Linear RGB of luminance 1."""
+_DOWN = 0.012
+"""Slope of a dipped beam: 1.2 % (UN R48)."""
+_CONE_RAD = 0.5
+_OUTSIDE_M = 0.06
+
+
+class VehicleLights(LookRandomizer):
+    """Switches lights of vehicles on, by the roles of their slots, and labels their state.
+
+    Attributes:
+        headlights: Whether head and tail lights are on by day; in the dark they always are.
+        braking: Whether the brake lights are on.
+        indicator: Which indicator blinks: none, left, right or both.
+        headlight_cd_m2: Luminance of headlight slots: what a lens shows on average off its beam.
+        taillight_cd_m2, brakelight_cd_m2, indicator_cd_m2: Luminance of the other slots. UN R7
+            and R6 ask for 4 to 17 cd, 60 to 260 cd and 175 to 1000 cd; lenses have 50 to 100 cm^2.
+        beam_cd: Luminous intensity of a dipped beam in its middle; UN R112 asks for 6 to 20 kcd
+            where it lights the road.
+        beams: Whether headlights cast light on the street in the dark.
+    """
+
+    type: Literal["vehicle_lights"] = "vehicle_lights"
+    headlights: Flag = Probability(0.35)
+    braking: Flag = Probability(0.2)
+    indicator: Name = Choice({"none": 0.9, "left": 0.05, "right": 0.05})
+    headlight_cd_m2: Positive = Uniform(15_000.0, 40_000.0)
+    taillight_cd_m2: Positive = Uniform(600.0, 1500.0)
+    brakelight_cd_m2: Positive = Uniform(6000.0, 15_000.0)
+    indicator_cd_m2: Positive = Uniform(15_000.0, 40_000.0)
+    beam_cd: Positive = Uniform(6000.0, 14_000.0)
+    beams: bool = Field(True)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with the lights of its vehicles as drawn."""
+        dark = is_dark(scene)
+        bodies, lights, states = [], list(scene.lights), {}
+        for body in self.chosen(scene):
+            on, braking = self.headlights.draw(rng), self.braking.draw(rng)
+            side, beam_cd = self.indicator.draw(rng), self.beam_cd.draw(rng)
+            on = on or dark
+            glow = self._glow(on, braking, side, rng)
+            bodies.append(_lit(body, assets, glow))
+            states[body.instance_id] = (
+                ("brake_lights", _word(braking)),
+                ("head_lights", _word(on)),
+                ("indicator", side),
+            )
+            if dark and self.beams:
+                lights += _beams(self.name, body, assets, beam_cd)
+        return replace(
+            scene.with_bodies(*bodies),
+            lights=tuple(lights),
+            instances=tuple(_labelled(i, states.get(i.instance_id, ())) for i in scene.instances),
+        )
+
+    def _glow(self, on: bool, braking: bool, side: str, rng: Rng) -> dict[str, Vec3]:
+        """Emission by role; one draw of every luminance, so that switches move no other draw."""
+        head, tail, brake, blink = (
+            luminance.draw(rng)
+            for luminance in (
+                self.headlight_cd_m2,
+                self.taillight_cd_m2,
+                self.brakelight_cd_m2,
+                self.indicator_cd_m2,
+            )
+        )
+        glow: dict[str, Vec3] = {}
+        if on:
+            glow |= {"headlight": _times(_WHITE, head), "taillight": _times(_RED, tail)}
+        if braking:
+            glow["brakelight"] = _times(_RED, brake)
+        for name in ("left", "right"):
+            if side in (name, "both"):
+                glow[f"indicator_{name}"] = _times(_AMBER, blink)
+        return glow
+
+
+def _lit(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
+    def lit(material: Material) -> Material:
+        return replace(material, emission_cd_m2=glow.get(material.role, material.emission_cd_m2))
+
+    return replace(body, materials=tuple(lit(m) for m in materials_of(body, assets)))
+
+
+def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Light]:
+    """One spot per headlight, just before its lens, slightly downwards."""
+    ahead = body.T_world_body.rotation()[:, 0]
+    direction = (float(ahead[0]), float(ahead[1]), float(ahead[2]) - _DOWN - 0.12)
+    length = sum(part * part for part in direction) ** 0.5
+    lights = []
+    for point in assets.keypoints(body.asset):
+        if point.name.startswith("headlight"):
+            x, y, z = (body.scale * part for part in point.position_m)
+            place = body.T_world_body @ SE3((x + _OUTSIDE_M, y, z))
+            px, py, pz = (round(part, 6) for part in place.translation_m)
+            dx, dy, dz = (round(part / length, 6) for part in direction)
+            lights.append(
+                Light(
+                    f"{name}/{body.name}/{point.name}",
+                    "spot",
+                    position_m=(px, py, pz),
+                    direction=(dx, dy, dz),
+                    color=_WHITE,
+                    intensity_cd=round(beam_cd, 3),
+                    radius_m=0.05,
+                    cone_rad=_CONE_RAD,
+                )
+            )
+    return lights
+
+
+def _labelled(instance: Instance, states: tuple[tuple[str, str], ...]) -> Instance:
+    attributes = {**dict(instance.attributes), **dict(states)}
+    return replace(instance, attributes=tuple(sorted(attributes.items())))
+
+
+def _word(on: bool) -> str:
+    return "on" if on else "off"
+
+
+def _times(color: Vec3, luminance_cd_m2: float) -> Vec3:
+    red, green, blue = (round(part * luminance_cd_m2, 3) for part in color)
+    return (red, green, blue)

@@ -1,0 +1,137 @@
+"""Paint and dirt of vehicles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from generator.config.distributions import Flag, LogUniform, Probability, Uniform, UnitInterval
+from generator.core.geometry import Material
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body, Scene
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+from randomizers.base import LookRandomizer, materials_of
+from randomizers.color_space import linear_of_hsv
+
+PAINT = "paint"
+_DUST: Vec3 = (0.17, 0.145, 0.115)
+_SOILED = ("paint", "glass", "rim", "tyre", "trim", "chrome", "plate", "headlight", "taillight")
+
+
+@dataclass(frozen=True, slots=True)
+class Paint:
+    """A family of paints: ranges of hue, saturation and value (HSV in sRGB)."""
+
+    hue: tuple[float, float]
+    saturation: tuple[float, float]
+    value: tuple[float, float]
+
+
+PAINTS: dict[str, Paint] = {
+    "white": Paint((0.1, 0.16), (0.0, 0.04), (0.86, 0.93)),
+    "black": Paint((0.0, 1.0), (0.0, 0.15), (0.05, 0.13)),
+    "grey": Paint((0.55, 0.65), (0.0, 0.1), (0.24, 0.45)),
+    "silver": Paint((0.5, 0.65), (0.0, 0.06), (0.62, 0.75)),
+    "blue": Paint((0.57, 0.65), (0.6, 0.95), (0.2, 0.6)),
+    "red": Paint((0.96, 1.01), (0.75, 0.95), (0.35, 0.75)),
+    "green": Paint((0.3, 0.45), (0.35, 0.8), (0.15, 0.45)),
+    "brown": Paint((0.04, 0.1), (0.3, 0.6), (0.2, 0.45)),
+    "yellow": Paint((0.12, 0.15), (0.75, 0.95), (0.75, 0.9)),
+    "orange": Paint((0.04, 0.08), (0.8, 0.95), (0.75, 0.9)),
+}
+
+ON_ROADS = {
+    "white": 30.0, "black": 21.0, "grey": 21.0, "silver": 10.0, "blue": 9.0,
+    "red": 5.0, "green": 1.5, "brown": 1.2, "yellow": 0.7, "orange": 0.6,
+}  # fmt: skip
+"""Weights of ours in the order that paint makers report year by year: white, black, grey first."""
+
+
+class VehiclePaint(LookRandomizer):
+    """Paints every slot of role ``paint`` of a vehicle in one colour, and soils the vehicle.
+
+    Attributes:
+        weights: How often a colour is drawn: white, black, grey, silver, blue, red, green, brown,
+            yellow, orange.
+        probability: Whether a vehicle is painted anew at all.
+        roughness: Of the clear coat: 0.1 waxed, 0.3 weathered.
+        metallic: Whether the paint has flakes of metal; white never has.
+        dirt: Share of dust in every colour of the vehicle.
+    """
+
+    type: Literal["vehicle_paint"] = "vehicle_paint"
+    weights: dict[str, Annotated[float, Field(ge=0)]] = Field(ON_ROADS)
+    probability: Flag = Probability(0.85)
+    roughness: UnitInterval = LogUniform(0.1, 0.3)
+    metallic: Flag = Probability(0.6)
+    dirt: UnitInterval = Uniform(0.0, 0.25)
+
+    def model_post_init(self, context: object) -> None:
+        """Refuse colours that do not exist, and weights of which none counts."""
+        del context
+        unknown = sorted(set(self.weights) - set(PAINTS))
+        if unknown:
+            raise ValueError(f"unknown colour '{unknown[0]}'; expected {', '.join(PAINTS)}")
+        if not any(self.weights.values()):
+            raise ValueError("every weight is 0; expected one above 0")
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with its vehicles painted; one draw of everything for each of them."""
+        painted = []
+        for body in self.chosen(scene):
+            paint = self._paint(rng)
+            anew, dirt = self.probability.draw(rng), self.dirt.draw(rng)
+            painted.append(_finished(body, assets, paint if anew else None, dirt))
+        return scene.with_bodies(*painted)
+
+    def _paint(self, rng: Rng) -> Material:
+        """The material of a paint; only its colour and gloss count."""
+        names = sorted(self.weights)
+        ends = [sum(self.weights[n] for n in names[: k + 1]) for k in range(len(names))]
+        draw = float(rng.uniform()) * ends[-1]
+        name = next(n for n, end in zip(names, ends, strict=True) if draw < end)
+        paint = PAINTS[name]
+        hue, saturation, value = (
+            float(rng.uniform(low, high))
+            for low, high in (paint.hue, paint.saturation, paint.value)
+        )
+        flakes = self.metallic.draw(rng) and name != "white"
+        return Material(
+            base_color=linear_of_hsv(hue, saturation, value),
+            roughness=round(self.roughness.draw(rng), 4),
+            metallic=0.25 if flakes else 0.0,
+            specular=0.6,
+        )
+
+
+def _finished(body: Body, assets: AssetIndex, paint: Material | None, dirt: float) -> Body:
+    """The body painted (unless None) and with dust on it."""
+
+    def finished(material: Material) -> Material:
+        if paint is not None and material.role == PAINT and not material.printed:
+            material = replace(
+                material,
+                base_color=paint.base_color,
+                roughness=paint.roughness,
+                metallic=paint.metallic,
+                specular=paint.specular,
+                texture="",
+            )
+        return _dusty(material, dirt) if material.role in _SOILED else material
+
+    slots = materials_of(body, assets)
+    return replace(body, materials=tuple(finished(material) for material in slots))
+
+
+def _dusty(material: Material, dirt: float) -> Material:
+    """A surface under a thin layer of dust: towards its colour, and duller."""
+    share = 0.35 * dirt if material.role == "glass" else dirt
+    red, green, blue = (
+        round(clean * (1.0 - share) + dust * share, 6)
+        for clean, dust in zip(material.base_color, _DUST, strict=True)
+    )
+    rough = round(material.roughness + (0.8 - material.roughness) * share, 4)
+    return replace(material, base_color=(red, green, blue), roughness=rough)
