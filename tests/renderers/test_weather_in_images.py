@@ -32,7 +32,7 @@ DOWN = Camera("top", look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), LENS, ev100=8.0)
 PLAIN = RenderSettings(tone="srgb", ambient_occlusion_radius_m=0.0, antialias=1)
 ASPHALT = (Material(base_color=(0.3, 0.3, 0.3), roughness=0.95, specular=0.0),)
 BLACK = (Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0),)
-SUN = Light("sun", "sun", direction=(0.6, 0.0, -0.8), illuminance_lux=1125.0)
+SUN = Light("sun", "sun", direction=(0.8, 0.0, -0.6), illuminance_lux=1500.0)
 DARK = Environment(luminance_cd_m2=0.0)
 STORM = Weather(0.02, 20.0, 30.0, 2.0, 0.9, 0.4, 0.4, 0.05, seed=5)
 
