@@ -6,18 +6,19 @@ Every function returns at once where the scene's weather has nothing for it to d
 from __future__ import annotations
 
 from statistics import NormalDist
+from typing import Any
 
 import warp as wp
 
 from generator.core.scene import Weather
 from generator.renderers.kernels import records, shade
 from generator.renderers.kernels import weather as kernels
+from generator.renderers.kernels.lighting import SUN
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
 
 # Standard deviation of kernels.ground.patches; it is close to normal.
 _PATCH_DEVIATION = 0.513
-_FILM_RAYS = 3
 
 
 def expose_ground(
@@ -54,13 +55,29 @@ def fill_air(
         water = stock.scratch("water", n, wp.vec2)
         mirror = stock.scratch("mirror", n, wp.vec4)
         ripples = min(0.004 * weather.rain_mm_h, 0.05)
-        inputs = [view, world.record, images, radiance, ripples, _FILM_RAYS]
+        inputs = [view, world.record, images, radiance, ripples]
         wp.launch(kernels.mirror_in_water, n, inputs, [water, mirror], device=stock.device)
         inputs = [view, images, water, mirror]
         wp.launch(kernels.lay_water, n, inputs, [radiance], device=stock.device)
     if weather.fog_extinction_per_m > 0.0:
-        inputs = [view, world.record, images, fog_of(weather)]
+        frame = [view, world.record, images, fog_of(weather)]
+        columns, glow = _glow(world, view, frame, stock)
+        inputs = [*frame, columns, glow]
         wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=stock.device)
+
+
+def _glow(
+    world: PackedWorld, view: records.View, frame: list[Any], stock: AssetStock
+) -> tuple[int, wp.array]:
+    """Glow of lamps in fog at a lattice of points, and its columns; 0 where no lamp shines."""
+    stride = int(kernels.GLOW_STRIDE)
+    columns, rows = (-(-(size - 1) // stride) + 2 for size in (view.width, view.height))
+    glow = stock.scratch("glow", columns * rows, wp.vec3)
+    if not (world.record.lamps.numpy()["kind"] != int(SUN)).any():
+        return 0, glow
+    inputs = [*frame, columns]
+    wp.launch(kernels.glow_at_points, columns * rows, inputs, [glow], device=stock.device)
+    return columns, glow
 
 
 def fog_of(weather: Weather) -> kernels.Fog:

@@ -158,8 +158,8 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     rgb = np.maximum(np.einsum("hwc,kc->hwk", xyz, _RGB_OF_XYZ, optimize=False), 0.02)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
     pale = np.exp(-up / 0.22)[..., None] * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
-    rgb /= np.einsum("hwc,c->hw", rgb, _LUMINANCE, optimize=False)[..., None]
     rgb += pale * (_HORIZON - rgb)
+    rgb /= np.einsum("hwc,c->hw", rgb, _LUMINANCE, optimize=False)[..., None]
     sky_rgb: Array = rgb * luminance[..., None]
     return sky_rgb
 

@@ -45,6 +45,9 @@ FORWARD = wp.constant(0.75)
 # Films smoother than this mirror like puddles.
 SHARP = wp.constant(0.02)
 LAMP_POINTS = wp.constant(4)
+GOLDEN_ANGLE = wp.constant(2.39996323)
+GLOW_STRIDE = wp.constant(4)
+GLOW_REACH_M = wp.constant(300.0)
 FAR_M = wp.constant(1.0e9)
 
 
@@ -175,7 +178,6 @@ def mirror_in_water(
     images: Images,
     radiance: wp.array(dtype=wp.vec3),
     ripples: float,
-    rays: int,
     water: wp.array(dtype=wp.vec2),
     mirror: wp.array(dtype=wp.vec4),
 ):
@@ -183,7 +185,6 @@ def mirror_in_water(
 
     Args:
         ripples: Slope of waves on puddles.
-        rays: Per pixel, on rough films.
         water: Share of each pixel that is water, and how rough it is.
         mirror: What it mirrors [cd/m^2], and its reflectance, for a pixel all of water.
     """
@@ -206,32 +207,32 @@ def mirror_in_water(
     water[i] = wet
     d = unit(d)
     origin = ray_origin(world, hit, images.weights[i], p, way)
-    wave_x = patches(p[0], p[1], 0.09, world.ground.seed + 48) * ripples
-    wave_y = patches(p[0], p[1], 0.09, world.ground.seed + 52) * ripples
-    count = wp.where(wet[1] > SHARP, rays, 1)
-    limit = 60.0 * wp.max(radiance[i]) + 4.0 * wp.max(world.sky.irradiance[0]) * world.sky.luminance
-    seen = wp.vec3(0.0)
-    reflectance = float(0.0)
-    for k in range(count):
-        # The sixteen pixels of any square of four share one even spread of slopes.
-        place = float(((x % 4) * 4 + y % 4) * count + k) + 0.5
-        slope = wet[1] * wp.sqrt(place / float(16 * count))
-        angle = 2.39996323 * place
-        m = unit(n + wp.vec3(wave_x + slope * wp.cos(angle), wave_y + slope * wp.sin(angle), 0.0))
-        c = wp.max(-wp.dot(d, m), 0.02)
-        r = d + m * (2.0 * c)
-        r = unit(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
-        grazing = 1.0 - c
-        squared = grazing * grazing
-        fresnel = WATER_F0 + (1.0 - WATER_F0) * squared * squared * grazing
-        c_seen = mirrored(view, world, images, radiance, origin, r, 0.02 + wet[1])
-        if wet[1] > SHARP:
-            # A few rays do not find small bright lamps evenly; their lobes are shaded already.
-            c_seen = c_seen * wp.min(limit / wp.max(wp.max(c_seen), 1.0e-9), 1.0)
-        seen += c_seen * fresnel
-        reflectance += fresnel
-    seen = seen * (1.0 / float(count))
-    mirror[i] = wp.vec4(seen[0], seen[1], seen[2], reflectance / float(count))
+    # Waves finer than a pixel would flicker from pixel to pixel.
+    slope = ripples * wp.min(5.0 / images.z_m[i], 1.0)
+    tilt_x = patches(p[0], p[1], 0.09, world.ground.seed + 48) * slope
+    tilt_y = patches(p[0], p[1], 0.09, world.ground.seed + 52) * slope
+    if wet[1] > SHARP:
+        # The pixels of any square of eight share one even spread of slopes, neighbours far from
+        # each other in it.
+        place = float(((x % 8) * 24 + (y % 8) * 19) % 64) + 0.5
+        rough = wet[1] * wp.sqrt(place / 64.0)
+        tilt_x += rough * wp.cos(GOLDEN_ANGLE * place)
+        tilt_y += rough * wp.sin(GOLDEN_ANGLE * place)
+    m = unit(n + wp.vec3(tilt_x, tilt_y, 0.0))
+    c = wp.max(-wp.dot(d, m), 0.02)
+    r = d + m * (2.0 * c)
+    r = unit(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
+    grazing = 1.0 - c
+    squared = grazing * grazing
+    fresnel = WATER_F0 + (1.0 - WATER_F0) * squared * squared * grazing
+    seen = mirrored(view, world, images, radiance, origin, r, 0.02 + wet[1])
+    if wet[1] > SHARP:
+        # One ray per pixel does not find small bright lamps evenly; their lobes are shaded already.
+        limit = 100.0 * wp.max(radiance[i])
+        limit += 4.0 * wp.max(world.sky.irradiance[0]) * world.sky.luminance
+        seen = seen * wp.min(limit / wp.max(wp.max(seen), 1.0e-9), 1.0)
+    seen = seen * fresnel
+    mirror[i] = wp.vec4(seen[0], seen[1], seen[2], fresnel)
 
 
 @wp.func
@@ -242,21 +243,21 @@ def film_around(
     mirror: wp.array(dtype=wp.vec4),
     i: int,
 ):
-    """What the rough film around a pixel mirrors, in the mean over four by four pixels."""
+    """What the rough film around a pixel mirrors, in the mean over eight by eight pixels."""
     x = i % view.width
     y = i / view.width
     total = mirror[i] * 1.0e-3
     weights = float(1.0e-3)
-    for dy in range(-2, 3):
-        for dx in range(-2, 3):
+    for dy in range(-4, 5):
+        for dx in range(-4, 5):
             u = x + dx
             v = y + dy
             if u >= 0 and u < view.width and v >= 0 and v < view.height:
                 j = v * view.width + u
                 near = wp.abs(images.z_m[j] - images.z_m[i]) < 0.15 * images.z_m[i]
                 if near and water[j][1] > SHARP:
-                    # Halves at the ends: every place of a square of four counts alike.
-                    w = wp.where(wp.abs(dx) == 2, 0.5, 1.0) * wp.where(wp.abs(dy) == 2, 0.5, 1.0)
+                    # Halves at the ends: every place of a square of eight counts alike.
+                    w = wp.where(wp.abs(dx) == 4, 0.5, 1.0) * wp.where(wp.abs(dy) == 4, 0.5, 1.0)
                     total += mirror[j] * w
                     weights += w
     return total * (1.0 / weights)
@@ -343,28 +344,105 @@ def glow_of_lamp(fog: Fog, lamp: Lamp, eye: wp.vec3, d: wp.vec3, distance_m: flo
     return total * ((end - start) / (apart_m * float(LAMP_POINTS)))
 
 
-@wp.kernel
-def fill_with_fog(
-    view: View, world: World, images: Images, fog: Fog, radiance: wp.array(dtype=wp.vec3)
-):
-    """Dim every pixel by the fog before it, and add the light that the fog scatters."""
-    i = wp.tid()
-    d = view.R_world_camera @ pixel_direction(
-        view, float(i % view.width) + 0.5, float(i / view.width) + 0.5
-    )
-    length = wp.length(d)
+@wp.func
+def seen_distance(images: Images, i: int, length: float):
+    """Distance to what pixel i sees [m]; FAR_M for nothing."""
     distance_m = float(FAR_M)
     if images.hits[i][0] >= 0:
         distance_m = images.z_m[i] * length
+    return distance_m
+
+
+@wp.func
+def glow_along(view: View, world: World, images: Images, fog: Fog, i: int):
+    """Light of all lamps that the fog before pixel i scatters to the camera."""
+    x = float(i % view.width) + 0.5
+    y = float(i / view.width) + 0.5
+    d = view.R_world_camera @ pixel_direction(view, x, y)
+    length = wp.length(d)
+    reach_m = wp.min(seen_distance(images, i, length), GLOW_REACH_M)
+    glow = wp.vec3(0.0)
+    for j in range(world.lamps.shape[0]):
+        if world.lamps[j].kind != SUN:
+            glow += glow_of_lamp(fog, world.lamps[j], view.eye_m, d * (1.0 / length), reach_m)
+    return glow
+
+
+@wp.kernel
+def glow_at_points(
+    view: View, world: World, images: Images, fog: Fog, columns: int, glow: wp.array(dtype=wp.vec3)
+):
+    """The glow of lamps at every few pixels of every few rows."""
+    k = wp.tid()
+    x = wp.min((k % columns) * GLOW_STRIDE, view.width - 1)
+    y = wp.min((k / columns) * GLOW_STRIDE, view.height - 1)
+    glow[k] = glow_along(view, world, images, fog, y * view.width + x)
+
+
+@wp.func
+def glow_between(
+    view: View,
+    world: World,
+    images: Images,
+    fog: Fog,
+    columns: int,
+    glow: wp.array(dtype=wp.vec3),
+    i: int,
+):
+    """The glow at pixel i, from the points around it, or by itself where depths differ."""
+    x = i % view.width
+    y = i / view.width
+    column = x / GLOW_STRIDE
+    row = y / GLOW_STRIDE
+    right = float(x - column * GLOW_STRIDE) / float(GLOW_STRIDE)
+    down = float(y - row * GLOW_STRIDE) / float(GLOW_STRIDE)
+    z_m = wp.min(images.z_m[i], GLOW_REACH_M)
+    total = wp.vec3(0.0)
+    alike = bool(True)
+    for k in range(4):
+        u = column + (k & 1)
+        v = row + k / 2
+        j = wp.min(v * GLOW_STRIDE, view.height - 1) * view.width
+        j += wp.min(u * GLOW_STRIDE, view.width - 1)
+        if wp.abs(wp.min(images.z_m[j], GLOW_REACH_M) - z_m) > 0.1 * z_m:
+            alike = False
+        w = wp.where((k & 1) == 1, right, 1.0 - right) * wp.where(k >= 2, down, 1.0 - down)
+        total += glow[v * columns + u] * w
+    if not alike:
+        total = glow_along(view, world, images, fog, i)
+    return total
+
+
+@wp.kernel
+def fill_with_fog(
+    view: View,
+    world: World,
+    images: Images,
+    fog: Fog,
+    columns: int,
+    glow: wp.array(dtype=wp.vec3),
+    radiance: wp.array(dtype=wp.vec3),
+):
+    """Dim every pixel by the fog before it, and add the light that the fog scatters.
+
+    Args:
+        columns: Points of the glow in a row; 0 = no lamp glows.
+        glow: Of lamps, at those points.
+    """
+    i = wp.tid()
+    x = float(i % view.width) + 0.5
+    y = float(i / view.width) + 0.5
+    d = view.R_world_camera @ pixel_direction(view, x, y)
+    length = wp.length(d)
+    distance_m = seen_distance(images, i, length)
     d = d * (1.0 / length)
     clear = wp.exp(-wp.min(optical_depth(fog, view.eye_m[2], d[2], distance_m), 80.0))
     # The mean over the sphere: the first coefficient of irradiance.
     air = world.sky.irradiance[0] * world.sky.luminance
-    glow = wp.vec3(0.0)
     for j in range(world.lamps.shape[0]):
         if world.lamps[j].kind == SUN:
             air += world.lamps[j].power * scattering(-wp.dot(d, world.lamps[j].direction))
-        else:
-            reach_m = wp.min(distance_m, 300.0)
-            glow += glow_of_lamp(fog, world.lamps[j], view.eye_m, d, reach_m)
-    radiance[i] = radiance[i] * clear + air * (1.0 - clear) + glow
+    lit = radiance[i] * clear + air * (1.0 - clear)
+    if columns > 0:
+        lit += glow_between(view, world, images, fog, columns, glow, i)
+    radiance[i] = lit

@@ -1,0 +1,171 @@
+"""Sun and sky, against tables and formulas of photometry and meteorology."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from generator.assets.library import open_library
+from generator.assets.skies import daylight
+from generator.assets.skies.sky import (
+    SkyModel,
+    clear_sky,
+    luminance_cd_m2,
+    mean_luminance_cd_m2,
+    overcast_sky,
+    sky,
+)
+from generator.core.errors import AssetError
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def level_illuminance_lux(image: np.ndarray) -> float:
+    """Of the upper hemisphere on level ground, by summing L cos(theta) d(omega) over pixels."""
+    rows, columns = image.shape[0] // 2, image.shape[1]
+    theta = (np.arange(rows) + 0.5) * 0.5 * math.pi / rows
+    d_omega = np.sin(theta) * (0.5 * math.pi / rows) * (2.0 * math.pi / columns)
+    per_row = (image[:rows] @ LUMINANCE).sum(axis=1)
+    return float((per_row * np.cos(theta) * d_omega).sum())
+
+
+@pytest.mark.parametrize(
+    ("altitude_deg", "lux"),
+    [(90.0, 103_300.0), (60.0, 100_000.0), (30.0, 83_800.0), (15.0, 56_900.0), (10.0, 39_200.0)],
+)
+def test_clear_sun_has_the_illuminance_of_the_ies_formula(altitude_deg: float, lux: float) -> None:
+    """127.5 klx exp(-0.21 m), with m = 1, 1.155, 2.0, 3.84, 5.6 from Kasten and Young's table."""
+    got = daylight.sun_illuminance_lux(math.radians(altitude_deg))
+
+    assert got == pytest.approx(lux, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("altitude_deg", "lux", "factor"), [(-0.8, 453.0, 1.2), (-6.0, 3.4, 1.2), (-12.0, 0.0083, 1.3)]
+)
+def test_twilight_fades_as_the_naval_observatory_tells(
+    altitude_deg: float, lux: float, factor: float
+) -> None:
+    """Sunset, the end of civil and of nautical twilight; a city's own glow is taken off."""
+    altitude = math.radians(altitude_deg)
+    got = daylight.sky_illuminance_lux(altitude) - daylight.night_illuminance_lux()
+
+    assert lux / factor < got < lux * factor
+
+
+def test_light_levels_are_those_of_the_street() -> None:
+    """Clear noon about 100 klx, overcast noon 10 to 20 klx; the sun sets without a jump."""
+    noon = math.radians(55.0)
+    clear_sun = daylight.sun_illuminance_lux(noon) * math.sin(noon)
+
+    assert 90e3 < clear_sun + daylight.sky_illuminance_lux(noon) < 110e3
+    assert daylight.sun_illuminance_lux(noon, cloudiness=1.0) == 0.0
+    assert 10e3 < daylight.sky_illuminance_lux(noon, 1.0) < 20e3
+    around = [daylight.sun_illuminance_lux(math.radians(a)) for a in (1.0, 0.0, -0.79, -0.81)]
+    assert around == sorted(around, reverse=True)
+    assert around[2] < 1.0
+    assert around[3] == 0.0
+
+
+def test_low_sun_is_redder() -> None:
+    """Rayleigh and aerosol extinction take blue first."""
+    colors = [daylight.sun_color(math.radians(a)) for a in (60.0, 20.0, 5.0)]
+    ratios = [red / blue for red, _, blue in colors]
+
+    assert ratios == sorted(ratios)
+    assert all(np.dot(color, LUMINANCE) == pytest.approx(1.0, abs=1e-4) for color in colors)
+
+
+@pytest.mark.parametrize("azimuth_deg", [0.0, 70.0, 180.0])
+@pytest.mark.parametrize("elevation_deg", [10.0, 45.0, 80.0])
+def test_clear_sky_follows_perez_with_preethams_coefficients(
+    elevation_deg: float, azimuth_deg: float
+) -> None:
+    """Ratios to the zenith at turbidity 2: A..E = -1.1056, -0.2833, 5.2797, -2.3359, 0.2363."""
+    a, b, c, d, e = -1.1056, -0.2833, 5.2797, -2.3359, 0.2363
+    sun, elevation, azimuth = (math.radians(v) for v in (40.0, elevation_deg, azimuth_deg))
+
+    def perez(elevation: float, gamma: float) -> float:
+        gradation = 1 + a * math.exp(b / math.sin(elevation))
+        return gradation * (1 + c * math.exp(d * gamma) + e * math.cos(gamma) ** 2)
+
+    level = math.cos(elevation)
+    place = np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
+    towards = np.array([math.cos(sun), 0.0, math.sin(sun)])
+    gamma = math.acos(float(place @ towards))
+    expected = perez(elevation, gamma) / perez(math.pi / 2, math.pi / 2 - sun)
+
+    got = clear_sky(place[None, None], sun, 2.0)[0, 0] @ LUMINANCE
+
+    assert got == pytest.approx(expected, rel=1e-6)
+
+
+def test_overcast_zenith_is_three_times_the_horizon() -> None:
+    """CIE standard overcast sky; 45 degrees: (1 + 2 / sqrt 2) / 3."""
+    d = np.array([[[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [math.sqrt(0.5), 0.0, math.sqrt(0.5)]]])
+    zenith, horizon, half = overcast_sky(d)[0] @ LUMINANCE
+
+    assert zenith / horizon == pytest.approx(3.0)
+    assert half / zenith == pytest.approx((1 + math.sqrt(2)) / 3)
+
+
+@pytest.mark.parametrize("cloudiness", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("altitude_deg", [50.0, 5.0, -4.0, -40.0])
+def test_image_gives_the_illuminance_of_the_formula(altitude_deg: float, cloudiness: float) -> None:
+    """Whatever the clouds look like, level ground gets what the tables say."""
+    model = SkyModel(3, altitude_deg, 2.5, cloudiness)
+    image = luminance_cd_m2(model, 128)
+    expected = daylight.sky_illuminance_lux(math.radians(altitude_deg), cloudiness)
+
+    assert image.min() >= 0.0
+    assert level_illuminance_lux(image) == pytest.approx(expected, rel=0.01)
+
+
+def test_mean_luminance_is_that_of_the_full_image() -> None:
+    """A coarse image is enough to know how bright the sphere is."""
+    model = SkyModel(5, 35.0, 3.0, 0.45)
+    image = luminance_cd_m2(model, 512)
+    weights = np.sin((np.arange(512) + 0.5) * math.pi / 512)
+    mean = float(((image @ LUMINANCE).mean(axis=1) * weights).sum() / weights.sum())
+
+    assert mean_luminance_cd_m2(model) == pytest.approx(mean, rel=0.03)
+
+
+def test_brightest_part_of_a_clear_sky_is_around_the_sun() -> None:
+    """The sun is in the direction of +X: the centre column."""
+    luminance = luminance_cd_m2(SkyModel(0, 40.0), 128) @ LUMINANCE
+    row, column = np.unravel_index(np.argmax(luminance[:60]), (60, 256))
+
+    assert 90.0 - (row + 0.5) / 128 * 180.0 == pytest.approx(40.0, abs=3.0)
+    assert column in (127, 128)
+
+
+def test_clouds_cover_more_the_cloudier_it_is() -> None:
+    """Where there is no cloud the sky is blue: twice as much blue as red."""
+    blue = []
+    for cloudiness in (0.0, 0.3, 0.6):
+        upper = luminance_cd_m2(SkyModel(2, 50.0, 2.0, cloudiness), 128)[:45]
+        blue.append(float((upper[..., 2] > 1.6 * upper[..., 0]).mean()))
+
+    assert blue[0] > 0.8
+    assert blue[0] > blue[1] + 0.1 > blue[2] + 0.2
+
+
+def test_same_arguments_make_the_same_bytes() -> None:
+    """And another seed makes other clouds."""
+    first, again, other = (sky(seed, 30.0, 2.5, 0.4, 0.18) for seed in (1, 1, 2))
+
+    assert first.tobytes() == again.tobytes()
+    assert first.tobytes() != other.tobytes()
+    assert first.shape == (512, 1024, 3)
+    assert first.dtype == np.float32
+
+
+def test_library_refuses_a_sky_that_cannot_be(tmp_path) -> None:  # noqa: ANN001
+    """The message names parameter, value and range."""
+    library = open_library(cache_dir=tmp_path)
+
+    with pytest.raises(AssetError, match=r"cloudiness is 2; expected a number in \[0, 1\]"):
+        library.environment("environment/sky?cloudiness=2")

@@ -1,0 +1,326 @@
+"""What weather does to images, against closed forms; and what it leaves alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.core.capture import Channel, Reading
+from generator.core.geometry import Material
+from generator.core.intrinsics import Intrinsics
+from generator.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
+from generator.core.se3 import SE3, look_at
+from generator.renderers.device import open_device
+from generator.renderers.lamps import main_lamps
+from generator.renderers.lens import glare, lens_drops
+from generator.renderers.packing import pack_world
+from generator.renderers.precipitation import exposure_time_s, poisson, rain, snow, traces
+from generator.renderers.settings import RenderSettings
+from generator.renderers.stock import AssetStock
+from generator.renderers.warp import WarpRenderer
+from tests.randomizers.doubles import rng_of
+from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
+
+RGB = frozenset({Channel.RGB})
+SEEN = frozenset({Channel.RGB, Channel.RANGE, Channel.INSTANCE})
+LENS = Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)
+AHEAD = Camera("front", look_at((0.0, 0.0, 1.5), (10.0, 0.0, 1.2)), LENS, ev100=8.0)
+DOWN = Camera("top", look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), LENS, ev100=8.0)
+PLAIN = RenderSettings(tone="srgb", ambient_occlusion_radius_m=0.0, antialias=1)
+ASPHALT = (Material(base_color=(0.3, 0.3, 0.3), roughness=0.95, specular=0.0),)
+BLACK = (Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0),)
+SUN = Light("sun", "sun", direction=(0.8, 0.0, -0.6), illuminance_lux=1500.0)
+DARK = Environment(luminance_cd_m2=0.0)
+STORM = Weather(0.02, 20.0, 30.0, 2.0, 0.9, 0.4, 0.4, 0.05, seed=5)
+
+
+@pytest.fixture(scope="module")
+def library() -> FakeLibrary:
+    """Asphalt, black walls, a lid."""
+    return FakeLibrary(
+        {
+            "road": plane_mesh(60.0, ASPHALT),
+            "black": box_mesh((0.2, 60.0, 60.0), BLACK),
+            "lid": box_mesh((0.8, 0.8, 0.05), ASPHALT),
+            "box": box_mesh((1.0, 1.0, 1.0), ASPHALT),
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def renderer(library: FakeLibrary) -> WarpRenderer:
+    """No tone curve: values that formulas can tell."""
+    return WarpRenderer(library, "cpu", PLAIN)
+
+
+def street(weather: Weather, environment: Environment = DARK, *lights: Light) -> Scene:
+    """A road with a box on it before a black wall, which instances label."""
+    bodies = (
+        Body("road", "road"),
+        Body("wall", "black", SE3((25.0, 0.0, 0.0)), instance_id=1),
+        Body("box", "box", SE3((6.0, 0.5, 0.5)), instance_id=2),
+    )
+    named = tuple(Instance(k, name, name, k, name) for k, name in ((1, "wall"), (2, "box")))
+    return Scene("t", bodies, named, lights=lights, environment=environment, weather=weather)
+
+
+def flat(weather: Weather, *bodies: Body) -> Scene:
+    """A road in the sun, seen from above."""
+    return Scene("t", (Body("road", "road"), *bodies), lights=(SUN,), environment=DARK,
+                 weather=weather)  # fmt: skip
+
+
+def luminance(reading: Reading, ev100: float = 8.0) -> np.ndarray:
+    """Luminance [cd/m^2] of an 8-bit image: sRGB undone, white is 1.2 * 2^EV100."""
+    value = reading.channels[Channel.RGB][..., 1].astype(float) / 255.0
+    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    return linear * 1.2 * 2.0**ev100
+
+
+def test_no_weather_changes_no_byte(renderer: WarpRenderer) -> None:
+    """A seed alone, and a height of fog that is not there, are no weather."""
+    light = (Environment(luminance_cd_m2=60.0), SUN)
+    plain = renderer.render(street(Weather(), *light), AHEAD, RGB).channels[Channel.RGB]
+    empty = Weather(seed=99, fog_height_m=50.0)
+    seeded = renderer.render(street(empty, *light), AHEAD, RGB).channels[Channel.RGB]
+
+    assert plain.tobytes() == seeded.tobytes()
+
+
+def test_labels_do_not_see_the_weather(renderer: WarpRenderer) -> None:
+    """Ids, depth, normals and silhouettes are those of a clear day, bit by bit."""
+    channels = frozenset(Channel)
+    light = (Environment(luminance_cd_m2=60.0), SUN)
+    clear = renderer.render(street(Weather(), *light), AHEAD, channels)
+    stormy = renderer.render(street(STORM, *light), AHEAD, channels)
+
+    for channel in sorted(channels & clear.channels.keys(), key=lambda c: c.value):
+        same = clear.channels[channel].tobytes() == stormy.channels[channel].tobytes()
+        assert same != (channel is Channel.RGB), channel
+    assert clear.silhouettes.keys() == stormy.silhouettes.keys() == {1, 2}
+    for key, silhouette in clear.silhouettes.items():
+        assert np.array_equal(silhouette.mask, stormy.silhouettes[key].mask)
+
+
+def test_same_weather_makes_the_same_bytes_in_another_renderer(library: FakeLibrary) -> None:
+    """And another seed makes other streaks, patches and drops."""
+    light = (Environment(luminance_cd_m2=60.0), SUN)
+    first, again, other = (
+        WarpRenderer(library, "cpu", PLAIN)
+        .render(street(weather, *light), AHEAD, RGB)
+        .channels[Channel.RGB]
+        .tobytes()
+        for weather in (STORM, STORM, replace(STORM, seed=6))
+    )
+
+    assert first == again
+    assert first != other
+
+
+def test_even_fog_follows_beer_and_lambert(renderer: WarpRenderer) -> None:
+    """Before black things fog shines with L (1 - exp(-beta r)) in light L from all around."""
+    beta, sky = 0.05, 200.0
+    weather = Weather(fog_extinction_per_m=beta)
+    scene = street(weather, Environment(luminance_cd_m2=sky))
+    reading = renderer.render(scene, AHEAD, SEEN)
+    wall = reading.channels[Channel.INSTANCE] == 1
+    expected = sky * (1.0 - np.exp(-beta * reading.channels[Channel.RANGE][wall].astype(float)))
+
+    assert wall.sum() > 500
+    assert np.abs(luminance(reading)[wall] / expected - 1.0).max() < 0.02
+
+
+def test_fog_thins_with_height(renderer: WarpRenderer) -> None:
+    """The optical depth of a sloping way: beta H exp(-z / H) (1 - exp(-d_z r / H)) / d_z."""
+    beta, height, sky = 0.2, 4.0, 200.0
+    weather = Weather(fog_extinction_per_m=beta, fog_height_m=height)
+    scene = street(weather, Environment(luminance_cd_m2=sky))
+    reading = renderer.render(scene, AHEAD, SEEN)
+    rows, columns = np.nonzero(reading.channels[Channel.INSTANCE] == 1)
+    r = reading.channels[Channel.RANGE][rows, columns].astype(float)
+    v = np.stack([(columns + 0.5 - 48.0) / 80.0, (rows + 0.5 - 32.0) / 80.0, np.ones_like(r)])
+    v = v / np.linalg.norm(v, axis=0)
+    up = (AHEAD.T_world_camera.rotation() @ v)[2]
+    depth = beta * height * math.exp(-1.5 / height) * -np.expm1(-up * r / height) / up
+    expected = sky * -np.expm1(-depth)
+
+    assert np.abs(luminance(reading)[rows, columns] / expected - 1.0).max() < 0.02
+
+
+def test_lamp_in_fog_has_a_halo(renderer: WarpRenderer) -> None:
+    """Before the black wall there is light around the lamp, less of it farther away."""
+    lamp = Light("lamp", "sphere", position_m=(10.0, 0.0, 1.2), intensity_cd=4000.0)
+    foggy = renderer.render(street(Weather(fog_extinction_per_m=0.05), DARK, lamp), AHEAD, RGB)
+    row = luminance(foggy)[32, 48:]
+
+    assert row[1] > row[8] > row[20] > 0.0
+
+
+def test_soaked_asphalt_keeps_a_fifth_of_its_albedo(renderer: WarpRenderer) -> None:
+    """Lagarde 2013: a porous surface is darkened by lerp(1, 0.2, wetness)."""
+    half = (slice(24, 40), slice(36, 60))
+    dry = luminance(renderer.render(flat(Weather()), DOWN, RGB))[half].mean()
+    for wetness in (0.5, 1.0):
+        wet = luminance(renderer.render(flat(Weather(wetness=wetness)), DOWN, RGB))[half].mean()
+        # Half of the pixel is a film of water with a reflectance of 2 %, in a dark room.
+        film = 1.0 - 0.5 * wetness * 0.02
+        assert wet / dry == pytest.approx((1.0 - 0.8 * wetness) * film, rel=0.03)
+
+
+def test_nothing_falls_below_a_lid(renderer: WarpRenderer) -> None:
+    """Beneath a low roof the road stays as it was."""
+    side = Camera("side", look_at((0.0, -4.0, 0.6), (0.0, 0.0, 0.0)), LENS, ev100=9.0)
+    lid = Body("lid", "lid", SE3((0.0, 0.0, 1.4)))
+    under = Environment(luminance_cd_m2=100.0)
+    dry, snowy = (
+        luminance(renderer.render(replace(flat(w, lid), environment=under), side, RGB), 9.0)
+        for w in (Weather(), Weather(snow_cover=1.0))
+    )
+
+    assert snowy[31:33, 47:49] == pytest.approx(dry[31:33, 47:49], rel=0.05)
+    assert snowy[60].mean() > 2.0 * dry[60].mean()
+
+
+@pytest.mark.parametrize("cover", [0.25, 0.75])
+def test_snow_covers_its_share_of_the_ground(renderer: WarpRenderer, cover: float) -> None:
+    """Over many square metres, and as white as snow: an albedo of 0.8 to 0.9."""
+    high = Camera("high", look_at((0.0, 0.0, 30.0), (0.0, 0.0, 0.0)), LENS, ev100=8.0)
+    image = luminance(renderer.render(flat(Weather(snow_cover=cover, seed=3)), high, RGB))
+    white = 0.83 * 900.0 / math.pi
+
+    assert (image > 0.5 * white).mean() == pytest.approx(cover, abs=0.08)
+    assert np.quantile(image, 0.99) == pytest.approx(white, rel=0.08)
+
+
+def test_puddles_mirror_what_stands_behind_them(renderer: WarpRenderer) -> None:
+    """All of the road under water: a lit wall appears in it with Fresnel's reflectance."""
+    glow = (Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0,
+                     emission_cd_m2=(200.0, 200.0, 200.0)),)  # fmt: skip
+    scene = street(Weather(puddles=1.0))
+    wall = replace(scene.body("wall"), materials=glow)
+    reading = renderer.render(scene.with_bodies(wall), replace(AHEAD, ev100=6.0), RGB)
+    row, column = 58, 80
+    d = AHEAD.T_world_camera.rotation() @ [(column - 47.5) / 80.0, (row - 31.5) / 80.0, 1.0]
+    cosine = -d[2] / np.linalg.norm(d)
+    fresnel = 0.02 + 0.98 * (1.0 - cosine) ** 5
+
+    assert luminance(reading, 6.0)[row, column] == pytest.approx(200.0 * fresnel, rel=0.06)
+
+
+def test_streaks_are_a_poisson_process() -> None:
+    """Their number has equal mean and variance; they spread evenly over the image."""
+    kind = rain(1.0)
+    found = [traces(kind, AHEAD, Weather(seed=k), 0.004, "rain") for k in range(300)]
+    numbers = np.array([len(values) for values in found])
+    frustum_m3 = (96 / 80) * (64 / 80) / 3.0 * (6.0**3 - 0.35**3)
+    expected = 8000.0 / 4.1 * math.exp(-4.1) * frustum_m3
+    middle = np.concatenate([(v["start_px"] + v["end_px"])[:, 0] / 2 for v in found])
+
+    assert numbers.mean() == pytest.approx(expected, rel=0.02)
+    assert numbers.var() / numbers.mean() == pytest.approx(1.0, abs=0.25)
+    quarters = np.histogram(middle, bins=4, range=(0.0, 96.0))[0]
+    assert quarters / quarters.mean() == pytest.approx(np.ones(4), abs=0.03)
+
+
+def test_small_poisson_numbers_have_the_right_mean_and_variance() -> None:
+    """Below the limit where the normal distribution takes over."""
+    rng = rng_of("poisson")
+    numbers = np.array([poisson(3.0, rng) for _ in range(4000)])
+
+    assert numbers.mean() == pytest.approx(3.0, abs=0.1)
+    assert numbers.var() == pytest.approx(3.0, abs=0.25)
+
+
+def test_drops_fall_faster_than_flakes() -> None:
+    """Streaks of rain are several times longer than those of flakes."""
+    streaks = traces(rain(10.0), AHEAD, Weather(seed=1), 0.01, "rain")
+    flakes = traces(snow(1.0), AHEAD, Weather(seed=1), 0.01, "snow")
+    lengths = [
+        float(np.median(np.hypot(*(v["end_px"] - v["start_px"]).T) * v["z_m"]))
+        for v in (streaks, flakes)
+    ]
+
+    assert lengths[0] > 2.0 * lengths[1]
+    # A drop of 1.4 mm falls at about 5.2 m/s (Gunn and Kinzer 1949): 52 mm in 10 ms, at 80 px.
+    assert lengths[0] / 80.0 == pytest.approx(0.052, rel=0.2)
+
+
+def test_nearer_things_hide_what_falls_behind_them(renderer: WarpRenderer) -> None:
+    """A wall half a metre away leaves hardly a streak, the open road has many."""
+    weather = Weather(snow_mm_h=3.0, seed=2)
+    light = Environment(luminance_cd_m2=100.0)
+    changed = []
+    for x in (0.55, 25.0):
+        pictures = []
+        for w in (Weather(), weather):
+            scene = street(w, light)
+            wall = replace(scene.body("wall"), T_world_body=SE3((x + 0.1, 0.0, 0.0)))
+            pictures.append(luminance(renderer.render(scene.with_bodies(wall), AHEAD, RGB)))
+        changed.append(float((np.abs(pictures[1] - pictures[0]) > 0.5).mean()))
+
+    assert changed[1] > 0.02
+    assert changed[0] < 0.1 * changed[1]
+
+
+def test_exposure_time_follows_the_light() -> None:
+    """T = N^2 / 2^EV at f/2, held between 1/500 s and 1/40 s."""
+    assert exposure_time_s(9.0) == pytest.approx(4.0 / 512.0)
+    assert exposure_time_s(15.0) == pytest.approx(1.0 / 500.0)
+    assert exposure_time_s(0.0) == pytest.approx(1.0 / 40.0)
+
+
+def test_drops_hide_their_share_of_the_lens() -> None:
+    """Discs thrown at random overlap: 1 - exp(-sum of areas / image)."""
+    camera = replace(AHEAD, intrinsics=Intrinsics(960, 640, 800.0, 800.0, 480.0, 320.0))
+    shares = []
+    for seed in range(60):
+        drops = lens_drops(Weather(lens_drops=0.05, seed=seed), camera)
+        area = 0.9 * math.pi * float((drops[:, 2] ** 2).sum())
+        shares.append(1.0 - math.exp(-area / (960 * 640)))
+
+    assert np.mean(shares) == pytest.approx(0.05, rel=0.15)
+
+
+def test_glare_moves_light_and_makes_none() -> None:
+    """A bright point far from the edges keeps its sum; its neighbourhood gets some of it."""
+    image = np.zeros((512, 512, 3), np.float32)
+    image[250, 260] = 1000.0
+    veil = glare(image)
+
+    assert veil.sum(dtype=np.float64) == pytest.approx(image.sum(dtype=np.float64), rel=1e-3)
+    assert veil[250, 260, 0] > veil[250, 300, 0] > 0.0
+    assert veil.min() >= 0.0
+
+
+def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:
+    """Of a row of lamps the near ones stay, in their order, and the sun always."""
+    lamps = tuple(
+        Light(f"{k}", "spot", (5.0 * k, 0.0, 6.0), intensity_cd=2000.0, cone_rad=1.2)
+        for k in range(40)
+    )
+    scene = street(Weather(), DARK, *lamps, SUN)
+    stock = AssetStock(library, open_device("cpu"))
+    records = pack_world(scene, AHEAD, stock).record.lamps.numpy()
+    ground = np.stack([np.linspace(1.0, 20.0, 60), np.zeros(60), np.zeros(60)], axis=-1)
+    up = np.tile([0.0, 0.0, 1.0], (60, 1))
+
+    assert main_lamps(records, ground, up, 6).tolist() == [0, 1, 2, 3, 4, 40]
+
+
+def test_lamps_left_out_change_little(library: FakeLibrary) -> None:
+    """Sixteen of forty lamps give the image of all of them, within 2 % of its light."""
+    lamps = tuple(
+        Light(f"{k}", "spot", (4.0 * k - 20.0, 0.0, 6.0), intensity_cd=2000.0, cone_rad=1.2)
+        for k in range(40)
+    )
+    scene = street(Weather(), DARK, *lamps)
+    few, every = (
+        luminance(WarpRenderer(library, "cpu", PLAIN.model_copy(update={"max_lamps": n})).render(
+            scene, replace(AHEAD, ev100=4.0), RGB), 4.0)
+        for n in (16, 40)
+    )  # fmt: skip
+
+    assert few.sum() == pytest.approx(every.sum(), rel=0.02)
