@@ -18,8 +18,9 @@ from generator.core.se3 import Vec3
 Profile = Sequence[tuple[float, float]]
 """(height in the template [m], distance from the body [m]), heights rising."""
 
-_SKIN_LIKE = ("face", "lips", "brows", "arms", "hands", "legs")
 _WAVES = 7
+_SMOOTHING = (0.55, -0.57)
+"""A step that smooths and shrinks, and one that takes the shrinking back."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,7 +33,7 @@ class Layer:
         folds_m: Height of its wrinkles.
         waves_per_m: Of the wrinkles.
         tapered: Whether the sheet's edge lies on the body (hair).
-        smoothings: How often each point moves to the middle of its neighbours: cloth spans hollows.
+        smoothings: How often the sheet is smoothed: cloth spans hollows.
     """
 
     zones: tuple[tuple[str, Material], ...]
@@ -106,7 +107,10 @@ def _skin(person: Person) -> Layer:
     if outfit.bottom in ("shorts", "skirt", "none"):
         stockings = Material((0.02, 0.02, 0.024), 0.7, specular=0.3, role="bottom")
         bare = outfit.bottom == "shorts" or not outfit.stockings
-        zones.append(("legs", skin if bare else stockings))
+        covering = skin if bare else stockings
+        zones.append(("legs", covering))
+        if outfit.bottom == "shorts" or outfit.skirt_zones == 1:
+            zones.append(("upper_legs", covering))
     return Layer(tuple(zones))
 
 
@@ -131,15 +135,29 @@ def _hair(person: Person) -> tuple[Layer, ...]:
 def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
     material = outfit.bottom_material
     if outfit.bottom == "trousers":
-        zones = ("hips", "thighs", "shins", "ankles")
-        profile = ((-0.78, 0.024), (-0.7, 0.018), (-0.36, 0.013), (0.0, 0.008), (0.12, 0.005))
-        return (Layer(tuple((zone, material) for zone in zones), profile, 0.0028, 5.0, smoothings=1),)
+        zones: tuple[str, ...] = ("hips", "thighs", "shins", "ankles")
+        profile: Profile = (
+            (-0.78, 0.024),
+            (-0.7, 0.018),
+            (-0.36, 0.013),
+            (0.0, 0.008),
+            (0.12, 0.005),
+        )
+        return (
+            Layer(tuple((zone, material) for zone in zones), profile, 0.0028, 5.0, smoothings=1),
+        )
     if outfit.bottom == "shorts":
         profile = ((-0.31, 0.022), (0.0, 0.01), (0.12, 0.005))
         return (Layer((("hips", material), ("thighs", material)), profile, 0.003),)
     if outfit.bottom == "skirt":
         zones = ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
-        return (Layer(tuple((zone, material) for zone in zones), ((0.1, 0.004), (0.18, 0.01)), 0.001),)
+        return (
+            Layer(
+                tuple((zone, material) for zone in zones),
+                ((0.02, 0.004), (0.12, 0.016), (0.18, 0.016)),
+                0.001,
+            ),
+        )
     return ()
 
 
@@ -155,8 +173,16 @@ def _tops(outfit: Outfit) -> tuple[Layer, ...]:
     thick = off[outfit.top]
     folds = 0.35 if outfit.top in ("jacket", "coat") else 0.3
     low = 0.002 if tucked and outfit.top != "coat" else thick + 0.006
-    profile = ((-0.02, thick + 0.009), (0.14, low), (0.22, thick), (0.48, thick), (0.54, 0.3 * thick))
-    return (Layer(tuple((zone, material) for zone in zones), profile, folds * thick, 5.0, smoothings=4),)
+    profile = (
+        (-0.02, thick + 0.009),
+        (0.14, low),
+        (0.22, thick),
+        (0.48, thick),
+        (0.54, 0.3 * thick),
+    )
+    return (
+        Layer(tuple((zone, material) for zone in zones), profile, folds * thick, 5.0, smoothings=5),
+    )
 
 
 def _shoes(outfit: Outfit) -> Layer:
@@ -166,14 +192,17 @@ def _shoes(outfit: Outfit) -> Layer:
 
 
 def _smoothed(places: Array, faces: Indices, times: int) -> Array:
-    """Points moved halfway to the mean of their neighbours; those on an edge stay."""
+    """Points moved to and fro along the way to the mean of their neighbours; edges stay.
+
+    Source: Taubin, "A signal processing approach to fair surface design", SIGGRAPH 1995.
+    """
     start, end = faces.T.reshape(-1), np.roll(faces, -1, axis=1).T.reshape(-1)
     counts = np.bincount(start, minlength=len(places))[:, None]
     inner = np.ones((len(places), 1))
     inner[_border(faces)] = 0.0
-    for _ in range(times):
+    for step in _SMOOTHING * times:
         sums = [np.bincount(start, places[end, axis], len(places)) for axis in range(3)]
-        places = places + 0.5 * inner * (np.stack(sums, axis=1) / counts - places)
+        places = places + step * inner * (np.stack(sums, axis=1) / counts - places)
     return places
 
 
@@ -193,7 +222,9 @@ def _border(faces: Indices) -> Indices:
     """Vertices on edges that only one face has."""
     start, end = faces.T.reshape(-1), np.roll(faces, -1, axis=1).T.reshape(-1)
     size = int(faces.max()) + 1
-    edges, counts = np.unique(np.minimum(start, end) * size + np.maximum(start, end), return_counts=True)
+    edges, counts = np.unique(
+        np.minimum(start, end) * size + np.maximum(start, end), return_counts=True
+    )
     alone = edges[counts == 1]
     return np.unique(np.concatenate([alone // size, alone % size]))
 

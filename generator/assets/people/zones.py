@@ -84,6 +84,11 @@ def _neck_hole(p: Array) -> Array:
     return np.minimum(0.074 - np.hypot(p[:, 0] - 0.012, p[:, 1]), p[:, 2] - 0.545 + 0.5 * p[:, 0])
 
 
+def _shoulders(p: Array) -> Array:
+    """Positive on the skin outside of every neckline."""
+    return np.minimum(np.hypot(p[:, 0] - 0.012, p[:, 1]) - 0.098, 0.6 - p[:, 2])
+
+
 def _ellipse(y_m: float, z_m: float, half_y_m: float, half_z_m: float, bend: float = 0.0) -> Level:
     """Positive within an upright ellipse on the front of the head, one on either side."""
 
@@ -108,11 +113,13 @@ def _along(p: Array, a: Array, b: Array) -> Array:
 def _to_segment(p: Array, a: Array, b: Array) -> Array:
     t = ((p - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum()
     nearest = a + np.clip(t, 0.0, 1.0)[:, None] * (b - a)
-    return np.sqrt(((p - nearest) ** 2).sum(axis=1))
+    return np.asarray(np.sqrt(((p - nearest) ** 2).sum(axis=1)))
 
 
 HAIRLINE = Cut("face", "scalp", _above_hairline)
+SHOULDERS = Cut("face", "", _shoulders)
 WAIST = Cut("hips", "torso", _above(0.13))
+THIGH = Cut("legs", "upper_legs", _above(-0.32))
 KNEE = Cut("thighs", "shins", _below(-0.31))
 CUFF = Cut("shins", "ankles", _below(-0.7))
 SOLE = Cut("shoes", "soles", _below(-0.803))
@@ -122,7 +129,9 @@ BODY: Sequence[Cut] = (
     Cut("face", "arms", _arm_beyond(_SHORT_SLEEVE_M - 0.04)),
     Cut("face", "legs", _below(-0.15)),
     Cut("legs", "", _below(-0.75)),
+    THIGH,
     Cut("face", "", _below(0.535, -0.3)),
+    SHOULDERS,
     Cut("face", "", _mouth_inside),
     HAIRLINE,
     Cut("face", "brows", _ellipse(0.033, 0.752, 0.022, 0.0042, 4.0)),
@@ -173,7 +182,8 @@ MAX_FACES = {
     "irises": 32,
     "hands": 560,
     "arms": 260,
-    "legs": 300,
+    "legs": 220,
+    "upper_legs": 120,
     "torso": 640,
     "sleeves": 280,
     "hips": 240,
