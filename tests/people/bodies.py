@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from generator.assets.people.body import load
+from generator.assets.people.body import Body, load
 from generator.assets.people.families import pack_file
 from generator.assets.people.simple import simple_body
 
@@ -17,5 +17,6 @@ KINDS = [
 ]
 
 
-def body_of(kind: str):
+def body_of(kind: str) -> Body:
+    """The body of a kind."""
     return simple_body() if kind == "simple" else load(pack_file())

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import generator.assets.people as people
+from generator.assets import people
 from generator.assets.library import open_library
 from generator.assets.paths import packs_dir
 from generator.assets.people.body import load

@@ -14,11 +14,25 @@ from generator.core.geometry import MeshData
 from tests.people.bodies import KINDS, body_of
 
 # https://cocodataset.org/#keypoints-2020, in the order of its annotation files.
-COCO_17 = (
-    "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow "
-    "right_elbow left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle "
-    "right_ankle"
-).split()
+COCO_17 = [
+    "nose",
+    "left_eye",
+    "right_eye",
+    "left_ear",
+    "right_ear",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "left_hip",
+    "right_hip",
+    "left_knee",
+    "right_knee",
+    "left_ankle",
+    "right_ankle",
+]
 SEEDS = range(12)
 
 
@@ -32,7 +46,7 @@ def distances_m(points: np.ndarray, mesh: MeshData) -> np.ndarray:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("pose", POSES)
 def test_the_lowest_vertex_stands_on_the_ground(kind: str, pose: str) -> None:
-    """z = 0 is the ground, whatever a person does."""
+    """The ground is z = 0, whatever a person does."""
     for phase in (0.0, 0.3125, 0.6875):
         mesh = built(drawn_person(3, pose, phase), body_of(kind)).mesh
         assert mesh.vertices_m[:, 2].min() == 0.0
@@ -61,9 +75,9 @@ def test_left_keypoints_lie_to_the_left_of_right_ones(kind: str, pose: str) -> N
     for seed in SEEDS:
         points = built(drawn_person(seed, pose), body_of(kind)).keypoints
         at = {point.name: np.array(point.position_m) for point in points}
-        for name in at:
+        for name, place in at.items():
             if name.startswith("left_"):
-                assert at[name][1] > at[name.replace("left_", "right_")][1], (seed, name)
+                assert place[1] > at[name.replace("left_", "right_")][1], (seed, name)
         assert at["nose"][0] > 0.5 * (at["left_ear"][0] + at["right_ear"][0])
 
 
@@ -85,10 +99,10 @@ def test_standing_bodies_are_mirror_images_of_themselves(kind: str) -> None:
     """Joints of a symmetric pose differ in the sign of y only."""
     points = built(drawn_person(5, "stand"), body_of(kind)).keypoints
     at = {point.name: np.array(point.position_m) for point in points}
-    for name in at:
+    for name, place in at.items():
         if name.startswith("left_"):
             mirrored = at[name.replace("left_", "right_")] * (1.0, -1.0, 1.0)
-            np.testing.assert_allclose(at[name], mirrored, atol=0.004)
+            np.testing.assert_allclose(place, mirrored, atol=0.004)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -168,6 +168,7 @@ _FOOT = (
     (0.192, -0.802, 0.008, 0.01),
 )
 
+_POINT_M = 0.02
 _SMOOTH_M = 0.05
 """Half length of the stretch over which one bone hands over to the next."""
 
@@ -423,15 +424,24 @@ def _curtain(bones: Mapping[str, tuple[str, Array]]) -> Rows:
 
 
 def _loft(middles: Array, axes: Array, halves: Array, columns: int) -> tuple[Array, Indices]:
-    """Ellipses joined ring by ring; faces look outward if the rings run against the axes' cross
-    product."""
-    turn = 2.0 * math.pi * np.arange(columns + 1) / columns
+    """Ellipses joined ring by ring, and closed at ends that are nearly points.
+
+    Faces look outward if the rings run against the cross product of the axes.
+    """
+    turn = 2.0 * math.pi * np.arange(columns) / columns
     spread = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     offsets = (halves[:, None, :] * spread[None]) @ axes
-    places = (middles[:, None] + offsets)[:, :-1].reshape(-1, 3)
-    grid = grid_faces(len(middles), columns + 1)
-    row, column = np.divmod(grid, columns + 1)
-    return places, row * columns + column % columns
+    places = (middles[:, None] + offsets).reshape(-1, 3)
+    row, column = np.divmod(grid_faces(len(middles), columns + 1), columns + 1)
+    faces = [row * columns + column % columns]
+    ring = np.arange(columns)
+    for end, order in ((0, (2, 0, 1)), (len(middles) - 1, (0, 2, 1))):
+        if halves[end].max() < _POINT_M:
+            fan = np.stack([ring, (ring + 1) % columns, np.full(columns, len(places))], axis=1)
+            fan[:, :2] += end * columns
+            faces.append(fan[:, order])
+            places = np.concatenate([places, middles[end : end + 1]])
+    return places, np.concatenate(faces)
 
 
 def _along_chain(
