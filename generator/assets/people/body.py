@@ -39,6 +39,7 @@ ZONES = (
     "legs",
     "upper_legs",
     "torso",
+    "front",
     "sleeves",
     "hips",
     "thighs",

@@ -19,6 +19,8 @@ Profile = Sequence[tuple[float, float]]
 """(height in the template [m], distance from the body [m]), heights rising."""
 
 _WAVES = 7
+_THICKNESS_M = {"tshirt": 0.009, "shirt": 0.01, "jacket": 0.018, "coat": 0.018, "dress": 0.006}
+"""How far garments stand off the chest, the air under them included."""
 _SMOOTHING = (0.55, -0.57)
 """A step that smooths and shrinks, and one that takes the shrinking back."""
 
@@ -136,53 +138,47 @@ def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
     material = outfit.bottom_material
     if outfit.bottom == "trousers":
         zones: tuple[str, ...] = ("hips", "thighs", "shins", "ankles")
+        if outfit.top == "coat":
+            zones = zones[outfit.skirt_zones :]
         profile: Profile = (
             (-0.78, 0.024),
             (-0.7, 0.018),
             (-0.36, 0.013),
-            (0.0, 0.008),
-            (0.12, 0.005),
+            (-0.1, 0.008),
+            (0.0, 0.004),
+            (0.12, 0.002),
         )
-        return (
-            Layer(tuple((zone, material) for zone in zones), profile, 0.0028, 5.0, smoothings=1),
-        )
+        painted = tuple((zone, material) for zone in zones)
+        return (Layer(painted, profile, 0.0025, 5.0, smoothings=1),)
     if outfit.bottom == "shorts":
-        profile = ((-0.31, 0.022), (0.0, 0.01), (0.12, 0.005))
-        return (Layer((("hips", material), ("thighs", material)), profile, 0.003),)
+        profile = ((-0.31, 0.022), (-0.1, 0.01), (0.0, 0.004), (0.12, 0.002))
+        return (Layer((("hips", material), ("thighs", material)), profile, 0.0025, smoothings=1),)
     if outfit.bottom == "skirt":
         zones = ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
-        return (
-            Layer(
-                tuple((zone, material) for zone in zones),
-                ((0.02, 0.004), (0.12, 0.016), (0.18, 0.016)),
-                0.001,
-            ),
-        )
+        profile = ((0.02, 0.004), (0.12, 0.016), (0.18, 0.016))
+        return (Layer(tuple((zone, material) for zone in zones), profile, 0.001),)
     return ()
 
 
 def _tops(outfit: Outfit) -> tuple[Layer, ...]:
-    material = outfit.top_material
-    zones = ["torso", *(("sleeves",) if outfit.sleeves else ())]
-    tucked = outfit.bottom == "skirt"
-    if outfit.top in ("tshirt", "shirt", "jacket") and not tucked:
-        zones.append("hips")
+    tucked = outfit.bottom == "skirt" and outfit.top != "coat"
+    zones = ["torso", "front", *(("sleeves",) if outfit.sleeves else ())]
     if outfit.top in ("dress", "coat"):
         zones += ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
-    off = {"tshirt": 0.009, "shirt": 0.01, "jacket": 0.018, "coat": 0.018, "dress": 0.006}
-    thick = off[outfit.top]
-    folds = 0.35 if outfit.top in ("jacket", "coat") else 0.3
-    low = 0.002 if tucked and outfit.top != "coat" else thick + 0.006
+    elif not tucked:
+        zones.append("hips")
+    thick = _THICKNESS_M[outfit.top]
     profile = (
         (-0.02, thick + 0.009),
-        (0.14, low),
+        (0.14, 0.002 if tucked else thick + 0.006),
         (0.22, thick),
         (0.48, thick),
         (0.54, 0.3 * thick),
     )
-    return (
-        Layer(tuple((zone, material) for zone in zones), profile, folds * thick, 5.0, smoothings=5),
+    painted = tuple(
+        (zone, outfit.front_material if zone == "front" else outfit.top_material) for zone in zones
     )
+    return (Layer(painted, profile, 0.32 * thick, 5.0, smoothings=5),)
 
 
 def _shoes(outfit: Outfit) -> Layer:

@@ -264,7 +264,7 @@ def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[Rows]:
     trunk = _upright(bones, _TRUNK, 24, spine)
     made = [
         _divided(head, "face", (zones.HAIRLINE, zones.SHOULDERS)),
-        _divided(trunk, "hips", (zones.WAIST,)),
+        _divided(trunk, "hips", (zones.WAIST, *zones.FRONT)),
         _divided(_ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
         _divided(_upright(bones, _SKIRT, 24, ("pelvis",), split=True), "skirt_top", zones.SKIRT),
         _curtain(bones),
