@@ -100,7 +100,7 @@ def _skin(person: Person) -> Layer:
     skin = Material(base_color=person.skin, roughness=0.5, specular=0.4, role="skin")
     r, g, b = person.skin
     lips = replace(skin, base_color=(0.82 * r, 0.55 * g, 0.55 * b), roughness=0.4)
-    brows = Material(base_color=_mixed(person.hair, person.skin, 0.25), roughness=0.8, role="hair")
+    brows = Material(base_color=_mixed(person.hair, person.skin, 0.45), roughness=0.8, role="hair")
     zones = [("face", skin), ("lips", lips), ("brows", brows), ("hands", skin)]
     if person.haircut == "bald" and not outfit.hat:
         zones.append(("scalp", skin))
@@ -196,9 +196,12 @@ def _smoothed(places: Array, faces: Indices, times: int) -> Array:
     counts = np.bincount(start, minlength=len(places))[:, None]
     inner = np.ones((len(places), 1))
     inner[_border(faces)] = 0.0
+    normals = inner * vertex_normals(places, faces)
     for step in _SMOOTHING * times:
         sums = [np.bincount(start, places[end, axis], len(places)) for axis in range(3)]
-        places = places + step * inner * (np.stack(sums, axis=1) / counts - places)
+        toward = np.stack(sums, axis=1) / counts - places
+        # Along the normal only: where triangles are uneven, seams would drift sideways.
+        places = places + step * (toward * normals).sum(axis=1, keepdims=True) * normals
     return places
 
 

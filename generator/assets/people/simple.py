@@ -277,7 +277,7 @@ def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[Rows]:
 def _limbs(bones: Mapping[str, tuple[str, Array]], side: str, sign: float) -> Sequence[Rows]:
     arm, hand = _arm(bones, side), _hand(bones, side)
     leg = (f"thigh_{side}", f"calf_{side}", f"foot_{side}")
-    bare = _upright(bones, _LEG, 14, leg, middle_y_m=_LEG_Y)
+    bare = _upright(bones, _LEG, 12, leg, middle_y_m=_LEG_Y)
     foot = _foot(bones, side)
     eye = _ball(bones, (0.1335, 0.031, 0.728), (0.0145, 0.0145, 0.0075))
     brow = _ball(bones, (0.137, 0.033, 0.75), (0.008, 0.021, 0.0045))
@@ -377,7 +377,7 @@ def _along_arm(
 ) -> tuple[Array, Indices]:
     across = np.cross(_DOWN_OUT, [1.0, 0.0, 0.0])
     middles = start + along_m[:, None] * _DOWN_OUT
-    values, faces = _loft(middles, np.array([[1.0, 0.0, 0.0], -across]), halves_m, 12)
+    values, faces = _loft(middles, np.array([[1.0, 0.0, 0.0], -across]), halves_m, 10)
     # Bones change by the distance along the arm, measured downwards like heights are.
     heights = -((values - _SHOULDER) @ _DOWN_OUT)
     weights = _along_chain(bones, heights, chain, -1)
@@ -388,7 +388,7 @@ def _foot(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Ind
     x, z, width, height = np.array(_FOOT).T
     middles = np.stack([x, np.full_like(x, _LEG_Y), z], axis=1)
     axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    values, faces = _loft(middles, axes, np.stack([width, height], axis=1), 14)
+    values, faces = _loft(middles, axes, np.stack([width, height], axis=1), 12)
     values[:, 2] = np.maximum(values[:, 2], _SOLE_Z_M)
     names = list(bones)
     toes = np.clip((values[:, 0] - 0.1) / 0.04, 0.0, 1.0)
