@@ -89,7 +89,7 @@ def drawn_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
         figure=figure,
         skin=jittered(linear(_SKIN[tone]), 0.07, rng),
         hair=_drawn_hair(age_group, tone, rng),
-        haircut=pick(_HAIRCUTS[sex], rng),
+        haircut=pick(_HAIRCUTS[sex][: 3 if age_group == "child" else None], rng),
         outfit=drawn_outfit(sex, age_group == "child", rng),
         pose=action,
         step=step,
