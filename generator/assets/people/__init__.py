@@ -6,6 +6,7 @@ needs no file.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping
 
 from generator.assets.paths import packs_dir
@@ -13,9 +14,10 @@ from generator.assets.procedural.family import Family, Lazy
 
 _PACKAGE = "generator.assets.people"
 _VARIANTS = 256
+_VERSION = 1
 
 
-def _people(name: str, *tags: str) -> Family:
+def _people(name: str, version: int, *tags: str) -> Family:
     return Family(
         name=name,
         category="person",
@@ -23,7 +25,7 @@ def _people(name: str, *tags: str) -> Family:
         variants=_VARIANTS,
         mass_kg=70.0,
         stackable=False,
-        version=1,
+        version=version,
         parameters={"pose": "", "phase": -1.0},
         build=Lazy(f"{_PACKAGE}.families:{name}"),
         facts=Lazy(f"{_PACKAGE}.person:facts"),
@@ -33,9 +35,12 @@ def _people(name: str, *tags: str) -> Family:
 
 
 def _families() -> Mapping[str, Family]:
-    families = {"simple_person": _people("simple_person")}
-    if (packs_dir() / "people" / "body.npz").is_file():
-        families["person"] = _people("person", "pack")
+    families = {"simple_person": _people("simple_person", _VERSION)}
+    pack = packs_dir() / "people" / "body.npz"
+    if pack.is_file():
+        # Another pack makes other bytes: its checksum is part of the version.
+        version = (_VERSION << 32) + zlib.crc32(pack.read_bytes())
+        families["person"] = _people("person", version, "pack")
     return families
 
 

@@ -37,7 +37,9 @@ ZONES = (
     "arms",
     "hands",
     "legs",
+    "upper_legs",
     "torso",
+    "front",
     "sleeves",
     "hips",
     "thighs",
@@ -89,7 +91,7 @@ class Body:
             figure: Strength in [0, 1] of each word that names of shapes are made of. A shape's
                 strength is the product over its words; words that are missing count as 0.
         """
-        points = self.points_m.copy()
+        points: Array = self.points_m.copy()
         for name, delta in zip(self.targets, self.deltas, strict=True):
             strength = 1.0
             for word in name.split("-"):
@@ -118,7 +120,9 @@ def load(path: Path) -> Body:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays: dict[str, NDArray[Any]] = {name: archive[name] for name in archive.files}
         if int(arrays["format"]) != FORMAT:
-            raise AssetError(f"{path}: is of format {int(arrays['format'])}, not {FORMAT}; {remedy}")
+            raise AssetError(
+                f"{path}: is of format {int(arrays['format'])}, not {FORMAT}; {remedy}"
+            )
         return _body(arrays)
     except (OSError, ValueError, KeyError, EOFError) as error:
         raise AssetError(f"{path}: the people pack cannot be read ({error}); {remedy}") from error

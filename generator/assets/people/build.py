@@ -10,7 +10,7 @@ import numpy as np
 from generator.assets.people import props
 from generator.assets.people.body import LANDMARKS, Array, Body, Indices
 from generator.assets.people.clothes import displaced, layers
-from generator.assets.people.gait import stance
+from generator.assets.people.gait import Stance, shortened, stance
 from generator.assets.people.person import Person
 from generator.assets.people.pose import rotations_of
 from generator.assets.people.skinning import bone_transforms, skinned, vertex_normals
@@ -22,6 +22,8 @@ from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData
 _GRID_M = 1e-5
 """Vertices lie on this grid, so that the last bits of sines do not reach the mesh."""
 _PHASES = 7
+_NARROW_STRIDE = 0.7
+"""What a long skirt leaves of a stride."""
 _HULL_POINTS = 40
 
 KEYPOINTS: tuple[tuple[str, str, float], ...] = (
@@ -66,7 +68,7 @@ def built(person: Person, body: Body) -> Solid:
     )
     points *= scale
     bones = len(body.bones)
-    rotations = rotations_of(body, points[:bones], stance(person.pose, person.step))
+    rotations = rotations_of(body, points[:bones], _stance(person))
     transforms = bone_transforms(body, points[:bones], rotations)
     sheets = _sheets(person, body, points, transforms)
     marks = slice(0, bones + len(LANDMARKS))
@@ -82,6 +84,13 @@ def built(person: Person, body: Body) -> Solid:
     )
     hull = extreme(mesh.vertices_m.astype(np.float64), _HULL_POINTS)
     return Solid(mesh, ConvexParts((hull,)), keypoints)
+
+
+def _stance(person: Person) -> Stance:
+    made = stance(person.pose, person.step)
+    outfit = person.outfit
+    narrow = outfit.skirt_zones > 1 and (outfit.bottom in ("skirt", "none") or outfit.top == "coat")
+    return shortened(made, _NARROW_STRIDE) if narrow and person.pose != "sit" else made
 
 
 def _sheets(person: Person, body: Body, points: Array, transforms: Array) -> list[_Sheet]:

@@ -18,8 +18,11 @@ from generator.core.se3 import Vec3
 Profile = Sequence[tuple[float, float]]
 """(height in the template [m], distance from the body [m]), heights rising."""
 
-_SKIN_LIKE = ("face", "lips", "brows", "arms", "hands", "legs")
 _WAVES = 7
+_THICKNESS_M = {"tshirt": 0.009, "shirt": 0.01, "jacket": 0.018, "coat": 0.018, "dress": 0.006}
+"""How far garments stand off the chest, the air under them included."""
+_SMOOTHING = (0.55, -0.57)
+"""A step that smooths and shrinks, and one that takes the shrinking back."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,7 +35,7 @@ class Layer:
         folds_m: Height of its wrinkles.
         waves_per_m: Of the wrinkles.
         tapered: Whether the sheet's edge lies on the body (hair).
-        smoothings: How often each point moves to the middle of its neighbours: cloth spans hollows.
+        smoothings: How often the sheet is smoothed: cloth spans hollows.
     """
 
     zones: tuple[tuple[str, Material], ...]
@@ -97,7 +100,7 @@ def _skin(person: Person) -> Layer:
     skin = Material(base_color=person.skin, roughness=0.5, specular=0.4, role="skin")
     r, g, b = person.skin
     lips = replace(skin, base_color=(0.82 * r, 0.55 * g, 0.55 * b), roughness=0.4)
-    brows = Material(base_color=_mixed(person.hair, person.skin, 0.25), roughness=0.8, role="hair")
+    brows = Material(base_color=_mixed(person.hair, person.skin, 0.45), roughness=0.8, role="hair")
     zones = [("face", skin), ("lips", lips), ("brows", brows), ("hands", skin)]
     if person.haircut == "bald" and not outfit.hat:
         zones.append(("scalp", skin))
@@ -106,7 +109,10 @@ def _skin(person: Person) -> Layer:
     if outfit.bottom in ("shorts", "skirt", "none"):
         stockings = Material((0.02, 0.02, 0.024), 0.7, specular=0.3, role="bottom")
         bare = outfit.bottom == "shorts" or not outfit.stockings
-        zones.append(("legs", skin if bare else stockings))
+        covering = skin if bare else stockings
+        zones.append(("legs", covering))
+        if outfit.bottom == "shorts" or outfit.skirt_zones == 1:
+            zones.append(("upper_legs", covering))
     return Layer(tuple(zones))
 
 
@@ -131,32 +137,48 @@ def _hair(person: Person) -> tuple[Layer, ...]:
 def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
     material = outfit.bottom_material
     if outfit.bottom == "trousers":
-        zones = ("hips", "thighs", "shins", "ankles")
-        profile = ((-0.78, 0.024), (-0.7, 0.018), (-0.36, 0.013), (0.0, 0.008), (0.12, 0.005))
-        return (Layer(tuple((zone, material) for zone in zones), profile, 0.0028, 5.0, smoothings=1),)
+        zones: tuple[str, ...] = ("hips", "thighs", "shins", "ankles")
+        if outfit.top == "coat":
+            zones = zones[outfit.skirt_zones :]
+        profile: Profile = (
+            (-0.78, 0.024),
+            (-0.7, 0.018),
+            (-0.36, 0.013),
+            (-0.1, 0.008),
+            (0.0, 0.004),
+            (0.12, 0.002),
+        )
+        painted = tuple((zone, material) for zone in zones)
+        return (Layer(painted, profile, 0.0025, 5.0, smoothings=1),)
     if outfit.bottom == "shorts":
-        profile = ((-0.31, 0.022), (0.0, 0.01), (0.12, 0.005))
-        return (Layer((("hips", material), ("thighs", material)), profile, 0.003),)
+        profile = ((-0.31, 0.022), (-0.1, 0.01), (0.0, 0.004), (0.12, 0.002))
+        return (Layer((("hips", material), ("thighs", material)), profile, 0.0025, smoothings=1),)
     if outfit.bottom == "skirt":
         zones = ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
-        return (Layer(tuple((zone, material) for zone in zones), ((0.1, 0.004), (0.18, 0.01)), 0.001),)
+        profile = ((0.02, 0.004), (0.12, 0.016), (0.18, 0.016))
+        return (Layer(tuple((zone, material) for zone in zones), profile, 0.001),)
     return ()
 
 
 def _tops(outfit: Outfit) -> tuple[Layer, ...]:
-    material = outfit.top_material
-    zones = ["torso", *(("sleeves",) if outfit.sleeves else ())]
-    tucked = outfit.bottom == "skirt"
-    if outfit.top in ("tshirt", "shirt", "jacket") and not tucked:
-        zones.append("hips")
+    tucked = outfit.bottom == "skirt" and outfit.top != "coat"
+    zones = ["torso", "front", *(("sleeves",) if outfit.sleeves else ())]
     if outfit.top in ("dress", "coat"):
         zones += ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
-    off = {"tshirt": 0.009, "shirt": 0.01, "jacket": 0.018, "coat": 0.018, "dress": 0.006}
-    thick = off[outfit.top]
-    folds = 0.35 if outfit.top in ("jacket", "coat") else 0.3
-    low = 0.002 if tucked and outfit.top != "coat" else thick + 0.006
-    profile = ((-0.02, thick + 0.009), (0.14, low), (0.22, thick), (0.48, thick), (0.54, 0.3 * thick))
-    return (Layer(tuple((zone, material) for zone in zones), profile, folds * thick, 5.0, smoothings=4),)
+    elif not tucked:
+        zones.append("hips")
+    thick = _THICKNESS_M[outfit.top]
+    profile = (
+        (-0.02, thick + 0.009),
+        (0.14, 0.002 if tucked else thick + 0.006),
+        (0.22, thick),
+        (0.48, thick),
+        (0.54, 0.3 * thick),
+    )
+    painted = tuple(
+        (zone, outfit.front_material if zone == "front" else outfit.top_material) for zone in zones
+    )
+    return (Layer(painted, profile, 0.32 * thick, 5.0, smoothings=5),)
 
 
 def _shoes(outfit: Outfit) -> Layer:
@@ -166,14 +188,20 @@ def _shoes(outfit: Outfit) -> Layer:
 
 
 def _smoothed(places: Array, faces: Indices, times: int) -> Array:
-    """Points moved halfway to the mean of their neighbours; those on an edge stay."""
+    """Points moved to and fro along the way to the mean of their neighbours; edges stay.
+
+    Source: Taubin, "A signal processing approach to fair surface design", SIGGRAPH 1995.
+    """
     start, end = faces.T.reshape(-1), np.roll(faces, -1, axis=1).T.reshape(-1)
     counts = np.bincount(start, minlength=len(places))[:, None]
     inner = np.ones((len(places), 1))
     inner[_border(faces)] = 0.0
-    for _ in range(times):
+    normals = inner * vertex_normals(places, faces)
+    for step in _SMOOTHING * times:
         sums = [np.bincount(start, places[end, axis], len(places)) for axis in range(3)]
-        places = places + 0.5 * inner * (np.stack(sums, axis=1) / counts - places)
+        toward = np.stack(sums, axis=1) / counts - places
+        # Along the normal only: where triangles are uneven, seams would drift sideways.
+        places = places + step * (toward * normals).sum(axis=1, keepdims=True) * normals
     return places
 
 
@@ -193,7 +221,9 @@ def _border(faces: Indices) -> Indices:
     """Vertices on edges that only one face has."""
     start, end = faces.T.reshape(-1), np.roll(faces, -1, axis=1).T.reshape(-1)
     size = int(faces.max()) + 1
-    edges, counts = np.unique(np.minimum(start, end) * size + np.maximum(start, end), return_counts=True)
+    edges, counts = np.unique(
+        np.minimum(start, end) * size + np.maximum(start, end), return_counts=True
+    )
     alone = edges[counts == 1]
     return np.unique(np.concatenate([alone // size, alone % size]))
 

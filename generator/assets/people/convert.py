@@ -10,7 +10,7 @@ import gzip
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,8 @@ _AGES = ("child", "young", "old")
 _ORIGINS = ("african", "asian", "caucasian")
 _METRES_PER_UNIT = 0.1
 _STRANDS = 6
+_SKIRT_SPAN_M = 0.13
+"""Half the width over which a skirt goes from one leg to the other."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,7 +68,9 @@ def convert(source: Path, target: Path) -> None:
     try:
         body = _body(_read(found[0].parent.parent))
     except (OSError, KeyError, ValueError) as error:
-        raise AssetError(f"{found[0].parent.parent}: not the body data expected: {error}") from error
+        raise AssetError(
+            f"{found[0].parent.parent}: not the body data expected: {error}"
+        ) from error
     target.mkdir(parents=True, exist_ok=True)
     save(body, target / FILE)
 
@@ -88,7 +92,9 @@ def _body(base: _Base) -> Body:
     weights[: len(bones)] = np.eye(len(bones))
     weight_bones, shares = four_strongest(weights)
     deltas = values[:, 3:columns].reshape(len(values), -1, 3).transpose(1, 0, 2)
-    parents = [bones.index(bone["parent"]) if bone["parent"] else -1 for bone in base.bones.values()]
+    parents = [
+        bones.index(bone["parent"]) if bone["parent"] else -1 for bone in base.bones.values()
+    ]
     return Body(
         bones=bones,
         parents=np.array(parents),
@@ -106,7 +112,7 @@ def _parts(base: _Base) -> Iterator[Rows]:
     yield _cut(base, ("body",), "face", zones.BODY)
     yield _cut(base, ("helper-l-eye", "helper-r-eye"), "eyes", zones.EYES)
     yield _cut(base, ("helper-tights",), "hips", zones.TIGHTS)
-    yield _cut(base, ("helper-skirt",), "skirt_top", zones.SKIRT)
+    yield _spanned(base, _cut(base, ("helper-skirt",), "skirt_top", zones.SKIRT))
     yield _divided(_curtain(base), zones.HAIR)
 
 
@@ -131,7 +137,18 @@ def _curtain(base: _Base) -> Rows:
     nearest = np.argsort(squared, axis=1, kind="stable")[:, :_STRANDS]
     values = strands[nearest].mean(axis=1)
     values[:, :3] = places
-    return rows_of(values, grid_faces(*z.shape[:1], zones.CURTAIN_COLUMNS), "hair")
+    return rows_of(values, grid_faces(len(z), zones.CURTAIN_COLUMNS), "hair")
+
+
+def _spanned(base: _Base, rows: Rows) -> Rows:
+    """A skirt whose middle follows both legs, so that it does not part between them."""
+    first = 3 + 3 * len(base.targets)
+    left, right = (first + list(base.bones).index(f"thigh_{side}") for side in "lr")
+    values = rows.values.copy()
+    both = values[:, left] + values[:, right]
+    share = np.clip(0.5 + values[:, 1] / (2.0 * _SKIRT_SPAN_M), 0.0, 1.0)
+    values[:, left], values[:, right] = share * both, (1.0 - share) * both
+    return Rows(values, rows.faces, rows.zones)
 
 
 def _divided(rows: Rows, cuts: Sequence[zones.Cut]) -> Rows:
@@ -222,7 +239,7 @@ def _read_obj(path: Path) -> tuple[Array, dict[str, Indices]]:
             triangles = groups.setdefault(rest.strip(), [])
         elif kind == "f":
             corners = [int(word.split("/")[0]) - 1 for word in rest.split()]
-            triangles += [[corners[0], b, c] for b, c in zip(corners[1:], corners[2:], strict=False)]
+            triangles += [[corners[0], b, c] for b, c in pairwise(corners[1:])]
     arrays = {name: np.array(faces, dtype=np.int64) for name, faces in groups.items() if faces}
     return _in_frame(np.array(vertices)), arrays
 
@@ -252,7 +269,9 @@ def _read_bones(folder: Path) -> dict[str, Any]:
     groups = json.loads(metadata.read_text("utf-8"))
     bones: dict[str, Any] = {}
     while len(bones) < len(rig):
-        ready = [b for b in sorted(rig) if b not in bones and (rig[b]["parent"] or "") in {"", *bones}]
+        ready = [
+            b for b in sorted(rig) if b not in bones and (rig[b]["parent"] or "") in {"", *bones}
+        ]
         if not ready:
             raise ValueError("its bones have no root")
         for name in ready:

@@ -43,8 +43,7 @@ def rows_of(values: Array, faces: Indices, zone: str) -> Rows:
 
 
 def grid_faces(rows: int, columns: int) -> Indices:
-    """Triangles of a grid of points, row by row; seen from the side where rows go down and
-    columns to the right."""
+    """Triangles of a grid of points, row by row; outside is where columns run to the right."""
     i = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
@@ -125,6 +124,8 @@ def _split(
                 zones.append(name)
     if not made:
         return values, np.zeros((0, 3), np.int64), np.zeros(0, "U16")
-    return np.concatenate([values, np.array(added)]) if added else values, np.array(made), np.array(
-        zones, dtype="U16"
+    return (
+        np.concatenate([values, np.array(added)]) if added else values,
+        np.array(made),
+        np.array(zones, dtype="U16"),
     )

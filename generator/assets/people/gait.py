@@ -88,6 +88,15 @@ _RUN_ANKLE = (5, 12, 18, 20, 16, 6, -10, -20, -16, -8, -2, 2, 5, 6, 6, 5)
 _RUN_TOES = (0, 0, 0, 2, 10, 22, 24, 10, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
+def shortened(stance: Stance, share: float) -> Stance:
+    """The same stride with smaller steps, as narrow clothes allow."""
+    left, right = (
+        Leg(share * leg.hip, leg.knee * (0.5 + 0.5 * share), leg.ankle * share, leg.toes)
+        for leg in (stance.left_leg, stance.right_leg)
+    )
+    return replace(stance, left_leg=left, right_leg=right)
+
+
 def stance(pose: PoseName, step: int) -> Stance:
     """Joint angles of a pose.
 
@@ -95,6 +104,7 @@ def stance(pose: PoseName, step: int) -> Stance:
         pose: What is done.
         step: Sixteenth of the stride of the left leg, 0 = its heel strikes; walk, carry, run.
     """
+    step %= PHASES
     if pose == "walk":
         return _walk(step)
     if pose == "run":

@@ -73,15 +73,14 @@ def drawn_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
         ValueError: on a pose that does not exist or a phase that is no number.
     """
     if pose and pose not in POSES:
-        raise ValueError(
-            f"pose '{pose}' is none of {', '.join(POSES)}{did_you_mean(pose, POSES)}"
-        )
+        raise ValueError(f"pose '{pose}' is none of {', '.join(POSES)}{did_you_mean(pose, POSES)}")
     rng = rng_of("person", seed)
     sex: Sex = "female" if chance(0.5, rng) else "male"
     age_group = _drawn_age(rng)
     height_m = _drawn_height_m(sex, age_group, rng)
     tone = min(int(rng.random() * len(_SKIN)), len(_SKIN) - 1)
     figure = _drawn_figure(sex, age_group, height_m, tone, rng)
+    action, step = _drawn_action(seed, pose, phase)
     return Person(
         seed=seed,
         sex=sex,
@@ -90,9 +89,10 @@ def drawn_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
         figure=figure,
         skin=jittered(linear(_SKIN[tone]), 0.07, rng),
         hair=_drawn_hair(age_group, tone, rng),
-        haircut=pick(_HAIRCUTS[sex], rng),
+        haircut=pick(_HAIRCUTS[sex][: 3 if age_group == "child" else None], rng),
         outfit=drawn_outfit(sex, age_group == "child", rng),
-        **_drawn_action(seed, pose, phase),
+        pose=action,
+        step=step,
     )
 
 
@@ -170,7 +170,7 @@ def _drawn_hair(age_group: AgeGroup, tone: int, rng: Rng) -> Vec3:
     return jittered(linear(pick(_HAIR[: 8 if tone < 2 else 4 if tone < 4 else 2], rng)), 0.12, rng)
 
 
-def _drawn_action(seed: int, pose: str, phase: float) -> dict[str, object]:
+def _drawn_action(seed: int, pose: str, phase: float) -> tuple[PoseName, int]:
     """Pose and step; they have a stream of their own, so that the same person can do anything."""
     rng = rng_of("person/pose", seed)
     drawn = pick(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3, rng)
@@ -179,4 +179,4 @@ def _drawn_action(seed: int, pose: str, phase: float) -> dict[str, object]:
         raise ValueError("phase is no number")
     if phase >= 0.0:
         step = round(phase * PHASES) % PHASES
-    return {"pose": cast(PoseName, pose or drawn), "step": step}
+    return cast(PoseName, pose or drawn), step

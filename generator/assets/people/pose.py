@@ -59,9 +59,7 @@ def _leg(body: Body, heads_m: Array, side: str, sign: float, leg: Leg) -> Rotati
     }
 
 
-def _arm(
-    body: Body, heads_m: Array, side: str, sign: float, arm: Arm, trunk: Array
-) -> Rotations:
+def _arm(body: Body, heads_m: Array, side: str, sign: float, arm: Arm, trunk: Array) -> Rotations:
     down = np.array([0.0, 0.0, -1.0])
     upper = _between(_direction(body, heads_m, f"upperarm_{side}", f"lowerarm_{side}"), down)
     fore_direction = upper @ _direction(body, heads_m, f"lowerarm_{side}", f"hand_{side}")
@@ -76,9 +74,7 @@ def _arm(
     }
 
 
-def _fingers(
-    body: Body, heads_m: Array, side: str, curl: float, hand: Array
-) -> dict[str, Array]:
+def _fingers(body: Body, heads_m: Array, side: str, curl: float, hand: Array) -> dict[str, Array]:
     """Fingers bent about the line of the knuckles."""
     across = _direction(body, heads_m, f"index_01_{side}", f"pinky_01_{side}")
     made: dict[str, Array] = {}
@@ -112,7 +108,8 @@ def _about(axis: Array, angle_deg: float) -> Array:
     angle = math.radians(angle_deg)
     x, y, z = axis
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
+    rotation: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
+    return rotation
 
 
 def _between(start: Array, end: Array) -> Array:
@@ -120,7 +117,8 @@ def _between(start: Array, end: Array) -> Array:
     a, b = _unit(start), _unit(end)
     x, y, z = np.cross(a, b)
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + k + (k @ k) / (1.0 + float((a * b).sum()))
+    rotation: Array = np.eye(3) + k + (k @ k) / (1.0 + float((a * b).sum()))
+    return rotation
 
 
 def _unit(vector: Array) -> Array:

@@ -64,10 +64,14 @@ def _pillow(middle: Array, size_m: Array, axes: Array, material: Material) -> Pr
     n = 5
     t = np.linspace(-1.0, 1.0, n)
     u, v = (grid.ravel() for grid in np.meshgrid(t, t, indexing="ij"))
-    quads = [(i * n + j, (i + 1) * n + j, (i + 1) * n + j + 1, i * n + j + 1)
-             for i in range(n - 1) for j in range(n - 1)]
+    quads = [
+        (i * n + j, (i + 1) * n + j, (i + 1) * n + j + 1, i * n + j + 1)
+        for i in range(n - 1)
+        for j in range(n - 1)
+    ]
     faces = np.array([tri for a, b, c, d in quads for tri in ((a, b, c), (a, c, d))])
-    places, triangles = [], []
+    places: list[Array] = []
+    triangles: list[Indices] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
             p = np.zeros((n * n, 3))

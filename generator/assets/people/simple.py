@@ -27,7 +27,7 @@ from generator.assets.people.body import (
     Indices,
     four_strongest,
 )
-from generator.assets.people.cutting import Rows, cut, grid_faces, rows_of
+from generator.assets.people.cutting import Level, Rows, cut, grid_faces, rows_of
 
 _HEIGHT_M = 1.67
 _SOLE_Z_M = -0.82
@@ -98,10 +98,11 @@ _HEAD = (
     (0.85, 0.048, 0.004, 0.003),
 )
 _TRUNK = (
-    (0.565, 0.015, 0.064, 0.08),
-    (0.555, 0.012, 0.075, 0.12),
-    (0.535, 0.01, 0.085, 0.158),
-    (0.5, 0.012, 0.1, 0.172),
+    (0.583, 0.014, 0.06, 0.066),
+    (0.573, 0.012, 0.068, 0.1),
+    (0.558, 0.01, 0.076, 0.145),
+    (0.535, 0.01, 0.088, 0.172),
+    (0.5, 0.012, 0.1, 0.178),
     (0.44, 0.02, 0.112, 0.17),
     (0.36, 0.025, 0.117, 0.162),
     (0.28, 0.022, 0.112, 0.152),
@@ -133,9 +134,10 @@ _SKIRT = (
 )
 # From the shoulder along the arm: share, half width across, half depth.
 _ARM = (
-    (-0.12, 0.012, 0.016),
-    (-0.07, 0.042, 0.048),
-    (0.0, 0.056, 0.06),
+    (-0.07, 0.012, 0.014),
+    (-0.05, 0.036, 0.04),
+    (0.0, 0.05, 0.056),
+    (0.08, 0.052, 0.058),
     (0.15, 0.052, 0.056),
     (0.4, 0.043, 0.045),
     (0.55, 0.041, 0.041),
@@ -166,6 +168,7 @@ _FOOT = (
     (0.192, -0.802, 0.008, 0.01),
 )
 
+_POINT_M = 0.02
 _SMOOTH_M = 0.05
 """Half length of the stretch over which one bone hands over to the next."""
 
@@ -179,7 +182,9 @@ def simple_body() -> Body:
     names = list(bones)
     marks = np.zeros((len(LANDMARKS), len(names)))
     marks[:, names.index("head")] = 1.0
-    points = np.concatenate([heads, [_FACE[name] for name in LANDMARKS], *(p.values[:, :3] for p in parts)])
+    points = np.concatenate(
+        [heads, [_FACE[name] for name in LANDMARKS], *(p.values[:, :3] for p in parts)]
+    )
     table = np.concatenate([np.eye(len(names)), marks, *(p.values[:, 3:] for p in parts)])
     weight_bones, weights = four_strongest(table)
     faces: dict[str, list[Indices]] = {}
@@ -195,7 +200,9 @@ def simple_body() -> Body:
         parents=np.array([names.index(parent) if parent else -1 for parent, _ in bones.values()]),
         points_m=points,
         targets=tuple(shapes),
-        deltas=np.stack([np.rint((s - points) / DELTA_M).astype(np.int16) for s in shapes.values()]),
+        deltas=np.stack(
+            [np.rint((s - points) / DELTA_M).astype(np.int16) for s in shapes.values()]
+        ),
         weight_bones=weight_bones,
         weights=weights,
         faces={zone: np.concatenate(faces[zone]) for zone in ZONES if zone in faces},
@@ -213,7 +220,9 @@ def _warp(p: Array, sex: str, age: str, weight: str) -> Array:
     """The points in the shape of a sex, an age and a weight."""
     x, y, z = p.T
     heights = (-0.3, 0.0, 0.17, 0.4, 0.52, 0.56)
-    hips, waist, bust, shoulders = (1.03, 0.9, 0.94, 0.9) if sex == "female" else (0.96, 0.97, 1.03, 1.03)
+    hips, waist, bust, shoulders = (
+        (1.03, 0.9, 0.94, 0.9) if sex == "female" else (0.96, 0.97, 1.03, 1.03)
+    )
     girth = {"minweight": 0.86, "averageweight": 1.0, "maxweight": 1.24}[weight]
     if age == "child":
         hips, bust, shoulders = 0.9 * hips, 0.86 * bust, 0.84 * shoulders
@@ -231,7 +240,9 @@ def _warp(p: Array, sex: str, age: str, weight: str) -> Array:
     if age == "child":
         head = np.clip((z - 0.6) / 0.02, 0.0, 1.0)
         moved_x, moved_y = moved_x * (1.0 + 0.2 * head), moved_y * (1.0 + 0.2 * head)
-        moved_z = np.where(z > 0.6, 0.6 + 1.2 * (z - 0.6), np.where(z < 0.06, 0.06 + 0.93 * (z - 0.06), z))
+        moved_z = np.where(
+            z > 0.6, 0.6 + 1.2 * (z - 0.6), np.where(z < 0.06, 0.06 + 0.93 * (z - 0.06), z)
+        )
     return np.stack([moved_x, moved_y, moved_z], axis=1)
 
 
@@ -252,9 +263,9 @@ def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[Rows]:
     _model_face(head)
     trunk = _upright(bones, _TRUNK, 24, spine)
     made = [
-        _divided(head, "face", (zones.HAIRLINE,)),
-        _divided(trunk, "hips", (zones.WAIST,)),
-        _divided(_ball(bones, (0.148, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
+        _divided(head, "face", (zones.HAIRLINE, zones.SHOULDERS)),
+        _divided(trunk, "hips", (zones.WAIST, *zones.FRONT)),
+        _divided(_ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
         _divided(_upright(bones, _SKIRT, 24, ("pelvis",), split=True), "skirt_top", zones.SKIRT),
         _curtain(bones),
     ]
@@ -266,34 +277,34 @@ def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[Rows]:
 def _limbs(bones: Mapping[str, tuple[str, Array]], side: str, sign: float) -> Sequence[Rows]:
     arm, hand = _arm(bones, side), _hand(bones, side)
     leg = (f"thigh_{side}", f"calf_{side}", f"foot_{side}")
-    bare = _upright(bones, _LEG, 14, leg, middle_y_m=_LEG_Y)
+    bare = _upright(bones, _LEG, 12, leg, middle_y_m=_LEG_Y)
     foot = _foot(bones, side)
     eye = _ball(bones, (0.1335, 0.031, 0.728), (0.0145, 0.0145, 0.0075))
-    brow = _ball(bones, (0.141, 0.033, 0.75), (0.008, 0.021, 0.0045))
+    brow = _ball(bones, (0.137, 0.033, 0.75), (0.008, 0.021, 0.0045))
     ear = _ball(bones, (0.045, 0.079, 0.715), (0.017, 0.007, 0.028))
     short = zones.Cut("torso", "sleeves", _beyond(0.145))
     made = [
-        _divided(arm, "arms", ()),
+        _divided(arm, "", (zones.Cut("", "arms", _beyond(0.1)),)),
         _divided(arm, "torso", (short,)),
         _divided(hand, "hands", ()),
-        _divided(bare, "legs", ()),
+        _divided(bare, "legs", (zones.THIGH,)),
         _divided(bare, "thighs", (zones.KNEE, zones.CUFF)),
         _divided(foot, "shoes", (zones.SOLE,)),
         _divided(eye, "eyes", (zones.Cut("eyes", "irises", _pupil),)),
         _divided(brow, "brows", ()),
         _divided(ear, "face", ()),
     ]
-    return made if sign > 0.0 else [_mirrored(rows, bones) for rows in made]
+    return made if sign > 0.0 else [_mirrored(rows) for rows in made]
 
 
-def _mirrored(rows: Rows, bones: Mapping[str, tuple[str, Array]]) -> Rows:
+def _mirrored(rows: Rows) -> Rows:
     """Left limbs as right ones: they were made with the right bones already."""
     values = rows.values.copy()
     values[:, 1] *= -1.0
     return Rows(values, rows.faces[:, ::-1], rows.zones)
 
 
-def _beyond(distance_m: float) -> zones.Level:
+def _beyond(distance_m: float) -> Level:
     def level(p: Array) -> Array:
         return np.asarray(((p - _SHOULDER) * _DOWN_OUT).sum(axis=1) - distance_m)
 
@@ -366,7 +377,7 @@ def _along_arm(
 ) -> tuple[Array, Indices]:
     across = np.cross(_DOWN_OUT, [1.0, 0.0, 0.0])
     middles = start + along_m[:, None] * _DOWN_OUT
-    values, faces = _loft(middles, np.array([[1.0, 0.0, 0.0], -across]), halves_m, 12)
+    values, faces = _loft(middles, np.array([[1.0, 0.0, 0.0], -across]), halves_m, 10)
     # Bones change by the distance along the arm, measured downwards like heights are.
     heights = -((values - _SHOULDER) @ _DOWN_OUT)
     weights = _along_chain(bones, heights, chain, -1)
@@ -377,7 +388,7 @@ def _foot(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Ind
     x, z, width, height = np.array(_FOOT).T
     middles = np.stack([x, np.full_like(x, _LEG_Y), z], axis=1)
     axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    values, faces = _loft(middles, axes, np.stack([width, height], axis=1), 14)
+    values, faces = _loft(middles, axes, np.stack([width, height], axis=1), 12)
     values[:, 2] = np.maximum(values[:, 2], _SOLE_Z_M)
     names = list(bones)
     toes = np.clip((values[:, 0] - 0.1) / 0.04, 0.0, 1.0)
@@ -393,10 +404,10 @@ def _ball(
     radii_m: tuple[float, float, float],
 ) -> tuple[Array, Indices]:
     """An ellipsoid on the head."""
-    polar = np.linspace(0.0, math.pi, 9)
+    polar = np.linspace(0.0, math.pi, 6)
     rings = np.stack([np.sin(polar)] * 2, axis=1) * radii_m[:2]
     middles = np.array(middle_m) + np.cos(polar)[:, None] * np.array([0.0, 0.0, radii_m[2]])
-    values, faces = _loft(middles, np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), rings, 12)
+    values, faces = _loft(middles, np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), rings, 9)
     weights = np.zeros((len(values), len(bones)))
     weights[:, list(bones).index("head")] = 1.0
     return np.concatenate([values, weights], axis=1), faces
@@ -413,15 +424,24 @@ def _curtain(bones: Mapping[str, tuple[str, Array]]) -> Rows:
 
 
 def _loft(middles: Array, axes: Array, halves: Array, columns: int) -> tuple[Array, Indices]:
-    """Ellipses joined ring by ring; faces look outward if the rings run against the axes' cross
-    product."""
-    turn = 2.0 * math.pi * np.arange(columns + 1) / columns
+    """Ellipses joined ring by ring, and closed at ends that are nearly points.
+
+    Faces look outward if the rings run against the cross product of the axes.
+    """
+    turn = 2.0 * math.pi * np.arange(columns) / columns
     spread = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     offsets = (halves[:, None, :] * spread[None]) @ axes
-    places = (middles[:, None] + offsets)[:, :-1].reshape(-1, 3)
-    grid = grid_faces(len(middles), columns + 1)
-    row, column = np.divmod(grid, columns + 1)
-    return places, row * columns + column % columns
+    places = (middles[:, None] + offsets).reshape(-1, 3)
+    row, column = np.divmod(grid_faces(len(middles), columns + 1), columns + 1)
+    faces = [row * columns + column % columns]
+    ring = np.arange(columns)
+    for end, order in ((0, (2, 0, 1)), (len(middles) - 1, (0, 2, 1))):
+        if halves[end].max() < _POINT_M:
+            fan = np.stack([ring, (ring + 1) % columns, np.full(columns, len(places))], axis=1)
+            fan[:, :2] += end * columns
+            faces.append(fan[:, order])
+            places = np.concatenate([places, middles[end : end + 1]])
+    return places, np.concatenate(faces)
 
 
 def _along_chain(

@@ -49,6 +49,7 @@ class Outfit:
         bottom: ``trousers``, ``shorts``, ``skirt`` or, under a dress, ``none``.
         skirt_zones: How many of the skirt's three zones skirt, dress or coat reach down to.
         bag: ``""``, ``backpack`` or ``handbag``.
+        front_material: Of the chest, where an open jacket shows a shirt.
         hat: Whether a knitted hat is worn.
         stockings: Whether legs that show are covered.
     """
@@ -61,6 +62,7 @@ class Outfit:
     hat: bool
     stockings: bool
     top_material: Material
+    front_material: Material
     bottom_material: Material
     shoe_material: Material
     bag_material: Material
@@ -71,12 +73,14 @@ def drawn_outfit(sex: str, child: bool, rng: Rng) -> Outfit:
     """An outfit that suits."""
     woman = sex == "female"
     tops = ("jacket",) * 5 + ("shirt",) * 4 + ("tshirt",) * 3 + ("coat",) * (0 if child else 3)
-    top = pick(tops + ("dress",) * (3 if woman else 0), rng)
+    top = pick(tops + ("dress",) * (2 if woman else 0), rng)
     bottoms = ("trousers",) * 9 + ("shorts",) * (2 if top in ("tshirt", "shirt") else 0)
     bottom = pick(bottoms + ("skirt",) * (3 if woman else 0), rng)
     if top == "dress":
         bottom = "none"
-    reach = pick((1, 2, 2, 3), rng)
+    outer = _top(top, child, rng)
+    open_front = top in ("jacket", "coat") and chance(0.6, rng)
+    reach = pick((1, 1, 1, 2, 2, 2, 3), rng)
     return Outfit(
         top=top,
         bottom=bottom,
@@ -85,7 +89,8 @@ def drawn_outfit(sex: str, child: bool, rng: Rng) -> Outfit:
         bag=pick(("", "", "", "backpack", "handbag" if woman and not child else ""), rng),
         hat=top in ("jacket", "coat") and chance(0.2, rng),
         stockings=top == "coat" or chance(0.5, rng),
-        top_material=_top(top, child, rng),
+        top_material=outer,
+        front_material=_top("shirt", child, rng) if open_front else outer,
         bottom_material=_bottom(bottom, rng),
         shoe_material=_plain(_SHOES, between(0.35, 0.7, rng), "shoes", rng),
         bag_material=_plain(_BAGS, between(0.45, 0.8, rng), "bag", rng),
@@ -95,14 +100,14 @@ def drawn_outfit(sex: str, child: bool, rng: Rng) -> Outfit:
 
 def _top(kind: str, child: bool, rng: Rng) -> Material:
     if kind in ("jacket", "coat"):
-        colors = _BRIGHT if chance(0.35 if child else 0.1, rng) else _JACKETS
+        colors = _BRIGHT if chance(0.35 if child else 0.07, rng) else _JACKETS
         return _plain(colors, between(0.55, 0.9, rng), "top", rng)
     pattern, seed = float(rng.random()), float(rng.random())
     if kind != "tshirt" and pattern < 0.12:
         return _patterned(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22, "top")
     if pattern < 0.12:
         return _patterned(_STRIPES[int(seed * len(_STRIPES))], 0.3, "top")
-    colors = _BRIGHT if chance(0.4 if child else 0.15, rng) else _TOPS
+    colors = _BRIGHT if chance(0.4 if child else 0.1, rng) else _TOPS
     return _plain(colors, between(0.75, 0.95, rng), "top", rng)
 
 

@@ -84,6 +84,21 @@ def _neck_hole(p: Array) -> Array:
     return np.minimum(0.074 - np.hypot(p[:, 0] - 0.012, p[:, 1]), p[:, 2] - 0.545 + 0.5 * p[:, 0])
 
 
+def _inside_lapel(sign: float) -> Level:
+    """Positive on the chest to one side of a lapel of an open jacket."""
+
+    def level(p: Array) -> Array:
+        half = np.interp(p[:, 2], (0.13, 0.3, 0.52), (0.016, 0.024, 0.062))
+        return np.minimum(half + sign * p[:, 1], p[:, 0] - 0.03)
+
+    return level
+
+
+def _shoulders(p: Array) -> Array:
+    """Positive on the skin outside of every neckline."""
+    return np.minimum(np.hypot(p[:, 0] - 0.012, p[:, 1]) - 0.098, 0.6 - p[:, 2])
+
+
 def _ellipse(y_m: float, z_m: float, half_y_m: float, half_z_m: float, bend: float = 0.0) -> Level:
     """Positive within an upright ellipse on the front of the head, one on either side."""
 
@@ -108,11 +123,19 @@ def _along(p: Array, a: Array, b: Array) -> Array:
 def _to_segment(p: Array, a: Array, b: Array) -> Array:
     t = ((p - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum()
     nearest = a + np.clip(t, 0.0, 1.0)[:, None] * (b - a)
-    return np.sqrt(((p - nearest) ** 2).sum(axis=1))
+    return np.asarray(np.sqrt(((p - nearest) ** 2).sum(axis=1)))
 
 
 HAIRLINE = Cut("face", "scalp", _above_hairline)
+SHOULDERS = Cut("face", "", _shoulders)
 WAIST = Cut("hips", "torso", _above(0.13))
+# One lapel after the other: a level that bends within a triangle would be cut raggedly.
+FRONT = (
+    Cut("torso", "lapel", _inside_lapel(1.0)),
+    Cut("lapel", "front", _inside_lapel(-1.0)),
+    Cut("lapel", "torso", lambda p: np.ones(len(p))),
+)
+THIGH = Cut("legs", "upper_legs", _above(-0.385))
 KNEE = Cut("thighs", "shins", _below(-0.31))
 CUFF = Cut("shins", "ankles", _below(-0.7))
 SOLE = Cut("shoes", "soles", _below(-0.803))
@@ -122,7 +145,9 @@ BODY: Sequence[Cut] = (
     Cut("face", "arms", _arm_beyond(_SHORT_SLEEVE_M - 0.04)),
     Cut("face", "legs", _below(-0.15)),
     Cut("legs", "", _below(-0.75)),
+    THIGH,
     Cut("face", "", _below(0.535, -0.3)),
+    SHOULDERS,
     Cut("face", "", _mouth_inside),
     HAIRLINE,
     Cut("face", "brows", _ellipse(0.033, 0.752, 0.022, 0.0042, 4.0)),
@@ -133,6 +158,7 @@ TIGHTS: Sequence[Cut] = (
     Cut("hips", "sleeves", _arm_beyond(_SHORT_SLEEVE_M)),
     WAIST,
     Cut("torso", "", _neck_hole),
+    *FRONT,
     Cut("hips", "thighs", _below(-0.01)),
     KNEE,
     CUFF,
@@ -141,7 +167,7 @@ TIGHTS: Sequence[Cut] = (
 )
 SKIRT: Sequence[Cut] = (
     Cut("skirt_top", "skirt_middle", _below(-0.24)),
-    Cut("skirt_middle", "skirt_end", _below(-0.41)),
+    Cut("skirt_middle", "skirt_end", _below(-0.45)),
     Cut("skirt_end", "", _below(-0.62)),
 )
 HAIR: Sequence[Cut] = (Cut("hair", "hair_end", _below(0.57)),)
@@ -173,8 +199,10 @@ MAX_FACES = {
     "irises": 32,
     "hands": 560,
     "arms": 260,
-    "legs": 300,
-    "torso": 640,
+    "legs": 220,
+    "upper_legs": 120,
+    "torso": 600,
+    "front": 80,
     "sleeves": 280,
     "hips": 240,
     "thighs": 240,

@@ -1,0 +1,77 @@
+"""Bones, angles and skinning."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from generator.assets.people.gait import PHASES, POSES, stance
+from generator.assets.people.pose import rotations_of
+from generator.assets.people.skinning import bone_transforms, skinned, vertex_normals
+from tests.people.bodies import KINDS, body_of
+
+
+def posed_heads(kind: str, pose: str, step: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bone heads before and after a pose, and parents."""
+    body = body_of(kind)
+    count = len(body.bones)
+    heads = body.points_m[:count]
+    transforms = bone_transforms(body, heads, rotations_of(body, heads, stance(pose, step)))
+    after = np.einsum("bij,bj->bi", transforms[:, :, :3], heads) + transforms[:, :, 3]
+    return heads, after, body.parents
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("pose", POSES)
+def test_bones_keep_their_lengths_in_every_pose(kind: str, pose: str) -> None:
+    """Poses turn bones; they never stretch them."""
+    for step in range(0, PHASES, 3):
+        before, after, parents = posed_heads(kind, pose, step)
+        child = np.flatnonzero(parents >= 0)
+        lengths = [np.linalg.norm(p[child] - p[parents[child]], axis=1) for p in (before, after)]
+        np.testing.assert_allclose(lengths[0], lengths[1], atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rotations_are_rotations(kind: str) -> None:
+    """Orthonormal, without reflection."""
+    body = body_of(kind)
+    heads = body.points_m[: len(body.bones)]
+    for pose in POSES:
+        for rotation in rotations_of(body, heads, stance(pose, 5)).values():
+            np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+            assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_points_of_one_bone_move_rigidly() -> None:
+    """With all weight on one bone, skinning is that bone's transform."""
+    points = np.array([[1.0, 2.0, 3.0], [0.0, -1.0, 0.5]])
+    quarter = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, 6.0], [0.0, 0.0, 1.0, 7.0]])
+    transforms = np.stack([np.eye(3, 4), quarter])
+    bones = np.array([[1, 0, 0, 0], [0, 1, 0, 0]])
+    weights = np.array([[1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]])
+    moved = skinned(points, bones, weights, transforms)
+    np.testing.assert_allclose(moved[0], [-2.0 + 5.0, 1.0 + 6.0, 10.0])
+    np.testing.assert_allclose(moved[1], 0.5 * points[1] + 0.5 * np.array([6.0, 6.0, 7.5]))
+
+
+def test_normals_of_a_flat_sheet_are_its_own() -> None:
+    """Counter-clockwise seen from above looks up; unused vertices get up, too."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]], dtype=np.float64)
+    normals = vertex_normals(points, np.array([[0, 1, 2], [0, 2, 3]]))
+    np.testing.assert_allclose(normals, np.tile([0.0, 0.0, 1.0], (5, 1)))
+
+
+def test_walking_is_periodic_and_opposite_legs_are_half_a_stride_apart() -> None:
+    """The right leg does at step k what the left does eight steps later."""
+    for pose in ("walk", "run"):
+        for step in range(PHASES):
+            assert stance(pose, step) == stance(pose, step + PHASES)
+            assert stance(pose, step).right_leg == stance(pose, step + PHASES // 2).left_leg
+
+
+def test_the_standing_foot_is_flat_while_the_other_swings() -> None:
+    """From foot flat to heel rise, hip, knee and ankle leave the sole within 3 deg of level."""
+    for step in range(2, 7):
+        leg = stance("walk", step).left_leg
+        assert abs(leg.hip - leg.knee + leg.ankle) <= 3.0
