@@ -151,7 +151,7 @@ def _origin(element: Element, source: Element) -> None:
     w, x, y, z = (float(v) for v in source.get("quat", "1 0 0 0").split())
     norm = math.sqrt(w * w + x * x + y * y + z * z)
     r = SE3(quaternion_wxyz=(w / norm, x / norm, y / norm, z / norm)).rotation()
-    pitch = math.asin(max(-1.0, min(1.0, -float(r[2, 0]))))
+    pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
     if abs(float(r[2, 0])) < 1.0 - 1e-9:
         roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])
     else:
@@ -161,5 +161,5 @@ def _origin(element: Element, source: Element) -> None:
         element,
         "origin",
         xyz=source.get("pos", "0 0 0"),
-        rpy=" ".join(repr(round(angle, 9)) for angle in (roll, pitch, yaw)),
+        rpy=" ".join(repr(round(angle, 12)) for angle in (roll, pitch, yaw)),
     )

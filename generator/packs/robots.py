@@ -100,7 +100,7 @@ def convert(source: Path, target: Path) -> None:
 
 
 def _entry(arm: Arm) -> RobotEntry:
-    fingers = {joint: _STROKE_M / 2.0 for joint in _FINGERS}
+    fingers = dict.fromkeys(_FINGERS, _STROKE_M / 2.0)
     return RobotEntry(
         id=arm.name,
         file=f"{arm.name}.urdf",
@@ -114,7 +114,7 @@ def _entry(arm: Arm) -> RobotEntry:
             stroke_m=_STROKE_M,
         ),
         touching=arm.touching,
-        max_faces=3000,
+        max_faces=1500,
         materials={"*": Finish(roughness=0.4)},
     )
 
