@@ -72,11 +72,16 @@ def _collapsed(
         return _placed(fewer_points, scale, low)[faces], None
     # Where each vertex went. (The points of a replay are single precision: unfit.)
     _, _, merged = fast_simplification.replay_simplification(points, triangles, collapses)
-    # Borders of the charts stay, so that all that was merged lies in one chart.
-    counts = np.bincount(merged, minlength=len(fewer_points))[:, None]
-    sums = np.zeros((len(fewer_points), 2))
-    np.add.at(sums, merged, uvs.reshape(-1, 2)[first])
-    mean: Float64 = (sums / np.maximum(counts, 1))[faces]
+    # Borders of the charts stay, so that all that was merged lies in one chart; what lay nearest
+    # to where they met counts most.
+    square = ((points - fewer_points[merged]) ** 2).sum(axis=1)
+    weights = 1.0 / (square + 1e-8)
+    sums = np.zeros((len(fewer_points), 3))
+    own = uvs.reshape(-1, 2)[first]
+    np.add.at(
+        sums, merged, np.concatenate([own, np.ones((len(own), 1))], axis=1) * weights[:, None]
+    )
+    mean: Float64 = (sums[:, :2] / sums[:, 2:])[faces]
     return _placed(fewer_points, scale, low)[faces], mean
 
 

@@ -87,7 +87,7 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
         AssetError: if it is malformed, is no tree of links, or refers outside the folder.
     """
     place = str(folder.root / relative)
-    root = _parsed(folder.read(relative), place)
+    root = parsed_xml(folder.read(relative), place, "robot")
     try:
         colors = dict(_named_colors(root))
         links = {
@@ -105,7 +105,12 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
         raise AssetError(f"{place}: malformed URDF ({reason}); correct it") from None
 
 
-def _parsed(data: bytes, place: str) -> Element:
+def parsed_xml(data: bytes, place: str, tag: str) -> Element:
+    """The root element of a robot description; nothing in it is ever expanded.
+
+    Raises:
+        AssetError: if it is malformed, too large, declares a document type, or is another element.
+    """
     builder = TreeBuilder()
     parser = expat.ParserCreate()
     depth = count = 0
@@ -132,9 +137,10 @@ def _parsed(data: bytes, place: str) -> Element:
         root: Element = builder.close()
     except (ValueError, expat.ExpatError, AssertionError) as error:
         raise AssetError(f"{place}: malformed XML ({error}); correct it") from None
-    if root.tag != "robot":
+    if root.tag != tag:
+        expected = {"robot": "a URDF", "mujoco": "an MJCF"}.get(tag, tag)
         raise AssetError(
-            f"{place}: its root element is <{root.tag[:40]}>, not <robot>; give a URDF"
+            f"{place}: its root element is <{root.tag[:40]}>, not <{tag}>; give {expected}"
         )
     return root
 

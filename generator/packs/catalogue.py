@@ -34,6 +34,9 @@ _LICENCE = "CC-BY-3.0; converted, decimated, re-coloured"
 _DENSITY = 250.0
 """Mass per volume of the bounding box [kg/m^3]: household things are half air, half light."""
 
+_GRASPABLE_M = 0.07 + 1e-9
+"""What parallel grippers open to, a little less."""
+
 Place = tuple[float, float, float]
 
 
@@ -174,7 +177,7 @@ def mesh_entry(
         category=choice.category or group.category,
         subcategory=choice.subcategory or group.subcategory,
         attributes={**group.attributes, **choice.attributes},
-        tags=tuple(sorted({*group.tags, *choice.tags, TAG})),
+        tags=_tags(choice, group, min(model.size_m) * scale),
         size_m=size_m,
         up="y",
         yaw_deg=_first(choice.yaw_deg, group.yaw_deg, 90.0),
@@ -191,6 +194,13 @@ def mesh_entry(
         licence=model.licence,
         author=model.creator,
     )
+
+
+def _tags(choice: Choice, group: Group, thickness_m: float) -> tuple[str, ...]:
+    tags = {*group.tags, *choice.tags, TAG}
+    if "household" in tags and thickness_m <= _GRASPABLE_M:
+        tags.add("graspable")
+    return tuple(sorted(tags))
 
 
 def _first(*values: float | None) -> float:

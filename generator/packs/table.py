@@ -103,10 +103,9 @@ PACKS = (
         wanted=(
             "robosuite/models/assets/robots/ur5e/*",
             "robosuite/models/assets/robots/sawyer/*",
-            "robosuite/models/assets/grippers/robotiq_gripper_85.xml",
             "robosuite/models/assets/grippers/rethink_gripper.xml",
-            "robosuite/models/assets/grippers/meshes/robotiq_85_gripper/*",
             "robosuite/models/assets/grippers/meshes/rethink_gripper/*",
+            "robosuite/models/assets/grippers/obj_meshes/rethink_gripper/*",
         ),
         converter="generator.packs.robots:convert",
     ),

@@ -1,0 +1,77 @@
+"""``gen-data assets``: what it says, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def gen_data(*arguments: str, home: Path) -> subprocess.CompletedProcess[str]:
+    """The program in a process of its own, with an asset folder of its own."""
+    environment = {**os.environ, "GEN_DATA_ASSETS": str(home), "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-m", "generator.cli", *arguments],
+        capture_output=True, text=True, env=environment, cwd=home, check=False,
+    )  # fmt: skip
+
+
+def test_list_names_every_pack_and_the_folder(tmp_path: Path) -> None:
+    """Nothing is installed; nothing is made by looking."""
+    done = gen_data("assets", "list", home=tmp_path)
+    assert done.returncode == 0
+    for name in ("people", "catalogue", "hdri", "robots"):
+        assert name in done.stdout
+    assert str(tmp_path / "packs") in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_show_tells_what_an_asset_is(tmp_path: Path) -> None:
+    """Of any asset of the library."""
+    done = gen_data("assets", "show", "pybullet/teddy", home=tmp_path)
+    assert done.returncode == 0
+    assert "teddy bear" in done.stdout and "zlib" in done.stdout and "triangles" in done.stdout
+
+
+def test_list_finds_assets_by_tags(tmp_path: Path) -> None:
+    """All tags must fit."""
+    done = gen_data("assets", "list", "pybullet", "toy", home=tmp_path)
+    assert "pybullet/teddy" in done.stdout and "franka" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("install", "catalog"), 2, "did you mean 'catalogue'"),
+        (("install", "all", "--from", "archive"), 2, "--from is the archive of one pack"),
+        (("install", "hdri", "--from", "archive"), 3, "sha256 is"),
+        (("install", "hdri", "--from", "nowhere"), 2, "does not exist"),
+        (("remove", "hdri"), 3, "not installed"),
+        (("verify", "hdri"), 3, "not installed"),
+    ],
+)
+def test_errors_have_one_message_and_their_exit_code(
+    arguments: tuple[str, ...], code: int, said: str, tmp_path: Path
+) -> None:
+    """Without a traceback, and with nothing installed."""
+    (tmp_path / "archive").write_bytes(b"no archive")
+    done = gen_data("assets", *arguments, home=tmp_path)
+    assert done.returncode == code
+    assert said in done.stderr and "Traceback" not in done.stderr
+    assert not (tmp_path / "packs" / "hdri").exists()
+
+
+def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
+    """``--help`` is for people in a hurry: neither numpy nor pydantic is loaded."""
+    code = (
+        "import sys; from generator.cli.main import cli;"
+        "cli.main(['--help'], standalone_mode=False);"
+        "sys.exit(any(name in sys.modules for name in ('numpy', 'pydantic', 'yaml')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, check=False)
+    assert done.returncode == 0
