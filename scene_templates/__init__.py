@@ -9,8 +9,12 @@ TABLE = PluginTable(
     {
         "backdrop": "scene_templates.backdrop:Backdrop",
         "bin": "scene_templates.bin:Bin",
+        "crosswalk": "scene_templates.crosswalk:Crosswalk",
+        "ground": "scene_templates.ground:GroundElement",
+        "junction": "scene_templates.junction:Junction",
         "light": "scene_templates.light:LightElement",
         "objects": "scene_templates.objects:Objects",
+        "parking_area": "scene_templates.parking_area:ParkingArea",
         "prop": "scene_templates.prop:Prop",
         "road": "scene_templates.road:Road",
         "robot": "scene_templates.robot:Robot",
