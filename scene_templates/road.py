@@ -15,6 +15,7 @@ from generator.core.errors import ConfigError, did_you_mean
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Lane, Scene
 from generator.core.se3 import SE3
+from generator.roads.junction import JunctionShape, arm_pose
 from generator.roads.lanes import linked, road_lanes
 from generator.roads.profile import RoadShape
 from scene_templates.element import Element, parametric, with_static
@@ -196,10 +197,33 @@ def road_of(scene: Scene, name: str, field: str) -> tuple[RoadShape, dict[str, A
 
 
 def port(scene: Scene, name: str, field: str) -> SE3:
-    """Where a road goes on: the end of another one. Raises ConfigError if there is none."""
+    """Where a road can go on: the end of a road, or of ``<junction>/<arm>``.
+
+    Raises:
+        ConfigError: there is no such road or arm.
+    """
+    owner, slash, arm = name.partition("/")
+    if slash:
+        return _arm_end(scene, owner, arm, field)
     shape, _, T_world_road = road_of(scene, name, field)
     x, y, heading = (float(v) for v in shape.line().poses(np.array([shape.length_m]))[0])
     return T_world_road @ SE3.about_z(heading, (x, y, 0.0))
+
+
+def _arm_end(scene: Scene, name: str, arm: str, field: str) -> SE3:
+    for body in scene.bodies:
+        parsed = parse(body.asset) if body.name == name else None
+        if parsed is not None and parsed.name == "junction":
+            names = {f.name for f in fields(JunctionShape)}
+            given: dict[str, Any] = {k: v for k, v in parsed.parameters.items() if k in names}
+            shape = JunctionShape(**given)
+            count = len(shape.arms_rad())
+            if arm.isdecimal() and int(arm) < count:
+                return body.T_world_body @ arm_pose(shape, int(arm))
+            raise ConfigError(f"{field}: '{name}' has no arm '{arm}'; expected 0 to {count - 1}")
+    raise ConfigError(
+        f"{field}: there is no junction '{name}'; list it before what goes on from it"
+    )
 
 
 def _numbers(pair: tuple[Any, Any]) -> tuple[float, float]:

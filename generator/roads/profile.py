@@ -19,7 +19,7 @@ StripKind = Literal[
 Pair = tuple[float, float]
 
 KERB_WIDTH_M = 0.15
-_FALL = 0.025
+FALL = 0.025
 """Slope of sidewalks and verges: 2 to 2.5 % sheds rain (EAE/RASt 06, 6.1.1.2)."""
 
 
@@ -71,6 +71,10 @@ class RoadShape:
         beside = self.bicycle_m[k] + self.shoulder_m[k] + self.parking_m[k]
         return 0.5 * self.median_m + self.lanes_on(side) * self.lane_width_m + beside
 
+    def crowned_m(self, side: int) -> float:
+        """From the middle to where the carriageway's fall ends: parking strips are level."""
+        return self.carriageway_m(side) - self.parking_m[index_of(side)]
+
     def changed(self) -> dict[str, Any]:
         """Fields that differ from their defaults."""
         pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
@@ -115,7 +119,7 @@ class Strip:
 def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
     """The strips of one side, from the middle outwards."""
     k = index_of(side)
-    top = shape.crown * max(shape.carriageway_m(1), shape.carriageway_m(-1))
+    top = shape.crown * max(shape.crowned_m(1), shape.crowned_m(-1))
     made: list[Strip] = []
 
     def put(kind: StripKind, width_m: float, rise_m: float, number: int = 0) -> None:
@@ -129,12 +133,12 @@ def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
         put("driving", shape.lane_width_m, -shape.lane_width_m * shape.crown, number)
     put("bicycle", shape.bicycle_m[k], -shape.bicycle_m[k] * shape.crown)
     put("shoulder", shape.shoulder_m[k], -shape.shoulder_m[k] * shape.crown)
-    put("parking", shape.parking_m[k], -shape.parking_m[k] * shape.crown)
+    put("parking", shape.parking_m[k], 0.0)
     beyond = shape.verge_m[k] + shape.sidewalk_m[k]
     if beyond > 0.0 and shape.kerb_m > 0.0:
         put("kerb", KERB_WIDTH_M, shape.kerb_m)
     # Behind a kerb the ground rises away from it; without one it falls, and water runs off.
-    fall = _FALL if shape.kerb_m > 0.0 else -_FALL
+    fall = FALL if shape.kerb_m > 0.0 else -FALL
     put("verge", shape.verge_m[k], fall * shape.verge_m[k])
     put("sidewalk", shape.sidewalk_m[k], fall * shape.sidewalk_m[k])
     return tuple(made)

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from generator.assets.procedural.family import Family, Lazy, TextureFamily
+from generator.roads.junction import JunctionShape
+from generator.roads.parking import ParkingShape
 from generator.roads.profile import RoadShape
 
 
@@ -19,7 +21,10 @@ def _texture(name: str, variants: int = 4, **parameters: object) -> TextureFamil
     return TextureFamily(name, ("ground", "street"), variants, 1, build, parameters)
 
 
-_SHAPE = {field.name: field.default for field in fields(RoadShape)}
+_SHAPE, _JUNCTION, _PARKING = (
+    {field.name: field.default for field in fields(shape)}
+    for shape in (RoadShape, JunctionShape, ParkingShape)
+)
 _LOOKS: dict[str, object] = {"seed": 0, "wear": 0.3, "paving": "paving", "ground": "grass"}
 
 FAMILIES: Mapping[str, Family] = {
@@ -36,6 +41,10 @@ FAMILIES: Mapping[str, Family] = {
             apron_m=6.0,
             rails=(0.0, 0.0),
         ),
+        _surface("junction", **_JUNCTION, **_LOOKS, crossings="zebra"),
+        _surface("crosswalk", **_SHAPE, seed=0, wear=0.3, station_m=20.0, width_m=4.0),
+        _surface("parking_area", **_PARKING, **_LOOKS),
+        _surface("ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
     )
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -81,9 +82,9 @@ class Deck:
         st = np.array([s_m, t_m]) + radius_m * ring
         rim = self.at(st[:, 0], st[:, 1], lift_m)
         center = self.at(np.array([s_m]), np.array([t_m]), lift_m)[0]
-        corners = [np.stack([center, a, b]) for a, b in zip(rim[:-1], rim[1:], strict=True)]
+        corners = [np.stack([center, a, b]) for a, b in pairwise(rim)]
         uv = 0.5 + 0.5 * ring
-        uvs = [np.stack([np.array([0.5, 0.5]), a, b]) for a, b in zip(uv[:-1], uv[1:], strict=True)]
+        uvs = [np.stack([np.array([0.5, 0.5]), a, b]) for a, b in pairwise(uv)]
         slots = np.full(sides, self.slots[slot], dtype=np.int64)
         return Patch(np.stack(corners), np.stack(uvs), slots)
 

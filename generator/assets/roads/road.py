@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ _BATTER_M = 0.02
 
 
 def road(  # noqa: PLR0913 - a family's parameters are its function's
+    *,
     seed: int = 0,
     markings: str = "dashed",
     edge_lines: str = "none",
@@ -45,7 +47,8 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
         dash_m: Length of dashes and of the gaps between them.
         line_m: Width of narrow lines.
         wear: 0 freshly laid to 1 worn out.
-        paving, ground: Words of ``GROUNDS`` for sidewalks and for the land beside the road.
+        paving: What sidewalks are covered with, a word of ``GROUNDS``.
+        ground: What the land beside is covered with, a word of ``GROUNDS``.
         apron_m: Width of that land on each side; 0 = none.
         rails: Whether there are guard rails, left and right.
         shape: Fields of ``RoadShape``.
@@ -170,7 +173,7 @@ def _wear(deck: Deck, profile: RoadShape, wear: float, rng: Rng) -> Iterator[Pat
         yield deck.ribbon(
             (s + seam, s + length - seam), _crossed(deck, inner), "asphalt_new", 0.0018
         )
-    for _ in range(round(wear * profile.length_m / 7.0)):
+    for _ in range(round(wear * profile.length_m / 4.5)):
         yield _crack(deck, profile.length_m, low, high, rng)
 
 
@@ -192,7 +195,7 @@ def _crack(deck: Deck, length_m: float, low: float, high: float, rng: Rng) -> Pa
         s = between(0.2, length_m - reach - 0.1, rng) + np.linspace(0.0, reach, count)
         t = between(low + 0.6, high - 0.6, rng) + 0.1 * np.cumsum(steps)
     s, t = np.clip(s, 0.05, length_m - 0.05), np.clip(t, low + 0.05, high - 0.05)
-    return deck.path(s, t, between(0.012, 0.04, rng), "tar", 0.002)
+    return deck.path(s, t, between(0.015, 0.05, rng), "tar", 0.002)
 
 
 def _covers(deck: Deck, profile: RoadShape, rng: Rng) -> Iterator[Patch]:
@@ -233,7 +236,7 @@ def _guard_rail(deck: Deck, profile: RoadShape, side: int) -> Iterator[Patch]:
     )
     yield surface(points, np.zeros((*points.shape[:2], 2)), "steel", deck.slots["steel"])
     for station in np.arange(1.0, profile.length_m, 4.0):
-        x, y, heading = deck.line.poses(np.array([station]))[0]
+        heading = deck.line.poses(np.array([station]))[0, 2]
         post = block((-0.03, -0.05, base - 0.1), (0.03, 0.05, base + 0.74), 0.0, 0)
         foot = deck.line.points(np.array([station]), np.array([t + side * 0.06]))[0]
         yield (
@@ -247,7 +250,7 @@ def _hulls(deck: Deck, profile: RoadShape) -> list[Array]:
     """Slabs of at most 20 m under every strip: what wheels and feet stand on."""
     stations = np.linspace(0.0, profile.length_m, max(2, int(np.ceil(profile.length_m / 20.0)) + 1))
     hulls = []
-    for s0, s1 in zip(stations[:-1], stations[1:], strict=True):
+    for s0, s1 in pairwise(stations):
         for side in (1, -1):
             row = [strip for strip in strips(profile, side) if strip.kind != "kerb"]
             for strip in row:

@@ -21,7 +21,6 @@ from generator.assets.procedural.noise import (
 from generator.assets.procedural.textures.images import color, drawn_color, mixed, texture
 from generator.core.geometry import Float32, TextureData
 
-
 GROUND_PX = 1024
 _N = GROUND_PX
 
@@ -34,8 +33,8 @@ def asphalt(seed: int, wear: float = 0.3) -> TextureData:
         wear: 0 fresh, dark and even; 1 grey, stony and stained.
     """
     rng = rng_of("asphalt", seed)
-    # Mean albedo 0.06 to 0.12 (linear) is 0.27 to 0.38 in sRGB.
-    level = 0.285 + 0.085 * wear + between(-0.015, 0.015, rng)
+    # Mean albedo 0.06 to 0.12 (linear) is 0.27 to 0.38 in sRGB; worn roads reach 0.15.
+    level = 0.315 + 0.09 * wear + between(-0.015, 0.015, rng)
     warm = np.array([1.0 + 0.012 * wear, 1.0, 0.985 - 0.01 * wear], dtype=np.float32)
     stones = worley((340, 340), rng, size_px=_N)
     tone = stones.of_each(uniform(stones.count, rng) - 0.5)

@@ -1,0 +1,54 @@
+"""A zebra crossing laid over a road."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.mesh import in_place
+from generator.assets.roads.deck import PAINT_LIFT_M
+from generator.assets.roads.markings import ZEBRA_BAR_M
+from generator.assets.roads.materials import street_materials
+from generator.assets.roads.road import deck_of
+from generator.roads.profile import RoadShape
+
+
+def crosswalk(
+    *,
+    seed: int = 0,
+    wear: float = 0.3,
+    station_m: float = 20.0,
+    width_m: float = 4.0,
+    **shape: Any,
+) -> Solid:
+    """Bars across a road, in the road's frame, over asphalt that hides its other lines.
+
+    Args:
+        seed: Of textures; the road's own.
+        wear: 0 freshly painted to 1 worn out; the road's own.
+        station_m: Its middle, along the road.
+        width_m: Along the road, the length of its bars.
+        shape: Fields of ``RoadShape``.
+    """
+    profile = RoadShape(**shape)
+    deck = deck_of(profile, seed, wear, "paving", "grass")
+    low, high = -profile.carriageway_m(-1), profile.carriageway_m(1)
+    span = (station_m - 0.5 * width_m, station_m + 0.5 * width_m)
+    columns = deck.t_m[(deck.t_m > low + 0.4) & (deck.t_m < high - 0.4)]
+    inner = (low + 0.36, *(float(t) for t in columns), high - 0.36)
+    patches = [deck.ribbon(span, inner, "asphalt", PAINT_LIFT_M + 0.001)]
+    count = int((high - low - 1.5 * ZEBRA_BAR_M) // (2.0 * ZEBRA_BAR_M)) + 1
+    first = 0.5 * (low + high) - (count - 0.5) * ZEBRA_BAR_M
+    for k in range(count):
+        t0 = first + 2.0 * k * ZEBRA_BAR_M
+        t1 = t0 + ZEBRA_BAR_M
+        between = deck.t_m[(deck.t_m > t0 + 1e-4) & (deck.t_m < t1 - 1e-4)]
+        bar = (t0, *(float(t) for t in between), t1)
+        patches.append(deck.ribbon(span, bar, "marking", PAINT_LIFT_M + 0.003))
+    s, t = np.meshgrid(span, [low, high], indexing="ij")
+    top = deck.at(s, t).reshape(-1, 3)
+    hull = np.concatenate([top, top - np.array([0.0, 0.0, 0.02])])
+    materials = tuple(street_materials(seed, wear, "paving", "grass").values())
+    return in_place(patches, materials, [hull])

@@ -1,0 +1,51 @@
+"""The land around: a wide plane with low relief, finer in its middle than at its edges."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import rng_of
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.mesh import in_place
+from generator.assets.roads.deck import surface
+from generator.assets.roads.materials import GROUNDS, ground_material
+from generator.core.errors import AssetError, did_you_mean
+
+_CELLS = 56
+
+
+def ground(
+    *,
+    seed: int = 0,
+    size_m: tuple[float, float] = (800.0, 800.0),
+    cover: str = "grass",
+    relief_m: float = 0.04,
+) -> Solid:
+    """A plane around the origin whose highest points are at z = 0.
+
+    Args:
+        seed: Of relief and texture.
+        size_m: Extent along X and Y.
+        cover: A word of ``GROUNDS``.
+        relief_m: How deep hollows are.
+
+    Raises:
+        AssetError: the cover is unknown.
+    """
+    if cover not in GROUNDS:
+        raise AssetError(
+            f"ground: cover={cover} is unknown; expected one of {', '.join(GROUNDS)}"
+            f"{did_you_mean(cover, GROUNDS)}"
+        )
+    even = np.linspace(-1.0, 1.0, _CELLS + 1)
+    graded = even * (0.25 + 0.75 * even * even)
+    x, y = np.meshgrid(0.5 * size_m[0] * graded, 0.5 * size_m[1] * graded, indexing="ij")
+    drawn = rng_of("ground", seed).random((_CELLS + 1, _CELLS + 1))
+    soft = 0.25 * sum(np.roll(drawn, shift, axis) for axis in (0, 1) for shift in (0, 1))
+    z = -relief_m * (1.0 - np.clip(soft, 0.0, 1.0))
+    plan = np.stack([x, y], axis=2)
+    patch = surface(np.stack([x, y, z], axis=2), plan, "ground", 0)
+    low, high = (-0.5 * size_m[0], -0.5 * size_m[1]), (0.5 * size_m[0], 0.5 * size_m[1])
+    slab = hulls.box((*low, -relief_m - 0.5), (*high, 0.0))
+    return in_place([patch], (ground_material(cover, seed),), [slab])

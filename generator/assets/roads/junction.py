@@ -1,0 +1,204 @@
+"""The surface of a junction: carriageway, kerbs and sidewalks around corners, stop lines, zebras."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.mesh import Array, Patch, in_place
+from generator.assets.roads.deck import PAINT_LIFT_M, surface
+from generator.assets.roads.markings import NARROW_M, ZEBRA_BAR_M
+from generator.assets.roads.materials import SCALES_M, street_materials
+from generator.roads.junction import (
+    CROSSWALK_M,
+    STOP_LINE_M,
+    Fan,
+    JunctionShape,
+    arm_points,
+    corner,
+    fan_of,
+)
+from generator.roads.profile import KERB_WIDTH_M
+
+_APRON_M, _APRON_Z_M = 6.0, -0.1
+_CELL_M = 0.6
+"""Markings are cut this small, so that they follow the surface."""
+
+
+def junction(
+    *,
+    seed: int = 0,
+    wear: float = 0.3,
+    paving: str = "paving",
+    ground: str = "grass",
+    crossings: str = "zebra",
+    **shape: Any,
+) -> Solid:
+    """A junction about the origin; slots are those of ``street_materials``.
+
+    Args:
+        seed: Of textures.
+        wear: 0 freshly laid to 1 worn out.
+        paving: What sidewalks are covered with, a word of ``GROUNDS``.
+        ground: What the land beside is covered with, a word of ``GROUNDS``.
+        crossings: What crosswalks look like: ``zebra``, ``lines`` or ``none``.
+        shape: Fields of ``JunctionShape``.
+    """
+    profile = JunctionShape(**shape)
+    materials = street_materials(seed, wear, paving, ground)
+    slots = {name: k for k, name in enumerate(materials)}
+    fan = fan_of(profile)
+    patches = [_carriageway(fan, slots["asphalt"])]
+    for number in range(len(profile.arms_rad())):
+        if profile.sidewalk_m > 0.0:
+            patches += _corner(profile, number, slots)
+        patches.append(_land(profile, number, slots["ground"]))
+        patches += _markings(profile, fan, number, crossings, slots["marking"])
+    return in_place(patches, tuple(materials.values()), _hulls(profile, fan))
+
+
+def _carriageway(fan: Fan, slot: int) -> Patch:
+    return _fan_patch(np.array([0.0, 0.0, fan.center_z_m]), fan.outline_m, "asphalt", slot)
+
+
+def _fan_patch(center: Array, line: Array, name: str, slot: int, closed: bool = True) -> Patch:
+    after = np.roll(line, -1, axis=0)
+    corners = np.stack([np.broadcast_to(center, line.shape), line, after], axis=1)
+    corners = corners if closed else corners[:-1]
+    return Patch(
+        corners, corners[..., :2] / SCALES_M[name], np.full(len(corners), slot, dtype=np.int64)
+    )
+
+
+def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterator[Patch]:
+    """Kerb and sidewalk from one arm's end to the next one's, and what closes them at both."""
+    top, b = shape.kerb_m, 0.02
+    yield _band(
+        shape, number, ((0.0, 0.0), (b, top - 0.015), (b + 0.015, top), (KERB_WIDTH_M, top)),
+        "kerb", slots["kerb"],
+    )  # fmt: skip
+    yield _band(
+        shape, number, ((KERB_WIDTH_M, top), (shape.border_m, shape.edge_z_m)),
+        "pavement", slots["pavement"],
+    )  # fmt: skip
+    for end in (0, -1):
+        inner, outer = corner(shape, number, 0.02)[end], corner(shape, number, shape.border_m)[end]
+        points = np.array(
+            [
+                [[*inner, -0.2], [*outer, -0.2]],
+                [[*inner, top], [*outer, shape.edge_z_m]],
+            ]
+        )
+        plan = points[..., [0, 2]] + points[..., [1, 1]] * np.array([1.0, 0.0])
+        yield surface(points, plan, "kerb", slots["kerb"])
+
+
+def _band(
+    shape: JunctionShape,
+    number: int,
+    profile: Sequence[tuple[float, float]],
+    name: str,
+    slot: int,
+) -> Patch:
+    """A profile of (distance behind the kerb's face, height) drawn around a corner."""
+    lines = [
+        np.column_stack([line, np.full(len(line), z)])
+        for line, z in ((corner(shape, number, offset), z) for offset, z in profile)
+    ]
+    # From the outside in: with the street on the left, that is from right to left.
+    points = np.stack(lines[::-1], axis=1)
+    middle = points[:, len(profile) // 2, :2]
+    steps = np.sqrt((np.diff(middle, axis=0) ** 2).sum(axis=1))
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    flat = np.array(profile[::-1])
+    across = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(flat, axis=0) ** 2).sum(axis=1)))])
+    plan = np.stack(np.meshgrid(along, across, indexing="ij"), axis=2)
+    return surface(points, plan, name, slot)
+
+
+def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
+    """What lies between two arms beyond the sidewalk: out to where their land begins."""
+    offset = shape.border_m if shape.sidewalk_m > 0.0 else 0.0
+    z = shape.edge_z_m if shape.sidewalk_m > 0.0 else 0.0
+    line = corner(shape, number, offset)
+    edge = np.column_stack([line, np.full(len(line), z)])
+    gap = shape.gaps_rad()[number]
+    if abs(gap - math.pi) <= 1e-3:
+        far = corner(shape, number, offset + _APRON_M)
+        outer = np.column_stack([far, np.full(len(far), _APRON_Z_M)])
+        return surface(
+            np.stack([outer, edge], axis=1), np.stack([far, line], axis=1), "ground", slot
+        )
+    away = shape.half_m + offset
+    meeting = away / math.tan(0.5 * gap)
+    cross = arm_points(shape, number, np.array(meeting), np.array(away))
+    tip = np.array([*(line[0] + line[-1] - cross), _APRON_Z_M])
+    return _fan_patch(tip, edge, "ground", slot, closed=False)
+
+
+def _markings(
+    shape: JunctionShape, fan: Fan, arm: int, crossings: str, slot: int
+) -> Iterator[Patch]:
+    start, half = shape.curve_end_m(), shape.half_m
+    side = 1.0 if shape.traffic == "right" else -1.0
+    stop = (start + STOP_LINE_M[0], start + STOP_LINE_M[1])
+
+    def painted(r: tuple[float, float], t: tuple[float, float]) -> Patch:
+        return _draped(shape, fan, arm, r, t, slot)
+
+    inner, outer = sorted((side * 0.06, side * (half - 0.15)))
+    yield painted(stop, (inner, outer))
+    for k in range(1 - shape.lanes, shape.lanes):
+        middle = k * shape.lane_width_m
+        yield painted(
+            (stop[0], shape.reach_m()), (middle - 0.5 * NARROW_M, middle + 0.5 * NARROW_M)
+        )
+    walk = (start + CROSSWALK_M[0], start + CROSSWALK_M[1])
+    if crossings == "zebra":
+        count = int((2.0 * half - ZEBRA_BAR_M) // (2.0 * ZEBRA_BAR_M)) + 1
+        first = -(count - 0.5) * ZEBRA_BAR_M
+        for k in range(count):
+            t = first + 2.0 * k * ZEBRA_BAR_M
+            yield painted(walk, (t, t + ZEBRA_BAR_M))
+    elif crossings == "lines":
+        # A signalled crossing: broken lines, dashes of 0.5 m and gaps of 0.2 m (RMS-1).
+        for edge in walk:
+            for t in np.arange(-half + 0.2, half - 0.5, 0.7):
+                yield painted((edge, edge + NARROW_M), (float(t), float(t) + 0.5))
+
+
+def _draped(
+    shape: JunctionShape,
+    fan: Fan,
+    arm: int,
+    r_m: tuple[float, float],
+    t_m: tuple[float, float],
+    slot: int,
+) -> Patch:
+    """A rectangle of an arm's frame laid on the carriageway."""
+    r, t = (
+        np.linspace(low, high, max(2, math.ceil((high - low) / _CELL_M) + 1))
+        for low, high in (r_m, t_m)
+    )
+    grid = np.stack(np.meshgrid(r, t, indexing="ij"), axis=2)
+    xy = arm_points(shape, arm, grid[..., 0], grid[..., 1])
+    z = fan.height_m(xy.reshape(-1, 2)).reshape(xy.shape[:2]) + PAINT_LIFT_M
+    return surface(np.concatenate([xy, z[..., None]], axis=2), grid, "marking", slot)
+
+
+def _hulls(shape: JunctionShape, fan: Fan) -> list[Array]:
+    """The carriageway's slices, and the sidewalk in pieces."""
+    center = np.array([0.0, 0.0, fan.center_z_m])
+    line = np.concatenate([fan.outline_m, fan.outline_m[:1]])
+    tops = [np.stack([center, a, b]) for a, b in pairwise(line[::4])]
+    for number in range(len(shape.arms_rad()) if shape.sidewalk_m > 0.0 else 0):
+        near, far = corner(shape, number, 0.0), corner(shape, number, shape.border_m)
+        for k in range(len(near) - 1):
+            quad = np.stack([near[k], near[k + 1], far[k], far[k + 1]])
+            tops.append(np.column_stack([quad, [shape.kerb_m] * 2 + [shape.edge_z_m] * 2]))
+    return [np.concatenate([top, top - np.array([0.0, 0.0, 0.3])]) for top in tops]

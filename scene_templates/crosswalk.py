@@ -1,0 +1,54 @@
+"""Where people cross a road."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Lane, Scene
+from generator.roads.lanes import world_points
+from generator.roads.profile import height_m
+from scene_templates.element import Element, parametric
+from scene_templates.road import road_of, with_street
+
+
+class Crosswalk(Element):
+    """A zebra crossing on a road.
+
+    Attributes:
+        road: Name of the road.
+        station_m: Where it is, along the road.
+        width_m: Its width: the length of its bars.
+    """
+
+    type: Literal["crosswalk"] = "crosswalk"
+    road: str
+    station_m: float = Field(40.0, ge=0)
+    width_m: float = Field(4.0, ge=1.5, le=20)
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """Paint on the road, and the lane of those who cross."""
+        where = f"elements.{self.name}"
+        shape, parameters, T_world_road = road_of(scene, self.road, f"{where}.road")
+        if not 0.5 * self.width_m <= self.station_m <= shape.length_m - 0.5 * self.width_m:
+            raise ConfigError(
+                f"{where}.station_m: {self.station_m:g} is not on '{self.road}', which is "
+                f"{shape.length_m:g} m long"
+            )
+        looks = {name: parameters[name] for name in ("seed", "wear") if name in parameters}
+        asset = parametric(
+            "crosswalk",
+            **shape.changed(),
+            **looks,
+            station_m=self.station_m,
+            width_m=self.width_m,
+        )
+        t = np.linspace(-shape.carriageway_m(-1), shape.carriageway_m(1), 7)
+        flat = shape.line().points(np.full(7, self.station_m), t)
+        center = world_points(np.column_stack([flat, height_m(shape, t)]), T_world_road)
+        lane = Lane(f"{self.name}/crosswalk", "crosswalk", center, self.width_m, road=self.road)
+        return with_street(scene, assets, self.name, asset, T_world_road, (lane,))

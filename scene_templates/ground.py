@@ -1,0 +1,47 @@
+"""The land around a street."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from generator.core.se3 import SE3
+from scene_templates.element import PlacedElement, parametric, with_static
+from scene_templates.road import Ground
+
+
+class GroundElement(PlacedElement):
+    """A wide plane, a little lower than the gutters of roads, without a label.
+
+    Attributes:
+        size_m: Extent along X and Y.
+        cover: What grows or lies on it.
+        relief_m: How deep its hollows are.
+        level_m: Height of its highest points; the land beside roads comes down to -0.1.
+        seed: Of relief and texture.
+    """
+
+    type: Literal["ground"] = "ground"
+    size_m: tuple[float, float] = (800.0, 800.0)
+    cover: Ground = "grass"
+    relief_m: float = Field(0.04, ge=0, le=1)
+    level_m: float = -0.05
+    seed: int = Field(0, ge=0, le=1_000_000)
+    name: str = Field("ground", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """A static body; background has no instance."""
+        asset = parametric(
+            "ground",
+            size_m=self.size_m,
+            cover=self.cover,
+            relief_m=self.relief_m,
+            seed=self.seed,
+        )
+        pose = self.pose(scene) @ SE3((0.0, 0.0, self.level_m))
+        return with_static(
+            scene, assets, name=self.name, asset=asset, T_world_body=pose, unlabelled=True
+        )

@@ -1,0 +1,102 @@
+"""Where roads meet."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal
+
+from pydantic import Field
+
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from generator.core.se3 import SE3
+from generator.roads.junction import ABSENT, JunctionShape, junction_lanes
+from scene_templates.element import Element, parametric
+from scene_templates.road import RoadLooks, port, with_street
+
+
+class Junction(RoadLooks, Element):
+    """A level junction with rounded corners; roads go on from its arms by ``after: <name>/<arm>``.
+
+    Attributes:
+        after: Name of the road whose end meets the arm at 180 degrees; empty = it lies at ``at_m``.
+        at_m: Its centre; a third number lifts it.
+        yaw_deg: Turn about the vertical.
+        arms_deg: Directions of its three or four arms, rising from 0; arm 0 is the first.
+        lanes: Per arm and direction.
+        lane_width_m: Of each lane.
+        sidewalk_m: Width of the sidewalks; 0 = none.
+        beside_m: Width between kerb and sidewalk, to match roads with verges or parked cars.
+        kerb_m: Height of the kerbs.
+        radius_m: Of the kerb at the corners.
+        crown: Slope of the arms from their middle to their gutters.
+        traffic: Side that is driven on.
+        crossings: What crosswalks look like; lines = as at traffic lights.
+        speed_m_s: Usual speed of those that cross it.
+    """
+
+    type: Literal["junction"] = "junction"
+    after: str = ""
+    at_m: tuple[float, float] | tuple[float, float, float] = (0.0, 0.0)
+    yaw_deg: float = 0.0
+    arms_deg: tuple[float, float, float] | tuple[float, float, float, float] = (
+        0.0, 90.0, 180.0, 270.0,
+    )  # fmt: skip
+    lanes: int = Field(1, ge=1, le=4)
+    lane_width_m: float = Field(3.5, ge=2, le=6)
+    sidewalk_m: float = Field(2.5, ge=0, le=20)
+    beside_m: float = Field(0.0, ge=0, le=10)
+    kerb_m: float = Field(0.12, ge=0, le=0.3)
+    radius_m: float = Field(7.0, ge=1, le=50)
+    crown: float = Field(0.02, ge=0, le=0.08)
+    traffic: Literal["right", "left"] = "right"
+    crossings: Literal["zebra", "lines", "none"] = "zebra"
+    speed_m_s: float = Field(8.0, ge=0, le=60)
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """The junction is background; its paths join the roads that it meets."""
+        shape = self.shape()
+        pose = self._pose(scene, shape)
+        given: dict[str, Any] = {} if self.crossings == "zebra" else {"crossings": self.crossings}
+        asset = parametric("junction", **shape.changed(), **given, **self.looks())
+        lanes = junction_lanes(shape, self.name, pose, self.speed_m_s, self.crossings != "none")
+        return with_street(scene, assets, self.name, asset, pose, lanes)
+
+    def shape(self) -> JunctionShape:
+        """Its plan. Raises ConfigError if the arms or the corners make none."""
+        where = f"elements.{self.name}"
+        arms = self.arms_deg
+        first, second, third = arms[:3]
+        fourth = arms[3] if len(arms) == 4 else ABSENT
+        shape = JunctionShape(
+            (first, second, third, fourth), self.lanes, self.lane_width_m, self.kerb_m,
+            self.sidewalk_m, self.beside_m, self.radius_m, self.crown, self.traffic,
+        )  # fmt: skip
+        rising = all(a < b for a, b in zip(arms, arms[1:], strict=False))
+        gaps = shape.gaps_rad()
+        if not rising or arms[0] < 0.0 or arms[-1] >= 360.0:
+            raise ConfigError(f"{where}.arms_deg: expected directions rising from 0 to below 360")
+        if min(gaps) < math.radians(40.0) or max(gaps) > math.pi + 1e-3:
+            raise ConfigError(
+                f"{where}.arms_deg: neighbouring arms must be 40 to 180 degrees apart; "
+                f"found {math.degrees(min(gaps)):.0f} to {math.degrees(max(gaps)):.0f}"
+            )
+        if self.sidewalk_m > 0.0 and self.radius_m < shape.border_m + 0.5:
+            raise ConfigError(
+                f"{where}.radius_m: {self.radius_m:g} m is too tight for the sidewalk; "
+                f"expected at least {shape.border_m + 0.5:.2f}"
+            )
+        return shape
+
+    def _pose(self, scene: Scene, shape: JunctionShape) -> SE3:
+        if not self.after:
+            x, y, *lift = self.at_m
+            return SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+        if 180.0 not in self.arms_deg:
+            raise ConfigError(
+                f"elements.{self.name}.after: no arm points back to it; expected 180 in arms_deg"
+            )
+        return port(scene, self.after, f"elements.{self.name}.after") @ SE3(
+            (shape.reach_m(), 0.0, 0.0)
+        )

@@ -1,0 +1,39 @@
+"""A car park."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Scene
+from generator.roads.parking import ParkingShape, parking_lanes
+from scene_templates.element import PlacedElement, parametric
+from scene_templates.road import RoadLooks, with_street
+
+
+class ParkingArea(RoadLooks, PlacedElement):
+    """Aisles along X with bays at right angles on both sides, around ``at_m``.
+
+    Attributes:
+        bays: Per row.
+        aisles: Each with two rows.
+        bay_m: Width and length of a bay.
+        aisle_m: Width of an aisle.
+    """
+
+    type: Literal["parking_area"] = "parking_area"
+    bays: int = Field(10, ge=1, le=60)
+    aisles: int = Field(1, ge=1, le=10)
+    bay_m: tuple[float, float] = (2.5, 5.0)
+    aisle_m: float = Field(6.0, ge=3, le=12)
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """The surface is background; every bay is a lane."""
+        shape = ParkingShape(self.bays, self.aisles, self.bay_m, self.aisle_m)
+        pose = self.pose(scene)
+        asset = parametric("parking_area", **shape.changed(), **self.looks())
+        return with_street(
+            scene, assets, self.name, asset, pose, parking_lanes(shape, self.name, pose)
+        )
