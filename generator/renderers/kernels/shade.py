@@ -211,22 +211,27 @@ def look_around(
     d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
     p = view.eye_m + d * images.z_m[i]
     cell = cell_at(view, lattice, x, y)
-    found = float(0.0)
-    sky = float(0.0)
     for j in range(world.lamps.shape[0]):
         lit[j, k] = 0.0
     # Light and shade change less than looks do: the points need not share the material.
     column = x / lattice.stride
     row = y / lattice.stride
-    for v in range(wp.max(row - 1, 0), wp.min(row + 3, lattice.height)):
-        for u in range(wp.max(column - 1, 0), wp.min(column + 3, lattice.width)):
-            q = v * lattice.width + u
-            w = nearness(float(column) + cell.right - float(u), float(row) + cell.down - float(v))
-            if related(view, images, lattice, i, p, q):
-                found += w
-                sky += lattice_sky[0, q] * w
-                for j in range(world.lamps.shape[0]):
-                    lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
+    found = float(0.0)
+    sky = float(0.0)
+    for reach in range(2):
+        # The cell's corners, and those around them only where none of the four will do.
+        if found == 0.0:
+            for v in range(wp.max(row - reach, 0), wp.min(row + 2 + reach, lattice.height)):
+                for u in range(wp.max(column - reach, 0), wp.min(column + 2 + reach, lattice.width)):
+                    q = v * lattice.width + u
+                    if related(view, images, lattice, i, p, q):
+                        right = float(column - u) + cell.right
+                        down = float(row - v) + cell.down
+                        w = nearness(right, down)
+                        found += w
+                        sky += lattice_sky[0, q] * w
+                        for j in range(world.lamps.shape[0]):
+                            lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
     if found > 0.0:
         open_sky[0, k] = sky / found
         for j in range(world.lamps.shape[0]):
