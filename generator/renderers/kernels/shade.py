@@ -22,6 +22,9 @@ from generator.renderers.kernels.sky import sky_irradiance, sky_reflection
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Lamps of a smaller radius over distance, such as the sun, have penumbrae of no importance to
+# surfaces that are too small for the lattice.
+SMALL_SPREAD = wp.constant(0.02)
 # Highlights of smoother surfaces are too small to be gathered.
 GATHERED_ROUGHNESS = wp.constant(0.25)
 
@@ -241,7 +244,27 @@ def look_around(
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
         for j in range(world.lamps.shape[0]):
             lit[j, k] = seen_part(world, world.lamps[j], origin, n, parts)
-        open_sky[0, k] = seen_sky(world, origin, n, disc, radius_m)
+        sky, found = sky_of_body(lattice, lattice_sky, cell.first, images.hits[i][0])
+        if found == 0.0:
+            sky = seen_sky(world, origin, n, disc, radius_m)
+            found = 1.0
+        open_sky[0, k] = sky / found
+
+
+@wp.func
+def sky_of_body(lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int):
+    """Sum and number of the sky's visible parts at those corners of a cell that lie on a body.
+
+    A leaf or a spoke is as open to the sky as those beside it, whichever way they are turned.
+    """
+    total = float(0.0)
+    found = float(0.0)
+    for k in range(4):
+        corner = q + (k & 1) + wp.where(k >= 2, lattice.width, 0)
+        if lattice.body[corner] == body:
+            total += lattice_sky[0, corner]
+            found += 1.0
+    return total, found
 
 
 @wp.func
@@ -267,14 +290,17 @@ def related(view: View, images: Images, lattice: Lattice, i: int, p: wp.vec3, q:
 def seen_part(
     world: World, lamp: Lamp, origin: wp.vec3, n: wp.vec3, parts: wp.array(dtype=wp.vec2)
 ):
-    """How much of a lamp a point sees."""
+    """How much of a lamp a point sees; two rays that agree speak for all, one for a small lamp."""
     beam = beam_from(lamp, origin)
     seen = float(0.0)
+    cast = int(0)
     if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
-        for k in range(parts.shape[0]):
-            if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, parts[k]))):
-                seen += 1.0
-    return seen / float(parts.shape[0])
+        for k in range(wp.where(beam.spread < SMALL_SPREAD, 1, parts.shape[0])):
+            if k < 2 or (seen > 0.0 and seen < float(cast)):
+                cast += 1
+                if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, parts[k]))):
+                    seen += 1.0
+    return seen / wp.max(float(cast), 1.0)
 
 
 @wp.func
