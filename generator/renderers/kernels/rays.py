@@ -103,8 +103,9 @@ def blocked(world: World, path: Path):
     candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
     b = int(0)
     while wp.bvh_query_next(candidates, b, 1.0):
-        if not hit:
-            hit = blocked_by(world, b, path)
+        hit = blocked_by(world, b, path)
+        if hit:
+            break
     return hit
 
 

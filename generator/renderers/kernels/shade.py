@@ -23,6 +23,9 @@ from generator.renderers.kernels.sky import sky_irradiance, sky_reflection
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Lamps of a smaller radius over distance, such as the sun, have penumbrae of no importance to
+# surfaces that are too small for the lattice.
+SMALL_SPREAD = wp.constant(0.02)
 # Highlights of smoother surfaces are too small to be gathered.
 GATHERED_ROUGHNESS = wp.constant(0.25)
 
@@ -213,22 +216,27 @@ def look_around(
     d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
     p = view.eye_m + d * images.z_m[i]
     cell = cell_at(view, lattice, x, y)
-    found = float(0.0)
-    sky = float(0.0)
     for j in range(world.lamps.shape[0]):
         lit[j, k] = 0.0
     # Light and shade change less than looks do: the points need not share the material.
     column = x / lattice.stride
     row = y / lattice.stride
-    for v in range(wp.max(row - 1, 0), wp.min(row + 3, lattice.height)):
-        for u in range(wp.max(column - 1, 0), wp.min(column + 3, lattice.width)):
-            q = v * lattice.width + u
-            w = nearness(float(column) + cell.right - float(u), float(row) + cell.down - float(v))
-            if related(view, images, lattice, i, p, q):
-                found += w
-                sky += lattice_sky[0, q] * w
-                for j in range(world.lamps.shape[0]):
-                    lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
+    found = float(0.0)
+    sky = float(0.0)
+    for reach in range(2):
+        # The cell's corners, and those around them only where none of the four will do.
+        if found == 0.0:
+            for v in range(wp.max(row - reach, 0), wp.min(row + 2 + reach, lattice.height)):
+                for u in range(wp.max(column - reach, 0), wp.min(column + 2 + reach, lattice.width)):
+                    q = v * lattice.width + u
+                    if related(view, images, lattice, i, p, q):
+                        right = float(column - u) + cell.right
+                        down = float(row - v) + cell.down
+                        w = nearness(right, down)
+                        found += w
+                        sky += lattice_sky[0, q] * w
+                        for j in range(world.lamps.shape[0]):
+                            lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
     if found > 0.0:
         open_sky[0, k] = sky / found
         for j in range(world.lamps.shape[0]):
@@ -238,7 +246,27 @@ def look_around(
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
         for j in range(world.lamps.shape[0]):
             lit[j, k] = seen_part(world, world.lamps[j], origin, n, parts)
-        open_sky[0, k] = seen_sky(world, origin, n, disc, radius_m)
+        sky, found = sky_of_body(lattice, lattice_sky, cell.first, images.hits[i][0])
+        if found == 0.0:
+            sky = seen_sky(world, origin, n, disc, radius_m)
+            found = 1.0
+        open_sky[0, k] = sky / found
+
+
+@wp.func
+def sky_of_body(lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int):
+    """Sum and number of the sky's visible parts at those corners of a cell that lie on a body.
+
+    A leaf or a spoke is as open to the sky as those beside it, whichever way they are turned.
+    """
+    total = float(0.0)
+    found = float(0.0)
+    for k in range(4):
+        corner = q + (k & 1) + wp.where(k >= 2, lattice.width, 0)
+        if lattice.body[corner] == body:
+            total += lattice_sky[0, corner]
+            found += 1.0
+    return total, found
 
 
 @wp.func
@@ -264,14 +292,17 @@ def related(view: View, images: Images, lattice: Lattice, i: int, p: wp.vec3, q:
 def seen_part(
     world: World, lamp: Lamp, origin: wp.vec3, n: wp.vec3, parts: wp.array(dtype=wp.vec2)
 ):
-    """How much of a lamp a point sees."""
+    """How much of a lamp a point sees; two rays that agree speak for all, one for a small lamp."""
     beam = beam_from(lamp, origin)
     seen = float(0.0)
+    cast = int(0)
     if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
-        for k in range(parts.shape[0]):
-            if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, parts[k]))):
-                seen += 1.0
-    return seen / float(parts.shape[0])
+        for k in range(wp.where(beam.spread < SMALL_SPREAD, 1, parts.shape[0])):
+            if k < 2 or (seen > 0.0 and seen < float(cast)):
+                cast += 1
+                if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, parts[k]))):
+                    seen += 1.0
+    return seen / wp.max(float(cast), 1.0)
 
 
 @wp.func
