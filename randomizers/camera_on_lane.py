@@ -8,7 +8,15 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Bounds, Constant, Flag, Normal, Positive, Scalar
+from generator.config.distributions import (
+    Bounds,
+    Constant,
+    Flag,
+    NonNegative,
+    Normal,
+    Positive,
+    Scalar,
+)
 from generator.core.errors import ConfigError, LayoutRejected, Rejection
 from generator.core.interfaces import AssetIndex
 from generator.core.lanes import LaneLine
@@ -17,7 +25,9 @@ from generator.core.se3 import SE3, look_at
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
 from randomizers.clearance import is_clear
+from randomizers.daylight import is_dark
 from randomizers.footprints import Footprint, Ground, ground_of
+from randomizers.vehicle_lights import dipped_beam
 
 TRIES = 64
 
@@ -38,6 +48,8 @@ class CameraOnLane(RandomizerBase):
         free_m: Length and width of the ground around it on which nothing stands: the vehicle it
             rides on. The camera is at three tenths of the length from its front.
         clearance_m: It keeps this far from every body.
+        beam_cd: In the dark, the vehicle it rides on lights the road with two dipped beams of this
+            luminous intensity; 0 = it has none.
     """
 
     type: Literal["camera_on_lane"] = "camera_on_lane"
@@ -52,6 +64,7 @@ class CameraOnLane(RandomizerBase):
     ahead_m: float = Field(40.0, ge=0)
     free_m: tuple[float, float] = (4.6, 1.9)
     clearance_m: float = Field(0.3, ge=0)
+    beam_cd: NonNegative = Constant(0.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with all cameras at one place.
@@ -73,15 +86,16 @@ class CameraOnLane(RandomizerBase):
         for _ in range(TRIES):
             pose = self._drawn(lines, ground, scene, assets, rng)
             if pose is not None:
-                cameras = tuple(_moved(camera, pose) for camera in scene.cameras)
-                return replace(scene, cameras=cameras)
+                cameras = tuple(_moved(camera, pose[1]) for camera in scene.cameras)
+                lit = replace(scene, cameras=cameras)
+                return self._with_beams(lit, pose[0], self.beam_cd.draw(rng))
         remedy = f"other lanes, a smaller free_m, or less traffic (randomizers.{self.name})"
         raise LayoutRejected(Rejection("no free place for a camera on a lane", remedy))
 
     def _drawn(
         self, lines: list[LaneLine], ground: Ground, scene: Scene, assets: AssetIndex, rng: Rng
-    ) -> SE3 | None:
-        """``T_world_camera`` of one try; None where something stands."""
+    ) -> tuple[SE3, SE3] | None:
+        """``T_world_rig`` on the ground and ``T_world_camera``; None where something stands."""
         weights = [line.length_m for line in lines]
         line = lines[_weighted(weights, float(rng.uniform()))]
         turned = self.turned.draw(rng)
@@ -107,7 +121,18 @@ class CameraOnLane(RandomizerBase):
             return None
         ahead = (math.cos(pitch), 0.0, height_m + math.sin(pitch))
         target = (T_world_turned @ SE3(ahead)).translation_m
-        return look_at(eye, target, roll)
+        return T_world_rig, look_at(eye, target, roll)
+
+    def _with_beams(self, scene: Scene, T_world_rig: SE3, beam_cd: float) -> Scene:
+        """The scene with the vehicle's own headlights on, if it is dark."""
+        if beam_cd == 0.0 or not is_dark(scene):
+            return scene
+        ahead_m = 0.3 * self.free_m[0]
+        beams = tuple(
+            dipped_beam(f"{self.name}/{side}", T_world_rig @ SE3((ahead_m, y, 0.65)), beam_cd)
+            for side, y in (("left", 0.6), ("right", -0.6))
+        )
+        return replace(scene, lights=(*scene.lights, *beams))
 
 
 def _weighted(weights: list[float], draw: float) -> int:

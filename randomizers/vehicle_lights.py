@@ -20,8 +20,8 @@ _WHITE: Vec3 = (1.02, 1.0, 0.94)
 _RED: Vec3 = (4.2, 0.14, 0.06)
 _AMBER: Vec3 = (2.35, 0.66, 0.02)
 """Linear RGB of luminance 1."""
-_DOWN = 0.012
-"""Slope of a dipped beam: 1.2 % (UN R48)."""
+_DOWN = 0.132
+"""Slope of a beam's axis: a cone that ends just above the cut-off, 1.2 % down (UN R48)."""
 _CONE_RAD = 0.5
 _OUTSIDE_M = 0.06
 
@@ -104,30 +104,33 @@ def _lit(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
     return replace(body, materials=tuple(lit(m) for m in materials_of(body, assets)))
 
 
-def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Light]:
-    """One spot per headlight, just before its lens, slightly downwards."""
-    ahead = body.T_world_body.rotation()[:, 0]
-    direction = (float(ahead[0]), float(ahead[1]), float(ahead[2]) - _DOWN - 0.12)
+def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
+    """A spot at a lens, which faces +X, slightly downwards."""
+    ahead = T_world_lens.rotation()[:, 0]
+    direction = (float(ahead[0]), float(ahead[1]), float(ahead[2]) - _DOWN)
     length = sum(part * part for part in direction) ** 0.5
+    x, y, z = (round(part, 6) for part in T_world_lens.translation_m)
+    dx, dy, dz = (round(part / length, 6) for part in direction)
+    return Light(
+        name,
+        "spot",
+        position_m=(x, y, z),
+        direction=(dx, dy, dz),
+        color=_WHITE,
+        intensity_cd=round(beam_cd, 3),
+        radius_m=0.05,
+        cone_rad=_CONE_RAD,
+    )
+
+
+def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Light]:
+    """One spot per headlight, just before its lens."""
     lights = []
     for point in assets.keypoints(body.asset):
         if point.name.startswith("headlight"):
             x, y, z = (body.scale * part for part in point.position_m)
             place = body.T_world_body @ SE3((x + _OUTSIDE_M, y, z))
-            px, py, pz = (round(part, 6) for part in place.translation_m)
-            dx, dy, dz = (round(part / length, 6) for part in direction)
-            lights.append(
-                Light(
-                    f"{name}/{body.name}/{point.name}",
-                    "spot",
-                    position_m=(px, py, pz),
-                    direction=(dx, dy, dz),
-                    color=_WHITE,
-                    intensity_cd=round(beam_cd, 3),
-                    radius_m=0.05,
-                    cone_rad=_CONE_RAD,
-                )
-            )
+            lights.append(dipped_beam(f"{name}/{body.name}/{point.name}", place, beam_cd))
     return lights
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Literal
 
@@ -9,6 +10,7 @@ from pydantic import Field, model_validator
 
 from generator.config.strict import Strict
 from generator.core.errors import ConfigError
+from generator.core.geometry import Asset
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Body, Instance, ObjectGroup, Placement, Scene, Surface
 from generator.core.se3 import SE3, Vec3
@@ -30,12 +32,15 @@ class AssetChoice(Strict):
         any_of: Assets that carry at least one of these tags.
         ids: Assets by id; a family name stands for all of its variants.
         exclude: Tags or categories that are left out.
+        prefer: Tags, the most wanted first: of those that fit, only the ones with the first of
+            these tags that any of them has; category by category.
     """
 
     tags: tuple[str, ...] = ()
     any_of: tuple[str, ...] = ()
     ids: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
+    prefer: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _says_something(self) -> AssetChoice:
@@ -57,14 +62,28 @@ class AssetChoice(Strict):
             family = [a for a in assets.find(()) if a.asset_id.partition("?")[0] == asset_id]
             members = family or [assets.get(asset_id)]
             found |= {a.asset_id: a for a in members}
-        kept = sorted(
-            asset_id
-            for asset_id, asset in found.items()
+        fitting = [
+            asset
+            for asset in found.values()
             if not {asset.category, *asset.tags} & set(self.exclude)
-        )
+        ]
+        kept = sorted(asset.asset_id for asset in self._preferred(fitting))
         if not kept:
             raise ConfigError(f"{field}: no asset fits; expected other tags or ids")
         return tuple(kept)
+
+    def _preferred(self, fitting: list[Asset]) -> Iterator[Asset]:
+        by_category: dict[str, list[Asset]] = {}
+        for asset in fitting:
+            by_category.setdefault(asset.category, []).append(asset)
+        for same in by_category.values():
+            for tag in self.prefer:
+                chosen = [asset for asset in same if tag in asset.tags]
+                if chosen:
+                    yield from chosen
+                    break
+            else:
+                yield from same
 
 
 class Objects(Element):

@@ -11,6 +11,7 @@ from generator.assets.ids import AssetId, ParameterValue, shown
 from generator.assets.importer import Imported
 from generator.assets.packing import pack, pack_texture, unpack, unpack_texture
 from generator.assets.procedural.family import (
+    OURS,
     EnvironmentFamily,
     Facts,
     Family,
@@ -70,14 +71,15 @@ class Generated:
         """The asset of an id whose name is known. Raises AssetError on wrong parameters."""
         family = self._families[asset_id.name]
         facts = _facts(asset_id, family)
+        origin = family.origin if isinstance(family, Family) else OURS
         return Asset(
             asset_id=str(asset_id),
             kind=_kind(family),
             category=family.category if isinstance(family, Family) else family.name,
             tags=_tags(asset_id.name, family),
-            licence="Apache-2.0",
-            author="gen-data contributors",
-            source="gen-data (procedural)",
+            licence=origin.licence,
+            author=origin.author,
+            source=origin.source,
             sha256=self._key(asset_id, family),
             mass_kg=family.mass_kg if isinstance(family, Family) else 0.0,
             stackable=isinstance(family, Family) and family.stackable,

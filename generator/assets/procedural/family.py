@@ -26,6 +26,18 @@ class Solid:
 
 
 @dataclass(frozen=True, slots=True)
+class Origin:
+    """Where an asset comes from, and on which terms."""
+
+    licence: str
+    author: str
+    source: str
+
+
+OURS = Origin("Apache-2.0", "gen-data contributors", "gen-data (procedural)")
+
+
+@dataclass(frozen=True, slots=True)
 class Facts:
     """What is known of an object without building it.
 
@@ -55,6 +67,7 @@ class Family:
         build: Pure function of its arguments.
         facts: Pure and quick function of the same arguments; None = nothing more is known.
         stored: Whether results are kept on disk; not if making one is quicker than reading it.
+        origin: Where it comes from, if it is not all ours.
     """
 
     name: str
@@ -68,6 +81,7 @@ class Family:
     build: Callable[..., Solid]
     facts: Callable[..., Facts] | None = None
     stored: bool = True
+    origin: Origin = OURS
 
 
 @dataclass(frozen=True)
