@@ -27,7 +27,8 @@ CLOTHOID_TOWN = """<?xml version="1.0"?>
   <road id="3" length="20" junction="9">
     <link><predecessor elementType="road" elementId="2" contactPoint="end"/></link>
     <planView>
-      <geometry s="0" x="{x:.9f}" y="{y:.9f}" hdg="0.4" length="20"><arc curvature="0.02"/></geometry>
+      <geometry s="0" x="{x:.9f}" y="{y:.9f}" hdg="0.4" length="20">
+        <arc curvature="0.02"/></geometry>
     </planView>
     <elevationProfile><elevation s="0" a="6" b="0" c="0" d="0"/></elevationProfile>
     {lanes}

@@ -150,7 +150,9 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
         flat = arm_points(shape, arm, np.full(len(out), shape.reach_m()), out)
         fall = np.array(APRON_DROPS[1:]) * (z + APRON_FALL_M)
         ends.append(np.column_stack([flat, z - fall])[:: -1 if end == 0 else 1])
-    return _fan_patch(tip, np.concatenate([ends[0], edge, ends[1]]), "ground", slot, closed=False)
+    line = np.concatenate([ends[0], edge, ends[1]])
+    # Seen from the tip the line runs clockwise.
+    return _fan_patch(tip, line, "ground", slot, closed=False).flipped()
 
 
 def _markings(
