@@ -18,6 +18,7 @@ TABLE = PluginTable(
         "parking_area": "scene_templates.parking_area:ParkingArea",
         "prop": "scene_templates.prop:Prop",
         "road": "scene_templates.road:Road",
+        "road_network": "scene_templates.road_network:RoadNetwork",
         "robot": "scene_templates.robot:Robot",
         "room": "scene_templates.room:Room",
         "shelf": "scene_templates.shelf:Shelf",

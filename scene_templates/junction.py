@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any, Literal
 
 from pydantic import Field
@@ -73,7 +74,7 @@ class Junction(RoadLooks, Element):
             (first, second, third, fourth), self.lanes, self.lane_width_m, self.kerb_m,
             self.sidewalk_m, self.beside_m, self.radius_m, self.crown, self.traffic,
         )  # fmt: skip
-        rising = all(a < b for a, b in zip(arms, arms[1:], strict=False))
+        rising = all(a < b for a, b in pairwise(arms))
         gaps = shape.gaps_rad()
         if not rising or arms[0] < 0.0 or arms[-1] >= 360.0:
             raise ConfigError(f"{where}.arms_deg: expected directions rising from 0 to below 360")

@@ -22,6 +22,8 @@ from generator.config.validation import validate
 from generator.core.errors import AssetError
 
 INDEX_NAME = "assets.yaml"
+ROAD_SUFFIX = ".xodr"
+"""Road networks: objects whose mesh is the surface of the roads."""
 _MAX_FILES = 20_000
 
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -241,7 +243,7 @@ def _found(root: Path) -> Index:
     """An index of every mesh and URDF in a folder; meshes that a URDF uses are not listed twice."""
     files = []
     for path in sorted(root.rglob("*")):
-        if path.suffix.lower() in {*MESH_SUFFIXES, ".urdf"}:
+        if path.suffix.lower() in {*MESH_SUFFIXES, ".urdf", ROAD_SUFFIX}:
             files.append(path.relative_to(root).as_posix())
         if len(files) > _MAX_FILES:
             raise AssetError(f"{root}: more than {_MAX_FILES} meshes; write an {INDEX_NAME}")

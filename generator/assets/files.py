@@ -10,6 +10,8 @@ from typing import TypeVar
 
 from generator.assets.cache import FORMAT, Arrays, DiskCache, Store, content_key
 from generator.assets.catalogue import (
+    ROAD_SUFFIX,
+    Entry,
     ImageEntry,
     Listed,
     MeshEntry,
@@ -24,10 +26,12 @@ from generator.assets.images import decode, decode_radiance
 from generator.assets.importer import VERSION, Imported, import_link, import_object
 from generator.assets.packing import pack, unpack
 from generator.assets.packs import pack_assets
+from generator.assets.road_files import import_road_network, road_network_lanes
 from generator.assets.robots import robot_model
 from generator.assets.urdf import Urdf, read_urdf
 from generator.core.errors import AssetError
 from generator.core.geometry import Asset, Float32, RobotModel, TextureData
+from generator.core.scene import Lane
 
 _BUILT_IN = Path(__file__).with_name("pybullet.yaml")
 
@@ -87,6 +91,8 @@ class Files:
         def compute() -> Arrays:
             if isinstance(entry, RobotEntry):
                 made = import_link(folder, entry, one.asset_id, self._urdf(one), name)
+            elif _is_road_network(entry):
+                made = import_road_network(folder, entry.file)
             elif isinstance(entry, MeshEntry):
                 made = import_object(folder, entry, asset_id)
             else:
@@ -99,6 +105,16 @@ class Files:
             raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
         key = content_key({"asset": self._key(one), "link": name})
         return self._store.get(key, compute, unpack)
+
+    def lanes(self, asset_id: str) -> tuple[Lane, ...]:
+        """Lanes of a road network; empty for anything else."""
+        one = self._all().get(asset_id)
+        if one is None or not _is_road_network(one.entry):
+            return ()
+        folder = Folder(one.root)
+        lanes = road_network_lanes(folder, one.entry.file)
+        self._check_unchanged(one, folder)
+        return lanes
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot."""
@@ -221,6 +237,10 @@ class Files:
         for name, digest in folder.digests.items():
             if known.get(name, digest) != digest:
                 raise AssetError(f"{folder.root / name}: changed while it was read; start again")
+
+
+def _is_road_network(entry: Entry) -> bool:
+    return isinstance(entry, MeshEntry) and entry.file.lower().endswith(ROAD_SUFFIX)
 
 
 def _everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[Listed]:

@@ -22,6 +22,7 @@ from generator.core.geometry import (
     RobotModel,
     TextureData,
 )
+from generator.core.scene import Lane
 from generator.core.se3 import Vec3
 
 
@@ -87,6 +88,10 @@ class Library:
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
         return self._imported(asset_id).keypoints
+
+    def lanes(self, asset_id: str) -> tuple[Lane, ...]:
+        """Lanes of a road network (an ``.xodr`` file), in its own frame; else empty."""
+        return () if self._is_generated(asset_id) else self._files.lanes(asset_id)
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is no robot."""

@@ -10,17 +10,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
-from typing import Any
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
 from generator.assets.folder import Folder
 from generator.core.errors import AssetError
 from generator.core.geometry import Joint
+from generator.core.markup import parsed_xml
 from generator.core.se3 import SE3, Vec3
 
 _MAX_ELEMENTS = 50_000
-_MAX_DEPTH = 64
 _MAX_LINKS = 500
 _KINDS = {"fixed", "revolute", "continuous", "prismatic"}
 
@@ -87,7 +85,7 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
         AssetError: if it is malformed, is no tree of links, or refers outside the folder.
     """
     place = str(folder.root / relative)
-    root = parsed_xml(folder.read(relative), place, "robot")
+    root = parsed_xml(folder.read(relative), place, "robot", "a URDF", _MAX_ELEMENTS)
     try:
         colors = dict(_named_colors(root))
         links = {
@@ -103,46 +101,6 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
     except (ValueError, KeyError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else error
         raise AssetError(f"{place}: malformed URDF ({reason}); correct it") from None
-
-
-def parsed_xml(data: bytes, place: str, tag: str) -> Element:
-    """The root element of a robot description; nothing in it is ever expanded.
-
-    Raises:
-        AssetError: if it is malformed, too large, declares a document type, or is another element.
-    """
-    builder = TreeBuilder()
-    parser = expat.ParserCreate()
-    depth = count = 0
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, count
-        depth, count = depth + 1, count + 1
-        if depth > _MAX_DEPTH or count > _MAX_ELEMENTS:
-            raise ValueError(f"more than {_MAX_DEPTH} levels or {_MAX_ELEMENTS} elements")
-        builder.start(tag, attributes)
-
-    def end(tag: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(tag)
-
-    def refuse(*_: Any) -> None:
-        raise ValueError("it declares a document type, which is not allowed; remove it")
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
-    try:
-        parser.Parse(data, True)
-        root: Element = builder.close()
-    except (ValueError, expat.ExpatError, AssertionError) as error:
-        raise AssetError(f"{place}: malformed XML ({error}); correct it") from None
-    if root.tag != tag:
-        expected = {"robot": "a URDF", "mujoco": "an MJCF"}.get(tag, tag)
-        raise AssetError(
-            f"{place}: its root element is <{root.tag[:40]}>, not <{tag}>; give {expected}"
-        )
-    return root
 
 
 def _distinct(root: Element, tag: str) -> Iterator[tuple[str, Element]]:

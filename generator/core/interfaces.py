@@ -25,7 +25,7 @@ from generator.core.geometry import (
     TextureData,
 )
 from generator.core.sample import ObjectTruth, Sample
-from generator.core.scene import Camera, Scene
+from generator.core.scene import Camera, Lane, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 
@@ -60,6 +60,10 @@ class AssetIndex(Protocol):
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
+        ...
+
+    def lanes(self, asset_id: str) -> tuple[Lane, ...]:
+        """Lanes of a road network, in its own frame; empty for anything else."""
         ...
 
     def robot(self, asset_id: str) -> RobotModel:

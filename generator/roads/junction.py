@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from generator.core.scene import Lane
+from generator.core.scene import Lane, LaneKind
 from generator.core.se3 import SE3
 from generator.roads.geometry import Array
 from generator.roads.lanes import FURNITURE_M, world_points
@@ -73,7 +73,6 @@ class JunctionShape:
         for gap in self.gaps_rad():
             if abs(gap - math.pi) > 1e-3:
                 ends.append((self.half_m + self.radius_m) / math.tan(0.5 * gap))
-                # Edge lines meet half / tan(gap / 2) from the centre, seen along the arm.
         return max(ends)
 
     def reach_m(self) -> float:
@@ -191,7 +190,7 @@ def junction_lanes(
     ]
     inner = KERB_WIDTH_M + shape.beside_m
     into = inner + min(FURNITURE_M, 0.5 * shape.sidewalk_m)
-    beside = (
+    beside: tuple[tuple[LaneKind, float, float], ...] = (
         ("sidewalk", inner + 0.5 * shape.sidewalk_m, shape.sidewalk_m),
         ("furniture", into, 0.6),
         ("frontage", shape.border_m, 0.0),

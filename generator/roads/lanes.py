@@ -33,17 +33,11 @@ def road_lanes(
         driving = [strip for strip in row if strip.kind == "driving"]
         forward = shape.forward(side)
         for strip in driving:
-            lanes.append(
-                Lane(
-                    lane_name(name, side, strip.number, shape),
-                    "driving",
-                    path(line, strip.middle_m, strip.middle_z_m, forward, T_world_road),
-                    strip.width_m,
-                    road=name,
-                    speed_m_s=speed_m_s,
-                    **_neighbours(name, shape, side, strip.number, len(driving)),
-                )
-            )
+            left, right = _neighbours(name, shape, side, strip.number, len(driving))
+            center = path(line, strip.middle_m, strip.middle_z_m, forward, T_world_road)
+            own = lane_name(name, side, strip.number, shape)
+            lane = Lane(own, "driving", center, strip.width_m, name, (), left, right, speed_m_s)
+            lanes.append(lane)
         for kind, t_m, z_m, width_m in _beside(row, side):
             center = path(line, t_m, z_m, side < 0, T_world_road)
             lanes.append(Lane(f"{name}/{kind}_{word}", kind, center, width_m, road=name))
@@ -103,16 +97,12 @@ def _heading(points: Sequence[Vec3], k: int) -> float:
     return math.atan2(y1 - y0, x1 - x0)
 
 
-def _neighbours(name: str, shape: RoadShape, side: int, number: int, count: int) -> dict[str, str]:
+def _neighbours(name: str, shape: RoadShape, side: int, number: int, count: int) -> tuple[str, str]:
     """Names of the lanes left and right that run the same way."""
     # Seen along its own direction, the middle is to the left of a lane in right-hand traffic.
     inner = lane_name(name, side, number - 1, shape) if number > 0 else ""
     outer = lane_name(name, side, number + 1, shape) if number + 1 < count else ""
-    return (
-        {"left": inner, "right": outer}
-        if shape.traffic == "right"
-        else {"left": outer, "right": inner}
-    )
+    return (inner, outer) if shape.traffic == "right" else (outer, inner)
 
 
 def _beside(row: Sequence[Strip], side: int) -> list[tuple[LaneKind, float, float, float]]:

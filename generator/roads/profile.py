@@ -19,6 +19,10 @@ StripKind = Literal[
 Pair = tuple[float, float]
 
 KERB_WIDTH_M = 0.15
+APRON_M, APRON_FALL_M = 6.0, 0.1
+"""Land beside a road that belongs to it: how wide, and how far below the gutter it ends."""
+APRON_STEPS, APRON_DROPS = (0.0, 0.25, 1.0), (0.0, 0.25, 1.0)
+"""Its profile as shares of both."""
 FALL = 0.025
 """Slope of sidewalks and verges: 2 to 2.5 % sheds rain (EAE/RASt 06, 6.1.1.2)."""
 

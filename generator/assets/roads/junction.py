@@ -1,4 +1,4 @@
-"""The surface of a junction: carriageway, kerbs and sidewalks around corners, stop lines, zebras."""
+"""The surface of a junction: carriageway, kerbs, sidewalks, stop lines and crosswalks."""
 
 from __future__ import annotations
 
@@ -23,9 +23,14 @@ from generator.roads.junction import (
     corner,
     fan_of,
 )
-from generator.roads.profile import KERB_WIDTH_M
+from generator.roads.profile import (
+    APRON_DROPS,
+    APRON_FALL_M,
+    APRON_M,
+    APRON_STEPS,
+    KERB_WIDTH_M,
+)
 
-_APRON_M, _APRON_Z_M = 6.0, -0.1
 _CELL_M = 0.6
 """Markings are cut this small, so that they follow the surface."""
 
@@ -129,16 +134,25 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
     edge = np.column_stack([line, np.full(len(line), z)])
     gap = shape.gaps_rad()[number]
     if abs(gap - math.pi) <= 1e-3:
-        far = corner(shape, number, offset + _APRON_M)
-        outer = np.column_stack([far, np.full(len(far), _APRON_Z_M)])
+        far = corner(shape, number, offset + APRON_M)
+        outer = np.column_stack([far, np.full(len(far), -APRON_FALL_M)])
         return surface(
             np.stack([outer, edge], axis=1), np.stack([far, line], axis=1), "ground", slot
         )
     away = shape.half_m + offset
     meeting = away / math.tan(0.5 * gap)
     cross = arm_points(shape, number, np.array(meeting), np.array(away))
-    tip = np.array([*(line[0] + line[-1] - cross), _APRON_Z_M])
-    return _fan_patch(tip, edge, "ground", slot, closed=False)
+    tip = np.array([*(line[0] + line[-1] - cross), -APRON_FALL_M])
+    ends = []
+    for end, arm, side in ((0, number, 1.0), (-1, (number + 1) % len(shape.arms_rad()), -1.0)):
+        # The same profile as beside the road that goes on here.
+        out = side * (away + APRON_M * np.array(APRON_STEPS[1:]))
+        flat = arm_points(shape, arm, np.full(len(out), shape.reach_m()), out)
+        fall = np.array(APRON_DROPS[1:]) * (z + APRON_FALL_M)
+        ends.append(np.column_stack([flat, z - fall])[:: -1 if end == 0 else 1])
+    line = np.concatenate([ends[0], edge, ends[1]])
+    # Seen from the tip the line runs clockwise.
+    return _fan_patch(tip, line, "ground", slot, closed=False).flipped()
 
 
 def _markings(
@@ -185,6 +199,9 @@ def _draped(
         np.linspace(low, high, max(2, math.ceil((high - low) / _CELL_M) + 1))
         for low, high in (r_m, t_m)
     )
+    if t[0] < 0.0 < t[-1]:
+        # The carriageway has its ridge in the middle of an arm.
+        t = np.unique(np.append(t, 0.0))
     grid = np.stack(np.meshgrid(r, t, indexing="ij"), axis=2)
     xy = arm_points(shape, arm, grid[..., 0], grid[..., 1])
     z = fan.height_m(xy.reshape(-1, 2)).reshape(xy.shape[:2]) + PAINT_LIFT_M

@@ -16,10 +16,19 @@ from generator.assets.roads.deck import Deck, surface
 from generator.assets.roads.markings import bay_lines, painted, stripes
 from generator.assets.roads.materials import street_materials
 from generator.core.streams import Rng
-from generator.roads.profile import KERB_WIDTH_M, RoadShape, Strip, height_m, strips
+from generator.roads.profile import (
+    APRON_DROPS,
+    APRON_FALL_M,
+    APRON_M,
+    APRON_STEPS,
+    KERB_WIDTH_M,
+    RoadShape,
+    Strip,
+    height_m,
+    strips,
+)
 
 _RUT_M, _RUT_WIDTH_M, _TRACK_M = 0.008, 0.35, 0.85
-_APRON_FALL_M = 0.1
 _BATTER_M = 0.02
 """Kerb faces lean back by this much."""
 
@@ -34,7 +43,7 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
     wear: float = 0.3,
     paving: str = "paving",
     ground: str = "grass",
-    apron_m: float = 6.0,
+    apron_m: float = APRON_M,
     rails: tuple[float, float] = (0.0, 0.0),
     **shape: Any,
 ) -> Solid:
@@ -130,8 +139,8 @@ def _beside(deck: Deck, profile: RoadShape, side: int, apron_m: float) -> Iterat
     if apron_m > 0.0 and not (row == () and profile.median_m > 0.0):
         edge = row[-1].outer_m if row else 0.0
         z = float(np.interp(side * edge, deck.t_m, deck.z_m))
-        across = edge + apron_m * np.array([0.0, 0.25, 1.0])
-        heights = z + np.array([0.0, -0.25, -1.0]) * (z + _APRON_FALL_M)
+        across = edge + apron_m * np.array(APRON_STEPS)
+        heights = z - np.array(APRON_DROPS) * (z + APRON_FALL_M)
         yield _beyond(deck, profile.length_m, side, across, heights, "ground")
 
 

@@ -87,7 +87,7 @@ def cobbles(seed: int) -> TextureData:
 def grass(seed: int) -> TextureData:
     """A mown lawn from above: green, straw and bare earth in patches; 5 m per repeat."""
     rng = rng_of("grass", seed)
-    green, deep, straw = color("#66703a"), color("#4a5628"), color("#8d8354")
+    green, deep, straw = color("#717a48"), color("#566034"), color("#9a9064")
     patches = fbm((7, 7), 6, rng, 0.62, _N)
     albedo = mixed(green, deep, smoothstep(-0.5, 0.8, patches))
     dry = smoothstep(0.15, 1.1, fbm((9, 9), 6, rng, 0.66, _N) + between(-0.15, 0.25, rng))

@@ -1,0 +1,400 @@
+"""OpenDRIVE: roads with lanes of varying width, and junctions, from ``.xodr`` files.
+
+Source: ASAM OpenDRIVE 1.4 (Rev. H) to 1.7. Read are reference lines, elevation, superelevation,
+lane offsets, lane sections with widths, heights, marks and links, and junction connections. What
+describes neither lanes nor surface (objects, signals, controllers, railways) is ignored.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from generator.core.errors import AssetError
+from generator.core.markup import parsed_xml
+from generator.roads.geometry import (
+    Arc,
+    Array,
+    Curve,
+    Line,
+    ParamPoly3,
+    Placed,
+    Poly3,
+    ReferenceLine,
+    Spiral,
+    cubic,
+)
+
+MAX_GAP_M = 0.01
+"""Pieces of a reference line must meet this closely."""
+_MAX_ELEMENTS = 500_000
+_MAX_ROADS = 5_000
+_MAX_LENGTH_M = 50_000.0
+
+Contact = Literal["start", "end"]
+
+
+@dataclass(frozen=True, slots=True)
+class Piecewise:
+    """A function of s made of cubics; 0 before the first and without any.
+
+    Attributes:
+        pieces: ``(start, a, b, c, d)``, by rising start.
+    """
+
+    pieces: tuple[tuple[float, float, float, float, float], ...] = ()
+
+    def __call__(self, s_m: Array) -> Array:
+        """Values [n] at arc lengths [n]."""
+        values = np.zeros_like(s_m)
+        for start, *coefficients in self.pieces:
+            here = s_m >= start - 1e-9
+            values[here] = cubic(coefficients, s_m[here] - start)
+        return values
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A line on the outer edge of a lane.
+
+    Attributes:
+        kind: ``solid``, ``broken``, ``none``, ... as the file says.
+    """
+
+    kind: str
+    width_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class LaneRecord:
+    """A lane of one section; ``number`` is positive to the left of the reference line.
+
+    Attributes:
+        width_m: By distance from the section's start.
+        height_m: Of its inner and outer edge over the road; None = the file says nothing.
+        predecessor, successor: Numbers in the sections before and after; None = no link.
+    """
+
+    number: int
+    kind: str
+    width_m: Piecewise
+    height_m: tuple[float, float] | None
+    mark: Mark
+    predecessor: int | None
+    successor: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A stretch of a road with the same lanes throughout; ``lanes`` by number, with 0."""
+
+    start_m: float
+    end_m: float
+    lanes: Mapping[int, LaneRecord]
+
+
+@dataclass(frozen=True, slots=True)
+class RoadLink:
+    """What lies before or behind a road: a road's start or end, or a junction."""
+
+    junction: bool
+    target: str
+    contact: Contact
+
+
+@dataclass(frozen=True, slots=True)
+class Road:
+    """One road of a file.
+
+    Attributes:
+        junction: Id of the junction that it crosses; empty = none.
+        left_hand: Whether its traffic keeps left.
+        speed_m_s: The limit; 0 = none is given.
+    """
+
+    road_id: str
+    junction: str
+    line: ReferenceLine
+    elevation_m: Piecewise
+    superelevation_rad: Piecewise
+    lane_offset_m: Piecewise
+    sections: tuple[Section, ...]
+    predecessor: RoadLink | None
+    successor: RoadLink | None
+    left_hand: bool
+    speed_m_s: float
+
+    def boundaries_m(self, section: Section, s_m: Array) -> dict[int, Array]:
+        """``t`` of each lane's outer edge by number; 0 is the middle, at the lane offset."""
+        edges = {0: self.lane_offset_m(s_m)}
+        for side in (1, -1):
+            t = edges[0]
+            for number in sorted((n for n in section.lanes if n * side > 0), key=abs):
+                width = section.lanes[number].width_m(s_m - section.start_m)
+                t = t + side * np.maximum(width, 0.0)
+                edges[number] = t
+        return edges
+
+    def points(self, s_m: Array, t_m: Array, lift_m: Array) -> Array:
+        """Points [n, 3] at arc lengths, distances to the left and heights over the road."""
+        flat = self.line.points(s_m, t_m)
+        z = self.elevation_m(s_m) + t_m * np.tan(self.superelevation_rad(s_m)) + lift_m
+        return np.column_stack([flat, z])
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A way through a junction; ``lanes`` are pairs (from, to) of numbers."""
+
+    incoming: str
+    connecting: str
+    contact: Contact
+    lanes: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A file.
+
+    Attributes:
+        roads: By id, in the file's order.
+        junctions: Connections by the junction's id.
+        place: What error messages call the file.
+    """
+
+    roads: Mapping[str, Road]
+    junctions: Mapping[str, tuple[Connection, ...]]
+    place: str
+
+
+def read_opendrive(data: bytes, place: str) -> Network:
+    """The roads of an OpenDRIVE file.
+
+    Raises:
+        AssetError: malformed, incomplete, with gaps, or with links to what it has not; the message
+            names the road.
+    """
+    root = parsed_xml(data, place, "OpenDRIVE", "an OpenDRIVE file", _MAX_ELEMENTS)
+    elements = root.findall("road")
+    if not elements:
+        raise AssetError(f"{place}: holds no roads; export it again")
+    if len(elements) > _MAX_ROADS:
+        raise AssetError(f"{place}: more than {_MAX_ROADS} roads; cut out the part that matters")
+    roads: dict[str, Road] = {}
+    for element in elements:
+        road_id = element.get("id", "")
+        where = f"{place}: road '{road_id[:40]}'"
+        if not road_id or road_id in roads:
+            raise AssetError(f"{where}: its id is missing or taken; give it one of its own")
+        try:
+            roads[road_id] = _road(element)
+        except KeyError as error:
+            raise AssetError(f"{where}: {error} is missing; add it") from None
+        except ValueError as error:
+            raise AssetError(f"{where}: {error}") from None
+    junctions = {}
+    for element in root.findall("junction"):
+        name = element.get("id", "")
+        try:
+            junctions[name] = tuple(_connection(e) for e in element.findall("connection"))
+        except (KeyError, ValueError) as error:
+            raise AssetError(f"{place}: junction '{name[:40]}': malformed ({error})") from None
+    network = Network(roads, junctions, place)
+    _check_links(network)
+    return network
+
+
+def _road(element: Element) -> Road:
+    line = _line(element)
+    length_m = _number(element, "length")
+    if abs(length_m - line.length_m) > MAX_GAP_M:
+        raise ValueError(
+            f"its length is {length_m:g} m, that of its geometry {line.length_m:g} m; correct one"
+        )
+    lanes = _child(element, "lanes")
+    junction = element.get("junction", "-1")
+    speed = element.find("type/speed")
+    return Road(
+        road_id=element.attrib["id"],
+        junction="" if junction == "-1" else junction,
+        line=line,
+        elevation_m=_piecewise(element.findall("elevationProfile/elevation")),
+        superelevation_rad=_piecewise(element.findall("lateralProfile/superelevation")),
+        lane_offset_m=_piecewise(lanes.findall("laneOffset")),
+        sections=_sections(lanes, line.length_m),
+        predecessor=_road_link(element.find("link/predecessor")),
+        successor=_road_link(element.find("link/successor")),
+        left_hand=element.get("rule", "RHT") == "LHT",
+        speed_m_s=0.0 if speed is None else _speed(speed),
+    )
+
+
+def _line(element: Element) -> ReferenceLine:
+    pieces: list[Placed] = []
+    s = 0.0
+    for geometry in element.findall("planView/geometry"):
+        curve = _curve(geometry)
+        x, y, heading = (_number(geometry, name) for name in ("x", "y", "hdg"))
+        if abs(_number(geometry, "s") - s) > MAX_GAP_M:
+            raise ValueError(f"its geometry has a gap at s = {s:g} m; let the pieces follow on")
+        piece = Placed(s, x, y, heading, curve)
+        if pieces:
+            end = ReferenceLine((pieces[-1],)).poses(np.array([s]))[0]
+            gap = math.hypot(end[0] - x, end[1] - y)
+            if gap > MAX_GAP_M:
+                raise ValueError(
+                    f"its geometry has a gap of {gap:.3f} m at s = {s:g} m; at most {MAX_GAP_M} m "
+                    "are allowed, correct x and y"
+                )
+        pieces.append(piece)
+        s += curve.length_m
+    if not pieces:
+        raise ValueError("it has no geometry; add a planView")
+    return ReferenceLine(tuple(pieces))
+
+
+def _curve(geometry: Element) -> Curve:
+    length_m = _number(geometry, "length")
+    if not 0.0 < length_m <= _MAX_LENGTH_M:
+        raise ValueError(f"a geometry is {length_m:g} m long; expected 0 to {_MAX_LENGTH_M:g} m")
+    for kind in geometry:
+        if kind.tag == "line":
+            return Line(length_m)
+        if kind.tag == "arc":
+            return Arc(length_m, _number(kind, "curvature"))
+        if kind.tag == "spiral":
+            return Spiral(length_m, _number(kind, "curvStart"), _number(kind, "curvEnd"))
+        if kind.tag == "poly3":
+            return Poly3(length_m, _coefficients(kind, ""))
+        if kind.tag == "paramPoly3":
+            end = length_m if kind.get("pRange", "normalized") == "arcLength" else 1.0
+            return ParamPoly3(length_m, _coefficients(kind, "U"), _coefficients(kind, "V"), end)
+    raise ValueError("a geometry is neither line, arc, spiral, poly3 nor paramPoly3; convert it")
+
+
+def _coefficients(element: Element, suffix: str) -> tuple[float, float, float, float]:
+    a, b, c, d = (_number(element, letter + suffix) for letter in "abcd")
+    return (a, b, c, d)
+
+
+def _sections(lanes: Element, length_m: float) -> tuple[Section, ...]:
+    elements = lanes.findall("laneSection")
+    if not elements:
+        raise ValueError("it has no lane sections; add one")
+    starts = [_number(element, "s") for element in elements]
+    ends = [*starts[1:], length_m]
+    if abs(starts[0]) > MAX_GAP_M or any(a >= b for a, b in zip(starts, ends, strict=True)):
+        raise ValueError("its lane sections do not start at s = 0 and rise; sort them")
+    made = []
+    for element, start, end in zip(elements, starts, ends, strict=True):
+        records = [_lane(lane) for lane in element.iterfind("*/lane")]
+        numbers = {record.number: record for record in records}
+        for side in (1, -1):
+            here = sorted((n for n in numbers if n * side > 0), key=abs)
+            if here != [side * (k + 1) for k in range(len(here))]:
+                raise ValueError(f"the lanes at s = {start:g} m are not numbered without gaps")
+        made.append(Section(start, end, numbers))
+    return tuple(made)
+
+
+def _lane(element: Element) -> LaneRecord:
+    mark = element.find("roadMark")
+    height = element.find("height")
+    links = {tag: element.find(f"link/{tag}") for tag in ("predecessor", "successor")}
+    number = int(element.attrib["id"])
+    width = _piecewise(element.findall("width"), "sOffset")
+    if number != 0 and not width.pieces:
+        raise ValueError(f"lane {number} has no width; add one")
+    return LaneRecord(
+        number=number,
+        kind=element.get("type", "none"),
+        width_m=width,
+        height_m=None if height is None else (_number(height, "inner"), _number(height, "outer")),
+        mark=Mark("none", 0.0)
+        if mark is None
+        else Mark(mark.get("type", "none"), float(mark.get("width", "0.12")) or 0.12),
+        **{tag: None if link is None else int(link.attrib["id"]) for tag, link in links.items()},
+    )
+
+
+def _piecewise(elements: Iterable[Element], start: str = "s") -> Piecewise:
+    pieces = [(_number(e, start), *_coefficients(e, "")) for e in elements]
+    return Piecewise(tuple(sorted(pieces)))
+
+
+def _road_link(element: Element | None) -> RoadLink | None:
+    if element is None:
+        return None
+    junction = element.get("elementType", "road") == "junction"
+    return RoadLink(junction, element.attrib["elementId"], _contact(element))
+
+
+def _connection(element: Element) -> Connection:
+    return Connection(
+        incoming=element.attrib["incomingRoad"],
+        connecting=element.attrib["connectingRoad"],
+        contact=_contact(element),
+        lanes=tuple(
+            (int(link.attrib["from"]), int(link.attrib["to"]))
+            for link in element.findall("laneLink")
+        ),
+    )
+
+
+def _contact(element: Element) -> Contact:
+    return "end" if element.get("contactPoint", "start") == "end" else "start"
+
+
+def _speed(element: Element) -> float:
+    text = element.get("max", "")
+    if text in ("no limit", "undefined", ""):
+        return 0.0
+    factor = {"km/h": 1 / 3.6, "mph": 0.44704}.get(element.get("unit", "m/s"), 1.0)
+    return float(text) * factor
+
+
+def _number(element: Element, name: str) -> float:
+    value = float(element.attrib[name])
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is not finite; correct it")
+    return value
+
+
+def _child(element: Element, tag: str) -> Element:
+    child = element.find(tag)
+    if child is None:
+        raise ValueError(f"it has no <{tag}>; add it")
+    return child
+
+
+def _check_links(network: Network) -> None:
+    """Every link leads somewhere. Raises AssetError."""
+    for road in network.roads.values():
+        for word, link in (("predecessor", road.predecessor), ("successor", road.successor)):
+            known = network.junctions if link and link.junction else network.roads
+            if link and link.target not in known:
+                raise AssetError(
+                    f"{network.place}: road '{road.road_id}': its {word} '{link.target[:40]}' is "
+                    "not in the file; add it or remove the link"
+                )
+        for number, section in enumerate(road.sections[:-1]):
+            after = road.sections[number + 1].lanes
+            for lane in section.lanes.values():
+                if lane.successor is not None and lane.successor not in after:
+                    raise AssetError(
+                        f"{network.place}: road '{road.road_id}': lane {lane.number} goes on as "
+                        f"lane {lane.successor}, which the next section has not; correct the link"
+                    )
+    for name, connections in network.junctions.items():
+        for one in connections:
+            for target in (one.incoming, one.connecting):
+                if target not in network.roads:
+                    raise AssetError(
+                        f"{network.place}: junction '{name}': road '{target[:40]}' is not in the "
+                        "file; add it or remove the connection"
+                    )

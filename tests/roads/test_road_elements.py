@@ -1,0 +1,209 @@
+"""Roads, junctions, crosswalks and car parks: lanes that people and cars can follow."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from generator.assets.library import Library, open_library
+from generator.core.errors import ConfigError
+from generator.core.scene import Lane, Scene
+from scene_templates import TABLE
+from scene_templates.builder import build
+from scene_templates.element import Element
+
+ROAD = {"type": "road", "name": "main", "length_m": 100.0}
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """Generated assets, cached in a folder of these tests."""
+    return open_library((), Path(tmp_path_factory.mktemp("cache")))
+
+
+def built(library: Library, *lines: dict[str, Any]) -> Scene:
+    """The nominal scene of some elements."""
+    elements: list[Element] = [
+        TABLE.load(line["type"]).model_validate(line, strict=False) for line in lines
+    ]
+    return build("street", elements, library)
+
+
+def by_name(scene: Scene) -> dict[str, Lane]:
+    """The scene's lanes."""
+    return {lane.name: lane for lane in scene.lanes}
+
+
+def heading(lane: Lane, k: int) -> float:
+    """Direction of a lane's first (0) or last (-1) step."""
+    (x0, y0, _), (x1, y1, _) = lane.center_m[:2] if k == 0 else lane.center_m[-2:]
+    return math.atan2(y1 - y0, x1 - x0)
+
+
+def check_links(scene: Scene) -> int:
+    """Successors start where their lanes end, in the same direction; how many there are."""
+    lanes, count = by_name(scene), 0
+    for lane in scene.lanes:
+        for name in lane.successors:
+            after = lanes[name]
+            assert math.dist(lane.center_m[-1], after.center_m[0]) < 0.01
+            turn = math.remainder(heading(after, 0) - heading(lane, -1), math.tau)
+            assert abs(turn) < math.radians(5.0)
+            assert after.kind == lane.kind
+            count += 1
+    return count
+
+
+def test_traffic_keeps_right(library: Library) -> None:
+    """Forward lanes run along +X on the right (-Y), backward lanes against it on the left."""
+    lanes = by_name(built(library, {**ROAD, "lanes": [1, 2]}))
+    first, second, back = lanes["main/forward0"], lanes["main/forward1"], lanes["main/backward0"]
+
+    assert first.center_m[0][:2] == (0.0, -1.75)
+    assert first.center_m[-1][:2] == (100.0, -1.75)
+    assert second.center_m[0][1] == -5.25
+    assert back.center_m[0][:2] == (100.0, 1.75)
+    assert (first.left, first.right) == ("", "main/forward1")
+    assert (second.left, second.right) == ("main/forward0", "")
+
+
+def test_traffic_keeps_left_where_told(library: Library) -> None:
+    """The same road in a country of left-hand traffic."""
+    lanes = by_name(built(library, {**ROAD, "traffic": "left"}))
+
+    assert lanes["main/forward0"].center_m[0][:2] == (0.0, 1.75)
+    assert lanes["main/backward0"].center_m[0][:2] == (100.0, -1.75)
+
+
+@pytest.mark.parametrize("curvature", [0.0, 0.02, -0.01])
+def test_side_lanes_have_the_street_on_their_left(library: Library, curvature: float) -> None:
+    """Parking, sidewalk, verge, furniture and house fronts on both sides."""
+    both = {"parking": [True, True], "verge_m": [1.5, 1.5], "bicycle_m": [1.6, 1.6]}
+    scene = built(library, {**ROAD, "curvature_per_m": curvature, **both})
+    middle = np.array(by_name(scene)["main/forward0"].center_m)
+    beside = [lane for lane in scene.lanes if lane.kind != "driving"]
+
+    assert len(beside) == 12
+    for lane in beside:
+        points = np.array(lane.center_m)
+        for a, b in pairwise(points):
+            street = middle[np.abs(middle[:, :2] - a[:2]).sum(axis=1).argmin()]
+            along, toward = b - a, street - a
+            assert along[0] * toward[1] - along[1] * toward[0] > 0.0
+
+
+def test_cross_section_adds_up(library: Library) -> None:
+    """Lane 3.5, parking 2.2, kerb 0.15, verge 1.5, sidewalk 2.5 m, and the heights on them."""
+    scene = built(library, {**ROAD, "parking": [True, True], "verge_m": [0, 1.5]})
+    lanes = by_name(scene)
+
+    def y_of(name: str) -> float:
+        return lanes[name].center_m[0][1]
+
+    assert y_of("main/parking_right") == pytest.approx(-(3.5 + 1.1))
+    assert y_of("main/verge_right") == pytest.approx(-(5.7 + 0.15 + 0.75))
+    assert y_of("main/sidewalk_right") == pytest.approx(-(5.7 + 0.15 + 1.5 + 1.25))
+    assert y_of("main/furniture_right") == pytest.approx(-(5.7 + 0.15 + 1.5 + 0.5))
+    assert y_of("main/frontage_left") == pytest.approx(5.7 + 0.15 + 2.5)
+    assert lanes["main/forward0"].center_m[0][2] == pytest.approx(0.02 * 1.75)
+    assert lanes["main/sidewalk_left"].center_m[0][2] == pytest.approx(0.12 + 0.025 * 1.25)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(-0.05, 0.05), st.floats(5.0, 100.0), st.floats(-180.0, 180.0))
+def test_roads_one_after_the_other_are_one_path(
+    library: Library, curvature: float, length: float, yaw: float
+) -> None:
+    """Every driving and side lane goes on: 1 + 1 driving, 2 sidewalks, 2 furniture, 2 fronts."""
+    scene = built(
+        library,
+        {**ROAD, "yaw_deg": yaw, "length_m": length, "curvature_per_m": curvature},
+        {"type": "road", "name": "next", "after": "main", "length_m": 20, "curvature_per_m": 0.01},
+    )
+
+    assert check_links(scene) == 8
+
+
+@pytest.mark.parametrize("lanes", [1, 2])
+@pytest.mark.parametrize("arms", [[0, 90, 180, 270], [0, 180, 270], [0, 70, 180, 300]])
+def test_every_way_into_a_junction_leads_out_again(
+    library: Library, arms: list[float], lanes: int
+) -> None:
+    """Each lane that comes in has a successor through the junction onto each road it may take."""
+    roads = [
+        {"type": "road", "name": f"arm{k}", "after": f"cross/{k}", "lanes": [lanes, lanes],
+         "length_m": 30}
+        for k in range(len(arms))
+    ]  # fmt: skip
+    cross = {"type": "junction", "name": "cross", "arms_deg": arms, "lanes": lanes, "yaw_deg": 33}
+    scene = built(library, cross, *roads)
+    named = by_name(scene)
+    check_links(scene)
+
+    for k in range(len(arms)):
+        ways = {
+            named[after].successors[0].split("/")[0]
+            for n in range(lanes)
+            for after in named[f"arm{k}/backward{n}"].successors
+        }
+        assert ways == {f"arm{j}" for j in range(len(arms)) if j != k}
+    assert all(named[f"cross/sidewalk{k}"].successors for k in range(len(arms)))
+
+
+def test_junction_meets_the_road_before_it(library: Library) -> None:
+    """``after``: its arm at 180 degrees begins at the road's end."""
+    tee = {"type": "junction", "name": "tee", "after": "main", "arms_deg": [90, 180, 270]}
+    scene = built(library, ROAD, tee)
+
+    assert len(by_name(scene)["main/forward0"].successors) == 2
+    check_links(scene)
+
+
+def test_crosswalk_spans_the_carriageway_at_its_station(library: Library) -> None:
+    """From gutter to gutter, over the crown."""
+    walk = {"type": "crosswalk", "name": "zebra", "road": "main", "station_m": 40}
+    lane = by_name(built(library, ROAD, walk))["zebra/crosswalk"]
+
+    assert lane.center_m[0] == pytest.approx((40.0, -3.5, 0.0))
+    assert lane.center_m[3] == pytest.approx((40.0, 0.0, 0.07))
+    assert lane.center_m[-1] == pytest.approx((40.0, 3.5, 0.0))
+
+
+def test_car_park_has_a_lane_per_bay(library: Library) -> None:
+    """Two aisles with two rows of six; cars point away from their aisle."""
+    lot = {"type": "parking_area", "name": "lot", "bays": 6, "aisles": 2, "at_m": [30, -40]}
+    scene = built(library, lot)
+    bays = [lane for lane in scene.lanes if lane.kind == "parking"]
+
+    assert len(bays) == 24
+    assert {lane.width_m for lane in bays} == {2.5}
+    assert all(math.dist(lane.center_m[0], lane.center_m[-1]) == 5.0 for lane in bays)
+    assert len([lane for lane in scene.lanes if lane.kind == "driving"]) == 4
+    assert len({lane.center_m for lane in bays}) == 24
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ({**ROAD, "lanes": [0, 0]}, "elements.main.lanes"),
+        ({**ROAD, "sidewalk_m": [-1, 0]}, "elements.main.sidewalk_m"),
+        ({**ROAD, "curvature_per_m": 0.15}, "elements.main.curvature_per_m"),
+        ({**ROAD, "after": "mian"}, "there is no road 'mian'"),
+        ({"type": "junction", "name": "x", "arms_deg": [0, 20, 180]}, "40 to 180"),
+        ({"type": "junction", "name": "x", "radius_m": 2.0}, "too tight for the sidewalk"),
+        ({"type": "crosswalk", "name": "z", "road": "main"}, "there is no road 'main'"),
+    ],
+)
+def test_what_makes_no_street_is_refused(
+    library: Library, line: dict[str, Any], message: str
+) -> None:
+    """One message that names field and remedy."""
+    with pytest.raises(ConfigError, match=message):
+        built(library, line)

@@ -1,0 +1,161 @@
+"""Meshes of roads: sizes, areas, heights and markings against hand-made sums."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from generator.assets.roads import FAMILIES, TEXTURES
+from generator.assets.roads.markings import stripes
+from generator.core.geometry import MeshData
+from generator.roads.junction import JunctionShape, fan_of
+from generator.roads.profile import RoadShape
+
+SLOTS = ("asphalt", "asphalt_new", "marking", "kerb", "pavement", "verge", "ground")
+
+
+def mesh_of(name: str, **parameters: object) -> MeshData:
+    """The mesh of a family with some of its parameters changed."""
+    family = FAMILIES[name]
+    mesh: MeshData = family.build(**{**family.parameters, **parameters}).mesh
+    return mesh
+
+
+def area_m2(mesh: MeshData, slot: str) -> float:
+    """Area of a slot's triangles, seen from above; those that face down count as negative."""
+    corners = mesh.vertices_m.astype(np.float64)[mesh.faces[mesh.face_slots == SLOTS.index(slot)]]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return 0.5 * float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+
+
+def test_straight_road_has_the_area_of_its_plan() -> None:
+    """Length times width, for asphalt and sidewalks."""
+    mesh = mesh_of("road", length_m=100.0, wear=0.0)
+
+    assert area_m2(mesh, "asphalt") == pytest.approx(100.0 * 7.0, rel=1e-6)
+    assert area_m2(mesh, "pavement") == pytest.approx(100.0 * 5.0, rel=1e-6)
+    assert area_m2(mesh, "kerb") == pytest.approx(100.0 * 0.3, rel=1e-5)
+
+
+@pytest.mark.parametrize("curvature", [0.02, -0.05])
+def test_bent_road_has_the_area_of_its_ring(curvature: float) -> None:
+    """An annulus' share: middle length times width, whatever the bend."""
+    mesh = mesh_of("road", length_m=40.0, wear=0.0, curvature_per_m=curvature)
+
+    assert area_m2(mesh, "asphalt") == pytest.approx(40.0 * 7.0, rel=2e-3)
+
+
+def test_crown_and_kerb_have_their_heights() -> None:
+    """2 % of 3.5 m in the middle, 0.12 m at the kerb, 2.5 % over the sidewalk."""
+    vertices = mesh_of("road", length_m=20.0, wear=0.0, apron_m=0.0).vertices_m
+    of_asphalt = vertices[np.abs(vertices[:, 1]) < 1e-4]
+
+    assert of_asphalt[:, 2].min() == pytest.approx(0.07, abs=1e-5)
+    assert vertices[:, 2].max() == pytest.approx(0.12 + 0.025 * 2.5, abs=1e-5)
+
+
+def test_dashes_are_three_metres_with_gaps_of_six() -> None:
+    """Ten dashes of 3 m x 0.12 m on 90 m."""
+    mesh = mesh_of("road", length_m=90.0, wear=0.0, kerb_m=0.0)
+
+    assert area_m2(mesh, "marking") == pytest.approx(10 * 3.0 * 0.12, rel=1e-4)
+
+
+def test_motorway_has_edge_lines_and_broken_lines_between_lanes() -> None:
+    """Three lanes: two broken lines of 0.15 m; broad lines of 0.25 m at both edges."""
+    shape = RoadShape(lanes=(0.0, 3.0), lane_width_m=3.75, shoulder_m=(0.0, 2.5), kerb_m=0.0,
+                      sidewalk_m=(0.0, 0.0), median_m=4.0)  # fmt: skip
+    lines = stripes(shape, "dashed", "solid", (6.0, 12.0), 0.15)
+    solid = [line for line in lines if line.gap_m == 0.0]
+    broken = sorted(line.t_m for line in lines if line.gap_m > 0.0)
+
+    assert broken == [-9.5, -5.75]
+    assert sorted(line.width_m for line in solid) == [0.25, 0.25]
+    assert min(line.t_m for line in solid) == pytest.approx(-13.25)
+
+
+def test_markings_lie_on_the_road() -> None:
+    """Over the crowned, rutted surface by millimetres, never below it."""
+    mesh = mesh_of("road", length_m=60.0, wear=1.0, markings="double", edge_lines="solid")
+    faces = mesh.faces[mesh.face_slots == SLOTS.index("marking")]
+    points = mesh.vertices_m[np.unique(faces)]
+    crown = 0.02 * (3.5 - np.abs(points[:, 1]))
+
+    assert (points[:, 2] - crown > -0.007).all()
+    assert (points[:, 2] - crown < 0.004).all()
+
+
+def test_long_road_stays_within_its_budget() -> None:
+    """160 m with everything on it, worn out, straight and bent."""
+    everything = {"parking_m": (2.2, 2.2), "verge_m": (1.5, 1.5), "bicycle_m": (1.6, 1.6),
+                  "length_m": 160.0, "wear": 1.0, "rails": (1.0, 1.0)}  # fmt: skip
+    assert len(mesh_of("road", **everything).faces) < 15_000
+    assert len(mesh_of("road", **everything, curvature_per_m=0.02).faces) < 20_000
+
+
+def test_junction_mouths_meet_the_roads() -> None:
+    """The fan's outline has the crowned profile of a road at every arm's end."""
+    shape = JunctionShape()
+    fan = fan_of(shape)
+    reach = shape.reach_m()
+    at = np.array([[reach, 0.0], [0.0, reach], [reach, 1.75], [-reach, -3.5 + 1e-9]])
+
+    assert fan.height_m(at) == pytest.approx([0.07, 0.07, 0.035, 0.0], abs=1e-6)
+    assert reach == pytest.approx(3.5 + 7.0 + 6.5)
+
+
+def test_junction_has_the_area_of_its_plan() -> None:
+    """Two crossing streets and four corners, each a square less a quarter of a disc."""
+    mesh = mesh_of("junction")
+    streets = 7.0 * 2 * 17.0 * 2 - 49.0
+    corners = 4 * (1.0 - math.pi / 4.0) * 49.0
+
+    assert area_m2(mesh, "asphalt") == pytest.approx(streets + corners, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "changed"),
+    [
+        *((name, {}) for name in sorted(set(FAMILIES) - {"ground"})),
+        ("junction", {"arms_deg": (90.0, 180.0, 270.0, -1.0)}),
+        ("road", {"curvature_per_m": -0.03, "traffic": "left", "rails": (0.0, 1.0)}),
+    ],
+)
+def test_surfaces_are_the_same_every_time_and_face_up(
+    name: str, changed: dict[str, object]
+) -> None:
+    """Equal bytes; no slot is seen from below."""
+    a, b = mesh_of(name, **changed), mesh_of(name, **changed)
+
+    assert a.vertices_m.tobytes() == b.vertices_m.tobytes()
+    assert a.faces.tobytes() == b.faces.tobytes()
+    for slot in (SLOTS[k] for k in np.unique(a.face_slots) if k < len(SLOTS)):
+        assert area_m2(a, slot) > 0.0
+    assert np.isfinite(a.uvs).all()
+
+
+@pytest.mark.parametrize("name", sorted(TEXTURES))
+def test_textures_tile_and_repeat_exactly(name: str) -> None:
+    """No seam at the border; equal seeds, equal bytes."""
+    build = TEXTURES[name].build
+    texture = build(1)
+    albedo = texture.albedo.astype(np.float64)
+
+    assert texture.albedo.tobytes() == build(1).albedo.tobytes()
+    for axis in (0, 1):
+        steps = np.abs(albedo - np.roll(albedo, 1, axis)).mean(axis=(1 - axis, 2))
+        assert steps[0] <= max(2.0 * np.quantile(steps[1:], 0.9), 1.1 * steps[1:].max())
+
+
+@pytest.mark.parametrize(("name", "low", "high"), [
+    ("asphalt", 0.05, 0.16), ("grass", 0.08, 0.24), ("paving", 0.15, 0.42),
+    ("road_paint", 0.4, 0.8),
+])  # fmt: skip
+def test_albedo_is_that_of_the_real_thing(name: str, low: float, high: float) -> None:
+    """Mean linear albedo within published ranges (LBNL-43442; grass about 0.2 at most)."""
+    srgb = TEXTURES[name].build(0).albedo.astype(np.float64) / 255.0
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+    assert low < float((linear @ np.array([0.2126, 0.7152, 0.0722])).mean()) < high
