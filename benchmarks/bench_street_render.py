@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import resource
-import time
 from dataclasses import dataclass
 from functools import cache
 
@@ -136,12 +135,16 @@ def lumpy_mesh(kind: Kind, rng: Rng, number: int) -> MeshData:
     """A superellipsoid with lumps, its materials in ten bands."""
     rows = max(int(np.sqrt(kind.triangles / 4)), 4)
     polar, azimuth = np.meshgrid(
-        np.linspace(0.02, np.pi - 0.02, rows + 1), np.linspace(0, 2 * np.pi, 2 * rows + 1), indexing="ij"
+        np.linspace(0.02, np.pi - 0.02, rows + 1),
+        np.linspace(0, 2 * np.pi, 2 * rows + 1),
+        indexing="ij",
     )
     unit = np.stack(
         [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1
     )
-    lumps = 1.0 + 0.03 * np.sin(rng.uniform(3, 6) * polar) * np.sin(int(rng.integers(2, 7)) * azimuth)
+    lumps = 1.0 + 0.03 * np.sin(rng.uniform(3, 6) * polar) * np.sin(
+        int(rng.integers(2, 7)) * azimuth
+    )
     shape = np.sign(unit) * np.abs(unit) ** kind.squareness * lumps[..., None]
     vertices = (0.5 * shape * np.asarray(kind.size_m)).reshape(-1, 3)
     vertices[:, 2] += 0.5 * kind.size_m[2]

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from generator.core.scene import Camera
 from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
-from generator.renderers.kernels import antialias, gather, records, shade, tone
+from generator.renderers.kernels import antialias, gather, raster, records, shade, tone
+from generator.renderers.kernels import samples as mixing
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.lamps import keep_main_lamps
 from generator.renderers.lens import add_glare, wet_lens
@@ -18,8 +19,12 @@ from generator.renderers.packing import PackedWorld
 from generator.renderers.precipitation import draw_precipitation
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
+<<<<<<< HEAD
 from generator.renderers.visibility import Seen
 from generator.renderers.weather import expose_ground, fill_air
+=======
+from generator.renderers.visibility import Projected, Seen
+>>>>>>> 1ab8ef7715bc91ac7ffb049e3dbe732517107de3
 
 # Column of the sample in each row of a pixel, far from that of the rows beside it.
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
@@ -53,12 +58,48 @@ def color_image(
         count = wp.zeros(1, dtype=wp.int32, device=device)
         pixels = stock.scratch("listed pixels", n, wp.int32)
         wp.launch(antialias.find_edges, view.height, [view, images], [count, pixels], device=device)
-        offsets = wp.array(pixel_parts(settings.antialias), dtype=wp.vec2, device=device)
-        inputs = [view, world.record, images, radiance, pixels, offsets, exposure, Z_NEAR_M, curve]
-        edges = int(count.numpy()[0])
-        wp.launch(antialias.antialias, edges, inputs, [rgb], device=device)
+        edges = pixels[: int(count.numpy()[0])]
+        parts = pixel_parts(settings.antialias)
+        if seen.projected is not None:
+            samples = _drawn_samples(world, view, seen, seen.projected, edges, parts, stock)
+            inputs = [view, world.record, images, radiance, edges, samples, exposure, curve]
+            wp.launch(mixing.mix_samples, len(edges), inputs, [rgb], device=device)
+        else:
+            offsets = wp.array(parts, dtype=wp.vec2, device=device)
+            inputs = [view, world.record, images, radiance, edges, offsets]
+            inputs += [exposure, Z_NEAR_M, curve]
+            wp.launch(antialias.antialias, len(edges), inputs, [rgb], device=device)
     image: NDArray[np.uint8] = rgb.numpy().reshape(view.height, view.width, 3)
     return image
+
+
+def _drawn_samples(
+    world: PackedWorld,
+    view: records.View,
+    seen: Seen,
+    projected: Projected,
+    pixels: wp.array,
+    parts: Array,
+    stock: AssetStock,
+) -> wp.array:
+    """What the parts of listed pixels see: (body, face), shape [pixels, parts]; (-1, -1)."""
+    device = stock.device
+    numbers = stock.scratch("numbers", view.width * view.height, wp.int32)
+    floors = stock.scratch("floors", view.width * view.height, float)
+    floors.fill_(mixing.UNLISTED)
+    inputs = [view, _images(seen), pixels]
+    wp.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors], device=device)
+    shape = (max(len(pixels), 1), len(parts))
+    nearness = wp.zeros(shape, dtype=float, device=device)
+    hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=device)
+    offsets = wp.array((parts * 256.0 - 128.0).astype(np.int32), dtype=wp.vec2i, device=device)
+    window = raster.Window()
+    window.width, window.height = view.width, view.height
+    inputs = [view, window, world.record, projected.p_camera, projected.xy]
+    inputs += [numbers, floors, offsets]
+    bodies = len(world.placed)
+    wp.launch(mixing.draw_samples, bodies, inputs, [nearness, hits], device=device)
+    return hits
 
 
 def pixel_parts(n: int) -> Array:

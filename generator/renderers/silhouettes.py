@@ -13,7 +13,7 @@ from generator.renderers.kernels import raster, records
 from generator.renderers.kernels.silhouette import Canvas, draw_silhouettes
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
-from generator.renderers.visibility import project
+from generator.renderers.visibility import Seen, project
 
 _NOTHING = np.zeros((0, 0), np.bool_)
 _UNSNAPPED = -(2**31)
@@ -24,6 +24,7 @@ def silhouettes(
     world: PackedWorld,
     view: records.View,
     stock: AssetStock,
+    seen: Seen,
     seen_ids: NDArray[np.uint16],
 ) -> dict[int, Silhouette]:
     """The silhouette of every annotated instance, by instance id.
@@ -31,7 +32,8 @@ def silhouettes(
     Coverage is the rasteriser's. ``seen_ids``, the image of visible instance ids, is united with
     it: where rays decide visibility, they may differ from the rasteriser by a pixel at an edge.
     """
-    p_camera, xy = project(world, view, stock)
+    projected = seen.projected or project(world, view, stock)
+    p_camera, xy = projected.p_camera, projected.xy
     boxes = _boxes_px(scene, world, view, p_camera.numpy(), xy.numpy())
     canvases, size = _canvases(scene, boxes)
     mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)

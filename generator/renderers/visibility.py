@@ -13,6 +13,19 @@ from generator.renderers.stock import AssetStock
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Projected:
+    """All vertices of a world, body after body.
+
+    Attributes:
+        p_camera: In the camera frame [m].
+        xy: Snapped to the image plane; see generator.renderers.kernels.raster.
+    """
+
+    p_camera: wp.array
+    xy: wp.array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Seen:
     """Flat images of what is seen, row by row.
 
@@ -21,12 +34,14 @@ class Seen:
         z_m: Depth along the optical axis; inf.
         weights: Barycentric (u, v); u + 2 where a triangle's inside is seen.
         normals: Smooth, unit, world frame, towards the camera; 0.
+        projected: What was drawn; None where rays were traced.
     """
 
     hits: wp.array
     z_m: wp.array
     weights: wp.array
     normals: wp.array
+    projected: Projected | None
 
 
 def see(
@@ -37,14 +52,17 @@ def see(
 ) -> Seen:
     """The surfaces at all pixel centres of a view."""
     n = view.width * view.height
+    drawn = method == "raster" or (method == "auto" and stock.device.is_cpu)
+    projected = project(world, view, stock) if drawn else None
     seen = Seen(
         stock.scratch("hits", n, wp.vec2i),
         stock.scratch("z", n, float),
         stock.scratch("weights", n, wp.vec2),
         stock.scratch("normals", n, wp.vec3),
+        projected,
     )
-    if method == "raster" or (method == "auto" and stock.device.is_cpu):
-        _rasterise(world, view, stock, seen.hits)
+    if projected is not None:
+        _rasterise(world, view, stock, projected, seen.hits)
     else:
         inputs = [view, world.record, raster.Z_NEAR_M]
         wp.launch(rays.trace_pixels, n, inputs, [seen.hits], device=stock.device)
@@ -58,28 +76,31 @@ def see(
     return seen
 
 
-def project(world: PackedWorld, view: records.View, stock: AssetStock) -> tuple[wp.array, wp.array]:
-    """All vertices in the camera frame, and snapped to the image plane."""
-    p_camera = wp.zeros(world.vertex_count, dtype=wp.vec3, device=stock.device)
-    xy = wp.zeros(world.vertex_count, dtype=wp.vec2i, device=stock.device)
-    inputs = [view, world.record]
-    wp.launch(
-        raster.project_vertices, len(world.placed), inputs, [p_camera, xy], device=stock.device
+def project(world: PackedWorld, view: records.View, stock: AssetStock) -> Projected:
+    """All vertices as the camera sees them; valid until the next call."""
+    count = max(world.vertex_count, 1)
+    projected = Projected(
+        stock.scratch("p camera", count, wp.vec3), stock.scratch("xy", count, wp.vec2i)
     )
-    return p_camera, xy
+    inputs = [view, world.record]
+    outputs = [projected.p_camera, projected.xy]
+    bodies = len(world.placed)
+    wp.launch(raster.project_vertices, bodies, inputs, outputs, device=stock.device)
+    return projected
 
 
-def _rasterise(world: PackedWorld, view: records.View, stock: AssetStock, hits: wp.array) -> None:
+def _rasterise(
+    world: PackedWorld,
+    view: records.View,
+    stock: AssetStock,
+    projected: Projected,
+    hits: wp.array,
+) -> None:
     nearness = stock.scratch("nearness", view.width * view.height, float)
     nearness.zero_()
     hits.fill_(wp.vec2i(-1, -1))
     window = raster.Window()
     window.width, window.height = view.width, view.height
-    p_camera, xy = project(world, view, stock)
-    wp.launch(
-        raster.draw_bodies,
-        len(world.placed),
-        [view, window, world.record, p_camera, xy],
-        [nearness, hits],
-        device=stock.device,
-    )
+    inputs = [view, window, world.record, projected.p_camera, projected.xy]
+    bodies = len(world.placed)
+    wp.launch(raster.draw_bodies, bodies, inputs, [nearness, hits], device=stock.device)

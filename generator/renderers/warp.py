@@ -57,5 +57,6 @@ class WarpRenderer:
             )
         outlines = {}
         if Channel.AMODAL in channels:
-            outlines = silhouettes(scene, world, view, self._stock, images[Channel.INSTANCE])
+            ids = images[Channel.INSTANCE]
+            outlines = silhouettes(scene, world, view, self._stock, seen, ids)
         return Reading(camera.name, camera, images, outlines)

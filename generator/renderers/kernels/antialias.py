@@ -188,6 +188,12 @@ def most_alike(view: View, images: Images, x: int, y: int, source: int, normal: 
     return found
 
 
+@wp.func
+def tone_weight(exposed: wp.vec3):
+    """Weight of a sample: bright ones count less, as they would after the tone curve."""
+    return 1.0 / (1.0 + 0.2126 * exposed[0] + 0.7152 * exposed[1] + 0.0722 * exposed[2])
+
+
 @wp.kernel
 def antialias(
     view: View,
@@ -227,8 +233,7 @@ def antialias(
             source = traced_source(view, world, images, x, y, x_px, y_px, t_min)
         if source >= 0:
             exposed = radiance[source] * exposure
-            # Bright samples count less, as they would after the tone curve.
-            w = 1.0 / (1.0 + 0.2126 * exposed[0] + 0.7152 * exposed[1] + 0.0722 * exposed[2])
+            w = tone_weight(exposed)
             total += exposed * w
             weights += w
     if weights > 0.0:

@@ -227,7 +227,9 @@ def look_around(
         # The cell's corners, and those around them only where none of the four will do.
         if found == 0.0:
             for v in range(wp.max(row - reach, 0), wp.min(row + 2 + reach, lattice.height)):
-                for u in range(wp.max(column - reach, 0), wp.min(column + 2 + reach, lattice.width)):
+                for u in range(
+                    wp.max(column - reach, 0), wp.min(column + 2 + reach, lattice.width)
+                ):
                     q = v * lattice.width + u
                     if related(view, images, lattice, i, p, q):
                         right = float(column - u) + cell.right

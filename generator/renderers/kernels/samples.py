@@ -1,0 +1,322 @@
+"""Anti-aliasing by the rasteriser: what the parts of pixels on edges see (CPU device only).
+
+Triangles are drawn once more, into samples of the pixels that edges cross; colour is taken from the
+pixel centres nearby that see the same surface, as in generator.renderers.kernels.antialias.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from generator.renderers.kernels.antialias import most_alike, nearby, tone_weight
+from generator.renderers.kernels.raster import (
+    UNSNAPPED,
+    Z_NEAR_M,
+    DepthPlane,
+    Window,
+    beyond_guard,
+    clip,
+    depth_plane,
+    snapped,
+    span_end,
+    span_start,
+)
+from generator.renderers.kernels.records import View, World, corners_of, vertex_at
+from generator.renderers.kernels.shade import Images
+from generator.renderers.kernels.tone import developed
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Above the nearness of any surface.
+UNLISTED = wp.constant(1.0e30)
+
+
+@wp.kernel
+def number_pixels(
+    view: View,
+    images: Images,
+    pixels: wp.array(dtype=int),
+    numbers: wp.array(dtype=int),
+    floors: wp.array(dtype=float),
+):
+    """At every listed pixel, its place in the list, and how near a surface must be to matter.
+
+    What lies behind all that the centres around see has no colour to take.
+
+    Args:
+        floors: 1/z [1/m]; to be UNLISTED at first.
+    """
+    k = wp.tid()
+    i = pixels[k]
+    farthest = float(0.0)
+    for m in range(9):
+        j = nearby(view, i % view.width, i / view.width, m)
+        farthest = wp.max(farthest, images.z_m[j])
+    numbers[i] = k
+    floors[i] = 0.98 / farthest
+
+
+@wp.struct
+class Side:
+    """An edge function: its value at a point, steps per 1/256 px, and their reach over a pixel.
+
+    Inside is >= 0.
+    """
+
+    value: wp.int64
+    dx: wp.int64
+    dy: wp.int64
+    reach: wp.int64
+
+
+@wp.func
+def side_of(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
+    """The edge from p to q, seen from a snapped point; positive to its right (y is down)."""
+    e = Side()
+    e.dx = wp.int64(p[1] - q[1])
+    e.dy = wp.int64(q[0] - p[0])
+    e.value = wp.int64(x - p[0]) * e.dx + wp.int64(y - p[1]) * e.dy
+    # Left and top edges own what lies on them.
+    if not (e.dx > wp.int64(0) or (e.dx == wp.int64(0) and e.dy > wp.int64(0))):
+        e.value -= wp.int64(1)
+    e.reach = wp.int64(128) * (wp.abs(e.dx) + wp.abs(e.dy))
+    return e
+
+
+@wp.func
+def draw_samples_of(
+    numbers: wp.array(dtype=int),
+    floors: wp.array(dtype=float),
+    window: Window,
+    offsets: wp.array(dtype=wp.vec2i),
+    p: wp.vec2i,
+    q: wp.vec2i,
+    r: wp.vec2i,
+    plane: DepthPlane,
+    body: int,
+    face: int,
+    nearness: wp.array(dtype=float, ndim=2),
+    hits: wp.array(dtype=wp.vec2i, ndim=2),
+):
+    """Write (body, face) into the samples of numbered pixels where a triangle is nearest.
+
+    The triangle's corners are in the order that puts its inside to the right of its edges.
+    """
+    x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
+    x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
+    y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
+    y_last = wp.min(wp.max(p[1], wp.max(q[1], r[1])) >> 8, window.height - 1)
+    # From the middle of the first pixel.
+    ea = side_of(p, q, (x_first << 8) + 128, (y_first << 8) + 128)
+    eb = side_of(q, r, (x_first << 8) + 128, (y_first << 8) + 128)
+    ec = side_of(r, p, (x_first << 8) + 128, (y_first << 8) + 128)
+    pixel = wp.int64(256)
+    for y in range(y_first, y_last + 1):
+        rows = wp.int64(y - y_first) * pixel
+        a = ea.value + rows * ea.dy
+        b = eb.value + rows * eb.dy
+        c = ec.value + rows * ec.dy
+        start = int(0)
+        end = x_last - x_first
+        if end > 8:
+            start = span_start(a + ea.reach, pixel * ea.dx, start)
+            start = span_start(b + eb.reach, pixel * eb.dx, start)
+            start = span_start(c + ec.reach, pixel * ec.dx, start)
+            end = span_end(a + ea.reach, pixel * ea.dx, end)
+            end = span_end(b + eb.reach, pixel * eb.dx, end)
+            end = span_end(c + ec.reach, pixel * ec.dx, end)
+        a += wp.int64(start) * pixel * ea.dx
+        b += wp.int64(start) * pixel * eb.dx
+        c += wp.int64(start) * pixel * ec.dx
+        for x in range(x_first + start, x_first + end + 1):
+            i = y * window.width + x
+            if plane.high >= floors[i] and (
+                (a + ea.reach) | (b + eb.reach) | (c + ec.reach)
+            ) >= wp.int64(0):
+                k = numbers[i]
+                row = plane.c + float(y) * plane.dy + float(x) * plane.dx
+                for s in range(offsets.shape[0]):
+                    right = wp.int64(offsets[s][0])
+                    down = wp.int64(offsets[s][1])
+                    inside = a + right * ea.dx + down * ea.dy
+                    inside = inside | (b + right * eb.dx + down * eb.dy)
+                    inside = inside | (c + right * ec.dx + down * ec.dy)
+                    if inside >= wp.int64(0):
+                        w = row + 0.00390625 * (
+                            float(offsets[s][0]) * plane.dx + float(offsets[s][1]) * plane.dy
+                        )
+                        w = wp.clamp(w, plane.low, plane.high)
+                        if w > nearness[k, s]:
+                            nearness[k, s] = w
+                            hits[k, s] = wp.vec2i(body, face)
+            a += pixel * ea.dx
+            b += pixel * eb.dx
+            c += pixel * ec.dx
+
+
+@wp.func
+def reaches(
+    floors: wp.array(dtype=float),
+    window: Window,
+    high: float,
+    p: wp.vec2i,
+    q: wp.vec2i,
+    r: wp.vec2i,
+):
+    """Whether a triangle's box holds a pixel for which its nearness of ``high`` will do."""
+    x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
+    x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
+    y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
+    y_last = wp.min(wp.max(p[1], wp.max(q[1], r[1])) >> 8, window.height - 1)
+    if (x_last - x_first) * (y_last - y_first) > 64:
+        return True
+    found = bool(False)
+    for y in range(y_first, y_last + 1):
+        for x in range(x_first, x_last + 1):
+            if high >= floors[y * window.width + x]:
+                found = True
+                break
+        if found:
+            break
+    return found
+
+
+@wp.func
+def turned(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i):
+    """Twice the signed area of a snapped triangle; positive if it need not be turned round."""
+    area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
+    return area - wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
+
+
+@wp.kernel
+def draw_samples(
+    view: View,
+    window: Window,
+    world: World,
+    p_camera: wp.array(dtype=wp.vec3),
+    xy: wp.array(dtype=wp.vec2i),
+    numbers: wp.array(dtype=int),
+    floors: wp.array(dtype=float),
+    offsets: wp.array(dtype=wp.vec2i),
+    nearness: wp.array(dtype=float, ndim=2),
+    hits: wp.array(dtype=wp.vec2i, ndim=2),
+):
+    """Z-buffer of all bodies over the samples of numbered pixels, as draw_bodies is over centres.
+
+    Args:
+        numbers: Row of each pixel in the outputs.
+        floors: Nearness below which a pixel takes nothing; UNLISTED where it has no row.
+        offsets: Sample positions, from the middle of a pixel [1/256 px].
+        nearness: 1/z [1/m], to be 0 at first.
+        hits: Unchanged where nothing is hit.
+    """
+    b = wp.tid()
+    geometry = world.geometries[world.bodies[b].geometry]
+    first = world.bodies[b].first_vertex
+    for f in range(geometry.face_slots.shape[0]):
+        i = first + geometry.faces[3 * f]
+        j = first + geometry.faces[3 * f + 1]
+        k = first + geometry.faces[3 * f + 2]
+        if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
+            z = wp.min(p_camera[i][2], wp.min(p_camera[j][2], p_camera[k][2]))
+            if reaches(floors, window, 1.0 / z, xy[i], xy[j], xy[k]):
+                area = turned(xy[i], xy[j], xy[k])
+                q = wp.where(area > wp.int64(0), xy[j], xy[k])
+                r = wp.where(area > wp.int64(0), xy[k], xy[j])
+                if area != wp.int64(0):
+                    plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+                    draw_samples_of(
+                        numbers,
+                        floors,
+                        window,
+                        offsets,
+                        xy[i],
+                        q,
+                        r,
+                        plane,
+                        b,
+                        f,
+                        nearness,
+                        hits,
+                    )
+        elif not beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
+            polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
+            plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+            plane.high = 1.0 / Z_NEAR_M
+            for t in range(1, corners - 1):
+                p = snapped(view, polygon[0])
+                q = snapped(view, polygon[t])
+                r = snapped(view, polygon[t + 1])
+                area = turned(p, q, r)
+                if area < wp.int64(0):
+                    q = snapped(view, polygon[t + 1])
+                    r = snapped(view, polygon[t])
+                if area != wp.int64(0):
+                    draw_samples_of(
+                        numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
+                    )
+
+
+@wp.func
+def lender(view: View, world: World, images: Images, x: int, y: int, hit: wp.vec2i):
+    """The pixel around (x, y) that lends its colour to a sample; -1 if none sees its body."""
+    source = int(-1)
+    same_face = bool(False)
+    others = int(0)
+    for k in range(9):
+        j = nearby(view, x, y, k)
+        if not same_face and images.hits[j][0] == hit[0]:
+            if images.hits[j][1] == hit[1] or hit[0] < 0:
+                same_face = True
+                source = j
+            else:
+                others += 1
+                if source < 0:
+                    source = j
+    if not same_face and others > 1:
+        b = hit[0]
+        corner = corners_of(world, world.bodies[b].geometry, hit[1])
+        p = vertex_at(world, world.bodies[b].geometry, corner[0])
+        e1 = vertex_at(world, world.bodies[b].geometry, corner[1]) - p
+        e2 = vertex_at(world, world.bodies[b].geometry, corner[2]) - p
+        n = world.bodies[b].R_world_mesh @ wp.normalize(wp.cross(e1, e2))
+        source = most_alike(view, images, x, y, source, n)
+    return source
+
+
+@wp.kernel
+def mix_samples(
+    view: View,
+    world: World,
+    images: Images,
+    radiance: wp.array(dtype=wp.vec3),
+    pixels: wp.array(dtype=int),
+    hits: wp.array(dtype=wp.vec2i, ndim=2),
+    exposure: float,
+    curve: wp.array(dtype=wp.uint8),
+    rgb: wp.array(dtype=wp.uint8, ndim=2),
+):
+    """Replace the bytes of listed pixels by the mean over their samples."""
+    row = wp.tid()
+    i = pixels[row]
+    x = i % view.width
+    y = i / view.width
+    total = wp.vec3(0.0)
+    weights = float(0.0)
+    last = wp.vec2i(-2, -2)
+    source = int(-1)
+    for s in range(hits.shape[1]):
+        hit = hits[row, s]
+        if hit[0] != last[0] or hit[1] != last[1]:
+            source = lender(view, world, images, x, y, hit)
+            last = hit
+        if source >= 0:
+            exposed = radiance[source] * exposure
+            w = tone_weight(exposed)
+            total += exposed * w
+            weights += w
+    if weights > 0.0:
+        mean = total * (1.0 / weights)
+        rgb[i, 0] = developed(mean[0], curve)
+        rgb[i, 1] = developed(mean[1], curve)
+        rgb[i, 2] = developed(mean[2], curve)
