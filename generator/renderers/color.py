@@ -19,12 +19,8 @@ from generator.renderers.packing import PackedWorld
 from generator.renderers.precipitation import draw_precipitation
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
-<<<<<<< HEAD
-from generator.renderers.visibility import Seen
-from generator.renderers.weather import expose_ground, fill_air
-=======
 from generator.renderers.visibility import Projected, Seen
->>>>>>> 1ab8ef7715bc91ac7ffb049e3dbe732517107de3
+from generator.renderers.weather import expose_ground, fill_air
 
 # Column of the sample in each row of a pixel, far from that of the rows beside it.
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
