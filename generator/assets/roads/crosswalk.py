@@ -38,7 +38,7 @@ def crosswalk(
     span = (station_m - 0.5 * width_m, station_m + 0.5 * width_m)
     columns = deck.t_m[(deck.t_m > low + 0.4) & (deck.t_m < high - 0.4)]
     inner = (low + 0.36, *(float(t) for t in columns), high - 0.36)
-    patches = [deck.ribbon(span, inner, "asphalt", PAINT_LIFT_M + 0.001)]
+    patches = [deck.ribbon(span, inner, "asphalt", PAINT_LIFT_M + 0.0008)]
     count = int((high - low - 1.5 * ZEBRA_BAR_M) // (2.0 * ZEBRA_BAR_M)) + 1
     first = 0.5 * (low + high) - (count - 0.5) * ZEBRA_BAR_M
     for k in range(count):
@@ -46,7 +46,7 @@ def crosswalk(
         t1 = t0 + ZEBRA_BAR_M
         between = deck.t_m[(deck.t_m > t0 + 1e-4) & (deck.t_m < t1 - 1e-4)]
         bar = (t0, *(float(t) for t in between), t1)
-        patches.append(deck.ribbon(span, bar, "marking", PAINT_LIFT_M + 0.003))
+        patches.append(deck.ribbon(span, bar, "marking", PAINT_LIFT_M + 0.002))
     s, t = np.meshgrid(span, [low, high], indexing="ij")
     top = deck.at(s, t).reshape(-1, 3)
     hull = np.concatenate([top, top - np.array([0.0, 0.0, 0.02])])

@@ -71,10 +71,9 @@ def _carriageway(fan: Fan, slot: int) -> Patch:
     return _fan_patch(np.array([0.0, 0.0, fan.center_z_m]), fan.outline_m, "asphalt", slot)
 
 
-def _fan_patch(center: Array, line: Array, name: str, slot: int, closed: bool = True) -> Patch:
+def _fan_patch(center: Array, line: Array, name: str, slot: int) -> Patch:
     after = np.roll(line, -1, axis=0)
     corners = np.stack([np.broadcast_to(center, line.shape), line, after], axis=1)
-    corners = corners if closed else corners[:-1]
     return Patch(
         corners, corners[..., :2] / SCALES_M[name], np.full(len(corners), slot, dtype=np.int64)
     )
@@ -150,9 +149,10 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
         flat = arm_points(shape, arm, np.full(len(out), shape.reach_m()), out)
         fall = np.array(APRON_DROPS[1:]) * (z + APRON_FALL_M)
         ends.append(np.column_stack([flat, z - fall])[:: -1 if end == 0 else 1])
-    line = np.concatenate([ends[0], edge, ends[1]])
-    # Seen from the tip the line runs clockwise.
-    return _fan_patch(tip, line, "ground", slot, closed=False).flipped()
+    loop = np.concatenate([ends[0], edge, ends[1], tip[None]])
+    # The land is convex. It runs clockwise: with the street on its left.
+    center = np.array([*loop[:, :2].mean(axis=0), 0.0])
+    return _fan_patch(center, loop, "ground", slot).flipped()
 
 
 def _markings(
