@@ -135,6 +135,9 @@ def _prepare(pack: str) -> None:
     library = open_library()
     started_s = time.perf_counter()
     objects = [a.asset_id for a in library.find(()) if a.asset_id.startswith(f"{pack}/")]
+    for robot in library.find((), "robot"):
+        if robot.asset_id.startswith(f"{pack}/"):
+            objects += library.robot(robot.asset_id).visuals.values()
     with click.progressbar(objects, label=f"{pack}: preparing {len(objects)} objects") as bar:
         for asset_id in bar:
             library.mesh(asset_id)

@@ -74,11 +74,11 @@ def test_functions_stay_short(path: Path) -> None:
 
 
 def test_only_the_command_line_prints_and_reads_the_environment() -> None:
-    """Library code has no hidden inputs and no output of its own."""
+    """Library code has no hidden inputs and no output of its own; packs say where they are."""
     offenders = [
         f"{path.relative_to(ROOT)}: {node.attr}"
         for path in python_files(*OURS)
-        if "cli" not in path.parts
+        if "cli" not in path.parts and path != ROOT / "generator" / "assets" / "paths.py"
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Attribute)
         and isinstance(node.value, ast.Name)
