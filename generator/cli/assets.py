@@ -135,11 +135,15 @@ def _prepare(pack: str) -> None:
     library = open_library()
     started_s = time.perf_counter()
     objects = [a.asset_id for a in library.find(()) if a.asset_id.startswith(f"{pack}/")]
+    for robot in library.find((), "robot"):
+        if robot.asset_id.startswith(f"{pack}/"):
+            objects += library.robot(robot.asset_id).visuals.values()
+    if not objects:
+        return
     with click.progressbar(objects, label=f"{pack}: preparing {len(objects)} objects") as bar:
         for asset_id in bar:
             library.mesh(asset_id)
-    if objects:
-        click.echo(f"{pack}: prepared in {time.perf_counter() - started_s:.0f} s")
+    click.echo(f"{pack}: prepared in {time.perf_counter() - started_s:.0f} s")
 
 
 def _list_assets(tags: tuple[str, ...]) -> None:

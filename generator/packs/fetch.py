@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import shutil
 import subprocess
 import sys
@@ -61,10 +60,9 @@ def fetch(pack: Pack, folder: Path) -> Path:
         AssetError: the client is missing, there is no network, or it fails otherwise.
     """
     command = _command(pack)
-    environment = {**os.environ, "LC_ALL": "C"}
     try:
         done = subprocess.run(
-            command, cwd=folder, env=environment, capture_output=True, text=True,
+            command, cwd=folder, capture_output=True, text=True,
             errors="replace", timeout=_TIMEOUT_S, stdin=subprocess.DEVNULL, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
@@ -112,11 +110,13 @@ def _command(pack: Pack) -> list[str]:
             f"{pack.source} elsewhere and give it with --from FILE"
         )
     names = {"package": pack.package, "version": pack.version}
-    return start + [argument.format(**names) for argument in client.arguments]
+    # What they say is matched, so that it has to be in English.
+    english = ["/usr/bin/env", "LC_ALL=C"]
+    return english + start + [argument.format(**names) for argument in client.arguments]
 
 
 def _failed(pack: Pack, command: list[str], what: str) -> AssetError:
     return AssetError(
-        f"pack '{pack.name}': '{' '.join([Path(command[0]).name, *command[1:]])}' {what}\n"
+        f"pack '{pack.name}': '{' '.join([Path(command[2]).name, *command[3:]])}' {what}\n"
         f"  Fetch {pack.source} elsewhere and give it with --from FILE; nothing was installed"
     )

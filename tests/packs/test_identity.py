@@ -1,0 +1,80 @@
+"""A data set names the packs it may draw from, and whom it owes thanks."""
+
+from __future__ import annotations
+
+import zipfile
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from generator.assemble.recipe import PipelineFactory
+from generator.assemble.spec import load_spec
+from generator.assets.paths import packs_dir
+from generator.packs.install import install
+from generator.packs.table import Pack
+from generator.runner.identity import licences_text, plan_of
+from generator.runner.plan import compare
+from tests.packs.converters import BOX
+
+
+@pytest.fixture
+def factory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> PipelineFactory:
+    """The shipped tabletop, on a machine without packs."""
+    monkeypatch.setenv("GEN_DATA_ASSETS", str(tmp_path / "assets"))
+    return PipelineFactory(load_spec("tabletop.yaml"), n=10)
+
+
+def installed_box(tmp_path: Path, side: str) -> None:
+    """A pack with one household object."""
+    archive = tmp_path / f"{side}.zip"
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr("data/box.obj", BOX.replace("v 1", f"v {side}"))
+    pack = Pack(
+        name="boxes",
+        summary="a box",
+        client="pip",
+        package="package",
+        version="1.0",
+        sha256=sha256(archive.read_bytes()).hexdigest(),
+        licence="CC-BY-3.0",
+        wanted=("data/*",),
+        converter="tests.packs.converters:box",
+    )
+    install(pack, packs_dir(), archive)
+
+
+def test_without_packs_a_plan_names_none(factory: PipelineFactory) -> None:
+    """So that data sets of procedural assets never care."""
+    assert not [name for name in plan_of(factory).versions if name.startswith("pack ")]
+
+
+def test_a_pack_that_fits_is_part_of_the_plan_and_of_the_licences(
+    factory: PipelineFactory, tmp_path: Path
+) -> None:
+    """Its household object may lie on the table."""
+    installed_box(tmp_path, "0.1")
+    plan = plan_of(factory)
+    assert plan.versions["pack boxes"].startswith("1.0 ")
+    assert "boxes/box" in plan.assets
+    assert "| a test | CC-BY-3.0 | A. Modeller | boxes/box |" in licences_text(factory)
+
+
+def test_another_content_of_the_pack_is_another_data_set(
+    factory: PipelineFactory, tmp_path: Path
+) -> None:
+    """Resuming is refused; the difference is named."""
+    installed_box(tmp_path, "0.1")
+    before = plan_of(factory)
+    installed_box(tmp_path, "0.2")
+    differences = compare(before, plan_of(factory))
+    assert any(line.startswith("versions.pack boxes: was") for line in differences)
+    assert compare(before, before) == []
+
+
+def test_panoramas_that_may_light_a_scene_belong_to_the_data_set(
+    factory: PipelineFactory,
+) -> None:
+    """Light changes every byte."""
+    environments = [name for name in plan_of(factory).assets if name.startswith("environment/")]
+    assert environments
