@@ -91,10 +91,10 @@ def _drawn_samples(
     offsets = wp.array((parts * 256.0 - 128.0).astype(np.int32), dtype=wp.vec2i, device=device)
     window = raster.Window()
     window.width, window.height = view.width, view.height
-    inputs = [view, window, world.record, projected.p_camera, projected.xy]
+    bodies = wp.array(projected.in_view, dtype=wp.int32, device=device)
+    inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
     inputs += [numbers, floors, offsets]
-    bodies = len(world.placed)
-    wp.launch(mixing.draw_samples, bodies, inputs, [nearness, hits], device=device)
+    wp.launch(mixing.draw_samples, len(bodies), inputs, [nearness, hits], device=device)
     return hits
 
 

@@ -13,7 +13,7 @@ from generator.renderers.kernels import raster, records
 from generator.renderers.kernels.silhouette import Canvas, draw_silhouettes
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
-from generator.renderers.visibility import Seen, project
+from generator.renderers.visibility import Projected, Seen, project
 
 _NOTHING = np.zeros((0, 0), np.bool_)
 _UNSNAPPED = -(2**31)
@@ -34,8 +34,8 @@ def silhouettes(
     """
     projected = seen.projected or project(world, view, stock)
     p_camera, xy = projected.p_camera, projected.xy
-    boxes = _boxes_px(scene, world, view, p_camera.numpy(), xy.numpy())
-    canvases, size = _canvases(scene, boxes)
+    boxes = _boxes_px(scene, world, view, projected)
+    canvases, size = _canvases(scene, boxes, projected.reached)
     mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
     if len(canvases):
         drawn_into = wp.array(canvases, dtype=Canvas, device=stock.device)
@@ -57,18 +57,20 @@ def _boxes_px(
     scene: Scene,
     world: PackedWorld,
     view: records.View,
-    p_camera: NDArray[np.float32],
-    xy: NDArray[np.int32],
+    projected: Projected,
 ) -> dict[int, BoxPx]:
     """Per annotated instance, the pixels of the canvas that its vertices reach; may be empty."""
     canvas = BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, BoxPx(0, 0, 0, 0))
+    p_camera, xy = projected.p_camera.numpy(), projected.xy.numpy()
     ends = [*world.placed["first_vertex"][1:], world.vertex_count]
-    for body, first, end in zip(scene.bodies, world.placed["first_vertex"], ends, strict=True):
-        if body.instance_id in boxes:
-            reached = _reached(p_camera[first:end], xy[first:end], canvas)
-            boxes[body.instance_id] = _around(boxes[body.instance_id], reached)
+    for number in projected.reached.tolist():
+        instance_id = scene.bodies[number].instance_id
+        if instance_id in boxes:
+            part = slice(world.placed["first_vertex"][number], ends[number])
+            reached = _reached(p_camera[part], xy[part], canvas)
+            boxes[instance_id] = _around(boxes[instance_id], reached)
     return boxes
 
 
@@ -95,16 +97,19 @@ def _around(a: BoxPx, b: BoxPx) -> BoxPx:
     )
 
 
-def _canvases(scene: Scene, boxes: dict[int, BoxPx]) -> tuple[NDArray[np.void], int]:
-    """One record per body of an instance with a box, and the number of pixels of all masks."""
+def _canvases(
+    scene: Scene, boxes: dict[int, BoxPx], reached: NDArray[np.int32]
+) -> tuple[NDArray[np.void], int]:
+    """One record per reached body of an instance with a box, and the pixels of all masks."""
     first_pixels, size = {}, 0
     for instance_id, box in boxes.items():
         first_pixels[instance_id] = size
         size += box.width_px * box.height_px
     drawn = [
-        (number, body.instance_id)
-        for number, body in enumerate(scene.bodies)
-        if body.instance_id in boxes and boxes[body.instance_id].width_px
+        (number, scene.bodies[number].instance_id)
+        for number in reached.tolist()
+        if scene.bodies[number].instance_id in boxes
+        and boxes[scene.bodies[number].instance_id].width_px
     ]
     values = np.zeros(len(drawn), dtype=Canvas.numpy_dtype())
     for value, (number, instance_id) in zip(values, drawn, strict=True):

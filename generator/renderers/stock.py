@@ -16,8 +16,8 @@ from generator.renderers.lobes import lobe_albedo
 from generator.renderers.meshes import DeviceMesh, upload_mesh
 from generator.renderers.textures import DeviceTexture, upload_texture
 
-_MESH_BYTES = 128 << 20
-_TEXTURE_BYTES = 96 << 20
+_MESH_BYTES = 256 << 20
+_TEXTURE_BYTES = 160 << 20
 _ENVIRONMENT_BYTES = 32 << 20
 _SCRATCH_BYTES = 96 << 20
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from generator.renderers.kernels import raster, rays, records, surface
 from generator.renderers.packing import PackedWorld
@@ -14,13 +16,18 @@ from generator.renderers.stock import AssetStock
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Projected:
-    """All vertices of a world, body after body.
+    """The vertices of bodies in or beside an image, body after body.
 
     Attributes:
+        reached: Numbers of the bodies that may lie on a canvas of three by three images; the
+            vertices of others are left over from before.
+        in_view: Numbers of the bodies that may lie in the image.
         p_camera: In the camera frame [m].
         xy: Snapped to the image plane; see generator.renderers.kernels.raster.
     """
 
+    reached: NDArray[np.int32]
+    in_view: NDArray[np.int32]
     p_camera: wp.array
     xy: wp.array
 
@@ -77,16 +84,45 @@ def see(
 
 
 def project(world: PackedWorld, view: records.View, stock: AssetStock) -> Projected:
-    """All vertices as the camera sees them; valid until the next call."""
+    """Vertices as the camera sees them; valid until the next call."""
     count = max(world.vertex_count, 1)
     projected = Projected(
-        stock.scratch("p camera", count, wp.vec3), stock.scratch("xy", count, wp.vec2i)
+        bodies_within(world.placed, view, 1.0),
+        bodies_within(world.placed, view, 0.0),
+        stock.scratch("p camera", count, wp.vec3),
+        stock.scratch("xy", count, wp.vec2i),
     )
-    inputs = [view, world.record]
+    bodies = wp.array(projected.reached, dtype=wp.int32, device=stock.device)
+    inputs = [view, world.record, bodies]
     outputs = [projected.p_camera, projected.xy]
-    bodies = len(world.placed)
-    wp.launch(raster.project_vertices, bodies, inputs, outputs, device=stock.device)
+    wp.launch(raster.project_vertices, len(bodies), inputs, outputs, device=stock.device)
     return projected
+
+
+def bodies_within(placed: NDArray[np.void], view: records.View, margin: float) -> NDArray[np.int32]:
+    """Numbers, ascending, of the bodies whose boxes reach into the pyramid of an image.
+
+    Args:
+        placed: Body records.
+        view: The camera.
+        margin: How far the pyramid reaches beyond each side of the image, in images.
+    """
+    ends = np.stack([placed["low_m"], placed["high_m"]], axis=1).astype(np.float64)
+    picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
+    corners = ends[:, picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
+    R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
+    x, y, z = np.moveaxis(np.einsum("nki,ij->nkj", corners, R_world_camera, optimize=False), -1, 0)
+    # A pixel more than asked for swallows every rounding.
+    beyond_x, beyond_y = margin * view.width + 1.0, margin * view.height + 1.0
+    outside = [
+        z < raster.Z_NEAR_M,
+        view.fx * x + (view.cx + beyond_x) * z < 0.0,
+        view.fx * x + (view.cx - view.width - beyond_x) * z > 0.0,
+        view.fy * y + (view.cy + beyond_y) * z < 0.0,
+        view.fy * y + (view.cy - view.height - beyond_y) * z > 0.0,
+    ]
+    hidden = np.any([side.all(axis=1) for side in outside], axis=0)
+    return np.flatnonzero(~hidden).astype(np.int32)
 
 
 def _rasterise(
@@ -101,6 +137,6 @@ def _rasterise(
     hits.fill_(wp.vec2i(-1, -1))
     window = raster.Window()
     window.width, window.height = view.width, view.height
-    inputs = [view, window, world.record, projected.p_camera, projected.xy]
-    bodies = len(world.placed)
-    wp.launch(raster.draw_bodies, bodies, inputs, [nearness, hits], device=stock.device)
+    bodies = wp.array(projected.in_view, dtype=wp.int32, device=stock.device)
+    inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
+    wp.launch(raster.draw_bodies, len(bodies), inputs, [nearness, hits], device=stock.device)

@@ -95,11 +95,12 @@ def guard_distance(view: View, p: wp.vec3, plane: int):
 def project_vertices(
     view: View,
     world: World,
+    bodies: wp.array(dtype=int),
     p_camera: wp.array(dtype=wp.vec3),
     xy: wp.array(dtype=wp.vec2i),
 ):
-    """Vertices in the camera frame and on the snapped image plane, one body per thread."""
-    b = wp.tid()
+    """Vertices in the camera frame and on the snapped image plane, one listed body per thread."""
+    b = bodies[wp.tid()]
     A = world.bodies[b].A_camera_mesh
     t = world.bodies[b].t_camera_mesh
     geometry = world.geometries[world.bodies[b].geometry]
@@ -350,18 +351,19 @@ def draw_bodies(
     view: View,
     window: Window,
     world: World,
+    bodies: wp.array(dtype=int),
     p_camera: wp.array(dtype=wp.vec3),
     xy: wp.array(dtype=wp.vec2i),
     nearness: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
 ):
-    """Z-buffer of all bodies: the nearest (body, face) at every pixel centre.
+    """Z-buffer of listed bodies: the nearest (body, face) at every pixel centre.
 
     Args:
         nearness: 1/z [1/m], to be 0 at first.
         hits: Unchanged where nothing is hit.
     """
-    b = wp.tid()
+    b = bodies[wp.tid()]
     geometry = world.geometries[world.bodies[b].geometry]
     first = world.bodies[b].first_vertex
     for f in range(geometry.face_slots.shape[0]):

@@ -193,6 +193,7 @@ def draw_samples(
     view: View,
     window: Window,
     world: World,
+    bodies: wp.array(dtype=int),
     p_camera: wp.array(dtype=wp.vec3),
     xy: wp.array(dtype=wp.vec2i),
     numbers: wp.array(dtype=int),
@@ -201,7 +202,7 @@ def draw_samples(
     nearness: wp.array(dtype=float, ndim=2),
     hits: wp.array(dtype=wp.vec2i, ndim=2),
 ):
-    """Z-buffer of all bodies over the samples of numbered pixels, as draw_bodies is over centres.
+    """Z-buffer of listed bodies over the samples of numbered pixels, as draw_bodies is over centres.
 
     Args:
         numbers: Row of each pixel in the outputs.
@@ -210,7 +211,7 @@ def draw_samples(
         nearness: 1/z [1/m], to be 0 at first.
         hits: Unchanged where nothing is hit.
     """
-    b = wp.tid()
+    b = bodies[wp.tid()]
     geometry = world.geometries[world.bodies[b].geometry]
     first = world.bodies[b].first_vertex
     for f in range(geometry.face_slots.shape[0]):

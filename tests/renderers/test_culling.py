@@ -1,0 +1,120 @@
+"""What is left out before rendering is what cannot matter; and edges are where they should be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.core.capture import Channel
+from generator.core.geometry import Material
+from generator.core.scene import Body, Environment, Instance, Scene
+from generator.core.se3 import SE3
+from generator.renderers.device import open_device
+from generator.renderers.meshes import boxes_around
+from generator.renderers.packing import pack_view, pack_world
+from generator.renderers.settings import RenderSettings
+from generator.renderers.stock import AssetStock
+from generator.renderers.visibility import bodies_within
+from generator.renderers.warp import WarpRenderer
+from tests.renderers.fake_library import (
+    FakeLibrary,
+    box_mesh,
+    camera_at,
+    forward_camera,
+    plane_mesh,
+    room_mesh,
+    sphere_mesh,
+)
+
+MESHES = {"box": box_mesh(), "sphere": sphere_mesh(0.5, rings=12), "room": room_mesh()}
+
+
+def ring_of_boxes() -> Scene:
+    """Boxes all around a camera, near and far, above and below."""
+    rng = np.random.default_rng(3)
+    spots = rng.uniform(-6.0, 6.0, (300, 3))
+    bodies = [Body(f"b{k}", "box", SE3(tuple(p)), 0.6, k + 1) for k, p in enumerate(spots)]
+    instances = [Instance(k + 1, f"b{k}", "box", 1, "box") for k in range(len(spots))]
+    return Scene("test", tuple(bodies), tuple(instances))
+
+
+@pytest.mark.parametrize("margin", [0.0, 1.0])
+def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
+    """Vertices are projected by Intrinsics, the project's own reference; most bodies are left out."""
+    scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
+    stock = AssetStock(FakeLibrary(MESHES), open_device("cpu"))
+    kept = set(bodies_within(pack_world(scene, camera, stock).placed, pack_view(camera), margin))
+    size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
+    needed = set()
+    for number, body in enumerate(scene.bodies):
+        vertices = body.T_world_body.apply(MESHES["box"].vertices_m.astype(float) * body.scale)
+        image = camera.intrinsics.project(camera.T_world_camera.inverse().apply(vertices))
+        inside = (image > -margin * size) & (image < (1.0 + margin) * size)
+        if inside.all(axis=-1).any():
+            needed.add(number)
+    assert needed <= kept
+    assert len(kept) < 0.5 * len(scene.bodies)
+
+
+def test_labels_do_not_depend_on_bodies_out_of_view() -> None:
+    """The same image and silhouettes with and without what lies behind the camera."""
+    scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
+    forward = camera.T_world_camera.rotation()[:, 2]
+    ahead = [b for b in scene.bodies if np.dot(b.T_world_body.translation_m, forward) > -0.6]
+    ids = {body.instance_id for body in ahead}
+    fewer = Scene("test", tuple(ahead), tuple(i for i in scene.instances if i.instance_id in ids))
+    wanted = frozenset({Channel.INSTANCE, Channel.Z_DEPTH, Channel.AMODAL})
+    renderer = WarpRenderer(FakeLibrary(MESHES), "cpu")
+
+    with_all, without = (renderer.render(s, camera, wanted) for s in (scene, fewer))
+
+    for channel in (Channel.INSTANCE, Channel.Z_DEPTH):
+        np.testing.assert_array_equal(with_all.channels[channel], without.channels[channel])
+    for instance_id in ids:
+        a, b = with_all.silhouettes[instance_id], without.silhouettes[instance_id]
+        assert (a.x_px, a.y_px) == (b.x_px, b.y_px)
+        np.testing.assert_array_equal(a.mask, b.mask)
+
+
+@pytest.mark.parametrize("name", sorted(MESHES))
+def test_every_face_lies_in_one_of_the_boxes(name: str) -> None:
+    """All three corners of each face in the same box."""
+    mesh = MESHES[name]
+    lows, highs = boxes_around(mesh.vertices_m, mesh.faces)
+    corners = mesh.vertices_m[mesh.faces]
+    within = (corners[:, None] >= lows[None, :, None]) & (corners[:, None] <= highs[None, :, None])
+    assert within.all(axis=(2, 3)).any(axis=1).all()
+    assert len(lows) <= len(mesh.faces)
+
+
+@pytest.mark.parametrize("visibility", ["raster", "rays"])
+def test_a_pixel_on_an_edge_is_mixed_by_coverage(visibility: str) -> None:
+    """A glowing square whose left edge leaves a quarter, half, three quarters of a pixel column.
+
+    Emission is the only light and exposure linear, so bytes tell the coverage: the samples of 4
+    rooks give exact quarters.
+    """
+    glow = Material((0.0, 0.0, 0.0), 1.0, specular=0.0, emission_cd_m2=(0.6, 0.6, 0.6))
+    meshes = {"square": plane_mesh(10.0, (glow,))}
+    dark = Environment(luminance_cd_m2=0.0, visible=False)
+    # Luminance 1.2 saturates at an exposure value of 0.
+    camera = replace(forward_camera(focal_px=64.0), ev100=0.0)
+    for quarters in (1, 2, 3):
+        edge_m = (1.0 - quarters / 4.0) / 64.0
+        pose = SE3((edge_m + 5.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0))
+        scene = Scene("test", (Body("square", "square", pose),), environment=dark)
+        settings = RenderSettings(visibility=visibility, tone="srgb", antialias=4)
+        reading = WarpRenderer(FakeLibrary(meshes), "cpu", settings).render(
+            scene, camera, frozenset({Channel.RGB})
+        )
+        row = reading.channels[Channel.RGB][24, :, 0].astype(int)
+        # Bright samples weigh less, by 1 / (1 + luminance), before the curve.
+        covered, exposed = quarters / 4.0, 0.5
+        bright = covered / (1.0 + exposed)
+        mean = exposed * bright / (bright + 1.0 - covered)
+        expected = 255.0 * (1.055 * mean ** (1.0 / 2.4) - 0.055)
+        assert row[31] == 0
+        assert row[34] == pytest.approx(188, abs=1)
+        assert row[32] == pytest.approx(expected, abs=2)
