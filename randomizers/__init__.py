@@ -24,6 +24,8 @@ TABLE = PluginTable(
         "street_lights": "randomizers.street_lights:StreetLights",
         "textures": "randomizers.textures:Textures",
         "time_of_day": "randomizers.time_of_day:TimeOfDay",
+        "vehicle_lights": "randomizers.vehicle_lights:VehicleLights",
+        "vehicle_paint": "randomizers.vehicle_paint:VehiclePaint",
         "weather": "randomizers.weather:Weather",
         "traffic_lights": "randomizers.traffic_lights:TrafficLights",
     },

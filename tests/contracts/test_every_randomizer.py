@@ -31,6 +31,7 @@ GIVEN: dict[str, dict[str, Any]] = {
     "materials": {"probability": True},
     "street_lights": {"when": "always"},
     "textures": {"textures": ["wood"], "probability": True},
+    "vehicle_lights": {"head_lights": True},
 }
 """Fields without which a randomizer cannot be made, or may leave a scene as it is."""
 
@@ -39,7 +40,7 @@ PHYSICS_BOUND = ("along", "arm_configuration", "distractors", "objects", "physic
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, distractors, a street lamp, a traffic light and two cameras."""
+    """A room with a table, an arm, objects, a lamp, a signal, a car and two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -57,9 +58,10 @@ def nominal_scene() -> Scene:
     scene = build("test", elements, FakeAssets())
     lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
     signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
+    car = Body("along/car", "car", SE3((-3.0, 5.0, 0.0)), group="along")
     return replace(
         scene,
-        bodies=(*scene.bodies, lamp, signal),
+        bodies=(*scene.bodies, lamp, signal, car),
         cameras=cameras,
         lanes=lanes,
         groups=(*scene.groups, group),

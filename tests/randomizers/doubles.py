@@ -47,6 +47,16 @@ class Thing:
 
 PRINTED = Material(texture="texture/label?seed=1", printed=True)
 LENSES = tuple(Material(role=f"lens_{color}") for color in ("red", "yellow", "green"))
+VEHICLE_ROLES = (
+    "paint",
+    "glass",
+    "headlight",
+    "taillight",
+    "brakelight",
+    "indicator_left",
+    "indicator_right",
+    "trim",
+)
 THINGS = {
     "brick": Thing("brick", (0.06, 0.03, 0.02), stackable=True),
     "can?seed=0": Thing("can", (0.066, 0.066, 0.12), stackable=True, materials=(PRINTED,)),
@@ -56,6 +66,13 @@ THINGS = {
     "bolt": Thing("bolt", (0.02, 0.02, 0.05), ("part",), 0.05),
     "nut": Thing("nut", (0.03, 0.03, 0.015), ("part",), 0.02, stackable=True),
     "signal": Thing("traffic_light", (0.3, 0.3, 3.0), ("street_furniture",), materials=LENSES),
+    "car": Thing(
+        "car",
+        (4.4, 1.8, 1.5),
+        ("vehicle",),
+        1400.0,
+        materials=tuple(Material(role=role) for role in VEHICLE_ROLES),
+    ),
     "odd": Thing("odd", (0.05, 0.07, 0.09), ("random_shape",)),
 }
 TEXTURES = {
@@ -125,7 +142,13 @@ class FakeAssets:
         return (-x / 2, -y / 2, 0.0), (x / 2, y / 2, height[0] if height else 0.0)
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
-        """A street lamp has its lamp at the top; nothing else has any."""
+        """A street lamp has its lamp at the top, a car its lights at its ends."""
+        if asset_id == "car":
+            return tuple(
+                Keypoint(f"{kind}_{side}", (x, y, 0.7))
+                for kind, x in (("headlight", 2.2), ("taillight", -2.2))
+                for side, y in (("left", 0.7), ("right", -0.7))
+            )
         return (Keypoint("lamp", (1.5, 0.0, 6.0)),) if asset_id == "street_lamp" else ()
 
     def robot(self, asset_id: str) -> RobotModel:
