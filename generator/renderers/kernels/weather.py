@@ -90,7 +90,8 @@ def mean_color(world: World, surface: int):
     color = world.surfaces[surface].base_color
     texture = world.surfaces[surface].texture
     if texture >= 0:
-        color = wp.cw_mul(color, texel_at(world, texture, sampler_of(world, texture, 30.0), 0.5, 0.5, False).albedo)
+        coarsest = sampler_of(world, texture, 30.0)
+        color = wp.cw_mul(color, texel_at(world, texture, coarsest, 0.5, 0.5, False).albedo)
     return color
 
 
