@@ -51,6 +51,7 @@ class Along(RandomizerBase):
     Attributes:
         group: Name of the template's group; empty = the randomizer's own name.
         lanes: Only lanes of these kinds; empty = those of the group.
+        roads: Only lanes of the elements with these names; empty = all.
         gap_m: Free length between neighbours of a row.
         rows: How often every lane is walked: people go abreast.
         used: Whether a place is used: how full a parking lane is.
@@ -70,6 +71,7 @@ class Along(RandomizerBase):
     every: Literal["scene"] = "scene"
     group: str = ""
     lanes: tuple[LaneKind, ...] = ()
+    roads: tuple[str, ...] = ()
     gap_m: NonNegative = Uniform(3.0, 30.0)
     rows: int = Field(1, ge=1, le=8)
     used: Flag = Constant(True)
@@ -96,7 +98,9 @@ class Along(RandomizerBase):
         lines = [
             LaneLine(lane)
             for lane in scene.lanes
-            if lane.kind in kinds and (self.junctions or not lane.junction)
+            if lane.kind in kinds
+            and (self.junctions or not lane.junction)
+            and (not self.roads or lane.road in self.roads)
         ]
         roads = {lane.road for lane in scene.lanes}
         ground = ground_of(

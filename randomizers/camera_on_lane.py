@@ -37,6 +37,7 @@ class CameraOnLane(RandomizerBase):
 
     Attributes:
         lanes: Kinds of the lanes it may be on.
+        roads: Names of the elements whose lanes it may be on; empty = all.
         height_m: Over the ground.
         lateral: Across the lane: -1 right edge, 0 middle, 1 left edge.
         yaw_deg: Turn to the left of the lane's direction.
@@ -55,6 +56,7 @@ class CameraOnLane(RandomizerBase):
     type: Literal["camera_on_lane"] = "camera_on_lane"
     every: Literal["scene", "view"] = "view"
     lanes: tuple[LaneKind, ...] = ("driving",)
+    roads: tuple[str, ...] = ()
     height_m: Positive = Constant(1.65)
     lateral: Annotated[Scalar, Bounds(-1, 1)] = Constant(0.0)
     yaw_deg: Scalar = Normal(0.0, 1.0, clip=(-3.0, 3.0))
@@ -74,7 +76,11 @@ class CameraOnLane(RandomizerBase):
             LayoutRejected: no free place was found.
         """
         lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
-        lines = [line for line in lines if not line.lane.junction]
+        lines = [
+            line
+            for line in lines
+            if not line.lane.junction and (not self.roads or line.lane.road in self.roads)
+        ]
         if not lines:
             known = ", ".join(sorted({lane.kind for lane in scene.lanes})) or "none"
             raise ConfigError(

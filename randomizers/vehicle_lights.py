@@ -20,9 +20,10 @@ _WHITE: Vec3 = (1.02, 1.0, 0.94)
 _RED: Vec3 = (4.2, 0.14, 0.06)
 _AMBER: Vec3 = (2.35, 0.66, 0.02)
 """Linear RGB of luminance 1."""
-_DOWN = 0.132
-"""Slope of a beam's axis: a cone that ends just above the cut-off, 1.2 % down (UN R48)."""
-_CONE_RAD = 0.5
+_DOWN = 0.035
+"""Slope of a beam's axis; its upper half stands for the stray light above the cut-off."""
+_CONE_RAD = 0.3
+_EVEN = 0.0
 _OUTSIDE_M = 0.06
 
 
@@ -120,6 +121,7 @@ def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
         intensity_cd=round(beam_cd, 3),
         radius_m=0.05,
         cone_rad=_CONE_RAD,
+        even=_EVEN,
     )
 
 

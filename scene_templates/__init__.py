@@ -22,6 +22,7 @@ TABLE = PluginTable(
         "robot": "scene_templates.robot:Robot",
         "room": "scene_templates.room:Room",
         "shelf": "scene_templates.shelf:Shelf",
+        "signals": "scene_templates.signals:Signals",
         "surface": "scene_templates.surface:SurfaceElement",
     },
 )

@@ -212,7 +212,8 @@ class Light:
         illuminance_lux: On a surface that faces it [lx] (sun).
         radius_m: Of the ball: its softness (sphere, spot).
         angular_radius_rad: Of the disc in the sky (sun).
-        cone_rad: Half angle at which a spot has faded to nothing; fades from 0.8 of it.
+        cone_rad: Half angle at which a spot has faded to nothing.
+        even: Share of the cone within which a spot is even; outside it fades.
     """
 
     name: str
@@ -225,6 +226,7 @@ class Light:
     radius_m: float = 0.05
     angular_radius_rad: float = 0.00465
     cone_rad: float = 0.6
+    even: float = 0.8
 
 
 @dataclass(frozen=True, slots=True)

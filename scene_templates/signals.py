@@ -1,0 +1,71 @@
+"""Traffic lights of a junction."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import Field
+
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetIndex
+from generator.core.lanes import LaneLine
+from generator.core.scene import Lane, Scene
+from generator.core.se3 import SE3
+from scene_templates.element import Element, parametric, standing, with_static
+
+SIGNAL_M = 0.6
+"""From the kerb to the pole."""
+
+
+class Signals(Element):
+    """A traffic light beside every road that comes to a junction, facing those who come.
+
+    Attributes:
+        junction: Name of the junction; its roads are listed before.
+        mount: Where the lights hang: on poles, or on arms over the road.
+        beside_m: Width between the outer lane and the kerb: parked cars and verges.
+        seed: Of the lights' make.
+        annotate: Whether labels are written for them.
+    """
+
+    type: Literal["signals"] = "signals"
+    junction: str
+    mount: Literal["pole", "mast_arm"] = "pole"
+    beside_m: float = Field(0.0, ge=0, le=20)
+    seed: int = Field(0, ge=0, le=1_000_000)
+    annotate: bool = False
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """One light per incoming road.
+
+        Raises:
+            ConfigError: no road leads to such a junction.
+        """
+        crossing = {lane.name for lane in scene.lanes if lane.road == self.junction}
+        coming = [lane for lane in scene.lanes if _enters(lane, crossing, self.junction)]
+        if not coming:
+            raise ConfigError(
+                f"elements.{self.name}.junction: no road leads to a junction '{self.junction}'; "
+                "list the junction and its roads before its signals"
+            )
+        asset = parametric("traffic_light", mount=self.mount, seed=self.seed)
+        for number, lane in enumerate(coming):
+            line = LaneLine(lane)
+            right_m = 0.5 * lane.width_m + self.beside_m + SIGNAL_M
+            stand = line.pose(line.length_m, -right_m) @ SE3.about_z(math.pi)
+            scene = with_static(
+                scene,
+                assets,
+                name=f"{self.name}/{number}",
+                asset=asset,
+                T_world_body=standing(assets, asset, stand),
+                annotated=self.annotate,
+            )
+        return scene
+
+
+def _enters(lane: Lane, crossing: set[str], junction: str) -> bool:
+    """Whether it is the outermost lane of a road that ends at the junction."""
+    outermost = lane.kind == "driving" and not lane.right and lane.road != junction
+    return outermost and bool(crossing & set(lane.successors))
