@@ -42,7 +42,7 @@ def ring_of_boxes() -> Scene:
 
 @pytest.mark.parametrize("margin", [0.0, 1.0])
 def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
-    """Vertices are projected by Intrinsics, our own reference; most bodies are left out."""
+    """Vertices are projected by Intrinsics; most bodies are left out all the same."""
     scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
     stock = AssetStock(FakeLibrary(MESHES), open_device("cpu"))
     kept = set(bodies_within(pack_world(scene, camera, stock).placed, pack_view(camera), margin))

@@ -21,7 +21,7 @@ from generator.renderers.kernels.raster import (
     span_end,
     span_start,
 )
-from generator.renderers.kernels.records import View, World, corners_of, vertex_at
+from generator.renderers.kernels.records import View, World, corners_of, lesser, vertex_at
 from generator.renderers.kernels.shade import Images
 from generator.renderers.kernels.tone import developed
 
@@ -155,30 +155,22 @@ def draw_samples_of(
 
 
 @wp.func
-def reaches(
-    floors: wp.array(dtype=float),
-    window: Window,
-    high: float,
-    p: wp.vec2i,
-    q: wp.vec2i,
-    r: wp.vec2i,
+def floor_below(
+    floors: wp.array(dtype=float), window: Window, p: wp.vec2i, q: wp.vec2i, r: wp.vec2i
 ):
-    """Whether a triangle's box holds a pixel for which its nearness of ``high`` will do."""
+    """The lowest floor in a triangle's box; 0 where the box is too large to look."""
     x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
     x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
     y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
     y_last = wp.min(wp.max(p[1], wp.max(q[1], r[1])) >> 8, window.height - 1)
-    if (x_last - x_first) * (y_last - y_first) > 64:
-        return True
-    found = bool(False)
-    for y in range(y_first, y_last + 1):
-        for x in range(x_first, x_last + 1):
-            if high >= floors[y * window.width + x]:
-                found = True
-                break
-        if found:
-            break
-    return found
+    lowest = float(UNLISTED)
+    if x_first <= x_last and y_first <= y_last:
+        if (x_last - x_first) * (y_last - y_first) > 64:
+            return 0.0
+        for y in range(y_first, y_last + 1):
+            for x in range(x_first, x_last + 1):
+                lowest = lesser(lowest, floors[y * window.width + x])
+    return lowest
 
 
 @wp.func
@@ -202,7 +194,7 @@ def draw_samples(
     nearness: wp.array(dtype=float, ndim=2),
     hits: wp.array(dtype=wp.vec2i, ndim=2),
 ):
-    """Z-buffer of listed bodies over the samples of numbered pixels, as draw_bodies is over centres.
+    """Z-buffer of listed bodies over samples of numbered pixels, as draw_bodies is over centres.
 
     Args:
         numbers: Row of each pixel in the outputs.
@@ -219,8 +211,12 @@ def draw_samples(
         j = first + geometry.faces[3 * f + 1]
         k = first + geometry.faces[3 * f + 2]
         if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
-            z = wp.min(p_camera[i][2], wp.min(p_camera[j][2], p_camera[k][2]))
-            if reaches(floors, window, 1.0 / z, xy[i], xy[j], xy[k]):
+            floor = floor_below(floors, window, xy[i], xy[j], xy[k])
+            near = bool(False)
+            if floor < UNLISTED:
+                z = wp.min(p_camera[i][2], wp.min(p_camera[j][2], p_camera[k][2]))
+                near = floor * z <= 1.0
+            if near:
                 area = turned(xy[i], xy[j], xy[k])
                 q = wp.where(area > wp.int64(0), xy[j], xy[k])
                 r = wp.where(area > wp.int64(0), xy[k], xy[j])
