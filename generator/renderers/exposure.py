@@ -13,8 +13,9 @@ from generator.core.se3 import Array
 
 _CURVE_ENTRIES = 8192
 _MIDDLE_GREY = 0.18
-# From moonlight to snow in the sun: beyond, an automatic exposure stays where it is.
-_EV100_RANGE = (-6.0, 17.0)
+# A 30th of a second at f/2 and ISO 3200, to snow in the sun: beyond, an automatic exposure stays
+# where it is, so that night stays night.
+_EV100_RANGE = (2.0, 17.0)
 # Luminances of Rec. 709 primaries.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -41,8 +42,10 @@ def automatic_ev100(radiance: Float32) -> float:
     brightest = float(luminance.max(initial=0.0))
     if brightest <= 0.0:
         return _EV100_RANGE[0]
-    # Black pixels (a missing background) say nothing about the light.
-    seen = luminance > 1e-4 * brightest
+    # Black pixels (a missing background) say nothing about the light. A lamp in the picture is no
+    # measure of black.
+    bright = float(np.quantile(luminance[luminance > 0.0], 0.95))
+    seen = luminance > 1e-4 * bright
     logs = np.log2(luminance[seen])
     average = float((logs * weights[seen]).sum() / weights[seen].sum())
     ev100 = average - math.log2(1.2 * _MIDDLE_GREY)
