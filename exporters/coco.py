@@ -1,12 +1,21 @@
-"""COCO instances: boxes and run-length masks, with 3D boxes, poses and visibility as extra keys.
+"""COCO instances and keypoints, with 3D boxes, poses, visibility and facts as extra keys.
 
 ::
 
-    annotations/instances_<split>.json      a split without images has no file
+    annotations/instances_<split>.json              a split without images has no file
+    annotations/<category>_keypoints_<split>.json   where the annotation keypoints is made
     <split>/000000012_color.png             images{file_name}; one name per sample and sensor
     <channel>/<split>/000000012_color.png   the other images of the data set: depth, instance, ...
 
-Every annotation has COCO's own keys. Further keys appear as far as their annotations are made:
+COCOeval compares keypoints of one skeleton at a time, so each category that has any gets a file
+of its own: ``person_keypoints_train.json`` is what COCO's own is. It lists all images, and of
+objects those of its category, with ``keypoints`` and ``num_keypoints`` (0 where an object has no
+keypoints); its category has ``keypoints`` and the 1-based ``skeleton``.
+
+Every annotation has COCO's own keys, and ``attributes``: the object's name, asset, subcategory
+and whatever else its asset says. Images have ``attributes`` too, the values that the draws of
+their scene had in common, and ``weather``, as far as it is not zero. Further keys appear as far
+as their annotations are made:
 
 ``amodal_bbox``, ``amodal_segmentation``
     The whole silhouette. The box may leave the image, the mask is clipped to it.
@@ -19,6 +28,8 @@ Every annotation has COCO's own keys. Further keys appear as far as their annota
     Pose of the object's own frame, 4 x 4, rows first.
 ``part_px``
     Visible pixels by part.
+``keypoints_camera_m``
+    In keypoint files: by name, positions in the camera frame.
 
 Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
 covers ``[i, i + 1)``, as COCO's boxes do; OpenCV's principal point is 0.5 px less.
@@ -31,8 +42,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal, TextIO
+from typing import Any, Literal
 
 from exporters.images import link_or_copy
 from exporters.rle import encoded
@@ -41,9 +54,11 @@ from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.sample import ImageTruth, ObjectTruth, Sample
+from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
+from generator.core.scene import Instance, Weather
 from generator.core.se3 import Array
 from generator.core.serial import canonical_json
+from generator.core.skeletons import Skeleton, skeleton_of
 
 DECIMALS = 9
 """Of metres, matrices and shares: far below what anyone can measure, and short to write."""
@@ -89,11 +104,14 @@ class Coco(Strict):
                 images = rows.setdefault(f"{sample.split}.images", [])
                 annotations = rows.setdefault(f"{sample.split}.annotations", [])
                 images.append(_image(info, sample, sensor))
-                annotations += (
-                    self._annotation(sample, sensor, truth, thing)
-                    for thing in truth.objects
-                    if thing.box is not None
-                )
+                for thing in truth.objects:
+                    if thing.box is None:
+                        continue
+                    row = self._annotation(sample, sensor, truth, thing)
+                    annotations.append(row)
+                    if thing.keypoints is not None:
+                        stem = f"{sample.split}.keypoints.{thing.instance.category_id}"
+                        rows.setdefault(stem, []).append(row | _named_points(thing.keypoints))
         folder = shard_dir / self.type
         folder.mkdir(parents=True, exist_ok=True)
         for stem, lines in rows.items():
@@ -103,14 +121,22 @@ class Coco(Strict):
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the lines of all shards, given in index order, and link the images."""
         fragments = [shard_dir / self.type for shard_dir in shard_dirs]
-        splits = {p.name.split(".")[0] for f in fragments for p in f.glob("*.images.jsonl")}
-        (dataset_dir / "annotations").mkdir(parents=True, exist_ok=True)
-        for split in sorted(splits):
-            path = dataset_dir / "annotations" / f"instances_{split}.json"
-            with path.open("w", encoding="utf-8", newline="\n") as file:
-                _write_dataset(file, _header(info), fragments, split)
-        for shard_dir in shard_dirs:
-            for split in sorted(splits):
+        splits = sorted({p.name.split(".")[0] for f in fragments for p in f.glob("*.images.jsonl")})
+        skeletons = _skeletons(fragments)
+        folder = dataset_dir / "annotations"
+        folder.mkdir(parents=True, exist_ok=True)
+        for split in splits:
+            images = partial(_joined, fragments, f"{split}.images.jsonl")
+            rows = _joined(fragments, f"{split}.annotations.jsonl")
+            header = _header(info, _categories(info))
+            _write_dataset(folder / f"instances_{split}.json", header, images(), rows)
+            for category_id, skeleton in skeletons.items():
+                lines = _joined(fragments, f"{split}.keypoints.{category_id}.jsonl")
+                name = info.categories[category_id - 1]
+                path = folder / f"{'_'.join(name.split())}_keypoints_{split}.json"
+                header = _header(info, [_keypoint_category(category_id, name, skeleton)])
+                _write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
+            for shard_dir in shard_dirs:
                 for line in _lines(shard_dir / self.type / f"{split}.images.jsonl"):
                     _link_images(json.loads(line), split, shard_dir, dataset_dir)
 
@@ -129,7 +155,7 @@ class Coco(Strict):
             "iscrowd": 0,
             "segmentation": [],
             "instance_id": instance.instance_id,
-            "attributes": {"name": instance.name, "asset": instance.asset},
+            "attributes": _facts(instance),
         }
         if self.segmentation == "rle":
             assert thing.mask is not None, "the annotation instance_masks is in `needs`"
@@ -174,10 +200,75 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "sensor": sensor,
         "K": _rows(camera.intrinsics.matrix()),
         "T_world_camera": _rows(camera.T_world_camera.matrix()),
+        "attributes": dict(sample.scene.shared),
+        "weather": _weather(sample.scene.weather),
     }
 
 
-def _header(info: DatasetInfo) -> dict[str, Any]:
+def _weather(weather: Weather) -> dict[str, float]:
+    """What of it is not zero; the seed of its patterns is no fact about the image."""
+    values = ((f.name, getattr(weather, f.name)) for f in fields(weather) if f.name != "seed")
+    return {name: round(value, DECIMALS) for name, value in values if value}
+
+
+def _facts(instance: Instance) -> dict[str, str]:
+    facts = {"name": instance.name, "asset": instance.asset}
+    if instance.subcategory:
+        facts["subcategory"] = instance.subcategory
+    return {**dict(instance.attributes), **facts}
+
+
+def _named_points(points: Sequence[KeypointTruth]) -> dict[str, Any]:
+    """As fragments hold them; what a category's points are is known when all shards are."""
+    return {
+        "points": [
+            [p.name, *(round(x, 3) for x in p.image_px), p.visibility, _rounded(p.position_m)]
+            for p in points
+        ]
+    }
+
+
+def _skeletons(fragments: Sequence[Path]) -> dict[int, Skeleton]:
+    """Skeletons by id of the categories that have keypoints, in order of the ids."""
+    names: dict[int, dict[str, None]] = {}
+    for fragment in fragments:
+        for path in sorted(fragment.glob("*.keypoints.*.jsonl")):
+            listed = names.setdefault(int(path.name.split(".")[2]), {})
+            for line in _lines(path):
+                listed.update(dict.fromkeys(point[0] for point in json.loads(line)["points"]))
+    return {number: skeleton_of(names[number]) for number in sorted(names) if names[number]}
+
+
+def _keypoint_rows(lines: Iterable[str], skeleton: Skeleton) -> Iterator[str]:
+    """Annotations with the points of the whole skeleton, absent ones as COCO's (0, 0, 0)."""
+    for line in lines:
+        row = json.loads(line)
+        points = {name: (u, v, seen, place) for name, u, v, seen, place in row.pop("points")}
+        found = [points.get(name, (0, 0, 0, None)) for name in skeleton.names]
+        row["keypoints"] = [value for u, v, seen, _ in found for value in (u, v, seen)]
+        row["num_keypoints"] = sum(seen > 0 for _, _, seen, _ in found)
+        row["keypoints_camera_m"] = {name: place for name, (*_, place) in points.items()}
+        yield canonical_json(row)
+
+
+def _categories(info: DatasetInfo) -> list[dict[str, Any]]:
+    return [
+        {"id": k, "name": name, "supercategory": "object"}
+        for k, name in enumerate(info.categories, 1)
+    ]
+
+
+def _keypoint_category(category_id: int, name: str, skeleton: Skeleton) -> dict[str, Any]:
+    return {
+        "id": category_id,
+        "name": name,
+        "supercategory": "object",
+        "keypoints": list(skeleton.names),
+        "skeleton": [[a + 1, b + 1] for a, b in skeleton.bones],
+    }
+
+
+def _header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "info": {
             "description": info.name,
@@ -188,27 +279,24 @@ def _header(info: DatasetInfo) -> dict[str, Any]:
             "pixel_centre": 0.5,
         },
         "licenses": [],
-        "categories": [
-            {"id": k, "name": name, "supercategory": "object"}
-            for k, name in enumerate(info.categories, 1)
-        ],
+        "categories": list(categories),
     }
 
 
 def _write_dataset(
-    file: TextIO, header: Mapping[str, Any], fragments: Sequence[Path], split: str
+    path: Path, header: Mapping[str, Any], images: Iterable[str], annotations: Iterable[str]
 ) -> None:
     """One JSON document, streamed: annotations of all images are never in memory together."""
-    file.write(canonical_json(header)[:-1])
-    for section in ("images", "annotations"):
-        file.write(f',\n"{section}":[')
-        separator = "\n"
-        for fragment in fragments:
-            for line in _lines(fragment / f"{split}.{section}.jsonl"):
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(canonical_json(header)[:-1])
+        for section, lines in (("images", images), ("annotations", annotations)):
+            file.write(f',\n"{section}":[')
+            separator = "\n"
+            for line in lines:
                 file.write(separator + line)
                 separator = ",\n"
-        file.write("\n]")
-    file.write("}\n")
+            file.write("\n]")
+        file.write("}\n")
 
 
 def _link_images(image: Mapping[str, Any], split: str, shard_dir: Path, dataset_dir: Path) -> None:
@@ -216,6 +304,11 @@ def _link_images(image: Mapping[str, Any], split: str, shard_dir: Path, dataset_
     for channel, target in targets.items():
         source = media_path(shard_dir, image["sensor"], Channel(channel), image["sample"])
         link_or_copy(source, dataset_dir / target)
+
+
+def _joined(fragments: Sequence[Path], name: str) -> Iterator[str]:
+    for fragment in fragments:
+        yield from _lines(fragment / name)
 
 
 def _lines(path: Path) -> Iterator[str]:

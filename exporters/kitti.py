@@ -40,6 +40,7 @@ from generator.core.errors import ConfigError, did_you_mean
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, ObjectTruth, Sample
+from generator.core.scene import Instance
 from generator.core.se3 import Array, Vec3
 
 OFFICIAL_TYPES = {
@@ -52,7 +53,11 @@ OFFICIAL_TYPES = {
     "cyclist": "Cyclist",
     "tram": "Tram",
 }
-"""KITTI's types by our category names; every other category is ``Misc``."""
+"""KITTI's types by our category names. Every other category is ``Misc``: buses, motorcycles and
+bicycles without riders too, for which KITTI has no type."""
+
+SITTING = frozenset({"sit", "sitting"})
+"""Values of a person's attribute ``pose`` that make it ``Person_sitting``."""
 
 SPLITS = ("train", "val", "test")
 FRAMES_MAX = 1_000_000
@@ -266,8 +271,8 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, types: Literal["official", 
     if min(thing.box.width_px, thing.box.height_px) < 2 or z <= 0:
         corners = _inclusive(_widened(thing.box, truth.camera.intrinsics))
         return f"DontCare -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
-    name = thing.instance.category
-    kind = OFFICIAL_TYPES.get(name.lower(), "Misc") if types == "official" else _one_word(name)
+    instance = thing.instance
+    kind = official_type(instance) if types == "official" else _one_word(instance.category)
     alpha_rad = _wrapped(box.heading_rad - math.atan2(x, z))
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
     return " ".join(
@@ -280,6 +285,13 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, types: Literal["official", 
             *map(_decimal, metric),
         )
     )
+
+
+def official_type(instance: Instance) -> str:
+    """The one of KITTI's eight types that an object is."""
+    kind = OFFICIAL_TYPES.get(_one_word(instance.category.lower()), "Misc")
+    sits = kind == "Pedestrian" and dict(instance.attributes).get("pose") in SITTING
+    return "Person_sitting" if sits else kind
 
 
 def occlusion_level(occlusion: float) -> int:
@@ -367,6 +379,8 @@ calib       P0 = P1 = P2 = P3, pixel centres at whole numbers; R0_rect = identit
 velodyne    Points of the depth image, one per {stride} x {stride} pixels (0: not written), as seen
             from {height:.2f} m above the camera; float32 x y z reflectance; reflectance is 0.
 label_2     type truncated occluded alpha left top right bottom h w l x y z rotation_y
+            Things without a type of KITTI's (buses, motorcycles) are Misc; sitting people, by
+            their attribute pose, are Person_sitting; scenery that is not annotated has no row.
             Boxes turn about the camera's y axis only: each is the smallest such box, headed like
             the object's x axis, around the object's own oriented box.
             truncated: share of the silhouette outside the image. occluded, by the hidden share of

@@ -14,6 +14,7 @@ TABLE = PluginTable(
         "boxes2d": "generator.annotations.boxes2d:Boxes2d",
         "boxes3d": "generator.annotations.boxes3d:Boxes3d",
         "instance_masks": "generator.annotations.instance_masks:InstanceMasks",
+        "keypoints": "generator.annotations.keypoints:Keypoints",
         "part_masks": "generator.annotations.part_masks:PartMasks",
         "poses": "generator.annotations.poses:Poses",
         "semantic_masks": "generator.annotations.semantic_masks:SemanticMasks",

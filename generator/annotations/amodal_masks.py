@@ -20,7 +20,7 @@ class AmodalMasks:
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``amodal_mask``, clipped to the image and tight; [0, 0] if nothing is inside."""
         camera = reading.camera.intrinsics
         silhouette = silhouette_of(reading, truth.instance)

@@ -21,6 +21,6 @@ class Boxes2d:
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``amodal_box``; ``box`` is part of every truth."""
         return replace(truth, amodal_box=silhouette_box(silhouette_of(reading, truth.instance)))

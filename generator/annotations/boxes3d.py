@@ -18,7 +18,7 @@ class Boxes3d:
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``box3d_world`` and ``box3d_camera``."""
         box_world = oriented_box(truth.instance)
         T_camera_world = reading.camera.T_world_camera.inverse()

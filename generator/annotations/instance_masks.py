@@ -19,7 +19,7 @@ class InstanceMasks:
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``mask``; its pixels fill the box exactly. Shape [0, 0] for the invisible."""
         if truth.box is None:
             return replace(truth, mask=MaskPx(0, 0, np.zeros((0, 0), dtype=bool)))

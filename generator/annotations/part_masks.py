@@ -23,7 +23,7 @@ class PartMasks:
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.PART})
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``part_px`` for an instance with parts, every part named; else None.
 
         Raises:

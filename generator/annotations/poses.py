@@ -16,7 +16,7 @@ class Poses:
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``T_camera_object``."""
         T_camera_world = reading.camera.T_world_camera.inverse()
         return replace(truth, T_camera_object=T_camera_world @ truth.instance.T_world_instance)

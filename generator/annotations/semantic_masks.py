@@ -18,7 +18,7 @@ class SemanticMasks:
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.CATEGORY})
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """The truth as it is, once the category image is known to agree with it.
 
         Raises:

@@ -45,6 +45,7 @@ def _faults(reading: Reading, truth: ObjectTruth) -> Iterator[str]:
     yield from _silhouette_faults(reading, truth, visible)
     yield from _share_faults(truth)
     yield from _pose_faults(truth)
+    yield from _keypoint_faults(reading, truth)
 
 
 def _box_faults(reading: Reading, box: BoxPx, visible: NDArray[np.bool_]) -> Iterator[str]:
@@ -97,6 +98,20 @@ def _pose_faults(truth: ObjectTruth) -> Iterator[str]:
                 yield f"its {name} has no rigid pose: {box.T_frame_box}"
     if truth.T_camera_object is not None and not _is_rigid(truth.T_camera_object):
         yield f"its T_camera_object is no rigid pose: {truth.T_camera_object}"
+
+
+def _keypoint_faults(reading: Reading, truth: ObjectTruth) -> Iterator[str]:
+    camera = reading.camera.intrinsics
+    for point in truth.keypoints or ():
+        u, v = point.image_px
+        if not all(math.isfinite(x) for x in (*point.position_m, u, v)):
+            yield f"its keypoint '{point.name}' is nowhere: {point}"
+        elif point.visibility and not (0 <= u < camera.width_px and 0 <= v < camera.height_px):
+            yield f"its keypoint '{point.name}' at ({u}, {v}) px is not in the image"
+        elif point.visibility == 0 and (u, v) != (0, 0):
+            yield f"its keypoint '{point.name}' is not in the image and has a place there"
+        if point.visibility == 2 and truth.box is None:
+            yield f"its keypoint '{point.name}' is visible and the object is not"
 
 
 def _is_tight(mask: NDArray[np.bool_]) -> bool:

@@ -24,7 +24,7 @@ class Visibility:
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:  # noqa: ARG002
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``visible_fraction``, ``occlusion`` and ``truncation``."""
         silhouette = silhouette_of(reading, truth.instance)
         outer = silhouette_box(silhouette)

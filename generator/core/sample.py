@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Capture
 from generator.core.scene import Camera, Instance, Scene
-from generator.core.se3 import SE3
+from generator.core.se3 import SE3, Vec3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,6 +27,22 @@ class MaskPx:
     x_px: int
     y_px: int
     pixels: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class KeypointTruth:
+    """One keypoint of an instance in one image.
+
+    Attributes:
+        position_m: In the camera frame.
+        image_px: Image coordinates; (0, 0) where it is not in the image.
+        visibility: COCO's: 0 not in the image, 1 in the image and hidden, 2 visible.
+    """
+
+    name: str
+    position_m: Vec3
+    image_px: tuple[float, float] = (0.0, 0.0)
+    visibility: Literal[0, 1, 2] = 0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,6 +65,7 @@ class ObjectTruth:
         occlusion: Share of the silhouette inside the image that other things hide (visibility).
         truncation: Share of the silhouette that lies outside the image (visibility).
         part_px: Visible pixels per part name, for instances with parts (part_masks).
+        keypoints: In the order of ``instance.keypoints``; empty if it has none (keypoints).
     """
 
     instance: Instance
@@ -63,6 +81,7 @@ class ObjectTruth:
     occlusion: float | None = None
     truncation: float | None = None
     part_px: Mapping[str, int] | None = None
+    keypoints: tuple[KeypointTruth, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

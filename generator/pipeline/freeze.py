@@ -66,7 +66,11 @@ def _measured(
             box_min_m=_scaled(low, body.scale),
             box_max_m=_scaled(high, body.scale),
             keypoints=tuple(
-                replace(point, position_m=_scaled(point.position_m, body.scale))
+                replace(
+                    point,
+                    position_m=_scaled(point.position_m, body.scale),
+                    radius_m=point.radius_m * body.scale,
+                )
                 for point in assets.keypoints(body.asset)
             ),
         )

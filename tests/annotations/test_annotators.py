@@ -19,7 +19,7 @@ from generator.core.capture import Channel, Reading, Silhouette
 from generator.core.errors import ConfigError, SampleError
 from generator.core.interfaces import Annotator
 from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ObjectTruth
+from generator.core.sample import KeypointTruth, ObjectTruth
 from generator.core.scene import Camera, Instance, Scene
 from generator.core.se3 import SE3, look_at
 
@@ -71,6 +71,7 @@ def scene_and_reading() -> tuple[Scene, Reading]:
         CAMERA,
         {
             Channel.INSTANCE: ids,
+            Channel.Z_DEPTH: np.where(ids == 5, 1.5, 2.0).astype(np.float32),
             Channel.CATEGORY: np.array([0, 0, 1, 0, 0, 2, 0, 0, 0, 3], np.uint16)[ids],
             Channel.PART: image({(0, 2, 6, 4): 3, (0, 4, 3, 10): 1, (4, 4, 8, 10): 0}),
         },
@@ -204,6 +205,7 @@ def test_every_annotator_fills_only_its_own_fields(name: str) -> None:
         "boxes2d": {"amodal_box"},
         "boxes3d": {"box3d_world", "box3d_camera"},
         "instance_masks": {"mask"},
+        "keypoints": {"keypoints"},
         "part_masks": {"part_px"},
         "poses": {"T_camera_object"},
         "semantic_masks": set(),
@@ -300,6 +302,11 @@ def test_without_annotators_nothing_is_annotated() -> None:
 
     assert truth.objects == ()
     assert truth.camera is CAMERA
+
+
+def keypoint(image_px: tuple[float, float], visibility: Any) -> KeypointTruth:
+    """A keypoint named ``tip``, one metre ahead."""
+    return KeypointTruth("tip", (0.0, 0.0, 1.0), image_px, visibility)
 
 
 def _moved(silhouette: Silhouette) -> Silhouette:
@@ -399,6 +406,9 @@ class _Liar:
         ({"occlusion": -0.1}, "occlusion is -0.1"),
         ({"truncation": math.nan}, "truncation is nan"),
         ({"T_camera_object": SE3((0.0, 0.0, 1.0), (1.0, 0.1, 0.0, 0.0))}, "no rigid pose"),
+        ({"keypoints": (keypoint((20.0, 3.0), 2),)}, "'tip' at .* px is not in the image"),
+        ({"keypoints": (keypoint((2.0, 3.0), 0),)}, "'tip' is not in the image and has a place"),
+        ({"keypoints": (keypoint((2.0, math.nan), 1),)}, "'tip' is nowhere"),
     ],
 )
 def test_labels_are_checked_against_the_image_whoever_made_them(

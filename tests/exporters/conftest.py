@@ -20,6 +20,7 @@ from generator import annotations
 from generator.annotations.truth import Thresholds, image_truth
 from generator.core.boxes import BoxPx, tight_box
 from generator.core.capture import Capture, Channel, Reading, Silhouette
+from generator.core.geometry import Keypoint
 from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import Sample
@@ -29,6 +30,30 @@ from generator.core.se3 import SE3, Array, look_at
 CATEGORIES = ("car", "crate", "pedestrian")
 MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
 SIZES_M = {"car": (4.0, 1.8, 1.5), "pedestrian": (0.5, 0.6, 1.8), "crate": (1.0, 1.4, 0.9)}
+
+
+def _keypoints(category: str, names: str) -> tuple[Keypoint, ...]:
+    """At left front and right rear edges of a box by turns, from the ground up, 1 cm inside."""
+    listed = names.split()
+    length, width, height = SIZES_M[category]
+    x_m, y_m = 0.5 * length - 0.01, 0.5 * width - 0.01
+    return tuple(
+        Keypoint(name, (side * x_m, side * y_m, height * (k + 0.5) / len(listed)))
+        for k, name in enumerate(listed)
+        for side in (1 - 2 * (k % 2),)
+    )
+
+
+KEYPOINTS = {
+    "car": _keypoints("car", "wheel_front_left wheel_front_right headlight_left headlight_right"),
+    "pedestrian": _keypoints(
+        "pedestrian",
+        "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow "
+        "right_elbow left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle "
+        "right_ankle",
+    ),
+}
+"""Half of a car's, all of a person's; crates have none."""
 
 
 def instance(
@@ -45,6 +70,7 @@ def instance(
         T_world_instance=SE3.about_z(yaw_rad, (x_m, y_m, 0.0)),
         box_min_m=(-0.5 * length, -0.5 * width, 0.0),
         box_max_m=(0.5 * length, 0.5 * width, height),
+        keypoints=KEYPOINTS.get(category, ()),
     )
 
 

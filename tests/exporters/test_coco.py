@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from exporters.coco import Coco
 from generator.annotations.truth import Thresholds
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
+from generator.core.scene import Weather
 from generator.core.se3 import SE3
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
@@ -89,7 +91,8 @@ def test_masks_are_the_pixels_of_the_instance_image(train: COCO, dataset: Path) 
 
 def test_ids_are_positive_and_unique_over_all_splits(dataset: Path) -> None:
     """Category ids are consecutive from 1 in the order of the data set's categories."""
-    parts = [json.loads(p.read_text()) for p in sorted((dataset / "annotations").iterdir())]
+    paths = sorted((dataset / "annotations").glob("instances_*.json"))
+    parts = [json.loads(path.read_text()) for path in paths]
     for section in ("images", "annotations"):
         ids = [row["id"] for part in parts for row in part[section]]
         assert len(ids) == len(set(ids))
@@ -114,7 +117,8 @@ def test_a_split_without_images_has_no_file(dataset: Path) -> None:
     """Readers would take an empty file for an empty data set."""
     names = {p.name for p in (dataset / "annotations").iterdir()}
 
-    assert names == {"instances_train.json", "instances_val.json"}
+    stems = ("instances", "car_keypoints", "pedestrian_keypoints")
+    assert names == {f"{stem}_{split}.json" for stem in stems for split in ("train", "val")}
 
 
 def test_images_are_links_to_the_shards(dataset: Path) -> None:
@@ -225,3 +229,107 @@ def test_a_data_set_without_colour_images_is_refused(world: Any) -> None:
 
     with pytest.raises(ConfigError, match="no sensor of color writes the rgb channel"):
         Coco().check(info)
+
+
+def object_keypoint_similarity(truth: COCO, sigmas: list[float] | None) -> float:
+    """OKS AP of the ground truth, submitted as predictions."""
+    rows = [
+        {**{k: a[k] for k in ("image_id", "category_id", "keypoints")}, "score": 1 - 1e-4 * i}
+        for i, a in enumerate(truth.dataset["annotations"])
+        if a["num_keypoints"]
+    ]
+    with contextlib.redirect_stdout(io.StringIO()):
+        evaluation = COCOeval(truth, truth.loadRes(rows), "keypoints")
+        if sigmas is not None:
+            evaluation.params.kpt_oks_sigmas = np.array(sigmas)
+        evaluation.evaluate()
+        evaluation.accumulate()
+        evaluation.summarize()
+    return float(evaluation.stats[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "sigmas"), [("pedestrian", None), ("car", [0.05] * 8)], ids=["pedestrian", "car"]
+)
+@pytest.mark.parametrize("split", ["train", "val"])
+def test_keypoints_as_predictions_score_one(
+    dataset: Path, split: str, name: str, sigmas: list[float] | None
+) -> None:
+    """COCOeval compares one skeleton at a time: each category has a file of its own."""
+    truth = opened(dataset / f"annotations/{name}_keypoints_{split}.json")
+
+    assert object_keypoint_similarity(truth, sigmas) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_keypoint_file_has_its_category_whole_and_all_images(dataset: Path, train: COCO) -> None:
+    """Boxes, masks and ids are those of the instances file; points come besides."""
+    truth = opened(dataset / "annotations/pedestrian_keypoints_train.json")
+
+    (category,) = truth.dataset["categories"]
+    assert (category["id"], category["name"]) == (3, "pedestrian")
+    assert len(category["keypoints"]) == 17
+    assert category["keypoints"][0] == "nose"
+    assert category["skeleton"][0] == [16, 14]
+    assert truth.imgs == train.imgs
+    expected = {k: row for k, row in train.anns.items() if row["category_id"] == 3}
+    added = ("keypoints", "num_keypoints", "keypoints_camera_m")
+    assert {
+        k: {name: value for name, value in row.items() if name not in added}
+        for k, row in truth.anns.items()
+    } == expected
+
+
+def test_keypoints_are_the_projections_of_their_positions(dataset: Path) -> None:
+    """Through the written K; v counts what is labelled, and visible ones lie on the mask."""
+    truth = opened(dataset / "annotations/pedestrian_keypoints_train.json")
+    (category,) = truth.dataset["categories"]
+    states = set()
+    for row in truth.anns.values():
+        k = np.array(truth.imgs[row["image_id"]]["K"])
+        mask = np.pad(truth.annToMask(row), 1)
+        points = np.array(row["keypoints"], float).reshape(-1, 3)
+        assert row["num_keypoints"] == (points[:, 2] > 0).sum()
+        for name, (u, v, state) in zip(category["keypoints"], points, strict=True):
+            states.add(state)
+            x, y, z = k @ row["keypoints_camera_m"][name]
+            if state:
+                assert (u, v) == pytest.approx((x / z, y / z), abs=1e-3)
+            else:
+                assert (u, v) == (0, 0)
+            if state == 2:
+                assert mask[int(v) : int(v) + 3, int(u) : int(u) + 3].any()
+    assert states == {0, 1, 2}
+
+
+def test_points_that_no_object_has_are_zero(dataset: Path) -> None:
+    """The cars have four of the eight points of a vehicle: tail lights and rear wheels miss."""
+    truth = opened(dataset / "annotations/car_keypoints_train.json")
+    (category,) = truth.dataset["categories"]
+
+    for row in truth.anns.values():
+        points = np.array(row["keypoints"]).reshape(-1, 3)
+        missing = [category["keypoints"].index(n) for n in ("taillight_left", "wheel_rear_right")]
+        assert not points[missing].any()
+        assert set(row["keypoints_camera_m"]) < set(category["keypoints"])
+
+
+def test_facts_of_objects_and_images_are_attributes(world: Any, tmp_path: Path) -> None:
+    """Subcategory and attributes of the asset; shared draws and weather of the scene."""
+    crate = replace(
+        world.instance(2, "crate", 8.0, 0.0, 0.0),
+        subcategory="wooden",
+        attributes=(("lid", "open"), ("name", "lost to the object's own")),
+    )
+    sample = world.sample(0, (crate,), [world.camera()])
+    weather = Weather(rain_mm_h=2.5, wetness=1.0, seed=77)
+    scene = replace(sample.scene, shared=(("lanes", 2), ("style", "modern")), weather=weather)
+
+    folder = world.export(Coco(), world.info(1), [replace(sample, scene=scene)], tmp_path)
+
+    truth = opened(folder / "annotations/instances_train.json")
+    (row,), (image,) = truth.anns.values(), truth.imgs.values()
+    assert row["attributes"] == {
+        "name": "crate/2", "asset": "primitive/box", "subcategory": "wooden", "lid": "open",
+    }  # fmt: skip
+    assert image["attributes"] == {"lanes": 2, "style": "modern"}
+    assert image["weather"] == {"rain_mm_h": 2.5, "wetness": 1.0}

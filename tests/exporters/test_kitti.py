@@ -13,7 +13,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
-from exporters.kitti import Kitti, calib_text, label_row, occlusion_level, upright_box
+from exporters.kitti import (
+    Kitti,
+    calib_text,
+    label_row,
+    occlusion_level,
+    official_type,
+    upright_box,
+)
 from generator.annotations.truth import Thresholds
 from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Channel
@@ -133,6 +140,30 @@ def test_a_row_has_fifteen_columns_with_one_blank_between() -> None:
         "Crate_box 0.26 1 -0.643501 10.00 20.00 29.00 29.00 "
         "0.600000 2.000000 1.000000 3.000000 0.800000 4.000000 0.000000"
     )
+
+
+@pytest.mark.parametrize(
+    ("category", "pose", "kind"),
+    [
+        ("car", "", "Car"),
+        ("Van", "", "Van"),
+        ("truck", "", "Truck"),
+        ("bus", "", "Misc"),
+        ("motorcycle", "", "Misc"),
+        ("person", "", "Pedestrian"),
+        ("person", "walk", "Pedestrian"),
+        ("person", "sit", "Person_sitting"),
+        ("pedestrian", "sitting", "Person_sitting"),
+        ("person sitting", "", "Person_sitting"),
+        ("cyclist", "sit", "Cyclist"),
+        ("tram", "", "Tram"),
+    ],
+)
+def test_categories_become_the_types_of_kittis_own(category: str, pose: str, kind: str) -> None:
+    """The eight names in the devkit's readme.txt; what has none of them is Misc."""
+    attributes = (("pose", pose),) if pose else ()
+
+    assert official_type(Instance(1, "it", category, 1, "it", attributes=attributes)) == kind
 
 
 @pytest.mark.parametrize(

@@ -247,7 +247,7 @@ def test_freezing_fills_ids_frames_and_boxes() -> None:
     assert (cup.category_id, arm.category_id) == (1, 2)
     assert cup.T_world_instance == quarter
     assert (cup.subcategory, dict(cup.attributes)) == ("small", {"lid": "shut", "state": "new"})
-    assert cup.keypoints == (Keypoint("top", (0.0, 0.0, 0.06)),)
+    assert cup.keypoints == (Keypoint("top", (0.0, 0.0, 0.06), 0.1),)
     assert cup.box_max_m == pytest.approx((0.02, 0.04, 0.06))
     assert arm.T_world_instance == SE3((0.0, 0.0, -1.0))
     assert arm.box_min_m == pytest.approx((-0.01, -0.02, 0.97), abs=1e-6)

@@ -1,0 +1,69 @@
+"""Which keypoints belong together, in which order, and which of them bones join."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """Names in the order in which formats list them, and bones as pairs of indices from 0."""
+
+    names: tuple[str, ...]
+    bones: tuple[tuple[int, int], ...] = ()
+
+
+def _joined(names: str, bones: str) -> Skeleton:
+    listed = tuple(names.split())
+    pairs = (bone.split("-") for bone in bones.split())
+    return Skeleton(listed, tuple((listed.index(a), listed.index(b)) for a, b in pairs))
+
+
+PERSON = _joined(
+    "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow "
+    "right_elbow left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle "
+    "right_ankle",
+    "left_ankle-left_knee left_knee-left_hip right_ankle-right_knee right_knee-right_hip "
+    "left_hip-right_hip left_shoulder-left_hip right_shoulder-right_hip "
+    "left_shoulder-right_shoulder left_shoulder-left_elbow right_shoulder-right_elbow "
+    "left_elbow-left_wrist right_elbow-right_wrist left_eye-right_eye nose-left_eye "
+    "nose-right_eye left_eye-left_ear right_eye-right_ear left_ear-left_shoulder "
+    "right_ear-right_shoulder",
+)
+"""The 17 points and 19 bones of COCO's category ``person`` (person_keypoints_val2017.json)."""
+
+VEHICLE = _joined(
+    "wheel_front_left wheel_front_right wheel_rear_left wheel_rear_right headlight_left "
+    "headlight_right taillight_left taillight_right",
+    "wheel_front_left-wheel_front_right wheel_rear_left-wheel_rear_right "
+    "wheel_front_left-wheel_rear_left wheel_front_right-wheel_rear_right "
+    "headlight_left-headlight_right taillight_left-taillight_right "
+    "wheel_front_left-headlight_left wheel_front_right-headlight_right "
+    "wheel_rear_left-taillight_left wheel_rear_right-taillight_right",
+)
+
+TWO_WHEELER = _joined(
+    "wheel_front wheel_rear headlight taillight",
+    "wheel_front-wheel_rear wheel_front-headlight wheel_rear-taillight",
+)
+
+CYCLIST = _joined(
+    " ".join(PERSON.names + TWO_WHEELER.names),
+    " ".join(f"{s.names[a]}-{s.names[b]}" for s in (PERSON, TWO_WHEELER) for a, b in s.bones),
+)
+"""A rider and what is ridden."""
+
+KNOWN = (PERSON, VEHICLE, TWO_WHEELER, CYCLIST)
+
+
+def skeleton_of(names: Iterable[str]) -> Skeleton:
+    """The first known skeleton that has all the names; else just the names, in their order.
+
+    A category's points are thus the same in every data set, even where one of them never occurs.
+    """
+    listed = tuple(dict.fromkeys(names))
+    for skeleton in KNOWN:
+        if set(listed) <= set(skeleton.names):
+            return skeleton
+    return Skeleton(listed)

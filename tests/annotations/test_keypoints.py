@@ -1,0 +1,146 @@
+"""Visibility of keypoints in images drawn by hand: one camera at the origin that looks along +Z."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from generator.annotations.keypoints import Keypoints
+from generator.annotations.truth import Thresholds, image_truth
+from generator.core.capture import Channel, Reading
+from generator.core.geometry import Keypoint
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import KeypointTruth
+from generator.core.scene import Camera, Instance, Scene
+from generator.core.se3 import IDENTITY, SE3
+from generator.core.skeletons import PERSON, VEHICLE, skeleton_of
+
+W, H = 20, 12
+CAMERA = Camera("color", IDENTITY, Intrinsics(W, H, 10.0, 10.0, 10.0, 6.0))
+PANEL, SCREEN = 1, 2
+
+
+def seen(
+    *points: Keypoint, T_world_instance: SE3 = IDENTITY, screen_m: float = 1.0
+) -> tuple[KeypointTruth, ...]:
+    """Keypoints of a panel 2 m ahead that fills columns 5 to 15 and rows 2 to 10.
+
+    A screen ``screen_m`` ahead covers its columns from 12 on; the wall is 5 m away.
+    """
+    ids = np.zeros((H, W), np.uint16)
+    ids[2:10, 5:15] = PANEL
+    ids[2:10, 12:15] = SCREEN
+    depth_m = np.array([5.0, 2.0, screen_m], np.float32)[ids]
+    panel = Instance(
+        PANEL, "panel", "panel", 1, "panel", T_world_instance=T_world_instance, keypoints=points
+    )
+    reading = Reading("color", CAMERA, {Channel.INSTANCE: ids, Channel.Z_DEPTH: depth_m})
+    scene = Scene("panel", instances=(panel,))
+    (truth,) = image_truth(scene, reading, [Keypoints()], Thresholds()).objects
+    assert truth.keypoints is not None
+    return truth.keypoints
+
+
+def visibility(x_m: float, y_m: float, z_m: float, **changes: float) -> int:
+    """Of one point of radius 5 cm."""
+    (point,) = seen(Keypoint("tip", (x_m, y_m, z_m), 0.05), **changes)
+    return point.visibility
+
+
+def test_a_point_on_the_surface_is_visible_at_its_projection() -> None:
+    """(0.3, -0.2, 2) m with a focal length of 10 px: 1.5 px right of, 1 px above (10, 6)."""
+    (point,) = seen(Keypoint("tip", (0.3, -0.2, 2.0)))
+
+    assert point == KeypointTruth("tip", (0.3, -0.2, 2.0), (11.5, 5.0), 2)
+
+
+def test_positions_follow_the_instance() -> None:
+    """A quarter turn about Z: the point's x becomes y, then the instance is moved."""
+    turned = SE3.about_z(np.pi / 2, (-0.2, -0.3, 2.0))
+
+    (point,) = seen(Keypoint("tip", (0.4, 0.0, 0.0)), T_world_instance=turned)
+
+    assert point.position_m == pytest.approx((-0.2, 0.1, 2.0))
+    assert point.image_px == pytest.approx((9.0, 6.5))
+
+
+@pytest.mark.parametrize(("depth_m", "expected"), [(1.9, 2), (2.04, 2), (2.06, 1), (3.0, 1)])
+def test_a_point_below_its_own_surface_is_visible_down_to_its_radius(
+    depth_m: float, expected: int
+) -> None:
+    """On the optical axis; behind more than 5 cm of the object it is hidden by the object."""
+    assert visibility(0.0, 0.0, depth_m) == expected
+
+
+def test_depth_below_the_surface_is_measured_along_the_ray() -> None:
+    """At (0.9, 0.7, 2) times 1.02 the ray runs 4.6 cm below the surface; at 1.025, 5.7 cm."""
+    assert visibility(-0.9 * 1.02, 0.7 * 1.02, 2.0 * 1.02) == 2
+    assert visibility(-0.9 * 1.025, 0.7 * 1.025, 2.0 * 1.025) == 1
+
+
+def test_a_point_behind_something_else_is_hidden() -> None:
+    """And so is one at the border of it, whose neighbour shows the panel."""
+    assert visibility(0.7, 0.0, 2.0) == 1
+    assert visibility(0.41, 0.0, 2.0) == 1
+    assert visibility(0.39, 0.0, 2.0) == 2
+
+
+def test_a_point_in_front_of_what_covers_the_panel_counts_as_silhouette() -> None:
+    """The screen is 3 m away: the ray misses the panel by one pixel, or by two."""
+    assert visibility(0.41, 0.0, 2.0, screen_m=3.0) == 2
+    assert visibility(0.61, 0.0, 2.0, screen_m=3.0) == 1
+
+
+@pytest.mark.parametrize(
+    ("place_m", "expected"),
+    [((-1.01, 0.0, 2.0), 2), ((-1.21, 0.0, 2.0), 1), ((0.0, -0.81, 2.0), 2), ((0.0, -1.1, 2.0), 1)],
+)
+def test_a_ray_that_misses_the_silhouette_by_a_pixel_is_visible(
+    place_m: tuple[float, float, float], expected: int
+) -> None:
+    """One pixel beside the panel's left and upper edge, and two."""
+    assert visibility(*place_m) == expected
+
+
+@pytest.mark.parametrize(
+    "place_m", [(-2.01, 0.0, 2.0), (2.0, 0.0, 2.0), (0.0, 1.2, 2.0), (0.0, 0.0, -2.0), (0, 0, 0)]
+)
+def test_a_point_outside_the_image_or_behind_the_camera_is_at_zero(
+    place_m: tuple[float, float, float],
+) -> None:
+    """The image covers [0, 20) x [0, 12); its camera position is known all the same."""
+    (point,) = seen(Keypoint("tip", place_m))
+
+    assert (point.image_px, point.visibility) == ((0.0, 0.0), 0)
+    assert point.position_m == place_m
+
+
+def test_the_first_pixel_belongs_to_the_image() -> None:
+    """(-2, -1.2, 2) m is its very corner."""
+    assert visibility(-2.0, -1.2, 2.0) == 1
+
+
+def test_points_keep_the_instances_order() -> None:
+    """Formats list them by position."""
+    names = ["b", "a", "c"]
+
+    assert [p.name for p in seen(*(Keypoint(n, (0.0, 0.0, 2.0)) for n in names))] == names
+
+
+def test_the_persons_skeleton_is_cocos() -> None:
+    """Bones as person_keypoints_val2017.json lists them, from 1."""
+    official = [
+        [16, 14], [14, 12], [17, 15], [15, 13], [12, 13], [6, 12], [7, 13], [6, 7], [6, 8],
+        [7, 9], [8, 10], [9, 11], [2, 3], [1, 2], [1, 3], [2, 4], [3, 5], [4, 6], [5, 7],
+    ]  # fmt: skip
+
+    assert [[a + 1, b + 1] for a, b in PERSON.bones] == official
+
+
+def test_a_skeleton_is_found_by_any_of_its_names() -> None:
+    """And unknown names are a skeleton without bones, in their own order."""
+    assert skeleton_of(["headlight_left", "wheel_rear_left"]) is VEHICLE
+    assert skeleton_of(["right_knee"]) is PERSON
+    assert skeleton_of(["lid", "handle", "lid"]).names == ("lid", "handle")
+    assert skeleton_of(["lid"]).bones == ()
+    assert len(skeleton_of([*PERSON.names, "wheel_front"]).names) == 21
