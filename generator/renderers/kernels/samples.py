@@ -85,6 +85,31 @@ def side_of(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
 
 
 @wp.func
+def span_from(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side, ec: Side):
+    """The first pixel of a row from 0 to ``last`` that edges with values a, b, c may reach."""
+    start = int(0)
+    # Shorter rows are looked at one by one.
+    if last > 8:
+        pixel = wp.int64(256)
+        start = span_start(a + ea.reach, pixel * ea.dx, start)
+        start = span_start(b + eb.reach, pixel * eb.dx, start)
+        start = span_start(c + ec.reach, pixel * ec.dx, start)
+    return start
+
+
+@wp.func
+def span_to(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side, ec: Side):
+    """The last pixel of a row from 0 to ``last`` that three edges may reach into."""
+    end = last
+    if last > 8:
+        pixel = wp.int64(256)
+        end = span_end(a + ea.reach, pixel * ea.dx, end)
+        end = span_end(b + eb.reach, pixel * eb.dx, end)
+        end = span_end(c + ec.reach, pixel * ec.dx, end)
+    return end
+
+
+@wp.func
 def draw_samples_of(
     numbers: wp.array(dtype=int),
     floors: wp.array(dtype=float),
@@ -121,15 +146,8 @@ def draw_samples_of(
         a = ea.value + rows * ea.dy
         b = eb.value + rows * eb.dy
         c = ec.value + rows * ec.dy
-        start = int(0)
-        end = x_last - x_first
-        if end > 8:
-            start = span_start(a + ea.reach, pixel * ea.dx, start)
-            start = span_start(b + eb.reach, pixel * eb.dx, start)
-            start = span_start(c + ec.reach, pixel * ec.dx, start)
-            end = span_end(a + ea.reach, pixel * ea.dx, end)
-            end = span_end(b + eb.reach, pixel * eb.dx, end)
-            end = span_end(c + ec.reach, pixel * ec.dx, end)
+        start = span_from(x_last - x_first, a, b, c, ea, eb, ec)
+        end = span_to(x_last - x_first, a, b, c, ea, eb, ec)
         a += wp.int64(start) * pixel * ea.dx
         b += wp.int64(start) * pixel * eb.dx
         c += wp.int64(start) * pixel * ec.dx
