@@ -70,17 +70,43 @@ class Side:
 
 
 @wp.func
-def side_of(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
-    """The edge from p to q, seen from a snapped point; positive to its right (y is down)."""
+def side_of(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
+    """The edge from p to q of a triangle with that signed area, seen from a snapped point."""
     e = Side()
-    e.dx = wp.int64(p[1] - q[1])
-    e.dy = wp.int64(q[0] - p[0])
+    turn = wp.where(area > wp.int64(0), wp.int64(1), wp.int64(-1))
+    e.dx = wp.int64(p[1] - q[1]) * turn
+    e.dy = wp.int64(q[0] - p[0]) * turn
     e.value = wp.int64(x - p[0]) * e.dx + wp.int64(y - p[1]) * e.dy
     # Left and top edges own what lies on them.
     if not (e.dx > wp.int64(0) or (e.dx == wp.int64(0) and e.dy > wp.int64(0))):
         e.value -= wp.int64(1)
     e.reach = wp.int64(128) * (wp.abs(e.dx) + wp.abs(e.dy))
     return e
+
+
+@wp.func
+def span_from(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side, ec: Side):
+    """The first pixel of a row from 0 to ``last`` that edges with values a, b, c may reach."""
+    start = int(0)
+    # Shorter rows are looked at one by one.
+    if last > 8:
+        pixel = wp.int64(256)
+        start = span_start(a + ea.reach, pixel * ea.dx, start)
+        start = span_start(b + eb.reach, pixel * eb.dx, start)
+        start = span_start(c + ec.reach, pixel * ec.dx, start)
+    return start
+
+
+@wp.func
+def span_to(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side, ec: Side):
+    """The last pixel of a row from 0 to ``last`` that three edges may reach into."""
+    end = last
+    if last > 8:
+        pixel = wp.int64(256)
+        end = span_end(a + ea.reach, pixel * ea.dx, end)
+        end = span_end(b + eb.reach, pixel * eb.dx, end)
+        end = span_end(c + ec.reach, pixel * ec.dx, end)
+    return end
 
 
 @wp.func
@@ -98,33 +124,30 @@ def draw_samples_of(
     nearness: wp.array(dtype=float, ndim=2),
     hits: wp.array(dtype=wp.vec2i, ndim=2),
 ):
-    """Write (body, face) into the samples of numbered pixels where a triangle is nearest.
-
-    The triangle's corners are in the order that puts its inside to the right of its edges.
-    """
+    """Write (body, face) into the samples of numbered pixels where a triangle is nearest."""
+    area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
+    area -= wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
+    if area == wp.int64(0):
+        return
     x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
     x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
     y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
     y_last = wp.min(wp.max(p[1], wp.max(q[1], r[1])) >> 8, window.height - 1)
     # From the middle of the first pixel.
-    ea = side_of(p, q, (x_first << 8) + 128, (y_first << 8) + 128)
-    eb = side_of(q, r, (x_first << 8) + 128, (y_first << 8) + 128)
-    ec = side_of(r, p, (x_first << 8) + 128, (y_first << 8) + 128)
+    x_middle = (x_first << 8) + 128
+    y_middle = (y_first << 8) + 128
+    ea = side_of(p, q, area, x_middle, y_middle)
+    eb = side_of(q, r, area, x_middle, y_middle)
+    ec = side_of(r, p, area, x_middle, y_middle)
     pixel = wp.int64(256)
+    slack = 0.5 * (wp.abs(plane.dx) + wp.abs(plane.dy))
     for y in range(y_first, y_last + 1):
         rows = wp.int64(y - y_first) * pixel
         a = ea.value + rows * ea.dy
         b = eb.value + rows * eb.dy
         c = ec.value + rows * ec.dy
-        start = int(0)
-        end = x_last - x_first
-        if end > 8:
-            start = span_start(a + ea.reach, pixel * ea.dx, start)
-            start = span_start(b + eb.reach, pixel * eb.dx, start)
-            start = span_start(c + ec.reach, pixel * ec.dx, start)
-            end = span_end(a + ea.reach, pixel * ea.dx, end)
-            end = span_end(b + eb.reach, pixel * eb.dx, end)
-            end = span_end(c + ec.reach, pixel * ec.dx, end)
+        start = span_from(x_last - x_first, a, b, c, ea, eb, ec)
+        end = span_to(x_last - x_first, a, b, c, ea, eb, ec)
         a += wp.int64(start) * pixel * ea.dx
         b += wp.int64(start) * pixel * eb.dx
         c += wp.int64(start) * pixel * ec.dx
@@ -135,7 +158,10 @@ def draw_samples_of(
             ) >= wp.int64(0):
                 k = numbers[i]
                 row = plane.c + float(y) * plane.dy + float(x) * plane.dx
-                for s in range(offsets.shape[0]):
+                count = offsets.shape[0]
+                if row + slack < floors[i]:
+                    count = 0
+                for s in range(count):
                     right = wp.int64(offsets[s][0])
                     down = wp.int64(offsets[s][1])
                     inside = a + right * ea.dx + down * ea.dy
@@ -171,13 +197,6 @@ def floor_below(
             for x in range(x_first, x_last + 1):
                 lowest = lesser(lowest, floors[y * window.width + x])
     return lowest
-
-
-@wp.func
-def turned(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i):
-    """Twice the signed area of a snapped triangle; positive if it need not be turned round."""
-    area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
-    return area - wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
 
 
 @wp.kernel
@@ -217,25 +236,13 @@ def draw_samples(
                 z = wp.min(p_camera[i][2], wp.min(p_camera[j][2], p_camera[k][2]))
                 near = floor * z <= 1.0
             if near:
-                area = turned(xy[i], xy[j], xy[k])
-                q = wp.where(area > wp.int64(0), xy[j], xy[k])
-                r = wp.where(area > wp.int64(0), xy[k], xy[j])
-                if area != wp.int64(0):
-                    plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
-                    draw_samples_of(
-                        numbers,
-                        floors,
-                        window,
-                        offsets,
-                        xy[i],
-                        q,
-                        r,
-                        plane,
-                        b,
-                        f,
-                        nearness,
-                        hits,
-                    )
+                p = xy[i]
+                q = xy[j]
+                r = xy[k]
+                plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+                draw_samples_of(
+                    numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
+                )
         elif not beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
             plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
@@ -244,14 +251,9 @@ def draw_samples(
                 p = snapped(view, polygon[0])
                 q = snapped(view, polygon[t])
                 r = snapped(view, polygon[t + 1])
-                area = turned(p, q, r)
-                if area < wp.int64(0):
-                    q = snapped(view, polygon[t + 1])
-                    r = snapped(view, polygon[t])
-                if area != wp.int64(0):
-                    draw_samples_of(
-                        numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
-                    )
+                draw_samples_of(
+                    numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
+                )
 
 
 @wp.func
