@@ -13,9 +13,9 @@ from generator.core.se3 import Array
 
 _CURVE_ENTRIES = 8192
 _MIDDLE_GREY = 0.18
-# A 30th of a second at f/2 and ISO 3200, to snow in the sun: beyond, an automatic exposure stays
+# A 30th of a second at f/1.4 and ISO 3200, to snow in the sun: beyond, an automatic exposure stays
 # where it is, so that night stays night.
-_EV100_RANGE = (2.0, 17.0)
+_EV100_RANGE = (1.0, 17.0)
 # Luminances of Rec. 709 primaries.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
