@@ -7,10 +7,12 @@ kilometres, so the layer is kept at many sizes, each half as fine as the one bef
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.assets.procedural.draw import rng_of
 from generator.assets.procedural.noise import fbm, perlin, smoothstep
 from generator.core.geometry import Float32
 from generator.core.streams import Rng
@@ -29,7 +31,7 @@ _OCTAVES = 7
 
 
 def cloud_layer(
-    d: Array, cloudiness: float, sun_altitude_rad: float, rng: Rng
+    d: Array, cloudiness: float, sun_altitude_rad: float, seed: int
 ) -> tuple[Array, Array]:
     """How much of each direction clouds hide, and how bright they are there.
 
@@ -37,14 +39,13 @@ def cloud_layer(
         d: Unit directions of the upper hemisphere [rows, columns, 3], one elevation per row.
         cloudiness: Share of the sky under clouds.
         sun_altitude_rad: Of a sun in the direction of +X.
-        rng: Draws the clouds.
+        seed: Of the clouds.
 
     Returns:
         Cover in [0, 1], 0 below the horizon; brightness relative to that of a white cloud in
         full light, 0 where there is none. Shape [rows, columns].
     """
-    cover, light = _seen_from_below(cloudiness, sun_altitude_rad, rng)
-    levels = _halvings(np.stack([cover, cover * light], axis=-1))
+    levels = _layer(cloudiness, sun_altitude_rad, seed)
     up = d[:, 0, 2]
     way_m = _way_to_layer(np.maximum(up, 0.0))
     seen = np.zeros((*d.shape[:2], 2))
@@ -59,6 +60,14 @@ def cloud_layer(
     clear = np.exp(-way_m / _HAZE_M)[:, None]
     brightness = seen[..., 1] / np.maximum(seen[..., 0], 1e-6)
     return seen[..., 0] * clear, brightness
+
+
+# A sky is looked at twice: for its mean, and for its image.
+@lru_cache(maxsize=2)
+def _layer(cloudiness: float, sun_altitude_rad: float, seed: int) -> tuple[Float32, ...]:
+    """The layer, and its halvings; read-only."""
+    cover, light = _seen_from_below(cloudiness, sun_altitude_rad, rng_of("sky", seed))
+    return tuple(_halvings(np.stack([cover, cover * light], axis=-1)))
 
 
 def _seen_from_below(

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.assets.procedural.draw import rng_of
 from generator.assets.procedural.environments import directions, normalised
 from generator.assets.procedural.noise import smoothstep
 from generator.assets.skies import daylight
@@ -184,8 +183,7 @@ def _daylit(d: Array, model: SkyModel) -> Array:
     by_day = _scaled(by_day, 1.0) * (1.0 - dusk) + _scaled(_twilight(d, model), 1.0) * dusk
     if model.cloudiness == 0.0:
         return by_day
-    rng = rng_of("sky", model.seed)
-    cover, light = cloud_layer(d, model.cloudiness, altitude, rng)
+    cover, light = cloud_layer(d, model.cloudiness, altitude, model.seed)
     # A white cloud sends back what sun and sky throw on it.
     clear_lux = daylight.sky_illuminance_lux(altitude)
     sun_lux = daylight.sun_illuminance_lux(altitude, model.turbidity) * max(math.sin(altitude), 0.1)
@@ -226,7 +224,7 @@ def _night(d: Array, model: SkyModel) -> Array:
     clear: Array = 0.22 * _AIRGLOW + glow
     if model.cloudiness == 0.0:
         return clear
-    cover, light = cloud_layer(d, model.cloudiness, 1.0, rng_of("sky", model.seed))
+    cover, light = cloud_layer(d, model.cloudiness, 1.0, model.seed)
     clouds = 5.0 * _CITY * (0.4 + 0.6 * light[..., None]) * (0.6 + 0.4 * np.exp(-up / 0.4))
     mixed: Array = clear + cover[..., None] * (clouds - clear)
     return mixed
