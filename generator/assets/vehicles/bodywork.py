@@ -147,9 +147,11 @@ _HOUSE = (
 
 def bodywork(design: Design, steer_deg: float) -> Patch:
     """Everything, both sides."""
-    ring = shell.plan(*design.body_ends, sides=28)
-    lower, edges = _with_wells(design, _lower_paint(design, ring, _lower(design, ring)))
-    half = joined([lower, *edges, _house(design), *_fitted(design)])
+    ring = shell.plan(*design.body_ends, sides=22)
+    plain = _lower(design, ring)
+    lower, wells = _with_wells(design, _lower_paint(design, ring, plain))
+    gaps = _gaps(design, plain)
+    half = joined([lower, *wells, *gaps, _house(design), *_fitted(design)])
     middle = [*_plates(design), *_wheels(design, steer_deg)]
     return joined([shell.whole(half, SIDES), *(shell.unmapped(p) for p in middle)])
 
@@ -193,7 +195,15 @@ def _lower(design: Design, ring: Plan) -> Patch:
     def floor(at: Array) -> Array:
         return np.full_like(at, design.clearance_m)
 
-    return shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
+    body = shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
+    # What lies under the glass house is never seen.
+    hidden = (
+        (body.uvs[..., 1] >= 1.0)
+        & (body.corners_m[..., 0] < design.x(design.cowl) - 0.35)
+        & (body.corners_m[..., 0] > design.x(design.rear_base) + 0.2)
+        & (body.corners_m[..., 1] < 0.8 * y)
+    ).all(axis=1)
+    return shell.taken(body, ~hidden)
 
 
 def _lower_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
@@ -208,12 +218,14 @@ def _lower_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
             patch = painted_where(patch, Slot.TRIM, *rows_between(0.0, 1.0), arch)
     patch = _front_paint(design, ring, patch)
     patch = _rear_paint(design, ring, patch)
-    doors = (above("y", 0.5), *rows_between(0.08, 0.99), above("z", sill))
-    for share in design.seams:
-        gap = between("x", design.x(share) - 0.004, design.x(share) + 0.004)
-        patch = painted_where(patch, Slot.TRIM, *gap, *doors)
     hood = between("x", x - 0.3, design.x(design.cowl) + 0.1)
     return painted_where(patch, Slot.TRIM, *rows_between(0.975, 0.988), *hood)
+
+
+def _gaps(design: Design, plain: Patch) -> list[Patch]:
+    """The lines around the doors."""
+    sides = (rows_between(0.1, 0.99)[0], rows_between(0.1, 0.99)[1], above("y", 0.5))
+    return [shell.gap(plain, design.x(share), 0.009, Slot.TRIM, *sides) for share in design.seams]
 
 
 def _front_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
@@ -265,7 +277,7 @@ def _with_wells(design: Design, patch: Patch) -> tuple[Patch, list[Patch]]:
 
 def _house(design: Design) -> Patch:
     """Glass house and roof."""
-    ring = shell.plan(*design.house_ends, sides=15)
+    ring = shell.plan(*design.house_ends, sides=13)
     crown, shoulder = 0.035, design.shoulder()
     wide = 0.925 * design.half_m
     narrow = design.roof_share * design.half_m
@@ -303,9 +315,7 @@ def _glazed(design: Design, ring: Plan, house: Patch) -> Patch:
     for share in design.pillars:
         post = between("x", design.x(share) - 0.035, design.x(share) + 0.035)
         house = painted_where(house, Slot.TRIM, *post, *sides)
-    strip = (*along(start, ring.rear(0.92) - 0.03), *rows_between(0.05, 0.09),
-             above("x", design.x(design.windows_to), -0.25, "z"))  # fmt: skip
-    return painted_where(house, Slot.TRIM, *strip)
+    return house
 
 
 def _fitted(design: Design) -> Iterable[Patch]:
@@ -314,19 +324,19 @@ def _fitted(design: Design) -> Iterable[Patch]:
     y = design.half_m
     mirror_x = design.x(design.cowl + 0.42 * (design.header - design.cowl))
     z = float(shoulder(np.array(mirror_x))) + 0.1
-    yield rounded_box((0.13, 0.2, 0.14), 0.05, 2).moved(mirror_x, y + 0.07, z).painted(Slot.PAINT)
+    yield rounded_box((0.13, 0.2, 0.14), 0.045, 1).moved(mirror_x, y + 0.07, z).painted(Slot.PAINT)
     face = block((mirror_x - 0.07, y - 0.01, z - 0.05), (mirror_x - 0.06, y + 0.15, z + 0.05))
     yield face.painted(Slot.CHROME)
     yield block((mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM)
     for share in design.seams[1:]:
         x = design.x(share) + 0.16
         z = float(shoulder(np.array(x))) - 0.13
-        yield rounded_box((0.2, 0.04, 0.03), 0.012, 1).moved(x, 0.995 * y, z).painted(Slot.PAINT)
+        yield block((x - 0.1, 0.95 * y, z), (x + 0.1, y + 0.012, z + 0.03), 0.0, Slot.PAINT)
     if design.rails:
         front, rear = design.x(design.header + 0.05), design.x(design.roof_end - 0.04)
         at = design.roof_share * y - 0.06
         top = design.height_m
-        yield block((rear, at - 0.015, top - 0.06), (front, at + 0.015, top), 0.01, Slot.CHROME)
+        yield block((rear, at - 0.015, top - 0.06), (front, at + 0.015, top), 0.0, Slot.CHROME)
 
 
 def _plates(design: Design) -> Iterable[Patch]:

@@ -13,14 +13,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from generator.assets.procedural.mesh import Array, Patch, joined
 from generator.assets.procedural.shapes import Point2, grid, spline
 
 Curve = Callable[[Array], Array]
+Mask = NDArray[np.bool_]
 Level = Callable[[Patch], Array]
 """Values at the corners of a patch, shape [n, 3]; positive inside."""
 
+# How far lines stand in front of what they are drawn on.
+_PROUD_M = 0.002
 _END_SHARES = (0.0, 0.28, 0.52, 0.7, 0.83, 0.92)
 
 
@@ -125,11 +129,11 @@ def split(patch: Patch, level: Level) -> tuple[Patch, Patch, Array]:
     """
     value = np.round(level(patch), 9)
     value = np.where(np.abs(value) < 1e-7, 0.0, value)
-    inside = [_take(patch, (value >= 0).all(axis=1) & (value > 0).any(axis=1))]
-    outside = [_take(patch, (value <= 0).all(axis=1))]
+    inside = [taken(patch, (value >= 0).all(axis=1) & (value > 0).any(axis=1))]
+    outside = [taken(patch, (value <= 0).all(axis=1))]
     mixed = (value > 0).any(axis=1) & (value < 0).any(axis=1)
     # Turn the corners until the first one is alone on its side, or lies on the line.
-    part, v = _take(patch, mixed), value[mixed]
+    part, v = taken(patch, mixed), value[mixed]
     sign = np.sign(v)
     lonely = np.where((sign == 0).any(axis=1), (sign == 0).argmax(axis=1),
                       (sign != np.sign(sign.sum(axis=1))[:, None]).argmax(axis=1))  # fmt: skip
@@ -150,12 +154,34 @@ def split(patch: Patch, level: Level) -> tuple[Patch, Patch, Array]:
 
 
 def painted_where(patch: Patch, slot: int, *levels: Level) -> Patch:
-    """The patch with everything in a slot that lies inside all of the levels."""
-    done = []
+    """The patch with everything in a slot that lies inside all of the levels.
+
+    Triangles that lie outside of any one level stay as they are.
+    """
+    touched = np.ones(len(patch.slots), dtype=bool)
+    for level in levels:
+        touched &= (level(patch) > 1e-7).any(axis=1)
+    done, patch = [taken(patch, ~touched)], taken(patch, touched)
     for level in levels:
         patch, outside, _ = split(patch, level)
         done.append(outside)
     return joined([*done, patch.painted(slot)])
+
+
+def gap(patch: Patch, x_m: float, width_m: float, slot: int, *levels: Level) -> Patch:
+    """A dark line across the side at ``x_m``, a little in front of the patch."""
+    for level in levels:
+        patch = split(patch, level)[0]
+    line = split(patch, above("x", x_m))[2] + np.array([0.0, _PROUD_M, 0.0])
+    upward = (line[:, 0, 2] < line[:, 1, 2])[:, None, None]
+    line = np.where(upward, line, line[:, ::-1])
+    half = np.array([0.5 * width_m, 0.0, 0.0])
+    low, high = line[:, 0], line[:, 1]
+    a, b, c, d = low + half, low - half, high - half, high + half
+    corners = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Patch(
+        corners, np.zeros((len(corners), 3, 2)), np.full(len(corners), slot, dtype=np.int64)
+    )
 
 
 def above(axis: str, limit_m: float, slope: float = 0.0, over: str = "x") -> Level:
@@ -221,11 +247,12 @@ def _ring(ring: Plan, row: Row, low: Curve, high: Curve) -> Array:
     return np.stack([x, row.half_m * ring.across, z], axis=1)
 
 
-def _take(patch: Patch, chosen: np.ndarray) -> Patch:
+def taken(patch: Patch, chosen: Mask) -> Patch:
+    """The chosen triangles."""
     return Patch(patch.corners_m[chosen], patch.uvs[chosen], patch.slots[chosen])
 
 
-Pieces = tuple[list[tuple[Array, np.ndarray]], Array]
+Pieces = tuple[list[tuple[Array, Mask]], Array]
 
 
 def _halved(data: Array, value: Array) -> Pieces:

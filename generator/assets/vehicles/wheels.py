@@ -10,16 +10,15 @@ from generator.assets.procedural.mesh import Array, Patch, joined
 from generator.assets.procedural.shapes import block, circle, fan, lathe
 from generator.assets.vehicles.materials import Slot
 
-_SEGMENTS = 22
+_SEGMENTS = 18
 
 
 def wheel(radius_m: float, width_m: float, spokes: int, rim_share: float = 0.68) -> Patch:
     """A wheel about the origin, its axle along Y and its outer face towards +Y."""
     half, rim = 0.5 * width_m, rim_share * radius_m
-    tread = [(rim, -half), (0.96 * radius_m, -half), (radius_m, -0.75 * half),
-             (radius_m, 0.75 * half), (0.965 * radius_m, 0.98 * half),
-             (1.04 * rim, half), (rim, 0.95 * half)]  # fmt: skip
-    lip = [(rim, 0.96 * half), (0.9 * rim, 0.9 * half), (0.88 * rim, 0.2 * half)]
+    tread = [(rim, -half), (radius_m, -0.85 * half), (radius_m, 0.75 * half),
+             (0.965 * radius_m, 0.98 * half), (1.02 * rim, half)]  # fmt: skip
+    lip = [(1.02 * rim, half), (0.9 * rim, 0.9 * half), (0.88 * rim, 0.2 * half)]
     back = [(0.9 * rim, 0.2 * half), (0.0, 0.2 * half)]
     hub = [(0.2 * rim, 0.2 * half), (0.19 * rim, 0.8 * half), (0.0, 0.84 * half)]
     parts = [
