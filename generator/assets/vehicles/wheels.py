@@ -1,0 +1,63 @@
+"""Wheels of everything with an axle, and the wells they turn in."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from generator.assets.procedural.mesh import Array, Patch, joined
+from generator.assets.procedural.shapes import block, circle, fan, lathe
+from generator.assets.vehicles.materials import Slot
+
+_SEGMENTS = 18
+
+
+def wheel(radius_m: float, width_m: float, spokes: int, rim_share: float = 0.68) -> Patch:
+    """A wheel about the origin, its axle along Y and its outer face towards +Y."""
+    half, rim = 0.5 * width_m, rim_share * radius_m
+    tread = [(rim, -half), (radius_m, -0.85 * half), (radius_m, 0.75 * half),
+             (0.965 * radius_m, 0.98 * half), (1.02 * rim, half)]  # fmt: skip
+    lip = [(1.02 * rim, half), (0.9 * rim, 0.9 * half), (0.88 * rim, 0.2 * half)]
+    back = [(0.9 * rim, 0.2 * half), (0.0, 0.2 * half)]
+    hub = [(0.2 * rim, 0.2 * half), (0.19 * rim, 0.8 * half), (0.0, 0.84 * half)]
+    parts = [
+        lathe(tread, _SEGMENTS, Slot.TYRE),
+        lathe(lip, _SEGMENTS, Slot.RIM),
+        lathe(back, _SEGMENTS, Slot.UNDERBODY),
+        lathe(hub, 10, Slot.RIM),
+        *_spokes(rim, half, spokes),
+    ]
+    # A lathe's axle is Z: turned so that its top faces +Y.
+    return joined(parts).rotated("x", -0.5 * math.pi)
+
+
+def _spokes(rim: float, half: float, count: int) -> list[Patch]:
+    """Bars from the hub to the rim; none = a plate with a step, as steel wheels have."""
+    if count == 0:
+        plate = [(0.92 * rim, 0.55 * half), (0.62 * rim, 0.75 * half), (0.55 * rim, 0.45 * half),
+                 (0.0, 0.45 * half)]  # fmt: skip
+        return [lathe(plate, _SEGMENTS, Slot.RIM)]
+    width = 1.25 * rim / (count + 1.5)
+    bar = block((0.12 * rim, -0.5 * width, 0.45 * half), (0.92 * rim, 0.5 * width, 0.82 * half))
+    # The lower face is never seen.
+    up = np.cross(bar.corners_m[:, 1] - bar.corners_m[:, 0], bar.corners_m[:, 2] - bar.corners_m[:, 0])
+    kept = (up[:, 2] > -1e-12) & (np.abs(up[:, 0]) < 1e-12)
+    seen = Patch(bar.corners_m[kept], bar.uvs[kept], bar.slots[kept]).painted(Slot.RIM)
+    return [seen.rotated("z", 2 * math.pi * (k + 0.25) / count) for k in range(count)]
+
+
+def well(edge_m: Array, hub_m: tuple[float, float], radius_m: float, inner_y_m: float) -> Patch:
+    """The inside of a wheel well behind an edge, as segments [n, 2, 3]; it looks at the hub."""
+    inner = edge_m.copy()
+    inner[..., 1] = inner_y_m
+    a, b, c, d = edge_m[:, 0], edge_m[:, 1], inner[:, 1], inner[:, 0]
+    corners = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.array([hub_m[0], 0.0, hub_m[1]]) - corners.mean(axis=1)
+    away = (normal[:, [0, 2]] * inward[:, [0, 2]]).sum(axis=1) < 0
+    corners[away] = corners[away, ::-1]
+    liner = Patch(corners, np.zeros((len(corners), 3, 2)), np.zeros(len(corners), dtype=np.int64))
+    x, z = circle(radius_m, 14, hub_m).T
+    wall = fan(np.stack([x, np.full_like(x, inner_y_m), np.maximum(z, 0.16)], axis=1)[::-1])
+    return joined([liner, wall]).painted(Slot.UNDERBODY)
