@@ -172,12 +172,12 @@ def collision(design: Design) -> list[Array]:
 
 
 def keypoints(design: Design) -> tuple[Keypoint, ...]:
-    """Hubs and lamps."""
+    """Hubs and lamps; a wheel that is seen from ahead hides its hub by its own radius."""
     points = []
     for end, x in zip(("front", "rear"), design.axles_m, strict=True):
         for side, sign in (("left", 1.0), ("right", -1.0)):
             at = (x, sign * design.hub_y_m, design.wheel_radius_m)
-            points.append(Keypoint(f"wheel_{end}_{side}", at, 0.5 * design.tyre_m + 0.05))
+            points.append(Keypoint(f"wheel_{end}_{side}", at, 1.1 * design.wheel_radius_m))
     x, y = 0.5 * design.length_m, design.half_m
     for name, place, z in (
         ("headlight", (x - 0.2, 0.74 * y), design.lamp_m[0]),
