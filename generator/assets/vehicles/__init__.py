@@ -28,5 +28,8 @@ FAMILIES: Mapping[str, Family] = {
     family.name: family
     for family in (
         _vehicle("car", 48, 1400.0, "car", steer_deg=0.0),
+        _vehicle("van", 16, 2200.0, "van", steer_deg=0.0),
+        _vehicle("truck", 16, 7500.0, "truck"),
+        _vehicle("bus", 8, 12000.0, "bus"),
     )
 }

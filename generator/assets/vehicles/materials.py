@@ -74,11 +74,11 @@ def materials(
     return (
         Material(paint, between(0.15, 0.25, rng), specular=0.6, role="paint"),
         Material((tint, 1.1 * tint, 1.15 * tint), 0.05, specular=0.8, role="glass"),
-        Material((0.02, 0.02, 0.021), 0.5, role="trim"),
+        Material((0.013, 0.013, 0.014), 0.5, specular=0.35, role="trim"),
         Material((0.008, 0.008, 0.008), 0.9, role="underbody"),
         Material((0.02, 0.02, 0.02), 0.85, role="tyre"),
         Material((rim, rim, 1.02 * rim), 0.3, 0.9, role="rim"),
-        Material((0.72, 0.74, 0.76), 0.15, specular=0.8, role="headlight"),
+        Material((0.62, 0.65, 0.68), 0.1, specular=0.9, role="headlight"),
         Material((0.3, 0.008, 0.01), role="taillight", **lens),
         Material((0.42, 0.012, 0.014), role="brakelight", **lens),
         Material((0.72, 0.3, 0.05), role="indicator_left", **lens),

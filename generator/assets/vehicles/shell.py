@@ -168,6 +168,13 @@ def painted_where(patch: Patch, slot: int, *levels: Level) -> Patch:
     return joined([*done, patch.painted(slot)])
 
 
+def refined(patch: Patch, axis: str, places_m: Sequence[float]) -> Patch:
+    """The patch with edges added along planes, so that round holes come out round."""
+    for place in places_m:
+        patch = joined(split(patch, above(axis, place))[:2])
+    return patch
+
+
 def gap(patch: Patch, x_m: float, width_m: float, slot: int, *levels: Level) -> Patch:
     """A dark line across the side at ``x_m``, a little in front of the patch."""
     for level in levels:
