@@ -31,5 +31,8 @@ FAMILIES: Mapping[str, Family] = {
         _vehicle("van", 16, 2200.0, "van", steer_deg=0.0),
         _vehicle("truck", 16, 7500.0, "truck"),
         _vehicle("bus", 8, 12000.0, "bus"),
+        _vehicle("motorcycle", 12, 200.0, "motorcycle"),
+        _vehicle("bicycle", 12, 15.0, "bicycle"),
+        _vehicle("cyclist", 16, 90.0, "bicycle"),
     )
 }
