@@ -19,7 +19,7 @@ from generator.assets.vehicles import rider as people
 from generator.assets.vehicles.materials import Slot, materials
 from generator.assets.vehicles.rider import Seat, blob, limb
 from generator.assets.vehicles.shell import unmapped
-from generator.core.geometry import Keypoint
+from generator.core.geometry import Keypoint, Material
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 
@@ -110,7 +110,9 @@ def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
         turn = 2.0 * math.pi * k / spokes
         end = (radius_m - 2.2 * tyre_m) * np.array([math.cos(turn), math.sin(turn), 0.0])
         start = np.array([0.02 * end[1], -0.02 * end[0], 0.03 * (-1) ** k])
-        wires.append(sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=Slot.CHROME))
+        wires.append(
+            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=Slot.CHROME)
+        )
     return joined([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
 
 
@@ -118,7 +120,7 @@ def _style(seed: int) -> str:
     return STYLES[seed % len(STYLES)]
 
 
-def _solid(parts: list[Patch], frame: _Frame, finish: tuple, top: float) -> Solid:
+def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top: float) -> Solid:
     reach, z = frame.axle + frame.wheel_m, frame.wheel_m
     points = (
         Keypoint("wheel_front", (frame.axle, 0.0, z), 0.06),
@@ -164,7 +166,11 @@ def _tubes(frame: _Frame) -> list[Patch]:
         out = np.array([0.0, sign * 0.055, 0.0])
         rear = np.array([-frame.axle, sign * 0.065, frame.wheel_m])
         front = np.array([frame.axle, sign * 0.055, frame.wheel_m])
-        for start, end in ((crank + 0.6 * out, rear), (seat + 0.3 * out, rear), (fork + out, front)):
+        for start, end in (
+            (crank + 0.6 * out, rear),
+            (seat + 0.3 * out, rear),
+            (fork + out, front),
+        ):
             parts.append(limb([start, end], (0.012, 0.009), Slot.PAINT, 5))
     return parts
 
@@ -178,8 +184,13 @@ def _bars(style: str, frame: _Frame) -> list[Patch]:
         corner = np.array([stem[0] + 0.06, sign * (y - 0.04), z])
         path = [stem, corner, grip]
         if style == "road":
-            path = [stem, np.array([x - 0.08, sign * y, z]), grip + (0.02, 0.0, 0.0),
-                    grip + (0.01, 0.0, -0.11), grip + (-0.1, 0.0, -0.13)]  # fmt: skip
+            path = [
+                stem,
+                np.array([x - 0.08, sign * y, z]),
+                grip + np.array([0.02, 0.0, 0.0]),
+                grip + np.array([0.01, 0.0, -0.11]),
+                grip + np.array([-0.1, 0.0, -0.13]),
+            ]
         parts.append(limb(path, (0.012,) * len(path), Slot.TRIM, 5))
         tip = grip + np.array([-0.09, sign * 0.02, 0.0])
         if style != "road":
@@ -202,8 +213,14 @@ def _drive(frame: _Frame, turn_rad: float) -> list[Patch]:
         axle, (px, py, pz) = np.array([x, sign * 0.07, z]), pedal
         arm = [axle, np.array([px, sign * 0.07, pz])]
         parts.append(limb(arm, (0.012, 0.01), Slot.CHROME, 5))
-        parts.append(block((px - 0.045, py - 0.045, pz - 0.012), (px + 0.045, py + 0.045, pz + 0.012),
-                           0.0, Slot.TRIM))  # fmt: skip
+        parts.append(
+            block(
+                (px - 0.045, py - 0.045, pz - 0.012),
+                (px + 0.045, py + 0.045, pz + 0.012),
+                0.0,
+                Slot.TRIM,
+            )
+        )
     rear = np.array([-frame.axle, -0.05, frame.wheel_m])
     for up in (1.0, -1.0):
         near, far = (np.array([0.0, 0.0, up * r]) for r in (0.085, 0.035))
@@ -216,7 +233,11 @@ def _mudguard(frame: _Frame, sign: float, arc_rad: tuple[float, float]) -> Patch
     turn = np.linspace(*arc_rad, 9)
     radius = frame.wheel_m + 0.02
     path = np.stack(
-        [sign * frame.axle + radius * np.cos(turn), 0 * turn, frame.wheel_m + radius * np.sin(turn)],
+        [
+            sign * frame.axle + radius * np.cos(turn),
+            0 * turn,
+            frame.wheel_m + radius * np.sin(turn),
+        ],
         axis=1,
     )
     section = np.array([(0.004, 0.0), (-0.006, 0.028), (-0.006, -0.028)])

@@ -1,4 +1,4 @@
-"""Cars and vans: a lower body with a hood, a glass house on it, wheels and what is fitted to them."""
+"""Cars and vans: a lower body with a hood, a glass house on it, and what is fitted to them."""
 
 from __future__ import annotations
 
@@ -150,8 +150,9 @@ def collision(design: Design) -> list[Array]:
     """Body and glass house as boxes."""
     x, y, axles = 0.5 * design.length_m, design.half_m, design.axles
     house = 0.5 * (1.0 + design.roof_share) * 0.92 * y
-    front, rear = design.x(0.5 * (design.cowl + design.header)), design.x(
-        0.5 * (design.roof_end + design.rear_base)
+    front, rear = (
+        design.x(0.5 * (design.cowl + design.header)),
+        design.x(0.5 * (design.roof_end + design.rear_base)),
     )
     return [
         hulls.box((-x, -y, design.clearance_m), (x, y, design.belt_m)),
@@ -177,12 +178,13 @@ def _lower(design: Design, ring: Plan) -> Patch:
 
     body = shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
     # What lies under the glass house is never seen.
-    hidden = (
+    hidden = np.all(
         (body.uvs[..., 1] >= 1.0)
         & (body.corners_m[..., 0] < design.x(design.cowl) - 0.35)
         & (body.corners_m[..., 0] > design.x(design.rear_base) + 0.2)
-        & (body.corners_m[..., 1] < 0.8 * y)
-    ).all(axis=1)
+        & (body.corners_m[..., 1] < 0.8 * y),
+        axis=1,
+    )
     return shell.taken(body, ~hidden)
 
 
@@ -237,7 +239,11 @@ def _rear_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
     patch = painted_where(patch, Slot.TAILLIGHT, *reach, *between("z", low, high))
     stop = (rear, *along(ring.rear(0.93) - 0.02, ring.rear(0.5 * inner + 0.4)))
     patch = painted_where(
-        patch, Slot.BRAKELIGHT, *stop, *rows_between(0.1, 0.985), *between("z", low, 0.5 * (low + high))
+        patch,
+        Slot.BRAKELIGHT,
+        *stop,
+        *rows_between(0.1, 0.985),
+        *between("z", low, 0.5 * (low + high)),
     )
     wink = (rear, *along(ring.rear(0.9), ring.rear(0.5 * inner + 0.4)))
     height = between("z", low, low + 0.28 * (high - low))
@@ -300,7 +306,9 @@ def _fitted(design: Design) -> Iterable[Patch]:
     yield rounded_box((0.13, 0.2, 0.14), 0.045, 1).moved(mirror_x, y + 0.07, z).painted(Slot.PAINT)
     face = block((mirror_x - 0.07, y - 0.01, z - 0.05), (mirror_x - 0.06, y + 0.15, z + 0.05))
     yield face.painted(Slot.CHROME)
-    yield block((mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM)
+    yield block(
+        (mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM
+    )
     for share in design.seams[1:]:
         x = design.x(share) + 0.16
         z = float(shoulder(np.array(x))) - 0.13

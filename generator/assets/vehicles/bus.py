@@ -8,7 +8,7 @@ from generator.assets.procedural import hulls
 from generator.assets.procedural.draw import between, chance, pick, rng_of
 from generator.assets.procedural.family import Facts, Solid
 from generator.assets.procedural.materials import linear
-from generator.assets.procedural.mesh import Array, Patch, joined
+from generator.assets.procedural.mesh import Patch, joined
 from generator.assets.procedural.shapes import block
 from generator.assets.scenery.forms import solid
 from generator.assets.vehicles import shell
@@ -33,7 +33,7 @@ _ROWS = (
 def bus(seed: int) -> Solid:
     """A city bus with its doors on the right. Slots and keypoints as every vehicle's."""
     rng = rng_of("bus", seed)
-    x, top = 0.5 * between(11.2, 12.2, rng), between(3.0, 3.15, rng)
+    x, top = 0.5 * between(11.2, 12.2, rng), between(2.95, 3.08, rng)
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, 0)
     livery = pick(_LIVERIES, rng)
     body = _body(x, top, axles, striped=chance(0.6, rng))
@@ -48,7 +48,7 @@ def bus(seed: int) -> Solid:
     return solid([joined(parts)], materials(rng, colors[0], colors[1]), hull, points)
 
 
-def bus_facts(seed: int) -> Facts:
+def bus_facts(**_: object) -> Facts:
     """Its kind."""
     return Facts("city_bus")
 
@@ -62,7 +62,7 @@ def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
 
     half = shell.stack(ring, rows, level(_FLOOR_M), level(top - 0.04), crown_m=0.04, lid_rows=2)
     half = painted_where(half, Slot.UNDERBODY, *shell.rows_between(-2.0, 0.0))
-    half = _painted(half, ring, x, top, striped=striped)
+    half = _painted(half, ring, top, striped=striped)
     around = [hub + 0.28 * k for hub in (axles.front_m, axles.rear_m) for k in (-2, -1, 0, 1, 2)]
     near = (half.corners_m[..., 2].min(axis=1) < 1.1) & (half.corners_m[..., 1].max(axis=1) > 0.9)
     low = shell.refined(shell.taken(half, near), "x", around)
@@ -70,7 +70,7 @@ def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
     return shell.whole(joined([shell.taken(half, ~near), low, *wells]), SIDES)
 
 
-def _painted(half: Patch, ring: shell.Plan, x: float, top: float, *, striped: bool) -> Patch:
+def _painted(half: Patch, ring: shell.Plan, top: float, *, striped: bool) -> Patch:
     """Stripe, windows, lamps."""
     if striped:
         half = painted_where(half, Slot.SECOND_PAINT, *shell.between("z", 0.55, 0.95))
@@ -87,8 +87,10 @@ def _painted(half: Patch, ring: shell.Plan, x: float, top: float, *, striped: bo
     wink = (*shell.along(ring.front(0.84), corner), *shell.between("z", 0.82, 0.88), above("x", 0))
     half = painted_where(half, Slot.INDICATOR_LEFT, *wink)
     for slot, low, high in (
-        (Slot.TAILLIGHT, 1.0, 1.18), (Slot.BRAKELIGHT, 1.18, 1.32), (Slot.INDICATOR_LEFT, 1.32, 1.44),
-    ):  # fmt: skip
+        (Slot.TAILLIGHT, 1.0, 1.18),
+        (Slot.BRAKELIGHT, 1.18, 1.32),
+        (Slot.INDICATOR_LEFT, 1.32, 1.44),
+    ):
         lens = (*shell.along(tail, ring.rear(0.78)), *shell.between("z", low, high), below("x", 0))
         half = painted_where(half, slot, *lens)
     return half
@@ -111,7 +113,7 @@ def _fitted(x: float, top: float) -> list[Patch]:
         block((x - 0.35, -0.75, top - 0.37), (x - 0.105, 0.75, top - 0.15), 0.0, Slot.TRIM),
         block((x - 0.03, -0.26, 0.42), (x + 0.006, 0.26, 0.53), 0.0, Slot.PLATE),
         block((-x - 0.006, -0.26, 0.62), (-x + 0.05, 0.26, 0.73), 0.0, Slot.PLATE),
-        block((-1.6, -0.85, top - 0.05), (1.2, 0.85, top + 0.16), 0.06, Slot.PAINT),
+        block((-1.6, -0.85, top - 0.05), (1.2, 0.85, top + 0.12), 0.05, Slot.PAINT),
     ]
     for sign in (1.0, -1.0):
         y = sign * 1.36
@@ -123,5 +125,3 @@ def _fitted(x: float, top: float) -> list[Patch]:
             parts.append(block((at - 0.03, edge[0], 1.13), (at + 0.03, edge[1], top - 0.39), 0.0,
                                Slot.TRIM))  # fmt: skip
     return parts
-
-

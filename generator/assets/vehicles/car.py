@@ -81,7 +81,7 @@ def car(seed: int, steer_deg: float) -> Solid:
     return solid([bodywork(design, steer_deg)], finish, collision(design), keypoints(design))
 
 
-def car_facts(seed: int, steer_deg: float) -> Facts:
+def car_facts(seed: int, **_: object) -> Facts:
     """Its body style."""
     return Facts(_style(seed))
 

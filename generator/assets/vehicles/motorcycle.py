@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
+from generator.assets.procedural.draw import chance, pick, rng_of
 from generator.assets.procedural.family import Facts, Solid
 from generator.assets.procedural.materials import linear
-from generator.assets.procedural.mesh import Array, Patch
+from generator.assets.procedural.mesh import Patch
 from generator.assets.procedural.shapes import block, circle, sweep
 from generator.assets.scenery.forms import solid
 from generator.assets.vehicles import rider as people
@@ -29,7 +29,7 @@ _PAINTS = ("#121314", "#b01d1a", "#1f4f91", "#e6e6e2", "#2f6b3d", "#c97a1e", "#6
 
 @dataclass(frozen=True)
 class _Build:
-    """Main measures, metres: half wheelbase, wheels, seat, hands, feet, top of the fork."""
+    """Main measures, metres: half wheelbase, wheels, seat, hands, feet, handlebar, fork's top."""
 
     axle: float
     wheel_m: float
@@ -38,16 +38,17 @@ class _Build:
     grip: Vec3
     foot: Vec3
     head: tuple[float, float]
+    fork: tuple[float, float]
     lean_rad: float
 
 
 _BUILDS = {
     "naked": _Build(0.71, 0.31, 0.14, (-0.25, 0.81), (0.28, 0.36, 1.05), (-0.1, 0.19, 0.36),
-                    (0.36, 0.98), 0.3),
+                    (0.36, 0.98), (0.36, 0.98), 0.3),
     "sport": _Build(0.7, 0.305, 0.15, (-0.28, 0.83), (0.36, 0.31, 0.93), (-0.24, 0.18, 0.4),
-                    (0.37, 0.92), 0.72),
+                    (0.37, 0.92), (0.37, 0.92), 0.72),
     "scooter": _Build(0.64, 0.235, 0.11, (-0.27, 0.79), (0.26, 0.33, 1.02), (0.15, 0.14, 0.31),
-                      (0.35, 0.95), 0.08),
+                      (0.35, 0.95), (0.48, 0.56), 0.08),
 }  # fmt: skip
 
 
@@ -59,7 +60,7 @@ def motorcycle(seed: int) -> Solid:
     parts = [*_running_gear(build), *_lamps(style, build), *_bodies(style, build)]
     ridden = _ridden(seed)
     if ridden:
-        parts += people.rider(_seat(style, build), rng)
+        parts += people.rider(_seat(build), rng)
     paint = linear(pick(_PAINTS, rng))
     finish = materials(rng, paint, clothes=people.drawn_clothes(rng))
     reach = build.axle + build.wheel_m
@@ -101,12 +102,19 @@ def _running_gear(build: _Build) -> list[Patch]:
     for sign in (1.0, -1.0):
         side = np.array([0.0, sign * 0.5 * (build.tyre_m + 0.05), 0.0])
         hub = np.array([build.axle, 0.0, build.wheel_m]) + side
-        parts.append(limb([hub, np.array([head_x, 0.0, head_z]) + side], (0.024, 0.021), Slot.CHROME, 7))
+        parts.append(
+            limb(
+                [hub, np.array([build.fork[0], 0.0, build.fork[1]]) + side],
+                (0.024, 0.021),
+                Slot.CHROME,
+                7,
+            )
+        )
         rear = np.array([-build.axle, 0.0, build.wheel_m]) + side
         parts.append(limb([rear, np.array([-0.12, 0.0, 0.42]) + side], (0.022, 0.03), Slot.TRIM, 5))
         grip = np.array([gx, sign * gy, gz])
         bar = [np.array([head_x, 0.0, head_z + 0.03]), np.array([gx + 0.1, sign * (gy - 0.12), gz]),
-               grip + (-0.03, sign * 0.04, 0.0)]  # fmt: skip
+               grip + np.array([-0.03, sign * 0.04, 0.0])]  # fmt: skip
         parts.append(limb(bar, (0.014, 0.014, 0.018), Slot.TRIM, 6))
         glass = np.array([gx + 0.1, sign * (gy - 0.06), gz + 0.17])
         parts.append(limb([bar[1], glass], (0.006, 0.006), Slot.TRIM, 4))
@@ -155,8 +163,16 @@ def _bodies(style: str, build: _Build) -> list[Patch]:
                                   (-0.76, 0.0, z + 0.05))]  # fmt: skip
     parts = [
         blob((0.1, 0.0, 0.86), (0.3, 0.15, 0.14), Slot.PAINT, 0.12),
-        limb([np.array([x + 0.25, 0.0, z - 0.02]), np.array([x, 0.0, z - 0.045]),
-              np.array([-0.62, 0.0, z + 0.03])], (0.075, 0.115, 0.08), Slot.TRIM, 8),
+        limb(
+            [
+                np.array([x + 0.25, 0.0, z - 0.02]),
+                np.array([x, 0.0, z - 0.045]),
+                np.array([-0.62, 0.0, z + 0.03]),
+            ],
+            (0.075, 0.115, 0.08),
+            Slot.TRIM,
+            8,
+        ),
         limb(tail, (0.11, 0.095, 0.05), Slot.PAINT, 8),
         block((-0.18, -0.15, 0.3), (0.22, 0.15, 0.6), 0.05, Slot.UNDERBODY),
         blob((0.14, 0.0, 0.58), (0.15, 0.17, 0.14), Slot.RIM, -0.5),
@@ -189,8 +205,13 @@ def _scooter(build: _Build) -> list[Patch]:
     x, z = build.seat
     shield = [np.array(p) for p in ((0.36, 0.0, 0.98), (0.4, 0.0, 0.7), (0.33, 0.0, 0.34),
                                     (0.1, 0.0, 0.24))]  # fmt: skip
-    wide = sweep(np.array(shield), circle(1.0, 10), up=(0.0, 1.0, 0.0), slot=Slot.PAINT,
-                 scale=np.array([(0.12, 0.07), (0.22, 0.07), (0.2, 0.06), (0.17, 0.05)]))  # fmt: skip
+    wide = sweep(
+        np.array(shield),
+        circle(1.0, 10),
+        up=(0.0, 1.0, 0.0),
+        slot=Slot.PAINT,
+        scale=np.array([(0.12, 0.07), (0.22, 0.07), (0.2, 0.06), (0.17, 0.05)]),
+    )
     return [
         wide,
         blob((0.39, 0.0, 0.98), (0.13, 0.16, 0.1), Slot.PAINT),
@@ -204,7 +225,7 @@ def _scooter(build: _Build) -> list[Patch]:
     ]  # fmt: skip
 
 
-def _seat(style: str, build: _Build) -> Seat:
+def _seat(build: _Build) -> Seat:
     gx, gy, gz = build.grip
     fx, fy, fz = build.foot
     return Seat(

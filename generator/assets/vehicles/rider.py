@@ -13,7 +13,7 @@ import numpy as np
 
 from generator.assets.procedural.draw import between, pick
 from generator.assets.procedural.materials import linear
-from generator.assets.procedural.mesh import Array, Patch, joined
+from generator.assets.procedural.mesh import Array, Patch
 from generator.assets.procedural.shapes import ball, circle, spline, sweep
 from generator.assets.vehicles.materials import Slot
 from generator.core.se3 import Vec3
@@ -60,9 +60,9 @@ def rider(seat: Seat, rng: Rng) -> list[Patch]:
     neck = hips + (_TORSO_M + 0.05) * spine
     parts = [*_trunk(hips, spine), *_head(neck, seat, between(-0.1, 0.15, rng))]
     for sign, grip, sole in zip((1.0, -1.0), seat.grips, seat.soles, strict=True):
-        shoulder = hips + _TORSO_M * spine + (0.0, sign * 0.175, 0.0)
+        shoulder = hips + _TORSO_M * spine + np.array([0.0, sign * 0.175, 0.0])
         parts += _arm(shoulder, np.array(grip), sign)
-        parts += _leg(hips + (0.0, sign * 0.09, 0.0), np.array(sole), sign)
+        parts += _leg(hips + np.array([0.0, sign * 0.09, 0.0]), np.array(sole), sign)
     return parts
 
 
@@ -80,7 +80,7 @@ def limb(
     return sweep(points, circle(1.0, sides), up=up, scale=np.array(radii_m), slot=slot)
 
 
-def blob(centre: Sequence[float], half: Vec3, slot: int, pitch_rad: float = 0.0) -> Patch:
+def blob(centre: Sequence[float] | Array, half: Vec3, slot: int, pitch_rad: float = 0.0) -> Patch:
     """An ellipsoid, its nose lowered by the pitch."""
     made = ball(lambda d: d * np.array(half), rings=6, segments=10)
     x, y, z = (float(c) for c in centre)
@@ -112,14 +112,22 @@ def _trunk(hips: Array, spine: Array) -> list[Patch]:
 
 
 def _head(neck: Array, seat: Seat, nod_rad: float) -> list[Patch]:
-    middle = neck + (0.07, 0.0, 0.13)
-    throat = limb([neck - (0.01, 0.0, 0.03), middle - (0.01, 0.0, 0.04)], (0.06, 0.055), Slot.SKIN)
+    middle = neck + np.array([0.07, 0.0, 0.13])
+    throat = limb(
+        [neck - np.array([0.01, 0.0, 0.03]), middle - np.array([0.01, 0.0, 0.04])],
+        (0.06, 0.055),
+        Slot.SKIN,
+    )
     if seat.full_face:
-        shell = blob(middle + (0.005, 0.0, 0.01), (0.148, 0.122, 0.145), Slot.HELMET, nod_rad)
-        visor = blob(middle + (0.045, 0.0, 0.02), (0.115, 0.108, 0.055), Slot.GLASS, nod_rad)
+        shell = blob(
+            middle + np.array([0.005, 0.0, 0.01]), (0.148, 0.122, 0.145), Slot.HELMET, nod_rad
+        )
+        visor = blob(
+            middle + np.array([0.05, 0.0, 0.02]), (0.11, 0.113, 0.058), Slot.GLASS, nod_rad
+        )
         return [throat, shell, visor]
     face = blob(middle, (0.1, 0.078, 0.12), Slot.SKIN, nod_rad)
-    helmet = blob(middle + (-0.015, 0.0, 0.065), (0.14, 0.1, 0.085), Slot.HELMET, nod_rad)
+    helmet = blob(middle + np.array([-0.015, 0.0, 0.065]), (0.14, 0.1, 0.085), Slot.HELMET, nod_rad)
     return [throat, face, helmet]
 
 
@@ -132,9 +140,13 @@ def _arm(shoulder: Array, grip: Array, sign: float) -> list[Patch]:
 
 
 def _leg(hip: Array, sole: Array, sign: float) -> list[Patch]:
-    ankle = sole + (-0.09, 0.0, 0.085)
+    ankle = sole + np.array([-0.09, 0.0, 0.085])
     knee = joint(hip, ankle, _THIGH_M, _SHIN_M, np.array([1.0, 0.12 * sign, 0.5]))
     trouser = limb([hip, knee, ankle], (0.088, 0.062, 0.045), Slot.BOTTOM)
-    heel, toe = ankle + (-0.05, 0.0, -0.05), sole + (0.13, 0.0, 0.03)
-    shoe = limb([heel, 0.5 * (heel + toe) + (0.0, 0.0, 0.012), toe], (0.045, 0.05, 0.032), Slot.SHOES)
+    heel, toe = ankle + np.array([-0.05, 0.0, -0.05]), sole + np.array([0.13, 0.0, 0.03])
+    shoe = limb(
+        [heel, 0.5 * (heel + toe) + np.array([0.0, 0.0, 0.012]), toe],
+        (0.045, 0.05, 0.032),
+        Slot.SHOES,
+    )
     return [trouser, shoe]

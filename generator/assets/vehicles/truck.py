@@ -23,8 +23,8 @@ _HALF_M = 1.16
 # Share of the height, how far front and rear stand back [m], share of the half width.
 _ROWS = (
     (0.0, 0.08, 0.0, 0.98), (0.04, 0.01, 0.0, 1.0), (0.14, 0.0, 0.0, 1.0), (0.26, 0.01, 0.0, 1.0),
-    (0.4, 0.03, 0.0, 1.0), (0.52, 0.06, 0.0, 1.0), (0.86, 0.26, 0.0, 0.95), (0.94, 0.33, 0.01, 0.93),
-    (0.985, 0.42, 0.04, 0.88), (1.0, 0.56, 0.1, 0.8),
+    (0.4, 0.03, 0.0, 1.0), (0.52, 0.06, 0.0, 1.0), (0.86, 0.26, 0.0, 0.95),
+    (0.94, 0.33, 0.01, 0.93), (0.985, 0.42, 0.04, 0.88), (1.0, 0.56, 0.1, 0.8),
 )  # fmt: skip
 
 
@@ -40,17 +40,17 @@ def truck(seed: int) -> Solid:
     if chance(0.6, rng):
         fitted.append(_spoiler(x, cab, roof, top))
     parts += [shell.unmapped(p) for p in fitted]
-    paints = [linear(pick(codes, rng)) for codes in (_CABS, _BOXES)]
+    cab_paint, box_paint = (linear(pick(codes, rng)) for codes in (_CABS, _BOXES))
     hull = [
         hulls.box((x - cab, -_HALF_M, _FLOOR_M), (x, _HALF_M, roof)),
         hulls.box((-x, -1.25, 0.95), (x - cab - 0.12, 1.25, top)),
         hulls.box((-x + 0.4, -1.1, 0.0), (x - 0.6, 1.1, 0.95)),
     ]
     points = axles.keypoints((x - 0.08, 0.95, 0.72), (-x + 0.02, 1.0, 0.8))
-    return solid([joined(parts)], materials(rng, *paints), hull, points)
+    return solid([joined(parts)], materials(rng, cab_paint, box_paint), hull, points)
 
 
-def truck_facts(seed: int) -> Facts:
+def truck_facts(**_: object) -> Facts:
     """Its kind."""
     return Facts("box_truck")
 
@@ -58,7 +58,8 @@ def truck_facts(seed: int) -> Facts:
 def _cab(x: float, length: float, roof: float, axles: Axles) -> Patch:
     ring = shell.plan((14.0, 3.0), (40.0, 9.0), sides=9)
     rows = [
-        Row(rise, x - front, x - length + rear, share * _HALF_M) for rise, front, rear, share in _ROWS
+        Row(rise, x - front, x - length + rear, share * _HALF_M)
+        for rise, front, rear, share in _ROWS
     ]
 
     def level(height_m: float) -> shell.Curve:
@@ -98,7 +99,9 @@ def _load(x: float, cab: float, top: float) -> list[Patch]:
             parts.append(block((-x, y - 0.025, z), (front, y + 0.025, z + 0.07), 0.0, Slot.CHROME))
         parts.append(block((-x, y - 0.025, 0.98), (-x + 0.08, y + 0.025, top), 0.0, Slot.CHROME))
     for y in (-0.62, -0.1, 0.1, 0.62):
-        parts.append(block((-x, y - 0.015, 1.05), (-x + 0.04, y + 0.015, top - 0.1), 0.0, Slot.CHROME))
+        parts.append(
+            block((-x, y - 0.015, 1.05), (-x + 0.04, y + 0.015, top - 0.1), 0.0, Slot.CHROME)
+        )
     parts.append(block((-x + 0.02, -0.006, 1.05), (-x + 0.04, 0.006, top - 0.1), 0.0, Slot.TRIM))
     return parts
 

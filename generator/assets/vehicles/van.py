@@ -68,7 +68,7 @@ def van(seed: int, steer_deg: float) -> Solid:
     return solid([bodywork(design, steer_deg)], finish, collision(design), keypoints(design))
 
 
-def van_facts(seed: int, steer_deg: float) -> Facts:
+def van_facts(seed: int, **_: object) -> Facts:
     """Its kind."""
     return Facts(_style(seed))
 

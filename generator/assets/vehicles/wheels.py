@@ -35,8 +35,8 @@ def wheel(radius_m: float, width_m: float, spokes: int, rim_share: float = 0.68)
         lathe(hub, 10, Slot.RIM),
         *_spokes(rim, half, spokes),
     ]
-    # A lathe's axle is Z: turned so that its top faces +Y.
-    return joined(parts).rotated("x", -0.5 * math.pi)
+    # A lathe's axle is Z: turned so that its top faces +Y, and a corner of the tread down.
+    return joined(parts).rotated("z", 0.5 * math.pi).rotated("x", -0.5 * math.pi)
 
 
 def _spokes(rim: float, half: float, count: int) -> list[Patch]:
@@ -48,7 +48,9 @@ def _spokes(rim: float, half: float, count: int) -> list[Patch]:
     width = 1.25 * rim / (count + 1.5)
     bar = block((0.12 * rim, -0.5 * width, 0.45 * half), (0.92 * rim, 0.5 * width, 0.82 * half))
     # The lower face is never seen.
-    up = np.cross(bar.corners_m[:, 1] - bar.corners_m[:, 0], bar.corners_m[:, 2] - bar.corners_m[:, 0])
+    up = np.cross(
+        bar.corners_m[:, 1] - bar.corners_m[:, 0], bar.corners_m[:, 2] - bar.corners_m[:, 0]
+    )
     kept = (up[:, 2] > -1e-12) & (np.abs(up[:, 0]) < 1e-12)
     seen = Patch(bar.corners_m[kept], bar.uvs[kept], bar.slots[kept]).painted(Slot.RIM)
     return [seen.rotated("z", 2 * math.pi * (k + 0.25) / count) for k in range(count)]
@@ -81,7 +83,9 @@ class Axles:
         """Four wheels; positive steering turns the front ones to the left."""
         made = wheel(self.radius_m, self.tyre_m, self.spokes)
         inner = made.moved(y=-1.1 * self.tyre_m)
-        for (x, steered), sign in product(((self.front_m, True), (self.rear_m, False)), (1.0, -1.0)):
+        for (x, steered), sign in product(
+            ((self.front_m, True), (self.rear_m, False)), (1.0, -1.0)
+        ):
             one = made if steered or not self.twin else joined([made, inner])
             side = one if sign > 0 else one.rotated("z", math.pi)
             turn = math.radians(steer_deg) if steered else 0.0
