@@ -17,7 +17,7 @@ def _vehicle(name: str, variants: int, mass_kg: float, module: str, **parameters
         variants=variants,
         mass_kg=mass_kg,
         stackable=False,
-        version=2,
+        version=3,
         parameters=parameters,
         build=Lazy(path),
         facts=Lazy(f"{path}_facts"),
@@ -28,5 +28,11 @@ FAMILIES: Mapping[str, Family] = {
     family.name: family
     for family in (
         _vehicle("car", 48, 1400.0, "car", steer_deg=0.0),
+        _vehicle("van", 16, 2200.0, "van", steer_deg=0.0),
+        _vehicle("truck", 16, 7500.0, "truck"),
+        _vehicle("bus", 8, 12000.0, "bus"),
+        _vehicle("motorcycle", 12, 200.0, "motorcycle"),
+        _vehicle("bicycle", 12, 15.0, "bicycle"),
+        _vehicle("cyclist", 16, 90.0, "bicycle"),
     )
 }

@@ -1,11 +1,9 @@
-"""Cars and vans: a lower body with a hood, a glass house on it, wheels and what is fitted to them."""
+"""Cars and vans: a lower body with a hood, a glass house on it, and what is fitted to them."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -26,10 +24,8 @@ from generator.assets.vehicles.shell import (
     painted_where,
     rows_between,
 )
-from generator.assets.vehicles.wheels import well, wheel
+from generator.assets.vehicles.wheels import Axles
 from generator.core.geometry import Keypoint
-
-_INNER_WELL_M = 0.32
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ class Design:
         clearance_m: Of the underbody.
         nose_m, cowl_m, belt_m, tail_m: Height of the shoulder along the car.
         cowl, header, roof_end, rear_base: Shares where windscreen and rear window begin and end.
-        roof_share: Half width of the roof over half width of the body.
+        waist_share, roof_share: Half width below the windows and of the roof over the body's.
         body_ends, house_ends: Exponents of the plan in front and behind.
         seams: Shares of the vertical door gaps.
         pillars: Shares of the pillars between side windows.
@@ -73,6 +69,7 @@ class Design:
     header: float
     roof_end: float
     rear_base: float
+    waist_share: float
     roof_share: float
     body_ends: tuple[Point2, Point2]
     house_ends: tuple[Point2, Point2]
@@ -95,25 +92,18 @@ class Design:
         return 0.5 * self.width_m
 
     @property
-    def axles_m(self) -> Point2:
-        """x of the front and the rear axle."""
-        front = 0.5 * self.length_m - self.front_axle_m
-        return front, front - self.wheelbase_m
-
-    @property
-    def hub_y_m(self) -> float:
-        """y of the middle of a left wheel."""
-        return 0.975 * self.half_m - 0.5 * self.tyre_m
-
-    @property
-    def tyre_m(self) -> float:
-        """Width of a tyre."""
-        return 0.66 * self.wheel_radius_m
-
-    @property
-    def arch_m(self) -> float:
-        """Radius of the wheel arches."""
-        return self.wheel_radius_m + (0.055 if self.cladding else 0.045)
+    def axles(self) -> Axles:
+        """Where the wheels are."""
+        front, tyre = 0.5 * self.length_m - self.front_axle_m, 0.66 * self.wheel_radius_m
+        return Axles(
+            front_m=front,
+            rear_m=front - self.wheelbase_m,
+            hub_y_m=0.975 * self.half_m - 0.5 * tyre,
+            radius_m=self.wheel_radius_m,
+            tyre_m=tyre,
+            arch_m=self.wheel_radius_m + (0.055 if self.cladding else 0.045),
+            spokes=self.spokes,
+        )
 
     def shoulder(self) -> Curve:
         """Height of the edge between side and hood, belt and boot lid."""
@@ -132,15 +122,15 @@ class Design:
 
 # Share of the height, how far front and rear stand back [m], share of the half width.
 _LOWER = (
-    (0.0, 0.12, 0.13, 0.9), (0.06, 0.06, 0.07, 0.955), (0.16, 0.02, 0.03, 0.985),
-    (0.3, 0.0, 0.0, 1.0), (0.46, 0.005, 0.0, 0.994), (0.58, 0.015, 0.012, 0.992),
-    (0.7, 0.035, 0.025, 1.0), (0.82, 0.075, 0.04, 0.992), (0.91, 0.13, 0.06, 0.975),
-    (0.97, 0.2, 0.09, 0.95), (1.0, 0.28, 0.14, 0.915),
+    (0.0, 0.12, 0.13, 0.9), (0.07, 0.055, 0.065, 0.958), (0.17, 0.02, 0.03, 0.985),
+    (0.32, 0.0, 0.0, 1.0), (0.5, 0.008, 0.004, 0.99), (0.66, 0.025, 0.018, 1.0),
+    (0.8, 0.055, 0.038, 0.992), (0.91, 0.1, 0.06, 0.975), (0.97, 0.155, 0.09, 0.95),
+    (1.0, 0.23, 0.14, 0.915),
 )  # fmt: skip
 # Share of the height, share of the windscreen's run, of the rear window's, of the lean inwards.
 _HOUSE = (
-    (0.0, 0.0, 0.0, 0.0), (0.14, 0.13, 0.12, 0.1), (0.4, 0.39, 0.37, 0.36), (0.66, 0.65, 0.62, 0.65),
-    (0.84, 0.83, 0.8, 0.88), (0.93, 0.94, 0.91, 1.03), (0.98, 1.04, 1.03, 1.17),
+    (0.0, 0.0, 0.0, 0.0), (0.2, 0.19, 0.18, 0.15), (0.52, 0.51, 0.48, 0.48),
+    (0.82, 0.81, 0.77, 0.85), (0.93, 0.94, 0.91, 1.03), (0.98, 1.04, 1.03, 1.17),
     (1.0, 1.13, 1.16, 1.36),
 )  # fmt: skip
 
@@ -149,43 +139,34 @@ def bodywork(design: Design, steer_deg: float) -> Patch:
     """Everything, both sides."""
     ring = shell.plan(*design.body_ends, sides=22)
     plain = _lower(design, ring)
-    lower, wells = _with_wells(design, _lower_paint(design, ring, plain))
-    gaps = _gaps(design, plain)
+    lower, wells = design.axles.wells(_lower_paint(design, ring, plain), design.half_m)
+    gaps = _gaps(design, design.axles.wells(plain, design.half_m)[0])
     half = joined([lower, *wells, *gaps, _house(design), *_fitted(design)])
-    middle = [*_plates(design), *_wheels(design, steer_deg)]
+    middle = [*_plates(design), *design.axles.wheels(steer_deg)]
     return joined([shell.whole(half, SIDES), *(shell.unmapped(p) for p in middle)])
 
 
 def collision(design: Design) -> list[Array]:
     """Body and glass house as boxes."""
-    x, y = 0.5 * design.length_m, design.half_m
+    x, y, axles = 0.5 * design.length_m, design.half_m, design.axles
     house = 0.5 * (1.0 + design.roof_share) * 0.92 * y
-    front, rear = design.x(0.5 * (design.cowl + design.header)), design.x(
-        0.5 * (design.roof_end + design.rear_base)
+    front, rear = (
+        design.x(0.5 * (design.cowl + design.header)),
+        design.x(0.5 * (design.roof_end + design.rear_base)),
     )
     return [
         hulls.box((-x, -y, design.clearance_m), (x, y, design.belt_m)),
         hulls.box((rear, -house, design.belt_m), (front, house, design.height_m)),
-        hulls.box((design.axles_m[1] - design.wheel_radius_m, -0.9 * y, 0.0),
-                  (design.axles_m[0] + design.wheel_radius_m, 0.9 * y, design.clearance_m)),
+        hulls.box((axles.rear_m - axles.radius_m, -0.9 * y, 0.0),
+                  (axles.front_m + axles.radius_m, 0.9 * y, design.clearance_m)),
     ]  # fmt: skip
 
 
 def keypoints(design: Design) -> tuple[Keypoint, ...]:
-    """Hubs and lamps; a wheel that is seen from ahead hides its hub by its own radius."""
-    points = []
-    for end, x in zip(("front", "rear"), design.axles_m, strict=True):
-        for side, sign in (("left", 1.0), ("right", -1.0)):
-            at = (x, sign * design.hub_y_m, design.wheel_radius_m)
-            points.append(Keypoint(f"wheel_{end}_{side}", at, 1.1 * design.wheel_radius_m))
+    """Hubs and lamps."""
     x, y = 0.5 * design.length_m, design.half_m
-    for name, place, z in (
-        ("headlight", (x - 0.2, 0.74 * y), design.lamp_m[0]),
-        ("taillight", (-x + 0.14, 0.8 * y), design.lamp_m[1]),
-    ):
-        for side, sign in (("left", 1.0), ("right", -1.0)):
-            points.append(Keypoint(f"{name}_{side}", (place[0], sign * place[1], z), 0.2))
-    return tuple(points)
+    head, tail = design.lamp_m
+    return design.axles.keypoints((x - 0.2, 0.74 * y, head), (-x + 0.14, 0.8 * y, tail))
 
 
 def _lower(design: Design, ring: Plan) -> Patch:
@@ -197,12 +178,13 @@ def _lower(design: Design, ring: Plan) -> Patch:
 
     body = shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
     # What lies under the glass house is never seen.
-    hidden = (
+    hidden = np.all(
         (body.uvs[..., 1] >= 1.0)
         & (body.corners_m[..., 0] < design.x(design.cowl) - 0.35)
         & (body.corners_m[..., 0] > design.x(design.rear_base) + 0.2)
-        & (body.corners_m[..., 1] < 0.8 * y)
-    ).all(axis=1)
+        & (body.corners_m[..., 1] < 0.8 * y),
+        axis=1,
+    )
     return shell.taken(body, ~hidden)
 
 
@@ -213,8 +195,9 @@ def _lower_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
     patch = painted_where(patch, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
     patch = painted_where(patch, Slot.TRIM, *rows_between(0.0, 2.0), below("z", sill))
     if design.cladding:
-        for axle in design.axles_m:
-            arch = shell.round_x_z(axle, design.wheel_radius_m, design.arch_m + 0.055, 0.4)
+        axles = design.axles
+        for x_m in (axles.front_m, axles.rear_m):
+            arch = shell.round_x_z(x_m, axles.radius_m, axles.arch_m + 0.055, 0.4)
             patch = painted_where(patch, Slot.TRIM, *rows_between(0.0, 1.0), arch)
     patch = _front_paint(design, ring, patch)
     patch = _rear_paint(design, ring, patch)
@@ -231,13 +214,17 @@ def _gaps(design: Design, plain: Patch) -> list[Patch]:
 def _front_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
     x, z, y = 0.5 * design.length_m, design.lamp_m[0], design.half_m
     front = above("x", x - 0.8)
-    inner, outer = ring.front(0.5), ring.front(0.93) + 0.035
-    lamp = (front, *along(inner, outer), *between("z", z - 0.075, z + 0.07),
-            below("z", z + 0.03, 0.35 / y, "y"), above("z", z - 0.16, 0.13 / y, "y"))  # fmt: skip
-    patch = painted_where(patch, Slot.HEADLIGHT, *lamp)
-    turn = (front, *along(ring.front(0.86), outer), *between("z", z - 0.075, z - 0.035))
+    outer = ring.front(0.93) + 0.03
+    bezel = (front, *along(ring.front(0.44), outer), *between("z", z - 0.085, z + 0.075),
+             above("z", z - 0.17, 0.13 / y, "y"))  # fmt: skip
+    patch = painted_where(patch, Slot.TRIM, *bezel)
+    lens = (front, *along(ring.front(0.52), ring.front(0.93) + 0.022),
+            *between("z", z - 0.055, z + 0.066))  # fmt: skip
+    patch = painted_where(patch, Slot.HEADLIGHT, *lens)
+    turn = (front, *along(ring.front(0.8), ring.front(0.93) + 0.01),
+            *between("z", z - 0.055, z - 0.025))  # fmt: skip
     patch = painted_where(patch, Slot.INDICATOR_LEFT, *turn)
-    grille = (front, below("y", 0.46 * y), *between("z", z - 0.1, z + 0.03))
+    grille = (front, below("y", 0.4 * y), *between("z", z - 0.11, z + 0.04))
     patch = painted_where(patch, Slot.TRIM, *grille)
     intake = (front, below("y", 0.68 * y), *between("z", design.clearance_m + 0.08, z - 0.28))
     return painted_where(patch, Slot.TRIM, *intake)
@@ -252,10 +239,14 @@ def _rear_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
     patch = painted_where(patch, Slot.TAILLIGHT, *reach, *between("z", low, high))
     stop = (rear, *along(ring.rear(0.93) - 0.02, ring.rear(0.5 * inner + 0.4)))
     patch = painted_where(
-        patch, Slot.BRAKELIGHT, *stop, *rows_between(0.1, 0.985), *between("z", low, 0.5 * (low + high))
+        patch,
+        Slot.BRAKELIGHT,
+        *stop,
+        *rows_between(0.1, 0.985),
+        *between("z", low, 0.5 * (low + high)),
     )
-    wink = (rear, *along(ring.rear(0.86), ring.rear(inner)))
-    height = between("z", low, low + 0.3 * (high - low))
+    wink = (rear, *along(ring.rear(0.9), ring.rear(0.5 * inner + 0.4)))
+    height = between("z", low, low + 0.28 * (high - low))
     patch = painted_where(patch, Slot.INDICATOR_LEFT, *wink, *rows_between(0.1, 0.985), *height)
     lid = (rear, below("y", 0.7 * y), *between("z", z - 0.335, z - 0.327))
     patch = painted_where(patch, Slot.TRIM, *lid)
@@ -263,23 +254,11 @@ def _rear_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
     return painted_where(patch, Slot.TRIM, *skirt)
 
 
-def _with_wells(design: Design, patch: Patch) -> tuple[Patch, list[Patch]]:
-    """The body with holes for the wheels, and what is behind them."""
-    wells = []
-    for x in design.axles_m:
-        hub = (x, design.wheel_radius_m)
-        inner = design.half_m - _INNER_WELL_M
-        hole = shell.round_x_z(*hub, design.arch_m, inner)
-        _, patch, edge = shell.split(patch, hole)
-        wells.append(well(edge, hub, design.arch_m, inner))
-    return patch, wells
-
-
 def _house(design: Design) -> Patch:
     """Glass house and roof."""
-    ring = shell.plan(*design.house_ends, sides=13)
+    ring = shell.plan(*design.house_ends, sides=11)
     crown, shoulder = 0.035, design.shoulder()
-    wide = 0.925 * design.half_m
+    wide = design.waist_share * design.half_m
     narrow = design.roof_share * design.half_m
     x = [design.x(s) for s in (design.cowl, design.header, design.roof_end, design.rear_base)]
     rows = [
@@ -327,7 +306,9 @@ def _fitted(design: Design) -> Iterable[Patch]:
     yield rounded_box((0.13, 0.2, 0.14), 0.045, 1).moved(mirror_x, y + 0.07, z).painted(Slot.PAINT)
     face = block((mirror_x - 0.07, y - 0.01, z - 0.05), (mirror_x - 0.06, y + 0.15, z + 0.05))
     yield face.painted(Slot.CHROME)
-    yield block((mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM)
+    yield block(
+        (mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM
+    )
     for share in design.seams[1:]:
         x = design.x(share) + 0.16
         z = float(shoulder(np.array(x))) - 0.13
@@ -345,13 +326,3 @@ def _plates(design: Design) -> Iterable[Patch]:
     yield block((x - 0.03, -0.26, z - 0.055), (x + 0.008, 0.26, z + 0.055), 0.0, Slot.PLATE)
     z = design.lamp_m[1] - 0.2 if not design.upright_lamps else design.lamp_m[1] - 0.3
     yield block((-x - 0.002, -0.26, z - 0.055), (-x + 0.05, 0.26, z + 0.055), 0.0, Slot.PLATE)
-
-
-def _wheels(design: Design, steer_deg: float) -> Iterable[Patch]:
-    made = wheel(design.wheel_radius_m, design.tyre_m, design.spokes)
-    for (end, x), sign in product(enumerate(design.axles_m), (1.0, -1.0)):
-        turn = math.radians(steer_deg) if end == 0 else 0.0
-        side = made if sign > 0 else made.rotated("z", math.pi)
-        yield side.rotated("z", turn).moved(x, sign * design.hub_y_m, design.wheel_radius_m)
-
-

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+import numpy as np
+
 from generator.assets.procedural.draw import between
 from generator.assets.procedural.materials import linear
 from generator.core.geometry import Material
@@ -48,12 +50,9 @@ _PAINTS = (
 
 def drawn_paint(rng: Rng) -> Vec3:
     """Colour of a private car, linear RGB."""
-    left = float(rng.random())
-    for weight, code in _PAINTS:
-        left -= weight
-        if left < 0.0:
-            break
-    return linear(code)
+    shares = np.cumsum([weight for weight, _ in _PAINTS])
+    index = int(np.searchsorted(shares, float(rng.random()), side="right"))
+    return linear(_PAINTS[min(index, len(_PAINTS) - 1)][1])
 
 
 def materials(
@@ -70,19 +69,18 @@ def materials(
     tint = between(0.015, 0.035, rng)
     rim = between(0.35, 0.75, rng) if rng.random() < 0.75 else 0.04
     skin, top, bottom, shoes, helmet = clothes or ((0.4,) * 3,) * 5
-    lens = {"roughness": 0.12, "specular": 0.7}
     return (
         Material(paint, between(0.15, 0.25, rng), specular=0.6, role="paint"),
         Material((tint, 1.1 * tint, 1.15 * tint), 0.05, specular=0.8, role="glass"),
-        Material((0.02, 0.02, 0.021), 0.5, role="trim"),
+        Material((0.013, 0.013, 0.014), 0.5, specular=0.35, role="trim"),
         Material((0.008, 0.008, 0.008), 0.9, role="underbody"),
         Material((0.02, 0.02, 0.02), 0.85, role="tyre"),
         Material((rim, rim, 1.02 * rim), 0.3, 0.9, role="rim"),
-        Material((0.72, 0.74, 0.76), 0.15, specular=0.8, role="headlight"),
-        Material((0.3, 0.008, 0.01), role="taillight", **lens),
-        Material((0.42, 0.012, 0.014), role="brakelight", **lens),
-        Material((0.72, 0.3, 0.05), role="indicator_left", **lens),
-        Material((0.72, 0.3, 0.05), role="indicator_right", **lens),
+        Material((0.62, 0.65, 0.68), 0.1, specular=0.9, role="headlight"),
+        _lens((0.3, 0.008, 0.01), "taillight"),
+        _lens((0.42, 0.012, 0.014), "brakelight"),
+        _lens((0.72, 0.3, 0.05), "indicator_left"),
+        _lens((0.72, 0.3, 0.05), "indicator_right"),
         Material((0.75, 0.75, 0.7), 0.4, role="plate"),
         Material((0.75, 0.76, 0.77), 0.15, 1.0, role="chrome"),
         Material(second, 0.35, role="paint"),
@@ -92,3 +90,7 @@ def materials(
         Material(shoes, 0.6, role="shoes"),
         Material(helmet, 0.3, role="trim"),
     )
+
+
+def _lens(color: Vec3, role: str) -> Material:
+    return Material(color, roughness=0.12, specular=0.7, role=role)

@@ -88,9 +88,7 @@ def plan(front: Point2, rear: Point2, sides: int) -> Plan:
     side = np.linspace(a[-1], -b[-1], sides + 1)[1:-1]
     exponents = [np.where(side > 0, front[i], rear[i]) for i in (0, 1)]
     bulge = (1.0 - np.abs(side) ** exponents[0]) ** (1.0 / exponents[1])
-    return Plan(
-        np.concatenate([a, side, -b[::-1]]), np.concatenate([share, bulge, share[::-1]])
-    )
+    return Plan(np.concatenate([a, side, -b[::-1]]), np.concatenate([share, bulge, share[::-1]]))
 
 
 def through(points: Sequence[Point2]) -> Curve:
@@ -118,7 +116,11 @@ def stack(
         lid[:, 2] += crown_m * ring.across**2 * (1.0 - share**2)
         lids.append(lid)
     points = np.stack([bottom, *rings, *lids])
-    rises = [-1.0, *(row.rise for row in rows), *(1.0 + k / lid_rows for k in range(1, lid_rows + 1))]
+    rises = [
+        -1.0,
+        *(row.rise for row in rows),
+        *(1.0 + k / lid_rows for k in range(1, lid_rows + 1)),
+    ]
     return grid(points, np.linspace(0.0, 1.0, points.shape[1]), np.array(rises))
 
 
@@ -129,9 +131,9 @@ def split(patch: Patch, level: Level) -> tuple[Patch, Patch, Array]:
     """
     value = np.round(level(patch), 9)
     value = np.where(np.abs(value) < 1e-7, 0.0, value)
-    inside = [taken(patch, (value >= 0).all(axis=1) & (value > 0).any(axis=1))]
-    outside = [taken(patch, (value <= 0).all(axis=1))]
-    mixed = (value > 0).any(axis=1) & (value < 0).any(axis=1)
+    inside = [taken(patch, np.all(value >= 0, axis=1) & np.any(value > 0, axis=1))]
+    outside = [taken(patch, np.all(value <= 0, axis=1))]
+    mixed = np.any(value > 0, axis=1) & np.any(value < 0, axis=1)
     # Turn the corners until the first one is alone on its side, or lies on the line.
     part, v = taken(patch, mixed), value[mixed]
     sign = np.sign(v)
@@ -160,12 +162,19 @@ def painted_where(patch: Patch, slot: int, *levels: Level) -> Patch:
     """
     touched = np.ones(len(patch.slots), dtype=bool)
     for level in levels:
-        touched &= (level(patch) > 1e-7).any(axis=1)
+        touched &= np.any(level(patch) > 1e-7, axis=1)
     done, patch = [taken(patch, ~touched)], taken(patch, touched)
     for level in levels:
         patch, outside, _ = split(patch, level)
         done.append(outside)
     return joined([*done, patch.painted(slot)])
+
+
+def refined(patch: Patch, axis: str, places_m: Sequence[float]) -> Patch:
+    """The patch with edges added along planes, so that round holes come out round."""
+    for place in places_m:
+        patch = joined(split(patch, above(axis, place))[:2])
+    return patch
 
 
 def gap(patch: Patch, x_m: float, width_m: float, slot: int, *levels: Level) -> Patch:

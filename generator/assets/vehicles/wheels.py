@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from generator.assets.procedural.mesh import Array, Patch, joined
 from generator.assets.procedural.shapes import block, circle, fan, lathe
 from generator.assets.vehicles.materials import Slot
+from generator.assets.vehicles.shell import round_x_z, split
+from generator.core.geometry import Keypoint
+from generator.core.se3 import Vec3
 
 _SEGMENTS = 18
+_WELL_M = 0.32
 
 
 def wheel(radius_m: float, width_m: float, spokes: int, rim_share: float = 0.68) -> Patch:
@@ -28,8 +35,8 @@ def wheel(radius_m: float, width_m: float, spokes: int, rim_share: float = 0.68)
         lathe(hub, 10, Slot.RIM),
         *_spokes(rim, half, spokes),
     ]
-    # A lathe's axle is Z: turned so that its top faces +Y.
-    return joined(parts).rotated("x", -0.5 * math.pi)
+    # A lathe's axle is Z: turned so that its top faces +Y, and a corner of the tread down.
+    return joined(parts).rotated("z", 0.5 * math.pi).rotated("x", -0.5 * math.pi)
 
 
 def _spokes(rim: float, half: float, count: int) -> list[Patch]:
@@ -41,13 +48,76 @@ def _spokes(rim: float, half: float, count: int) -> list[Patch]:
     width = 1.25 * rim / (count + 1.5)
     bar = block((0.12 * rim, -0.5 * width, 0.45 * half), (0.92 * rim, 0.5 * width, 0.82 * half))
     # The lower face is never seen.
-    up = np.cross(bar.corners_m[:, 1] - bar.corners_m[:, 0], bar.corners_m[:, 2] - bar.corners_m[:, 0])
+    up = np.cross(
+        bar.corners_m[:, 1] - bar.corners_m[:, 0], bar.corners_m[:, 2] - bar.corners_m[:, 0]
+    )
     kept = (up[:, 2] > -1e-12) & (np.abs(up[:, 0]) < 1e-12)
     seen = Patch(bar.corners_m[kept], bar.uvs[kept], bar.slots[kept]).painted(Slot.RIM)
     return [seen.rotated("z", 2 * math.pi * (k + 0.25) / count) for k in range(count)]
 
 
-def well(edge_m: Array, hub_m: tuple[float, float], radius_m: float, inner_y_m: float) -> Patch:
+@dataclass(frozen=True)
+class Axles:
+    """Two axles with equal wheels.
+
+    Attributes:
+        front_m, rear_m: x of the axles.
+        hub_y_m: y of the middle of a left wheel.
+        radius_m: Of the wheels.
+        tyre_m: Width of the tyres; twin tyres behind are as wide as two.
+        arch_m: Radius of the wheel arches.
+        spokes: 0 = steel wheels.
+        twin: Whether the rear wheels are twins.
+    """
+
+    front_m: float
+    rear_m: float
+    hub_y_m: float
+    radius_m: float
+    tyre_m: float
+    arch_m: float
+    spokes: int
+    twin: bool = False
+
+    def wheels(self, steer_deg: float) -> Iterator[Patch]:
+        """Four wheels; positive steering turns the front ones to the left."""
+        made = wheel(self.radius_m, self.tyre_m, self.spokes)
+        inner = made.moved(y=-1.1 * self.tyre_m)
+        for (x, steered), sign in product(
+            ((self.front_m, True), (self.rear_m, False)), (1.0, -1.0)
+        ):
+            one = made if steered or not self.twin else joined([made, inner])
+            side = one if sign > 0 else one.rotated("z", math.pi)
+            turn = math.radians(steer_deg) if steered else 0.0
+            yield side.rotated("z", turn).moved(x, sign * self.hub_y_m, self.radius_m)
+
+    def wells(self, patch: Patch, half_m: float) -> tuple[Patch, list[Patch]]:
+        """A left half of a body with holes for the wheels, and what is behind the holes."""
+        inner = half_m - _WELL_M
+        made = []
+        for x in (self.front_m, self.rear_m):
+            hub = (x, self.radius_m)
+            _, patch, edge = split(patch, round_x_z(*hub, self.arch_m, inner))
+            if len(edge):
+                made.append(_well(edge, hub, self.arch_m, inner))
+        return patch, made
+
+    def keypoints(self, headlight_m: Vec3, taillight_m: Vec3) -> tuple[Keypoint, ...]:
+        """Hubs and lamps; the left lamps are given."""
+        hubs = {
+            "wheel_front": ((self.front_m, self.hub_y_m, self.radius_m), 0.5 * self.tyre_m + 0.05),
+            "wheel_rear": ((self.rear_m, self.hub_y_m, self.radius_m), 0.5 * self.tyre_m + 0.05),
+            "headlight": (headlight_m, 0.2),
+            "taillight": (taillight_m, 0.2),
+        }
+        return tuple(
+            Keypoint(f"{name}_{side}", (x, sign * y, z), radius)
+            for name, ((x, y, z), radius) in hubs.items()
+            for side, sign in (("left", 1.0), ("right", -1.0))
+        )
+
+
+def _well(edge_m: Array, hub_m: tuple[float, float], radius_m: float, inner_y_m: float) -> Patch:
     """The inside of a wheel well behind an edge, as segments [n, 2, 3]; it looks at the hub."""
     inner = edge_m.copy()
     inner[..., 1] = inner_y_m
