@@ -75,7 +75,7 @@ R_CAMERA_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 T_CAMERA_LIDAR_M = np.array([0.0, -LIDAR_HEIGHT_M, 0.0])
 
 NEAR_M = 0.05
-"""Boxes are clipped at this depth before they are projected."""
+"""Boxes that come nearer than this depth are not projected."""
 LIDAR_RANGE_M = 120.0
 """Of Velodyne's HDL-64E, whose place the virtual scanner takes."""
 
@@ -290,7 +290,7 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
     """The fifteen columns of one visible object.
 
     A DontCare row where it is too far or too small for ``style``, less than two pixels wide, or
-    where its location is not before the camera: KITTI cannot say that.
+    where its box reaches behind the camera: it has no projection that readers agree on.
     """
     assert thing.box is not None, "invisible objects are not listed"
     assert thing.box3d_camera is not None, "the annotation boxes3d is in `needs`"
@@ -300,7 +300,7 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
     x, y, z = box.bottom_m
     k = truth.camera.intrinsics
     tiny = thing.box.width_px < 2 or thing.box.height_px < style.low_px
-    if tiny or not 0 < z <= style.far_m:
+    if tiny or not 0 < z <= style.far_m or box.corners()[:, 2].min() < NEAR_M:
         corners = _inclusive(_widened(thing.box, k))
         return f"DontCare -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
     instance = thing.instance
@@ -321,11 +321,7 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
 
 def projected_corners(box: UprightBox, camera: Intrinsics) -> str:
     """Left, top, right and bottom of a box's image, clipped; pixel centres at whole numbers."""
-    p = box.corners()
-    front = p[:, 2] > NEAR_M
-    # Where edges pass the camera's plane, their image begins just before it.
-    cut = [a + (NEAR_M - a[2]) / (b[2] - a[2]) * (b - a) for a in p[front] for b in p[~front]]
-    uv = camera.project(np.vstack([p[front], *cut])) - 0.5
+    uv = camera.project(box.corners()) - 0.5
     (left, top), (right, bottom) = uv.min(axis=0), uv.max(axis=0)
     x = np.clip([left, right], 0.0, camera.width_px - 1.0)
     y = np.clip([top, bottom], 0.0, camera.height_px - 1.0)

@@ -233,7 +233,7 @@ def test_steering_turns_the_front_wheels_alone(name: str) -> None:
     front = straight.keypoints[0].position_m
 
     def ahead(corners: Array) -> float:
-        """y of the foremost part of the left front tyre."""
+        """Y of the foremost part of the left front tyre."""
         mine = corners[(corners[:, 1] > 0) & (np.abs(corners[:, 0] - front[0]) < front[2] + 0.05)]
         return float(mine[mine[:, 0] > mine[:, 0].max() - 0.03, 1].mean())
 
