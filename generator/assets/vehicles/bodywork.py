@@ -137,7 +137,7 @@ _HOUSE = (
 
 def bodywork(design: Design, steer_deg: float) -> Patch:
     """Everything, both sides."""
-    ring = shell.plan(*design.body_ends, sides=22)
+    ring = shell.plan(*design.body_ends, sides=20)
     plain = _lower(design, ring)
     lower, wells = design.axles.wells(_lower_paint(design, ring, plain), design.half_m)
     gaps = _gaps(design, design.axles.wells(plain, design.half_m)[0])
@@ -256,7 +256,7 @@ def _rear_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
 
 def _house(design: Design) -> Patch:
     """Glass house and roof."""
-    ring = shell.plan(*design.house_ends, sides=11)
+    ring = shell.plan(*design.house_ends, sides=10)
     crown, shoulder = 0.035, design.shoulder()
     wide = design.waist_share * design.half_m
     narrow = design.roof_share * design.half_m

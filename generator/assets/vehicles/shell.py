@@ -25,7 +25,7 @@ Level = Callable[[Patch], Array]
 
 # How far lines stand in front of what they are drawn on.
 _PROUD_M = 0.002
-_END_SHARES = (0.0, 0.28, 0.52, 0.7, 0.83, 0.92)
+_END_SHARES = (0.0, 0.32, 0.58, 0.78, 0.92)
 
 
 @dataclass(frozen=True, eq=False)
