@@ -86,9 +86,12 @@ def see(
 def project(world: PackedWorld, view: records.View, stock: AssetStock) -> Projected:
     """Vertices as the camera sees them; valid until the next call."""
     count = max(world.vertex_count, 1)
+    reached = bodies_within(world.placed, view, 1.0)
+    # The wider test may refuse a body that the narrower one cannot: it is outside of both.
+    in_view = np.intersect1d(reached, bodies_within(world.placed, view, 0.0))
     projected = Projected(
-        bodies_within(world.placed, view, 1.0),
-        bodies_within(world.placed, view, 0.0),
+        reached,
+        in_view,
         stock.scratch("p camera", count, wp.vec3),
         stock.scratch("xy", count, wp.vec2i),
     )

@@ -106,3 +106,13 @@ def test_values_that_need_one_another_are_refused() -> None:
     """A circle has no beginning."""
     with pytest.raises(ConfigError, match="need one another"):
         drawn(parse("a: $shared.b\nb: $shared.a", "test"), Streams(0, 0))
+
+
+def test_order_of_a_choices_entries_moves_no_draw() -> None:
+    """A plan keeps its keys sorted, and must make the same samples again."""
+    one = parse("x: {choice: {wet: 3, dry: 1, 10: 2, 9: 1}}", "test")
+    other = parse("x: {choice: {10: 2, 9: 1, dry: 1, wet: 3}}", "test")
+
+    assert [drawn(one, Streams(5, k)) for k in range(50)] == [
+        drawn(other, Streams(5, k)) for k in range(50)
+    ]

@@ -16,7 +16,7 @@ from generator.renderers.meshes import boxes_around
 from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
-from generator.renderers.visibility import bodies_within
+from generator.renderers.visibility import bodies_within, project
 from generator.renderers.warp import WarpRenderer
 from tests.renderers.fake_library import (
     FakeLibrary,
@@ -56,6 +56,52 @@ def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
             needed.add(number)
     assert needed <= kept
     assert len(kept) < 0.5 * len(scene.bodies)
+
+
+def slabs_all_around() -> Scene:
+    """Long thin boxes, many of which reach from before the camera to behind it, or stand beside."""
+    rng = np.random.default_rng(5)
+    spots, turns = rng.uniform(-5.0, 5.0, (200, 3)), rng.uniform(0.0, 6.3, 200)
+    bodies = [
+        Body(f"b{k}", "slab", SE3.about_z(float(turn), tuple(spot)), 1.0, k + 1)
+        for k, (spot, turn) in enumerate(zip(spots.tolist(), turns, strict=True))
+    ]
+    instances = [Instance(k + 1, f"b{k}", "slab", 1, "slab") for k in range(len(bodies))]
+    return Scene("test", tuple(bodies), tuple(instances))
+
+
+def test_whatever_is_drawn_was_projected() -> None:
+    """The narrow test alone keeps bodies that the wide one refuses: those must not be drawn."""
+    meshes = {"slab": box_mesh((8.0, 0.4, 1.0))}
+    scene = slabs_all_around()
+    stock = AssetStock(FakeLibrary(meshes), open_device("cpu"))
+    apart = 0
+    for target in ((1.0, 0.2, 0.1), (-1.0, 0.4, -0.3), (0.2, 1.0, 0.5)):
+        camera = camera_at((0.0, 0.0, 0.0), target)
+        world, view = pack_world(scene, camera, stock), pack_view(camera)
+        projected = project(world, view, stock)
+        narrow = bodies_within(world.placed, view, 0.0)
+        apart += len(np.setdiff1d(narrow, projected.reached))
+        assert np.isin(projected.in_view, projected.reached).all()
+    assert apart > 0
+
+
+def test_a_frame_does_not_depend_on_the_frames_before_it() -> None:
+    """The third of three views is the same when it is the first."""
+    meshes = {"slab": box_mesh((8.0, 0.4, 1.0))}
+    scene = slabs_all_around()
+    targets = ((1.0, 0.2, 0.1), (-1.0, 0.4, -0.3), (0.2, 1.0, 0.5))
+    cameras = [camera_at((0.0, 0.0, 0.0), target) for target in targets]
+    wanted = frozenset({Channel.INSTANCE, Channel.Z_DEPTH, Channel.RGB})
+    warm, fresh = (WarpRenderer(FakeLibrary(meshes), "cpu") for _ in range(2))
+
+    for camera in cameras:
+        after = warm.render(scene, camera, wanted)
+    alone = fresh.render(scene, cameras[-1], wanted)
+
+    for channel in wanted:
+        np.testing.assert_array_equal(after.channels[channel], alone.channels[channel])
+    assert (after.channels[Channel.Z_DEPTH] > 0.0).all()
 
 
 def test_labels_do_not_depend_on_bodies_out_of_view() -> None:

@@ -88,8 +88,11 @@ class Choice(Numeric[T_co]):
     kinds: ClassVar[frozenset[str]] = EVERY_KIND
 
     def __init__(self, values: Items[T_co] | Mapping[T_co, float]) -> None:
-        """Accept a sequence (equal weights) or ``{value: weight}``."""
+        """Accept a sequence (equal weights) or ``{value: weight}``, whose order means nothing."""
         weighted = isinstance(values, Mapping)
+        if isinstance(values, Mapping):
+            # Documents that are kept have their keys sorted: draws must not depend on it.
+            values = dict(sorted(values.items(), key=lambda item: shown(item[0])))
         weights = values.values() if isinstance(values, Mapping) else [1.0] * len(values)
         object.__setattr__(self, "values", tuple(_plain_frozen(v) for v in values))
         object.__setattr__(self, "weights", tuple(read_number(w) for w in weights))
