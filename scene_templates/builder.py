@@ -9,12 +9,16 @@ import numpy as np
 
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetIndex
-from generator.core.scene import Light, Region, Scene, Surface
+from generator.core.scene import Lane, Light, Region, Scene, Surface
+from generator.core.se3 import Vec3
 from scene_templates.element import Element
 from scene_templates.objects import Objects
 
 CONTENT_HEIGHT_M = 0.25
 """Height over a surface that counts as what is looked at."""
+
+STREET_MARGIN_M, STREET_HEIGHT_M = 50.0, 60.0
+"""How far beyond its lanes, and how high, a street reaches."""
 
 DEFAULT_LIGHT = Light("lamp", "sphere", (0.4, -0.9, 2.2), intensity_cd=900.0, radius_m=0.08)
 
@@ -35,6 +39,8 @@ def build(name: str, elements: Sequence[Element], assets: AssetIndex) -> Scene:
         scene = element.add(scene, assets)
     if not scene.lights:
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
+    if scene.lanes:
+        scene = replace(scene, interior_m=_around_lanes(scene.lanes))
     return replace(scene, focus=focus_of(scene))
 
 
@@ -55,6 +61,15 @@ def focus_of(scene: Scene) -> Region:
         ),
         size_m=(round(float(size[0]), 6), round(float(size[1]), 6), round(float(size[2]), 6)),
     )
+
+
+def _around_lanes(lanes: Sequence[Lane]) -> tuple[Vec3, Vec3]:
+    """Where cameras and lamps of a street may be: over its lanes and beside them."""
+    points = np.concatenate([np.array(lane.center_m) for lane in lanes])
+    low, high = points.min(axis=0), points.max(axis=0)
+    x0, y0 = (float(v) - STREET_MARGIN_M for v in low[:2])
+    x1, y1 = (float(v) + STREET_MARGIN_M for v in high[:2])
+    return (x0, y0, float(low[2]) - 0.5), (x1, y1, float(high[2]) + STREET_HEIGHT_M)
 
 
 def _check_names(elements: Sequence[Element]) -> None:
