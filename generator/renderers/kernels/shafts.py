@@ -198,9 +198,7 @@ def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
 
 
 @wp.func
-def matters(
-    lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int
-):
+def matters(lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int):
     """Whether lamp j is more than faint at any point of a tile."""
     found = bool(False)
     for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
