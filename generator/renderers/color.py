@@ -11,6 +11,7 @@ from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
 from generator.renderers.kernels import antialias, gather, raster, records, shade, tone
 from generator.renderers.kernels import samples as mixing
+from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.lamps import keep_main_lamps
 from generator.renderers.lens import add_glare, wet_lens
@@ -38,8 +39,9 @@ def color_image(
     device, n = stock.device, view.width * view.height
     images = _images(seen)
     keep_main_lamps(world, view, seen, stock, settings.max_lamps)
-    radiance = _shaded(world, view, seen, images, stock, settings)
-    fill_air(world, view, images, radiance, stock)
+    lattice = sampled_lattice(world, view, seen, stock)
+    radiance = _shaded(world, view, images, lattice, stock, settings)
+    fill_air(world, view, images, lattice, radiance, stock)
     ev100 = camera.ev100
     if ev100 is None:
         ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
@@ -114,38 +116,39 @@ def _images(seen: Seen) -> shade.Images:
 def _shaded(
     world: PackedWorld,
     view: records.View,
-    seen: Seen,
     images: shade.Images,
+    lattice: Lattice,
     stock: AssetStock,
     settings: RenderSettings,
 ) -> wp.array:
     """Luminance at all pixel centres [cd/m^2], linear RGB, flat."""
     device, n = stock.device, view.width * view.height
-    expose_ground(world, view, images, stock)
+    expose_ground(world, lattice, stock)
     radiance = stock.scratch("radiance", n, wp.vec3)
-    lattice = sampled_lattice(world, view, seen, stock)
     around = openness(world, view, lattice, stock, settings)
     points = lattice.width * lattice.height
     lights = stock.scratch("lights", points, shade.Light)
+    coats = stock.scratch("coats", points, wp.vec4)
     frame = [view, world.record, images]
     inputs = [*frame, lattice, around.lit, around.open_sky]
-    wp.launch(shade.light_lattice, points, inputs, [lights], device=device)
+    wp.launch(shade.light_lattice, points, inputs, [lights, coats], device=device)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", n, wp.int32)
     # One thread per row on the CPU, where threads run one after the other anyway.
     cells = lattice.width - 1
     run = cells if device.is_cpu else 1
-    inputs = [*frame, lattice, lights, run]
+    inputs = [*frame, lattice, lights, coats, run]
     shape = (lattice.height - 1, cells // run)
     wp.launch(gather.gather_light, shape, inputs, [count, pixels, radiance], device=device)
     listed = int(count.numpy()[0])
     lit = stock.scratch("listed lit", (around.lit.shape[0], n), float)
     open_sky = stock.scratch("listed sky", (1, n), float)
+    exposed = stock.scratch("listed exposed", n, float)
     parts = wp.array(lamp_parts(4, settings), dtype=wp.vec2, device=device)
     disc = wp.array(sunflower(4), dtype=wp.vec2, device=device)
     radius_m = settings.ambient_occlusion_radius_m
     inputs = [*frame, lattice, around.lit, around.open_sky, parts, disc, radius_m, pixels]
-    wp.launch(shade.look_around, listed, inputs, [lit, open_sky], device=device)
-    inputs = [*frame, pixels, lit, open_sky]
+    wp.launch(shade.look_around, listed, inputs, [lit, open_sky, exposed], device=device)
+    inputs = [*frame, pixels, lit, open_sky, exposed]
     wp.launch(shade.shade_points, listed, inputs, [radiance], device=device)
     return radiance

@@ -68,10 +68,13 @@ def openness(
     tiles = columns * -(-lattice.height // _TILE)
     lists = stock.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
     radius_m = settings.ambient_occlusion_radius_m
-    inputs = [world.record, lattice, columns, radius_m, lists]
+    points = lattice.width * lattice.height
+    shares = stock.scratch("shares", (max(lamps, 1), points), float)
+    wp.launch(occlusion.weigh_lamps, points, [world.record, lattice], [shares], device=stock.device)
+    inputs = [world.record, lattice, columns, radius_m, shares, lists]
     wp.launch(shafts.list_occluders, tiles, inputs, device=stock.device)
     return Openness(
-        _lit(world, view, lattice, lists, columns, lamp_parts(48, settings), stock),
+        _lit(world, view, lattice, lists, shares, lamp_parts(48, settings), stock),
         _open_sky(world, view, lattice, lists, columns, radius_m, stock),
     )
 
@@ -100,7 +103,7 @@ def _lit(
     view: records.View,
     lattice: lattice_kernels.Lattice,
     lists: wp.array,
-    columns: int,
+    shares: wp.array,
     parts: Array,
     stock: AssetStock,
 ) -> wp.array:
@@ -111,7 +114,8 @@ def _lit(
     if lamps == 0:
         return lit
     disc = wp.array(parts, dtype=wp.vec2, device=device)
-    inputs = [world.record, lattice, columns, lists, disc]
+    columns = -(-lattice.width // _TILE)
+    inputs = [world.record, lattice, columns, lists, disc, shares]
     for parity in (0, 1):
         wp.launch(occlusion.probe_lamps, n, [*inputs, parity], [probed], device=device)
     classes = _classes(lattice, probed, lamps, stock)

@@ -11,8 +11,9 @@ from typing import Any
 import warp as wp
 
 from generator.core.scene import Weather
-from generator.renderers.kernels import records, shade
+from generator.renderers.kernels import records, shade, water
 from generator.renderers.kernels import weather as kernels
+from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.lighting import SUN
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
@@ -21,17 +22,18 @@ from generator.renderers.stock import AssetStock
 _PATCH_DEVIATION = 0.513
 
 
-def expose_ground(
-    world: PackedWorld, view: records.View, images: shade.Images, stock: AssetStock
-) -> None:
+def expose_ground(world: PackedWorld, lattice: Lattice, stock: AssetStock) -> None:
     """Prepare the world's surfaces for being wet or under snow."""
     weather = world.weather
     if not weather.wetness + weather.puddles + weather.snow_cover:
         return
-    n = view.width * view.height
-    exposed = stock.scratch("exposed", n, float)
-    inputs = [view, world.record, images]
-    wp.launch(kernels.find_shelter, n, inputs, [exposed], device=stock.device)
+    points = lattice.width * lattice.height
+    probed = stock.scratch("probed shelter", points, float)
+    exposed = stock.scratch("exposed", points, float)
+    inputs = [world.record, lattice]
+    wp.launch(water.find_shelter, points, inputs, [probed], device=stock.device)
+    inputs = [lattice, probed]
+    wp.launch(water.average_shelter, points, inputs, [exposed], device=stock.device)
     ground = records.Ground()
     ground.covered = 1
     ground.wetness = weather.wetness
@@ -46,24 +48,44 @@ def fill_air(
     world: PackedWorld,
     view: records.View,
     images: shade.Images,
+    lattice: Lattice,
     radiance: wp.array,
     stock: AssetStock,
 ) -> None:
     """Reflections in water, then fog; in place."""
     weather, n = world.weather, view.width * view.height
     if weather.wetness + weather.puddles > 0.0:
-        water = stock.scratch("water", n, wp.vec2)
-        mirror = stock.scratch("mirror", n, wp.vec4)
-        ripples = min(0.004 * weather.rain_mm_h, 0.05)
-        inputs = [view, world.record, images, radiance, ripples]
-        wp.launch(kernels.mirror_in_water, n, inputs, [water, mirror], device=stock.device)
-        inputs = [view, images, water, mirror]
-        wp.launch(kernels.lay_water, n, inputs, [radiance], device=stock.device)
+        _mirror(world, view, images, lattice, radiance, stock)
     if weather.fog_extinction_per_m > 0.0:
         frame = [view, world.record, images, fog_of(weather)]
         columns, glow = _glow(world, view, frame, stock)
         inputs = [*frame, columns, glow]
         wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=stock.device)
+
+
+def _mirror(
+    world: PackedWorld,
+    view: records.View,
+    images: shade.Images,
+    lattice: Lattice,
+    radiance: wp.array,
+    stock: AssetStock,
+) -> None:
+    """Lay what water on the ground mirrors over the image, in place."""
+    device, n = stock.device, view.width * view.height
+    points = lattice.width * lattice.height
+    share = stock.scratch("water", points, wp.vec2)
+    films, rows = (stock.scratch(name, points, wp.vec4) for name in ("films", "film rows"))
+    frame = [view, world.record, images, lattice, radiance]
+    wp.launch(water.mirror_in_films, points, frame, [share, films], device=device)
+    for step, source, spread in ((1, films, rows), (lattice.width, rows, films)):
+        inputs = [images, lattice, share, source, step]
+        wp.launch(water.spread_films, points, inputs, [spread], device=device)
+    laid = stock.scratch("laid", n, wp.vec4)
+    ripples = min(0.004 * world.weather.rain_mm_h, 0.05)
+    inputs = [*frame, ripples, share, films]
+    wp.launch(water.mirror_in_puddles, n, inputs, [laid], device=device)
+    wp.launch(water.lay_water, n, [laid], [radiance], device=device)
 
 
 def _glow(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.ground import weathered
+from generator.renderers.kernels.ground import bumps_through, laid_on
 from generator.renderers.kernels.lattice import Cell, Lattice, agree, cell_at, corner_of, step_at
 from generator.renderers.kernels.look import look_at_hit
 from generator.renderers.kernels.occlusion import surface_tolerance
@@ -173,6 +173,7 @@ def gathered_radiance(
     images: Images,
     lattice: Lattice,
     lights: wp.array(dtype=Light),
+    coats: wp.array(dtype=wp.vec4),
     cell: Cell,
     i: int,
     d: wp.vec3,
@@ -188,6 +189,8 @@ def gathered_radiance(
     bumpy = texture >= 0
     if bumpy:
         bumpy = world.textures[texture].has_bumps != 0
+    covered = world.ground.covered != 0
+    coat = wp.vec4(0.0)
     light = Light()
     total = float(0.0)
     turns = bool(False)
@@ -202,6 +205,8 @@ def gathered_radiance(
                     total += w
                     light.diffuse += lights[q].diffuse * w
                     light.rest += lights[q].rest * w
+                    if covered:
+                        coat += coats[q] * w
                     if bumpy:
                         light.towards += lights[q].towards * w
                         light.lamps += lights[q].lamps * w
@@ -210,19 +215,21 @@ def gathered_radiance(
         return wp.vec3(-1.0)
     share = 1.0 / total
     albedo = world.surfaces[surface].base_color
-    if texture >= 0 or world.ground.covered != 0:
+    if texture >= 0:
         v = unit(-d)
         n = images.normals[i]
         z = images.z_m[i]
         look = look_at_hit(view, world, surface, hit, images.weights[i], n, z, v)
-        if world.ground.covered != 0:
-            look = weathered(world, surface, look, n, p, i)
         albedo = look.albedo
         if bumpy:
+            if covered:
+                look.normal = unit(n + (look.normal - n) * bumps_through(coat * share))
             tilt = tilt_of(light.towards, light.lamps * share, light.shine * share, n, v)
             factors = on_bump(tilt, look.roughness, look.normal)
             light.diffuse *= factors[0]
             light.rest *= factors[1]
+    if covered:
+        albedo = laid_on(coat * share, albedo)
     return (wp.cw_mul(light.diffuse, albedo) + light.rest) * share
 
 
@@ -245,6 +252,7 @@ def light_patch(
     images: Images,
     lattice: Lattice,
     lights: wp.array(dtype=Light),
+    coats: wp.array(dtype=wp.vec4),
     quad: Quad,
     patch: Patch,
     column: int,
@@ -272,6 +280,9 @@ def light_patch(
         if world.textures[texture].has_bumps != 0:
             tilt = quad_tilt(lattice, lights, q, quad)
     bumpy = tilt.before > 0.0
+    covered = world.ground.covered != 0
+    coat = wp.vec4(0.0)
+    coat_step = wp.vec4(0.0)
     below = q + lattice.width
     for y in range(y0, y1):
         down = float(y - y0) * down_step
@@ -282,8 +293,13 @@ def light_patch(
         rest_step = lights[q + 1].rest * up + lights[below + 1].rest * down
         diffuse_step = (diffuse_step - diffuse) * right_step
         rest_step = (rest_step - rest) * right_step
+        if covered:
+            coat = coats[q] * up + coats[below] * down
+            coat_step = (coats[q + 1] * up + coats[below + 1] * down - coat) * right_step
         for x in range(x0, x1):
             i = y * view.width + x
+            color = albedo
+            bumps = float(1.0)
             lit = diffuse
             shine = rest
             if texture >= 0:
@@ -292,15 +308,21 @@ def light_patch(
                 u = patch.u + wp.dot(patch.to_u, d) * z
                 v = patch.v + wp.dot(patch.to_v, d) * z
                 texel = texel_at(world, texture, sampler, u, v, bumpy)
-                lit = wp.cw_mul(lit, texel.albedo)
+                color = wp.cw_mul(albedo, texel.albedo)
+                if covered:
+                    color = laid_on(coat, color)
+                    bumps = bumps_through(coat)
                 if bumpy:
-                    b = texel.bump
+                    b = texel.bump * bumps
                     m = patch.tangent * b[0] + patch.bitangent * b[1]
-                    m = unit(m + patch.normal * wp.max(b[2], 0.1))
+                    m = unit(m + patch.normal * wp.max(b[2] + 1.0 - bumps, 0.1))
                     factors = on_bump(tilt, roughness * texel.roughness, m)
                     lit = lit * factors[0]
                     shine = shine * factors[1]
-            radiance[i] = wp.cw_mul(lit, albedo) + shine
+            elif covered:
+                color = laid_on(coat, color)
+            coat += coat_step
+            radiance[i] = wp.cw_mul(lit, color) + shine
             diffuse += diffuse_step
             rest += rest_step
 
@@ -312,6 +334,7 @@ def gather_light(
     images: Images,
     lattice: Lattice,
     lights: wp.array(dtype=Light),
+    coats: wp.array(dtype=wp.vec4),
     run: int,
     count: wp.array(dtype=int),
     pixels: wp.array(dtype=int),
@@ -320,6 +343,7 @@ def gather_light(
     """Light every pixel from lattice points, or list it to be shaded by itself.
 
     Args:
+        coats: As light_lattice leaves them.
         run: Cells in a row per thread.
         count: Length of the list; 0 at first.
         pixels: The list, in any order.
@@ -331,7 +355,7 @@ def gather_light(
         x0 = column * lattice.stride
         x1 = wp.min(x0 + lattice.stride, view.width)
         quad = quad_at(view, world, images, lattice, row * lattice.width + column)
-        whole = quad.smooth != 0 and world.ground.covered == 0
+        whole = quad.smooth != 0
         if whole:
             whole = one_face(view, images, quad.face, x0, x1, y0, y1)
         if whole:
@@ -342,7 +366,7 @@ def gather_light(
                 whole = patch.flat != 0
             if whole:
                 light_patch(
-                    view, world, images, lattice, lights, quad, patch, column, row, radiance
+                    view, world, images, lattice, lights, coats, quad, patch, column, row, radiance
                 )
         if not whole:
             for y in range(y0, y1):
@@ -354,7 +378,7 @@ def gather_light(
                     if images.hits[i][0] >= 0:
                         cell = cell_at(view, lattice, x, y)
                         c = gathered_radiance(
-                            view, world, images, lattice, lights, cell, i, d_world
+                            view, world, images, lattice, lights, coats, cell, i, d_world
                         )
                     elif world.sky.visible != 0:
                         c = sky_image(world.sky, d_world)

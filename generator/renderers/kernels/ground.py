@@ -9,7 +9,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.look import Look
-from generator.renderers.kernels.records import World, floor_int, unit
+from generator.renderers.kernels.records import View, World, floor_int, unit
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -76,53 +76,118 @@ def porosity_of(world: World, surface: int):
 
 
 @wp.func
-def puddle_at(world: World, p: wp.vec3, n: wp.vec3, exposed: float):
-    """How much of a point lies under standing water."""
+def footprint(view: View, p: wp.vec3, n: wp.vec3, pixels: float):
+    """Length on a surface of as many pixels, along the way to the viewer [m]."""
+    to_eye = view.eye_m - p
+    slant = wp.max(wp.abs(wp.dot(unit(to_eye), n)), 0.02)
+    return pixels * view.pixel_rad * wp.length(to_eye) / slant
+
+
+@wp.func
+def widened(footprint_m: float, size_m: float):
+    """How far the edges of patches spread where footprints are not small to them."""
+    return wp.min(0.3 * footprint_m / size_m, 1.2)
+
+
+@wp.func
+def puddle_at(world: World, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float):
+    """How much of a point lies under standing water, in the mean over a footprint."""
     depth = float(0.0)
     if world.ground.puddles > 0.0 and n[2] > 0.985:
         level = patches(p[0], p[1], 5.0, world.ground.seed)
-        depth = smooth(world.ground.puddle_level, world.ground.puddle_level + 0.12, level)
+        wide = widened(footprint_m, 5.0)
+        edge = world.ground.puddle_level
+        depth = smooth(edge - wide, edge + 0.12 + wide, level)
         depth *= smooth(0.985, 0.997, n[2]) * exposed
     return depth
 
 
 @wp.func
-def snow_at(world: World, p: wp.vec3, n: wp.vec3, exposed: float):
-    """How much of a point lies under snow."""
-    cover = float(0.0)
+def snow_rise(world: World, p: wp.vec3, n: wp.vec3, footprint_m: float):
+    """Where a point is between the edge of snow, 0, and full cover, 1; more within [-2, 3]."""
+    rise = float(-2.0)
     if world.ground.snow_cover > 0.0 and n[2] > 0.2:
         level = patches(p[0], p[1], 3.0, world.ground.seed + 16)
         # On slopes it holds where there is most.
         level -= 1.6 * (1.0 - smooth(0.3, 0.85, n[2]))
-        cover = smooth(world.ground.snow_level - 0.1, world.ground.snow_level + 0.15, level)
-        cover *= exposed
-    return cover
+        wide = widened(footprint_m, 3.0)
+        rise = (level - world.ground.snow_level + 0.1 + wide) / (0.25 + 2.0 * wide)
+    return wp.clamp(rise, -2.0, 3.0)
 
 
 @wp.func
-def weathered(world: World, surface: int, look: Look, n: wp.vec3, p: wp.vec3, i: int):
-    """The surface at pixel i as the weather leaves it; ``n`` is its normal without bumps."""
-    exposed = world.ground.exposed[i]
+def snow_at(world: World, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float):
+    """How much of a point lies under snow, in the mean over a footprint."""
+    return smooth(0.0, 1.0, snow_rise(world, p, n, footprint_m)) * exposed
+
+
+@wp.struct
+class Coat:
+    """What the weather lays on a surface at a point.
+
+    Attributes:
+        wet, puddle, snow: Shares of the point.
+        mixable: What neighbours may mix, for laid_on and bumps_through: factor of wetness on the
+            albedo, how much of the surface's own bumps shows beside snow, the rise of snow, and
+            its brightness where it is full.
+    """
+
+    wet: float
+    puddle: float
+    snow: float
+    mixable: wp.vec4
+
+
+@wp.func
+def coat_at(world: World, surface: int, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float):
+    """The coat of a footprint at a point; ``n`` is its normal without bumps."""
+    coat = Coat()
     porous = porosity_of(world, surface)
-    puddle = puddle_at(world, p, n, exposed) * porous
+    coat.puddle = puddle_at(world, p, n, exposed, footprint_m) * porous
     facing = WALL_SHARE + (1.0 - WALL_SHARE) * wp.clamp(n[2], 0.0, 1.0)
-    wet = wp.max(world.ground.wetness * facing * exposed * smooth(-0.5, 0.2, n[2]), puddle)
-    factor = 1.0 - 0.8 * porous
-    gloss = 1.0 - look.roughness
-    look.albedo = look.albedo * (1.0 + (factor - 1.0) * wet)
-    gloss = 1.0 + (gloss - 1.0) * (1.0 + (factor - 1.0) * 0.5 * wet)
-    look.roughness = 1.0 - gloss
-    if puddle > 0.0:
-        look.normal = unit(look.normal * (1.0 - puddle) + n * puddle)
-        # Water reflects instead; the ground below it shines no more.
-        look.specular *= 1.0 - puddle
-    snow = snow_at(world, p, n, exposed)
-    if snow > 0.0:
-        white = wp.vec3(SNOW_RED, SNOW_GREEN, SNOW_BLUE)
-        grain = 1.0 + 0.05 * patches(p[0], p[1], 0.35, world.ground.seed + 32)
-        look.albedo = look.albedo * (1.0 - snow) + white * (grain * snow)
-        look.roughness += (0.85 - look.roughness) * snow
-        look.metallic *= 1.0 - snow
-        look.specular += (0.3 - look.specular) * snow
-        look.normal = unit(look.normal * (1.0 - 0.8 * snow) + n * (0.8 * snow))
+    film = world.ground.wetness * facing * exposed * smooth(-0.5, 0.2, n[2])
+    coat.wet = wp.max(film, coat.puddle)
+    rise = snow_rise(world, p, n, footprint_m)
+    coat.snow = smooth(0.0, 1.0, rise) * exposed
+    full = exposed
+    if coat.snow > 0.0:
+        full *= 1.0 + 0.05 * patches(p[0], p[1], 0.35, world.ground.seed + 32)
+    coat.mixable = wp.vec4(1.0 - 0.8 * porous * coat.wet, 1.0 - coat.puddle, rise, full)
+    return coat
+
+
+@wp.func
+def mixed_snow(mixable: wp.vec4):
+    """The share of snow that a mix of coats says, with the grain of its brightness."""
+    return smooth(0.0, 1.0, mixable[2]) * mixable[3]
+
+
+@wp.func
+def laid_on(mixable: wp.vec4, albedo: wp.vec3):
+    """An albedo below a mix of coats."""
+    snow = mixed_snow(mixable)
+    white = wp.vec3(SNOW_RED, SNOW_GREEN, SNOW_BLUE)
+    return albedo * (mixable[0] * wp.max(1.0 - snow, 0.0)) + white * snow
+
+
+@wp.func
+def bumps_through(mixable: wp.vec4):
+    """How much of a surface's own bumps shows through a mix of coats."""
+    return mixable[1] * (1.0 - 0.8 * wp.min(mixed_snow(mixable), 1.0))
+
+
+@wp.func
+def coated(world: World, surface: int, look: Look, coat: Coat, n: wp.vec3):
+    """The surface as the weather leaves it; ``n`` is its normal without bumps."""
+    look.albedo = laid_on(coat.mixable, look.albedo)
+    bumps = bumps_through(coat.mixable)
+    look.roughness *= 1.0 - 0.4 * porosity_of(world, surface) * coat.wet
+    # Water reflects instead; the ground below it shines no more.
+    look.specular *= 1.0 - coat.puddle
+    if coat.snow > 0.0:
+        look.roughness += (0.85 - look.roughness) * coat.snow
+        look.metallic *= 1.0 - coat.snow
+        look.specular += (0.3 - look.specular) * coat.snow
+    if bumps < 1.0:
+        look.normal = unit(look.normal * bumps + n * (1.0 - bumps))
     return look

@@ -18,11 +18,14 @@ from generator.renderers.kernels.lattice import Lattice, agree
 from generator.renderers.kernels.lighting import SUN, SUN_DISTANCE_M, beam_from
 from generator.renderers.kernels.rays import blocked_by_listed, free_of_listed, path_along
 from generator.renderers.kernels.records import Lamp, View, World, unit
-from generator.renderers.kernels.shafts import TILE
+from generator.renderers.kernels.shafts import FAINT_SHARE, TILE
+from generator.renderers.kernels.sky import sky_irradiance
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 UNSEEN = wp.constant(-1.0)
+# Lamps that give less of a point's light than this have shadows too faint to be smoothed by rays.
+SMOOTHED_SHARE = wp.constant(0.08)
 
 
 @wp.func
@@ -83,12 +86,39 @@ def settled(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: 
 
 
 @wp.kernel
+def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, ndim=2)):
+    """The part of each point's light that each lamp would give if nothing shaded it [lamp, point].
+
+    UNSEEN where the lamp is behind the surface.
+    """
+    i = wp.tid()
+    if lattice.body[i] < 0:
+        return
+    n = lattice.normal[i]
+    total = wp.max(wp.max(sky_irradiance(world.sky, n)) * wp.pi, 1.0e-9)
+    for j in range(world.lamps.shape[0]):
+        beam = beam_from(world.lamps[j], lattice.origin_m[i])
+        cosine = wp.dot(beam.direction, n)
+        brightest = wp.max(beam.normal_lux)
+        lux = float(UNSEEN)
+        if cosine > -beam.spread and brightest > 0.0:
+            # Highlights at grazing angles are as bright as others.
+            lux = brightest * wp.max(cosine, 0.2)
+            total += lux
+        shares[j, i] = lux
+    for j in range(world.lamps.shape[0]):
+        if shares[j, i] > 0.0:
+            shares[j, i] = shares[j, i] / total
+
+
+@wp.kernel
 def probe_lamps(
     world: World,
     lattice: Lattice,
     tile_columns: int,
     lists: wp.array(dtype=int, ndim=3),
     disc: wp.array(dtype=wp.vec2),
+    shares: wp.array(dtype=float, ndim=2),
     parity: int,
     lit: wp.array(dtype=float, ndim=2),
 ):
@@ -96,6 +126,7 @@ def probe_lamps(
 
     Args:
         disc: Forty-eight points of the unit disc; a point looks at one of three in a row.
+        shares: As weigh_lamps says.
         parity: 0 to probe the black fields of a chessboard. 1, after that, for the white ones:
             they are probed only where black ones around them differ.
     """
@@ -107,7 +138,7 @@ def probe_lamps(
     tile = tile_index(lattice, i, tile_columns)
     for j in range(world.lamps.shape[0]):
         value = float(UNSEEN)
-        if lattice.body[i] >= 0:
+        if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
             if parity == 1:
                 value = settled(lattice, lit, j, x, y)
             if value == UNSEEN:
@@ -126,15 +157,12 @@ def probed(
     part: wp.vec2,
 ):
     """Whether point i sees a part of lamp j."""
-    value = float(UNSEEN)
-    origin = lattice.origin_m[i]
-    beam = beam_from(world.lamps[j], origin)
-    if wp.dot(beam.direction, lattice.normal[i]) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
-        value = 1.0
-        if lists[tile, j, 0] != 0:
-            path = path_along(origin, way_to_lamp(world.lamps[j], origin, part))
-            if blocked_by_listed(world, lists, tile, j, lattice.skip[i], path):
-                value = 0.0
+    value = float(1.0)
+    if lists[tile, j, 0] != 0:
+        origin = lattice.origin_m[i]
+        path = path_along(origin, way_to_lamp(world.lamps[j], origin, part))
+        if blocked_by_listed(world, lists, tile, j, lattice.skip[i], path):
+            value = 0.0
     return value
 
 
@@ -192,6 +220,7 @@ def refine_lamps(
     tile_columns: int,
     lists: wp.array(dtype=int, ndim=3),
     disc: wp.array(dtype=wp.vec2),
+    shares: wp.array(dtype=float, ndim=2),
     classes: wp.array(dtype=int, ndim=3),
     probed: wp.array(dtype=float, ndim=2),
     lit: wp.array(dtype=float, ndim=2),
@@ -199,7 +228,7 @@ def refine_lamps(
     """Two more rays where a lamp is neither seen by all points around nor by none.
 
     Args:
-        disc: As for probe_lamps.
+        disc, shares: As for probe_lamps.
     """
     i = wp.tid()
     x = i % lattice.width
@@ -207,7 +236,8 @@ def refine_lamps(
     tile = tile_index(lattice, i, tile_columns)
     for j in range(world.lamps.shape[0]):
         value = probed[j, i]
-        if value != UNSEEN and (classes_around(classes, x, y, j) & 3) == 3:
+        mixed = value != UNSEEN and (classes_around(classes, x, y, j) & 3) == 3
+        if mixed and shares[j, i] > SMOOTHED_SHARE:
             if window_bits(lattice, probed, j, i) == 3:
                 seen = value
                 origin = lattice.origin_m[i]

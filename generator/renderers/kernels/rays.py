@@ -17,6 +17,8 @@ from generator.renderers.kernels.records import (
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 FARTHEST = wp.constant(1.0e6)
+# What is lower than this over a surface keeps rain and snow off it.
+SHELTER_M = wp.constant(2.5)
 
 
 @wp.func
@@ -165,4 +167,17 @@ def freed_by(world: World, b: int, path: Path, free: float):
         answer = wp.mesh_query_ray(mesh, o, d, free)
         if answer.result:
             free = answer.t
+    return free
+
+
+@wp.func
+def unsheltered(world: World, origin: wp.vec3):
+    """Share of what falls that reaches a point: a ray up, astray by where the point is."""
+    x = origin[0] * 5.0
+    y = origin[1] * 5.0
+    east = 0.15 * wp.sin(1.7 * x + 2.3 * wp.sin(1.3 * y))
+    north = 0.15 * wp.sin(1.9 * y + 2.1 * wp.sin(1.1 * x))
+    free = float(1.0)
+    if blocked(world, path_along(origin, wp.vec3(east, north, 1.0) * SHELTER_M)):
+        free = 0.0
     return free

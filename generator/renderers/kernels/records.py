@@ -170,7 +170,7 @@ class Ground:
         wetness, puddles, snow_cover: As in ``generator.core.scene.Weather``.
         puddle_level, snow_level: Levels of the noise above which there is water, snow.
         seed: Of the noise.
-        exposed: Share of what falls that reaches each pixel's point, flat.
+        exposed: Share of what falls that reaches each point of the lattice, flat.
     """
 
     covered: int

@@ -5,12 +5,12 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.brdf import make_brdf, specular_lobe
-from generator.renderers.kernels.ground import weathered
+from generator.renderers.kernels.ground import coat_at, coated, footprint
 from generator.renderers.kernels.lattice import Lattice, cell_at, ray_origin
 from generator.renderers.kernels.lighting import beam_from, towards_mirror
 from generator.renderers.kernels.look import Look, look_at_hit, plain_look
 from generator.renderers.kernels.occlusion import frame_of, surface_tolerance, way_to_lamp
-from generator.renderers.kernels.rays import blocked, free_path, path_along
+from generator.renderers.kernels.rays import blocked, free_path, path_along, unsheltered
 from generator.renderers.kernels.records import (
     Lamp,
     View,
@@ -127,8 +127,13 @@ def light_lattice(
     lit: wp.array(dtype=float, ndim=2),
     open_sky: wp.array(dtype=float, ndim=2),
     lights: wp.array(dtype=Light),
+    coats: wp.array(dtype=wp.vec4),
 ):
-    """Light at the lattice's points, on surfaces whose light is gathered; bumps are left out."""
+    """Light at the lattice's points, on surfaces whose light is gathered; bumps are left out.
+
+    Args:
+        coats: What weather lays there, ``mixable`` of a Coat; written if the ground is covered.
+    """
     k = wp.tid()
     surface = lattice.surface[k]
     if surface < 0:
@@ -144,7 +149,10 @@ def light_lattice(
         weight = images.weights[i]
         look = look_at_hit(view, world, surface, images.hits[i], weight, lattice.normal[k], z, v)
     if world.ground.covered != 0:
-        look = weathered(world, surface, look, lattice.normal[k], p, i)
+        size_m = footprint(view, p, lattice.normal[k], float(lattice.stride))
+        coat = coat_at(world, surface, p, lattice.normal[k], world.ground.exposed[k], size_m)
+        look = coated(world, surface, look, coat, lattice.normal[k])
+        coats[k] = coat.mixable
     look.normal = lattice.normal[k]
     lights[k] = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
 
@@ -157,6 +165,7 @@ def shade_points(
     pixels: wp.array(dtype=int),
     lit: wp.array(dtype=float, ndim=2),
     open_sky: wp.array(dtype=float, ndim=2),
+    exposed: wp.array(dtype=float),
     radiance: wp.array(dtype=wp.vec3),
 ):
     """Shade a list of pixels, each by itself."""
@@ -172,7 +181,9 @@ def shade_points(
     look = look_at_hit(view, world, surface, hit, images.weights[i], images.normals[i], z, v)
     p = view.eye_m + d * z
     if world.ground.covered != 0:
-        look = weathered(world, surface, look, images.normals[i], p, i)
+        n = images.normals[i]
+        coat = coat_at(world, surface, p, n, exposed[k], footprint(view, p, n, 1.0))
+        look = coated(world, surface, look, coat, n)
     light = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
     radiance[i] = wp.cw_mul(light.diffuse, look.albedo) + light.rest
 
@@ -201,6 +212,7 @@ def look_around(
     pixels: wp.array(dtype=int),
     lit: wp.array(dtype=float, ndim=2),
     open_sky: wp.array(dtype=float, ndim=2),
+    exposed: wp.array(dtype=float),
 ):
     """What listed pixels see of lamps and sky: the mean of lattice points, or by rays.
 
@@ -223,6 +235,7 @@ def look_around(
     row = y / lattice.stride
     found = float(0.0)
     sky = float(0.0)
+    rained_on = float(0.0)
     for reach in range(2):
         # The cell's corners, and those around them only where none of the four will do.
         if found == 0.0:
@@ -237,10 +250,13 @@ def look_around(
                         w = nearness(right, down)
                         found += w
                         sky += lattice_sky[0, q] * w
+                        if world.ground.covered != 0:
+                            rained_on += world.ground.exposed[q] * w
                         for j in range(world.lamps.shape[0]):
                             lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
     if found > 0.0:
         open_sky[0, k] = sky / found
+        exposed[k] = rained_on / found
         for j in range(world.lamps.shape[0]):
             lit[j, k] = lit[j, k] / found
     else:
@@ -253,6 +269,9 @@ def look_around(
             sky = seen_sky(world, origin, n, disc, radius_m)
             found = 1.0
         open_sky[0, k] = sky / found
+        exposed[k] = 1.0
+        if world.ground.covered != 0 and n[2] > 0.1:
+            exposed[k] = unsheltered(world, origin)
 
 
 @wp.func

@@ -25,6 +25,9 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 TILE = wp.constant(8)
 # Longer lists are not worth their memory: rays then use the hierarchy over all bodies.
 LIST_LENGTH = wp.constant(48)
+# Lamps that would give less of a point's light than this are left out there: half a step of eight
+# bits at most.
+FAINT_SHARE = wp.constant(0.006)
 
 
 @wp.struct
@@ -194,20 +197,40 @@ def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
         lists[tile, j, 0] = -1
 
 
+@wp.func
+def matters(lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int):
+    """Whether lamp j is more than faint at any point of a tile."""
+    found = bool(False)
+    for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
+        for x in range(column * TILE, wp.min((column + 1) * TILE, lattice.width)):
+            i = y * lattice.width + x
+            if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
+                found = True
+    return found
+
+
 @wp.kernel
 def list_occluders(
     world: World,
     lattice: Lattice,
     tile_columns: int,
     ambient_radius_m: float,
+    shares: wp.array(dtype=float, ndim=2),
     lists: wp.array(dtype=int, ndim=3),
 ):
     """Bodies that may shade each tile from each lamp; the last list is for ambient occlusion.
 
     A list begins with its length, which is -1 where it would be too long.
+
+    Args:
+        ambient_radius_m: Of ambient occlusion.
+        shares: Of each lamp in the light of each point [lamp, point]; lamps that are faint
+            everywhere in a tile are not asked about.
     """
     i = wp.tid()
-    tile = tile_of(lattice, i % tile_columns, i / tile_columns)
+    column = i % tile_columns
+    row = i / tile_columns
+    tile = tile_of(lattice, column, row)
     lamps = world.lamps.shape[0]
     for j in range(lamps + 1):
         lists[i, j, 0] = 0
@@ -215,9 +238,11 @@ def list_occluders(
         return
     near = tile
     near.radius_m = tile.radius_m + ambient_radius_m
+    for j in range(lamps):
+        if matters(lattice, shares, j, column, row):
+            for b in range(world.bodies.shape[0]):
+                if may_shade_from(world, b, tile, world.lamps[j]):
+                    append(lists, i, j, b)
     for b in range(world.bodies.shape[0]):
-        for j in range(lamps):
-            if may_shade_from(world, b, tile, world.lamps[j]):
-                append(lists, i, j, b)
         if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
             append(lists, i, lamps, b)
