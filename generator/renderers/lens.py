@@ -72,13 +72,17 @@ def add_glare(view: records.View, share: float, radiance: wp.array, stock: Asset
 def glare(image: Float32) -> Float32:
     """The image as scattered light: the mean of several blurs, each as bright as the image."""
     height, width = image.shape[:2]
-    total = np.zeros_like(image)
-    for level in _GLARE_LEVELS:
-        small = _halved(image, level)
-        for _ in range(2):
-            small = _spread(small)
-        total += _enlarged(small, height, width, 2**level)
-    mean: Float32 = total * np.float32(1.0 / len(_GLARE_LEVELS))
+    levels, blurs = _GLARE_LEVELS, []
+    for level, before in zip(levels, (0, *levels), strict=False):
+        image = _halved(image, level - before)
+        blurs.append(_spread(_spread(image)))
+    # From coarse to fine, so that only the sum is enlarged to full size.
+    total = blurs[-1]
+    for k in range(len(levels) - 2, -1, -1):
+        rows, columns = blurs[k].shape[:2]
+        total = blurs[k] + _enlarged(total, rows, columns, 2 ** (levels[k + 1] - levels[k]))
+    veil = _enlarged(total, height, width, 2 ** levels[0])
+    mean: Float32 = veil * np.float32(1.0 / len(_GLARE_LEVELS))
     return mean
 
 

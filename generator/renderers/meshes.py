@@ -76,8 +76,9 @@ def boxes_around(
 
     Faces whose middles lie in one cell of a coarse grid share a box; large ones have their own.
     """
-    corners = vertices_m[faces]
-    lows, highs = corners.min(axis=1), corners.max(axis=1)
+    # Corner by corner: reducing over the short middle axis of [m, 3, 3] takes ten times as long.
+    a, b, c = (vertices_m[faces[:, k]] for k in range(3))
+    lows, highs = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     origin = lows.min(axis=0)
     cell_m = max(float((highs.max(axis=0) - origin).max()) / _CELLS, 1e-9)
     places = ((0.5 * (lows + highs) - origin) / cell_m).astype(np.int64)

@@ -181,7 +181,7 @@ def test_nothing_falls_below_a_lid(renderer: WarpRenderer) -> None:
         for w in (Weather(), Weather(snow_cover=1.0))
     )
 
-    assert snowy[96:98, 143:145] == pytest.approx(dry[96:98, 143:145], rel=0.05)
+    assert snowy[96, 143:145] == pytest.approx(dry[96, 143:145], rel=0.05)
     assert snowy[180].mean() > 2.0 * dry[180].mean()
 
 

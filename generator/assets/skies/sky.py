@@ -180,7 +180,9 @@ def _daylit(d: Array, model: SkyModel) -> Array:
     altitude = model.sun_altitude_rad
     by_day = clear_sky(d, max(altitude, math.radians(1.5)), model.turbidity)
     dusk = 1.0 - _ramp(-1.0, 6.0, model.sun_altitude_deg)
-    by_day = _scaled(by_day, 1.0) * (1.0 - dusk) + _scaled(_twilight(d, model), 1.0) * dusk
+    by_day = _scaled(by_day, 1.0)
+    if dusk > 0.0:
+        by_day = by_day * (1.0 - dusk) + _scaled(_twilight(d, model), 1.0) * dusk
     if model.cloudiness == 0.0:
         return by_day
     cover, light = cloud_layer(d, model.cloudiness, altitude, model.seed)
@@ -193,8 +195,10 @@ def _daylit(d: Array, model: SkyModel) -> Array:
     rim = 1.0 + 0.9 * np.exp((towards - 1.0) / 0.03)
     clouds = light[..., None] * lit * rim
     broken = by_day + cover[..., None] * (clouds - by_day)
-    deck = overcast_sky(d) * (0.72 + 0.5 * np.where(cover > 0.0, light, 0.5))[..., None]
     closed = _ramp(0.6, 0.95, model.cloudiness)
+    if closed == 0.0:
+        return _scaled(broken, 1.0)
+    deck = overcast_sky(d) * (0.72 + 0.5 * np.where(cover > 0.0, light, 0.5))[..., None]
     return _scaled(broken, 1.0) * (1.0 - closed) + _scaled(deck, 1.0) * closed
 
 

@@ -76,6 +76,9 @@ def sampler_of(world: World, texture: int, level: float):
 @wp.func
 def taps_at(first: int, width: int, height: int, u: float, v: float):
     """The texels of a level around (u, v), which wraps around; v grows upwards, rows downwards."""
+    # Beyond what an integer holds there is no place within a texel left to speak of.
+    u = wp.clamp(u, -1.0e6, 1.0e6)
+    v = wp.clamp(v, -1.0e6, 1.0e6)
     x = (u - float(floor_int(u))) * float(width) - 0.5
     y = (1.0 - (v - float(floor_int(v)))) * float(height) - 0.5
     x0 = floor_int(x)
