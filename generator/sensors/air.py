@@ -40,7 +40,7 @@ RANGE_STEPS = 512
 
 def rain_extinction_per_m(rain_mm_h: float) -> float:
     """Goodin et al. 2019."""
-    return 0.01 * rain_mm_h**0.6 if rain_mm_h > 0.0 else 0.0
+    return float(0.01 * rain_mm_h**0.6) if rain_mm_h > 0.0 else 0.0
 
 
 def snow_extinction_per_m(snow_mm_h: float, wavelength_nm: float) -> float:
@@ -48,7 +48,7 @@ def snow_extinction_per_m(snow_mm_h: float, wavelength_nm: float) -> float:
     if snow_mm_h <= 0.0:
         return 0.0
     a = 5.42e-5 * wavelength_nm + 5.4958776
-    return a * snow_mm_h**1.38 / 4.343 / 1000.0
+    return float(a * snow_mm_h**1.38 / 4.343 / 1000.0)
 
 
 def optical_depth(
@@ -67,13 +67,13 @@ def optical_depth(
     even += snow_extinction_per_m(weather.snow_mm_h, model.wavelength_nm)
     fog = weather.fog_extinction_per_m
     if weather.fog_height_m <= 0.0 or fog == 0.0:
-        return range_m * np.float32(even + fog)
+        return np.asarray(range_m * np.float32(even + fog), np.float32)
     # The integral of exp(-(height + up * r) / H) over r, by a series where it hardly climbs.
     climb = (up * range_m).astype(np.float64) / weather.fog_height_m
     level = np.abs(climb) < 1e-4
     mean = np.where(level, 1.0 - 0.5 * climb, -np.expm1(-climb) / np.where(level, 1.0, climb))
     here = fog * math.exp(-height_m / weather.fog_height_m)
-    return (range_m * (even + here * mean)).astype(np.float32)
+    return np.asarray(range_m * (even + here * mean), np.float32)
 
 
 def dimmed(pulses: Pulses, depth: Float32) -> Pulses:
@@ -112,7 +112,7 @@ def with_air(
 
 def rain_noise_m(rain_mm_h: float, range_m: Float32) -> Float32:
     """Standard deviation that rain adds to ranges (Goodin et al. 2019)."""
-    return range_m * np.float32(0.02 * (1.0 - math.exp(-rain_mm_h)) ** 2)
+    return np.asarray(range_m * np.float32(0.02 * (1.0 - math.exp(-rain_mm_h)) ** 2), np.float32)
 
 
 @lru_cache(maxsize=64)

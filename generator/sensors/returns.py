@@ -64,7 +64,8 @@ def light_of(reflectance: Float32, range_m: Float32, model: LidarModel) -> Float
     """Light from a reflectance at a range through clear air; 0 where there is nothing."""
     reach = np.float32(model.seen.range_m)
     near = reach / np.maximum(range_m, np.float32(1e-3))
-    return reflectance * (near * near) * np.float32(1.0 / model.seen.reflectance)
+    light: Float32 = reflectance * (near * near) * np.float32(1.0 / model.seen.reflectance)
+    return light
 
 
 def joined(pulses: Pulses, more: Pulses) -> Pulses:
@@ -81,7 +82,8 @@ def detected(pulses: Pulses, rng: Rng) -> NDArray[np.bool_]:
     """Which candidates the detector notices: of light L, ``L^k / (1 + L^k)``."""
     draw = rng.random(pulses.light.shape, dtype=np.float32)
     strong = np.minimum(pulses.light, np.float32(100.0)) ** np.float32(STEEPNESS)
-    return draw * (1.0 + strong) < strong
+    noticed: NDArray[np.bool_] = draw * (1.0 + strong) < strong
+    return noticed
 
 
 def selected(

@@ -86,7 +86,7 @@ class LidarModel(Strict):
     def elevations_rad(self) -> NDArray[np.float64]:
         """Elevation of every laser, the highest first [rings]; empty for a rosette."""
         blocks = [np.linspace(b.first, b.last, b.count) for b in self.elevations_deg]
-        return np.radians(np.concatenate([np.zeros(0), *blocks]))
+        return np.asarray(np.radians(np.concatenate([np.zeros(0), *blocks])), np.float64)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
