@@ -8,19 +8,16 @@ same scenes are drawn by PyBullet's TinyRenderer in the same run, for a ratio.
 from __future__ import annotations
 
 import argparse
-import platform
 import tempfile
 import time
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from generator.assemble.recipe import PipelineFactory, open_pipeline
+from benchmarks.runs import described, machine, measured_run
+from generator.assemble.recipe import open_pipeline
 from generator.assemble.spec import Spec, load_spec
-from generator.runner.identity import licences_text, plan_of
-from generator.runner.run import Summary, run
 
 OVERRIDES = (
     "randomizers.clutter.count=10",
@@ -32,20 +29,6 @@ def spec_of(views_per_scene: int) -> Spec:
     """The benchmark's scene."""
     overrides = (*OVERRIDES, f"views_per_scene={views_per_scene}")
     return load_spec("tabletop.yaml", seed=1, overrides=overrides)
-
-
-def measured_run(views_per_scene: int, n: int, workers: int) -> Summary:
-    """A whole run into a temporary folder."""
-    factory = PipelineFactory(spec_of(views_per_scene), n)
-    with tempfile.TemporaryDirectory() as folder:
-        return run(
-            plan_of(factory),
-            factory,
-            Path(folder) / "out",
-            workers=workers,
-            resume_command="",
-            licences=partial(licences_text, factory),
-        )
 
 
 def first_sample_s() -> float:
@@ -142,34 +125,18 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
 
-    print(
-        f"{platform.machine()}, {_processor()}, {arguments.workers} workers, {arguments.n} samples"
-    )
+    print(f"{machine()}, {arguments.workers} workers, {arguments.n} samples")
     print(f"first sample in this process: {first_sample_s():.1f} s")
     ours_s = {}
     for views_per_scene in (5, 1):
-        summary = measured_run(views_per_scene, arguments.n, arguments.workers)
-        stages = {stage: 1e3 * seconds for stage, seconds in summary.cpu_s.items()}
-        ours_s[views_per_scene] = sum(stages.values()) / 1e3
-        print(
-            f"views_per_scene {views_per_scene}: {summary.samples_per_s:.1f} samples/s,"
-            f" {sum(stages.values()):.0f} CPU ms/sample,"
-            f" largest worker {summary.rss_bytes_max / 1e6:.0f} MB"
-        )
-        for stage, ms in stages.items():
-            print(f"    {stage:<10} {ms:7.1f} CPU ms")
+        summary = measured_run(spec_of(views_per_scene), arguments.n, arguments.workers)
+        ours_s[views_per_scene] = sum(summary.cpu_s.values())
+        print(f"views_per_scene {views_per_scene}: {described(summary)}")
     tiny_s = tiny_renderer_s(20)
     print(
         f"TinyRenderer, same scenes: {1e3 * tiny_s:.0f} CPU ms/sample (render, encode, write; no"
         f" physics, no annotation); ours, everything: {1e3 * ours_s[5]:.0f} CPU ms/sample"
     )
-
-
-def _processor() -> str:
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        if line.startswith("model name"):
-            return line.partition(":")[2].strip()
-    return platform.processor()
 
 
 if __name__ == "__main__":

@@ -14,6 +14,11 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
 * **Boxes turn about the camera's y axis only.** A label is the smallest such box, with the heading
   of the object's x axis, that encloses the object's own oriented box; both are equal when the
   object stands upright before a level camera. Exact poses are in the COCO export.
+* **Image boxes** bound the projection of the 3D box, as KITTI's own do (frame 000001's car, 1.67 m
+  wide at 46.7 m, is labelled 27 pixels wide: 721 x 1.67 / 44.9); ``boxes: tight`` writes the tight
+  box of the visible pixels, which COCO has.
+* **Things far off** are not labelled: KITTI's annotators saw what the laser scanner saw. They
+  become ``DontCare`` regions.
 * **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
   which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
 
@@ -69,6 +74,11 @@ R_CAMERA_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """Scanner axes (X forward, Y left, Z up) in the camera frame (X right, Y down, Z forward)."""
 T_CAMERA_LIDAR_M = np.array([0.0, -LIDAR_HEIGHT_M, 0.0])
 
+NEAR_M = 0.05
+"""Boxes that come nearer than this depth are not projected."""
+LIDAR_RANGE_M = 120.0
+"""Of Velodyne's HDL-64E, whose place the virtual scanner takes."""
+
 PARTLY_OCCLUDED = 0.1
 """Hidden share of the silhouette above which ``occluded`` is 1."""
 LARGELY_OCCLUDED = 0.5
@@ -83,6 +93,12 @@ class Kitti(Strict):
     """Sensor that becomes camera 2; empty = the first one, by name, with the rgb channel."""
     types: Literal["official", "category"] = "official"
     """KITTI's own eight types, or category names as they are (blanks become underscores)."""
+    boxes: Literal["projected", "tight"] = "projected"
+    """Image boxes: around the projected 3D box, or around the visible pixels."""
+    far_m: float = Field(80.0, gt=0)
+    """What is farther than this along the optical axis becomes DontCare."""
+    low_px: int = Field(10, ge=2)
+    """What has fewer visible pixel rows than this becomes DontCare."""
     velodyne_stride_px: int = Field(8, ge=0)
     """Every how many pixels a depth pixel becomes a LiDAR point; 0 = no velodyne folder."""
 
@@ -123,7 +139,7 @@ class Kitti(Strict):
         for sample in samples:
             truth = sample.truth[camera]
             frame = _frame(sample.index)
-            _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self.types))
+            _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self))
             _write_text(folder / f"calib/{frame}.txt", calib_text(truth.camera.intrinsics))
             if self.velodyne_stride_px:
                 points = self._points(info, sample, shard_dir)
@@ -198,6 +214,9 @@ class Kitti(Strict):
             scale=info.depth_scale_m,
             height=LIDAR_HEIGHT_M,
             stride=self.velodyne_stride_px,
+            boxes=_BOXES[self.boxes],
+            far=self.far_m,
+            low=self.low_px,
             partly=PARTLY_OCCLUDED,
             largely=LARGELY_OCCLUDED,
         )
@@ -216,6 +235,17 @@ class UprightBox:
     size_hwl_m: Vec3
     bottom_m: Vec3
     heading_rad: float
+
+    def corners(self) -> Array:
+        """The eight corners in the camera frame [m], shape [8, 3]."""
+        height, width, length = self.size_hwl_m
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        along, across = np.array([c, 0.0, -s]), np.array([s, 0.0, c])
+        signs = [(i, j, k) for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (0.0, -1.0)]
+        ends = [
+            i * length * along + j * width * across + (0.0, k * height, 0.0) for i, j, k in signs
+        ]
+        return np.asarray(self.bottom_m) + np.array(ends)
 
 
 def upright_box(box: OrientedBox) -> UprightBox:
@@ -249,18 +279,18 @@ def upright_box(box: OrientedBox) -> UprightBox:
     )
 
 
-def label_text(truth: ImageTruth, types: Literal["official", "category"]) -> str:
+def label_text(truth: ImageTruth, style: Kitti) -> str:
     """The lines of one label file; DontCare rows last, as readers expect."""
-    rows = [label_row(thing, truth, types) for thing in truth.objects if thing.box is not None]
+    rows = [label_row(thing, truth, style) for thing in truth.objects if thing.box is not None]
     rows.sort(key=lambda row: row.startswith("DontCare"))
     return "".join(f"{row}\n" for row in rows)
 
 
-def label_row(thing: ObjectTruth, truth: ImageTruth, types: Literal["official", "category"]) -> str:
+def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
     """The fifteen columns of one visible object.
 
-    A DontCare row where the box is less than two pixels wide or high, or its location is not
-    before the camera: KITTI cannot say either.
+    A DontCare row where it is too far or too small for ``style``, less than two pixels wide, or
+    where its box reaches behind the camera: it has no projection that readers agree on.
     """
     assert thing.box is not None, "invisible objects are not listed"
     assert thing.box3d_camera is not None, "the annotation boxes3d is in `needs`"
@@ -268,11 +298,13 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, types: Literal["official", 
     assert thing.truncation is not None, "the annotation visibility is in `needs`"
     box = upright_box(thing.box3d_camera)
     x, y, z = box.bottom_m
-    if min(thing.box.width_px, thing.box.height_px) < 2 or z <= 0:
-        corners = _inclusive(_widened(thing.box, truth.camera.intrinsics))
+    k = truth.camera.intrinsics
+    tiny = thing.box.width_px < 2 or thing.box.height_px < style.low_px
+    if tiny or not 0 < z <= style.far_m or box.corners()[:, 2].min() < NEAR_M:
+        corners = _inclusive(_widened(thing.box, k))
         return f"DontCare -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
     instance = thing.instance
-    kind = official_type(instance) if types == "official" else _one_word(instance.category)
+    kind = official_type(instance) if style.types == "official" else _one_word(instance.category)
     alpha_rad = _wrapped(box.heading_rad - math.atan2(x, z))
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
     return " ".join(
@@ -281,10 +313,19 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, types: Literal["official", 
             f"{thing.truncation:.2f}",
             str(occlusion_level(thing.occlusion)),
             _decimal(alpha_rad),
-            _inclusive(thing.box),
+            projected_corners(box, k) if style.boxes == "projected" else _inclusive(thing.box),
             *map(_decimal, metric),
         )
     )
+
+
+def projected_corners(box: UprightBox, camera: Intrinsics) -> str:
+    """Left, top, right and bottom of a box's image, clipped; pixel centres at whole numbers."""
+    uv = camera.project(box.corners()) - 0.5
+    (left, top), (right, bottom) = uv.min(axis=0), uv.max(axis=0)
+    x = np.clip([left, right], 0.0, camera.width_px - 1.0)
+    y = np.clip([top, bottom], 0.0, camera.height_px - 1.0)
+    return f"{x[0]:.2f} {y[0]:.2f} {x[1]:.2f} {y[1]:.2f}"
 
 
 def official_type(instance: Instance) -> str:
@@ -331,7 +372,9 @@ def lidar_points(camera: Intrinsics, z_depth_m: NDArray[np.floating], stride_px:
     centre_px = stride_px // 2 + 0.5
     x = (columns * stride_px + centre_px - camera.cx_px) / camera.fx_px * z
     y = (rows * stride_px + centre_px - camera.cy_px) / camera.fy_px * z
-    return np.column_stack([z, -x, -y - LIDAR_HEIGHT_M, np.zeros_like(z)])
+    points = np.column_stack([z, -x, -y - LIDAR_HEIGHT_M, np.zeros_like(z)])
+    near: Array = points[np.sum(points * points, axis=1) < LIDAR_RANGE_M**2]
+    return near
 
 
 def _widened(box: BoxPx, camera: Intrinsics) -> BoxPx:
@@ -367,6 +410,10 @@ def _write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
+_BOXES = {
+    "projected": "around the projection of the 3D box, clipped to the image",
+    "tight": "around the visible pixels",
+}
 _README = """\
 {name}: KITTI object detection format, sensor '{camera}'
 
@@ -383,6 +430,8 @@ label_2     type truncated occluded alpha left top right bottom h w l x y z rota
             their attribute pose, are Person_sitting; scenery that is not annotated has no row.
             Boxes turn about the camera's y axis only: each is the smallest such box, headed like
             the object's x axis, around the object's own oriented box.
+            left top right bottom: {boxes}.
+            DontCare: farther than {far:g} m, or lower than {low} pixels.
             truncated: share of the silhouette outside the image. occluded, by the hidden share of
             the silhouette inside the image: 0 up to {partly}, 1 up to {largely}, 2 above.
             Metres and radians have six decimals.

@@ -14,17 +14,23 @@ from generator.core.sample import KeypointTruth, ObjectTruth
 from generator.core.scene import Scene
 from generator.core.se3 import Array, Vec3
 
+LEAST_COSINE = 1.0 / 3.0
+"""Of the angle under which a surface is seen: below it, depth counts as if it were this."""
+
 
 @dataclass(frozen=True, slots=True)
 class Keypoints:
     """Points of instances that have them: image and camera coordinates, and COCO's visibility.
 
     0 = not in the image (or behind the camera), 1 = in the image and hidden, by other things or
-    by the object itself, 2 = visible. A point may lie as deep as its own radius below the surface
-    that is seen there.
+    by the object itself, 2 = visible. A point is seen through the surface of its own object as
+    long as it lies no deeper below it than its radius. Depth is measured across the surface, as
+    for a hub below the face of its wheel, which is seen from the side and obliquely alike.
     """
 
-    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.Z_DEPTH})
+    channels: ClassVar[frozenset[Channel]] = frozenset(
+        {Channel.INSTANCE, Channel.Z_DEPTH, Channel.NORMALS}
+    )
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``keypoints``, in the instance's order; empty for one that has none."""
@@ -32,18 +38,14 @@ class Keypoints:
         T_camera_world = reading.camera.T_world_camera.inverse()
         T_camera_instance = T_camera_world @ instance.T_world_instance
         found = tuple(
-            _seen(
-                reading,
-                instance.instance_id,
-                point,
-                T_camera_instance.apply(np.array(point.position_m)),
-            )
+            _found(reading, instance.instance_id, point, T_camera_instance.apply(place_m))
             for point in instance.keypoints
+            for place_m in (np.array(point.position_m),)
         )
         return replace(truth, keypoints=found)
 
 
-def _seen(reading: Reading, instance_id: int, point: Keypoint, p_camera: Array) -> KeypointTruth:
+def _found(reading: Reading, instance_id: int, point: Keypoint, p_camera: Array) -> KeypointTruth:
     camera = reading.camera.intrinsics
     x, y, z = (float(v) for v in p_camera)
     position_m: Vec3 = (x, y, z)
@@ -52,32 +54,34 @@ def _seen(reading: Reading, instance_id: int, point: Keypoint, p_camera: Array) 
     u, v = (float(w) for w in camera.project(p_camera))
     if not (0 <= u < camera.width_px and 0 <= v < camera.height_px):
         return KeypointTruth(point.name, position_m)
-    # Depths differ by less than distances along a slanted ray do.
-    slack_m = point.radius_m * z / math.sqrt(x * x + y * y + z * z)
-    visible = is_visible(reading, instance_id, (int(u), int(v)), z - slack_m)
+    visible = is_visible(reading, instance_id, p_camera, (int(u), int(v)), point.radius_m)
     return KeypointTruth(point.name, position_m, (u, v), 2 if visible else 1)
 
 
 def is_visible(
-    reading: Reading, instance_id: int, pixel: tuple[int, int], nearest_m: float
+    reading: Reading, instance_id: int, p_camera: Array, pixel: tuple[int, int], radius_m: float
 ) -> bool:
-    """Whether the surface of an instance is seen at a pixel, and no nearer than it may be.
+    """Whether a point of an instance is seen at its pixel.
 
-    Whatever is nearer at the pixel itself hides the point. Where the pixel shows something that
-    lies behind the point, its ray just misses the silhouette: then one of the eight neighbours
-    has to show the instance.
+    Where the pixel shows another thing that lies behind the point, its ray just misses the
+    silhouette: then one of the eight neighbours has to show the instance.
 
     Args:
-        reading: With ids and z-depth.
+        reading: With ids, z-depth and normals.
         instance_id: Of the instance that the point belongs to.
-        pixel: Column and row.
-        nearest_m: Least z-depth of the surface through which the point is still seen.
+        p_camera: The point [m], camera frame, in front of the camera.
+        pixel: Column and row of its image.
+        radius_m: How deep it may lie below the surface.
     """
-    ids, z_depth_m = reading.channels[Channel.INSTANCE], reading.channels[Channel.Z_DEPTH]
     column, row = pixel
-    if z_depth_m[row, column] < nearest_m:
-        return False
-    if ids[row, column] == instance_id:
-        return True
-    around = np.s_[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
-    return bool(((ids[around] == instance_id) & (z_depth_m[around] >= nearest_m)).any())
+    left, top = max(column - 1, 0), max(row - 1, 0)
+    window = np.s_[top : row + 2, left : column + 2]
+    centre = (row - top, column - left)
+    own = reading.channels[Channel.INSTANCE][window] == instance_id
+    distance_m = math.sqrt(float(p_camera @ p_camera))
+    along_m = (1.0 - reading.channels[Channel.Z_DEPTH][window] / p_camera[2]) * distance_m
+    cosine = np.abs(reading.channels[Channel.NORMALS][window] @ (p_camera / distance_m))
+    shallow = along_m * np.maximum(cosine, LEAST_COSINE) <= radius_m
+    if own[centre]:
+        return bool(shallow[centre])
+    return bool(along_m[centre] <= radius_m and (own & shallow).any())

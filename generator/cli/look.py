@@ -66,9 +66,7 @@ def preview(
     show_default=True,
     help="The PNG to write.",
 )
-@click.option(
-    "--columns", type=int, default=0, help="Tiles in a row; by default a sheet of 4 to 3."
-)
+@click.option("--columns", type=int, default=0, help="Tiles in a row; 0 = a sheet of 4 to 3.")
 @click.option("--tile-px", type=int, default=320, show_default=True, help="Width of a tile.")
 @click.option("--channels", default="rgb", show_default=True, help="Comma-separated channels.")
 @click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")

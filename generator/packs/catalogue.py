@@ -210,16 +210,20 @@ def _first(*values: float | None) -> float:
 def _points(name: str, place: Place) -> tuple[Point, ...]:
     x, y, z = place
     if y == 0.0:
-        return (Point(name=name, position_m=place, radius_m=_radius_m(name)),)
+        return (Point(name=name, position_m=place, radius_m=_radius_m(name, place)),)
     return tuple(
-        Point(name=f"{name}_{side}", position_m=(x, sign * y, z), radius_m=_radius_m(name))
+        Point(name=f"{name}_{side}", position_m=(x, sign * y, z), radius_m=_radius_m(name, place))
         for side, sign in (("left", 1.0), ("right", -1.0))
     )
 
 
-def _radius_m(name: str) -> float:
-    """Hubs lie half a tyre's width deep, lamps at the surface."""
-    return 0.2 if name.startswith("wheel") else 0.15
+def _radius_m(name: str, place: Place) -> float:
+    """Lamps are at the surface; hubs can lie a wheel's radius, their own height, below the tyre.
+
+    So deep they are where a wheel is seen from ahead, or turned. A tenth more is for hubs that
+    were measured a little low; bodywork before the far wheels is much thicker.
+    """
+    return round(1.1 * place[2], 3) if name.startswith("wheel") else 0.15
 
 
 def _regions(lamp: Lamp, finishes: Mapping[str, Finish]) -> tuple[Region, Region]:

@@ -1,7 +1,8 @@
-"""Labels drawn on their image: masks tinted, boxes outlined, names written."""
+"""Labels drawn on their image: masks tinted, boxes and skeletons outlined, names written."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from generator.core.boxes import OrientedBox
 from generator.core.capture import Channel, Reading
 from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ImageTruth, ObjectTruth
+from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
+from generator.core.skeletons import skeleton_of
 from generator.preview.palette import Rgb, color_of, colored_depth, colored_ids
 
 Image = NDArray[np.uint8]
@@ -38,6 +40,7 @@ def labelled_image(reading: Reading, truth: ImageTruth) -> Image:
             b = item.box
             cv2.rectangle(image, (b.x_min, b.y_min), (b.x_max - 1, b.y_max - 1), color, 1)
             _write(image, item.instance.category, (b.x_min, b.y_min), color)
+        draw_keypoints(image, item.keypoints or (), _lighter(color))
     return image
 
 
@@ -68,6 +71,34 @@ def draw_box3d(image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rg
             (ua, va), (ub, vb) = np.clip(intrinsics.project(segment), -1e4, 1e4)
             start, end = (round(ua), round(va)), (round(ub), round(vb))
             cv2.line(image, start, end, color, 1, cv2.LINE_AA)
+
+
+def draw_keypoints(image: Image, points: Sequence[KeypointTruth], color: Rgb) -> None:
+    """Draw bones and points that are in the image, in place: hidden points are rings."""
+    shown = {p.name: p for p in points if p.visibility}
+    skeleton = skeleton_of(p.name for p in points)
+    for a, b in skeleton.bones:
+        ends = [shown.get(skeleton.names[k]) for k in (a, b)]
+        if ends[0] is not None and ends[1] is not None:
+            cv2.line(image, _at(ends[0]), _at(ends[1]), color, 1, cv2.LINE_AA, _SHIFT)
+    for point in shown.values():
+        filled = cv2.FILLED if point.visibility == 2 else 1
+        cv2.circle(image, _at(point), 2 << _SHIFT, color, filled, cv2.LINE_AA, _SHIFT)
+
+
+def _lighter(color: Rgb) -> Rgb:
+    """Halfway to white: told apart from the tint of the same object."""
+    red, green, blue = color
+    return ((red + 255) // 2, (green + 255) // 2, (blue + 255) // 2)
+
+
+_SHIFT = 4
+"""OpenCV's coordinates for drawing have this many binary places; centres are whole numbers."""
+
+
+def _at(point: KeypointTruth) -> tuple[int, int]:
+    u, v = point.image_px
+    return (round((u - 0.5) * (1 << _SHIFT)), round((v - 0.5) * (1 << _SHIFT)))
 
 
 def _in_front(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any] | None:

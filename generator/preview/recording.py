@@ -21,8 +21,9 @@ from generator.core.errors import StorageError
 from generator.core.geometry import MeshData
 from generator.core.interfaces import AssetLibrary
 from generator.core.sample import ImageTruth, Sample
-from generator.core.scene import Body, Scene
+from generator.core.scene import Body, Instance, Scene
 from generator.core.se3 import SE3
+from generator.core.skeletons import Skeleton, skeleton_of
 from generator.preview.palette import color_of
 
 TIMELINE = "sample"
@@ -42,20 +43,48 @@ class Recorder:
     assets: AssetLibrary
     categories: Sequence[str]
     _sent: dict[str, tuple[Any, ...]] = field(default_factory=dict)
+    _skeletons: dict[int, Skeleton] = field(default_factory=dict)
 
     def start(self, sensors: Sequence[str]) -> None:
         """Log what holds for every sample: axes, category names, the layout of the views."""
-        names = [rr.AnnotationInfo(id=0, label="background", color=(60, 60, 60))]
-        names += [
-            rr.AnnotationInfo(id=k, label=name, color=color_of(k))
-            for k, name in enumerate(self.categories, 1)
-        ]
-        self.stream.log("/", rr.AnnotationContext(names), static=True)
+        self._name_classes()
         self.stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self.stream.send_blueprint(_layout(sensors))
 
+    def _name_classes(self) -> None:
+        """Log names and colours of categories and, as far as they are known, their skeletons."""
+        background = rr.AnnotationInfo(id=0, label="background", color=(60, 60, 60))
+        described = [rr.ClassDescription(info=background)]
+        for k, name in enumerate(self.categories, 1):
+            info = rr.AnnotationInfo(id=k, label=name, color=color_of(k))
+            skeleton = self._skeletons.get(k, Skeleton(()))
+            described.append(
+                rr.ClassDescription(
+                    info=info,
+                    keypoint_annotations=[
+                        rr.AnnotationInfo(id=i, label=label, color=color_of(k))
+                        for i, label in enumerate(skeleton.names)
+                    ],
+                    keypoint_connections=skeleton.bones,
+                )
+            )
+        self.stream.log("/", rr.AnnotationContext(described), static=True)
+
+    def _learn_skeletons(self, instances: Iterable[Instance]) -> None:
+        """Name the keypoints of categories that are met for the first time, or with more points."""
+        known = dict(self._skeletons)
+        for instance in instances:
+            if instance.keypoints and instance.category_id:
+                before = known.get(instance.category_id, Skeleton(()))
+                names = (*before.names, *(point.name for point in instance.keypoints))
+                known[instance.category_id] = skeleton_of(names)
+        if known != self._skeletons:
+            self._skeletons = known
+            self._name_classes()
+
     def record(self, sample: Sample) -> None:
         """Log one sample at its own step of the timeline."""
+        self._learn_skeletons(sample.scene.instances)
         self.stream.set_time(TIMELINE, sequence=sample.index)
         self._record_bodies(sample.scene)
         for name, reading in sorted(sample.capture.readings.items()):
@@ -123,6 +152,24 @@ class Recorder:
             categories = rr.SegmentationImage(channels[Channel.CATEGORY], opacity=0.4)
             self.stream.log(f"{path}/image/category", categories)
         self.stream.log(f"{path}/image/boxes", _boxes_2d(truth))
+        self._record_keypoints(f"{path}/image/keypoints", truth)
+
+    def _record_keypoints(self, path: str, truth: ImageTruth) -> None:
+        # One entity per object: Rerun joins the points of one class within an entity.
+        self.stream.log(path, rr.Clear(recursive=True))
+        for item in truth.objects:
+            shown = [point for point in item.keypoints or () if point.visibility]
+            category_id = item.instance.category_id
+            if shown and category_id in self._skeletons:
+                names = self._skeletons[category_id].names
+                points = rr.Points2D(
+                    [point.image_px for point in shown],
+                    class_ids=[category_id] * len(shown),
+                    keypoint_ids=[names.index(point.name) for point in shown],
+                    radii=[-3.0 if point.visibility == 2 else -1.5 for point in shown],
+                    show_labels=False,
+                )
+                self.stream.log(f"{path}/{item.instance.instance_id}", points)
 
     def _record_boxes(self, sample: Sample) -> None:
         found = {

@@ -71,6 +71,7 @@ def scene_and_reading() -> tuple[Scene, Reading]:
         CAMERA,
         {
             Channel.INSTANCE: ids,
+            Channel.NORMALS: np.full((H, W, 3), (0.0, 0.0, -1.0), np.float32),
             Channel.Z_DEPTH: np.where(ids == 5, 1.5, 2.0).astype(np.float32),
             Channel.CATEGORY: np.array([0, 0, 1, 0, 0, 2, 0, 0, 0, 3], np.uint16)[ids],
             Channel.PART: image({(0, 2, 6, 4): 3, (0, 4, 3, 10): 1, (4, 4, 8, 10): 0}),

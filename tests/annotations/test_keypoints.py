@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -21,7 +23,10 @@ PANEL, SCREEN = 1, 2
 
 
 def seen(
-    *points: Keypoint, T_world_instance: SE3 = IDENTITY, screen_m: float = 1.0
+    *points: Keypoint,
+    T_world_instance: SE3 = IDENTITY,
+    screen_m: float = 1.0,
+    normal: tuple[float, float, float] = (0.0, 0.0, -1.0),
 ) -> tuple[KeypointTruth, ...]:
     """Keypoints of a panel 2 m ahead that fills columns 5 to 15 and rows 2 to 10.
 
@@ -34,14 +39,16 @@ def seen(
     panel = Instance(
         PANEL, "panel", "panel", 1, "panel", T_world_instance=T_world_instance, keypoints=points
     )
-    reading = Reading("color", CAMERA, {Channel.INSTANCE: ids, Channel.Z_DEPTH: depth_m})
+    normals = np.full((H, W, 3), normal, np.float32)
+    channels = {Channel.INSTANCE: ids, Channel.Z_DEPTH: depth_m, Channel.NORMALS: normals}
+    reading = Reading("color", CAMERA, channels)
     scene = Scene("panel", instances=(panel,))
     (truth,) = image_truth(scene, reading, [Keypoints()], Thresholds()).objects
     assert truth.keypoints is not None
     return truth.keypoints
 
 
-def visibility(x_m: float, y_m: float, z_m: float, **changes: float) -> int:
+def visibility(x_m: float, y_m: float, z_m: float, **changes: Any) -> int:
     """Of one point of radius 5 cm."""
     (point,) = seen(Keypoint("tip", (x_m, y_m, z_m), 0.05), **changes)
     return point.visibility
@@ -72,10 +79,19 @@ def test_a_point_below_its_own_surface_is_visible_down_to_its_radius(
     assert visibility(0.0, 0.0, depth_m) == expected
 
 
-def test_depth_below_the_surface_is_measured_along_the_ray() -> None:
-    """At (0.9, 0.7, 2) times 1.02 the ray runs 4.6 cm below the surface; at 1.025, 5.7 cm."""
-    assert visibility(-0.9 * 1.02, 0.7 * 1.02, 2.0 * 1.02) == 2
-    assert visibility(-0.9 * 1.025, 0.7 * 1.025, 2.0 * 1.025) == 1
+def test_depth_is_measured_across_the_surface() -> None:
+    """On a slant: the panel's normal is the optical axis, however the ray comes."""
+    assert visibility(-0.9 * 1.024, 0.7 * 1.024, 2.0 * 1.024) == 2
+    assert visibility(-0.9 * 1.026, 0.7 * 1.026, 2.0 * 1.026) == 1
+
+
+def test_a_point_below_a_surface_that_is_seen_obliquely_is_as_deep_as_across_it() -> None:
+    """At 60 degrees 9 cm along the ray are 4.5 cm across; grazing rays go three radii deep."""
+    half, root = 0.5, 0.75**0.5
+    assert visibility(0.0, 0.0, 2.09, normal=(root, 0.0, -half)) == 2
+    assert visibility(0.0, 0.0, 2.11, normal=(root, 0.0, -half)) == 1
+    assert visibility(0.0, 0.0, 2.14, normal=(1.0, 0.0, 0.0)) == 2
+    assert visibility(0.0, 0.0, 2.16, normal=(1.0, 0.0, 0.0)) == 1
 
 
 def test_a_point_behind_something_else_is_hidden() -> None:

@@ -67,3 +67,17 @@ def test_doctor_finds_this_machine_fit(tmp_path: Path) -> None:
 
     assert done.returncode == 0, done.stdout + done.stderr
     assert "FAIL" not in done.stdout
+
+
+def test_a_report_counts_the_annotations_of_a_dataset(dataset: Path, tmp_path: Path) -> None:
+    """As many objects as COCO's files list; the page has the same tables."""
+    files = sorted((dataset / "coco/annotations").glob("instances_*.json"))
+    listed = [json.loads(path.read_text(encoding="utf-8")) for path in files]
+    images, objects = (sum(len(part[k]) for part in listed) for k in ("images", "annotations"))
+
+    done = gen_data("report", str(dataset), "--html", "report.html", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    row = next(line.split() for line in done.stdout.splitlines() if line.split()[:1] == ["all"])
+    assert row[1:3] == [str(images), str(objects)]
+    assert "Occlusion and truncation" in (tmp_path / "report.html").read_text(encoding="utf-8")

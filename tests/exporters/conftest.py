@@ -105,11 +105,20 @@ def ray_cast(scene: Scene, camera: Camera) -> Reading:
     channels: dict[Channel, NDArray[Any]] = {
         Channel.RGB: rgb,
         Channel.Z_DEPTH: depth.astype(np.float32),
+        Channel.NORMALS: _normals(depth[..., None] * rays[inside]),
         Channel.INSTANCE: ids,
         Channel.CATEGORY: categories,
         Channel.PART: np.zeros_like(ids),
     }
     return Reading(camera.name, camera, channels, silhouettes)
+
+
+def _normals(points: Array) -> NDArray[np.float32]:
+    """Of the surface through neighbouring points, either side; 0 where there is none."""
+    finite = np.where(np.isfinite(points), points, 0.0)
+    normals = np.cross(np.gradient(finite, axis=1), np.gradient(finite, axis=0))
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    return np.divide(normals, length, where=length > 0, out=np.zeros_like(normals)).astype("f4")
 
 
 def _ground_depth(rays: Array, camera: Camera) -> Array:

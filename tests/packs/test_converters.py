@@ -102,6 +102,21 @@ def test_a_point_beside_the_middle_stands_for_two() -> None:
     ]
 
 
+@pytest.mark.parametrize("view", ["side", "ahead"])
+def test_a_wheel_counts_as_seen_from_the_side_and_from_ahead(view: str) -> None:
+    """A hub 0.3 m high in a tyre 0.2 m wide: 0.1 m deep from the side, 0.3 m from ahead.
+
+    The far hub, 1.4 m behind the near one, is hidden either way.
+    """
+    choice = Choice(
+        id="car", category="car", model="car.obj", keypoints={"wheel_front": (1.2, 0.7, 0.3)}
+    )
+    left, right = mesh_entry(choice, Group(models=()), _model(Path()), {}).keypoints
+
+    assert left.radius_m == right.radius_m
+    assert {"side": 0.1, "ahead": 0.3}[view] < left.radius_m < 1.4 - 0.2
+
+
 def test_what_fits_between_fingers_is_graspable() -> None:
     """One of its edges must be at most 7 cm; the package says 20 x 10 x 40 cm."""
     choice = Choice(id="mug", category="mug", model="mug.obj")

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from generator.core.boxes import OrientedBox
+from generator.core.boxes import BoxPx, OrientedBox
+from generator.core.capture import Capture, Reading
 from generator.core.errors import ConfigError
+from generator.core.geometry import Keypoint
 from generator.core.intrinsics import Intrinsics
-from generator.core.se3 import SE3
-from generator.preview.overlay import BOX_EDGES, draw_box3d
+from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
+from generator.core.scene import Camera, Instance, Scene
+from generator.core.se3 import IDENTITY, SE3
+from generator.core.skeletons import PERSON
+from generator.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
 from generator.preview.palette import color_of, colored_depth, colored_ids
+from generator.preview.recording import Recorder
 from generator.preview.sheet import GAP_PX, arranged
 
 
@@ -33,6 +41,82 @@ def test_box_is_drawn_at_its_projection() -> None:
     rows, columns = np.nonzero(image[..., 0] > 128)
     assert (rows.min(), rows.max()) == (40, 80)
     assert (columns.min(), columns.max()) == (40, 80)
+
+
+def test_a_skeleton_is_drawn_at_its_points_and_hidden_ones_are_rings() -> None:
+    """Knee and ankle are joined; the hidden hip has no centre; others leave no trace."""
+    image = np.zeros((40, 40, 3), np.uint8)
+    far = (0.0, 0.0, 9.0)
+    points = (
+        KeypointTruth("left_ankle", far, (10.5, 30.5), 2),
+        KeypointTruth("left_knee", far, (10.5, 15.5), 2),
+        KeypointTruth("right_hip", far, (30.5, 20.5), 1),
+        KeypointTruth("nose", far),
+    )
+
+    draw_keypoints(image, points, (255, 0, 0))
+
+    red = image[..., 0]
+    assert (red[15:31, 10] > 200).all()
+    assert red[20, 30] < 100
+    assert red[20, 32] > 100
+    assert not red[:12].any()
+
+
+class _Stream:
+    """Keeps what is logged, in order."""
+
+    def __init__(self) -> None:
+        self.logged: list[tuple[str, Any]] = []
+
+    def log(self, path: str, what: Any, *, static: bool = False) -> None:
+        self.logged.append((path, what))
+
+    def set_time(self, timeline: str, *, sequence: int) -> None:
+        """Time is of no interest here."""
+
+    def send_blueprint(self, blueprint: object) -> None:
+        """Nor are views."""
+
+
+def test_a_recording_joins_the_keypoints_of_each_object_by_itself() -> None:
+    """An entity per person; ids by the place in COCO's list; points outside the image left out."""
+    camera = Camera("color", IDENTITY, Intrinsics(40, 40, 40.0, 40.0, 20.0, 20.0))
+    points = (Keypoint("left_ankle", (0.0, 0.0, 2.0)), Keypoint("nose", (0.0, -9.0, 2.0)))
+    truth = ImageTruth(
+        camera,
+        tuple(
+            ObjectTruth(
+                Instance(k, f"person/{k}", "person", 1, "person", keypoints=points),
+                visible_px=9,
+                box=BoxPx(0, 0, 9, 9),
+                keypoints=(
+                    KeypointTruth("left_ankle", (0.0, 0.0, 2.0), (20.0, 20.0), 2),
+                    KeypointTruth("nose", (0.0, -9.0, 2.0)),
+                ),
+            )
+            for k in (4, 7)
+        ),
+    )
+    scene = Scene("street", instances=tuple(item.instance for item in truth.objects))
+    capture = Capture({"color": Reading("color", camera, {})})
+    stream = _Stream()
+    recorder = Recorder(stream, None, ["person"])  # type: ignore[arg-type]
+
+    recorder.start(["color"])
+    recorder.record(Sample(0, 0, 0, "train", scene, capture, {"color": truth}))
+
+    prefix = "world/cameras/color/image/keypoints"
+    logged = [(path, what) for path, what in stream.logged if path.startswith(prefix)]
+    assert [path for path, _ in logged] == [prefix, f"{prefix}/4", f"{prefix}/7"]
+    for _, what in logged[1:]:
+        assert what.keypoint_ids.as_arrow_array().to_pylist() == [PERSON.names.index("left_ankle")]
+        assert what.class_ids.as_arrow_array().to_pylist() == [1]
+    contexts = [what for path, what in stream.logged if path == "/"]
+    (described,) = contexts[-1].context.as_arrow_array().to_pylist()
+    bones = described[1]["class_description"]["keypoint_connections"]
+    assert len(contexts) == 2
+    assert [(b["keypoint0"], b["keypoint1"]) for b in bones] == list(PERSON.bones)
 
 
 def test_box_behind_the_camera_leaves_no_trace() -> None:

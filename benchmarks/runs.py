@@ -1,0 +1,45 @@
+"""What the benchmarks of whole runs share."""
+
+from __future__ import annotations
+
+import platform
+import tempfile
+from functools import partial
+from pathlib import Path
+
+from generator.assemble.recipe import PipelineFactory
+from generator.assemble.spec import Spec
+from generator.runner.identity import licences_text, plan_of
+from generator.runner.run import Summary, run
+
+
+def measured_run(spec: Spec, n: int, workers: int) -> Summary:
+    """A whole run into a temporary folder."""
+    factory = PipelineFactory(spec, n)
+    with tempfile.TemporaryDirectory() as folder:
+        return run(
+            plan_of(factory),
+            factory,
+            Path(folder) / "out",
+            workers=workers,
+            resume_command="",
+            licences=partial(licences_text, factory),
+        )
+
+
+def machine() -> str:
+    """Processor and architecture, as a table names them."""
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("model name"):
+            return f"{platform.machine()}, {line.partition(':')[2].strip()}"
+    return platform.machine()
+
+
+def described(summary: Summary) -> str:
+    """Speed, memory, and CPU milliseconds per sample by stage."""
+    lines = [
+        f"{summary.samples_per_s:.1f} samples/s, {1e3 * sum(summary.cpu_s.values()):.0f} CPU"
+        f" ms/sample, largest worker {summary.rss_bytes_max / 1e6:.0f} MB"
+    ]
+    lines += [f"    {stage:<10} {1e3 * s:7.1f} CPU ms" for stage, s in summary.cpu_s.items()]
+    return "\n".join(lines)

@@ -1,0 +1,278 @@
+"""Bicycles, alone and ridden; frames after the usual geometry charts of 28 inch bicycles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, chance, pick, rng_of
+from generator.assets.procedural.family import Facts, Solid
+from generator.assets.procedural.materials import linear
+from generator.assets.procedural.mesh import Array, Patch, joined
+from generator.assets.procedural.shapes import block, circle, cone, lathe, sweep
+from generator.assets.scenery.forms import solid
+from generator.assets.vehicles import rider as people
+from generator.assets.vehicles.materials import Slot, materials
+from generator.assets.vehicles.rider import Seat, blob, limb
+from generator.assets.vehicles.shell import unmapped
+from generator.core.geometry import Keypoint, Material
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+
+STYLES = ("city", "mountain", "road")
+
+_PAINTS = ("#151618", "#e6e6e2", "#1f4f91", "#a3201c", "#2f5a42", "#6d7276", "#c97a1e", "#2aa3a0")
+_CRANK_M = 0.17
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Joints in the plane y = 0, metres: (x, z).
+
+    Attributes:
+        step: Where the top tube meets the seat tube, as a share of that.
+        grip: Place of the left hand: x, y, z.
+        tyre_m: Radius of a tyre's section.
+        lean_rad: How far a rider leans forward.
+    """
+
+    axle: float
+    wheel_m: float
+    crank: tuple[float, float]
+    seat: tuple[float, float]
+    saddle: tuple[float, float]
+    head: tuple[float, float]
+    fork: tuple[float, float]
+    step: float
+    grip: Vec3
+    tyre_m: float
+    lean_rad: float
+
+
+_FRAMES = {
+    "city": _Frame(0.54, 0.345, (-0.12, 0.29), (-0.27, 0.74), (-0.33, 0.95), (0.27, 0.86),
+                   (0.33, 0.68), 0.3, (0.16, 0.28, 1.1), 0.021, 0.2),
+    "mountain": _Frame(0.55, 0.345, (-0.12, 0.31), (-0.26, 0.73), (-0.31, 0.97), (0.29, 0.85),
+                       (0.34, 0.73), 0.92, (0.34, 0.32, 1.02), 0.028, 0.55),
+    "road": _Frame(0.495, 0.335, (-0.09, 0.27), (-0.24, 0.8), (-0.28, 0.98), (0.29, 0.86),
+                   (0.335, 0.7), 0.97, (0.43, 0.2, 0.95), 0.013, 0.8),
+}  # fmt: skip
+
+
+def bicycle(seed: int) -> Solid:
+    """A bicycle that stands upright with nobody on it."""
+    rng = rng_of("bicycle", seed)
+    frame = _FRAMES[_style(seed)]
+    parts = _machine(_style(seed), frame, between(0.0, 2.0 * math.pi, rng), rng)
+    paint = linear(pick(_PAINTS, rng))
+    return _solid(parts, frame, materials(rng, paint), 1.0)
+
+
+def bicycle_facts(seed: int) -> Facts:
+    """Its kind."""
+    return Facts(_style(seed), {"rider": "no"})
+
+
+def cyclist(seed: int) -> Solid:
+    """A bicycle with its rider."""
+    rng = rng_of("cyclist", seed)
+    frame, turn = _FRAMES[_style(seed)], between(0.0, 2.0 * math.pi, rng)
+    parts = _machine(_style(seed), frame, turn, rng)
+    parts += people.rider(_seat(frame, turn), rng)
+    paint = linear(pick(_PAINTS, rng))
+    finish = materials(rng, paint, clothes=people.drawn_clothes(rng))
+    return _solid(parts, frame, finish, 1.7)
+
+
+def cyclist_facts(seed: int) -> Facts:
+    """The kind of bicycle."""
+    return Facts(_style(seed), {"rider": "yes"})
+
+
+def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
+    """A thin wheel about the origin, its axle along Y."""
+    ring = circle(tyre_m, 6) + np.array([radius_m - tyre_m, 0.0])
+    tyre = lathe([*map(tuple, ring), tuple(ring[0])], 24, Slot.TYRE)
+    rim = lathe(
+        [(radius_m - 1.7 * tyre_m - 0.014, h) for h in (0.6 * tyre_m, -0.6 * tyre_m)]
+        + [(radius_m - 1.4 * tyre_m, h) for h in (-0.7 * tyre_m, 0.7 * tyre_m)]
+        + [(radius_m - 1.7 * tyre_m - 0.014, 0.6 * tyre_m)],
+        24,
+        Slot.RIM,
+    )
+    hub = cone((0.022, -0.035), (0.022, 0.035), 6, Slot.CHROME)
+    wires = []
+    for k in range(spokes):
+        turn = 2.0 * math.pi * k / spokes
+        end = (radius_m - 2.2 * tyre_m) * np.array([math.cos(turn), math.sin(turn), 0.0])
+        start = np.array([0.02 * end[1], -0.02 * end[0], 0.03 * (-1) ** k])
+        wires.append(
+            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=Slot.CHROME)
+        )
+    return joined([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
+
+
+def _style(seed: int) -> str:
+    return STYLES[seed % len(STYLES)]
+
+
+def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top: float) -> Solid:
+    reach, z = frame.axle + frame.wheel_m, frame.wheel_m
+    points = (
+        Keypoint("wheel_front", (frame.axle, 0.0, z), 0.06),
+        Keypoint("wheel_rear", (-frame.axle, 0.0, z), 0.06),
+        Keypoint("headlight", (frame.head[0] + 0.08, 0.0, frame.head[1] + 0.02), 0.06),
+        Keypoint("taillight", (frame.saddle[0] - 0.14, 0.0, frame.saddle[1] - 0.1), 0.06),
+    )
+    hull = [
+        hulls.box((-reach, -0.05, 0.0), (reach, 0.05, 0.7)),
+        hulls.box((-0.45, -0.28, 0.25), (0.45, 0.28, top)),
+    ]
+    return solid([unmapped(part) for part in parts], finish, hull, points)
+
+
+def _machine(style: str, frame: _Frame, turn_rad: float, rng: Rng) -> list[Patch]:
+    """The bicycle itself; ``turn_rad`` is the left crank's angle."""
+    wheel = spoked_wheel(frame.wheel_m, frame.tyre_m, 14)
+    parts = [wheel.moved(sign * frame.axle, 0.0, frame.wheel_m) for sign in (1.0, -1.0)]
+    parts += [*_tubes(frame), *_bars(style, frame), *_drive(frame, turn_rad)]
+    x, z = frame.saddle
+    parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), Slot.TRIM))
+    parts.append(limb([_at((x + 0.1, z)), _at((x + 0.15, z))], (0.03, 0.016), Slot.TRIM))
+    x, z = frame.head
+    parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), Slot.HEADLIGHT))
+    x, z = frame.saddle
+    parts.append(blob((x - 0.14, 0.0, z - 0.1), (0.018, 0.03, 0.025), Slot.TAILLIGHT))
+    if style == "city":
+        parts += [_mudguard(frame, 1.0, (0.2, 2.0)), _mudguard(frame, -1.0, (0.8, 3.3))]
+        parts += _rack(frame)
+        if chance(0.5, rng):
+            parts.append(block((0.3, -0.18, 0.98), (0.55, 0.18, 1.18), 0.02, Slot.TRIM))
+    return parts
+
+
+def _tubes(frame: _Frame) -> list[Patch]:
+    crank, seat, head, fork = (_at(p) for p in (frame.crank, frame.seat, frame.head, frame.fork))
+    step = crank + frame.step * (seat - crank)
+    radius = 0.017
+    bars = [(crank, seat), (step, head - 0.12 * (head - fork)), (crank, fork), (head, fork)]
+    parts = [limb(bar, (radius, radius), Slot.PAINT, 6) for bar in bars]
+    parts.append(limb([seat, _at(frame.saddle)], (0.013, 0.013), Slot.CHROME, 6))
+    for sign in (1.0, -1.0):
+        out = np.array([0.0, sign * 0.055, 0.0])
+        rear = np.array([-frame.axle, sign * 0.065, frame.wheel_m])
+        front = np.array([frame.axle, sign * 0.055, frame.wheel_m])
+        for start, end in (
+            (crank + 0.6 * out, rear),
+            (seat + 0.3 * out, rear),
+            (fork + out, front),
+        ):
+            parts.append(limb([start, end], (0.012, 0.009), Slot.PAINT, 5))
+    return parts
+
+
+def _bars(style: str, frame: _Frame) -> list[Patch]:
+    x, y, z = frame.grip
+    stem = np.array([frame.head[0] - 0.01, 0.0, z - (0.0 if style == "road" else 0.03)])
+    parts = [limb([_at(frame.head), stem], (0.014, 0.014), Slot.CHROME, 6)]
+    for sign in (1.0, -1.0):
+        grip = np.array([x, sign * y, z])
+        corner = np.array([stem[0] + 0.06, sign * (y - 0.04), z])
+        path = [stem, corner, grip]
+        if style == "road":
+            path = [
+                stem,
+                np.array([x - 0.08, sign * y, z]),
+                grip + np.array([0.02, 0.0, 0.0]),
+                grip + np.array([0.01, 0.0, -0.11]),
+                grip + np.array([-0.1, 0.0, -0.13]),
+            ]
+        parts.append(limb(path, (0.012,) * len(path), Slot.TRIM, 5))
+        tip = grip + np.array([-0.09, sign * 0.02, 0.0])
+        if style != "road":
+            parts.append(limb([grip + 0.5 * (grip - tip), tip], (0.016, 0.016), Slot.TRIM, 6))
+    return parts
+
+
+def _pedals(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
+    """Middles of the left and the right pedal."""
+    x, z = frame.crank
+    reach = (_CRANK_M * math.cos(turn_rad), _CRANK_M * math.sin(turn_rad))
+    return (x + reach[0], 0.13, z + reach[1]), (x - reach[0], -0.13, z - reach[1])
+
+
+def _drive(frame: _Frame, turn_rad: float) -> list[Patch]:
+    ring = lathe([(0.0, -0.004), (0.09, -0.004), (0.09, 0.004), (0.0, 0.004)], 16, Slot.TRIM)
+    x, z = frame.crank
+    parts = [ring.rotated("x", 0.5 * math.pi).moved(x, -0.05, z)]
+    for sign, pedal in zip((1.0, -1.0), _pedals(frame, turn_rad), strict=True):
+        axle, (px, py, pz) = np.array([x, sign * 0.07, z]), pedal
+        arm = [axle, np.array([px, sign * 0.07, pz])]
+        parts.append(limb(arm, (0.012, 0.01), Slot.CHROME, 5))
+        parts.append(
+            block(
+                (px - 0.045, py - 0.045, pz - 0.012),
+                (px + 0.045, py + 0.045, pz + 0.012),
+                0.0,
+                Slot.TRIM,
+            )
+        )
+    rear = np.array([-frame.axle, -0.05, frame.wheel_m])
+    for up in (1.0, -1.0):
+        near, far = (np.array([0.0, 0.0, up * r]) for r in (0.085, 0.035))
+        chain = [np.array([x, -0.05, z]) + near, rear + far]
+        parts.append(limb(chain, (0.005, 0.005), Slot.TRIM, 4))
+    return parts
+
+
+def _mudguard(frame: _Frame, sign: float, arc_rad: tuple[float, float]) -> Patch:
+    turn = np.linspace(*arc_rad, 9)
+    radius = frame.wheel_m + 0.02
+    path = np.stack(
+        [
+            sign * frame.axle + radius * np.cos(turn),
+            0 * turn,
+            frame.wheel_m + radius * np.sin(turn),
+        ],
+        axis=1,
+    )
+    section = np.array([(0.004, 0.0), (-0.006, 0.028), (-0.006, -0.028)])
+    return joined(
+        sweep(np.array(pair), section, up=(0.0, 0.0, 1.0), slot=Slot.PAINT)
+        for pair in pairwise(path)
+    )
+
+
+def _rack(frame: _Frame) -> list[Patch]:
+    x, z = -frame.axle, 2.0 * frame.wheel_m + 0.07
+    top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, Slot.TRIM)
+    stays = [
+        limb([np.array([x, s * 0.07, frame.wheel_m]), np.array([x - 0.1, s * 0.06, z])],
+             (0.006, 0.006), Slot.TRIM, 4)
+        for s in (1.0, -1.0)
+    ]  # fmt: skip
+    return [top, *stays]
+
+
+def _seat(frame: _Frame, turn_rad: float) -> Seat:
+    x, y, z = frame.grip
+    return Seat(
+        hips=(frame.saddle[0], 0.0, frame.saddle[1] + 0.1),
+        grips=((x, y, z), (x, -y, z)),
+        soles=_soles(frame, turn_rad),
+        lean_rad=frame.lean_rad,
+        full_face=False,
+    )
+
+
+def _soles(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
+    left, right = ((x, y, z + 0.03) for x, y, z in _pedals(frame, turn_rad))
+    return left, right
+
+
+def _at(point: tuple[float, float]) -> Array:
+    return np.array([point[0], 0.0, point[1]])

@@ -1,0 +1,328 @@
+"""Cars and vans: a lower body with a hood, a glass house on it, and what is fitted to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.mesh import Array, Patch, joined
+from generator.assets.procedural.shapes import Point2, block, rounded_box
+from generator.assets.vehicles import shell
+from generator.assets.vehicles.materials import SIDES, Slot
+from generator.assets.vehicles.shell import (
+    Curve,
+    Level,
+    Plan,
+    Row,
+    above,
+    along,
+    below,
+    between,
+    painted_where,
+    rows_between,
+)
+from generator.assets.vehicles.wheels import Axles
+from generator.core.geometry import Keypoint
+
+
+@dataclass(frozen=True)
+class Design:
+    """What distinguishes one car or van from another.
+
+    Shares are of the length from the front bumper; heights are above the ground.
+
+    Attributes:
+        length_m, width_m, height_m: Overall, without mirrors.
+        wheelbase_m, front_axle_m: Distance of the axles; of the front one from the bumper.
+        wheel_radius_m, spokes: Wheels; 0 spokes = steel wheels.
+        clearance_m: Of the underbody.
+        nose_m, cowl_m, belt_m, tail_m: Height of the shoulder along the car.
+        cowl, header, roof_end, rear_base: Shares where windscreen and rear window begin and end.
+        waist_share, roof_share: Half width below the windows and of the roof over the body's.
+        body_ends, house_ends: Exponents of the plan in front and behind.
+        seams: Shares of the vertical door gaps.
+        pillars: Shares of the pillars between side windows.
+        windows_to: Share where the side windows end.
+        rear_window: Whether the rear is glazed.
+        cladding: Whether sills and wheel arches are of black plastic.
+        rails: Whether there are roof rails.
+        lamp_m: Height of the headlights' middle, and of the tail lights'.
+        upright_lamps: Whether tail lights stand in the rear corners, as on vans.
+    """
+
+    length_m: float
+    width_m: float
+    height_m: float
+    wheelbase_m: float
+    front_axle_m: float
+    wheel_radius_m: float
+    spokes: int
+    clearance_m: float
+    nose_m: float
+    cowl_m: float
+    belt_m: float
+    tail_m: float
+    cowl: float
+    header: float
+    roof_end: float
+    rear_base: float
+    waist_share: float
+    roof_share: float
+    body_ends: tuple[Point2, Point2]
+    house_ends: tuple[Point2, Point2]
+    seams: tuple[float, ...]
+    pillars: tuple[float, ...]
+    windows_to: float
+    rear_window: bool
+    cladding: bool
+    rails: bool
+    lamp_m: Point2
+    upright_lamps: bool
+
+    def x(self, share: float) -> float:
+        """Coordinate of a share of the length."""
+        return self.length_m * (0.5 - share)
+
+    @property
+    def half_m(self) -> float:
+        """Half of the width."""
+        return 0.5 * self.width_m
+
+    @property
+    def axles(self) -> Axles:
+        """Where the wheels are."""
+        front, tyre = 0.5 * self.length_m - self.front_axle_m, 0.66 * self.wheel_radius_m
+        return Axles(
+            front_m=front,
+            rear_m=front - self.wheelbase_m,
+            hub_y_m=0.975 * self.half_m - 0.5 * tyre,
+            radius_m=self.wheel_radius_m,
+            tyre_m=tyre,
+            arch_m=self.wheel_radius_m + (0.055 if self.cladding else 0.045),
+            spokes=self.spokes,
+        )
+
+    def shoulder(self) -> Curve:
+        """Height of the edge between side and hood, belt and boot lid."""
+        return shell.through(
+            [
+                (self.x(1.0), self.tail_m - 0.01),
+                (self.x(0.9), self.tail_m),
+                (self.x(0.6), self.belt_m),
+                (self.x(self.cowl + 0.05), self.cowl_m + 0.01),
+                (self.x(0.5 * self.cowl + 0.02), 0.35 * self.nose_m + 0.65 * self.cowl_m),
+                (self.x(0.03), self.nose_m),
+                (self.x(0.0), self.nose_m - 0.03),
+            ]
+        )
+
+
+# Share of the height, how far front and rear stand back [m], share of the half width.
+_LOWER = (
+    (0.0, 0.12, 0.13, 0.9), (0.07, 0.055, 0.065, 0.958), (0.17, 0.02, 0.03, 0.985),
+    (0.32, 0.0, 0.0, 1.0), (0.5, 0.008, 0.004, 0.99), (0.66, 0.025, 0.018, 1.0),
+    (0.8, 0.055, 0.038, 0.992), (0.91, 0.1, 0.06, 0.975), (0.97, 0.155, 0.09, 0.95),
+    (1.0, 0.23, 0.14, 0.915),
+)  # fmt: skip
+# Share of the height, share of the windscreen's run, of the rear window's, of the lean inwards.
+_HOUSE = (
+    (0.0, 0.0, 0.0, 0.0), (0.2, 0.19, 0.18, 0.15), (0.52, 0.51, 0.48, 0.48),
+    (0.82, 0.81, 0.77, 0.85), (0.93, 0.94, 0.91, 1.03), (0.98, 1.04, 1.03, 1.17),
+    (1.0, 1.13, 1.16, 1.36),
+)  # fmt: skip
+
+
+def bodywork(design: Design, steer_deg: float) -> Patch:
+    """Everything, both sides."""
+    ring = shell.plan(*design.body_ends, sides=20)
+    plain = _lower(design, ring)
+    lower, wells = design.axles.wells(_lower_paint(design, ring, plain), design.half_m)
+    gaps = _gaps(design, design.axles.wells(plain, design.half_m)[0])
+    half = joined([lower, *wells, *gaps, _house(design), *_fitted(design)])
+    middle = [*_plates(design), *design.axles.wheels(steer_deg)]
+    return joined([shell.whole(half, SIDES), *(shell.unmapped(p) for p in middle)])
+
+
+def collision(design: Design) -> list[Array]:
+    """Body and glass house as boxes."""
+    x, y, axles = 0.5 * design.length_m, design.half_m, design.axles
+    house = 0.5 * (1.0 + design.roof_share) * 0.92 * y
+    front, rear = (
+        design.x(0.5 * (design.cowl + design.header)),
+        design.x(0.5 * (design.roof_end + design.rear_base)),
+    )
+    return [
+        hulls.box((-x, -y, design.clearance_m), (x, y, design.belt_m)),
+        hulls.box((rear, -house, design.belt_m), (front, house, design.height_m)),
+        hulls.box((axles.rear_m - axles.radius_m, -0.9 * y, 0.0),
+                  (axles.front_m + axles.radius_m, 0.9 * y, design.clearance_m)),
+    ]  # fmt: skip
+
+
+def keypoints(design: Design) -> tuple[Keypoint, ...]:
+    """Hubs and lamps."""
+    x, y = 0.5 * design.length_m, design.half_m
+    head, tail = design.lamp_m
+    return design.axles.keypoints((x - 0.2, 0.74 * y, head), (-x + 0.14, 0.8 * y, tail))
+
+
+def _lower(design: Design, ring: Plan) -> Patch:
+    x, y = 0.5 * design.length_m, design.half_m
+    rows = [Row(rise, x - front, -x + rear, share * y) for rise, front, rear, share in _LOWER]
+
+    def floor(at: Array) -> Array:
+        return np.full_like(at, design.clearance_m)
+
+    body = shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
+    # What lies under the glass house is never seen.
+    hidden = np.all(
+        (body.uvs[..., 1] >= 1.0)
+        & (body.corners_m[..., 0] < design.x(design.cowl) - 0.35)
+        & (body.corners_m[..., 0] > design.x(design.rear_base) + 0.2)
+        & (body.corners_m[..., 1] < 0.8 * y),
+        axis=1,
+    )
+    return shell.taken(body, ~hidden)
+
+
+def _lower_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
+    """Bumpers, lamps, grille and the gaps around doors and lids."""
+    x, floor = 0.5 * design.length_m, design.clearance_m
+    sill = floor + (0.15 if design.cladding else 0.07)
+    patch = painted_where(patch, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
+    patch = painted_where(patch, Slot.TRIM, *rows_between(0.0, 2.0), below("z", sill))
+    if design.cladding:
+        axles = design.axles
+        for x_m in (axles.front_m, axles.rear_m):
+            arch = shell.round_x_z(x_m, axles.radius_m, axles.arch_m + 0.055, 0.4)
+            patch = painted_where(patch, Slot.TRIM, *rows_between(0.0, 1.0), arch)
+    patch = _front_paint(design, ring, patch)
+    patch = _rear_paint(design, ring, patch)
+    hood = between("x", x - 0.3, design.x(design.cowl) + 0.1)
+    return painted_where(patch, Slot.TRIM, *rows_between(0.975, 0.988), *hood)
+
+
+def _gaps(design: Design, plain: Patch) -> list[Patch]:
+    """The lines around the doors."""
+    sides = (rows_between(0.1, 0.99)[0], rows_between(0.1, 0.99)[1], above("y", 0.5))
+    return [shell.gap(plain, design.x(share), 0.009, Slot.TRIM, *sides) for share in design.seams]
+
+
+def _front_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
+    x, z, y = 0.5 * design.length_m, design.lamp_m[0], design.half_m
+    front = above("x", x - 0.8)
+    outer = ring.front(0.93) + 0.03
+    bezel = (front, *along(ring.front(0.44), outer), *between("z", z - 0.085, z + 0.075),
+             above("z", z - 0.17, 0.13 / y, "y"))  # fmt: skip
+    patch = painted_where(patch, Slot.TRIM, *bezel)
+    lens = (front, *along(ring.front(0.52), ring.front(0.93) + 0.022),
+            *between("z", z - 0.055, z + 0.066))  # fmt: skip
+    patch = painted_where(patch, Slot.HEADLIGHT, *lens)
+    turn = (front, *along(ring.front(0.8), ring.front(0.93) + 0.01),
+            *between("z", z - 0.055, z - 0.025))  # fmt: skip
+    patch = painted_where(patch, Slot.INDICATOR_LEFT, *turn)
+    grille = (front, below("y", 0.4 * y), *between("z", z - 0.11, z + 0.04))
+    patch = painted_where(patch, Slot.TRIM, *grille)
+    intake = (front, below("y", 0.68 * y), *between("z", design.clearance_m + 0.08, z - 0.28))
+    return painted_where(patch, Slot.TRIM, *intake)
+
+
+def _rear_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
+    x, z, y = 0.5 * design.length_m, design.lamp_m[1], design.half_m
+    rear = below("x", -x + 0.6)
+    low, high = (z - 0.22, z + 0.2) if design.upright_lamps else (z - 0.09, z + 0.08)
+    inner = 0.78 if design.upright_lamps else 0.5
+    reach = (rear, *along(ring.rear(0.93) - 0.02, ring.rear(inner)), *rows_between(0.1, 0.985))
+    patch = painted_where(patch, Slot.TAILLIGHT, *reach, *between("z", low, high))
+    stop = (rear, *along(ring.rear(0.93) - 0.02, ring.rear(0.5 * inner + 0.4)))
+    patch = painted_where(
+        patch,
+        Slot.BRAKELIGHT,
+        *stop,
+        *rows_between(0.1, 0.985),
+        *between("z", low, 0.5 * (low + high)),
+    )
+    wink = (rear, *along(ring.rear(0.9), ring.rear(0.5 * inner + 0.4)))
+    height = between("z", low, low + 0.28 * (high - low))
+    patch = painted_where(patch, Slot.INDICATOR_LEFT, *wink, *rows_between(0.1, 0.985), *height)
+    lid = (rear, below("y", 0.7 * y), *between("z", z - 0.335, z - 0.327))
+    patch = painted_where(patch, Slot.TRIM, *lid)
+    skirt = (rear, below("y", 0.72 * y), below("z", design.clearance_m + 0.17), *rows_between(0, 2))
+    return painted_where(patch, Slot.TRIM, *skirt)
+
+
+def _house(design: Design) -> Patch:
+    """Glass house and roof."""
+    ring = shell.plan(*design.house_ends, sides=10)
+    crown, shoulder = 0.035, design.shoulder()
+    wide = design.waist_share * design.half_m
+    narrow = design.roof_share * design.half_m
+    x = [design.x(s) for s in (design.cowl, design.header, design.roof_end, design.rear_base)]
+    rows = [
+        Row(rise, x[0] + front * (x[1] - x[0]), x[3] + rear * (x[2] - x[3]),
+            wide + lean * (narrow - wide))
+        for rise, front, rear, lean in _HOUSE
+    ]  # fmt: skip
+    top = design.height_m - crown
+    middle = 0.55 * x[1] + 0.45 * x[2]
+    roof = shell.through([(x[3], top - 0.05), (x[2], top - 0.035), (middle, top),
+                          (x[1], top - 0.03), (x[0], top - 0.06)])  # fmt: skip
+
+    def base(at: Array) -> Array:
+        return shoulder(at) - 0.03
+
+    house = shell.stack(ring, rows, base, roof, crown_m=crown, lid_rows=2)
+    _, house, _ = shell.split(house, lambda p: -p.uvs[..., 1])
+    return _glazed(design, ring, house)
+
+
+def _glazed(design: Design, ring: Plan, house: Patch) -> Patch:
+    glass: list[tuple[Level, ...]] = [
+        (*along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91)),
+    ]
+    if design.rear_window:
+        glass.append((*along(ring.rear(0.8), 2.0), *rows_between(0.16, 0.87)))
+    start = ring.front(0.92) + 0.035
+    sides = (*along(start, ring.rear(0.92) - 0.03), *rows_between(0.09, 0.9),
+             above("x", design.x(design.windows_to), -0.25, "z"))  # fmt: skip
+    glass.append(sides)
+    for levels in glass:
+        house = painted_where(house, Slot.GLASS, *levels)
+    for share in design.pillars:
+        post = between("x", design.x(share) - 0.035, design.x(share) + 0.035)
+        house = painted_where(house, Slot.TRIM, *post, *sides)
+    return house
+
+
+def _fitted(design: Design) -> Iterable[Patch]:
+    """Mirror, door handles, roof rail: the left one of each."""
+    shoulder = design.shoulder()
+    y = design.half_m
+    mirror_x = design.x(design.cowl + 0.42 * (design.header - design.cowl))
+    z = float(shoulder(np.array(mirror_x))) + 0.1
+    yield rounded_box((0.13, 0.2, 0.14), 0.045, 1).moved(mirror_x, y + 0.07, z).painted(Slot.PAINT)
+    face = block((mirror_x - 0.07, y - 0.01, z - 0.05), (mirror_x - 0.06, y + 0.15, z + 0.05))
+    yield face.painted(Slot.CHROME)
+    yield block(
+        (mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM
+    )
+    for share in design.seams[1:]:
+        x = design.x(share) + 0.16
+        z = float(shoulder(np.array(x))) - 0.13
+        yield block((x - 0.1, 0.95 * y, z), (x + 0.1, y + 0.012, z + 0.03), 0.0, Slot.PAINT)
+    if design.rails:
+        front, rear = design.x(design.header + 0.05), design.x(design.roof_end - 0.04)
+        at = design.roof_share * y - 0.06
+        top = design.height_m
+        yield block((rear, at - 0.015, top - 0.06), (front, at + 0.015, top), 0.0, Slot.CHROME)
+
+
+def _plates(design: Design) -> Iterable[Patch]:
+    x = 0.5 * design.length_m
+    z = design.lamp_m[0] - 0.2
+    yield block((x - 0.03, -0.26, z - 0.055), (x + 0.008, 0.26, z + 0.055), 0.0, Slot.PLATE)
+    z = design.lamp_m[1] - 0.2 if not design.upright_lamps else design.lamp_m[1] - 0.3
+    yield block((-x - 0.002, -0.26, z - 0.055), (-x + 0.05, 0.26, z + 0.055), 0.0, Slot.PLATE)

@@ -1,0 +1,152 @@
+"""Someone who sits on two wheels: limbs between hips, grips and pedals.
+
+Lengths are shares of stature from Drillis and Contini, "Body segment parameters", 1966.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.assets.procedural.draw import between, pick
+from generator.assets.procedural.materials import linear
+from generator.assets.procedural.mesh import Array, Patch
+from generator.assets.procedural.shapes import ball, circle, spline, sweep
+from generator.assets.vehicles.materials import Slot
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+
+_SKINS = ("#f0cdb0", "#e0b08c", "#c68e64", "#8d5a3a", "#5a3825")
+_TOPS = ("#1f3a5f", "#b3231d", "#20242a", "#e8e6e0", "#d9d12a", "#2f6b4a", "#6b6f76", "#d96a1f")
+_BOTTOMS = ("#1c1e22", "#2b3a55", "#4b4a45", "#1c1e22", "#7a6a52")
+_HELMETS = ("#e8e8e6", "#1a1b1d", "#b3231d", "#1f4f91", "#d9d12a")
+_STATURE_M = 1.74
+_THIGH_M, _SHIN_M = 0.245 * _STATURE_M, 0.246 * _STATURE_M
+_UPPER_ARM_M, _FOREARM_M = 0.186 * _STATURE_M, 0.17 * _STATURE_M
+_TORSO_M = 0.275 * _STATURE_M
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where the rider touches the vehicle, metres; left (y > 0) before right.
+
+    Attributes:
+        hips: Middle of the hip joints.
+        grips, soles: Hands' and feet's places.
+        lean_rad: Of the trunk, forward from upright.
+        full_face: Whether the helmet covers the face.
+    """
+
+    hips: Vec3
+    grips: tuple[Vec3, Vec3]
+    soles: tuple[Vec3, Vec3]
+    lean_rad: float
+    full_face: bool
+
+
+def drawn_clothes(rng: Rng) -> tuple[Vec3, ...]:
+    """Colours of skin, top, bottom, shoes and helmet, linear RGB."""
+    codes = (_SKINS, _TOPS, _BOTTOMS, ("#18181a", "#e2e2de", "#4a3627"), _HELMETS)
+    return tuple(linear(pick(options, rng)) for options in codes)
+
+
+def rider(seat: Seat, rng: Rng) -> list[Patch]:
+    """The rider's body."""
+    hips = np.array(seat.hips)
+    spine = np.array([math.sin(seat.lean_rad), 0.0, math.cos(seat.lean_rad)])
+    neck = hips + (_TORSO_M + 0.05) * spine
+    parts = [*_trunk(hips, spine), *_head(neck, seat, between(-0.1, 0.15, rng))]
+    for sign, grip, sole in zip((1.0, -1.0), seat.grips, seat.soles, strict=True):
+        shoulder = hips + _TORSO_M * spine + np.array([0.0, sign * 0.175, 0.0])
+        parts += _arm(shoulder, np.array(grip), sign)
+        parts += _leg(hips + np.array([0.0, sign * 0.09, 0.0]), np.array(sole), sign)
+    return parts
+
+
+def limb(
+    path: Sequence[Array], radii_m: Sequence[float], slot: int, sides: int = 8, bend: int = 2
+) -> Patch:
+    """A tapering round bar through points, rounded where it bends."""
+    points = np.array(path, dtype=np.float64)
+    if len(path) > 2:
+        both = np.concatenate([points, np.array(radii_m)[:, None]], axis=1)
+        smooth = spline(both.tolist(), bend * (len(path) - 1) + 1)
+        points, radii_m = smooth[:, :3], smooth[:, 3].tolist()
+    start = np.abs(points[1] - points[0])
+    up = (0.0, 1.0, 0.0) if start[1] < 0.8 * math.sqrt(float((start**2).sum())) else (1.0, 0.0, 0.0)
+    return sweep(points, circle(1.0, sides), up=up, scale=np.array(radii_m), slot=slot)
+
+
+def blob(centre: Sequence[float] | Array, half: Vec3, slot: int, pitch_rad: float = 0.0) -> Patch:
+    """An ellipsoid, its nose lowered by the pitch."""
+    made = ball(lambda d: d * np.array(half), rings=6, segments=10)
+    x, y, z = (float(c) for c in centre)
+    return made.rotated("y", pitch_rad).moved(x, y, z).painted(slot)
+
+
+def joint(start: Array, end: Array, first_m: float, second_m: float, towards: Array) -> Array:
+    """Where a limb of two bones bends; it bends towards a direction, or not if it cannot reach."""
+    reach = end - start
+    distance = math.sqrt(float((reach**2).sum()))
+    along = (distance**2 + first_m**2 - second_m**2) / (2.0 * distance)
+    out = math.sqrt(max(0.0, first_m**2 - along**2))
+    axis = reach / distance
+    side = towards - (towards * axis).sum() * axis
+    bent: Array = start + along * axis + out * side / math.sqrt(float((side**2).sum()))
+    return bent
+
+
+def _trunk(hips: Array, spine: Array) -> list[Patch]:
+    path = [hips + share * _TORSO_M * spine for share in (-0.16, 0.0, 0.4, 0.8, 1.02, 1.12)]
+    # Half width across, half depth.
+    sizes = np.array([(0.1, 0.09), (0.17, 0.125), (0.155, 0.11), (0.185, 0.115), (0.14, 0.08),
+                      (0.06, 0.06)])  # fmt: skip
+    points = np.array(path)
+    top = sweep(points[1:], circle(1.0, 10), up=(0.0, 1.0, 0.0), scale=sizes[1:], slot=Slot.TOP)
+    seat = sweep(points[:3], circle(1.0, 10), up=(0.0, 1.0, 0.0), scale=0.98 * sizes[:3],
+                 slot=Slot.BOTTOM)  # fmt: skip
+    return [top, seat]
+
+
+def _head(neck: Array, seat: Seat, nod_rad: float) -> list[Patch]:
+    middle = neck + np.array([0.07, 0.0, 0.13])
+    throat = limb(
+        [neck - np.array([0.01, 0.0, 0.03]), middle - np.array([0.01, 0.0, 0.04])],
+        (0.06, 0.055),
+        Slot.SKIN,
+    )
+    if seat.full_face:
+        shell = blob(
+            middle + np.array([0.005, 0.0, 0.01]), (0.148, 0.122, 0.145), Slot.HELMET, nod_rad
+        )
+        visor = blob(
+            middle + np.array([0.05, 0.0, 0.02]), (0.11, 0.113, 0.058), Slot.GLASS, nod_rad
+        )
+        return [throat, shell, visor]
+    face = blob(middle, (0.1, 0.078, 0.12), Slot.SKIN, nod_rad)
+    helmet = blob(middle + np.array([-0.015, 0.0, 0.065]), (0.14, 0.1, 0.085), Slot.HELMET, nod_rad)
+    return [throat, face, helmet]
+
+
+def _arm(shoulder: Array, grip: Array, sign: float) -> list[Patch]:
+    out = np.array([-0.3, 0.8 * sign, -0.8])
+    elbow = joint(shoulder, grip, _UPPER_ARM_M, _FOREARM_M, out)
+    wrist = elbow + 0.85 * (grip - elbow)
+    sleeve = limb([shoulder, elbow, wrist], (0.062, 0.047, 0.036), Slot.TOP)
+    return [sleeve, blob(grip + 0.02 * (wrist - grip), (0.045, 0.045, 0.04), Slot.SKIN)]
+
+
+def _leg(hip: Array, sole: Array, sign: float) -> list[Patch]:
+    ankle = sole + np.array([-0.09, 0.0, 0.085])
+    knee = joint(hip, ankle, _THIGH_M, _SHIN_M, np.array([1.0, 0.12 * sign, 0.5]))
+    trouser = limb([hip, knee, ankle], (0.088, 0.062, 0.045), Slot.BOTTOM)
+    heel, toe = ankle + np.array([-0.05, 0.0, -0.05]), sole + np.array([0.13, 0.0, 0.03])
+    shoe = limb(
+        [heel, 0.5 * (heel + toe) + np.array([0.0, 0.0, 0.012]), toe],
+        (0.045, 0.05, 0.032),
+        Slot.SHOES,
+    )
+    return [trouser, shoe]

@@ -1,0 +1,50 @@
+"""``gen-data report``: what a data set contains."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from generator.core.errors import StorageError
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--html", type=click.Path(path_type=Path), help="Also write a page with histograms here."
+)
+def report(folder: Path, html: Path | None) -> None:
+    """Count what a data set contains, beside what is published about KITTI.
+
+    FOLDER is a data set that was exported as coco or kitti: objects, box sizes, occlusion,
+    truncation, distances and keypoints by category. Only label files are read.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table as RichTable
+
+    from generator.report.labels import records
+    from generator.report.page import page
+    from generator.report.survey import survey
+    from generator.report.tables import histograms, tables
+
+    found = survey(records(folder))
+    made = tables(found)
+    console = Console()
+    for table in made:
+        shown = RichTable(title=table.title, caption=table.note or None, box=box.SIMPLE_HEAD)
+        for number, name in enumerate(table.header):
+            shown.add_column(name, justify="right" if number else "left")
+        for row in table.rows:
+            shown.add_row(*row)
+        console.print(shown)
+    if html is not None:
+        try:
+            html.parent.mkdir(parents=True, exist_ok=True)
+            html.write_text(
+                page(folder.resolve().name, made, histograms(found)), encoding="utf-8", newline="\n"
+            )
+        except OSError as error:
+            raise StorageError(f"{html}: {error.strerror}") from error
+        click.echo(f"wrote {html}")

@@ -1,0 +1,240 @@
+"""Reports of data sets written by hand, where every share can be counted on paper."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from generator.cli.report import report
+from generator.core.errors import StorageError
+from generator.report.labels import Label, Picture, Points, records
+from generator.report.page import page
+from generator.report.published import DIFFICULTIES, TYPES
+from generator.report.survey import Survey, survey
+from generator.report.tables import Histogram, Table, counts_at, histograms, tables
+
+
+def annotation(number: int, image_id: int, category_id: int, **keys: Any) -> dict[str, Any]:
+    """A car, or a person, 5 m ahead and 12 m to the right: 13 m away."""
+    return {
+        "id": number,
+        "image_id": image_id,
+        "category_id": category_id,
+        "bbox": [3, 4, 30, 20],
+        "attributes": {"name": "it", "asset": "it"},
+        "occlusion": 0.0,
+        "truncation": 0.0,
+        "visible_fraction": 1.0,
+        "box3d": {"center_m": [12.0, 1.0, 5.0], "size_m": [4.0, 1.6, 1.5]},
+        **keys,
+    }
+
+
+def write_coco(folder: Path, split: str, stem: str, n: int, rows: list[dict[str, Any]]) -> None:
+    """A file as the exporter lays it out: a line per image and per annotation."""
+    head = {"categories": [{"id": 1, "name": "car"}, {"id": 2, "name": "person"}]}
+    images = ",\n".join(json.dumps({"id": k}) for k in range(1, n + 1))
+    lines = ",\n".join(map(json.dumps, rows))
+    text = f'{json.dumps(head)[:-1]},\n"images":[\n{images}\n],\n"annotations":[\n{lines}\n]}}\n'
+    path = folder / f"coco/annotations/{stem}_{split}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+@pytest.fixture
+def street(tmp_path: Path) -> Path:
+    """Three cars and a sitting person in two of three images; one car half hidden, one cut off."""
+    rows = [
+        annotation(1, 1, 1),
+        annotation(2, 1, 1, occlusion=0.4, visible_fraction=0.6, bbox=[0, 0, 60, 45]),
+        annotation(3, 2, 1, truncation=0.2, bbox=[0, 0, 60, 45]),
+        annotation(4, 2, 2, attributes={"pose": "sit"}, occlusion=0.9),
+    ]
+    write_coco(tmp_path, "train", "instances", 3, rows)
+    points = [0, 0, 0, 5.0, 5.0, 1, 6.0, 6.0, 2, 7.0, 7.0, 2]
+    write_coco(tmp_path, "train", "person_keypoints", 3, [rows[3] | {"keypoints": points}])
+    return tmp_path
+
+
+def row_of(made: tuple[Table, ...], title: str, name: str) -> dict[str, str]:
+    """The cells of a row by their columns; KITTI's own columns are numbered."""
+    (table,) = (t for t in made if t.title == title)
+    (row,) = (r for r in table.rows if r[0] == name)
+    return {f"{h} {k}" if h == "KITTI" else h: c for k, (h, c) in enumerate(zip(table.header, row))}  # noqa: B905
+
+
+def test_cocos_files_are_read_an_object_at_a_time(street: Path) -> None:
+    """Distance is over the ground; the pose makes the type; points are counted by state."""
+    found = list(records(street))
+
+    assert [r for r in found if isinstance(r, Picture)] == [
+        Picture("train", str(k)) for k in (1, 2, 3)
+    ]
+    labels = [r for r in found if isinstance(r, Label)]
+    assert labels[1] == Label(
+        ("train", "1"), "car", "Car", 60, 45, 1, 0.0, 0.6, 13.0, (4.0, 1.6, 1.5)
+    )
+    assert (labels[3].kind, labels[3].occlusion_level) == ("Person_sitting", 2)
+    assert [r for r in found if isinstance(r, Points)] == [Points("person", (1, 1, 2))]
+
+
+def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
+    """Pixels are inclusive; DontCare is no object; h w l become l w h."""
+    labels = tmp_path / "kitti/training/label_2"
+    labels.mkdir(parents=True)
+    (tmp_path / "kitti/ImageSets").mkdir()
+    (tmp_path / "kitti/ImageSets/val.txt").write_text("000007\n")
+    (labels / "000007.txt").write_text(
+        "Car 0.10 2 0.50 10.00 20.00 39.00 39.00 1.5 1.6 4.0 12.0 1.0 5.0 1.0\n"
+        "DontCare -1 -1 -10 1.00 1.00 2.00 2.00 -1 -1 -1 -1000 -1000 -1000 -10\n"
+    )
+
+    picture, label = records(tmp_path)
+
+    assert picture == Picture("val", "000007")
+    assert label == Label(
+        ("val", "000007"), "Car", "Car", 30, 20, 2, 0.1, None, 13.0, (4.0, 1.6, 1.5)
+    )
+
+
+def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
+    """With the remedy."""
+    with pytest.raises(StorageError, match=r"no labels here.*exported as coco or kitti"):
+        list(records(tmp_path))
+
+
+@pytest.mark.parametrize("text", ["Car 0 0 0\n", "Car a 0 0 1 1 2 2 1 1 1 1 1 1 1\n"])
+def test_a_damaged_label_is_named_with_its_line(tmp_path: Path, text: str) -> None:
+    """Too few columns, or no number."""
+    test_kittis_files_are_read_where_there_is_no_coco(tmp_path)
+    path = tmp_path / "kitti/training/label_2/000007.txt"
+    path.write_text(text)
+
+    with pytest.raises(StorageError, match=r"000007.txt:1: not the 15 columns"):
+        list(records(tmp_path))
+
+
+def test_a_coco_file_of_another_layout_is_refused(tmp_path: Path) -> None:
+    """It would have to be read whole."""
+    folder = tmp_path / "coco/annotations"
+    folder.mkdir(parents=True)
+    (folder / "instances_val.json").write_text('{\n "images": [],\n "annotations": []\n}')
+
+    with pytest.raises(StorageError, match="not written by gen-data"):
+        list(records(tmp_path))
+
+
+def test_tables_count_what_was_written(street: Path) -> None:
+    """Two of four objects in each of two images, one image empty."""
+    made = tables(survey(records(street)))
+
+    images = row_of(made, "Images", "all")
+    assert (images["images"], images["objects"], images["empty"]) == ("3", "4", "33.3 %")
+    assert images["objects/image"] == "1.3"
+    assert row_of(made, "Objects", "car")["share"] == "75.0 %"
+    hidden = row_of(made, "Occlusion and truncation", "car")
+    assert [hidden[k] for k in ("occluded 0", "1", "2")] == ["66.7 %", "33.3 %", "0.0 %"]
+    assert hidden["truncated"] == "33.3 %"
+    # The first is too small for all three, the second hidden, the third cut off.
+    assert [hidden[d.name] for d in DIFFICULTIES] == ["0.0 %", "66.7 %", "66.7 %"]
+    assert row_of(made, "Distance and size", "person")["distance m"] == "13.0 / 13.0 / 13.0"
+    points = row_of(made, "Keypoints", "person")
+    assert (points["visible"], points["hidden"]) == ("50.0 %", "25.0 %")
+    car = row_of(made, "Beside KITTI", "Car")
+    assert (car["objects"], car["per image"], car["length m"]) == ("3", "1.00", "4.00")
+    assert (car["KITTI 2"], car["KITTI 4"], car["KITTI 10"]) == ("28742", "3.84", "3.88")
+    assert row_of(made, "Beside KITTI", "Person_sitting")["objects"] == "1"
+
+
+def test_labels_that_were_not_annotated_are_left_blank() -> None:
+    """A data set of boxes only has sizes still; without its types KITTI is no match."""
+    made = tables(survey([Picture("train", "1"), Label(("train", "1"), "mug", "Misc", 10, 20)]))
+
+    hidden = row_of(made, "Occlusion and truncation", "mug")
+    assert set(hidden.values()) == {"mug", "-"}
+    assert row_of(made, "Distance and size", "mug")["height m"] == "-"
+    assert [t.title for t in made][-1] == "Distance and size"
+
+
+def test_a_data_set_without_objects_has_a_report() -> None:
+    """Only negatives."""
+    found = survey([Picture("train", "1")])
+
+    assert row_of(tables(found), "Images", "train")["empty"] == "100.0 %"
+    assert histograms(found)[0].counts["images"].sum() == 1
+
+
+def test_the_difficulties_are_those_of_the_devkit() -> None:
+    """40, 25 and 25 px; levels 0, 1, 2; 15, 30 and 50 % outside: limits belong to the level."""
+    columns = {
+        "height_px": np.array([40.0, 39.9, 25.0, 24.9, 90.0]),
+        "occlusion_level": np.array([0.0, 0.0, 1.0, 0.0, 2.0]),
+        "truncation": np.array([0.15, 0.0, 0.3, 0.0, 0.5]),
+    }
+
+    counted = [counts_at(columns, level).tolist() for level in DIFFICULTIES]
+
+    assert counted == [
+        [True, False, False, False, False],
+        [True, True, True, False, False],
+        [True, True, True, False, True],
+    ]
+
+
+def test_kittis_counts_add_up() -> None:
+    """51,865 labelled objects in all, 11,295 of which are DontCare regions."""
+    assert sum(kind.objects for kind in TYPES.values()) == 51_865 - 11_295
+
+
+def test_histograms_lose_nothing(street: Path) -> None:
+    """What is beyond the last edge is in the last bin."""
+    found = survey(records(street))
+    found.numbers[("car", "Car")].extend([5000.0, 4000.0, 0, 0, 1, 999.0, 4, 2, 1])
+
+    made = histograms(found)
+
+    for histogram in made[1:]:
+        assert histogram.counts["car"].sum() == 4
+        assert len(histogram.counts["car"]) == len(histogram.edges) - 1
+    assert made[0].counts["images"].tolist()[:3] == [1, 0, 2]
+
+
+def test_the_page_is_well_formed_and_whole(street: Path) -> None:
+    """Names are escaped; every bar says its bin; nothing is fetched from elsewhere."""
+    bars = Histogram("Depth <m>", np.array([0.0, 1.0, 2.5]), {"a & b": np.array([3, 6])})
+    text = page("x < y", [Table("T", ("a", "b"), (("<i>", "2"),), "note")], [bars])
+
+    root = ElementTree.fromstring(text.partition("\n")[2].replace('<meta charset="utf-8">', ""))
+
+    rects = root.findall(".//rect")
+    assert [r.findtext("title") for r in rects] == ["0 to 1: 3", "1 to 2.5: 6"]
+    tall = [float(r.attrib["height"]) for r in rects]
+    assert tall[1] == pytest.approx(2 * tall[0])
+    assert [cell.text for cell in root.findall(".//td")] == ["<i>", "2"]
+    assert "http" not in text
+
+
+def test_the_command_prints_tables_and_writes_a_page(street: Path, tmp_path: Path) -> None:
+    """From one pass over the files."""
+    html = tmp_path / "out/report.html"
+
+    done = CliRunner().invoke(report, [str(street), "--html", str(html)])
+
+    assert done.exit_code == 0, done.output
+    assert "Occlusion and truncation" in done.output
+    assert "Beside KITTI" in html.read_text(encoding="utf-8")
+
+
+def test_memory_grows_by_nine_numbers_per_object() -> None:
+    """A million objects are 72 MB."""
+    label = Label(("train", "1"), "mug", "Misc", 10, 20)
+
+    found: Survey = survey(label for _ in range(1000))
+
+    assert found.numbers[("mug", "Misc")].buffer_info()[1] == 9000

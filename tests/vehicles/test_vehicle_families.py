@@ -1,0 +1,277 @@
+"""Everything on wheels: sizes, budgets, frames, slots, keypoints and bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from generator.assets.procedural.family import Solid
+from generator.assets.vehicles import FAMILIES
+from generator.core.geometry import MeshData
+from tests.scenery.rays import cast
+
+Array = NDArray[np.float64]
+
+# Length, width without mirrors (from paint and glass), height [m], and triangles.
+LIMITS = {
+    "car": ((3.9, 4.95), (1.68, 1.95), (1.4, 1.76), 6300),
+    "van": ((5.0, 6.5), (1.9, 2.1), (2.0, 2.7), 6300),
+    "truck": ((6.5, 10.0), (2.2, 2.6), (3.0, 3.8), 6300),
+    "bus": ((11.0, 12.4), (2.5, 2.6), (2.95, 3.25), 6300),
+    "motorcycle": ((1.7, 2.2), (0.2, 0.6), (1.0, 1.8), 5500),
+    "bicycle": ((1.6, 1.9), (0.05, 0.3), (0.9, 1.2), 4000),
+    "cyclist": ((1.6, 1.9), (0.05, 0.3), (1.6, 1.95), 4000),
+}
+FOUR_WHEELED = ("car", "van", "truck", "bus")
+LAMPS = {"headlight", "taillight"}
+ROLES = {
+    *LAMPS, "paint", "glass", "tyre", "rim", "brakelight", "indicator_left", "indicator_right",
+    "plate", "trim", "underbody",
+}  # fmt: skip
+
+
+def variant(name: str, seed: int, **parameters: object) -> Solid:
+    """One variant, with the other parameters at their defaults."""
+    return FAMILIES[name].build(seed=seed, **{**FAMILIES[name].parameters, **parameters})
+
+
+def with_role(mesh: MeshData, *roles: str) -> Array:
+    """Corners of the faces of these roles, shape [n, 3 corners, 3]."""
+    slots = [k for k, material in enumerate(mesh.materials) if material.role in roles]
+    faces = mesh.faces[np.isin(mesh.face_slots, slots)]
+    return mesh.vertices_m[faces].astype(np.float64)
+
+
+@pytest.fixture(
+    params=[(name, seed) for name in FAMILIES for seed in range(5)], ids=str, scope="module"
+)
+def built(request: pytest.FixtureRequest) -> tuple[str, Solid]:
+    """The first variants of every family."""
+    name, seed = request.param
+    return name, variant(name, seed)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_every_variant_is_as_big_as_real_ones_and_within_its_budget(name: str) -> None:
+    """All seeds that are offered for selection."""
+    lengths, widths, heights, triangles = LIMITS[name]
+    for seed in range(FAMILIES[name].variants):
+        mesh = variant(name, seed).mesh
+        low, high = mesh.bounds_m()
+        painted = with_role(mesh, "paint")
+        side = np.abs(painted[..., 1])
+        # Mirror housings are painted too: what is beside the body's middle tells its width.
+        body = side[np.abs(painted[..., 0]) < 0.1 * (high[0] - low[0])]
+        assert lengths[0] <= high[0] - low[0] <= lengths[1], seed
+        assert heights[0] <= high[2] <= heights[1], seed
+        if name in FOUR_WHEELED and name != "truck":
+            assert widths[0] <= 2.0 * np.quantile(body, 0.97) <= widths[1], seed
+        assert 1000 <= len(mesh.faces) <= triangles, seed
+
+
+def test_tyres_touch_the_ground_and_nothing_reaches_below(built: tuple[str, Solid]) -> None:
+    """The ground is z = 0."""
+    mesh = built[1].mesh
+
+    assert mesh.vertices_m[:, 2].min() == pytest.approx(0.0, abs=1e-4)
+    assert with_role(mesh, "tyre")[..., 2].min() == pytest.approx(0.0, abs=1e-4)
+    others = {m.role for m in mesh.materials} - {"tyre"}
+    assert with_role(mesh, *others)[..., 2].min() > 0.015
+
+
+def test_the_origin_is_the_middle_of_the_footprint(built: tuple[str, Solid]) -> None:
+    """Mirrors and baskets aside."""
+    low, high = built[1].mesh.bounds_m()
+
+    assert abs(low[0] + high[0]) < 0.2
+    assert abs(low[1] + high[1]) < 0.15
+
+
+def test_wheel_keypoints_are_the_middles_of_the_tyres(built: tuple[str, Solid]) -> None:
+    """Found again from the tyres' own triangles."""
+    name, solid = built
+    tyres = with_role(solid.mesh, "tyre").reshape(-1, 3)
+    wheels = [point for point in solid.keypoints if point.name.startswith("wheel")]
+
+    assert len(wheels) == (4 if name in FOUR_WHEELED else 2)
+    for wheel in wheels:
+        at = np.array(wheel.position_m)
+        mine = tyres[np.hypot(tyres[:, 0] - at[0], tyres[:, 2] - at[2]) < 1.05 * at[2]]
+        mine = mine[mine[:, 1] * at[1] >= -1e-9]
+        middle = 0.5 * (mine.min(axis=0) + mine.max(axis=0))
+        assert middle[[0, 2]] == pytest.approx(at[[0, 2]], abs=0.01)
+        assert mine[:, 1].min() - 1e-3 <= at[1] <= mine[:, 1].max() + 1e-3
+
+
+def test_keypoints_are_named_in_the_vocabulary(built: tuple[str, Solid]) -> None:
+    """Front is +X and left is +Y."""
+    name, solid = built
+    points = {point.name: np.array(point.position_m) for point in solid.keypoints}
+    if name in FOUR_WHEELED:
+        parts = ("wheel_front", "wheel_rear", "headlight", "taillight")
+        assert set(points) == {f"{part}_{side}" for part in parts for side in ("left", "right")}
+        for part in parts:
+            left, right = points[f"{part}_left"], points[f"{part}_right"]
+            assert left == pytest.approx(right * (1, -1, 1))
+            assert left[1] > 0.3
+        assert points["wheel_front_left"][0] > 0.0 > points["wheel_rear_left"][0]
+    else:
+        assert set(points) == {"wheel_front", "wheel_rear", "headlight", "taillight"}
+        assert points["wheel_front"][0] > 0.0 > points["wheel_rear"][0]
+
+
+def test_lamp_keypoints_lie_at_the_lamps(built: tuple[str, Solid]) -> None:
+    """Within a hand's breadth of triangles of the lamp."""
+    _, solid = built
+    for point in solid.keypoints:
+        role = point.name.partition("_")[0]
+        if role in LAMPS:
+            corners = with_role(solid.mesh, role, "brakelight").reshape(-1, 3)
+            away = np.sqrt(((corners - np.array(point.position_m)) ** 2).sum(axis=1))
+            assert away.min() < point.radius_m, point.name
+
+
+def test_slots_have_the_roles_that_randomizers_look_for(built: tuple[str, Solid]) -> None:
+    """Cars, vans, trucks, buses and motorcycles have all lamps; bicycles have two."""
+    name, solid = built
+    roles = {material.role for material in solid.mesh.materials}
+    if name in ("bicycle", "cyclist"):
+        assert {"paint", "tyre", "rim", "trim", *LAMPS} <= roles
+    elif name == "motorcycle":
+        assert roles >= ROLES - {"glass"}
+    else:
+        assert roles >= ROLES
+    assert ({"skin", "top", "bottom", "shoes"} <= roles) == (
+        FAMILIES[name].facts is not None
+        and FAMILIES[name].facts(seed=_seed_of(built)).attributes.get("rider") == "yes"
+    )
+
+
+def _seed_of(built: tuple[str, Solid]) -> int:
+    name, solid = built
+    for seed in range(5):
+        if np.array_equal(variant(name, seed).mesh.vertices_m, solid.mesh.vertices_m):
+            return seed
+    raise AssertionError("no seed makes this mesh")
+
+
+def test_indicators_are_on_their_own_sides(built: tuple[str, Solid]) -> None:
+    """The left one has y > 0, in front and behind."""
+    name, solid = built
+    if name in ("bicycle", "cyclist"):
+        return
+    for role, sign in (("indicator_left", 1.0), ("indicator_right", -1.0)):
+        lens = with_role(solid.mesh, role)
+        assert (lens[..., 1] * sign > 0.0).all()
+        assert lens[..., 0].max() > 0.3
+        assert lens[..., 0].min() < -0.3
+
+
+@pytest.mark.parametrize("name", ["car", "van"])
+def test_shell_and_glass_are_symmetric(name: str) -> None:
+    """Each triangle has a mirror image."""
+    for seed in range(5):
+        shell = np.round(with_role(variant(name, seed).mesh, "paint", "glass") * 1e5)
+        keys = {tuple(sorted(map(tuple, face))) for face in shell.astype(int).tolist()}
+        mirrored = shell * (1.0, -1.0, 1.0)
+        twins = {tuple(sorted(map(tuple, face))) for face in mirrored.astype(int).tolist()}
+        assert keys == twins
+
+
+@pytest.mark.parametrize("name", FOUR_WHEELED)
+def test_body_faces_outward_wherever_it_is_seen(name: str) -> None:
+    """Rays from all around meet paint, glass and lamps from in front, as do their normals."""
+    mesh = variant(name, 1).mesh
+    roles = [m.role for m in mesh.materials]
+    turn, rise = np.meshgrid(np.linspace(0, 2 * math.pi, 60, endpoint=False), [0.05, 0.3, 0.8])
+    away = np.stack(
+        [np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)], axis=-1
+    ).reshape(-1, 3)
+    low, high = mesh.bounds_m()
+    for share in (0.2, 0.5, 0.8):
+        target = np.array([low[0] + share * (high[0] - low[0]), 0.0, 0.45 * high[2]])
+        _, face, normal = cast(mesh, target + 20.0 * away, -away)
+        seen = np.array(
+            [f >= 0 and roles[mesh.face_slots[f]] in ("paint", "glass", "headlight") for f in face]
+        )
+        assert seen.sum() > 60
+        assert ((normal * away).sum(axis=1)[seen] > 0.0).all()
+        smooth = mesh.normals[mesh.faces[face[seen]]].mean(axis=1)
+        assert ((smooth * normal[seen]).sum(axis=1) > 0.5).all()
+
+
+def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> None:
+    """Shapes and types are the contract's."""
+    mesh = built[1].mesh
+
+    assert mesh.vertices_m.dtype == np.float32
+    assert np.isfinite(mesh.vertices_m).all()
+    assert np.sqrt((mesh.normals.astype(np.float64) ** 2).sum(axis=1)) == pytest.approx(1, abs=1e-4)
+    assert mesh.face_slots.max() < len(mesh.materials)
+
+
+def test_collision_is_a_few_boxes_around_the_body(built: tuple[str, Solid]) -> None:
+    """At most three parts that cover the mesh but for mirrors and handlebars."""
+    solid = built[1]
+    hull = np.concatenate(solid.collision.parts_m)
+    low, high = solid.mesh.bounds_m()
+
+    assert 2 <= len(solid.collision.parts_m) <= 3
+    assert hull.min(axis=0) == pytest.approx(low, abs=0.25)
+    assert hull.max(axis=0) == pytest.approx(high, abs=0.35)
+
+
+@pytest.mark.parametrize("name", ["car", "van"])
+def test_steering_turns_the_front_wheels_alone(name: str) -> None:
+    """To the left: the front of the front wheels moves to +Y, all else stays."""
+    straight, turned = variant(name, 2), variant(name, 2, steer_deg=25.0)
+    before, after = (with_role(s.mesh, "tyre").reshape(-1, 3) for s in (straight, turned))
+    front = straight.keypoints[0].position_m
+
+    def toe(corners: Array) -> float:
+        """How much further to the left the left front tyre is in front of its hub than behind."""
+        mine = corners[(corners[:, 1] > 0) & (np.abs(corners[:, 0] - front[0]) < front[2] + 0.05)]
+        ahead = mine[:, 0] > front[0]
+        return float(mine[ahead, 1].mean() - mine[~ahead, 1].mean())
+
+    assert toe(before) == pytest.approx(0.0, abs=0.01)
+    assert toe(after) > 0.1
+    assert np.array_equal(before[before[:, 0] < 0], after[after[:, 0] < 0])
+    assert np.array_equal(with_role(straight.mesh, "paint"), with_role(turned.mesh, "paint"))
+    assert straight.keypoints == turned.keypoints
+
+
+def test_same_seed_makes_the_same_bytes_and_others_do_not(built: tuple[str, Solid]) -> None:
+    """Pure functions of the seed."""
+    name, solid = built
+    seed = _seed_of(built)
+
+    def digest(one: Solid) -> str:
+        return hashlib.sha256(one.mesh.vertices_m.tobytes() + one.mesh.faces.tobytes()).hexdigest()
+
+    assert digest(variant(name, seed)) == digest(solid)
+    assert digest(variant(name, seed + 5)) != digest(solid)
+
+
+def test_body_styles_are_all_offered_and_told_without_building() -> None:
+    """Subcategories of the first variants."""
+    facts = FAMILIES["car"].facts
+    assert facts is not None
+    told = {facts(seed=seed, steer_deg=0.0).subcategory for seed in range(FAMILIES["car"].variants)}
+
+    assert told == {"hatchback", "sedan", "estate", "suv", "coupe"}
+
+
+def test_paint_is_drawn_from_the_seed() -> None:
+    """Several colours, and none of them most of all."""
+    paints = [
+        next(m.base_color for m in variant("car", seed).mesh.materials if m.role == "paint")
+        for seed in range(20)
+    ]
+
+    assert len(set(paints)) >= 6
+    assert max(paints.count(paint) for paint in set(paints)) <= 10
