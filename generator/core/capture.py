@@ -80,6 +80,7 @@ POINT = np.dtype(
         ("ring", "<u2"),
         ("instance_id", "<u2"),
         ("category_id", "<u2"),
+        ("surface", "u1"),
         ("return_number", "u1"),
         ("return_count", "u1"),
     ]
@@ -92,6 +93,7 @@ intensity                 [0, 1], what the device reports after its own range co
 time_s                    when the pulse left, from the start of the sweep
 ring                      row of the model's table, from 0, the highest first
 instance_id, category_id  what reflected it; 0 where that is the air or has no label
+surface                   what kind of surface, a number of ``generator.core.geometry.SURFACES``
 return_number             1 the first of its pulse, 2 the second
 return_count              how many returns its pulse has
 ========================  ====================================================================
@@ -139,6 +141,7 @@ class Echoes:
             float32; 0 where there is nothing.
         incidence_cos: Cosine of the angle to the surface's normal, float32; 0.
         instance_id, category_id: uint16; 0.
+        surface: Number in ``generator.core.geometry.SURFACES``, uint8; 0.
     """
 
     range_m: NDArray[np.float32]
@@ -146,6 +149,7 @@ class Echoes:
     incidence_cos: NDArray[np.float32]
     instance_id: NDArray[np.uint16]
     category_id: NDArray[np.uint16]
+    surface: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

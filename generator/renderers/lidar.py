@@ -9,6 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.capture import Beams, Echoes
+from generator.core.geometry import SURFACES
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Lidar, Scene
 from generator.renderers.infrared import infrared_surfaces
@@ -16,6 +17,8 @@ from generator.renderers.kernels import lidar as kernels
 from generator.renderers.labels import category_ids
 from generator.renderers.packing import pack_world
 from generator.renderers.stock import AssetStock
+
+_SURFACE = {role: number for number, role in enumerate(SURFACES)}
 
 RING_SHARE = math.sqrt(1.0 / 2.0)
 """Radius of the ring of rays, in units of the beam's: half the light is outside it."""
@@ -33,22 +36,24 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     lights = wp.array(infrared_surfaces(materials, stock), dtype=kernels.Infrared, device=device)
     axes = wp.array(beams.directions, dtype=wp.vec3, device=device)
     images = [stock.scratch(f"scan {k}", count, float) for k in range(3)]
-    bodies = stock.scratch("scan bodies", count, int)
+    hits_ = stock.scratch("scan hits", count, wp.vec2i)
     wp.launch(
         kernels.scan_beams,
         dim=count,
         inputs=[_scan(lidar, beams), world.record, lights, axes],
-        outputs=[*images, bodies],
+        outputs=[*images, hits_],
         device=device,
     )
     ranges_m, reflectances, cosines = (image.numpy().reshape(shape).copy() for image in images)
-    hits = bodies.numpy().reshape(shape)
+    hits = hits_.numpy().reshape(*shape, 2)
+    bodies = hits[..., 0]
     return Echoes(
         ranges_m,
         reflectances,
         cosines,
-        _ids([body.instance_id for body in scene.bodies], hits),
-        _ids(category_ids(scene), hits),
+        _ids([body.instance_id for body in scene.bodies], bodies),
+        _ids(category_ids(scene), bodies),
+        _ids([_SURFACE.get(m.role, 0) for m in materials], hits[..., 1]).astype(np.uint8),
     )
 
 
@@ -62,8 +67,8 @@ def _scan(lidar: Lidar, beams: Beams) -> kernels.Scan:
     return scan
 
 
-def _ids(of_bodies: list[int], hits: NDArray[np.int32]) -> NDArray[np.uint16]:
-    """The id of the body at every hit; 0 where there is none."""
-    table = np.array([0, *of_bodies], dtype=np.uint16)
+def _ids(known: list[int], hits: NDArray[np.int32]) -> NDArray[np.uint16]:
+    """The id of what is at every hit; 0 where there is nothing."""
+    table = np.array([0, *known], dtype=np.uint16)
     ids: NDArray[np.uint16] = table[hits + 1]
     return ids

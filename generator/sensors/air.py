@@ -23,6 +23,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.core.geometry import SURFACES
 from generator.core.scene import Weather
 from generator.core.streams import Rng
 from generator.sensors.returns import Float32, Pulses, joined, light_of
@@ -79,13 +80,7 @@ def optical_depth(
 def dimmed(pulses: Pulses, depth: Float32) -> Pulses:
     """The pulses after both ways through the air."""
     passed = np.exp(np.float32(-2.0) * depth)
-    return Pulses(
-        pulses.range_m,
-        pulses.light * passed,
-        pulses.reflectance * passed,
-        pulses.instance_id,
-        pulses.category_id,
-    )
+    return replace(pulses, light=pulses.light * passed, reflectance=pulses.reflectance * passed)
 
 
 def with_air(
@@ -164,4 +159,5 @@ def _particles(
 
 def _in_air(range_m: Float32, light: Float32, reflectance: Float32) -> Pulses:
     nothing: NDArray[np.uint16] = np.zeros(range_m.shape, np.uint16)
-    return Pulses(range_m, light, reflectance, nothing, nothing)
+    air = np.full(range_m.shape, SURFACES.index("air"), np.uint8)
+    return Pulses(range_m, light, reflectance, nothing, nothing, air)

@@ -20,9 +20,11 @@ from generator.core.streams import Rng
 from generator.sensors.air import dimmed, optical_depth, rain_noise_m, with_air
 from generator.sensors.lidars import lidar_model, model_names
 from generator.sensors.returns import (
+    LABELS,
     Float32,
     Kept,
     Pulses,
+    UInt8,
     UInt16,
     beyond_reach,
     detected,
@@ -124,6 +126,7 @@ class Found:
     reflectance: Float32
     instance_id: UInt16
     category_id: UInt16
+    surface: UInt8
 
     @classmethod
     def of(cls, pulses: Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]) -> Found:
@@ -134,6 +137,7 @@ class Found:
             pulses.reflectance[rows, picks],
             pulses.instance_id[rows, picks],
             pulses.category_id[rows, picks],
+            pulses.surface[rows, picks],
         )
 
 
@@ -166,8 +170,8 @@ def _points(found: Found, sweep: Sweep, model: LidarModel) -> NDArray[np.void]:
     points["intensity"] = reported_intensity(found.reflectance, model)
     points["time_s"] = sweep.time_s[rows]
     points["ring"] = sweep.ring[rows]
-    points["instance_id"] = found.instance_id
-    points["category_id"] = found.category_id
+    for name in LABELS:
+        points[name] = getattr(found, name)
     per_pulse = np.bincount(rows, minlength=len(sweep.ring))
     first = np.cumsum(per_pulse) - per_pulse
     points["return_number"] = np.arange(len(rows)) - first[rows] + 1

@@ -19,6 +19,8 @@ from generator.sensors.scanning import LidarModel
 
 Float32 = NDArray[np.float32]
 UInt16 = NDArray[np.uint16]
+UInt8 = NDArray[np.uint8]
+LABELS = ("instance_id", "category_id", "surface")
 Kept = Literal["strongest", "last", "dual"]
 
 STEEPNESS = 6.0
@@ -36,7 +38,7 @@ class Pulses:
         range_m: inf where there is nothing.
         light: Received, in units of what answers half of the time; 0.
         reflectance: As a compensated device sees it, incidence and air included; 0.
-        instance_id, category_id: 0 for air.
+        instance_id, category_id, surface: As of Echoes; air has no ids.
     """
 
     range_m: Float32
@@ -44,6 +46,7 @@ class Pulses:
     reflectance: Float32
     instance_id: UInt16
     category_id: UInt16
+    surface: UInt8
 
 
 def pulses_of(echoes: Echoes, model: LidarModel) -> Pulses:
@@ -57,6 +60,7 @@ def pulses_of(echoes: Echoes, model: LidarModel) -> Pulses:
         reflectance,
         echoes.instance_id,
         echoes.category_id,
+        echoes.surface,
     )
 
 
@@ -137,7 +141,7 @@ def _merged(echoes: Echoes, model: LidarModel) -> Pulses:
     order = np.argsort(echoes.range_m, axis=1, kind="stable")
     sorted_ = {
         name: np.take_along_axis(getattr(echoes, name), order, axis=1)
-        for name in ("range_m", "reflectance", "instance_id", "category_id")
+        for name in ("range_m", "reflectance", *LABELS)
     }
     range_m = sorted_["range_m"]
     share = np.float32(1.0 / range_m.shape[1])
@@ -150,8 +154,7 @@ def _merged(echoes: Echoes, model: LidarModel) -> Pulses:
         np.full_like(range_m, np.inf),
         np.zeros_like(light),
         np.zeros_like(light),
-        np.zeros_like(sorted_["instance_id"]),
-        np.zeros_like(sorted_["category_id"]),
+        *(np.zeros_like(sorted_[name]) for name in LABELS),
     )
     for k in range(range_m.shape[1]):
         inside = np.where((peak == k) & finite, light, np.float32(-1.0))
@@ -161,7 +164,7 @@ def _merged(echoes: Echoes, model: LidarModel) -> Pulses:
         kept = np.where(inside >= 0.0, sorted_["reflectance"], 0.0)
         merged.reflectance[:, k] = kept.sum(axis=1) * share
         merged.range_m[there, k] = range_m[every, best][there]
-        for name in ("instance_id", "category_id"):
+        for name in LABELS:
             getattr(merged, name)[there, k] = sorted_[name][every, best][there]
     return merged
 

@@ -39,7 +39,7 @@ def random_scene(seed: int) -> tuple[Scene, Lidar]:
         )
     things = tuple(Instance(k + 1, f"b{k}", "thing", 1, "box") for k in range(40))
     q = np.array([1.0, *rng.normal(scale=0.05, size=3)])
-    eye = tuple(float(v) for v in np.asarray(away) + (0.3, -0.4, 8.0))
+    eye = tuple(float(v) for v in np.add(away, (0.3, -0.4, 8.0)))
     pose = SE3(eye, tuple(map(float, q / np.linalg.norm(q))))
     return Scene("random", tuple(bodies), things), Lidar("top", "color", T_world_lidar=pose)
 

@@ -91,9 +91,12 @@ def scan_beams(
     ranges_m: wp.array(dtype=float),
     reflectances: wp.array(dtype=float),
     cosines: wp.array(dtype=float),
-    bodies: wp.array(dtype=int),
+    hits: wp.array(dtype=wp.vec2i),
 ):
-    """First hit of every ray; ray k of beam i is at ``i * subrays + k``."""
+    """First hit of every ray; ray k of beam i is at ``i * subrays + k``.
+
+    Hits are (body, material), (-1, -1) where there is nothing.
+    """
     i = wp.tid()
     ray = ray_of_beam(axes[i / scan.subrays], i % scan.subrays, scan.spread)
     nearest = float(scan.reach_m)
@@ -112,8 +115,8 @@ def scan_beams(
             hit = wp.vec2i(b, answer.face)
             u = answer.u
             v = answer.v
-    bodies[i] = hit[0]
     if hit[0] < 0:
+        hits[i] = hit
         ranges_m[i] = wp.inf
         reflectances[i] = 0.0
         cosines[i] = 0.0
@@ -125,6 +128,8 @@ def scan_beams(
     n += normal_at(world, g, corner[2]) * (1.0 - u - v)
     n_lidar = wp.transpose(scan.R_world_lidar) @ (world.bodies[hit[0]].R_world_mesh @ unit(n))
     cosine = wp.min(wp.abs(wp.dot(n_lidar, ray)), 1.0)
+    material = surface_index(world, hit)
+    hits[i] = wp.vec2i(hit[0], material)
     ranges_m[i] = nearest
     cosines[i] = cosine
-    reflectances[i] = returned(lights[surface_index(world, hit)], cosine)
+    reflectances[i] = returned(lights[material], cosine)
