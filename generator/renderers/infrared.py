@@ -9,6 +9,8 @@ objects come first, and colour decides among what is left.
 * **Skin** about 0.55 (Cooksey and Allen, "Reflectance measurements of human skin", NIST 2013);
   dyed **textiles** are bright, dark ones too: dyes are made for the eye.
 * **Car paint, rubber** follow their colour: carbon black is black in the infrared as well.
+* **Ground, walls and plants** are rough: Oren and Nayar's model with slopes of 0.5 rad. Distant road
+  stays visible to scanners because of it.
 * **Signs and plates**: coefficients of retro-reflection of ASTM D4956, 250 cd/lx/m^2 for type III
   and 70 for type I. A white matte surface has 1 / pi, so they are 785 and 220 times as bright.
 * **Markings** send back some hundred mcd/lx/m^2 at 30 m geometry (EN 1436); a scanner looks more
@@ -54,6 +56,12 @@ RETRO = {
 }
 """Retro-reflectance of roles, in units of a white matte surface; tail lights hold a reflector."""
 
+ROUGH = frozenset(
+    {"asphalt", "pavement", "kerb", "grass", "marking", "leaf", "bark", "facade", "roof", *TEXTILES}
+)
+SLOPE_RAD = 0.5
+"""Spread of the facets of rough surfaces."""
+
 ALPHA_MIN = 0.03
 """Narrower lobes than this are wider than the material says: no glass is flat to a milliradian."""
 
@@ -61,7 +69,7 @@ ALPHA_MIN = 0.03
 def infrared_surfaces(materials: Sequence[Material], stock: AssetStock) -> NDArray[np.void]:
     """Infrared records of materials, in their order; at least one."""
     values: NDArray[Any] = np.zeros(max(len(materials), 1), dtype=Infrared.numpy_dtype())
-    known: dict[Material, tuple[float, float, float, float]] = {}
+    known: dict[Material, tuple[float, ...]] = {}
     for k, material in enumerate(materials):
         if material not in known:
             color = np.asarray(material.base_color, dtype=np.float64)
@@ -72,8 +80,8 @@ def infrared_surfaces(materials: Sequence[Material], stock: AssetStock) -> NDArr
     return values
 
 
-def infrared_of(material: Material, color: Array) -> tuple[float, float, float, float]:
-    """Diffuse and specular reflectance, lobe width and retro-reflectance of one material.
+def infrared_of(material: Material, color: Array) -> tuple[float, ...]:
+    """The fields of one material's Infrared record.
 
     Args:
         material: What it is made of.
@@ -83,14 +91,20 @@ def infrared_of(material: Material, color: Array) -> tuple[float, float, float, 
     diffuse = DIFFUSE.get(material.role, red)
     if material.role in TEXTILES:
         diffuse = 0.45 + 0.4 * red
+    diffuse *= 1.0 - material.metallic
+    even, rim = oren_nayar(SLOPE_RAD if material.role in ROUGH else 0.0)
     specular = material.metallic * red + (1.0 - material.metallic) * 0.08 * material.specular
     alpha = max(material.roughness * material.roughness, ALPHA_MIN)
-    return (
-        diffuse * (1.0 - material.metallic),
-        specular,
-        alpha,
-        RETRO.get(material.role, 0.0),
-    )
+    return (diffuse * even, diffuse * rim, specular, alpha, RETRO.get(material.role, 0.0))
+
+
+def oren_nayar(slope_rad: float) -> tuple[float, float]:
+    """Factors of cosine and of squared sine of incidence, light and eye on one side.
+
+    Oren and Nayar 1994: ``cos(t) (A + B sin(t) tan(t)) = A cos(t) + B sin(t)^2``; Lambert is (1, 0).
+    """
+    s2 = slope_rad * slope_rad
+    return 1.0 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09)
 
 
 def mean_albedo(stock: AssetStock, texture_id: str) -> Array:

@@ -22,13 +22,14 @@ class Infrared:
     """What a surface does to a laser's light that comes back the way it went.
 
     Attributes:
-        diffuse: Of a matte surface, in [0, 1].
+        even, rim: Diffuse reflectance is ``even * cosine + rim * sine^2`` of incidence.
         specular: Fresnel reflectance at normal incidence.
         alpha: Width of the specular lobe (GGX).
         retro: Reflectance of a retro-reflector, in units of a white matte surface seen square on.
     """
 
-    diffuse: float
+    even: float
+    rim: float
     specular: float
     alpha: float
     retro: float
@@ -68,7 +69,9 @@ def ray_of_beam(axis: wp.vec3, k: int, spread: float):
 def returned(light: Infrared, cosine: float):
     """Reflectance for light that returns along its way, incidence included.
 
-    Lambert's term is ``diffuse * cosine``. The lobe is GGX with its half vector along the ray, in
+    The diffuse term is Lambert's, ``even * cosine``, or that of a rough surface, whose facets face
+    the scanner however it looks (Oren and Nayar, "Generalization of Lambert's reflectance model",
+    1994, with light and eye on one side). The lobe is GGX with its half vector along the ray, in
     units of a white matte surface: ``pi * D * F * G / (4 cosine^2) * cosine`` with Smith's G, both
     ways alike (Walter et al., "Microfacet models for refraction", 2007).
     A retro-reflector keeps its entrance angles to about 60 degrees (ASTM D4956).
@@ -79,7 +82,8 @@ def returned(light: Infrared, cosine: float):
     base = c2 * (a2 - 1.0) + 1.0
     g1 = 2.0 * c / (c + wp.sqrt(a2 + (1.0 - a2) * c2))
     lobe = a2 / (base * base) * light.specular * g1 * g1 / (4.0 * c)
-    return light.diffuse * c + lobe + light.retro * c * wp.clamp((c - 0.35) * 4.0, 0.0, 1.0)
+    diffuse = light.even * c + light.rim * (1.0 - c2)
+    return diffuse + lobe + light.retro * c * wp.clamp((c - 0.35) * 4.0, 0.0, 1.0)
 
 
 @wp.kernel
