@@ -76,7 +76,8 @@ LIDAR_HEIGHT_M = 0.30
 """Of the virtual scanner above camera 0, axes parallel to the camera's."""
 R_CAMERA_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """Scanner axes (X forward, Y left, Z up) in the camera frame (X right, Y down, Z forward)."""
-T_CAMERA_LIDAR_M = np.array([0.0, -LIDAR_HEIGHT_M, 0.0])
+T_CAMERA_THINNED = np.column_stack([R_CAMERA_LIDAR, [0.0, -LIDAR_HEIGHT_M, 0.0]])
+"""Pose of that scanner in the camera frame, [3, 4]."""
 
 NEAR_M = 0.05
 """Boxes that come nearer than this depth are not projected."""
@@ -203,7 +204,7 @@ class Kitti(Strict):
         lidar = self._lidar(info)
         if lidar:
             return T_camera_lidar(sample, self._camera(info), lidar)[:3]
-        return np.column_stack([R_CAMERA_LIDAR, T_CAMERA_LIDAR_M])
+        return T_CAMERA_THINNED
 
     def _points(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> Array:
         # The file's decimal grid, whether the array is still here or not: equal bytes both ways.
@@ -397,7 +398,7 @@ def occlusion_level(occlusion: float) -> int:
     return int(occlusion > PARTLY_OCCLUDED) + int(occlusion > LARGELY_OCCLUDED)
 
 
-def calib_text(camera: Intrinsics, T_camera_velo: Array) -> str:
+def calib_text(camera: Intrinsics, T_camera_velo: Array = T_CAMERA_THINNED) -> str:
     """The seven lines of a calibration file, in the order in which readers count them."""
     return matrix_lines(calib_matrices(camera, T_camera_velo))
 

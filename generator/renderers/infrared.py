@@ -9,7 +9,7 @@ objects come first, and colour decides among what is left.
 * **Skin** about 0.55 (Cooksey and Allen, "Reflectance measurements of human skin", NIST 2013);
   dyed **textiles** are bright, dark ones too: dyes are made for the eye.
 * **Car paint, rubber** follow their colour: carbon black is black in the infrared as well.
-* **Ground, walls and plants** are rough: Oren and Nayar's model with slopes of 0.5 rad. Distant road
+* **Ground, walls and plants** are rough: Oren and Nayar 1994 with slopes of 0.5 rad. Distant road
   stays visible to scanners because of it.
 * **Signs and plates**: coefficients of retro-reflection of ASTM D4956, 250 cd/lx/m^2 for type III
   and 70 for type I. A white matte surface has 1 / pi, so they are 785 and 220 times as bright.
@@ -101,7 +101,7 @@ def infrared_of(material: Material, color: Array) -> tuple[float, ...]:
 def oren_nayar(slope_rad: float) -> tuple[float, float]:
     """Factors of cosine and of squared sine of incidence, light and eye on one side.
 
-    Oren and Nayar 1994: ``cos(t) (A + B sin(t) tan(t)) = A cos(t) + B sin(t)^2``; Lambert is (1, 0).
+    Oren and Nayar 1994: ``cos(t) (A + B sin(t) tan(t)) = A cos(t) + B sin(t)^2``; Lambert: (1, 0).
     """
     s2 = slope_rad * slope_rad
     return 1.0 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09)

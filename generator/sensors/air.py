@@ -9,15 +9,16 @@
   extinction ``0.01 R^0.6`` per metre, and noise of ``0.02 range (1 - exp(-R))^2`` for R in mm/h.
 * **Snow**: extinction by ITU-R P.1814: ``a S^1.38`` dB/km, ``a = 5.42e-5 wavelength_nm + 5.496``
   (dry snow).
-* **Drops and flakes** in the beam: numbers from the extinction of ``2 * cross-section`` each, met
-  by Poisson along the beam, as in Hahner et al., "LiDAR Snowfall Simulation", CVPR 2022, with one
-  mean size: 1.5 mm drops and 4 mm flakes.
+* **Drops and flakes** that are large enough to be noticed where they are, met by Poisson along the
+  beam, as in Hahner et al., "LiDAR Snowfall Simulation", CVPR 2022. Sizes of drops: Marshall and
+  Palmer 1948; of flakes: Gunn and Marshall 1958, whose melted diameters grow by the cube root of
+  ten, the ratio of the densities of water and snow.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -31,12 +32,35 @@ from generator.sensors.scanning import LidarModel
 
 PULSE_LENGTH_M = 20e-9 * 299_792_458.0
 OVERLAP_M = (0.9, 1.0)
-DROP = (1.5e-3, 0.02)
-FLAKE = (4.0e-3, 0.9)
-"""Diameter [m] and reflectance. Water sends nearly all light on; its surface returns 2 %."""
+SOFT_GAIN = 2.0e6 / 299_792_458.0
+"""Hahner et al. set a hard target to 1e-6 / pi beside an integral over time: their receivers, which
+see little of what is near, find fog this much weaker than the lidar equation alone."""
+DROP_REFLECTANCE = 0.005
+"""Of a clear sphere, which sends the 2 % of its surface all around: a quarter of it, as a disc."""
+FLAKE_REFLECTANCE, FLAKE_GROWTH = 0.9, 10.0 ** (1.0 / 3.0)
 APERTURE_M = 0.01
 """Width of a beam where it leaves the scanner."""
 RANGE_STEPS = 512
+
+
+@dataclass(frozen=True, slots=True)
+class Particles:
+    """What falls: ``per_m4 * exp(-slope_per_m * diameter)`` per m^3 and metre of diameter."""
+
+    per_m4: float
+    slope_per_m: float
+    reflectance: float
+
+
+def drops(rain_mm_h: float) -> Particles:
+    """Marshall and Palmer 1948."""
+    return Particles(8.0e6, 4100.0 * rain_mm_h**-0.21, DROP_REFLECTANCE)
+
+
+def flakes(snow_mm_h: float) -> Particles:
+    """Gunn and Marshall 1958."""
+    slope_per_m = 2550.0 * snow_mm_h**-0.48 / FLAKE_GROWTH
+    return Particles(3.8e6 * snow_mm_h**-0.87 / FLAKE_GROWTH, slope_per_m, FLAKE_REFLECTANCE)
 
 
 def rain_extinction_per_m(rain_mm_h: float) -> float:
@@ -93,12 +117,10 @@ def with_air(
     if weather.fog_height_m > 0.0:
         fog *= math.exp(-height_m / weather.fog_height_m)
     air = [_fog(count, fog, model, rng)] if fog > 0.0 else []
-    rain = rain_extinction_per_m(weather.rain_mm_h)
-    if rain > 0.0:
-        air.append(_particles(count, rain, DROP, model, rng))
-    snow = snow_extinction_per_m(weather.snow_mm_h, model.wavelength_nm)
-    if snow > 0.0:
-        air.append(_particles(count, snow, FLAKE, model, rng))
+    if weather.rain_mm_h > 0.0:
+        air.append(_falling(count, drops(weather.rain_mm_h), model, rng))
+    if weather.snow_mm_h > 0.0:
+        air.append(_falling(count, flakes(weather.snow_mm_h), model, rng))
     for more in air:
         light = np.where(more.range_m < nearest_m, more.light, np.float32(0.0))
         pulses = joined(pulses, replace(more, light=light))
@@ -114,7 +136,7 @@ def rain_noise_m(rain_mm_h: float, range_m: Float32) -> Float32:
 def fog_peak(extinction_per_m: float) -> tuple[float, float]:
     """Where fog itself answers most [m], and the matte reflectance / range^2 that answers as much.
 
-    ``pi * beta * max over R of integral sin^2(pi (R - r) / L) exp(-2 a r) xi(r) / r^2 dr``.
+    ``gain * pi * beta * max over R of integral sin^2(pi (R - r) / L) exp(-2 a r) xi(r) / r^2 dr``.
     """
     beta = 0.046 * extinction_per_m / math.log(20.0)
     step_m = 0.02
@@ -126,7 +148,7 @@ def fog_peak(extinction_per_m: float) -> tuple[float, float]:
     shape = np.sin(np.pi * back / PULSE_LENGTH_M) ** 2
     answer = np.convolve(density, shape)[: len(r)]
     k = int(answer.argmax())
-    return float(r[k]), float(math.pi * beta * answer[k])
+    return float(r[k]), float(SOFT_GAIN * math.pi * beta * answer[k])
 
 
 def _fog(count: int, extinction: float, model: LidarModel, rng: Rng) -> Pulses:
@@ -138,23 +160,28 @@ def _fog(count: int, extinction: float, model: LidarModel, rng: Rng) -> Pulses:
     return _in_air(range_m, light, np.float32(strength) * range_m * range_m)
 
 
-def _particles(
-    count: int, extinction: float, kind: tuple[float, float], model: LidarModel, rng: Rng
-) -> Pulses:
-    """The first drop or flake in each beam that is drawn by Poisson; inf where there is none."""
-    diameter_m, reflectance = kind
-    area_m2 = 0.25 * math.pi * diameter_m**2
-    per_m3 = extinction / (2.0 * area_m2)
+def _falling(count: int, kind: Particles, model: LidarModel, rng: Rng) -> Pulses:
+    """The first drop or flake in each beam that can be noticed; inf where there is none."""
     r = np.linspace(0.0, model.range_m[1], RANGE_STEPS)
-    beam_m2 = 0.25 * math.pi * (APERTURE_M + 1e-3 * model.divergence_mrad * r) ** 2
-    met = np.concatenate([[0.0], np.cumsum(0.5 * (beam_m2[1:] + beam_m2[:-1]) * np.diff(r))])
-    draw = rng.exponential(1.0, (count, 1))
-    range_m = np.interp(draw, per_m3 * met, r, right=np.inf).astype(np.float32)
-    finite = np.where(np.isfinite(range_m), range_m, np.float32(1e6))
-    across = np.float32(APERTURE_M) + np.float32(1e-3 * model.divergence_mrad) * finite
-    share = np.minimum((np.float32(diameter_m) / across) ** 2, np.float32(1.0))
-    seen = share * np.float32(reflectance)
-    return _in_air(range_m, light_of(seen, finite, model), seen)
+    across_m = APERTURE_M + 1e-3 * model.divergence_mrad * r
+    least_m = across_m * r * _per_range(model, kind)
+    per_m3 = kind.per_m4 / kind.slope_per_m * np.exp(-kind.slope_per_m * least_m)
+    rate = per_m3 * 0.25 * math.pi * across_m**2
+    met = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(r))])
+    draw = rng.exponential(1.0, (count, 2))
+    range_m = np.where(draw[:, :1] < met[-1], np.interp(draw[:, :1], met, r), np.inf)
+    finite = np.where(np.isfinite(range_m), range_m, model.range_m[1])
+    across_m = APERTURE_M + 1e-3 * model.divergence_mrad * finite
+    diameter_m = across_m * finite * _per_range(model, kind) + draw[:, 1:] / kind.slope_per_m
+    share = np.minimum(diameter_m / across_m, 1.0) ** 2
+    seen = (share * kind.reflectance).astype(np.float32)
+    light = light_of(seen, finite.astype(np.float32), model)
+    return _in_air(range_m.astype(np.float32), light, seen)
+
+
+def _per_range(model: LidarModel, kind: Particles) -> float:
+    """Least share of a beam's width, per metre of range, that must be covered to be noticed."""
+    return math.sqrt(model.seen.reflectance / kind.reflectance) / model.seen.range_m
 
 
 def _in_air(range_m: Float32, light: Float32, reflectance: Float32) -> Pulses:
