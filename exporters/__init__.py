@@ -8,4 +8,12 @@ from __future__ import annotations
 
 from generator.core.plugins import PluginTable
 
-TABLE = PluginTable("exporter", {"coco": "exporters.coco:Coco", "kitti": "exporters.kitti:Kitti"})
+TABLE = PluginTable(
+    "exporter",
+    {
+        "coco": "exporters.coco:Coco",
+        "kitti": "exporters.kitti:Kitti",
+        "pointclouds": "exporters.pointclouds:PointClouds",
+        "semantickitti": "exporters.semantickitti:SemanticKitti",
+    },
+)

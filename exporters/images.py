@@ -28,6 +28,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.clouds import write_cloud
 from exporters.png import RowFilter, encode_png
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError, SampleError, StorageError
@@ -55,6 +56,8 @@ ENCODING = {
 def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     """Write every image channel of a sample that the data set keeps to its ``media_path``.
 
+    Laser scans go to their ``cloud_path``.
+
     Raises:
         ConfigError: if a channel is no image.
         SampleError: if a depth is negative or NaN.
@@ -65,6 +68,8 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
             path = media_path(shard_dir, sensor, channel, sample.index)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(png(channel, reading.channels[channel], info.depth_scale_m))
+    for lidar in info.lidars:
+        write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
 
 
 def png(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:

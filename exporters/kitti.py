@@ -1,10 +1,11 @@
-"""KITTI object detection: images, calibration, labels and a pseudo-LiDAR, one frame per sample.
+"""KITTI object detection: images, calibration, labels and laser scans, one frame per sample.
 
 ::
 
     training/image_2/000012.png     RGB                    training/label_2/000012.txt
     training/depth_2/000012.png     16-bit z-depth         training/calib/000012.txt
-    training/velodyne/000012.bin    float32 x y z 0
+    training/velodyne/000012.bin    float32 x y z reflectance
+    training/velodyne_labels/000012.label   uint32 category | row in label_2 << 16, from 1
     ImageSets/{train,val,test}.txt  frame names            README.txt
 
 Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitti, object devkit):
@@ -19,6 +20,8 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   box of the visible pixels, which COCO has.
 * **Things far off** are not labelled: KITTI's annotators saw what the laser scanner saw. They
   become ``DontCare`` regions.
+* **Points** are those of the data set's laser scanner, with labels per point; without one they are
+  thinned pixels of the depth image, with reflectance 0 and no labels.
 * **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
   which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
 
@@ -37,6 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx, OrientedBox
@@ -72,7 +76,8 @@ LIDAR_HEIGHT_M = 0.30
 """Of the virtual scanner above camera 0, axes parallel to the camera's."""
 R_CAMERA_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """Scanner axes (X forward, Y left, Z up) in the camera frame (X right, Y down, Z forward)."""
-T_CAMERA_LIDAR_M = np.array([0.0, -LIDAR_HEIGHT_M, 0.0])
+T_CAMERA_THINNED = np.column_stack([R_CAMERA_LIDAR, [0.0, -LIDAR_HEIGHT_M, 0.0]])
+"""Pose of that scanner in the camera frame, [3, 4]."""
 
 NEAR_M = 0.05
 """Boxes that come nearer than this depth are not projected."""
@@ -100,7 +105,10 @@ class Kitti(Strict):
     low_px: int = Field(10, ge=2)
     """What has fewer visible pixel rows than this becomes DontCare."""
     velodyne_stride_px: int = Field(8, ge=0)
-    """Every how many pixels a depth pixel becomes a LiDAR point; 0 = no velodyne folder."""
+    """Every how many pixels a depth pixel becomes a LiDAR point, where the data set has no laser
+    scanner; 0 = no velodyne folder."""
+    lidar: str = ""
+    """Laser scanner whose points these are; empty = the first one by name, if there is one."""
 
     @property
     def needs(self) -> frozenset[str]:
@@ -115,7 +123,13 @@ class Kitti(Strict):
                 samples for six digits.
         """
         media = info.media[self._camera(info)]
-        if self.velodyne_stride_px and Channel.Z_DEPTH not in media:
+        if self.lidar and self.lidar not in info.lidars:
+            known = ", ".join(info.lidars) or "none"
+            raise ConfigError(
+                f"exporter 'kitti': there is no lidar '{self.lidar}'; expected one of: {known}"
+                f"{did_you_mean(self.lidar, info.lidars)}"
+            )
+        if not info.lidars and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
             raise ConfigError(
                 f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
                 "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
@@ -140,12 +154,18 @@ class Kitti(Strict):
             truth = sample.truth[camera]
             frame = _frame(sample.index)
             _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self))
-            _write_text(folder / f"calib/{frame}.txt", calib_text(truth.camera.intrinsics))
-            if self.velodyne_stride_px:
-                points = self._points(info, sample, shard_dir)
-                path = folder / f"velodyne/{frame}.bin"
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(points.astype("<f4").tobytes())
+            T_camera_velo = self._velodyne_pose(info, sample)
+            calib = calib_text(truth.camera.intrinsics, T_camera_velo)
+            _write_text(folder / f"calib/{frame}.txt", calib)
+            lidar = self._lidar(info)
+            if lidar:
+                points = read_points(shard_dir, lidar, sample.index)
+                _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
+                labels = point_labels(points, truth, self)
+                _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
+            elif self.velodyne_stride_px:
+                thinned = self._points(info, sample, shard_dir)
+                _write_bytes(folder / f"velodyne/{frame}.bin", thinned.astype("<f4").tobytes())
             frames.append(f"{sample.index} {sample.split}\n")
         _write_text(folder / "frames.txt", "".join(frames))
 
@@ -176,6 +196,16 @@ class Kitti(Strict):
             f"expected one of: {known}{did_you_mean(self.camera, with_rgb)}"
         )
 
+    def _lidar(self, info: DatasetInfo) -> str:
+        return self.lidar or next(iter(info.lidars), "")
+
+    def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> Array:
+        """Points of the velodyne folder to the camera frame, [3, 4]."""
+        lidar = self._lidar(info)
+        if lidar:
+            return T_camera_lidar(sample, self._camera(info), lidar)[:3]
+        return T_CAMERA_THINNED
+
     def _points(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> Array:
         # The file's decimal grid, whether the array is still here or not: equal bytes both ways.
         camera = self._camera(info)
@@ -197,8 +227,10 @@ class Kitti(Strict):
         """Files of one frame, each with its place under ``training``."""
         frame = _frame(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
-        if self.velodyne_stride_px:
+        if self._lidar(info) or self.velodyne_stride_px:
             names.append(f"velodyne/{frame}.bin")
+        if self._lidar(info):
+            names.append(f"velodyne_labels/{frame}.label")
         links = [(shard_dir / self.type / name, name) for name in names]
         rgb = media_path(shard_dir, camera, Channel.RGB, index)
         links.append((rgb, f"image_2/{frame}.png"))
@@ -212,14 +244,18 @@ class Kitti(Strict):
             name=info.name,
             camera=camera,
             scale=info.depth_scale_m,
-            height=LIDAR_HEIGHT_M,
-            stride=self.velodyne_stride_px,
+            points=self._readme_points(info),
             boxes=_BOXES[self.boxes],
             far=self.far_m,
             low=self.low_px,
             partly=PARTLY_OCCLUDED,
             largely=LARGELY_OCCLUDED,
         )
+
+    def _readme_points(self, info: DatasetInfo) -> str:
+        if self._lidar(info):
+            return _SCANNED.format(lidar=self._lidar(info))
+        return _THINNED.format(height=LIDAR_HEIGHT_M, stride=self.velodyne_stride_px)
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,9 +317,31 @@ def upright_box(box: OrientedBox) -> UprightBox:
 
 def label_text(truth: ImageTruth, style: Kitti) -> str:
     """The lines of one label file; DontCare rows last, as readers expect."""
-    rows = [label_row(thing, truth, style) for thing in truth.objects if thing.box is not None]
-    rows.sort(key=lambda row: row.startswith("DontCare"))
-    return "".join(f"{row}\n" for row in rows)
+    return "".join(f"{row}\n" for row, _ in label_rows(truth, style))
+
+
+def label_rows(truth: ImageTruth, style: Kitti) -> list[tuple[str, int]]:
+    """Each row of a label file with its instance id."""
+    rows = [
+        (label_row(thing, truth, style), thing.instance.instance_id)
+        for thing in truth.objects
+        if thing.box is not None
+    ]
+    rows.sort(key=lambda row: row[0].startswith("DontCare"))
+    return rows
+
+
+def point_labels(points: NDArray[np.void], truth: ImageTruth, style: Kitti) -> NDArray[np.uint32]:
+    """Per point the category id, and in the upper half the row in label_2 from 1; 0 = no row."""
+    ids = points["instance_id"]
+    rows = np.zeros(1 + int(ids.max(initial=0)), np.uint32)
+    for number, (_, instance_id) in enumerate(label_rows(truth, style), 1):
+        if instance_id < len(rows):
+            rows[instance_id] = number
+    labels: NDArray[np.uint32] = (points["category_id"] | (rows[ids] << np.uint32(16))).astype(
+        "<u4"
+    )
+    return labels
 
 
 def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
@@ -340,15 +398,25 @@ def occlusion_level(occlusion: float) -> int:
     return int(occlusion > PARTLY_OCCLUDED) + int(occlusion > LARGELY_OCCLUDED)
 
 
-def calib_text(camera: Intrinsics) -> str:
+def calib_text(camera: Intrinsics, T_camera_velo: Array = T_CAMERA_THINNED) -> str:
     """The seven lines of a calibration file, in the order in which readers count them."""
+    return matrix_lines(calib_matrices(camera, T_camera_velo))
+
+
+def calib_matrices(camera: Intrinsics, T_camera_velo: Array) -> dict[str, Array]:
+    """The matrices of a calibration file by name; pixel centres at whole numbers."""
     projection = np.zeros((3, 4))
     projection[:, :3] = camera.matrix()
     projection[:2, 2] -= 0.5
-    rows = {f"P{k}": projection for k in range(4)}
+    rows: dict[str, Array] = {f"P{k}": projection for k in range(4)}
     rows["R0_rect"] = np.eye(3)
-    rows["Tr_velo_to_cam"] = np.column_stack([R_CAMERA_LIDAR, T_CAMERA_LIDAR_M])
+    rows["Tr_velo_to_cam"] = T_camera_velo
     rows["Tr_imu_to_velo"] = np.eye(3, 4)
+    return rows
+
+
+def matrix_lines(rows: dict[str, Array]) -> str:
+    """``name: numbers``, row by row of each matrix, a line each."""
     return "".join(
         f"{name}: " + " ".join(f"{value:.12e}" for value in matrix.ravel()) + "\n"
         for name, matrix in rows.items()
@@ -405,6 +473,11 @@ def _frame(index: int) -> str:
     return f"{index:06d}"
 
 
+def _write_bytes(path: Path, data: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
+
+
 def _write_text(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")
@@ -414,6 +487,13 @@ _BOXES = {
     "projected": "around the projection of the 3D box, clipped to the image",
     "tight": "around the visible pixels",
 }
+_SCANNED = """\
+velodyne    Points of the laser scanner '{lidar}'; float32 x y z reflectance [0, 1].
+velodyne_labels  One uint32 per point: lower half category id, upper half row in label_2, from 1;
+            0 = no row."""
+_THINNED = """\
+velodyne    Points of the depth image, one per {stride} x {stride} pixels (0: not written), as seen
+            from {height:.2f} m above the camera; float32 x y z reflectance; reflectance is 0."""
 _README = """\
 {name}: KITTI object detection format, sensor '{camera}'
 
@@ -423,8 +503,7 @@ depth_2     z-depth, 16-bit: metres = value * {scale}; 0 = nothing or out of ran
             the data set keeps depth images.
 calib       P0 = P1 = P2 = P3, pixel centres at whole numbers; R0_rect = identity, so the rectified
             frame is the camera's: X right, Y down, Z forward. The virtual IMU is at the scanner.
-velodyne    Points of the depth image, one per {stride} x {stride} pixels (0: not written), as seen
-            from {height:.2f} m above the camera; float32 x y z reflectance; reflectance is 0.
+{points}
 label_2     type truncated occluded alpha left top right bottom h w l x y z rotation_y
             Things without a type of KITTI's (buses, motorcycles) are Misc; sitting people, by
             their attribute pose, are Person_sitting; scenery that is not annotated has no row.

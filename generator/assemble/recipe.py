@@ -74,8 +74,9 @@ def recipe_of(
         n=n,
         views_per_scene=spec.head.views_per_scene,
         categories=categories_of(nominal_scenes(spec, library), library),
-        sensors=tuple(sorted(sensor.name for sensor in spec.sensors)),
-        media={sensor.name: tuple(sensor.media) for sensor in spec.sensors},
+        sensors=tuple(sorted(s.name for s in spec.sensors if s.modality == "camera")),
+        lidars=tuple(sorted(s.name for s in spec.sensors if s.modality == "lidar")),
+        media={s.name: tuple(s.media) for s in spec.sensors if s.modality == "camera"},
         depth_scale_m=spec.head.depth_scale_m,
     )
     exporters = _exporters(spec, info)

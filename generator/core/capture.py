@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.scene import Camera
+from generator.core.scene import Camera, Lidar
 
 
 class Channel(str, Enum):
@@ -72,8 +72,89 @@ class Reading:
     silhouettes: Mapping[int, Silhouette] = field(default_factory=dict)
 
 
+POINT = np.dtype(
+    [
+        ("position_m", "<f4", (3,)),
+        ("intensity", "<f4"),
+        ("time_s", "<f4"),
+        ("ring", "<u2"),
+        ("instance_id", "<u2"),
+        ("category_id", "<u2"),
+        ("surface", "u1"),
+        ("return_number", "u1"),
+        ("return_count", "u1"),
+    ]
+)
+"""One point of a laser scan.
+
+========================  ====================================================================
+position_m                lidar frame: X forward, Y left, Z up [m]
+intensity                 [0, 1], what the device reports after its own range compensation
+time_s                    when the pulse left, from the start of the sweep
+ring                      row of the model's table, from 0, the highest first
+instance_id, category_id  what reflected it; 0 where that is the air or has no label
+surface                   what kind of surface, a number of ``generator.core.geometry.SURFACES``
+return_number             1 the first of its pulse, 2 the second
+return_count              how many returns its pulse has
+========================  ====================================================================
+"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PointCloud:
+    """What one sweep of a laser scanner returned, in the order of firing.
+
+    Attributes:
+        points: Records of ``POINT`` [n].
+    """
+
+    sensor: str
+    lidar: Lidar
+    points: NDArray[np.void]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Beams:
+    """The light that a laser scanner sends out.
+
+    Attributes:
+        directions: Unit vectors in the lidar frame, float32 [n, 3].
+        divergence_rad: Full angle of a beam.
+        subrays: Rays that stand for one beam: 1, or 7, the axis and six around it.
+        range_max_m: Beyond it nothing is looked for.
+    """
+
+    directions: NDArray[np.float32]
+    divergence_rad: float
+    subrays: int
+    range_max_m: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Echoes:
+    """What the rays of beams hit first; arrays are [n, subrays].
+
+    Attributes:
+        range_m: float32; inf where there is nothing.
+        reflectance: Of a white-to-black matte surface, seen square on, that would send as much
+            light back: incidence is in it already. Glossy and retro-reflecting surfaces exceed 1.
+            float32; 0 where there is nothing.
+        incidence_cos: Cosine of the angle to the surface's normal, float32; 0.
+        instance_id, category_id: uint16; 0.
+        surface: Number in ``generator.core.geometry.SURFACES``, uint8; 0.
+    """
+
+    range_m: NDArray[np.float32]
+    reflectance: NDArray[np.float32]
+    incidence_cos: NDArray[np.float32]
+    instance_id: NDArray[np.uint16]
+    category_id: NDArray[np.uint16]
+    surface: NDArray[np.uint8]
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Capture:
-    """All readings of one instant, by sensor name."""
+    """What all sensors saw at one instant, by sensor name: cameras read, lidars return clouds."""
 
     readings: Mapping[str, Reading]
+    clouds: Mapping[str, PointCloud] = field(default_factory=dict)

@@ -46,6 +46,13 @@ class Material:
     role: str = ""
 
 
+SURFACES = (
+    "", "air", "asphalt", "marking", "pavement", "kerb", "grass", "leaf", "bark", "sign", "plate",
+    "glass", "window", "facade", "roof", "paint", "tyre", "skin", "lamp",
+)  # fmt: skip
+"""What a laser may have hit, by number: fog and rain, or the role of a material; 0 = any other."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class MeshData:
     """A triangle mesh in its body's frame: metres, Z up, counter-clockwise outward.

@@ -12,7 +12,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from generator.core.capture import Channel, Reading
+from generator.core.capture import Beams, Channel, Echoes, PointCloud, Reading
 from generator.core.errors import Rejection
 from generator.core.geometry import (
     Asset,
@@ -25,7 +25,7 @@ from generator.core.geometry import (
     TextureData,
 )
 from generator.core.sample import ObjectTruth, Sample
-from generator.core.scene import Camera, Lane, Scene
+from generator.core.scene import Camera, Lane, Lidar, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 
@@ -141,6 +141,10 @@ class Renderer(Protocol):
         """Every asked channel of one camera; ``Reading.sensor`` is the camera's name."""
         ...
 
+    def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
+        """What the rays of a laser scanner's beams hit first, and how well it reflects."""
+        ...
+
 
 class Sensor(Protocol):
     """Image formation."""
@@ -151,12 +155,12 @@ class Sensor(Protocol):
         ...
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with the sensor's nominal camera in it."""
+        """The scene with the sensor's nominal camera, or its lidar, in it."""
         ...
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
-    ) -> Reading:
+    ) -> Reading | PointCloud:
         """What the sensor sees; ``channels`` are what annotators need beyond its own."""
         ...
 
@@ -181,7 +185,8 @@ class DatasetInfo:
 
     Attributes:
         categories: Names; category id ``k`` is ``categories[k - 1]``.
-        sensors: Sensor names, sorted.
+        sensors: Names of the cameras, sorted.
+        lidars: Names of the laser scanners, sorted.
         media: ``{sensor: channels written as images}``.
         depth_scale_m: Metres per unit of the 16-bit depth images.
     """
@@ -194,6 +199,7 @@ class DatasetInfo:
     sensors: tuple[str, ...]
     media: Mapping[str, tuple[Channel, ...]]
     depth_scale_m: float = 0.0001
+    lidars: tuple[str, ...] = ()
 
 
 class Exporter(Protocol):
@@ -220,3 +226,8 @@ class Exporter(Protocol):
 def media_path(shard_dir: Path, sensor: str, channel: Channel, index: int) -> Path:
     """Where the image of one channel of one sample lies."""
     return shard_dir / sensor / channel.value / f"{index:09d}.png"
+
+
+def cloud_path(shard_dir: Path, sensor: str, index: int) -> Path:
+    """Where the points of one sweep lie: a NumPy file with an array of ``POINT`` records."""
+    return shard_dir / sensor / "points" / f"{index:09d}.npy"

@@ -66,6 +66,7 @@ class ObjectTruth:
         truncation: Share of the silhouette that lies outside the image (visibility).
         part_px: Visible pixels per part name, for instances with parts (part_masks).
         keypoints: In the order of ``instance.keypoints``; empty if it has none (keypoints).
+        lidar_points: Points of each laser scanner on the instance, by sensor; None without one.
     """
 
     instance: Instance
@@ -82,6 +83,7 @@ class ObjectTruth:
     truncation: float | None = None
     part_px: Mapping[str, int] | None = None
     keypoints: tuple[KeypointTruth, ...] | None = None
+    lidar_points: Mapping[str, int] | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

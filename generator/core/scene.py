@@ -290,6 +290,26 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True)
+class Lidar:
+    """A laser scanner on the rig of a camera.
+
+    Attributes:
+        name: The sensor's name in the YAML.
+        camera: Name of the camera it rides with.
+        T_rig_lidar: Where it is on the rig. Both frames are X forward, Y left, Z up; the rig's
+            origin is the camera's centre, its X axis the camera's optical axis.
+        T_world_lidar: Its pose; follows the camera.
+        model: What it is, for the labels: ``HDL-64E``.
+    """
+
+    name: str
+    camera: str
+    T_rig_lidar: SE3 = IDENTITY
+    T_world_lidar: SE3 = IDENTITY
+    model: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Region:
     """What cameras look at: a box in the world around the things of interest."""
 
@@ -317,6 +337,7 @@ class Scene:
     lights: tuple[Light, ...] = ()
     environment: Environment = field(default_factory=Environment)
     cameras: tuple[Camera, ...] = ()
+    lidars: tuple[Lidar, ...] = ()
     focus: Region = field(default_factory=Region)
     interior_m: tuple[Vec3, Vec3] = ((-50.0, -50.0, 0.0), (50.0, 50.0, 50.0))
     lanes: tuple[Lane, ...] = ()
@@ -334,6 +355,10 @@ class Scene:
     def camera(self, name: str) -> Camera:
         """The camera of that name; KeyError if there is none."""
         return _named(self.cameras, name)
+
+    def lidar(self, name: str) -> Lidar:
+        """The laser scanner of that name; KeyError if there is none."""
+        return _named(self.lidars, name)
 
     def instance(self, instance_id: int) -> Instance:
         """The instance with that id; KeyError if there is none."""

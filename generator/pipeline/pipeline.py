@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from generator.core.capture import Capture, Channel, Reading
+from generator.core.capture import Capture, Channel, PointCloud, Reading
 from generator.core.errors import LayoutRejected, Rejection, SceneRejected
 from generator.core.interfaces import (
     AssetLibrary,
@@ -24,7 +24,8 @@ from generator.core.interfaces import (
 from generator.core.sample import ImageTruth, Sample
 from generator.core.scene import Scene
 from generator.core.streams import Streams
-from generator.pipeline.freeze import frozen_scene, with_rounded_cameras
+from generator.pipeline.freeze import frozen_scene, with_placed_sensors
+from generator.pipeline.scans import with_lidar_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -148,22 +149,26 @@ class Pipeline:
         with _timed(timings, "randomize"):
             scene, streams = self._view(accepted, view_index, index)
         readings: dict[str, Reading] = {}
+        clouds: dict[str, PointCloud] = {}
         truth: dict[str, ImageTruth] = {}
         for sensor in self.recipe.sensors:
             rng = streams.rng(f"sensor/{sensor.name}")
             with _timed(timings, "render"):
-                reading = sensor.capture(scene, self.renderer, self.recipe.channels, rng)
+                seen = sensor.capture(scene, self.renderer, self.recipe.channels, rng)
+            if isinstance(seen, PointCloud):
+                clouds[sensor.name] = seen
+                continue
             with _timed(timings, "annotate"):
-                truth[sensor.name] = self.recipe.image_truth(scene, reading)
-            readings[sensor.name] = reading
+                truth[sensor.name] = self.recipe.image_truth(scene, seen)
+            readings[sensor.name] = seen
         return Sample(
             index=index,
             scene_index=scene_index,
             view_index=view_index,
             split=self.split(scene_index),
             scene=scene,
-            capture=Capture(readings),
-            truth=truth,
+            capture=Capture(readings, clouds),
+            truth=with_lidar_points(truth, clouds),
             attempts=accepted.attempt + 1,
             timings_s=timings,
         )
@@ -216,7 +221,7 @@ class Pipeline:
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
                 continue
-            return with_rounded_cameras(scene), streams
+            return with_placed_sensors(scene), streams
         raise SceneRejected(accepted.index, tuple(rejections))
 
     def _randomized(

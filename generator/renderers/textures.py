@@ -25,10 +25,12 @@ class DeviceTexture:
     Attributes:
         record: Value of a Texture record.
         keep: The device arrays that the record points to.
+        texels: One of them: packed colours of all levels, the coarsest last.
     """
 
     record: object
     keep: tuple[object, ...]
+    texels: wp.array
     nbytes: int
 
 
@@ -48,7 +50,8 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     record.texels, record.bumps = on_device
     record.offsets = offsets
     record.has_bumps = int(data.normal is not None)
-    return DeviceTexture(record.numpy_value(), (*on_device, offsets), texels.nbytes + bumps.nbytes)
+    keep = (*on_device, offsets)
+    return DeviceTexture(record.numpy_value(), keep, on_device[0], texels.nbytes + bumps.nbytes)
 
 
 def halved(image: Pixels) -> Pixels:

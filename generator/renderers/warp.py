@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from generator.core.capture import Channel, Reading
+from generator.core.capture import Beams, Channel, Echoes, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
-from generator.core.scene import Camera, Scene
+from generator.core.scene import Camera, Lidar, Scene
 from generator.renderers.color import color_image
 from generator.renderers.device import open_device
 from generator.renderers.labels import label_images
+from generator.renderers.lidar import scanned
 from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
 from generator.renderers.silhouettes import silhouettes
@@ -60,3 +61,7 @@ class WarpRenderer:
             ids = images[Channel.INSTANCE]
             outlines = silhouettes(scene, world, view, self._stock, seen, ids)
         return Reading(camera.name, camera, images, outlines)
+
+    def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
+        """What the rays of a laser scanner's beams hit first, and how well it reflects."""
+        return scanned(scene, lidar, beams, self._stock)

@@ -4,4 +4,10 @@ from __future__ import annotations
 
 from generator.core.plugins import PluginTable
 
-TABLE = PluginTable("sensor", {"rgb_camera": "generator.sensors.rgb_camera:RgbCamera"})
+TABLE = PluginTable(
+    "sensor",
+    {
+        "rgb_camera": "generator.sensors.rgb_camera:RgbCamera",
+        "lidar": "generator.sensors.lidar:LidarSensor",
+    },
+)

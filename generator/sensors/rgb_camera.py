@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -38,6 +38,7 @@ class RgbCamera(Strict):
         ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
     """
 
+    modality: ClassVar[Literal["camera", "lidar"]] = "camera"
     type: Literal["rgb_camera"] = "rgb_camera"
     name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     size_px: tuple[SidePx, SidePx] = (640, 480)

@@ -19,12 +19,19 @@ from exporters.images import write_media
 from generator import annotations
 from generator.annotations.truth import Thresholds, image_truth
 from generator.core.boxes import BoxPx, tight_box
-from generator.core.capture import Capture, Channel, Reading, Silhouette
-from generator.core.geometry import Keypoint
+from generator.core.capture import (
+    POINT,
+    Capture,
+    Channel,
+    PointCloud,
+    Reading,
+    Silhouette,
+)
+from generator.core.geometry import SURFACES, Keypoint
 from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import Sample
-from generator.core.scene import Camera, Instance, Scene
+from generator.core.scene import Camera, Instance, Lidar, Scene
 from generator.core.se3 import SE3, Array, look_at
 
 CATEGORIES = ("car", "crate", "pedestrian")
@@ -183,10 +190,41 @@ def make_sample(
         name: image_truth(scene, reading, annotators, thresholds or Thresholds())
         for name, reading in readings.items()
     }
-    return Sample(index, index, 0, split, scene, Capture(readings), truth)
+    lidar = Lidar("top", cameras[0].name, T_world_lidar=SE3((0.0, 0.0, 1.73)), model="VLP-16")
+    scene = replace(scene, lidars=(lidar,))
+    clouds = {"top": PointCloud("top", lidar, scan(scene, lidar))}
+    return Sample(index, index, 0, split, scene, Capture(readings, clouds), truth)
 
 
-def make_info(n: int, sensors: Sequence[str] = ("color",), **changes: Any) -> DatasetInfo:
+def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:
+    """A coarse sweep over the things and the ground."""
+    elevation, azimuth = np.meshgrid(np.radians(np.arange(2, -24, -1)), np.radians(range(180)))
+    level = np.cos(elevation)
+    rays = np.stack(
+        [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)], -1
+    ).reshape(-1, 3)
+    rays[:, 1] = np.where(np.arange(len(rays)) % 2, rays[:, 1], -rays[:, 1])
+    eye = Camera("eye", lidar.T_world_lidar, level_camera().intrinsics)
+    nearest = _ground_depth(rays, eye)
+    ids, categories = np.zeros(len(rays), int), np.zeros(len(rays), int)
+    for thing in scene.instances:
+        hit = _hit(rays, thing, eye)
+        nearer = hit < nearest
+        nearest = np.where(nearer, hit, nearest)
+        ids[nearer], categories[nearer] = thing.instance_id, thing.category_id
+    near = nearest < 100.0
+    points = np.zeros(int(near.sum()), POINT)
+    points["position_m"] = rays[near] * nearest[near, None]
+    points["intensity"] = 1.0 / (1.0 + nearest[near])
+    points["instance_id"], points["category_id"] = ids[near], categories[near]
+    points["surface"] = np.where(ids[near] > 0, 0, SURFACES.index("asphalt"))
+    points["return_number"] = points["return_count"] = 1
+    return points
+
+
+def make_info(
+    n: int, sensors: Sequence[str] = ("color",), lidars: tuple[str, ...] = (), **changes: Any
+) -> DatasetInfo:
     """A data set of ``n`` samples whose sensors write ``MEDIA``."""
     info = DatasetInfo(
         name="street",
@@ -197,6 +235,7 @@ def make_info(n: int, sensors: Sequence[str] = ("color",), **changes: Any) -> Da
         sensors=tuple(sensors),
         media=dict.fromkeys(sensors, MEDIA),
         depth_scale_m=0.001,
+        lidars=lidars,
     )
     return replace(info, **changes)
 

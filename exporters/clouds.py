@@ -1,0 +1,53 @@
+"""Laser scans on disk: one NumPy file of ``POINT`` records per sweep, written before any label.
+
+``numpy.load`` reads them; every field is described at ``generator.core.capture.POINT``. Exporters
+make their own files from these.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.capture import POINT, PointCloud
+from generator.core.errors import StorageError
+from generator.core.interfaces import cloud_path
+from generator.core.sample import Sample
+from generator.core.se3 import Array
+
+
+def write_cloud(cloud: PointCloud, shard_dir: Path, index: int) -> None:
+    """Write one sweep to its ``cloud_path``."""
+    path = cloud_path(shard_dir, cloud.sensor, index)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("wb") as file:
+        np.lib.format.write_array(file, cloud.points, version=(1, 0), allow_pickle=False)
+
+
+def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
+    """Points of one sweep as they were written.
+
+    Raises:
+        StorageError: if the file is missing or damaged.
+    """
+    path = cloud_path(shard_dir, sensor, index)
+    try:
+        points: NDArray[np.void] = np.load(path, allow_pickle=False)
+    except (OSError, ValueError) as error:
+        raise StorageError(f"{path}: cannot be read ({error}); make the data set again") from error
+    if points.dtype != POINT:
+        raise StorageError(f"{path}: holds no laser points; make the data set again")
+    return points
+
+
+def xyzi_bytes(points: NDArray[np.void]) -> bytes:
+    """KITTI's ``.bin``: little-endian float32 x, y, z, intensity, point by point."""
+    return np.column_stack([points["position_m"], points["intensity"]]).astype("<f4").tobytes()
+
+
+def T_camera_lidar(sample: Sample, camera: str, lidar: str) -> Array:  # noqa: N802
+    """Lidar coordinates to camera coordinates, 4 x 4."""
+    T_camera_world = sample.truth[camera].camera.T_world_camera.inverse()
+    return (T_camera_world @ sample.scene.lidar(lidar).T_world_lidar).matrix()

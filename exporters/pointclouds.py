@@ -1,0 +1,182 @@
+"""Point clouds for viewers and libraries: PLY or PCD, every field of every point.
+
+::
+
+    <lidar>/000000012.ply    binary little-endian, or 000000012.pcd, PCD 0.7 binary
+    <lidar>/poses.jsonl      {"index", "T_world_lidar", "boxes": [3D boxes in the lidar frame]}
+
+Properties: ``x y z intensity time ring instance category surface return_number return_count``, as
+described at ``generator.core.capture.POINT``. Both formats are read by Open3D, PCL, CloudCompare
+and MeshLab; those without a field skip it.
+
+References: Turk, "The PLY Polygon File Format", 1994; PCL, "The PCD file format".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exporters.clouds import read_points
+from exporters.images import link_or_copy
+from generator.config.strict import Strict
+from generator.core.boxes import OrientedBox
+from generator.core.errors import ConfigError
+from generator.core.interfaces import DatasetInfo
+from generator.core.sample import Sample
+from generator.core.scene import Instance
+from generator.core.se3 import SE3
+from generator.core.serial import canonical_json
+
+FILE_POINT = np.dtype(
+    [
+        ("x", "<f4"),
+        ("y", "<f4"),
+        ("z", "<f4"),
+        ("intensity", "<f4"),
+        ("time", "<f4"),
+        ("ring", "<u2"),
+        ("instance", "<u2"),
+        ("category", "<u2"),
+        ("surface", "u1"),
+        ("return_number", "u1"),
+        ("return_count", "u1"),
+    ]
+)
+PLY_TYPES = {"<f4": "float", "<u2": "ushort", "|u1": "uchar"}
+PCD_TYPES = {"<f4": ("4", "F"), "<u2": ("2", "U"), "|u1": ("1", "U")}
+
+
+class PointClouds(Strict):
+    """PLY or PCD files of every laser scan."""
+
+    type: Literal["pointclouds"] = "pointclouds"
+    format: Literal["ply", "pcd"] = "ply"
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it reads."""
+        return frozenset()
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set without a laser scanner.
+
+        Raises:
+            ConfigError: there is none.
+        """
+        if not info.lidars:
+            raise ConfigError(
+                "exporter 'pointclouds': there is no lidar; add a sensor of that type"
+            )
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write one file per sweep, and a line about where it was taken."""
+        self.check(info)
+        encoded = {"ply": ply_bytes, "pcd": pcd_bytes}[self.format]
+        kept = list(samples)
+        for lidar in info.lidars:
+            folder = shard_dir / self.type / lidar
+            folder.mkdir(parents=True, exist_ok=True)
+            for sample in kept:
+                points = read_points(shard_dir, lidar, sample.index)
+                path = folder / f"{sample.index:09d}.{self.format}"
+                path.write_bytes(encoded(file_points(points)))
+            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in kept)
+            (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link the files of all shards and join their lines."""
+        for lidar in info.lidars:
+            folders = [shard_dir / self.type / lidar for shard_dir in shard_dirs]
+            target = dataset_dir / lidar
+            target.mkdir(parents=True, exist_ok=True)
+            for folder in folders:
+                for path in sorted(folder.glob(f"*.{self.format}")):
+                    link_or_copy(path, target / path.name)
+            lines = "".join((folder / "poses.jsonl").read_text("utf-8") for folder in folders)
+            (target / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
+
+
+def file_points(points: NDArray[np.void]) -> NDArray[np.void]:
+    """Records as files hold them, one scalar per property."""
+    flat: NDArray[Any] = np.zeros(len(points), FILE_POINT)
+    for k, axis in enumerate("xyz"):
+        flat[axis] = points["position_m"][:, k]
+    flat["time"] = points["time_s"]
+    flat["instance"], flat["category"] = points["instance_id"], points["category_id"]
+    for name in ("intensity", "ring", "surface", "return_number", "return_count"):
+        flat[name] = points[name]
+    return flat
+
+
+def ply_bytes(points: NDArray[np.void]) -> bytes:
+    """A binary PLY file of ``FILE_POINT`` records."""
+    properties = [f"property {PLY_TYPES[_kind(name)]} {name}" for name in FILE_POINT.names or ()]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(points)}",
+        *properties,
+        "end_header",
+    ]
+    return ("\n".join(header) + "\n").encode("ascii") + points.tobytes()
+
+
+def pcd_bytes(points: NDArray[np.void]) -> bytes:
+    """A binary PCD 0.7 file of ``FILE_POINT`` records."""
+    names = FILE_POINT.names or ()
+    header = [
+        "# .PCD v0.7 - Point Cloud Data file format",
+        "VERSION 0.7",
+        "FIELDS " + " ".join(names),
+        "SIZE " + " ".join(PCD_TYPES[_kind(name)][0] for name in names),
+        "TYPE " + " ".join(PCD_TYPES[_kind(name)][1] for name in names),
+        "COUNT " + " ".join("1" for _ in names),
+        f"WIDTH {len(points)}",
+        "HEIGHT 1",
+        "VIEWPOINT 0 0 0 1 0 0 0",
+        f"POINTS {len(points)}",
+        "DATA binary",
+    ]
+    return ("\n".join(header) + "\n").encode("ascii") + points.tobytes()
+
+
+def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
+    """Boxes of all annotated things in the frame of a laser scanner, by instance id."""
+    T_lidar_world = sample.scene.lidar(lidar).T_world_lidar.inverse()
+    things = sorted((i for i in sample.scene.instances if i.annotated), key=lambda i: i.instance_id)
+    boxes = []
+    for thing in things:
+        low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
+        x, y, z = (float(v) for v in 0.5 * (low + high))
+        length, width, height = (float(v) for v in high - low)
+        box = OrientedBox(thing.T_world_instance @ SE3((x, y, z)), (length, width, height))
+        boxes.append((thing, box.seen_from(T_lidar_world)))
+    return boxes
+
+
+def _pose(sample: Sample, lidar: str) -> dict[str, Any]:
+    scanner = sample.scene.lidar(lidar)
+    return {
+        "index": sample.index,
+        "model": scanner.model,
+        "T_world_lidar": scanner.T_world_lidar.matrix().tolist(),
+        "boxes": [
+            {
+                "instance": thing.instance_id,
+                "category": thing.category,
+                "center_m": box.T_frame_box.translation_m,
+                "size_m": box.size_m,
+                "quaternion_wxyz": box.T_frame_box.quaternion_wxyz,
+            }
+            for thing, box in lidar_boxes(sample, lidar)
+        ],
+    }
+
+
+def _kind(name: str) -> str:
+    return str(FILE_POINT[name].str)

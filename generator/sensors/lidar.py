@@ -1,0 +1,179 @@
+"""A laser scanner on the rig of a camera."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from generator.config.strict import Strict
+from generator.core.capture import POINT, Beams, Channel, PointCloud
+from generator.core.errors import ConfigError
+from generator.core.interfaces import Renderer
+from generator.core.scene import Lidar, Scene, Weather
+from generator.core.se3 import SE3
+from generator.core.streams import Rng
+from generator.sensors.air import dimmed, optical_depth, rain_noise_m, with_air
+from generator.sensors.lidars import lidar_model, model_names
+from generator.sensors.returns import (
+    LABELS,
+    Float32,
+    Kept,
+    Pulses,
+    UInt8,
+    UInt16,
+    beyond_reach,
+    detected,
+    pulses_of,
+    reported_intensity,
+    selected,
+)
+from generator.sensors.scanning import LidarModel, Sweep, sweep_of
+
+SUBRAYS = 7
+"""Rays that stand for a beam with a width."""
+
+CLEAR = Weather()
+
+
+def _known(name: str) -> str:
+    if name not in model_names():
+        raise ValueError(f"expected one of {', '.join(model_names())}")
+    return name
+
+
+class LidarSensor(Strict):
+    """A laser scanner; it follows the camera it is mounted beside.
+
+    Attributes:
+        name: What labels and files call it.
+        model: A file of ``generator/sensors/lidars``.
+        camera: Name of the camera whose rig it is on; that sensor comes before it.
+        offset_m: From the camera's centre: forward, left, up.
+        yaw_deg, pitch_deg: Turn to the left, then upwards, from the camera's axis.
+        returns: Which return of a pulse is reported; ``dual`` reports two.
+        divergence: Whether beams have a width; costs seven rays instead of one.
+        ideal: No noise, no missed return, no weather: every hit within range.
+    """
+
+    modality: ClassVar[Literal["camera", "lidar"]] = "lidar"
+    type: Literal["lidar"] = "lidar"
+    name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    model: Annotated[str, AfterValidator(_known)] = "HDL-64E"
+    camera: str = "color"
+    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_deg: float = Field(0.0, ge=-180, le=180)
+    pitch_deg: float = Field(0.0, ge=-90, le=90)
+    returns: Kept = "strongest"
+    divergence: bool = False
+    ideal: bool = False
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with this scanner on its camera's rig.
+
+        Raises:
+            ConfigError: the scene has no such camera.
+        """
+        known = [camera.name for camera in scene.cameras]
+        if self.camera not in known:
+            raise ConfigError(
+                f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
+                f" is {', '.join(known) or 'none'}"
+            )
+        half = -0.5 * math.radians(self.pitch_deg)
+        upwards = SE3((0.0, 0.0, 0.0), (math.cos(half), 0.0, math.sin(half), 0.0))
+        T_rig_lidar = SE3.about_z(math.radians(self.yaw_deg), self.offset_m) @ upwards
+        lidar = Lidar(self.name, self.camera, T_rig_lidar.rounded(), model=self.model)
+        return replace(scene, lidars=(*scene.lidars, lidar))
+
+    def capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> PointCloud:
+        """One sweep."""
+        del channels
+        model = lidar_model(self.model)
+        lidar = scene.lidar(self.name)
+        sweep = sweep_of(model, float(rng.uniform(0.0, 3600.0)))
+        beams = Beams(
+            sweep.directions,
+            1e-3 * model.divergence_mrad,
+            SUBRAYS if self.divergence else 1,
+            model.range_m[1],
+        )
+        pulses = pulses_of(renderer.scan(scene, lidar, beams), model)
+        weather = CLEAR if self.ideal else scene.weather
+        if weather != CLEAR:
+            pulses = _through_air(pulses, weather, model, lidar, sweep, rng)
+        pulses = beyond_reach(pulses, model)
+        noticed = pulses.light > 0.0 if self.ideal else detected(pulses, rng)
+        rows, picks = selected(pulses, noticed, self.returns)
+        found = Found.of(pulses, rows, picks)
+        if not self.ideal:
+            found = _noisy(found, model, weather, rng)
+        return PointCloud(self.name, lidar, _points(found, sweep, model))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Found:
+    """The returns that are reported, arrays [n]; ``row`` is the number of their pulse."""
+
+    row: NDArray[np.intp]
+    range_m: Float32
+    reflectance: Float32
+    instance_id: UInt16
+    category_id: UInt16
+    surface: UInt8
+
+    @classmethod
+    def of(cls, pulses: Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]) -> Found:
+        """These candidates of these pulses."""
+        return cls(
+            rows,
+            pulses.range_m[rows, picks],
+            pulses.reflectance[rows, picks],
+            pulses.instance_id[rows, picks],
+            pulses.category_id[rows, picks],
+            pulses.surface[rows, picks],
+        )
+
+
+def _through_air(
+    pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, sweep: Sweep, rng: Rng
+) -> Pulses:
+    """The pulses after fog, rain and snow, and what these send back themselves."""
+    height_m = lidar.T_world_lidar.translation_m[2]
+    up = sweep.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
+    finite = np.where(np.isfinite(pulses.range_m), pulses.range_m, np.float32(model.range_m[1]))
+    depth = optical_depth(weather, model, height_m, up[:, None], finite)
+    return with_air(dimmed(pulses, depth), weather, model, height_m, rng)
+
+
+def _noisy(found: Found, model: LidarModel, weather: Weather, rng: Rng) -> Found:
+    """Ranges with the noise and on the steps of the device."""
+    spread_m = np.float32(model.range_noise_m) + rain_noise_m(weather.rain_mm_h, found.range_m)
+    noise = rng.standard_normal(len(found.range_m), dtype=np.float32)
+    range_m = np.clip(found.range_m + spread_m * noise, *model.range_m)
+    if model.range_step_m > 0.0:
+        range_m = np.rint(range_m / model.range_step_m) * model.range_step_m
+    return replace(found, range_m=range_m.astype(np.float32))
+
+
+def _points(found: Found, sweep: Sweep, model: LidarModel) -> NDArray[np.void]:
+    """Records of ``POINT``; returns of a pulse follow each other, nearest first."""
+    rows = found.row
+    points: NDArray[Any] = np.zeros(len(rows), POINT)
+    points["position_m"] = sweep.directions[rows] * found.range_m[:, None]
+    points["intensity"] = reported_intensity(found.reflectance, model)
+    points["time_s"] = sweep.time_s[rows]
+    points["ring"] = sweep.ring[rows]
+    for name in LABELS:
+        points[name] = getattr(found, name)
+    per_pulse = np.bincount(rows, minlength=len(sweep.ring))
+    first = np.cumsum(per_pulse) - per_pulse
+    points["return_number"] = np.arange(len(rows)) - first[rows] + 1
+    points["return_count"] = per_pulse[rows]
+    return points

@@ -1,0 +1,115 @@
+"""Laser ranges and labels of random scenes against Intel Embree, and against arithmetic."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from generator.core.capture import Beams
+from generator.core.scene import Body, Instance, Lidar, Scene
+from generator.core.se3 import SE3
+from generator.renderers.warp import WarpRenderer
+from tests.renderers.embree import open3d_or_skip
+from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, room_mesh, sphere_mesh
+
+MESHES = {
+    "room": room_mesh((60.0, 60.0, 20.0)),
+    "box": box_mesh((1.8, 4.0, 1.5)),
+    "ball": sphere_mesh(0.8, rings=24),
+    "plane": plane_mesh(400.0),
+}
+
+
+def random_scene(seed: int) -> tuple[Scene, Lidar]:
+    """A hall far from the origin with forty turned and scaled bodies, and a tilted scanner."""
+    rng = np.random.default_rng(seed)
+    away = (300.0, -200.0, 5.0)
+    bodies = [Body("room", "room", SE3(away))]
+    for k in range(40):
+        q = rng.normal(size=4)
+        place = np.asarray(away) + rng.uniform((-25, -25, 0), (25, 25, 6))
+        bodies.append(
+            Body(
+                f"b{k}",
+                str(rng.choice(["box", "ball"])),
+                SE3(tuple(map(float, place)), tuple(map(float, q / np.linalg.norm(q)))),
+                float(rng.uniform(0.4, 1.8)),
+                instance_id=k + 1,
+            )
+        )
+    things = tuple(Instance(k + 1, f"b{k}", "thing", 1, "box") for k in range(40))
+    q = np.array([1.0, *rng.normal(scale=0.05, size=3)])
+    eye = tuple(float(v) for v in np.add(away, (0.3, -0.4, 8.0)))
+    pose = SE3(eye, tuple(map(float, q / np.linalg.norm(q))))
+    return Scene("random", tuple(bodies), things), Lidar("top", "color", T_world_lidar=pose)
+
+
+def directions(count: int, seed: int) -> np.ndarray:
+    """Unit vectors all around."""
+    v = np.random.default_rng(seed).normal(size=(count, 3))
+    return (v / np.linalg.norm(v, axis=1, keepdims=True)).astype(np.float32)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_ranges_and_labels_agree_with_embree(seed: int) -> None:
+    """Ranges within a millimetre and labels equal on 99.9 % of 20,000 rays."""
+    o3d = open3d_or_skip()
+    scene, lidar = random_scene(seed)
+    rays = directions(20_000, seed)
+    caster = o3d.t.geometry.RaycastingScene(nthreads=1)
+    for body in scene.bodies:
+        mesh = MESHES[body.asset]
+        world = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
+        vertices = lidar.T_world_lidar.inverse().apply(world)
+        faces = o3d.core.Tensor(mesh.faces.astype(np.uint32))
+        caster.add_triangles(o3d.core.Tensor(vertices.astype(np.float32)), faces)
+    hit = caster.cast_rays(o3d.core.Tensor(np.hstack([np.zeros_like(rays), rays])))
+    expected_m = hit["t_hit"].numpy()
+    ids = np.array([body.instance_id for body in scene.bodies])[hit["geometry_ids"].numpy()]
+
+    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(scene, lidar, Beams(rays, 0.0, 1, 200.0))
+
+    assert (np.abs(echoes.range_m[:, 0] - expected_m) < 1e-3).mean() >= 0.999
+    assert (echoes.instance_id[:, 0] == ids).mean() >= 0.999
+    assert (echoes.category_id[:, 0] == (ids > 0)).mean() >= 0.999
+
+
+def test_a_ground_plane_is_where_geometry_says() -> None:
+    """Range = height / sine of the angle downwards; cosine of incidence = that sine."""
+    down = np.radians(np.array([1.0, 2.0, 5.0, 20.0, 60.0, 90.0]))
+    rays = np.stack([np.cos(down), np.zeros(6), -np.sin(down)], axis=1).astype(np.float32)
+    lidar = Lidar("top", "color", T_world_lidar=SE3((10.0, 20.0, 1.73)))
+    scene = Scene("plane", (Body("plane", "plane"),))
+
+    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(scene, lidar, Beams(rays, 0.0, 1, 120.0))
+
+    np.testing.assert_allclose(echoes.range_m[:, 0], 1.73 / np.sin(down), rtol=1e-5)
+    np.testing.assert_allclose(echoes.incidence_cos[:, 0], np.sin(down), rtol=1e-4)
+
+
+def test_nothing_beyond_the_reach_of_beams_is_hit() -> None:
+    """Ranges are inf, labels and reflectance 0."""
+    rays = np.array([[0.0, 0.0, -1.0]], np.float32)
+    lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, 30.0)))
+    scene = Scene("plane", (Body("plane", "plane", instance_id=3),))
+    renderer = WarpRenderer(FakeLibrary(MESHES), "cpu")
+
+    near = renderer.scan(scene, lidar, Beams(rays, 0.0, 1, 29.0))
+    far = renderer.scan(scene, lidar, Beams(rays, 0.0, 1, 31.0))
+
+    assert near.range_m[0, 0] == np.inf
+    assert near.instance_id[0, 0] == 0 and near.reflectance[0, 0] == 0.0
+    assert far.range_m[0, 0] == pytest.approx(30.0)
+    assert far.instance_id[0, 0] == 3
+
+
+def test_rays_of_a_wide_beam_surround_its_axis() -> None:
+    """On a plane square on, the six rays end on a circle of half the beam's light."""
+    rays = np.array([[0.0, 0.0, -1.0]], np.float32)
+    lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, 10.0)))
+    scene = Scene("plane", (Body("plane", "plane"),))
+
+    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(scene, lidar, Beams(rays, 0.2, 7, 120.0))
+
+    slant_m = 10.0 * np.hypot(1.0, np.tan(0.1) / np.sqrt(2.0))
+    np.testing.assert_allclose(echoes.range_m[0], [10.0, *[slant_m] * 6], rtol=1e-5)

@@ -1,0 +1,108 @@
+"""Models of laser scanners against the numbers of their manuals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from generator.core.errors import ConfigError
+from generator.sensors.lidars import lidar_model, model_names
+from generator.sensors.scanning import LidarModel, sweep_of
+
+
+def angles_deg(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Elevation, azimuth and ring of every pulse of a sweep."""
+    sweep = sweep_of(lidar_model(name), 0.0)
+    x, y, z = sweep.directions.astype(np.float64).T
+    return np.degrees(np.arcsin(z)), np.degrees(np.arctan2(y, x)), sweep.ring
+
+
+def test_the_hdl64_has_two_blocks_of_lasers() -> None:
+    """Upper 32 from +2 to -8.33 degrees in thirds, lower 32 from -8.83 to -24.33 in halves."""
+    elevation, _, ring = angles_deg("HDL-64E")
+    table = np.array([elevation[ring == k].mean() for k in range(64)])
+
+    np.testing.assert_allclose(table[:32], 2.0 - np.arange(32) / 3.0, atol=1e-4)
+    np.testing.assert_allclose(table[32:], -(8.0 + 5.0 / 6.0) - np.arange(32) / 2.0, atol=1e-4)
+    assert max(np.ptp(elevation[ring == k]) for k in range(64)) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "rings", "top", "bottom", "pulses"),
+    [
+        ("VLP-16", 16, 15.0, -15.0, 28_935),
+        ("HDL-32E", 32, 32 / 3, -92 / 3, 69_440),
+        ("HDL-64E", 64, 2.0, -73 / 3, 133_331),
+        ("OS1-64", 64, 22.5, -22.5, 65_536),
+        ("OS1-128", 128, 22.5, -22.5, 131_072),
+        ("carla", 32, 15.0, -25.0, 2_250),
+    ],
+)
+def test_rings_and_pulses_are_those_of_the_data_sheet(
+    name: str, rings: int, top: float, bottom: float, pulses: int
+) -> None:
+    """Rings from the top; pulses of a sweep within one column of rate / rotation."""
+    elevation, _, ring = angles_deg(name)
+
+    assert ring.max() + 1 == rings
+    assert elevation[ring == 0].mean() == pytest.approx(top, abs=1e-3)
+    assert elevation[ring == rings - 1].mean() == pytest.approx(bottom, abs=1e-3)
+    assert len(ring) == pytest.approx(pulses, abs=rings)
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_every_direction_is_a_unit_vector_and_time_rises_within_a_sweep(name: str) -> None:
+    """From 0 to one rotation."""
+    model = lidar_model(name)
+    sweep = sweep_of(model, 1.25)
+
+    assert np.abs(np.linalg.norm(sweep.directions, axis=1) - 1.0).max() < 1e-6
+    assert (np.diff(sweep.time_s) >= 0).all()
+    assert sweep.time_s[0] >= 0.0 and sweep.time_s[-1] <= 1.0 / model.rotation_hz
+
+
+def test_azimuths_are_even_and_turn_clockwise() -> None:
+    """From behind over the left and ahead in the middle, one step after the other."""
+    _, azimuth, ring = angles_deg("VLP-16")
+    of_one = azimuth[ring == 3]
+    steps = np.diff(of_one)
+
+    np.testing.assert_allclose(steps, -360.0 / len(of_one), atol=1e-3)
+    assert abs(of_one[len(of_one) // 2]) < 360.0 / len(of_one)
+
+
+def test_lasers_of_an_os1_are_staggered() -> None:
+    """Four columns, 2.1 degrees apart."""
+    _, azimuth, ring = angles_deg("OS1-64")
+    first = {k: azimuth[ring == k][300] for k in range(8)}
+
+    assert first[0] - first[1] == pytest.approx(2.109, abs=1e-3)
+    assert first[0] - first[3] == pytest.approx(6.328, abs=1e-3)
+    assert first[4] == pytest.approx(first[0], abs=1e-3)
+
+
+def test_a_rosette_fills_its_round_view_and_never_repeats() -> None:
+    """Within 19.2 degrees of its axis; the next sweep shares hardly any direction."""
+    model = lidar_model("livox")
+    one, next_ = sweep_of(model, 10.0), sweep_of(model, 10.1)
+    away = np.degrees(np.arccos(np.clip(one.directions[:, 0].astype(float), -1, 1)))
+
+    assert away.max() == pytest.approx(19.2, abs=0.05)
+    assert away.min() < 0.1
+    assert np.linalg.norm(one.directions - next_.directions, axis=1).mean() > 0.05
+
+
+def test_an_unknown_model_is_refused_with_the_nearest_name() -> None:
+    """The message lists what there is."""
+    with pytest.raises(ConfigError, match=r"VLP-16.*did you mean 'HDL-64E'"):
+        lidar_model("HDL-64")
+
+
+def test_a_scanner_either_turns_or_draws_a_rosette() -> None:
+    """Neither lasers nor prisms is no scanner; ranges must rise."""
+    plain = lidar_model("VLP-16").model_dump()
+    with pytest.raises(ValidationError, match="elevations_deg or prisms"):
+        LidarModel.model_validate({**plain, "elevations_deg": ()})
+    with pytest.raises(ValidationError, match="must rise"):
+        LidarModel.model_validate({**plain, "range_m": (100.0, 1.0)})

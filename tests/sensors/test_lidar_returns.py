@@ -1,0 +1,249 @@
+"""What laser scanners report of what their rays hit: light, weather, chance, noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.core.capture import POINT, Beams, Echoes, PointCloud
+from generator.core.errors import ConfigError
+from generator.core.geometry import SURFACES
+from generator.core.scene import Camera, Lidar, Scene, Weather
+from generator.core.se3 import SE3
+from generator.core.streams import Rng, Streams
+from generator.sensors.air import fog_peak, optical_depth, rain_extinction_per_m
+from generator.sensors.lidar import LidarSensor
+from generator.sensors.lidars import lidar_model
+from generator.sensors.returns import detected, light_of, pulses_of, reported_intensity, selected
+from generator.sensors.rgb_camera import RgbCamera
+
+MODEL = lidar_model("VLP-16")
+
+
+def rng(seed: int = 0) -> Rng:
+    return Streams(seed=seed, scene=0).rng("sensor/lidar")
+
+
+def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> Echoes:
+    """Hits on instance 7 of category 2, where there is any."""
+    ranges_m = np.asarray(ranges_m, np.float32)
+    hit = np.isfinite(ranges_m)
+    return Echoes(
+        ranges_m,
+        np.where(hit, np.float32(reflectance), np.float32(0)),
+        hit.astype(np.float32),
+        np.where(hit, 7, 0).astype(np.uint16),
+        np.where(hit, 2, 0).astype(np.uint16),
+        np.zeros(ranges_m.shape, np.uint8),
+    )
+
+
+class Wall:
+    """A renderer whose every ray meets the same reflectance at the same range."""
+
+    def __init__(self, range_m: float, reflectance: float = 0.5) -> None:
+        self.range_m, self.reflectance = range_m, reflectance
+
+    def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
+        shape = (len(beams.directions), beams.subrays)
+        return echoes(np.full(shape, self.range_m), self.reflectance)
+
+    def render(self, scene: Scene, camera: Camera, channels: object) -> None:
+        raise AssertionError("a laser scanner takes no picture")
+
+
+def scene_with(sensor: LidarSensor, weather: Weather | None = None) -> Scene:
+    scene = sensor.mount(RgbCamera(name="color").mount(Scene("t")))
+    return replace(scene, weather=weather or Weather())
+
+
+def scan(sensor: LidarSensor, wall: Wall, weather: Weather | None = None, seed: int = 0):  # noqa: ANN201
+    cloud = sensor.capture(scene_with(sensor, weather), wall, frozenset(), rng(seed))
+    assert isinstance(cloud, PointCloud) and cloud.points.dtype == POINT
+    return cloud.points
+
+
+def test_light_falls_with_the_square_of_range() -> None:
+    """Twice as far is a quarter; the unit is the model's own sensitivity."""
+    r = np.array([10.0, 20.0, MODEL.seen.range_m], np.float32)
+    light = light_of(np.full(3, MODEL.seen.reflectance, np.float32), r, MODEL)
+
+    assert light[0] / light[1] == pytest.approx(4.0, rel=1e-5)
+    assert light[2] == pytest.approx(1.0, rel=1e-5)
+
+
+def test_an_ideal_scan_reports_every_hit_where_it_is() -> None:
+    """All pulses, exact ranges, labels, one return each, intensity of the manual's scale."""
+    points = scan(LidarSensor(model="VLP-16", ideal=True), Wall(30.0))
+    ranges_m = np.linalg.norm(points["position_m"].astype(float), axis=1)
+
+    assert len(points) == 1808 * 16
+    np.testing.assert_allclose(ranges_m, 30.0, rtol=1e-6)
+    np.testing.assert_allclose(points["intensity"], 0.5 * 0.392, rtol=1e-5)
+    assert (points["instance_id"] == 7).all() and (points["category_id"] == 2).all()
+    assert (points["return_number"] == 1).all() and (points["return_count"] == 1).all()
+
+
+def test_half_of_the_pulses_answer_at_the_limit_of_sensitivity() -> None:
+    """As the model's data says; nearer nearly all do, farther hardly any."""
+    share = {}
+    for range_m in (0.5, 1.0, 1.9):
+        wall = Wall(range_m * MODEL.seen.range_m, MODEL.seen.reflectance)
+        share[range_m] = len(scan(LidarSensor(model="VLP-16"), wall)) / (1808 * 16)
+
+    assert share[1.0] == pytest.approx(0.5, abs=4 * math.sqrt(0.25 / 28_928))
+    assert share[0.5] > 0.99
+    assert share[1.9] < 0.01
+
+
+def test_range_noise_is_that_of_the_data_sheet_on_steps_of_the_device() -> None:
+    """Standard deviation within 3 %, multiples of 2 mm."""
+    points = scan(LidarSensor(model="VLP-16"), Wall(20.0))
+    ranges_m = np.linalg.norm(points["position_m"].astype(float), axis=1)
+
+    assert ranges_m.std() == pytest.approx(MODEL.range_noise_m, rel=0.03)
+    assert ranges_m.mean() == pytest.approx(20.0, abs=1e-3)
+    steps = ranges_m / MODEL.range_step_m
+    assert np.abs(steps - np.rint(steps)).max() < 2e-3
+
+
+def test_nothing_nearer_or_farther_than_the_device_reports() -> None:
+    """Its range is 0.5 to 100 m."""
+    sensor = LidarSensor(model="VLP-16", ideal=True)
+
+    assert len(scan(sensor, Wall(0.4))) == 0
+    assert len(scan(sensor, Wall(100.5))) == 0
+    assert len(scan(sensor, Wall(99.5))) == 1808 * 16
+
+
+def test_equal_streams_make_equal_bytes() -> None:
+    """Weather and all; another stream makes others."""
+    sensor = LidarSensor(model="VLP-16", returns="dual", divergence=True)
+    weather = Weather(fog_extinction_per_m=0.02, rain_mm_h=20.0, snow_mm_h=2.0)
+    one, same, other = (scan(sensor, Wall(25.0), weather, seed) for seed in (1, 1, 2))
+
+    assert one.tobytes() == same.tobytes()
+    assert one.tobytes() != other.tobytes()
+
+
+@pytest.mark.parametrize("fog_per_m", [0.01, 0.03])
+def test_fog_dims_intensity_by_beer_and_lambert(fog_per_m: float) -> None:
+    """Both ways through it: exp(-2 a r)."""
+    bright = Wall(20.0, 1.0)
+    clear = scan(LidarSensor(model="VLP-16"), bright)
+    foggy = scan(LidarSensor(model="VLP-16"), bright, Weather(fog_extinction_per_m=fog_per_m))
+    wall = foggy[foggy["instance_id"] == 7]
+
+    ratio = np.median(wall["intensity"]) / np.median(clear["intensity"])
+    assert ratio == pytest.approx(math.exp(-2.0 * fog_per_m * 20.0), rel=1e-4)
+
+
+def test_rain_dims_by_goodin_s_law() -> None:
+    """0.01 R^0.6 per metre: 0.0398 at 10 mm/h; nothing without rain."""
+    assert rain_extinction_per_m(10.0) == pytest.approx(0.01 * 10.0**0.6)
+    assert rain_extinction_per_m(0.0) == 0.0
+    depth = optical_depth(
+        Weather(rain_mm_h=10.0), MODEL, 1.7, np.zeros((1, 1), np.float32), np.float32([[25.0]])
+    )
+    assert depth[0, 0] == pytest.approx(0.25 * 10.0**0.6, rel=1e-5)
+
+
+@pytest.mark.parametrize("up", [-0.4, -1e-6, 0.0, 0.3])
+def test_fog_that_thins_with_height_is_integrated_along_the_beam(up: float) -> None:
+    """Against a sum over short steps."""
+    weather = Weather(fog_extinction_per_m=0.02, fog_height_m=12.0)
+    r = (np.arange(200_000) + 0.5) * (40.0 / 200_000)
+    expected = (0.02 * np.exp(-(1.7 + up * r) / 12.0)).mean() * 40.0
+
+    depth = optical_depth(weather, MODEL, 1.7, np.float32([[up]]), np.float32([[40.0]]))
+
+    assert depth[0, 0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_dense_fog_answers_itself_a_few_metres_away() -> None:
+    """Points of air, no instance, near the scanner; none in clear air (Hahner et al. 2021)."""
+    peak_m, _ = fog_peak(0.06)
+    points = scan(LidarSensor(model="HDL-64E"), Wall(90.0), Weather(fog_extinction_per_m=0.06))
+    air = points[points["surface"] == SURFACES.index("air")]
+    ranges_m = np.linalg.norm(air["position_m"].astype(float), axis=1)
+
+    assert 1.0 < peak_m < 8.0
+    assert len(air) > 100
+    assert (air["instance_id"] == 0).all()
+    assert np.median(ranges_m) == pytest.approx(peak_m, rel=0.1)
+    assert not (scan(LidarSensor(), Wall(90.0))["surface"] == SURFACES.index("air")).any()
+
+
+def test_thicker_fog_answers_more() -> None:
+    """Its strength rises with extinction."""
+    strengths = [fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
+
+    assert strengths == sorted(strengths)
+
+
+def test_snow_sends_back_more_than_rain() -> None:
+    """Flakes are white and large, drops clear and small. A wall outshines the drops before it."""
+    air = SURFACES.index("air")
+    sensor = LidarSensor(model="HDL-64E")
+    pulses = 2083 * 64
+    snow = len(scan(sensor, Wall(math.inf), Weather(snow_mm_h=1.0))) / pulses
+    rain = len(scan(sensor, Wall(math.inf), Weather(rain_mm_h=3.0))) / pulses
+    wall = scan(sensor, Wall(20.0), Weather(rain_mm_h=3.0))
+
+    print(snow, rain)
+    assert 0.001 < rain < 0.03
+    assert snow > 5.0 * rain
+    assert (wall["surface"] == air).mean() < 0.001
+
+
+def test_a_beam_that_meets_two_things_can_return_both() -> None:
+    """Strongest and last; nearest first; rays that end close to each other are one return."""
+    near_and_far = np.array([[10.0, 10.1, 10.2, 10.1, 30.0, 30.1, np.inf]])
+    pulses = pulses_of(echoes(near_and_far), MODEL)
+    noticed = pulses.light > 0.0
+
+    rows, picks = selected(pulses, noticed, "dual")
+    np.testing.assert_allclose(pulses.range_m[rows, picks], [10.0, 30.0])
+    assert pulses.reflectance[rows, picks] == pytest.approx([0.5 * 4 / 7, 0.5 * 2 / 7])
+    rows, picks = selected(pulses, noticed, "strongest")
+    np.testing.assert_allclose(pulses.range_m[rows, picks], [10.0])
+    rows, picks = selected(pulses, noticed, "last")
+    np.testing.assert_allclose(pulses.range_m[rows, picks], [30.0])
+
+
+def test_the_detector_notices_by_light() -> None:
+    """L^6 / (1 + L^6), within four standard deviations."""
+    for light in (0.7, 1.0, 1.3):
+        pulses = pulses_of(echoes(np.full((20_000, 1), 10.0)), MODEL)
+        pulses = replace(pulses, light=np.full((20_000, 1), light, np.float32))
+        expected = light**6 / (1.0 + light**6)
+        spread = math.sqrt(expected * (1 - expected) / 20_000)
+        assert detected(pulses, rng()).mean() == pytest.approx(expected, abs=4 * spread)
+
+
+def test_retro_reflectors_are_told_from_white() -> None:
+    """White matte is 100 of 255 on a Velodyne, the brightest sign 255."""
+    told = reported_intensity(np.float32([0.0, 0.5, 1.0, 800.0, 1e5]), MODEL)
+
+    np.testing.assert_allclose(told, [0.0, 0.196, 0.392, 1.0, 1.0], atol=1e-6)
+
+
+def test_a_scanner_needs_a_camera_listed_before_it() -> None:
+    """The message names what there is."""
+    with pytest.raises(ConfigError, match=r"camera 'color'.*none"):
+        LidarSensor().mount(Scene("t"))
+
+
+def test_the_mount_turns_left_and_upwards() -> None:
+    """Yaw 90 looks along the rig's Y, pitch 90 along its Z."""
+    ahead = np.array([[1.0, 0.0, 0.0]])
+    left = scene_with(LidarSensor(yaw_deg=90.0)).lidars[0].T_rig_lidar
+    up = scene_with(LidarSensor(pitch_deg=90.0, offset_m=(0.1, 0.2, 0.3))).lidars[0].T_rig_lidar
+
+    np.testing.assert_allclose(left.rotate(ahead), [[0.0, 1.0, 0.0]], atol=1e-5)
+    np.testing.assert_allclose(up.rotate(ahead), [[0.0, 0.0, 1.0]], atol=1e-5)
+    assert up.translation_m == (0.1, 0.2, 0.3)
+    assert isinstance(up, SE3)
