@@ -57,7 +57,8 @@ def test_a_pack_that_fits_is_part_of_the_plan_and_of_the_licences(
     plan = plan_of(factory)
     assert plan.versions["pack boxes"].startswith("1.0 ")
     assert "boxes/box" in plan.assets
-    assert "| a test | CC-BY-3.0 | A. Modeller | boxes/box |" in licences_text(factory, ["boxes/box"])
+    text = licences_text(factory, ["boxes/box"])
+    assert "| a test | CC-BY-3.0 | A. Modeller | boxes/box |" in text
 
 
 def test_another_content_of_the_pack_is_another_data_set(
