@@ -141,9 +141,12 @@ def _shaded(
     shape = (lattice.height - 1, cells // run)
     wp.launch(gather.gather_light, shape, inputs, [count, pixels, radiance], device=device)
     listed = int(count.numpy()[0])
-    lit = stock.scratch("listed lit", (around.lit.shape[0], n), float)
-    open_sky = stock.scratch("listed sky", (1, n), float)
-    exposed = stock.scratch("listed exposed", n, float)
+    # In powers of two, so that few sizes are kept, and a little more: lamps a power of two apart
+    # would share their places in the processor's cache.
+    room = (1 << listed.bit_length()) + 48
+    lit = stock.scratch("listed lit", (around.lit.shape[0], room), float)
+    open_sky = stock.scratch("listed sky", (1, room), float)
+    exposed = stock.scratch("listed exposed", room, float)
     parts = wp.array(lamp_parts(4, settings), dtype=wp.vec2, device=device)
     disc = wp.array(sunflower(4), dtype=wp.vec2, device=device)
     radius_m = settings.ambient_occlusion_radius_m
