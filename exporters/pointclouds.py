@@ -47,7 +47,7 @@ FILE_POINT = np.dtype(
         ("return_count", "u1"),
     ]
 )
-PLY_TYPES = {"<f4": "float", "<u2": "ushort", "|u1": "uchar"}
+PLY_TYPES = {"<f4": "float", "<u2": "uint16", "|u1": "uint8"}
 PCD_TYPES = {"<f4": ("4", "F"), "<u2": ("2", "U"), "|u1": ("1", "U")}
 
 

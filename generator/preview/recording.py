@@ -16,7 +16,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from generator.core.capture import Channel, Reading
+from generator.core.capture import Channel, PointCloud, Reading
 from generator.core.errors import StorageError
 from generator.core.geometry import MeshData
 from generator.core.interfaces import AssetLibrary
@@ -24,6 +24,7 @@ from generator.core.sample import ImageTruth, Sample
 from generator.core.scene import Body, Instance, Scene
 from generator.core.se3 import SE3
 from generator.core.skeletons import Skeleton, skeleton_of
+from generator.preview.clouds import point_colors
 from generator.preview.palette import color_of
 
 TIMELINE = "sample"
@@ -89,6 +90,8 @@ class Recorder:
         self._record_bodies(sample.scene)
         for name, reading in sorted(sample.capture.readings.items()):
             self._record_image(name, reading, sample.truth[name])
+        for name, cloud in sorted(sample.capture.clouds.items()):
+            self._record_cloud(name, cloud)
         self._record_boxes(sample)
 
     def _record_bodies(self, scene: Scene) -> None:
@@ -170,6 +173,14 @@ class Recorder:
                     show_labels=False,
                 )
                 self.stream.log(f"{path}/{item.instance.instance_id}", points)
+
+    def _record_cloud(self, name: str, cloud: PointCloud) -> None:
+        path = f"world/lidars/{name}"
+        self.stream.log(path, _transform(cloud.lidar.T_world_lidar))
+        points = rr.Points3D(
+            cloud.points["position_m"], colors=point_colors(cloud), radii=rr.Radius.ui_points(1.5)
+        )
+        self.stream.log(f"{path}/points", points)
 
     def _record_boxes(self, sample: Sample) -> None:
         found = {

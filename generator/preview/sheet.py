@@ -12,6 +12,7 @@ import numpy as np
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError, StorageError
 from generator.core.sample import Sample
+from generator.preview.clouds import top_view
 from generator.preview.overlay import Image, channel_image, labelled_image
 
 GAP_PX = 4
@@ -21,18 +22,22 @@ BACKGROUND = 24
 def tiles(
     samples: Iterable[Sample], channels: Sequence[Channel], *, labels: bool, width_px: int
 ) -> list[Image]:
-    """One tile per sample, sensor and channel, each ``width_px`` wide."""
-    return [
-        _scaled(
-            labelled_image(reading, sample.truth[name])
-            if labels and channel is Channel.RGB
-            else channel_image(reading, channel),
-            width_px,
-        )
-        for sample in samples
-        for name, reading in sorted(sample.capture.readings.items())
-        for channel in channels
-    ]
+    """One tile per sample, camera and channel, and one per scan, each ``width_px`` wide."""
+    shown = []
+    for sample in samples:
+        aspect = 1.0
+        for name, reading in sorted(sample.capture.readings.items()):
+            aspect = reading.camera.intrinsics.width_px / reading.camera.intrinsics.height_px
+            for channel in channels:
+                drawn = labels and channel is Channel.RGB
+                shown.append(
+                    labelled_image(reading, sample.truth[name])
+                    if drawn
+                    else channel_image(reading, channel)
+                )
+        clouds = sorted(sample.capture.clouds.items())
+        shown += [top_view(cloud, sample.scene, aspect) for _, cloud in clouds]
+    return [_scaled(image, width_px) for image in shown]
 
 
 def arranged(images: Sequence[Image], columns: int) -> Image:

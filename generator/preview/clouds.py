@@ -1,0 +1,100 @@
+"""Laser scans to look at: coloured points, and a view from above."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.boxes import OrientedBox
+from generator.core.capture import PointCloud
+from generator.core.geometry import SURFACES
+from generator.core.scene import Scene
+from generator.core.se3 import SE3
+from generator.preview.overlay import BOX_EDGES, Image
+from generator.preview.palette import color_of
+
+PANEL_PX = 960
+"""Width of a view from above before it is scaled to its tile."""
+AHEAD_M = 50.0
+"""Shown before and behind the scanner."""
+
+GREY = (120, 120, 120)
+COLORS = {
+    "air": (255, 80, 255),
+    "asphalt": (105, 105, 112),
+    "marking": (235, 235, 235),
+    "pavement": (150, 140, 130),
+    "kerb": (170, 160, 150),
+    "grass": (90, 130, 60),
+    "leaf": (60, 170, 60),
+    "bark": (140, 100, 60),
+    "sign": (255, 210, 0),
+    "facade": (170, 110, 80),
+    "roof": (150, 70, 60),
+    "window": (90, 130, 170),
+}
+"""Of what has no category, by surface."""
+
+
+def point_colors(cloud: PointCloud) -> NDArray[np.uint8]:
+    """SRGB colour of each point: that of its category, else of its surface, uint8 [n, 3]."""
+    points = cloud.points
+    categories = points["category_id"]
+    of_category = [color_of(k) for k in range(int(categories.max(initial=0)) + 1)]
+    of_surface = [COLORS.get(name, GREY) for name in SURFACES]
+    colors: NDArray[np.uint8] = np.array(of_surface, np.uint8)[points["surface"]]
+    labelled = categories > 0
+    colors[labelled] = np.array(of_category, np.uint8)[categories[labelled]]
+    return colors
+
+
+def top_view(cloud: PointCloud, scene: Scene, aspect: float) -> Image:
+    """The scan from above, its X axis to the right, uint8 [h, w, 3]; boxes are outlined.
+
+    Args:
+        cloud: What is shown.
+        scene: Whose annotated things are outlined.
+        aspect: Width over height.
+    """
+    shape = (max(8, round(PANEL_PX / aspect)), PANEL_PX)
+    image: Image = np.zeros((*shape, 3), np.uint8)
+    position_m = cloud.points["position_m"]
+    colors = point_colors(cloud)
+    column, row = _pixels(position_m, shape)
+    inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
+    # Higher points last: they are what is seen from above.
+    order = np.argsort(position_m[:, 2], kind="stable")
+    order = order[inside[order]]
+    image[row[order], column[order]] = colors[order]
+    T_lidar_world = cloud.lidar.T_world_lidar.inverse()
+    for thing in scene.instances:
+        if thing.annotated:
+            low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
+            x, y, z = (float(v) for v in 0.5 * (low + high))
+            length, width, height = (float(v) for v in high - low)
+            box = OrientedBox(
+                T_lidar_world @ thing.T_world_instance @ SE3((x, y, z)), (length, width, height)
+            )
+            _outline(image, box, color_of(thing.category_id))
+    return image
+
+
+def _pixels(
+    position_m: NDArray[np.floating], shape: tuple[int, int]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Column and row of points; X to the right, Y up."""
+    scale = 0.5 * shape[1] / AHEAD_M
+    column = np.floor(0.5 * shape[1] + position_m[:, 0] * scale).astype(np.intp)
+    row = np.floor(0.5 * shape[0] - position_m[:, 1] * scale).astype(np.intp)
+    return column, row
+
+
+def _outline(image: Image, box: OrientedBox, color: tuple[int, int, int]) -> None:
+    column, row = _pixels(box.corners(), (image.shape[0], image.shape[1]))
+    far = max(image.shape) * 4
+    if max(np.abs(column).max(), np.abs(row).max()) > far:
+        return
+    for a, b in BOX_EDGES:
+        start, end = (int(column[a]), int(row[a])), (int(column[b]), int(row[b]))
+        cv2.line(image, start, end, color, 1, cv2.LINE_AA)

@@ -1,0 +1,237 @@
+"""Laser scans in files: KITTI, SemanticKITTI, PLY and PCD, read back by other means."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from exporters.clouds import read_points
+from exporters.kitti import Kitti, official_type
+from exporters.pointclouds import PointClouds
+from exporters.semantickitti import SemanticKitti
+from generator.core.errors import ConfigError, StorageError
+from generator.core.geometry import SURFACES
+
+POINT_FIELDS = [
+    *("x", "y", "z", "intensity", "time", "ring", "instance", "category", "surface"),
+    *("return_number", "return_count"),
+]
+
+
+@pytest.fixture(scope="module")
+def kitti(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A KITTI data set with a scanner."""
+    info = world.info(7, lidars=("top",))
+    return world.export(Kitti(far_m=100.0), info, world.samples, tmp_path_factory.mktemp("kitti"))
+
+
+@pytest.fixture(scope="module")
+def semantic(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A SemanticKITTI data set."""
+    info = world.info(7, lidars=("top",))
+    return world.export(SemanticKitti(), info, world.samples, tmp_path_factory.mktemp("semantic"))
+
+
+def bins(path: Path) -> np.ndarray:
+    return np.frombuffer(path.read_bytes(), "<f4").reshape(-1, 4)
+
+
+def labels(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper halves."""
+    value = np.frombuffer(path.read_bytes(), "<u4")
+    return value & 0xFFFF, value >> 16
+
+
+def test_the_native_file_holds_every_field_and_nothing_else(world: Any, tmp_path: Path) -> None:
+    """What was captured is what is read; a missing file is told."""
+    world.export(Kitti(), world.info(7, lidars=("top",)), world.samples, tmp_path)
+    kept = read_points(tmp_path / "shards/000000", "top", 1)
+
+    assert kept.tobytes() == world.samples[1].capture.clouds["top"].points.tobytes()
+    with pytest.raises(StorageError, match="make the data set again"):
+        read_points(tmp_path / "shards/000000", "top", 99)
+
+
+def test_kitti_points_are_the_scanner_s(kitti: Path, world: Any) -> None:
+    """All points, x y z and reflectance in [0, 1]."""
+    for sample in world.samples:
+        points = sample.capture.clouds["top"].points
+        written = bins(kitti / f"training/velodyne/{sample.index:06d}.bin")
+        np.testing.assert_array_equal(written[:, :3], points["position_m"])
+        np.testing.assert_array_equal(written[:, 3], points["intensity"])
+
+
+def test_the_calibration_takes_points_onto_the_objects_pixels(kitti: Path, world: Any) -> None:
+    """P2 Tr x: points of an instance fall on its mask or within two pixels of it, if visible."""
+    sample = world.samples[0]
+    rows = dict(
+        line.split(": ") for line in (kitti / "training/calib/000000.txt").read_text().splitlines()
+    )
+    tr = np.array(rows["Tr_velo_to_cam"].split(), float).reshape(3, 4)
+    p2 = np.array(rows["P2"].split(), float).reshape(3, 4)[:, :3]
+    points = sample.capture.clouds["top"].points
+    seen = {t.instance.instance_id: t for t in sample.truth["color"].objects}
+    checked = 0
+    for number, thing in seen.items():
+        mine = points[points["instance_id"] == number]["position_m"]
+        uv = (tr[:, :3] @ mine.T + tr[:, 3:]).T @ p2.T
+        uv = uv[uv[:, 2] > 0]
+        uv = uv[:, :2] / uv[:, 2:]
+        box = thing.amodal_box
+        inside = (uv[:, 0] > box.x_min - 2) & (uv[:, 0] < box.x_max + 2)
+        inside &= (uv[:, 1] > box.y_min - 2) & (uv[:, 1] < box.y_max + 2)
+        assert inside.all()
+        checked += len(uv)
+    assert checked > 20
+
+
+def test_kitti_point_labels_name_the_row_of_the_label_file(kitti: Path, world: Any) -> None:
+    """Upper half 1-based row of the type that the instance has; lower half the category."""
+    checked = 0
+    for sample in world.samples:
+        points = sample.capture.clouds["top"].points
+        category, row = labels(kitti / f"training/velodyne_labels/{sample.index:06d}.label")
+        np.testing.assert_array_equal(category, points["category_id"])
+        text = (kitti / f"training/label_2/{sample.index:06d}.txt").read_text().splitlines()
+        for number in np.unique(row[row > 0]):
+            (instance_id,) = np.unique(points["instance_id"][row == number])
+            kind = text[number - 1].split(" ")[0]
+            expected = official_type(sample.scene.instance(int(instance_id)))
+            assert kind in (expected, "DontCare")
+            checked += 1
+    assert checked > 10
+
+
+def test_semantic_scans_are_numbered_without_gaps_in_official_splits(semantic: Path) -> None:
+    """Train is sequence 00, val is 08; points, labels, poses and times agree in number."""
+    counts = {"00": 5, "08": 2}
+    assert sorted(p.name for p in (semantic / "sequences").iterdir()) == sorted(counts)
+    for name, count in counts.items():
+        folder = semantic / "sequences" / name
+        stems = [f"{k:06d}" for k in range(count)]
+        assert [p.stem for p in sorted((folder / "velodyne").iterdir())] == stems
+        assert [p.stem for p in sorted((folder / "labels").iterdir())] == stems
+        for text in ("poses.txt", "times.txt", "scans.txt"):
+            assert len((folder / text).read_text().splitlines()) == count
+        first = np.array((folder / "poses.txt").read_text().splitlines()[0].split(), float)
+        np.testing.assert_allclose(first.reshape(3, 4), np.eye(3, 4), atol=1e-9)
+
+
+def test_semantic_classes_follow_category_and_surface(semantic: Path, world: Any) -> None:
+    """Cars 10, people 30 with an instance; crates 99 and the road 40 without."""
+    folder = semantic / "sequences/00"
+    sample = world.samples[0]
+    points = sample.capture.clouds["top"].points
+    classes, things = labels(folder / "labels/000000.label")
+    ids = points["instance_id"]
+
+    for number, expected in {1: 10, 2: 30, 3: 99, 7: 30}.items():
+        assert set(classes[ids == number]) <= {expected}
+    assert set(classes[ids == 0]) == {40}
+    assert (things[np.isin(classes, [10, 30])] > 0).all()
+    assert (things[np.isin(classes, [99, 40])] == 0).all()
+    assert {10, 30, 99, 40} <= set(classes)
+
+
+def test_instances_of_different_scenes_have_different_ids(semantic: Path) -> None:
+    """Instance ids never come back with another scene."""
+    seen: set[int] = set()
+    for path in sorted((semantic / "sequences/00/labels").iterdir()):
+        _, things = labels(path)
+        mine = set(things[things > 0].tolist())
+        assert not mine & seen
+        seen |= mine
+    assert len(seen) > 5
+
+
+@pytest.mark.parametrize("kind", ["ply", "pcd"])
+def test_open3d_reads_point_clouds(kind: str, world: Any, tmp_path: Path) -> None:
+    """All positions and all scalar fields, as written."""
+    o3d = pytest.importorskip(
+        "open3d", reason="Open3D needs system libraries", exc_type=(ImportError, OSError)
+    )
+    info = world.info(7, lidars=("top",))
+    folder = world.export(PointClouds(format=kind), info, world.samples, tmp_path)
+    points = world.samples[2].capture.clouds["top"].points
+
+    read = o3d.t.io.read_point_cloud(str(folder / f"top/000000002.{kind}"))
+
+    np.testing.assert_array_equal(read.point["positions"].numpy(), points["position_m"])
+    for name, field in (("intensity", "intensity"), ("instance", "instance_id")):
+        np.testing.assert_array_equal(read.point[name].numpy()[:, 0], points[field])
+
+
+def test_a_ply_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
+    """Parsed by hand: one record per point, in the order of the properties."""
+    info = world.info(7, lidars=("top",))
+    folder = world.export(PointClouds(), info, world.samples, tmp_path)
+    data = (folder / "top/000000000.ply").read_bytes()
+    header, body = data.split(b"end_header\n", 1)
+    lines = [line.split() for line in io.StringIO(header.decode("ascii"))]
+    types = {"float": "<f4", "uint16": "<u2", "uint8": "u1"}
+    dtype = np.dtype([(line[2], types[line[1]]) for line in lines if line[0] == "property"])
+    points = world.samples[0].capture.clouds["top"].points
+
+    assert list(dtype.names or ()) == POINT_FIELDS
+    records = np.frombuffer(body, dtype)
+    np.testing.assert_array_equal(records["category"], points["category_id"])
+    np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])
+
+
+def test_points_lie_in_the_boxes_of_the_lidar_frame(world: Any, tmp_path: Path) -> None:
+    """``poses.jsonl`` lists boxes; every labelled point is in its own, to a millimetre."""
+    info = world.info(7, lidars=("top",))
+    folder = world.export(PointClouds(), info, world.samples, tmp_path)
+    rows = [json.loads(line) for line in (folder / "top/poses.jsonl").read_text().splitlines()]
+
+    assert [row["index"] for row in rows] == list(range(7))
+    checked = 0
+    for row, sample in zip(rows, world.samples, strict=True):
+        points = sample.capture.clouds["top"].points
+        for box in row["boxes"]:
+            w, x, y, z = box["quaternion_wxyz"]
+            rotation = np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+                ]
+            )
+            mine = points[points["instance_id"] == box["instance"]]["position_m"]
+            local = (mine - np.array(box["center_m"])) @ rotation
+            assert (np.abs(local) <= 0.5 * np.array(box["size_m"]) + 1e-3).all()
+            checked += len(mine)
+    assert checked > 100
+
+
+@pytest.mark.parametrize(
+    ("exporter", "message"),
+    [
+        (SemanticKitti(lidar="velo"), "no lidar 'velo'.*top"),
+        (SemanticKitti(camera="colour"), "no camera 'colour'.*color"),
+        (Kitti(lidar="velo"), "no lidar 'velo'.*top"),
+    ],
+)
+def test_sensors_that_are_not_there_are_refused(exporter: Any, message: str, world: Any) -> None:
+    """Before anything is rendered."""
+    with pytest.raises(ConfigError, match=message):
+        exporter.check(world.info(7, lidars=("top",)))
+
+
+def test_point_formats_need_a_scanner(world: Any) -> None:
+    """The message says what to add."""
+    with pytest.raises(ConfigError, match="add a sensor of that type"):
+        PointClouds().check(world.info(7))
+    with pytest.raises(ConfigError, match="no lidar"):
+        SemanticKitti().check(world.info(7))
+
+
+def test_air_and_ground_have_surfaces_with_names() -> None:
+    """Numbers in files never move: the first and the second are fixed."""
+    assert SURFACES[:3] == ("", "air", "asphalt")
+    assert len(set(SURFACES)) == len(SURFACES) < 256
