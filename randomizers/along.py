@@ -56,6 +56,7 @@ class Along(RandomizerBase):
         rows: How often every lane is walked: people go abreast.
         used: Whether a place is used: how full a parking lane is.
         count: How many at most: a random choice of all places; null = all.
+        at_least: A layout with fewer free places is refused.
         lateral: Place across the lane, of the room there is: -1 right edge, 0 middle, 1 left edge.
         yaw_deg: Turn from the lane's direction.
         turned: Whether it faces the other way.
@@ -76,6 +77,7 @@ class Along(RandomizerBase):
     rows: int = Field(1, ge=1, le=8)
     used: Flag = Constant(True)
     count: Count | None = None
+    at_least: int = Field(0, ge=0)
     lateral: Annotated[Scalar, Bounds(-1, 1)] = Constant(0.0)
     yaw_deg: Scalar = Constant(0.0)
     turned: Flag = Constant(False)
@@ -89,7 +91,7 @@ class Along(RandomizerBase):
         """The scene with the group's members exchanged.
 
         Raises:
-            LayoutRejected: things are to be scattered and there is no room for them.
+            LayoutRejected: there is no room for what is to be scattered, or too little.
         """
         group = group_named(scene, self.group or self.name, f"randomizers.{self.name}.group")
         scene = without_members(scene, group.name)
@@ -109,6 +111,11 @@ class Along(RandomizerBase):
         )
         walk = self._strewn if self.scattered else self._walked
         places = list(walk(lines, group, wheel, ground, assets, rng))
+        if len(places) < self.at_least:
+            remedy = (
+                f"a smaller at_least, gap_m or spare_m, or longer roads (randomizers.{self.name})"
+            )
+            raise LayoutRejected(Rejection("too few free places along lanes", remedy))
         if self.count is not None:
             wanted = self.count.draw(rng)
             places = [places[k] for k in sorted(rng.permutation(len(places))[:wanted].tolist())]

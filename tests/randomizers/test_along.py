@@ -110,6 +110,13 @@ def test_too_many_scattered_things_are_refused_by_name() -> None:
         drawn(replace(street(), lanes=(lane,)), count=Constant(500), scattered=True)
 
 
+def test_an_impossible_density_is_refused_by_name() -> None:
+    """Two lanes of 40 m have room for 40 bricks every 2 m, not for 400."""
+    assert len(drawn(street(), gap_m=Constant(1.94), at_least=38).bodies) >= 38
+    with pytest.raises(LayoutRejected, match="too few free places"):
+        drawn(street(), gap_m=Constant(1.94), at_least=400)
+
+
 def test_the_camera_rides_where_nothing_stands() -> None:
     """A brick on every metre but for 10 m: the camera is in that gap, 1.65 m up, looking along."""
     bodies = tuple(
