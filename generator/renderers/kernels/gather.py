@@ -246,6 +246,24 @@ def one_face(view: View, images: Images, face: wp.vec2i, x0: int, x1: int, y0: i
 
 
 @wp.func
+def quad_sampler(world: World, texture: int, quad: Quad, patch: Patch, footprint_m: float):
+    """The sampler of a cell whose pixels are that wide at its depth."""
+    slant = wp.max(wp.dot(quad.normal, quad.to_viewer), 0.05)
+    return sampler_of(world, texture, wp.log2(footprint_m * patch.texels_per_m / wp.sqrt(slant)))
+
+
+@wp.func
+def bumped(patch: Patch, bump: wp.vec3, covered: bool, coat: wp.vec4):
+    """The normal of a patch with a texture's bumps, below what weather has laid on them."""
+    b = bump
+    if covered:
+        bumps = bumps_through(coat)
+        b = b * bumps + wp.vec3(0.0, 0.0, 1.0 - bumps)
+    m = patch.tangent * b[0] + patch.bitangent * b[1]
+    return unit(m + patch.normal * wp.max(b[2], 0.1))
+
+
+@wp.func
 def light_patch(
     view: View,
     world: World,
@@ -266,7 +284,6 @@ def light_patch(
     x1 = wp.min(x0 + lattice.stride, view.width)
     y1 = wp.min(y0 + lattice.stride, view.height)
     right_step = step_at(lattice, x0, view.width)
-    down_step = step_at(lattice, y0, view.height)
     surface = lattice.surface[q]
     texture = world.surfaces[surface].texture
     albedo = world.surfaces[surface].base_color
@@ -274,18 +291,16 @@ def light_patch(
     sampler = Sampler()
     tilt = Tilt()
     if texture >= 0:
-        texels = images.z_m[lattice.pixel[q]] * view.pixel_rad * patch.texels_per_m
-        slant = wp.max(wp.dot(quad.normal, quad.to_viewer), 0.05)
-        sampler = sampler_of(world, texture, wp.log2(texels / wp.sqrt(slant)))
+        z = images.z_m[lattice.pixel[q]]
+        sampler = quad_sampler(world, texture, quad, patch, z * view.pixel_rad)
         if world.textures[texture].has_bumps != 0:
             tilt = quad_tilt(lattice, lights, q, quad)
     bumpy = tilt.before > 0.0
     covered = world.ground.covered != 0
-    coat = wp.vec4(0.0)
-    coat_step = wp.vec4(0.0)
+    coat, coat_step = wp.vec4(0.0), wp.vec4(0.0)
     below = q + lattice.width
     for y in range(y0, y1):
-        down = float(y - y0) * down_step
+        down = float(y - y0) * step_at(lattice, y0, view.height)
         up = 1.0 - down
         diffuse = lights[q].diffuse * up + lights[below].diffuse * down
         rest = lights[q].rest * up + lights[below].rest * down
@@ -299,27 +314,20 @@ def light_patch(
         for x in range(x0, x1):
             i = y * view.width + x
             color = albedo
-            bumps = float(1.0)
             lit = diffuse
             shine = rest
             if texture >= 0:
-                d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-                z = images.z_m[i]
-                u = patch.u + wp.dot(patch.to_u, d) * z
-                v = patch.v + wp.dot(patch.to_v, d) * z
+                p = pixel_direction(view, float(x) + 0.5, float(y) + 0.5) * images.z_m[i]
+                u = patch.u + wp.dot(patch.to_u, p)
+                v = patch.v + wp.dot(patch.to_v, p)
                 texel = texel_at(world, texture, sampler, u, v, bumpy)
                 color = wp.cw_mul(albedo, texel.albedo)
-                if covered:
-                    color = laid_on(coat, color)
-                    bumps = bumps_through(coat)
                 if bumpy:
-                    b = texel.bump * bumps
-                    m = patch.tangent * b[0] + patch.bitangent * b[1]
-                    m = unit(m + patch.normal * wp.max(b[2] + 1.0 - bumps, 0.1))
+                    m = bumped(patch, texel.bump, covered, coat)
                     factors = on_bump(tilt, roughness * texel.roughness, m)
                     lit = lit * factors[0]
                     shine = shine * factors[1]
-            elif covered:
+            if covered:
                 color = laid_on(coat, color)
             coat += coat_step
             radiance[i] = wp.cw_mul(lit, color) + shine

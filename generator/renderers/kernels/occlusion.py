@@ -111,6 +111,21 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, nd
             shares[j, i] = shares[j, i] / total
 
 
+@wp.func
+def mean_beside(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
+    """Mean of what the points beside, above and below a point say on its material, if any does."""
+    i = y * lattice.width + x
+    total = float(0.0)
+    found = float(0.0)
+    if x > 0 and y > 0 and x < lattice.width - 1 and y < lattice.height - 1:
+        for k in range(4):
+            q = i + wp.where(k < 2, 1, lattice.width) * wp.where((k & 1) == 0, 1, -1)
+            if lattice.surface[q] == lattice.surface[i] and values[j, q] != UNSEEN:
+                total += values[j, q]
+                found += 1.0
+    return wp.where(found > 0.0, total / wp.max(found, 1.0), UNSEEN)
+
+
 @wp.kernel
 def probe_lamps(
     world: World,
@@ -141,6 +156,8 @@ def probe_lamps(
         if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
             if parity == 1:
                 value = settled(lattice, lit, j, x, y)
+                if value == UNSEEN and shares[j, i] < SMOOTHED_SHARE:
+                    value = mean_beside(lattice, lit, j, x, y)
             if value == UNSEEN:
                 value = probed(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
         lit[j, i] = value

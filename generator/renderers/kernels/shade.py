@@ -250,8 +250,7 @@ def look_around(
                         w = nearness(right, down)
                         found += w
                         sky += lattice_sky[0, q] * w
-                        if world.ground.covered != 0:
-                            rained_on += world.ground.exposed[q] * w
+                        rained_on += exposed_point(world, q) * w
                         for j in range(world.lamps.shape[0]):
                             lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
     if found > 0.0:
@@ -269,9 +268,25 @@ def look_around(
             sky = seen_sky(world, origin, n, disc, radius_m)
             found = 1.0
         open_sky[0, k] = sky / found
-        exposed[k] = 1.0
-        if world.ground.covered != 0 and n[2] > 0.1:
-            exposed[k] = unsheltered(world, origin)
+        exposed[k] = exposed_at(world, origin, n)
+
+
+@wp.func
+def exposed_point(world: World, q: int):
+    """Share of what falls that reaches lattice point q."""
+    exposed = float(1.0)
+    if world.ground.covered != 0:
+        exposed = world.ground.exposed[q]
+    return exposed
+
+
+@wp.func
+def exposed_at(world: World, origin: wp.vec3, n: wp.vec3):
+    """Share of what falls that reaches a point, by a ray."""
+    exposed = float(1.0)
+    if world.ground.covered != 0 and n[2] > 0.1:
+        exposed = unsheltered(world, origin)
+    return exposed
 
 
 @wp.func
