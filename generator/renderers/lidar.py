@@ -24,6 +24,10 @@ RING_SHARE = math.sqrt(1.0 / 2.0)
 """Radius of the ring of rays, in units of the beam's: half the light is outside it."""
 
 
+RUN = 64
+"""Rays per thread: neighbours mostly hit the same body."""
+
+
 def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echoes:
     """What the rays of all beams hit first."""
     eye = Camera(lidar.name, lidar.T_world_lidar, Intrinsics(1, 1, 1.0, 1.0, 0.5, 0.5))
@@ -39,7 +43,7 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     hits_ = stock.scratch("scan hits", count, wp.vec2i)
     wp.launch(
         kernels.scan_beams,
-        dim=count,
+        dim=(count + RUN - 1) // RUN,
         inputs=[_scan(lidar, beams), world.record, lights, axes],
         outputs=[*images, hits_],
         device=device,
@@ -64,6 +68,7 @@ def _scan(lidar: Lidar, beams: Beams) -> kernels.Scan:
     scan.reach_m = beams.range_max_m
     scan.spread = RING_SHARE * math.tan(0.5 * beams.divergence_rad)
     scan.subrays = beams.subrays
+    scan.run = RUN
     return scan
 
 

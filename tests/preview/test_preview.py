@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from generator.core.boxes import BoxPx, OrientedBox
-from generator.core.capture import Capture, Reading
+from generator.core.capture import POINT, Capture, PointCloud, Reading
 from generator.core.errors import ConfigError
 from generator.core.geometry import Keypoint
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
-from generator.core.scene import Camera, Instance, Scene
+from generator.core.scene import Camera, Instance, Lidar, Scene
 from generator.core.se3 import IDENTITY, SE3
 from generator.core.skeletons import PERSON
+from generator.preview.clouds import top_view
 from generator.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
 from generator.preview.palette import color_of, colored_depth, colored_ids
 from generator.preview.recording import Recorder
@@ -161,3 +162,18 @@ def test_sheet_of_nothing_is_refused() -> None:
     """No tile, no picture."""
     with pytest.raises(ConfigError):
         arranged([], columns=3)
+
+
+def test_a_scan_from_above_has_its_points_where_they_are() -> None:
+    """X to the right, Y up: a point 25 m ahead and 10 m to the left, coloured by its category."""
+    points = np.zeros(2, POINT)
+    points["position_m"] = [(25.0, 10.0, 0.0), (25.0, 10.0, -1.0)]
+    points["category_id"] = [3, 0]
+    cloud = PointCloud("top", Lidar("top", "color"), points)
+
+    view = top_view(cloud, Scene("t"), aspect=2.0)
+
+    assert view.shape == (480, 960, 3)
+    (row,), (column,) = np.nonzero(view.any(axis=-1))
+    assert (row, column) == (240 - 96, 480 + 240)
+    assert tuple(view[row, column]) == color_of(3)

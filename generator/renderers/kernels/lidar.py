@@ -44,6 +44,7 @@ class Scan:
         reach_m: Rays end here.
         spread: Tangent of the angle between a beam's axis and the rays around it.
         subrays: 1 or 7.
+        run: Rays per thread.
     """
 
     R_world_lidar: wp.mat33
@@ -51,6 +52,7 @@ class Scan:
     reach_m: float
     spread: float
     subrays: int
+    run: int
 
 
 @wp.func
@@ -86,6 +88,39 @@ def returned(light: Infrared, cosine: float):
     return diffuse + lobe + light.retro * c * wp.clamp((c - 0.35) * 4.0, 0.0, 1.0)
 
 
+@wp.struct
+class Nearest:
+    """The nearest hit of a ray so far; body -1 where there is none.
+
+    Attributes:
+        u, v: Weights of the face's first two vertices.
+    """
+
+    range_m: float
+    body: int
+    face: int
+    u: float
+    v: float
+
+
+@wp.func
+def nearer(world: World, b: int, ray: wp.vec3, hit: Nearest):
+    """The hit, or a nearer one on a body.
+
+    From the scanner's own frame: what is far from the world's origin loses nothing.
+    """
+    d = world.bodies[b].B_mesh_camera @ ray
+    mesh = world.geometries[world.bodies[b].geometry].mesh
+    answer = wp.mesh_query_ray(mesh, world.bodies[b].eye_mesh, d, hit.range_m)
+    if answer.result:
+        hit.range_m = answer.t
+        hit.body = b
+        hit.face = answer.face
+        hit.u = answer.u
+        hit.v = answer.v
+    return hit
+
+
 @wp.kernel
 def scan_beams(
     scan: Scan,
@@ -99,41 +134,43 @@ def scan_beams(
 ):
     """First hit of every ray; ray k of beam i is at ``i * subrays + k``.
 
-    Hits are (body, material), (-1, -1) where there is nothing.
+    Each thread takes ``run`` rays, one after the other: what the last one hit is tried first, and
+    mostly leaves nothing else to try. Hits are (body, material), (-1, -1) where there is nothing.
     """
-    i = wp.tid()
-    ray = ray_of_beam(axes[i / scan.subrays], i % scan.subrays, scan.spread)
-    nearest = float(scan.reach_m)
-    hit = wp.vec2i(-1, -1)
-    u = float(0.0)
-    v = float(0.0)
-    candidates = wp.bvh_query_ray(world.tree, scan.eye_m, scan.R_world_lidar @ ray)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, nearest):
-        # From the scanner's own frame: what is far from the world's origin loses nothing.
-        d = world.bodies[b].B_mesh_camera @ ray
-        mesh = world.geometries[world.bodies[b].geometry].mesh
-        answer = wp.mesh_query_ray(mesh, world.bodies[b].eye_mesh, d, nearest)
-        if answer.result:
-            nearest = answer.t
-            hit = wp.vec2i(b, answer.face)
-            u = answer.u
-            v = answer.v
-    if hit[0] < 0:
-        hits[i] = hit
-        ranges_m[i] = wp.inf
-        reflectances[i] = 0.0
-        cosines[i] = 0.0
-        return
-    g = world.bodies[hit[0]].geometry
-    corner = corners_of(world, g, hit[1])
-    n = normal_at(world, g, corner[0]) * u
-    n += normal_at(world, g, corner[1]) * v
-    n += normal_at(world, g, corner[2]) * (1.0 - u - v)
-    n_lidar = wp.transpose(scan.R_world_lidar) @ (world.bodies[hit[0]].R_world_mesh @ unit(n))
-    cosine = wp.min(wp.abs(wp.dot(n_lidar, ray)), 1.0)
-    material = surface_index(world, hit)
-    hits[i] = wp.vec2i(hit[0], material)
-    ranges_m[i] = nearest
-    cosines[i] = cosine
-    reflectances[i] = returned(lights[material], cosine)
+    t = wp.tid()
+    end = wp.min((t + 1) * scan.run, ranges_m.shape[0])
+    last = int(-1)
+    for i in range(t * scan.run, end):
+        ray = ray_of_beam(axes[i / scan.subrays], i % scan.subrays, scan.spread)
+        hit = Nearest()
+        hit.range_m = scan.reach_m
+        hit.body = -1
+        if last >= 0:
+            hit = nearer(world, last, ray, hit)
+        tried = last
+        candidates = wp.bvh_query_ray(world.tree, scan.eye_m, scan.R_world_lidar @ ray)
+        b = int(0)
+        while wp.bvh_query_next(candidates, b, hit.range_m):
+            if b != tried:
+                hit = nearer(world, b, ray, hit)
+        last = hit.body
+        if hit.body < 0:
+            hits[i] = wp.vec2i(-1, -1)
+            ranges_m[i] = wp.inf
+            reflectances[i] = 0.0
+            cosines[i] = 0.0
+        else:
+            g = world.bodies[hit.body].geometry
+            corner = corners_of(world, g, hit.face)
+            n = normal_at(world, g, corner[0]) * hit.u
+            n += normal_at(world, g, corner[1]) * hit.v
+            n += normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
+            n_lidar = wp.transpose(scan.R_world_lidar) @ (
+                world.bodies[hit.body].R_world_mesh @ unit(n)
+            )
+            cosine = wp.min(wp.abs(wp.dot(n_lidar, ray)), 1.0)
+            material = surface_index(world, wp.vec2i(hit.body, hit.face))
+            hits[i] = wp.vec2i(hit.body, material)
+            ranges_m[i] = hit.range_m
+            cosines[i] = cosine
+            reflectances[i] = returned(lights[material], cosine)

@@ -1,0 +1,76 @@
+"""CPU milliseconds per laser sweep in a street: ``python -m benchmarks.bench_lidar``.
+
+An HDL-64E, 133,312 pulses, in samples of ``kitti_rig.yaml``: everything from directions to records
+with position, intensity, time, ring, labels and returns. One process, one core; the best of
+several sweeps, as the scene is packed and traced anew for each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+from benchmarks.bench_render import timed_launches
+from benchmarks.runs import machine
+from generator.assemble.recipe import open_pipeline
+from generator.assemble.spec import load_spec
+from generator.core.capture import Beams, PointCloud
+from generator.core.streams import Streams
+from generator.sensors.lidar import LidarSensor
+from generator.sensors.lidars import lidar_model
+from generator.sensors.scanning import sweep_of
+
+
+def best_s(work: Callable[[], object], repeats: int) -> float:
+    """Least CPU time of one call."""
+    spent = []
+    for _ in range(repeats):
+        started = time.process_time()
+        work()
+        spent.append(time.process_time() - started)
+    return min(spent)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=3)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--model", default="HDL-64E")
+    arguments = parser.parse_args()
+    model = lidar_model(arguments.model)
+    sweep = sweep_of(model, 0.0)
+    beams = Beams(sweep.directions, 0.0, 1, model.range_m[1])
+    spec = load_spec("kitti_rig.yaml", overrides=["sensors[0].size_px=[64, 32]"])
+    print(f"{machine()}; {arguments.model}, {len(sweep.ring)} pulses")
+    with open_pipeline(spec) as pipeline:
+        for index in range(0, 5 * arguments.samples, 5):
+            scene = pipeline.sample(index).scene
+            renderer, lidar = pipeline.renderer, scene.lidar("velodyne")
+            for sensor in (
+                LidarSensor(name="velodyne", model=arguments.model),
+                LidarSensor(
+                    name="velodyne", model=arguments.model, divergence=True, returns="dual"
+                ),
+            ):
+
+                def capture(sensor: LidarSensor = sensor) -> PointCloud:
+                    rng = Streams(0, 0).rng("sensor/velodyne")
+                    return sensor.capture(scene, renderer, frozenset(), rng)  # noqa: B023
+
+                points = len(capture().points)
+                spent = best_s(capture, arguments.repeats)
+                kind = "7 rays, dual" if sensor.divergence else "1 ray, strongest"
+                print(f"sample {index}, {kind}: {1e3 * spent:.0f} ms, {points} points")
+            scan_s = best_s(lambda: renderer.scan(scene, lidar, beams), arguments.repeats)  # noqa: B023
+            with timed_launches() as by_kernel:
+                renderer.scan(scene, lidar, beams)
+            for kernel, ms in by_kernel.items():
+                rate = len(sweep.ring) / ms / 1e3
+                print(f"    {len(scene.bodies)} bodies; scan {1e3 * scan_s:.0f} ms; {kernel}"
+                      f" {ms:.0f} ms = {rate:.2f} million rays/s")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
