@@ -23,6 +23,7 @@ from generator.pipeline.pipeline import Blueprint, Recipe
 from scene_templates.builder import build
 
 BLUEPRINTS_KEPT = 32
+IMAGING = ("camera", "lidar")
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,9 @@ def recipe_of(
         lidars=tuple(sorted(s.name for s in spec.sensors if s.modality == "lidar")),
         media={s.name: tuple(s.media) for s in spec.sensors if s.modality == "camera"},
         depth_scale_m=spec.head.depth_scale_m,
+        devices={s.name: s.modality for s in spec.sensors if s.modality not in IMAGING},
+        steps_per_scene=spec.head.steps_per_scene,
+        step_s=spec.head.step_s,
     )
     exporters = _exporters(spec, info)
     needed = frozenset().union(*(a.channels for a in annotators), extra_channels)

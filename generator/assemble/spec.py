@@ -73,6 +73,10 @@ class Head(Strict):
     views_per_scene: int = Field(
         1, ge=1, le=10_000, description="Views that share one settled scene."
     )
+    steps_per_scene: int = Field(
+        1, ge=1, le=10_000, description="Instants of every view: samples that follow in time."
+    )
+    step_s: float = Field(0.1, gt=0, le=10, description="Time between two instants [s].")
     shard_size: int = Field(
         SHARD_SIZE, ge=1, le=100_000, description="Samples that are committed together."
     )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.scene import Camera, Lidar
+from generator.core.scene import Camera, Device, Lidar
 
 
 class Channel(str, Enum):
@@ -64,12 +64,14 @@ class Reading:
     Attributes:
         channels: Arrays by channel, as listed at Channel.
         silhouettes: By instance id; empty unless AMODAL was asked for.
+        time_s: The instant that depth, ids and boxes refer to.
     """
 
     sensor: str
     camera: Camera
     channels: Mapping[Channel, NDArray[Any]]
     silhouettes: Mapping[int, Silhouette] = field(default_factory=dict)
+    time_s: float = 0.0
 
 
 POINT = np.dtype(
@@ -106,11 +108,28 @@ class PointCloud:
 
     Attributes:
         points: Records of ``POINT`` [n].
+        time_s: The instant that ``lidar`` and the boxes refer to.
     """
 
     sensor: str
     lidar: Lidar
     points: NDArray[np.void]
+    time_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Table:
+    """What a device measured: radar, inertial unit, satellite receiver, odometer, watcher.
+
+    Attributes:
+        rows: Records [n] of the dtype that belongs to ``device.kind``; may be empty.
+        time_s: The instant that ``device`` refers to.
+    """
+
+    sensor: str
+    device: Device
+    rows: NDArray[np.void]
+    time_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -154,7 +173,12 @@ class Echoes:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Capture:
-    """What all sensors saw at one instant, by sensor name: cameras read, lidars return clouds."""
+    """What all sensors saw at one instant, by sensor name.
+
+    Cameras read, lidars return clouds, other devices tables. A sensor slower than the sequence is
+    missing from the steps between.
+    """
 
     readings: Mapping[str, Reading]
     clouds: Mapping[str, PointCloud] = field(default_factory=dict)
+    tables: Mapping[str, Table] = field(default_factory=dict)

@@ -7,12 +7,12 @@ of counting: what must not be done cannot be done.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from generator.core.capture import Beams, Channel, Echoes, PointCloud, Reading
+from generator.core.capture import Beams, Channel, Echoes, PointCloud, Reading, Table
 from generator.core.errors import Rejection
 from generator.core.geometry import (
     Asset,
@@ -160,7 +160,7 @@ class Sensor(Protocol):
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
-    ) -> Reading | PointCloud:
+    ) -> Reading | PointCloud | Table:
         """What the sensor sees; ``channels`` are what annotators need beyond its own."""
         ...
 
@@ -189,6 +189,9 @@ class DatasetInfo:
         lidars: Names of the laser scanners, sorted.
         media: ``{sensor: channels written as images}``.
         depth_scale_m: Metres per unit of the 16-bit depth images.
+        devices: ``{sensor: kind}`` of all other sensors, sorted by name.
+        steps_per_scene: Instants of one view: the length of a sequence.
+        step_s: Time between them.
     """
 
     name: str
@@ -200,6 +203,9 @@ class DatasetInfo:
     media: Mapping[str, tuple[Channel, ...]]
     depth_scale_m: float = 0.0001
     lidars: tuple[str, ...] = ()
+    devices: Mapping[str, str] = field(default_factory=dict)
+    steps_per_scene: int = 1
+    step_s: float = 0.1
 
 
 class Exporter(Protocol):

@@ -99,8 +99,8 @@ class Sample:
     """One element of the data set.
 
     Attributes:
-        index: Number in the data set, from 0; ``divmod(index, views_per_scene)`` names scene and
-            view.
+        index: Number in the data set, from 0: scene, then view, then step, the last the fastest.
+        step_index: Instant of its view's sequence; ``scene.time_s`` tells when.
         split: ``train``, ``val`` or ``test``: the same for all views of a scene.
         scene: The final world; rendering it again needs no randomizer and no physics.
         truth: Annotations by sensor name.
@@ -117,6 +117,7 @@ class Sample:
     truth: Mapping[str, ImageTruth]
     attempts: int = 1
     timings_s: Mapping[str, float] = field(default_factory=dict)
+    step_index: int = 0
 
     def image_id(self, sensor: str) -> int:
         """Number of one image of the sample, from 1, unique in the data set."""

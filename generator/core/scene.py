@@ -12,6 +12,7 @@ from typing import Literal, Protocol, TypeVar
 
 from generator.core.geometry import Keypoint, Material
 from generator.core.intrinsics import Intrinsics
+from generator.core.motion import STILL, Change, Track, Twist
 from generator.core.se3 import IDENTITY, SE3, Vec3
 
 SharedValue = str | float | int | bool
@@ -37,6 +38,7 @@ class Instance:
         subcategory: A finer name than the category; may be empty.
         attributes: Further facts that labels carry, ``(name, value)``, sorted by name.
         keypoints: Named points in the instance frame, in the order of their skeleton.
+        twist: How its frame moves.
     """
 
     instance_id: int
@@ -52,6 +54,7 @@ class Instance:
     subcategory: str = ""
     attributes: tuple[tuple[str, str], ...] = ()
     keypoints: tuple[Keypoint, ...] = ()
+    twist: Twist = STILL
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +217,7 @@ class Light:
         angular_radius_rad: Of the disc in the sky (sun).
         cone_rad: Half angle at which a spot has faded to nothing.
         even: Share of the cone within which a spot is even; outside it fades.
+        body: Name of the body it moves with; empty = none.
     """
 
     name: str
@@ -227,6 +231,7 @@ class Light:
     angular_radius_rad: float = 0.00465
     cone_rad: float = 0.6
     even: float = 0.8
+    body: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,38 +279,79 @@ class Weather:
 
 
 @dataclass(frozen=True, slots=True)
+class Rig:
+    """A frame that sensors are mounted on: the ego vehicle's, a robot's wrist.
+
+    Attributes:
+        body: Name of the body it rides on.
+        T_body_rig: Where it is on the body. X forward, Y left, Z up.
+    """
+
+    name: str
+    body: str
+    T_body_rig: SE3 = IDENTITY
+
+
+@dataclass(frozen=True, slots=True)
 class Camera:
-    """A camera mounted in the world.
+    """A camera.
 
     Attributes:
         name: The sensor's name in the YAML.
-        T_world_camera: Camera frame: X right, Y down, Z forward.
+        T_world_camera: Camera frame: X right, Y down, Z forward. Follows the rig if it has one.
         ev100: Fixed exposure value at ISO 100; None = exposed automatically.
+        rig: Name of the rig it is mounted on; empty = it stands in the world by itself.
+        T_rig_camera: Where it is on its rig.
     """
 
     name: str
     T_world_camera: SE3
     intrinsics: Intrinsics
     ev100: float | None = None
+    rig: str = ""
+    T_rig_camera: SE3 = IDENTITY
 
 
 @dataclass(frozen=True, slots=True)
 class Lidar:
-    """A laser scanner on the rig of a camera.
+    """A laser scanner on a rig, or on that of a camera.
 
     Attributes:
         name: The sensor's name in the YAML.
-        camera: Name of the camera it rides with.
-        T_rig_lidar: Where it is on the rig. Both frames are X forward, Y left, Z up; the rig's
-            origin is the camera's centre, its X axis the camera's optical axis.
-        T_world_lidar: Its pose; follows the camera.
+        camera: Name of the camera it rides with; empty = it is on ``rig``.
+        T_rig_lidar: Where it is on the rig. Both frames are X forward, Y left, Z up; the origin of
+            a camera's rig is the camera's centre, its X axis the camera's optical axis.
+        T_world_lidar: Its pose; follows the rig.
         model: What it is, for the labels: ``HDL-64E``.
+        rig: Name of its rig; empty = it rides with ``camera``.
     """
 
     name: str
     camera: str
     T_rig_lidar: SE3 = IDENTITY
     T_world_lidar: SE3 = IDENTITY
+    model: str = ""
+    rig: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """Any other sensor on a rig: radar, inertial unit, satellite receiver, odometer, watcher.
+
+    Attributes:
+        name: The sensor's name in the YAML.
+        kind: The modality: ``radar``, ``imu``, ``gnss``, ``odometer``, ``events``.
+        rig: Name of its rig.
+        T_rig_device: Where it is on the rig. X forward, Y left, Z up.
+        T_world_device: Its pose; follows the rig.
+        model: What it is, for the labels.
+    """
+
+    name: str
+    kind: str
+    rig: str
+    T_rig_device: SE3 = IDENTITY
+    T_world_device: SE3 = IDENTITY
     model: str = ""
 
 
@@ -326,6 +372,9 @@ class Scene:
             inner walls.
         lanes: Where things may move or stand, in a street.
         shared: Values that several draws have in common, ``(name, value)``, sorted by name.
+        time_s: The instant it is shown at; 0 = when it was built.
+        tracks: How bodies move; at most one per body.
+        changes: What changes at once, in order of time.
     """
 
     template: str
@@ -343,6 +392,11 @@ class Scene:
     lanes: tuple[Lane, ...] = ()
     weather: Weather = Weather()
     shared: tuple[tuple[str, SharedValue], ...] = ()
+    rigs: tuple[Rig, ...] = ()
+    devices: tuple[Device, ...] = ()
+    time_s: float = 0.0
+    tracks: tuple[Track, ...] = ()
+    changes: tuple[Change, ...] = ()
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""
@@ -359,6 +413,23 @@ class Scene:
     def lidar(self, name: str) -> Lidar:
         """The laser scanner of that name; KeyError if there is none."""
         return _named(self.lidars, name)
+
+    def device(self, name: str) -> Device:
+        """The device of that name; KeyError if there is none."""
+        return _named(self.devices, name)
+
+    def rig(self, name: str) -> Rig:
+        """The rig of that name; KeyError if there is none."""
+        return _named(self.rigs, name)
+
+    def track(self, body: str) -> Track | None:
+        """The track of that body; None if it stands still."""
+        return next((track for track in self.tracks if track.body == body), None)
+
+    def rig_pose(self, name: str) -> SE3:
+        """``T_world_rig``; KeyError if there is none."""
+        rig = self.rig(name)
+        return self.body(rig.body).T_world_body @ rig.T_body_rig
 
     def instance(self, instance_id: int) -> Instance:
         """The instance with that id; KeyError if there is none."""

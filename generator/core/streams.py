@@ -1,7 +1,7 @@
 """Random streams: stateless, keyed by what draws, never by when it draws.
 
-A stream's key is a digest of (seed, scene, view, attempt, name). Adding, removing or reordering
-whatever draws leaves every other stream as it was, and any sample can be made alone.
+A stream's key is a digest of (seed, scene, view, step, attempt, name). Adding, removing or
+reordering whatever draws leaves every other stream as it was, and any sample can be made alone.
 Counter-based generator: Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
 """
 
@@ -17,8 +17,8 @@ class Rng(np.random.Generator):
     """A numpy generator that also knows the number of the scene or sample it draws for.
 
     Attributes:
-        index: Scene index for draws that all views share, else sample index. What a
-            ``sequence`` in YAML steps by, so that no distribution needs a memory.
+        index: Scene index for draws that all views share, else the number of the view in the
+            data set. What a ``sequence`` in YAML steps by, so that no distribution needs a memory.
     """
 
     index: int = 0
@@ -34,6 +34,7 @@ class Streams:
         view: View index within the scene, or -1 for draws that all views of a scene share.
         attempt: Number of the attempt, from 0.
         index: What ``Rng.index`` will be.
+        step: Instant of a sequence, for draws that differ from one to the next.
     """
 
     seed: int
@@ -41,10 +42,12 @@ class Streams:
     view: int = -1
     attempt: int = 0
     index: int = 0
+    step: int = 0
 
     def rng(self, name: str) -> Rng:
         """The generator of everything that ``name`` draws."""
-        text = "\0".join((str(self.seed), str(self.scene), str(self.view), str(self.attempt), name))
+        view = f"{self.view}.{self.step}" if self.step else str(self.view)
+        text = "\0".join((str(self.seed), str(self.scene), view, str(self.attempt), name))
         key = blake2b(text.encode(), digest_size=16).digest()
         rng = Rng(np.random.Philox(key=int.from_bytes(key, "little")))
         rng.index = self.index

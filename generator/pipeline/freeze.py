@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from generator.core.instants import with_twists
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Body, Instance, Scene
 from generator.core.se3 import SE3, Array, Vec3
@@ -31,27 +32,7 @@ def frozen_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, 
         )
         for instance in scene.instances
     )
-    return replace(scene, instances=instances)
-
-
-RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
-"""``T_camera_rig``: X forward, Y left, Z up in the camera's X right, Y down, Z forward."""
-
-
-def with_placed_sensors(scene: Scene) -> Scene:
-    """The scene with camera poses on the decimal grid of files, and lidars where they ride."""
-    cameras = tuple(replace(c, T_world_camera=c.T_world_camera.rounded()) for c in scene.cameras)
-    scene = replace(scene, cameras=cameras)
-    lidars = tuple(
-        replace(
-            lidar,
-            T_world_lidar=(
-                scene.camera(lidar.camera).T_world_camera @ RIG_AXES @ lidar.T_rig_lidar
-            ).rounded(),
-        )
-        for lidar in scene.lidars
-    )
-    return replace(scene, lidars=lidars)
+    return with_twists(replace(scene, instances=instances))
 
 
 def _known(instance: Instance, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Instance:

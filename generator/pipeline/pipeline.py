@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from generator.core.capture import Capture, Channel, PointCloud, Reading
+from generator.core.capture import Capture, Channel, PointCloud, Reading, Table
 from generator.core.errors import LayoutRejected, Rejection, SceneRejected
+from generator.core.instants import at, with_placed_sensors
 from generator.core.interfaces import (
     AssetLibrary,
     DatasetInfo,
@@ -24,7 +25,7 @@ from generator.core.interfaces import (
 from generator.core.sample import ImageTruth, Sample
 from generator.core.scene import Scene
 from generator.core.streams import Streams
-from generator.pipeline.freeze import frozen_scene, with_placed_sensors
+from generator.pipeline.freeze import frozen_scene
 from generator.pipeline.scans import with_lidar_points
 
 if TYPE_CHECKING:
@@ -85,11 +86,21 @@ class AcceptedScene:
     timings_s: Mapping[str, float]
 
 
+@dataclass(frozen=True, slots=True)
+class DrawnView:
+    """A view of a scene at the beginning of its sequence, and the streams that drew it."""
+
+    scene_index: int
+    view_index: int
+    scene: Scene
+    streams: Streams
+
+
 class Pipeline:
     """Owns the engines; ``sample(index)`` depends on nothing but the recipe and the index.
 
-    The last accepted scene is kept, because the next index is usually another view of it: an
-    optimisation, never a state.
+    The last accepted scene and view are kept, because the next index is usually another view or
+    the next instant of them: an optimisation, never a state.
     """
 
     def __init__(
@@ -106,6 +117,7 @@ class Pipeline:
         self._physics: PhysicsEngine | None = None
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
+        self._view: DrawnView | None = None
         self._category_ids = {name: i for i, name in enumerate(recipe.info.categories, 1)}
 
     @property
@@ -143,35 +155,57 @@ class Pipeline:
             SceneRejected: no valid layout within the bounded number of attempts.
             SampleError: the labels contradict each other.
         """
-        scene_index, view_index = divmod(index, self.recipe.views_per_scene)
+        view_number, step_index = divmod(index, self.info.steps_per_scene)
+        scene_index, view_index = divmod(view_number, self.recipe.views_per_scene)
         accepted = self.accepted_scene(scene_index)
-        timings: dict[str, float] = dict(accepted.timings_s) if view_index == 0 else {}
+        first = view_index == 0 and step_index == 0
+        timings: dict[str, float] = dict(accepted.timings_s) if first else {}
         with _timed(timings, "randomize"):
-            scene, streams = self._view(accepted, view_index, index)
-        readings: dict[str, Reading] = {}
-        clouds: dict[str, PointCloud] = {}
-        truth: dict[str, ImageTruth] = {}
-        for sensor in self.recipe.sensors:
-            rng = streams.rng(f"sensor/{sensor.name}")
-            with _timed(timings, "render"):
-                seen = sensor.capture(scene, self.renderer, self.recipe.channels, rng)
-            if isinstance(seen, PointCloud):
-                clouds[sensor.name] = seen
-                continue
-            with _timed(timings, "annotate"):
-                truth[sensor.name] = self.recipe.image_truth(scene, seen)
-            readings[sensor.name] = seen
+            view = self.drawn_view(accepted, view_index)
+            scene = self._instant(view.scene, step_index * self.info.step_s)
+            streams = replace(view.streams, step=step_index)
+        capture, truth = self._captured(scene, streams, timings)
         return Sample(
             index=index,
             scene_index=scene_index,
             view_index=view_index,
+            step_index=step_index,
             split=self.split(scene_index),
             scene=scene,
-            capture=Capture(readings, clouds),
-            truth=with_lidar_points(truth, clouds),
+            capture=capture,
+            truth=with_lidar_points(truth, capture.clouds),
             attempts=accepted.attempt + 1,
             timings_s=timings,
         )
+
+    def _captured(
+        self, scene: Scene, streams: Streams, timings_s: dict[str, float]
+    ) -> tuple[Capture, dict[str, ImageTruth]]:
+        """What every sensor sees, and the truth about every image at the image's instant."""
+        readings: dict[str, Reading] = {}
+        clouds: dict[str, PointCloud] = {}
+        tables: dict[str, Table] = {}
+        truth: dict[str, ImageTruth] = {}
+        for sensor in self.recipe.sensors:
+            rng = streams.rng(f"sensor/{sensor.name}")
+            with _timed(timings_s, "render"):
+                seen = sensor.capture(scene, self.renderer, self.recipe.channels, rng)
+            if isinstance(seen, PointCloud):
+                clouds[sensor.name] = seen
+            elif isinstance(seen, Table):
+                tables[sensor.name] = seen
+            else:
+                with _timed(timings_s, "annotate"):
+                    then = self._instant(scene, seen.time_s)
+                    truth[sensor.name] = self.recipe.image_truth(then, seen)
+                readings[sensor.name] = seen
+        return Capture(readings, clouds, tables), truth
+
+    def _instant(self, scene: Scene, time_s: float) -> Scene:
+        """The scene at another instant, its instances measured anew."""
+        if time_s == scene.time_s:
+            return scene
+        return frozen_scene(at(scene, time_s), self.assets, self._category_ids)
 
     def accepted_scene(self, scene_index: int) -> AcceptedScene:
         """The scene at rest that all views of it share."""
@@ -209,19 +243,30 @@ class Pipeline:
             rejections.append(settled.rejection)
         raise SceneRejected(scene_index, tuple(rejections))
 
-    def _view(self, accepted: AcceptedScene, view_index: int, index: int) -> tuple[Scene, Streams]:
-        """The scene as one view sees it; a view that cannot be drawn is tried again."""
+    def drawn_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
+        """One view of a scene, before anything has moved."""
+        latest = self._view
+        if latest is None or (latest.scene_index, latest.view_index) != (
+            accepted.index,
+            view_index,
+        ):
+            latest = self._view = self._draw_view(accepted, view_index)
+        return latest
+
+    def _draw_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
+        """A view that cannot be drawn is tried again."""
+        number = accepted.index * self.recipe.views_per_scene + view_index
         rejections: list[Rejection] = []
         for attempt in range(self.recipe.layout_attempts_max):
             streams = Streams(
-                self.recipe.seed, accepted.index, view=view_index, attempt=attempt, index=index
+                self.recipe.seed, accepted.index, view=view_index, attempt=attempt, index=number
             )
             try:
                 scene = self._randomized(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
                 continue
-            return with_placed_sensors(scene), streams
+            return DrawnView(accepted.index, view_index, with_placed_sensors(scene), streams)
         raise SceneRejected(accepted.index, tuple(rejections))
 
     def _randomized(

@@ -60,7 +60,7 @@ class WarpRenderer:
         if Channel.AMODAL in channels:
             ids = images[Channel.INSTANCE]
             outlines = silhouettes(scene, world, view, self._stock, seen, ids)
-        return Reading(camera.name, camera, images, outlines)
+        return Reading(camera.name, camera, images, outlines, scene.time_s)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
         """What the rays of a laser scanner's beams hit first, and how well it reflects."""

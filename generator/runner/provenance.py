@@ -27,6 +27,7 @@ class KeptScene:
     index: int
     scene_index: int
     view_index: int
+    step_index: int
     split: str
     attempts: int
     scene: Scene
@@ -47,6 +48,7 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
             "index": sample.index,
             "scene_index": sample.scene_index,
             "view_index": sample.view_index,
+            "step_index": sample.step_index,
             "split": sample.split,
             "attempts": sample.attempts,
             "base": None if base is None else base.index,

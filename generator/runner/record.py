@@ -86,7 +86,7 @@ def describe_shard(
     assets: set[str] = set()
     for sample in samples:
         assets |= _assets_in(sample.scene)
-        if sample.view_index == 0:
+        if sample.view_index == 0 and sample.step_index == 0:
             scenes += 1
             rejections += sample.attempts - 1
         counts.append(_count(sample))

@@ -114,7 +114,7 @@ class LidarSensor(Strict):
         found = Found.of(pulses, rows, picks)
         if not self.ideal:
             found = _noisy(found, model, weather, rng)
-        return PointCloud(self.name, lidar, _points(found, sweep, model))
+        return PointCloud(self.name, lidar, _points(found, sweep, model), scene.time_s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -1,0 +1,172 @@
+"""How things move: poses at even steps of time, what lies between them, and sudden changes.
+
+Only ``+ - * / sqrt`` and no transcendental function decide a pose, so that it has the same bits on
+every processor.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.geometry import Material
+from generator.core.se3 import SE3, Array, Vec3, multiply_quaternions
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """How a frame moves at one instant; world axes.
+
+    Attributes:
+        velocity_m_s, acceleration_m_s2: Of its origin.
+        angular_velocity_rad_s: Of its axes.
+    """
+
+    velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
+    acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
+    angular_velocity_rad_s: Vec3 = (0.0, 0.0, 0.0)
+
+
+STILL = Twist()
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """The way of one body through time.
+
+    Positions between knots lie on cubic Hermite curves with the slopes of Catmull and Rom (1974),
+    so that velocity has no jumps; rotations are interpolated linearly and normalised. Before the
+    first and after the last knot the body stands still.
+
+    Attributes:
+        body: Name of the body.
+        step_s: Time between knots.
+        knots: ``T_world_body`` at ``start_s + k * step_s``; at least two.
+        start_s: Time of the first knot.
+    """
+
+    body: str
+    step_s: float
+    knots: tuple[SE3, ...]
+    start_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no way.
+
+        Raises:
+            ValueError: fewer than two knots, or no step.
+        """
+        if len(self.knots) < 2 or not self.step_s > 0.0:
+            raise ValueError(f"the track of '{self.body}' needs two knots and a step above 0 s")
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last knot."""
+        return self.start_s + (len(self.knots) - 1) * self.step_s
+
+    def pose(self, time_s: float) -> SE3:
+        """``T_world_body`` at one instant."""
+        k, f = self._place(time_s)
+        if f == 0.0:
+            return self.knots[k]
+        if f == 1.0:
+            return self.knots[k + 1]
+        weights = (
+            (1.0 + 2.0 * f) * (1.0 - f) * (1.0 - f),
+            f * (1.0 - f) * (1.0 - f),
+            f * f * (3.0 - 2.0 * f),
+            f * f * (f - 1.0),
+        )
+        return SE3(self._weighted(k, weights), self._turned(k, f))
+
+    def poses(self, times_s: NDArray[np.floating]) -> tuple[Array, Array]:
+        """Rotation matrices [n, 3, 3] and translations [n, 3] at several instants."""
+        poses = [self.pose(float(t)) for t in times_s]
+        return (
+            np.stack([pose.rotation() for pose in poses]),
+            np.array([pose.translation_m for pose in poses]),
+        )
+
+    def twist(self, time_s: float) -> Twist:
+        """How the body moves at one instant; nothing moves outside the knots."""
+        if not self.start_s <= time_s <= self.end_s:
+            return STILL
+        k, f = self._place(time_s)
+        h = self.step_s
+        slope = (
+            6.0 * f * (f - 1.0),
+            (1.0 - f) * (1.0 - 3.0 * f),
+            6.0 * f * (1.0 - f),
+            f * (3 * f - 2),
+        )
+        bend = (12.0 * f - 6.0, 6.0 * f - 4.0, 6.0 - 12.0 * f, 6.0 * f - 2.0)
+        return Twist(
+            self._weighted(k, tuple(w / h for w in slope)),
+            self._weighted(k, tuple(w / (h * h) for w in bend)),
+            _angular_velocity(self.knots[k], self.knots[k + 1], h),
+        )
+
+    def _place(self, time_s: float) -> tuple[int, float]:
+        """Number of the knot before an instant, and the share of the step that has passed."""
+        last = len(self.knots) - 2
+        # A grid that does not depend on how an instant was added up.
+        steps = round((time_s - self.start_s) / self.step_s, 9)
+        k = min(max(math.floor(steps), 0), last)
+        return k, min(max(steps - k, 0.0), 1.0)
+
+    def _weighted(self, k: int, weights: tuple[float, ...]) -> Vec3:
+        """A combination of two knots' positions and of the slopes there, per step."""
+        a, b = self.knots[k].translation_m, self.knots[k + 1].translation_m
+        from_, to = self._slope(k), self._slope(k + 1)
+        x, y, z = (
+            weights[0] * a[i] + weights[1] * from_[i] + weights[2] * b[i] + weights[3] * to[i]
+            for i in range(3)
+        )
+        return (x, y, z)
+
+    def _slope(self, k: int) -> Vec3:
+        """Way per step at a knot; one-sided at the ends."""
+        before, after = max(k - 1, 0), min(k + 1, len(self.knots) - 1)
+        a, b = self.knots[before].translation_m, self.knots[after].translation_m
+        span = after - before
+        return ((b[0] - a[0]) / span, (b[1] - a[1]) / span, (b[2] - a[2]) / span)
+
+    def _turned(self, k: int, f: float) -> tuple[float, float, float, float]:
+        a, b = self.knots[k].quaternion_wxyz, self.knots[k + 1].quaternion_wxyz
+        sign = 1.0 if sum(p * q for p, q in zip(a, b, strict=True)) >= 0.0 else -1.0
+        w, x, y, z = ((1.0 - f) * p + f * sign * q for p, q in zip(a, b, strict=True))
+        norm = math.sqrt(w * w + x * x + y * y + z * z)
+        return (w / norm, x / norm, y / norm, z / norm)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What a body is like from an instant on: a lamp that lights, the next step of a walk.
+
+    Attributes:
+        time_s: From when on; until the next change of the same body.
+        body: Name of the body.
+        asset: Its mesh asset; empty = as before.
+        materials: One per mesh slot; empty = as before.
+        attributes: Facts about its instance that change, ``(name, value)``.
+    """
+
+    time_s: float
+    body: str
+    asset: str = ""
+    materials: tuple[Material, ...] = ()
+    attributes: tuple[tuple[str, str], ...] = ()
+
+
+def _angular_velocity(one: SE3, other: SE3, step_s: float) -> Vec3:
+    """Mean angular velocity between two poses, in the outer frame's axes."""
+    w, x, y, z = one.quaternion_wxyz
+    dw, dx, dy, dz = multiply_quaternions(other.quaternion_wxyz, (w, -x, -y, -z))
+    if dw < 0.0:
+        dw, dx, dy, dz = -dw, -dx, -dy, -dz
+    sine = math.sqrt(dx * dx + dy * dy + dz * dz)
+    rate = 2.0 * math.atan2(sine, dw) / (sine * step_s) if sine > 1e-12 else 2.0 / step_s
+    return (rate * dx, rate * dy, rate * dz)

@@ -1,0 +1,159 @@
+"""Tracks pass through their knots, move as calculus says, and carry everything that rides along."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+from generator.core.instants import at, with_placed_sensors
+from generator.core.intrinsics import Intrinsics
+from generator.core.motion import STILL, Change, Track
+from generator.core.scene import Body, Camera, Device, Instance, Lidar, Light, Rig, Scene
+from generator.core.se3 import SE3
+
+QUICK = settings(max_examples=60, deadline=None, derandomize=True)
+
+ways = st.lists(
+    st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(-3, 3)), min_size=2, max_size=8
+)
+
+
+def track_of(points: list[tuple[float, float, float]], step_s: float = 0.25) -> Track:
+    """A track through points, turning a little at every knot."""
+    return Track(
+        "car", step_s, tuple(SE3.about_z(0.1 * k, p) for k, p in enumerate(points)), start_s=1.0
+    )
+
+
+@QUICK
+@given(ways)
+def test_a_track_passes_through_its_knots(points: list[tuple[float, float, float]]) -> None:
+    """At the knots' instants the pose is the knot itself."""
+    track = track_of(points)
+    for k, knot in enumerate(track.knots):
+        assert track.pose(1.0 + 0.25 * k) == knot
+
+
+@QUICK
+@given(ways, st.floats(0.0, 1.0))
+def test_positions_velocities_and_accelerations_are_those_of_a_catmull_rom_spline(
+    points: list[tuple[float, float, float]], share: float
+) -> None:
+    """SciPy's Hermite spline with central differences for slopes, and its derivatives."""
+    track = track_of(points)
+    p = np.array(points)
+    knots_s = 1.0 + 0.25 * np.arange(len(points))
+    spline = CubicHermiteSpline(knots_s, p, np.gradient(p, 0.25, axis=0))
+    t = 1.0 + share * (knots_s[-1] - 1.0)
+    if np.min(np.abs(knots_s - t)) < 1e-6:
+        return
+    twist = track.twist(t)
+    np.testing.assert_allclose(track.pose(t).translation_m, spline(t), atol=1e-6)
+    np.testing.assert_allclose(twist.velocity_m_s, spline(t, 1), atol=1e-5)
+    np.testing.assert_allclose(twist.acceleration_m_s2, spline(t, 2), atol=1e-4)
+
+
+@QUICK
+@given(st.floats(0.0, 1.0), st.floats(-0.4, 0.4))
+def test_rotations_between_knots_stay_near_the_shortest_arc(f: float, turn_rad: float) -> None:
+    """A normalised linear blend of small turns differs from slerp by a hair."""
+    track = Track("car", 1.0, (SE3(), SE3.about_z(turn_rad)))
+    turned = Rotation.from_matrix(track.pose(f).rotation()).magnitude()
+    assert turned == pytest.approx(abs(turn_rad) * f, abs=1e-3)
+
+
+def test_angular_velocity_is_the_turn_over_the_step() -> None:
+    """A quarter turn to the left in half a second is pi radians a second about Z."""
+    track = Track("car", 0.5, (SE3(), SE3.about_z(0.5 * math.pi)))
+    np.testing.assert_allclose(
+        track.twist(0.2).angular_velocity_rad_s, (0.0, 0.0, math.pi), atol=1e-9
+    )
+
+
+def test_outside_its_knots_a_body_stands_still() -> None:
+    """Before the first and after the last knot."""
+    track = track_of([(0, 0, 0), (1, 0, 0)])
+    assert track.pose(0.0) == track.knots[0]
+    assert track.pose(9.0) == track.knots[-1]
+    assert track.twist(9.0) == STILL
+
+
+def test_a_track_of_one_knot_is_refused() -> None:
+    """It is no way."""
+    with pytest.raises(ValueError, match="two knots"):
+        Track("car", 0.1, (SE3(),))
+
+
+def scene() -> Scene:
+    """A car with a lamp, a rig and sensors on it, which drives 1 m in 1 s along X."""
+    k = Intrinsics.from_hfov(8, 6, 1.0)
+    return with_placed_sensors(
+        Scene(
+            "test",
+            bodies=(
+                Body("car", "box", SE3(), instance_id=1),
+                Body("tree", "box", SE3((5.0, 5.0, 0.0)), instance_id=2),
+            ),
+            instances=(
+                Instance(1, "car", "car", 1, "box", attributes=(("brake", "off"),)),
+                Instance(2, "tree", "tree", 2, "box"),
+            ),
+            lights=(
+                Light("lamp", "spot", position_m=(2.0, 0.5, 0.6), body="car"),
+                Light("sun", "sun"),
+            ),
+            cameras=(Camera("color", SE3(), k, rig="ego", T_rig_camera=SE3((1.0, 0.0, 1.5))),),
+            lidars=(Lidar("top", "", SE3((0.0, 0.0, 2.0)), rig="ego"),),
+            devices=(Device("imu", "imu", "ego", SE3((0.1, 0.0, 0.3))),),
+            rigs=(Rig("ego", "car", SE3((0.0, 0.0, 0.1))),),
+            tracks=(Track("car", 1.0, (SE3(), SE3((1.0, 0.0, 0.0)))),),
+            changes=(
+                Change(0.5, "car", asset="box?lit", attributes=(("brake", "on"),)),
+                Change(0.8, "car", attributes=(("brake", "off"),)),
+            ),
+        )
+    )
+
+
+def test_everything_on_a_moving_body_moves_with_it() -> None:
+    """Body, instance, lamp, camera, lidar and device; the tree and the sun stay."""
+    then = at(scene(), 1.0)
+    assert then.body("car").T_world_body.translation_m == (1.0, 0.0, 0.0)
+    assert then.instance(1).T_world_instance.translation_m == (1.0, 0.0, 0.0)
+    assert then.lights[0].position_m == (3.0, 0.5, 0.6)
+    assert then.lights[1] == scene().lights[1]
+    assert then.camera("color").T_world_camera.translation_m == (2.0, 0.0, 1.6)
+    assert then.lidar("top").T_world_lidar.translation_m == (1.0, 0.0, 2.1)
+    assert then.device("imu").T_world_device.translation_m == (1.1, 0.0, 0.4)
+    assert then.body("tree") == scene().body("tree")
+
+
+def test_changes_hold_until_the_next_one() -> None:
+    """The brake lights for three tenths of a second; the lamp's look stays."""
+    for time_s, brake, asset in (
+        (0.4, "off", "box"),
+        (0.6, "on", "box?lit"),
+        (0.9, "off", "box?lit"),
+    ):
+        then = at(scene(), time_s)
+        assert dict(then.instance(1).attributes)["brake"] == brake
+        assert then.body("car").asset == then.instance(1).asset == asset
+
+
+def test_the_way_to_an_instant_does_not_matter() -> None:
+    """By another instant or straight: the same bodies."""
+    detour = at(at(scene(), 0.3), 0.7)
+    assert detour.bodies == at(scene(), 0.7).bodies
+
+
+def test_what_moves_is_known_to_its_instance() -> None:
+    """One metre in one second; the tree stands."""
+    then = at(scene(), 0.5)
+    assert then.instance(1).twist.velocity_m_s == pytest.approx((1.0, 0.0, 0.0))
+    assert then.instance(2).twist == STILL
