@@ -20,6 +20,7 @@ from generator.core.streams import Streams
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
 from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.sensors.mounting import stride
 from scene_templates.builder import build
 
 BLUEPRINTS_KEPT = 32
@@ -96,7 +97,17 @@ def recipe_of(
         layout_attempts_max=spec.head.physics.layout_attempts_max,
         info=info,
         exporters=exporters,
+        strides=_strides(spec),
     )
+
+
+def _strides(spec: Spec) -> dict[str, int]:
+    """Every how many steps cameras and laser scanners read."""
+    return {
+        s.name: stride(s.name, s.rate_hz, spec.head.step_s)
+        for s in spec.sensors
+        if s.modality in IMAGING
+    }
 
 
 def blueprints(spec: Spec, assets: AssetIndex) -> Callable[[Streams], Blueprint]:

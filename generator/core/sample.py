@@ -106,6 +106,8 @@ class Sample:
         truth: Annotations by sensor name.
         attempts: How many layouts were drawn before this one was accepted.
         timings_s: Seconds of CPU by stage. Never written to a data file.
+        cameras: Sorted names of all cameras of the data set, also of those that do not read at
+            this step; empty = those that do.
     """
 
     index: int
@@ -118,10 +120,11 @@ class Sample:
     attempts: int = 1
     timings_s: Mapping[str, float] = field(default_factory=dict)
     step_index: int = 0
+    cameras: tuple[str, ...] = ()
 
     def image_id(self, sensor: str) -> int:
         """Number of one image of the sample, from 1, unique in the data set."""
-        names = sorted(self.truth)
+        names = self.cameras or tuple(sorted(self.truth))
         return self.index * len(names) + names.index(sensor) + 1
 
     def annotation_id(self, sensor: str, instance_id: int) -> int:

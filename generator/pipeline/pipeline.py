@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -55,6 +55,7 @@ class Recipe:
         split_shares: ``{split: share}`` in order; shares sum to 1.
         layout_attempts_max: Bound on the attempts at one scene.
         info: The data set as its exporters see it.
+        strides: Every how many steps a sensor reads, by name, where that is not every one.
     """
 
     seed: int
@@ -67,6 +68,7 @@ class Recipe:
     layout_attempts_max: int
     info: DatasetInfo
     exporters: Mapping[str, Exporter]
+    strides: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +178,7 @@ class Pipeline:
             truth=with_lidar_points(truth, capture.clouds),
             attempts=accepted.attempt + 1,
             timings_s=timings,
+            cameras=self.info.sensors,
         )
 
     def _captured(
@@ -187,6 +190,8 @@ class Pipeline:
         tables: dict[str, Table] = {}
         truth: dict[str, ImageTruth] = {}
         for sensor in self.recipe.sensors:
+            if streams.step % self.recipe.strides.get(sensor.name, 1):
+                continue
             rng = streams.rng(f"sensor/{sensor.name}")
             with _timed(timings_s, "render"):
                 seen = sensor.capture(scene, self.renderer, self.recipe.channels, rng)

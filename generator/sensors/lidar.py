@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -10,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from generator.config.strict import Strict
 from generator.core.capture import POINT, Beams, Channel, PointCloud
 from generator.core.errors import ConfigError
 from generator.core.interfaces import Renderer
 from generator.core.scene import Lidar, Scene, Weather
-from generator.core.se3 import SE3
 from generator.core.streams import Rng
 from generator.sensors.air import dimmed, optical_depth, rain_noise_m, with_air
 from generator.sensors.lidars import lidar_model, model_names
+from generator.sensors.mounting import Mounted, known_rig
 from generator.sensors.returns import (
     LABELS,
     Float32,
@@ -46,15 +44,14 @@ def _known(name: str) -> str:
     return name
 
 
-class LidarSensor(Strict):
-    """A laser scanner; it follows the camera it is mounted beside.
+class LidarSensor(Mounted):
+    """A laser scanner on a rig, or on that of the camera it is mounted beside.
 
     Attributes:
         name: What labels and files call it.
         model: A file of ``generator/sensors/lidars``.
-        camera: Name of the camera whose rig it is on; that sensor comes before it.
-        offset_m: From the camera's centre: forward, left, up.
-        yaw_deg, pitch_deg: Turn to the left, then upwards, from the camera's axis.
+        camera: Without a rig: name of the camera it rides with, which is listed before it. The
+            rig is then at the camera's centre and looks along its axis.
         returns: Which return of a pulse is reported; ``dual`` reports two.
         divergence: Whether beams have a width; costs seven rays instead of one.
         ideal: No noise, no missed return, no weather: every hit within range.
@@ -65,29 +62,27 @@ class LidarSensor(Strict):
     name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: Annotated[str, AfterValidator(_known)] = "HDL-64E"
     camera: str = "color"
-    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    yaw_deg: float = Field(0.0, ge=-180, le=180)
-    pitch_deg: float = Field(0.0, ge=-90, le=90)
     returns: Kept = "strongest"
     divergence: bool = False
     ideal: bool = False
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with this scanner on its camera's rig.
+        """The scene with this scanner on its rig.
 
         Raises:
-            ConfigError: the scene has no such camera.
+            ConfigError: the scene has no such rig or camera.
         """
+        if self.rig:
+            rig = known_rig(scene, self.name, self.rig)
+            lidar = Lidar(self.name, "", self.T_rig_sensor, model=self.model, rig=rig)
+            return replace(scene, lidars=(*scene.lidars, lidar))
         known = [camera.name for camera in scene.cameras]
         if self.camera not in known:
             raise ConfigError(
                 f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
                 f" is {', '.join(known) or 'none'}"
             )
-        half = -0.5 * math.radians(self.pitch_deg)
-        upwards = SE3((0.0, 0.0, 0.0), (math.cos(half), 0.0, math.sin(half), 0.0))
-        T_rig_lidar = SE3.about_z(math.radians(self.yaw_deg), self.offset_m) @ upwards
-        lidar = Lidar(self.name, self.camera, T_rig_lidar.rounded(), model=self.model)
+        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.model)
         return replace(scene, lidars=(*scene.lidars, lidar))
 
     def capture(

@@ -8,13 +8,14 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
+from generator.core.instants import RIG_AXES
 from generator.core.interfaces import Renderer
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Region, Scene
 from generator.core.se3 import SE3, look_at
 from generator.core.streams import Rng
+from generator.sensors.mounting import Mounted, known_rig
 
 Image = Literal[
     "rgb", "depth", "range", "normals", "instance", "part", "category", "object_coordinates"
@@ -27,7 +28,7 @@ NOMINAL_AZIMUTH_RAD = math.radians(-60.0)
 NOMINAL_ELEVATION_RAD = math.radians(35.0)
 
 
-class RgbCamera(Strict):
+class RgbCamera(Mounted):
     """A camera without distortion; its pose and lens are varied by randomizers.
 
     Attributes:
@@ -57,6 +58,11 @@ class RgbCamera(Strict):
             return scene
         width_px, height_px = self.size_px
         intrinsics = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
+        if self.rig:
+            rig = known_rig(scene, self.name, self.rig)
+            T_rig_camera = self.T_rig_sensor @ RIG_AXES.inverse()
+            camera = Camera(self.name, SE3(), intrinsics, self.ev100, rig, T_rig_camera)
+            return replace(scene, cameras=(*scene.cameras, camera))
         narrower_px = 0.5 * min(width_px, height_px)
         pose = _nominal_pose(scene.focus, math.atan(narrower_px / intrinsics.fx_px))
         camera = Camera(self.name, pose, intrinsics, self.ev100)
