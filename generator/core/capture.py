@@ -20,6 +20,7 @@ class Channel(str, Enum):
     channel               array                   meaning; value for "nothing"
     ====================  ======================  ==========================================
     RGB                   uint8 [h, w, 3]         sRGB, anti-aliased
+    RADIANCE              float32 [h, w, 3]       luminance, linear RGB [cd/m^2], anti-aliased
     Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf
     RANGE                 float32 [h, w]          along the ray [m]; inf
     NORMALS               float32 [h, w, 3]       unit, camera frame, towards the camera; 0
@@ -32,6 +33,7 @@ class Channel(str, Enum):
     """
 
     RGB = "rgb"
+    RADIANCE = "radiance"
     Z_DEPTH = "depth"
     RANGE = "range"
     NORMALS = "normals"
@@ -65,6 +67,7 @@ class Reading:
         channels: Arrays by channel, as listed at Channel.
         silhouettes: By instance id; empty unless AMODAL was asked for.
         time_s: The instant that depth, ids and boxes refer to.
+        ev100: Exposure value that was set or metered; None where there is no colour.
     """
 
     sensor: str
@@ -72,6 +75,7 @@ class Reading:
     channels: Mapping[Channel, NDArray[Any]]
     silhouettes: Mapping[int, Silhouette] = field(default_factory=dict)
     time_s: float = 0.0
+    ev100: float | None = None
 
 
 POINT = np.dtype(

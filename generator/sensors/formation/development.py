@@ -61,8 +61,8 @@ def toned(image: Float32, tone: Tone, white: float) -> Float32:
     if tone == "linear":
         return np.clip(image, 0.0, 1.0)
     if tone == "log":
-        # Reinhard and Devlin-like compression: slope 1 at black, the sensor's whole range in.
-        image = np.log1p(16.0 * np.maximum(image, 0.0)) / np.float32(np.log1p(16.0 * white))
+        # The whole range of the sensor, evenly in stops where it is bright.
+        image = np.log1p(8.0 * np.maximum(image, 0.0)) / np.float32(np.log1p(8.0 * white))
     elif tone == "filmic":
         image = _shoulder(image)
     values = np.clip(image, 0.0, 1.0)
