@@ -33,6 +33,7 @@ from generator.core.intrinsics import Intrinsics
 from generator.core.sample import Sample
 from generator.core.scene import Camera, Instance, Lidar, Scene
 from generator.core.se3 import SE3, Array, look_at
+from generator.runner.shard import without_pixels
 
 CATEGORIES = ("car", "crate", "pedestrian")
 MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
@@ -240,11 +241,6 @@ def make_info(
     return replace(info, **changes)
 
 
-def without_arrays(sample: Sample) -> Sample:
-    """The sample after its images were written and dropped."""
-    return replace(sample, capture=Capture({}))
-
-
 def export(
     exporter: Exporter,
     info: DatasetInfo,
@@ -262,7 +258,7 @@ def export(
     for shard, shard_dir in reversed(work) if backwards else work:
         for sample in shard:
             write_media(info, sample, shard_dir)
-        exporter.write_shard(info, shard if keep_arrays else map(without_arrays, shard), shard_dir)
+        exporter.write_shard(info, shard if keep_arrays else map(without_pixels, shard), shard_dir)
     exporter.finalize(info, shard_dirs, folder / "dataset")
     return folder / "dataset"
 
