@@ -39,20 +39,22 @@ from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.sample import ImageTruth, ObjectTruth, Sample
 from generator.core.scene import Instance
 
-PEDESTRIAN, STATIC_PERSON = 1, 7
+PEDESTRIAN, PERSON_ON_VEHICLE, BICYCLE, MOTORBIKE, STATIC_PERSON = 1, 2, 4, 5, 7
 CLASSES = {
     "pedestrian": PEDESTRIAN,
     "person": PEDESTRIAN,
-    "cyclist": 2,
-    "motorcyclist": 2,
+    "cyclist": PERSON_ON_VEHICLE,
+    "motorcyclist": PERSON_ON_VEHICLE,
     "car": 3,
     "van": 3,
     "truck": 3,
     "bus": 3,
-    "bicycle": 4,
-    "motorcycle": 5,
+    "bicycle": BICYCLE,
+    "motorcycle": MOTORBIKE,
 }
 """MOT16's numbers by our category names."""
+RIDDEN = frozenset({BICYCLE, MOTORBIKE})
+"""Classes that become persons on vehicles by the attribute ``rider``."""
 STATIC_POSES = frozenset({"sit", "sitting", "lie", "lying"})
 """Values of a person's attribute ``pose`` that make it a static person."""
 SEQUENCES_MAX = 10_000
@@ -147,6 +149,9 @@ def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:
 def mot_class(instance: Instance) -> int:
     """MOT16's number of an object's class; 0 = none."""
     number = CLASSES.get("_".join(instance.category.lower().split()), 0)
-    if number == PEDESTRIAN and dict(instance.attributes).get("pose") in STATIC_POSES:
+    facts = dict(instance.attributes)
+    if number == PEDESTRIAN and facts.get("pose") in STATIC_POSES:
         return STATIC_PERSON
+    if number in RIDDEN and facts.get("rider") == "yes":
+        return PERSON_ON_VEHICLE
     return number

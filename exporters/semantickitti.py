@@ -97,8 +97,11 @@ OF_SURFACE = {
 }
 """Classes by surface, for what has no category; ``air`` is an outlier."""
 OTHER_OBJECT, OTHER_GROUND, SIGN, VEGETATION, TRUNK = 99, 49, 81, 70, 71
-MOVING = {10: 252, 30: 254, 31: 253, 32: 255, 16: 256, 13: 257, 18: 258}
-"""Classes of things that move by those of things that stand."""
+RIDDEN = {"bicycle": 31, "motorcycle": 32}
+"""Classes of what has a rider, by its attribute ``rider``."""
+MOVING = {10: 252, 11: 253, 30: 254, 31: 253, 32: 255, 15: 255, 16: 256, 13: 257, 18: 258}
+"""Classes of things that move by those of things that stand; a bicycle or motorcycle that moves by
+itself has no class but that of its riders."""
 MOVING_M_S = 0.1
 """What is faster than this moves."""
 SEQUENCES = {"train": 0, "val": 8, "test": 11}
@@ -183,6 +186,8 @@ def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
         k, category = thing.instance_id, thing.category
         counted[k] = category in THINGS
         named[k] = THINGS.get(category, STUFF.get(category, OTHER_OBJECT))
+        if dict(thing.attributes).get("rider") == "yes":
+            named[k] = RIDDEN.get(category, named[k])
         if math.hypot(*thing.twist.velocity_m_s) > MOVING_M_S:
             named[k] = MOVING.get(int(named[k]), named[k])
         leafy[k], signed[k] = named[k] == VEGETATION, category == "traffic_sign"
