@@ -54,7 +54,8 @@ def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uin
     """
     points = cloud.points
     if by == "intensity":
-        return colored_shares(points["intensity"])
+        # Most surfaces return little: the root tells them apart.
+        return colored_shares(np.sqrt(points["intensity"]))
     categories = points["category_id"]
     of_category = [color_of(k) for k in range(int(categories.max(initial=0)) + 1)]
     of_surface = [COLORS.get(name, GREY) for name in SURFACES]
