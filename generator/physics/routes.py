@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import islice, pairwise
 
 from generator.core.kinematics import all_positions, is_arm_joint, rounded_positions
 from generator.core.se3 import SE3
@@ -14,6 +15,7 @@ from generator.physics.trajectories import Held, Leg, speed_max
 
 Positions = tuple[float, ...]
 
+_SOLUTIONS_MAX = 4
 _RISES_M = (0.10, 0.20, 0.35)
 """Of the hand on its detours, above the higher end of a way."""
 
@@ -40,13 +42,13 @@ class Router:
         if self._chain is None:
             return []
         target = self._T_base_world @ T_world_grasp
-        seeds = [self._of_arm(start), *solutions(self._chain, target)]
+        seeds = [self._of_arm(start), *islice(solutions(self._chain, target), _SOLUTIONS_MAX)]
         found: dict[Positions, None] = {}
         for seed in seeds:
             exact = neighbour(self._chain, target, seed)
             if exact is not None:
                 found[rounded_positions(all_positions(self._robot, exact, opening))] = None
-        return sorted(found, key=lambda end: self._effort_s(start, end))
+        return sorted(found, key=lambda end: self.effort_s(start, end))
 
     def near(self, T_world_grasp: SE3, positions: Positions) -> Positions | None:
         """The same configuration with the hand at a pose that is near, or None."""
@@ -64,6 +66,14 @@ class Router:
             ]
         )
 
+    def effort_s(self, start: Positions, end: Positions) -> float:
+        """Time that the slowest joint needs at full speed, and a little for each of the others."""
+        times = [
+            abs(b - a) / speed_max(joint)
+            for joint, a, b in zip(self._robot.movable, start, end, strict=True)
+        ]
+        return max(times) + 0.1 * sum(times)
+
     def hit(self, leg: Leg, around: Surroundings) -> str:
         """Name of what a leg hits first; empty if it is free."""
         return self._sweep.hit(leg, around)
@@ -78,7 +88,7 @@ class Router:
             return [direct]
         for middle in self._detours(start, end):
             stops = [start, *middle, end]
-            legs = [Leg(a, b, held=held) for a, b in zip(stops, stops[1:], strict=False)]
+            legs = [Leg(a, b, held=held) for a, b in pairwise(stops)]
             if not any(self.hit(leg, around) for leg in legs):
                 return legs
         return hit
@@ -100,14 +110,6 @@ class Router:
 
     def _of_arm(self, positions: Sequence[float]) -> list[float]:
         return [p for p, is_arm in zip(positions, self._is_arm, strict=True) if is_arm]
-
-    def _effort_s(self, start: Positions, end: Positions) -> float:
-        """Time that the slowest joint needs at full speed, and a little for each of the others."""
-        times = [
-            abs(b - a) / speed_max(joint)
-            for joint, a, b in zip(self._robot.movable, start, end, strict=True)
-        ]
-        return max(times) + 0.1 * sum(times)
 
 
 def _at_height(pose: SE3, z_m: float) -> SE3:

@@ -25,8 +25,12 @@ NO_PLACE = "has no free place for what it holds"
 _APPROACH_M = 0.10
 """Of the straight way along the fingers, to what is grasped and from it."""
 _YAWS = 12
-_GRIPS_MAX = 4
-_CONFIGURATIONS_MAX = 3
+_NARROW = 1.15
+"""Hands take things across sides at most this much wider than the narrowest."""
+_TAKES_MAX = 8
+_SPOTS_AT_ONCE = 6
+_PUTS_MAX = 4
+_ENDS_MAX = 3
 _FLOOR_GAP_M = 0.004
 """Between the finger tips and the ground of what they grasp."""
 _APART_M = 0.001
@@ -36,6 +40,8 @@ _STANDS_M = 0.002
 _STAY_STEPS = 60
 _STAY_M = 0.002
 """A thing that is put down must not move farther than this while simulated for so many steps."""
+_TURNED = SE3(quaternion_wxyz=(0.0, 0.0, 0.0, 1.0))
+"""The same grip with the fingers exchanged."""
 _FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
 
 
@@ -114,7 +120,7 @@ class Way:
                 yield positions
         for pose in goal.pose_candidates:
             found = self._router.configurations(pose, self.positions, opening)
-            yield from found[:_CONFIGURATIONS_MAX]
+            yield from found[:_ENDS_MAX]
 
     def _route(self, end: Positions) -> list[Leg] | str:
         self._restore()
@@ -132,14 +138,28 @@ class Way:
             rest = self._rest_on_surface(body)
             if rest is None:
                 continue
-            for grasp in self._grips(self._hand, body)[:_GRIPS_MAX]:
-                legs = self._pick(body, grasp, rest)
+            for held, closed, lifted in self._takes(self._grips(self._hand, body), body, rest):
+                legs = self._pick(held, closed, lifted)
                 if not isinstance(legs, str):
-                    self._held = legs[-1].held
+                    self._held = held
                     del self.resting[body]
                     return legs
                 hits[legs] = None
         return _what_hits(hits, NOTHING_TO_GRASP)
+
+    def _takes(
+        self, grips: list[Grasp], body: str, rest: SE3
+    ) -> list[tuple[Held, Positions, Positions]]:
+        """Configurations at and above the narrowest grips, those soonest reached first."""
+        found = []
+        for grip in grips:
+            if grip.T_grasp_held is None or grip.opening > _NARROW * grips[0].opening:
+                continue
+            for turn in (SE3(), _TURNED):
+                held = Held(body, turn @ grip.T_grasp_held, rest, grip.opening)
+                found += [(held, *stop) for stop in self._stops(held, self.resting[body])]
+        found.sort(key=lambda take: self._effort_s(*take[1:]))
+        return found[:_TAKES_MAX]
 
     def _grips(self, hand: Hand, body: str) -> list[Grasp]:
         """Ways to hold a body as it lies, from above, across its narrow sides first."""
@@ -147,8 +167,8 @@ class Way:
         low, high = self._world.bounds_m(body)
         x, y = (float(v) for v in 0.5 * (low + high)[:2])
         bottom, top = float(low[2]), float(high[2])
-        highest = max(0.5 * (bottom + top), top - hand.palm_height_m())
-        height = max(highest, bottom + hand.tip_depth_m() + _FLOOR_GAP_M)
+        height = max(0.5 * (bottom + top), top - hand.palm_height_m())
+        height = max(height, bottom + hand.tip_depth_m() + _FLOOR_GAP_M)
         found = []
         for k in range(_YAWS):
             yaw = SE3.about_z(math.pi * k / _YAWS, (x, y, height))
@@ -158,28 +178,15 @@ class Way:
         self._restore()
         return sorted(found, key=lambda grasp: grasp.opening)
 
-    def _pick(self, body: str, grasp: Grasp, rest: SE3) -> list[Leg] | str:
+    def _pick(self, held: Held, closed: Positions, lifted: Positions) -> list[Leg] | str:
         """Open, come, close, lift; or what is hit."""
-        assert grasp.T_grasp_held is not None
-        T_world_grasp = self.resting[body] @ grasp.T_grasp_held.inverse()
-        held = Held(body, grasp.T_grasp_held, rest, grasp.opening)
-        router, why = self._router, CANNOT_REACH
-        for closed in self._configurations(T_world_grasp, grasp.opening):
-            lifted = router.near(_back(T_world_grasp), closed)
-            if lifted is None:
-                continue
-            above, around = router.opened(lifted, 1.0), router.opened(closed, 1.0)
-            self._restore()
-            why = router.hit(Leg(above, around), self._touching())
-            why = why or router.hit(Leg(closed, lifted, held=held), self._touching(body))
-            if why:
-                continue
-            route = self._route(above)
-            if not isinstance(route, str):
-                ending = [Leg(above, around), Leg(around, closed), Leg(closed, lifted, held=held)]
-                return [*route, *ending]
-            why = route
-        return why
+        router = self._router
+        above, around = router.opened(lifted, 1.0), router.opened(closed, 1.0)
+        come, lift = Leg(above, around), Leg(closed, lifted, held=held)
+        self._restore()
+        hit = router.hit(come, self._touching()) or router.hit(lift, self._touching(held.body))
+        route = hit or self._route(above)
+        return route if isinstance(route, str) else [*route, come, Leg(around, closed), lift]
 
     def _rest_on_surface(self, body: str) -> SE3 | None:
         """How a body stands on its surface; None if it stands on, leans on or carries others."""
@@ -200,11 +207,8 @@ class Way:
         if held is None:
             return NOTHING_HELD
         hits: dict[str, None] = {}
-        for spot in goal.pose_candidates:
-            T_world_rest = spot @ held.T_surface_rest
-            if not self._stays(held.body, T_world_rest):
-                continue
-            legs = self._put(held, T_world_rest)
+        for T_world_rest, closed, above in self._spots(held, goal.pose_candidates):
+            legs = self._put(held, T_world_rest, closed, above)
             if not isinstance(legs, str):
                 self.resting[held.body] = T_world_rest.rounded()
                 self._held = None
@@ -212,28 +216,37 @@ class Way:
             hits[legs] = None
         return _what_hits(hits, NO_PLACE)
 
-    def _put(self, held: Held, T_world_rest: SE3) -> list[Leg] | str:
+    def _spots(
+        self, held: Held, candidates: Sequence[SE3]
+    ) -> Iterator[tuple[SE3, Positions, Positions]]:
+        """Where a body can be left, and configurations there and above, soonest reached first.
+
+        Candidates are looked at a few at a time, so that the first ones are preferred.
+        """
+        for first in range(0, len(candidates), _SPOTS_AT_ONCE):
+            found = []
+            for spot in candidates[first : first + _SPOTS_AT_ONCE]:
+                T_world_rest = spot @ held.T_surface_rest
+                if self._stays(held.body, T_world_rest):
+                    found += [(T_world_rest, *stop) for stop in self._stops(held, T_world_rest)]
+            found.sort(key=lambda stop: self._effort_s(*stop[1:]))
+            yield from found[:_PUTS_MAX]
+
+    def _put(
+        self, held: Held, T_world_rest: SE3, closed: Positions, above: Positions
+    ) -> list[Leg] | str:
         """Lower, open, leave; or what is hit."""
-        T_world_grasp = T_world_rest @ held.T_grasp_held.inverse()
-        router, why = self._router, CANNOT_REACH
-        for closed in self._configurations(T_world_grasp, held.opening):
-            above = router.near(_back(T_world_grasp), closed)
-            if above is None:
-                continue
-            opened, away = router.opened(closed, 1.0), router.opened(above, 1.0)
-            lower, release, leave = Leg(above, closed, held=held), Leg(closed, opened), Leg(opened, away)
-            self._restore()
-            why = router.hit(lower, self._touching())
-            self._world.place(held.body, T_world_rest)
-            why = why or router.hit(release, self._touching(held.body))
-            why = why or router.hit(leave, self._touching(held.body))
-            if why:
-                continue
-            route = self._route(above)
-            if not isinstance(route, str):
-                return [*route, lower, release, leave]
-            why = route
-        return why
+        router = self._router
+        opened, away = router.opened(closed, 1.0), router.opened(above, 1.0)
+        lower = Leg(above, closed, held=held)
+        release, leave = Leg(closed, opened), Leg(opened, away)
+        self._restore()
+        hit = router.hit(lower, self._touching())
+        self._world.place(held.body, T_world_rest)
+        hit = hit or router.hit(release, self._touching(held.body))
+        hit = hit or router.hit(leave, self._touching(held.body))
+        route = hit or self._route(above)
+        return route if isinstance(route, str) else [*route, lower, release, leave]
 
     def _stays(self, body: str, T_world_rest: SE3) -> bool:
         """Whether a body can be left at a pose: on a surface, apart from others, and at rest."""
@@ -249,9 +262,20 @@ class Way:
 
     # What all of them need.
 
-    def _configurations(self, T_world_grasp: SE3, opening: float) -> list[Positions]:
-        found = self._router.configurations(T_world_grasp, self.positions, opening)
-        return found[:_CONFIGURATIONS_MAX]
+    def _stops(self, held: Held, T_world_held: SE3) -> list[tuple[Positions, Positions]]:
+        """Configurations with the fingers around a body, and drawn back from it."""
+        T_world_grasp = T_world_held @ held.T_grasp_held.inverse()
+        drawn_back = T_world_grasp @ SE3((0.0, 0.0, -_APPROACH_M))
+        stops = []
+        for closed in self._router.configurations(T_world_grasp, self.positions, held.opening):
+            above = self._router.near(drawn_back, closed)
+            if above is not None:
+                stops.append((closed, above))
+        return stops
+
+    def _effort_s(self, closed: Positions, above: Positions) -> float:
+        effort_s = self._router.effort_s
+        return effort_s(self.positions, above) + 2.0 * effort_s(above, closed)
 
     def _touching(self, body: str = "") -> Surroundings:
         """Everything may be touched; a body that is taken up or was put down counts besides."""
@@ -301,11 +325,6 @@ def _what_hits(hits: Mapping[str, None], otherwise: str) -> str:
     if named:
         return f"hits {named[0]}" if named[0] == "itself" else f"hits '{named[0]}'"
     return CANNOT_REACH if hits else otherwise
-
-
-def _back(T_world_grasp: SE3) -> SE3:
-    """The hand drawn back along its fingers."""
-    return T_world_grasp @ SE3((0.0, 0.0, -_APPROACH_M))
 
 
 def _opening(arm: Arm, positions: Positions) -> float:
