@@ -132,6 +132,7 @@ class Joint:
         axis: Unit axis in the joint frame.
         lower, upper: Limits [rad or m].
         mimic: Name of the joint this one follows, or empty.
+        speed_max: Limit of its speed [rad/s or m/s]; 0 = unknown.
     """
 
     name: str
@@ -143,6 +144,7 @@ class Joint:
     lower: float
     upper: float
     mimic: str = ""
+    speed_max: float = 0.0
 
     @property
     def movable(self) -> bool:
