@@ -92,14 +92,18 @@ LIGHT_STATES = ("dark", "red", "red_yellow", "yellow", "green")
 
 WATCHER = (
     TIME,
-    Column("kind", "|u1", "0 collision, 1 lane_invasion, 2 obstacle, 3 traffic_light, 4 proximity"),
+    Column(
+        "occurrence",
+        "|u1",
+        "0 collision, 1 lane_invasion, 2 obstacle, 3 traffic_light, 4 proximity",
+    ),
     Column("instance_id", "<u2", "the other thing; 0 = none"),
     Column(
         "value",
         "<f4",
-        "collision: speed of closing [m/s]; lane_invasion: 1 the line to the left, -1 to the right;"
-        " obstacle, proximity: distance [m]; traffic_light: 0 dark, 1 red, 2 red and yellow,"
-        " 3 yellow, 4 green",
+        "collision: speed against each other [m/s]; lane_invasion: 1 = the line to the left, -1 ="
+        " to the right; obstacle, proximity: distance [m]; traffic_light: 0 dark, 1 red, 2 red and"
+        " yellow, 3 yellow, 4 green",
     ),
 )
 
@@ -127,7 +131,7 @@ def table_dtype(kind: str) -> np.dtype[np.void]:
     return np.dtype([(column.name, column.type) for column in TABLE_COLUMNS[kind]])
 
 
-def table_rows(kind: str, count: int, **columns: ArrayLike) -> NDArray[np.void]:
+def table_rows(kind: str, count: int, /, **columns: ArrayLike) -> NDArray[np.void]:
     """Rows of a table; columns that are not given are 0.
 
     Args:

@@ -12,5 +12,6 @@ TABLE = PluginTable(
         "imu": "generator.sensors.imu:Imu",
         "gnss": "generator.sensors.gnss:Gnss",
         "odometer": "generator.sensors.odometer:Odometer",
+        "watcher": "generator.sensors.watcher:Watcher",
     },
 )
