@@ -12,6 +12,7 @@ TABLE = PluginTable(
         "imu": "generator.sensors.imu:Imu",
         "gnss": "generator.sensors.gnss:Gnss",
         "odometer": "generator.sensors.odometer:Odometer",
+        "radar": "generator.sensors.radar:Radar",
         "watcher": "generator.sensors.watcher:Watcher",
     },
 )
