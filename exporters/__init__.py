@@ -18,5 +18,6 @@ TABLE = PluginTable(
         "motchallenge": "exporters.motchallenge:MotChallenge",
         "pointclouds": "exporters.pointclouds:PointClouds",
         "semantickitti": "exporters.semantickitti:SemanticKitti",
+        "tables": "exporters.tables:Tables",
     },
 )

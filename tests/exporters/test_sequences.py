@@ -571,7 +571,7 @@ def test_every_format_can_do_without_some_readings(
     [
         (KittiRaw(image_02="lefd"), "camera 'lefd'.*did you mean 'left'"),
         (KittiRaw(lidar="velo"), "no lidar 'velo'.*top"),
-        (KittiRaw(oxts="gps"), "no device 'gps'.*none"),
+        (KittiRaw(oxts="gps"), "no device 'gps'.*imu"),
         (KittiTracking(camera="middle"), "camera 'middle'.*left, right"),
         (KittiTracking(lidar="velo"), "no lidar 'velo'"),
         (MotChallenge(camera="middle"), "camera 'middle'.*left, right"),
