@@ -92,7 +92,7 @@ POINT = np.dtype(
 ========================  ====================================================================
 position_m                lidar frame: X forward, Y left, Z up [m]
 intensity                 [0, 1], what the device reports after its own range compensation
-time_s                    when the pulse left, from the start of the sweep; ``PointCloud.start_s``
+time_s                    when the pulse left, from the start of the sweep
 ring                      row of the model's table, from 0, the highest first
 instance_id, category_id  what reflected it; 0 where that is the air or has no label
 surface                   what kind of surface, a number of ``generator.core.geometry.SURFACES``
@@ -109,14 +109,17 @@ class PointCloud:
     Attributes:
         points: Records of ``POINT`` [n].
         time_s: The instant that ``lidar`` and the boxes refer to: the middle of the sweep.
-        start_s: When the sweep began.
     """
 
     sensor: str
     lidar: Lidar
     points: NDArray[np.void]
     time_s: float = 0.0
-    start_s: float = 0.0
+
+    @property
+    def start_s(self) -> float:
+        """When the sweep began."""
+        return self.time_s - 0.5 * self.lidar.sweep_s
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -78,17 +78,17 @@ class LidarSensor(Mounted):
         Raises:
             ConfigError: the scene has no such rig or camera.
         """
+        sweep_s = round(1.0 / lidar_model(self.model).rotation_hz, 9)
+        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.model, sweep_s=sweep_s)
         if self.rig:
             rig = known_rig(scene, self.name, self.rig)
-            lidar = Lidar(self.name, "", self.T_rig_sensor, model=self.model, rig=rig)
-            return replace(scene, lidars=(*scene.lidars, lidar))
+            return replace(scene, lidars=(*scene.lidars, replace(lidar, camera="", rig=rig)))
         known = [camera.name for camera in scene.cameras]
         if self.camera not in known:
             raise ConfigError(
                 f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
                 f" is {', '.join(known) or 'none'}"
             )
-        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.model)
         return replace(scene, lidars=(*scene.lidars, lidar))
 
     def capture(
@@ -99,10 +99,9 @@ class LidarSensor(Mounted):
         model = lidar_model(self.model)
         lidar = scene.lidar(self.name)
         sweep = sweep_of(model, float(rng.uniform(0.0, 3600.0)))
-        middle_s = 0.5 / model.rotation_hz
         shots = Shots(sweep.directions)
         if self.motion != "frozen":
-            shots = shots_of(scene, lidar, sweep, middle_s)
+            shots = shots_of(scene, lidar, sweep)
         beams = Beams(
             shots.directions,
             1e-3 * model.divergence_mrad,
@@ -123,7 +122,7 @@ class LidarSensor(Mounted):
             found = _noisy(found, model, weather, rng)
         seen_from = Shots(sweep.directions) if self.motion == "raw" else shots
         points = _points(found, seen_from, sweep, model)
-        return PointCloud(self.name, lidar, points, scene.time_s, scene.time_s - middle_s)
+        return PointCloud(self.name, lidar, points, scene.time_s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -38,18 +38,17 @@ class Shots:
         return points if self.origins_m is None else points + self.origins_m[rows]
 
 
-def shots_of(scene: Scene, lidar: Lidar, sweep: Sweep, middle_s: float) -> Shots:
+def shots_of(scene: Scene, lidar: Lidar, sweep: Sweep) -> Shots:
     """The pulses of a sweep whose scanner rides on what moves.
 
     Args:
         scene: At the instant of the sweep's middle.
         lidar: One of its scanners.
         sweep: Its pulses; directions are in the lidar frame of each pulse's own instant.
-        middle_s: Time from the sweep's start to its middle.
     """
     if not scene.tracks:
         return Shots(sweep.directions)
-    time_s = sweep.time_s - np.float32(middle_s)
+    time_s = sweep.time_s - np.float32(0.5 * lidar.sweep_s)
     body, T_body_lidar = carrier(scene, lidar)
     track = scene.track(body) if body else None
     if track is None:

@@ -38,7 +38,7 @@ def scene_of(bodies: list[Body], *tracks: Track) -> Scene:
     """Bodies about a scanner on a cart at the origin."""
     cart = Body("cart", "cart", SE3((0.0, 0.0, -3.0)))
     rig = Rig("rig", "cart", SE3((0.0, 0.0, 3.0)))
-    lidar = Lidar("velodyne", "", SE3((0.5, 0.0, 0.0)), rig="rig")
+    lidar = Lidar("velodyne", "", SE3((0.5, 0.0, 0.0)), rig="rig", sweep_s=PERIOD_S)
     scene = Scene("test", (cart, *bodies), tracks=tracks, rigs=(rig,), lidars=(lidar,))
     return at(scene, 0.2)
 
@@ -172,7 +172,7 @@ def test_a_scanner_beside_a_camera_rides_with_the_camera_s_rig() -> None:
     T_rig_camera = SE3((0.5, 0.0, 0.0), (0.5, -0.5, 0.5, -0.5))
     camera = Camera("color", SE3(), Intrinsics(8, 8, 8.0, 8.0, 4.0, 4.0), None, "rig", T_rig_camera)
     beside = Scene("test", scene.bodies, cameras=(camera,), rigs=scene.rigs, tracks=scene.tracks,
-                   lidars=(Lidar("velodyne", "color"),))  # fmt: skip
+                   lidars=(Lidar("velodyne", "color", sweep_s=PERIOD_S),))  # fmt: skip
 
     one, other = sweep(scene, "raw"), sweep(at(beside, 0.2), "raw")
 
