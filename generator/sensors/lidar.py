@@ -110,7 +110,7 @@ class LidarSensor(Mounted):
             shots.origins_m,
             shots.time_s,
         )
-        pulses = pulses_of(renderer.scan(scene, lidar, beams), model)
+        pulses = pulses_of(renderer.scan(scene, lidar, beams), model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
             pulses = _through_air(pulses, weather, model, lidar, shots, rng)
