@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from generator.core.scene import Camera
 from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
-from generator.renderers.kernels import antialias, gather, raster, records, shade, tone
+from generator.renderers.kernels import antialias, gather, optics, raster, records, shade, tone
 from generator.renderers.kernels import samples as mixing
 from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.raster import Z_NEAR_M
@@ -42,12 +42,14 @@ def color_image(
     lattice = sampled_lattice(world, view, seen, stock)
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
+    _darken_outside(view, radiance)
     ev100 = camera.ev100
     if ev100 is None:
         ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
     draw_precipitation(world, camera, view, seen.z_m, radiance, ev100=ev100, stock=stock)
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
+    _darken_outside(view, radiance)
     exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
     curve = wp.array(tone_curve(settings.tone), dtype=wp.uint8, device=device)
     rgb = wp.zeros((n, 3), dtype=wp.uint8, device=device)
@@ -69,6 +71,13 @@ def color_image(
             wp.launch(antialias.antialias, len(edges), inputs, [rgb], device=device)
     image: NDArray[np.uint8] = rgb.numpy().reshape(view.height, view.width, 3)
     return image
+
+
+def _darken_outside(view: records.View, radiance: wp.array) -> None:
+    """Leave no light where the lens shows nothing, in place."""
+    if view.lens != records.PINHOLE:
+        n = view.width * view.height
+        wp.launch(optics.darken_outside, n, [view], [radiance], device=radiance.device)
 
 
 def _drawn_samples(

@@ -15,6 +15,7 @@ from generator.renderers.kernels.records import (
     View,
     World,
     pixel_direction,
+    shows,
     to_mesh_point,
     to_mesh_vector,
 )
@@ -214,6 +215,8 @@ def antialias(
         t_min: z-depth from which surfaces are seen.
     """
     i = pixels[wp.tid()]
+    if not shows(view, i):
+        return
     x = i % view.width
     y = i / view.width
     parts = Parts()
