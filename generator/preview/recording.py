@@ -134,16 +134,18 @@ class Recorder:
         camera, intrinsics = reading.camera, reading.camera.intrinsics
         path = f"world/cameras/{name}"
         self.stream.log(path, _transform(camera.T_world_camera))
-        self.stream.log(
-            f"{path}/image",
-            rr.Pinhole(
-                image_from_camera=intrinsics.matrix(),
-                width=intrinsics.width_px,
-                height=intrinsics.height_px,
-                camera_xyz=rr.ViewCoordinates.RDF,
-                image_plane_distance=0.15,
-            ),
-        )
+        # Rerun knows no other camera: images of other lenses are shown by themselves.
+        if intrinsics.straight:
+            self.stream.log(
+                f"{path}/image",
+                rr.Pinhole(
+                    image_from_camera=intrinsics.matrix(),
+                    width=intrinsics.width_px,
+                    height=intrinsics.height_px,
+                    camera_xyz=rr.ViewCoordinates.RDF,
+                    image_plane_distance=0.15,
+                ),
+            )
         channels = reading.channels
         if Channel.RGB in channels:
             self.stream.log(f"{path}/image/rgb", rr.Image(channels[Channel.RGB]).compress(90))

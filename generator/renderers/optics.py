@@ -66,7 +66,8 @@ def canvas_nodes(intrinsics: Intrinsics) -> Float32:
         np.arange(-(-3 * size // NODE_STRIDE_PX) + 1) * NODE_STRIDE_PX - size + 0.5
         for size in (width, height)
     )
-    return intrinsics.rays(np.stack(np.meshgrid(u, v), axis=-1)).astype(np.float32)
+    nodes: Float32 = intrinsics.rays(np.stack(np.meshgrid(u, v), axis=-1)).astype(np.float32)
+    return nodes
 
 
 def _pixel_angles(rays: Array, intrinsics: Intrinsics) -> Array:
@@ -76,7 +77,8 @@ def _pixel_angles(rays: Array, intrinsics: Intrinsics) -> Array:
     angles = np.sqrt(np.sqrt((area * area).sum(axis=-1)))
     usual = 1.0 / intrinsics.fx_px
     # Rows of an equirectangular image shrink to nothing at the poles, and what they show does not.
-    return np.maximum(np.nan_to_num(angles, nan=usual), 0.05 * usual)
+    filled: Array = np.maximum(np.nan_to_num(angles, nan=usual), 0.05 * usual)
+    return filled
 
 
 def _slopes(rays: Array, axis: int) -> Array:
