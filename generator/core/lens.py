@@ -119,9 +119,8 @@ class Lens:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             if self.model == "equirectangular":
                 across = np.sqrt(x * x + z * z)
-                nowhere = (across == 0.0) & (y == 0.0)
-                longitude = np.where(nowhere, np.nan, np.arctan2(x, z))
-                return np.stack([longitude, np.arctan2(y, across)], axis=-1)
+                angles = np.stack([np.arctan2(x, z), np.arctan2(y, across)], axis=-1)
+                return np.where(((across == 0.0) & (y == 0.0))[..., None], np.nan, angles)
             if self.model == "kannala_brandt":
                 return _fisheye_image(self, x, y, z)
             front = np.where(z > 0, z, np.nan)
