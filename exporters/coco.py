@@ -35,6 +35,10 @@ Where views are sequences of several instants, images also have ``sequence_id``,
 instant's number in its sequence, from 0) and ``time_s``, and annotations have ``track_id``: the
 same for one object in all images of its sequence, whatever the camera, and unique in the data set.
 
+Images have ``K`` and, where their camera is no pinhole, ``lens``: its ``model`` (one of those in
+``generator.core.lens``), the ``distortion`` that ``K`` maps on, which is OpenCV's vector, with the
+names of its ``coefficients``, and ``half_field_rad``, the angle to the axis where the image ends.
+
 Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
 covers ``[i, i + 1)``, as COCO's boxes do; OpenCV's principal point is 0.5 px less.
 
@@ -60,6 +64,7 @@ from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
+from generator.core.lens import COEFFICIENTS, Lens
 from generator.core.sample import ANNOTATION_STRIDE, KeypointTruth, ObjectTruth, Sample
 from generator.core.scene import Instance, Weather
 from generator.core.se3 import Array
@@ -210,6 +215,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "view": sample.view_index,
         "sensor": sensor,
         "K": _rows(camera.intrinsics.matrix()),
+        **_lens(camera.intrinsics.lens),
         "T_world_camera": _rows(camera.T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
@@ -219,6 +225,18 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         row["frame_id"] = sample.index % info.steps_per_scene
         row["time_s"] = round(instant_s(sample, sensor), DECIMALS)
     return row
+
+
+def _lens(lens: Lens) -> dict[str, Any]:
+    """Nothing for a pinhole."""
+    if lens.model == "pinhole":
+        return {}
+    names = COEFFICIENTS[lens.model]
+    known: dict[str, Any] = {"model": lens.model, "coefficients": list(names)}
+    if names:
+        known["distortion"] = list(lens.coefficients)
+        known["half_field_rad"] = lens.half_field_rad
+    return {"lens": known}
 
 
 def _weather(weather: Weather) -> dict[str, float]:

@@ -128,14 +128,21 @@ class Kitti(Strict):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: no such camera, it does not write the images that are needed, or too many
-                samples for six digits.
+            ConfigError: no such camera, it is no pinhole or does not write the images that are
+                needed, or too many samples for six digits.
         """
         media = info.media[self._camera(info)]
         if not self._lidar(info) and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
             raise ConfigError(
                 f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
                 "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
+            )
+        model = info.lenses.get(self._camera(info), "pinhole")
+        if model != "pinhole":
+            raise ConfigError(
+                f"exporter 'kitti': sensor '{self._camera(info)}' has a lens of the model "
+                f"'{model}'; KITTI's images are rectified and its calibration has no distortion: "
+                "name a camera with a pinhole, or export this one as coco"
             )
         if info.n > FRAMES_MAX:
             raise ConfigError(

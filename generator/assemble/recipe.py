@@ -104,6 +104,7 @@ def recipe_of(
         devices={s.name: s.modality for s in spec.sensors if s.modality not in IMAGING},
         steps_per_scene=spec.head.steps_per_scene,
         step_s=spec.head.step_s,
+        lenses={s.name: s.intrinsics().lens.model for s in spec.sensors if s.modality == "camera"},
     )
     exporters = _exporters(spec, info)
     needed = frozenset().union(*(a.channels for a in annotators), extra_channels)

@@ -74,10 +74,19 @@ def _sparse_points(view: records.View, seen: Seen) -> tuple[Array, Array]:
     z = seen.z_m.numpy().reshape(shape)[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
     normals = seen.normals.numpy().reshape(*shape, 3)[::_STRIDE_PX, ::_STRIDE_PX]
     rows, columns = np.nonzero(np.isfinite(z))
-    x = (columns * _STRIDE_PX + 0.5 - view.cx) * view.inverse_fx
-    y = (rows * _STRIDE_PX + 0.5 - view.cy) * view.inverse_fy
-    p_camera = np.stack([x, y, np.ones_like(x)], axis=-1) * z[rows, columns, None]
+    directions = _directions(view, rows * _STRIDE_PX, columns * _STRIDE_PX)
+    p_camera = directions * z[rows, columns, None]
     R = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
     eye = np.array(view.eye_m, dtype=np.float64)
     points = np.einsum("ij,nj->ni", R, p_camera, optimize=False) + eye
     return points, normals[rows, columns].astype(np.float64)
+
+
+def _directions(view: records.View, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
+    """As kernels.records.pixel_direction, at pixel centres."""
+    if view.lens != records.PINHOLE:
+        directions: Array = view.directions.numpy()[rows * view.width + columns, :3]
+        return directions.astype(np.float64)
+    x = (columns + 0.5 - view.cx) * view.inverse_fx
+    y = (rows + 0.5 - view.cy) * view.inverse_fy
+    return np.stack([x, y, np.ones_like(x)], axis=-1)
