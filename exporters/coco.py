@@ -99,7 +99,7 @@ class Coco(Strict):
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
         for sample in samples:
-            for sensor in _sensors(info):
+            for sensor in (s for s in _sensors(info) if s in sample.truth):
                 truth = sample.truth[sensor]
                 images = rows.setdefault(f"{sample.split}.images", [])
                 annotations = rows.setdefault(f"{sample.split}.annotations", [])

@@ -56,20 +56,22 @@ ENCODING = {
 def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     """Write every image channel of a sample that the data set keeps to its ``media_path``.
 
-    Laser scans go to their ``cloud_path``.
+    Laser scans go to their ``cloud_path``. Sensors that do not read at the sample's step have no
+    file.
 
     Raises:
         ConfigError: if a channel is no image.
         SampleError: if a depth is negative or NaN.
     """
     for sensor in info.sensors:
-        reading = sample.capture.readings[sensor]
-        for channel in info.media[sensor]:
+        reading = sample.capture.readings.get(sensor)
+        for channel in info.media[sensor] if reading is not None else ():
             path = media_path(shard_dir, sensor, channel, sample.index)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(png(channel, reading.channels[channel], info.depth_scale_m))
     for lidar in info.lidars:
-        write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
+        if lidar in sample.capture.clouds:
+            write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
 
 
 def png(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:

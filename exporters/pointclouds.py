@@ -21,7 +21,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.clouds import read_points
+from exporters.clouds import has_points, read_points, scanner_of
 from exporters.images import link_or_copy
 from generator.config.strict import Strict
 from generator.core.boxes import OrientedBox
@@ -81,11 +81,12 @@ class PointClouds(Strict):
         for lidar in info.lidars:
             folder = shard_dir / self.type / lidar
             folder.mkdir(parents=True, exist_ok=True)
-            for sample in kept:
+            for sample in (s for s in kept if has_points(shard_dir, lidar, s.index)):
                 points = read_points(shard_dir, lidar, sample.index)
                 path = folder / f"{sample.index:09d}.{self.format}"
                 path.write_bytes(encoded(file_points(points)))
-            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in kept)
+            swept = (s for s in kept if has_points(shard_dir, lidar, s.index))
+            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in swept)
             (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -147,7 +148,7 @@ def pcd_bytes(points: NDArray[np.void]) -> bytes:
 
 def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
     """Boxes of all annotated things in the frame of a laser scanner, by instance id."""
-    T_lidar_world = sample.scene.lidar(lidar).T_world_lidar.inverse()
+    T_lidar_world = scanner_of(sample, lidar).T_world_lidar.inverse()
     things = sorted((i for i in sample.scene.instances if i.annotated), key=lambda i: i.instance_id)
     boxes = []
     for thing in things:
@@ -160,7 +161,7 @@ def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]
 
 
 def _pose(sample: Sample, lidar: str) -> dict[str, Any]:
-    scanner = sample.scene.lidar(lidar)
+    scanner = scanner_of(sample, lidar)
     return {
         "index": sample.index,
         "model": scanner.model,

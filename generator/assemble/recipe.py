@@ -98,6 +98,7 @@ def recipe_of(
         info=info,
         exporters=exporters,
         strides=_strides(spec),
+        offsets_s={s.name: s.time_offset_s for s in spec.sensors if s.time_offset_s},
     )
 
 

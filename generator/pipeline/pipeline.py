@@ -56,6 +56,7 @@ class Recipe:
         layout_attempts_max: Bound on the attempts at one scene.
         info: The data set as its exporters see it.
         strides: Every how many steps a sensor reads, by name, where that is not every one.
+        offsets_s: How much later than its step a sensor reads, by name, where that is not 0.
     """
 
     seed: int
@@ -69,6 +70,7 @@ class Recipe:
     info: DatasetInfo
     exporters: Mapping[str, Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
+    offsets_s: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +186,7 @@ class Pipeline:
     def _captured(
         self, scene: Scene, streams: Streams, timings_s: dict[str, float]
     ) -> tuple[Capture, dict[str, ImageTruth]]:
-        """What every sensor sees, and the truth about every image at the image's instant."""
+        """What every sensor sees at its own instant, and the truth about every image at that."""
         readings: dict[str, Reading] = {}
         clouds: dict[str, PointCloud] = {}
         tables: dict[str, Table] = {}
@@ -193,15 +195,16 @@ class Pipeline:
             if streams.step % self.recipe.strides.get(sensor.name, 1):
                 continue
             rng = streams.rng(f"sensor/{sensor.name}")
+            then = self._instant(scene, scene.time_s + self.recipe.offsets_s.get(sensor.name, 0.0))
             with _timed(timings_s, "render"):
-                seen = sensor.capture(scene, self.renderer, self.recipe.channels, rng)
+                seen = sensor.capture(then, self.renderer, self.recipe.channels, rng)
             if isinstance(seen, PointCloud):
                 clouds[sensor.name] = seen
             elif isinstance(seen, Table):
                 tables[sensor.name] = seen
             else:
                 with _timed(timings_s, "annotate"):
-                    then = self._instant(scene, seen.time_s)
+                    then = self._instant(then, seen.time_s)
                     truth[sensor.name] = self.recipe.image_truth(then, seen)
                 readings[sensor.name] = seen
         return Capture(readings, clouds, tables), truth

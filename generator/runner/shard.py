@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from generator.core.capture import Capture, Reading
+import numpy as np
+
+from generator.core.capture import POINT, Capture, PointCloud, Reading
 from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.sample import Sample
 from generator.runner.plan import Plan
@@ -144,9 +146,14 @@ def _written(
 
 
 def without_pixels(sample: Sample) -> Sample:
-    """The sample with its cameras and labels, and no image."""
+    """The sample with its sensors, labels and tables, and no image and no point."""
+    seen = sample.capture
     readings = {
-        name: Reading(sensor=reading.sensor, camera=reading.camera, channels={})
-        for name, reading in sample.capture.readings.items()
+        name: Reading(sensor=r.sensor, camera=r.camera, channels={}, time_s=r.time_s)
+        for name, r in seen.readings.items()
     }
-    return replace(sample, capture=Capture(readings))
+    clouds = {
+        name: PointCloud(c.sensor, c.lidar, np.zeros(0, POINT), c.time_s)
+        for name, c in seen.clouds.items()
+    }
+    return replace(sample, capture=Capture(readings, clouds, seen.tables))
