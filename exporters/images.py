@@ -65,7 +65,9 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     """
     for sensor in info.sensors:
         reading = sample.capture.readings.get(sensor)
-        for channel in info.media[sensor] if reading is not None else ():
+        if reading is None:
+            continue
+        for channel in info.media[sensor]:
             path = media_path(shard_dir, sensor, channel, sample.index)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(png(channel, reading.channels[channel], info.depth_scale_m))

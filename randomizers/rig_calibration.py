@@ -10,7 +10,7 @@ from generator.config.distributions import Normal, Scalar
 from generator.core.errors import ConfigError, did_you_mean
 from generator.core.instants import with_placed_sensors
 from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
+from generator.core.scene import Camera, Device, Lidar, Scene
 from generator.core.se3 import SE3, multiply_quaternions
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
@@ -39,7 +39,9 @@ class RigCalibration(RandomizerBase):
             ConfigError: there is no such rig, or nothing is mounted on it.
         """
         del assets
-        known = sorted({s.rig for s in (*scene.cameras, *scene.lidars, *scene.devices) if s.rig})
+        sensors: tuple[Camera | Lidar | Device, ...]
+        sensors = (*scene.cameras, *scene.lidars, *scene.devices)
+        known = sorted({sensor.rig for sensor in sensors if sensor.rig})
         if not known or (self.rig and self.rig not in known):
             raise ConfigError(
                 f"randomizers.{self.name}.rig: no sensor is on a rig '{self.rig}'; rigs with "

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from generator.core.interfaces import AssetIndex
 from generator.core.geometry import RobotModel
+from generator.core.interfaces import AssetIndex
 from generator.core.kinematics import finger_links, link_bodies, link_poses, rigid_group
 from generator.core.scene import Articulation, Instance, Rig, Scene
 from generator.core.se3 import SE3, Vec3

@@ -1,8 +1,8 @@
-"""The truth about one image: which instances are in it, and what the annotators say of them."""
+"""The truth about one image or sample: what is in it, and what the annotators say of that."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from pydantic import Field
 
@@ -11,9 +11,12 @@ from generator.annotations.validity import check_truth
 from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.errors import ConfigError
-from generator.core.interfaces import Annotator
-from generator.core.sample import ImageTruth, ObjectTruth
+from generator.core.instants import ego_rig, rig_twist
+from generator.core.interfaces import Annotator, AssetLibrary, FrameAnnotator, ImageAnnotator
+from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth
 from generator.core.scene import Scene
+
+AnyAnnotator = Annotator | ImageAnnotator | FrameAnnotator
 
 
 class Thresholds(Strict):
@@ -32,10 +35,53 @@ class Thresholds(Strict):
     """Annotate every instance, hidden ones too; the other thresholds then do not apply."""
 
 
+def complete_truth(
+    scene: Scene,
+    reading: Reading,
+    annotators: Sequence[AnyAnnotator],
+    thresholds: Thresholds,
+    assets: AssetLibrary,
+) -> ImageTruth:
+    """Annotations of one reading: of its objects, and of the image as a whole.
+
+    Raises:
+        SampleError, ConfigError: see ``image_truth``.
+    """
+    of_objects = [a for a in annotators if isinstance(a, Annotator)]
+    truth = image_truth(scene, reading, of_objects, thresholds)
+    for annotator in annotators:
+        if isinstance(annotator, ImageAnnotator):
+            truth = annotator.annotate_image(scene, assets, reading, truth)
+    return truth
+
+
+def frame_truth(
+    scenes: Mapping[str, Scene], annotators: Sequence[AnyAnnotator], assets: AssetLibrary
+) -> FrameTruth | None:
+    """Annotations of one sample as a whole; None where nothing annotates it.
+
+    Args:
+        scenes: As ``FrameAnnotator`` has them.
+        annotators: All of the data set.
+        assets: Geometry.
+    """
+    of_frames = [a for a in annotators if isinstance(a, FrameAnnotator)]
+    if not of_frames:
+        return None
+    scene = scenes[""]
+    rig = ego_rig(scene)
+    truth = FrameTruth()
+    if rig is not None:
+        truth = FrameTruth(rig.name, scene.rig_pose(rig.name).rounded(), rig_twist(scene, rig))
+    for annotator in of_frames:
+        truth = annotator.annotate_frame(scenes, assets, truth)
+    return truth
+
+
 def image_truth(
     scene: Scene, reading: Reading, annotators: Sequence[Annotator], thresholds: Thresholds
 ) -> ImageTruth:
-    """Annotations of one reading, in order of instance id; none where nothing annotates.
+    """Annotations of the objects in one reading, in order of instance id.
 
     Raises:
         SampleError: if the labels of an instance contradict each other or the images.

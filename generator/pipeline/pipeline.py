@@ -22,7 +22,7 @@ from generator.core.interfaces import (
     Sensor,
     Stage,
 )
-from generator.core.sample import ImageTruth, Sample
+from generator.core.sample import FrameTruth, ImageTruth, Sample
 from generator.core.scene import Scene
 from generator.core.streams import Streams
 from generator.pipeline.freeze import frozen_scene
@@ -52,6 +52,8 @@ class Recipe:
         blueprint: What the scene of these streams is made from: a pure function.
         channels: What the annotators need to have been rendered.
         image_truth: Annotates one reading.
+        frame_truth: Annotates a sample as a whole, given the scene at the sample's instant by
+            ``""`` and at each laser scanner's by its name; None if there is nothing to say.
         split_shares: ``{split: share}`` in order; shares sum to 1.
         layout_attempts_max: Bound on the attempts at one scene.
         info: The data set as its exporters see it.
@@ -71,6 +73,7 @@ class Recipe:
     exporters: Mapping[str, Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
     offsets_s: Mapping[str, float] = field(default_factory=dict)
+    frame_truth: Callable[[Mapping[str, Scene]], FrameTruth | None] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +172,10 @@ class Pipeline:
             scene = self._instant(view.scene, step_index * self.info.step_s)
             streams = replace(view.streams, step=step_index)
         capture, truth = self._captured(scene, streams, timings)
+        with _timed(timings, "annotate"):
+            swept = {n: self._instant(scene, c.time_s) for n, c in capture.clouds.items()}
+            described = self.recipe.frame_truth
+            frame = described({"": scene, **swept}) if described is not None else None
         return Sample(
             index=index,
             scene_index=scene_index,
@@ -181,6 +188,7 @@ class Pipeline:
             attempts=accepted.attempt + 1,
             timings_s=timings,
             cameras=self.info.sensors,
+            frame=frame,
         )
 
     def _captured(

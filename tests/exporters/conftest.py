@@ -28,7 +28,7 @@ from generator.core.capture import (
     Silhouette,
 )
 from generator.core.geometry import SURFACES, Keypoint
-from generator.core.interfaces import DatasetInfo, Exporter
+from generator.core.interfaces import Annotator, DatasetInfo, Exporter
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import Sample
 from generator.core.scene import Camera, Instance, Lidar, Scene
@@ -185,7 +185,8 @@ def make_sample(
     """A sample with every annotation."""
     scene = Scene("street", instances=tuple(instances), cameras=tuple(cameras))
     readings = {camera.name: ray_cast(scene, camera) for camera in cameras}
-    annotators = [annotations.TABLE.load(name)() for name in annotations.TABLE]
+    every = [annotations.TABLE.load(name)() for name in annotations.TABLE]
+    annotators = [annotator for annotator in every if isinstance(annotator, Annotator)]
     truth = {
         name: image_truth(scene, reading, annotators, thresholds or Thresholds())
         for name, reading in readings.items()
