@@ -29,7 +29,6 @@ class Twist:
     acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
     angular_velocity_rad_s: Vec3 = (0.0, 0.0, 0.0)
 
-
     def seen_along(self, T_world_frame: SE3) -> Twist:
         """The same motion along the axes of a frame."""
         w, x, y, z = T_world_frame.quaternion_wxyz
