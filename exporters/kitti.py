@@ -20,8 +20,13 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   box of the visible pixels, which COCO has.
 * **Things far off** are not labelled: KITTI's annotators saw what the laser scanner saw. They
   become ``DontCare`` regions.
-* **Points** are those of the data set's laser scanner, with labels per point; without one they are
-  thinned pixels of the depth image, with reflectance 0 and no labels.
+* **Points** are those of the data set's laser scanner; without one they are thinned pixels of the
+  depth image, with reflectance 0 and no labels.
+* **Point labels** are not KITTI's; they keep its rule that an object is what lies in its box. A
+  pulse that an object reflected, and that noise took more than 3 cm out of the box, has no row;
+  what lies as deep inside has the row whatever it is: the road between the wheels, where the box
+  of a car on a cambered street reaches below it. What a thing moved by itself between a pulse and
+  the instant of its box is taken back before. What reflected each pulse is in the lower half.
 * **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
   which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
 
@@ -31,7 +36,7 @@ Readers take ``calib`` by line number and need all printed digits of a rotation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -49,7 +54,7 @@ from generator.core.errors import ConfigError, did_you_mean
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, ObjectTruth, Sample
-from generator.core.scene import Instance
+from generator.core.scene import Camera, Instance
 from generator.core.se3 import Array, Vec3
 
 OFFICIAL_TYPES = {
@@ -83,6 +88,9 @@ NEAR_M = 0.05
 """Boxes that come nearer than this depth are not projected."""
 LIDAR_RANGE_M = 120.0
 """Of Velodyne's HDL-64E, whose place the virtual scanner takes."""
+
+BORDER_M = 0.029
+"""How far on the wrong side of a box's face a point may be: 3 cm, less rounding."""
 
 PARTLY_OCCLUDED = 0.1
 """Hidden share of the silhouette above which ``occluded`` is 1."""
@@ -165,7 +173,8 @@ class Kitti(Strict):
             if lidar:
                 points = read_points(shard_dir, lidar, sample.index)
                 _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
-                labels = point_labels(points, truth, self)
+                sweep_s = sample.scene.lidar(lidar).sweep_s
+                labels = point_labels(points, truth, self, T_camera_velo, sweep_s)
                 _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
             elif self.velodyne_stride_px:
                 thinned = self._points(info, sample, shard_dir)
@@ -287,6 +296,16 @@ class UprightBox:
         ]
         return np.asarray(self.bottom_m) + np.array(ends)
 
+    def depths_m(self, points_m: Array) -> Array:
+        """How deep points [n, 3] of the camera frame lie inside; negative outside."""
+        height, width, length = self.size_hwl_m
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        x, y, z = (points_m - self.bottom_m).T
+        along, across = c * x - s * z, s * x + c * z
+        sides = (0.5 * length - np.abs(along), 0.5 * width - np.abs(across))
+        depths: Array = np.minimum.reduce([*sides, -y, height + y])
+        return depths
+
 
 def upright_box(box: OrientedBox) -> UprightBox:
     """The smallest upright box, headed like the object's x axis, around an oriented box.
@@ -335,17 +354,63 @@ def label_rows(truth: ImageTruth, style: Kitti) -> list[tuple[str, int]]:
     return rows
 
 
-def point_labels(points: NDArray[np.void], truth: ImageTruth, style: Kitti) -> NDArray[np.uint32]:
-    """Per point the category id, and in the upper half the row in label_2 from 1; 0 = no row."""
+def point_labels(
+    points: NDArray[np.void],
+    truth: ImageTruth,
+    style: Kitti,
+    T_camera_velo: Array,
+    sweep_s: float = 0.0,
+) -> NDArray[np.uint32]:
+    """Per point the category id of what reflected it, and in the upper half its row in label_2.
+
+    Args:
+        points: Records of ``POINT``.
+        truth: Of the image; its labels' rows are counted from 1, 0 = no row.
+        style: Of the labels.
+        T_camera_velo: Points to the camera frame, [3, 4].
+        sweep_s: How long the sweep took; its middle is the instant of the boxes.
+    """
     ids = points["instance_id"]
-    rows = np.zeros(1 + int(ids.max(initial=0)), np.uint32)
-    for number, (_, instance_id) in enumerate(label_rows(truth, style), 1):
-        if instance_id < len(rows):
-            rows[instance_id] = number
-    labels: NDArray[np.uint32] = (points["category_id"] | (rows[ids] << np.uint32(16))).astype(
-        "<u4"
-    )
+    table = np.zeros(1 + int(ids.max(initial=0)), np.uint32)
+    things = {thing.instance.instance_id: thing for thing in truth.objects}
+    boxed: dict[int, ObjectTruth] = {}
+    for number, (row, instance_id) in enumerate(label_rows(truth, style), 1):
+        if instance_id < len(table):
+            table[instance_id] = number
+        if not row.startswith("DontCare"):
+            boxed[number] = things[instance_id]
+    R_camera_velo, t_camera_velo = T_camera_velo[:, :3], T_camera_velo[:, 3]
+    p_camera = np.einsum("ij,nj->ni", R_camera_velo, points["position_m"], optimize=False)
+    p_camera += t_camera_velo
+    dt_s = points["time_s"] - 0.5 * sweep_s
+    rows = _rows_by_box(table[ids], p_camera, dt_s, boxed, truth.camera)
+    labels: NDArray[np.uint32] = (points["category_id"] | (rows << np.uint32(16))).astype("<u4")
     return labels
+
+
+def _rows_by_box(
+    rows: NDArray[np.uint32],
+    p_camera: Array,
+    dt_s: NDArray[np.floating],
+    boxed: Mapping[int, ObjectTruth],
+    camera: Camera,
+) -> NDArray[np.uint32]:
+    """Rows of points, from those of what reflected them; see the head of this file."""
+    T_camera_world = camera.T_world_camera.inverse()
+    boxes = {}
+    for number, thing in boxed.items():
+        assert thing.box3d_camera is not None
+        boxes[number] = upright_box(thing.box3d_camera)
+        (mine,) = np.nonzero(rows == number)
+        velocity_m_s = T_camera_world.rotate(np.asarray(thing.instance.twist.velocity_m_s))
+        then = p_camera[mine] - dt_s[mine, None] * velocity_m_s
+        rows[mine[boxes[number].depths_m(then) < -BORDER_M]] = 0
+    (free,) = np.nonzero(rows == 0)
+    for number, box in boxes.items():
+        reach_m = math.hypot(*box.size_hwl_m)
+        near = free[np.abs(p_camera[free] - box.bottom_m).max(axis=1) < reach_m]
+        rows[near[box.depths_m(p_camera[near]) > BORDER_M]] = number
+    return rows
 
 
 def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
@@ -493,8 +558,9 @@ _BOXES = {
 }
 _SCANNED = """\
 velodyne    Points of the laser scanner '{lidar}'; float32 x y z reflectance [0, 1].
-velodyne_labels  One uint32 per point: lower half category id, upper half row in label_2, from 1;
-            0 = no row."""
+velodyne_labels  One uint32 per point: lower half the category id of what reflected it, upper half
+            row in label_2, from 1; 0 = no row. Objects are what lies in their boxes: points that
+            range noise took more than 3 cm out have no row, and what is deeper inside has one."""
 _THINNED = """\
 velodyne    Points of the depth image, one per {stride} x {stride} pixels (0: not written), as seen
             from {height:.2f} m above the camera; float32 x y z reflectance; reflectance is 0."""

@@ -6,11 +6,12 @@
     sequences/00/labels/000000.label   uint32, class | instance << 16  a sequence of each official
     sequences/00/calib.txt             P0 to P3, Tr                    split
     sequences/00/poses.txt             camera i in camera 0, 3 x 4
-    sequences/00/times.txt             seconds, one sweep apart
+    sequences/00/times.txt             seconds, one step apart
 
-Scans are numbered without gaps in the order of samples; ``scans.txt`` names their samples. Views of
-one scene share a world, and things keep their instance id from scan to scan; the next scene begins
-elsewhere, with instance ids of its own.
+Scans are numbered without gaps in the order of samples; ``scans.txt`` names their samples. Over the
+steps of a view things keep their instance id from scan to scan. The next view begins elsewhere,
+with instance ids of its own: nothing is followed across a jump. Things that move at the instant of
+a scan have the ``moving-`` classes.
 
 Reference: Behley et al., "SemanticKITTI", ICCV 2019, and semantic-kitti-api, whose classes and
 numbers these are. A van is a car there; a mast is a pole, also that of a sign or a light.
@@ -51,6 +52,9 @@ THINGS = {
     "motorcyclist": 32,
 }
 """Countable classes by category."""
+MOVING = {10: 252, 31: 253, 30: 254, 32: 255, 16: 256, 13: 257, 18: 258}
+"""Classes of things under way, by their class at rest; motorcycles have none."""
+MOVING_M_S = 0.05
 STUFF = {
     "building": 50,
     "fence": 51,
@@ -78,7 +82,6 @@ OF_SURFACE = {
 """Classes by surface, for what has no category; ``air`` is an outlier."""
 OTHER_OBJECT, OTHER_GROUND, SIGN, VEGETATION, TRUNK = 99, 49, 81, 70, 71
 SEQUENCES = {"train": "00", "val": "08", "test": "11"}
-SWEEP_S = 0.1
 INSTANCES_MAX = 65_535
 
 
@@ -130,7 +133,7 @@ class SemanticKitti(Strict):
             calib = calib_matrices(view.intrinsics, T_camera_lidar(sample, camera, lidar)[:3])
             scan = {
                 "index": sample.index,
-                "scene": sample.scene_index,
+                "view": [sample.scene_index, sample.view_index],
                 "split": sample.split,
                 "pose": [float(v) for v in view.T_world_camera.matrix().ravel()],
                 "calib": matrix_lines({k: calib[k] for k in ("P0", "P1", "P2", "P3")})
@@ -141,12 +144,11 @@ class SemanticKitti(Strict):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the scans of each split, and the things in them."""
-        del info
         scans = list(_scans([shard_dir / self.type for shard_dir in shard_dirs]))
         for split, number in SEQUENCES.items():
             mine = [(folder, scan) for folder, scan in scans if scan["split"] == split]
             if mine:
-                _write_sequence(mine, dataset_dir / "sequences" / number)
+                _write_sequence(mine, dataset_dir / "sequences" / number, info.step_s)
 
 
 def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
@@ -160,6 +162,8 @@ def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
         k, category = thing.instance_id, thing.category
         counted[k] = category in THINGS
         named[k] = THINGS.get(category, STUFF.get(category, OTHER_OBJECT))
+        if max(map(abs, thing.twist.velocity_m_s)) > MOVING_M_S:
+            named[k] = MOVING.get(int(named[k]), named[k])
         leafy[k], signed[k] = named[k] == VEGETATION, category == "traffic_sign"
     ids, surfaces = points["instance_id"].astype(np.int64), points["surface"]
     ground = of_surface[surfaces]
@@ -178,33 +182,35 @@ def _scans(folders: Sequence[Path]) -> Iterator[tuple[Path, dict[str, Any]]]:
             yield folder, json.loads(line)
 
 
-def _write_sequence(scans: Sequence[tuple[Path, dict[str, Any]]], folder: Path) -> None:
+def _write_sequence(
+    scans: Sequence[tuple[Path, dict[str, Any]]], folder: Path, step_s: float
+) -> None:
     (folder / "labels").mkdir(parents=True, exist_ok=True)
-    numbers: dict[tuple[int, int], int] = {}
+    numbers: dict[tuple[int, int, int], int] = {}
     first = np.linalg.inv(np.array(scans[0][1]["pose"]).reshape(4, 4))
     poses = []
     for k, (source, scan) in enumerate(scans):
         stem = source / f"{scan['index']:09d}"
         link_or_copy(stem.with_suffix(".bin"), folder / f"velodyne/{k:06d}.bin")
         labels = np.frombuffer(stem.with_suffix(".label").read_bytes(), "<u4")
-        labels = _renumbered(labels, scan["scene"], numbers)
+        labels = _renumbered(labels, tuple(scan["view"]), numbers)
         (folder / f"labels/{k:06d}.label").write_bytes(labels.tobytes())
         pose = first @ np.array(scan["pose"]).reshape(4, 4)
         poses.append(" ".join(f"{v + 0.0:.9e}" for v in pose[:3].ravel()) + "\n")
     _write(folder / "poses.txt", "".join(poses))
-    _write(folder / "times.txt", "".join(f"{SWEEP_S * k:.6e}\n" for k in range(len(scans))))
+    _write(folder / "times.txt", "".join(f"{step_s * k:.6e}\n" for k in range(len(scans))))
     _write(folder / "calib.txt", scans[0][1]["calib"])
     _write(folder / "scans.txt", "".join(f"{scan['index']}\n" for _, scan in scans))
 
 
 def _renumbered(
-    labels: NDArray[np.uint32], scene: int, numbers: dict[tuple[int, int], int]
+    labels: NDArray[np.uint32], view: tuple[int, int], numbers: dict[tuple[int, int, int], int]
 ) -> NDArray[np.uint32]:
     """Labels with instance ids that are unique in the sequence; ``numbers`` grows."""
     ids = labels >> np.uint32(16)
     table = np.zeros(int(ids.max(initial=0)) + 1, np.uint32)
     for old in np.unique(ids[ids > 0]):
-        new = numbers.setdefault((scene, int(old)), len(numbers) + 1)
+        new = numbers.setdefault((*view, int(old)), len(numbers) + 1)
         if new > INSTANCES_MAX:
             raise ConfigError(
                 f"exporter 'semantickitti': a sequence holds {INSTANCES_MAX} instances at most; "

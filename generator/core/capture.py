@@ -108,13 +108,18 @@ class PointCloud:
 
     Attributes:
         points: Records of ``POINT`` [n].
-        time_s: The instant that ``lidar`` and the boxes refer to.
+        time_s: The instant that ``lidar`` and the boxes refer to: the middle of the sweep.
     """
 
     sensor: str
     lidar: Lidar
     points: NDArray[np.void]
     time_s: float = 0.0
+
+    @property
+    def start_s(self) -> float:
+        """When the sweep began."""
+        return self.time_s - 0.5 * self.lidar.sweep_s
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -134,19 +139,24 @@ class Table:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Beams:
-    """The light that a laser scanner sends out.
+    """The light that a laser scanner sends out; "lidar frame" is that of the scene's instant.
 
     Attributes:
         directions: Unit vectors in the lidar frame, float32 [n, 3].
         divergence_rad: Full angle of a beam.
         subrays: Rays that stand for one beam: 1, or 7, the axis and six around it.
         range_max_m: Beyond it nothing is looked for.
+        origins_m: Where beams begin in the lidar frame, float32 [n, 3]; None = at its origin.
+        time_s: When beams leave, counted from the scene's instant, float32 [n]: they meet bodies
+            with tracks where these are then. None = all at that instant.
     """
 
     directions: NDArray[np.float32]
     divergence_rad: float
     subrays: int
     range_max_m: float
+    origins_m: NDArray[np.float32] | None = None
+    time_s: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

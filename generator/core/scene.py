@@ -326,6 +326,7 @@ class Lidar:
         T_world_lidar: Its pose; follows the rig.
         model: What it is, for the labels: ``HDL-64E``.
         rig: Name of its rig; empty = it rides with ``camera``.
+        sweep_s: How long a sweep takes; the scene's instant is its middle.
     """
 
     name: str
@@ -334,6 +335,7 @@ class Lidar:
     T_world_lidar: SE3 = IDENTITY
     model: str = ""
     rig: str = ""
+    sweep_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

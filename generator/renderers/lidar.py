@@ -17,6 +17,7 @@ from generator.renderers.kernels import lidar as kernels
 from generator.renderers.labels import category_ids
 from generator.renderers.packing import pack_world
 from generator.renderers.stock import AssetStock
+from generator.renderers.travel import travelling
 
 _SURFACE = {role: number for number, role in enumerate(SURFACES)}
 
@@ -31,7 +32,7 @@ RUN = 64
 def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echoes:
     """What the rays of all beams hit first."""
     eye = Camera(lidar.name, lidar.T_world_lidar, Intrinsics(1, 1, 1.0, 1.0, 0.5, 0.5))
-    world = pack_world(scene, eye, stock)
+    world, travel = travelling(scene, lidar, beams, pack_world(scene, eye, stock), stock)
     own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
     materials = [material for group in own for material in group]
     device = stock.device
@@ -44,7 +45,7 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     wp.launch(
         kernels.scan_beams,
         dim=(count + RUN - 1) // RUN,
-        inputs=[_scan(lidar, beams), world.record, lights, axes],
+        inputs=[_scan(lidar, beams), world.record, travel, lights, axes],
         outputs=[*images, hits_],
         device=device,
     )

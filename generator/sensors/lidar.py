@@ -31,6 +31,7 @@ from generator.sensors.returns import (
     selected,
 )
 from generator.sensors.scanning import LidarModel, Sweep, sweep_of
+from generator.sensors.travel import Shots, shots_of
 
 SUBRAYS = 7
 """Rays that stand for a beam with a width."""
@@ -55,6 +56,10 @@ class LidarSensor(Mounted):
         returns: Which return of a pulse is reported; ``dual`` reports two.
         divergence: Whether beams have a width; costs seven rays instead of one.
         ideal: No noise, no missed return, no weather: every hit within range.
+        motion: What becomes of the scanner's way during a sweep. ``raw``: points are in the lidar
+            frame of each pulse's own instant. ``compensated``: in that of the sweep's middle, as in
+            KITTI's files; what moves by itself is where each pulse met it. ``frozen``: all pulses
+            leave in the middle of the sweep.
     """
 
     modality: ClassVar[Literal["camera", "lidar"]] = "lidar"
@@ -65,6 +70,7 @@ class LidarSensor(Mounted):
     returns: Kept = "strongest"
     divergence: bool = False
     ideal: bool = False
+    motion: Literal["raw", "compensated", "frozen"] = "compensated"
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this scanner on its rig.
@@ -72,17 +78,17 @@ class LidarSensor(Mounted):
         Raises:
             ConfigError: the scene has no such rig or camera.
         """
+        sweep_s = round(1.0 / lidar_model(self.model).rotation_hz, 9)
+        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.model, sweep_s=sweep_s)
         if self.rig:
             rig = known_rig(scene, self.name, self.rig)
-            lidar = Lidar(self.name, "", self.T_rig_sensor, model=self.model, rig=rig)
-            return replace(scene, lidars=(*scene.lidars, lidar))
+            return replace(scene, lidars=(*scene.lidars, replace(lidar, camera="", rig=rig)))
         known = [camera.name for camera in scene.cameras]
         if self.camera not in known:
             raise ConfigError(
                 f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
                 f" is {', '.join(known) or 'none'}"
             )
-        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.model)
         return replace(scene, lidars=(*scene.lidars, lidar))
 
     def capture(
@@ -93,23 +99,30 @@ class LidarSensor(Mounted):
         model = lidar_model(self.model)
         lidar = scene.lidar(self.name)
         sweep = sweep_of(model, float(rng.uniform(0.0, 3600.0)))
+        shots = Shots(sweep.directions)
+        if self.motion != "frozen":
+            shots = shots_of(scene, lidar, sweep)
         beams = Beams(
-            sweep.directions,
+            shots.directions,
             1e-3 * model.divergence_mrad,
             SUBRAYS if self.divergence else 1,
             model.range_m[1],
+            shots.origins_m,
+            shots.time_s,
         )
         pulses = pulses_of(renderer.scan(scene, lidar, beams), model)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
-            pulses = _through_air(pulses, weather, model, lidar, sweep, rng)
+            pulses = _through_air(pulses, weather, model, lidar, shots, rng)
         pulses = beyond_reach(pulses, model)
         noticed = pulses.light > 0.0 if self.ideal else detected(pulses, rng)
         rows, picks = selected(pulses, noticed, self.returns)
         found = Found.of(pulses, rows, picks)
         if not self.ideal:
             found = _noisy(found, model, weather, rng)
-        return PointCloud(self.name, lidar, _points(found, sweep, model), scene.time_s)
+        seen_from = Shots(sweep.directions) if self.motion == "raw" else shots
+        points = _points(found, seen_from, sweep, model)
+        return PointCloud(self.name, lidar, points, scene.time_s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -137,11 +150,11 @@ class Found:
 
 
 def _through_air(
-    pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, sweep: Sweep, rng: Rng
+    pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, shots: Shots, rng: Rng
 ) -> Pulses:
     """The pulses after fog, rain and snow, and what these send back themselves."""
     height_m = lidar.T_world_lidar.translation_m[2]
-    up = sweep.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
+    up = shots.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
     finite = np.where(np.isfinite(pulses.range_m), pulses.range_m, np.float32(model.range_m[1]))
     depth = optical_depth(weather, model, height_m, up[:, None], finite)
     return with_air(dimmed(pulses, depth), weather, model, height_m, rng)
@@ -157,11 +170,11 @@ def _noisy(found: Found, model: LidarModel, weather: Weather, rng: Rng) -> Found
     return replace(found, range_m=range_m.astype(np.float32))
 
 
-def _points(found: Found, sweep: Sweep, model: LidarModel) -> NDArray[np.void]:
+def _points(found: Found, shots: Shots, sweep: Sweep, model: LidarModel) -> NDArray[np.void]:
     """Records of ``POINT``; returns of a pulse follow each other, nearest first."""
     rows = found.row
     points: NDArray[Any] = np.zeros(len(rows), POINT)
-    points["position_m"] = sweep.directions[rows] * found.range_m[:, None]
+    points["position_m"] = shots.points_m(rows, found.range_m)
     points["intensity"] = reported_intensity(found.reflectance, model)
     points["time_s"] = sweep.time_s[rows]
     points["ring"] = sweep.ring[rows]

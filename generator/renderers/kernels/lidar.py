@@ -55,6 +55,41 @@ class Scan:
     run: int
 
 
+@wp.struct
+class Travel:
+    """What moves while beams leave one after the other.
+
+    Attributes:
+        keys: Poses that every mover has over the sweep; 0 = nothing moves, nothing else is read.
+        rows: Row of each body among the movers; -1 = it stands still.
+        B_mesh_lidar, eye_mesh: Directions and origin of the lidar frame in movers' mesh frames,
+            [mover, key].
+        phases: When each beam leaves, in keys.
+        origins_m: Where it begins in the lidar frame.
+    """
+
+    keys: int
+    rows: wp.array(dtype=int)
+    B_mesh_lidar: wp.array(dtype=wp.mat33, ndim=2)
+    eye_mesh: wp.array(dtype=wp.vec3, ndim=2)
+    phases: wp.array(dtype=float)
+    origins_m: wp.array(dtype=wp.vec3)
+
+
+@wp.struct
+class Ray:
+    """A ray in the lidar frame.
+
+    Attributes:
+        key, share: It leaves this share of a step after this key.
+    """
+
+    direction: wp.vec3
+    origin_m: wp.vec3
+    key: int
+    share: float
+
+
 @wp.func
 def ray_of_beam(axis: wp.vec3, k: int, spread: float):
     """The axis of a beam, or one of six rays around it."""
@@ -104,14 +139,32 @@ class Nearest:
 
 
 @wp.func
-def nearer(world: World, b: int, ray: wp.vec3, hit: Nearest):
+def mover_frame(travel: Travel, m: int, ray: Ray):
+    """Directions of the lidar frame in the mesh frame of mover m when a ray leaves."""
+    before = travel.B_mesh_lidar[m, ray.key]
+    return before + (travel.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
+
+
+@wp.func
+def nearer(world: World, travel: Travel, b: int, ray: Ray, hit: Nearest):
     """The hit, or a nearer one on a body.
 
     From the scanner's own frame: what is far from the world's origin loses nothing.
     """
-    d = world.bodies[b].B_mesh_camera @ ray
+    d = world.bodies[b].B_mesh_camera @ ray.direction
+    o = world.bodies[b].eye_mesh
+    if travel.keys > 0:
+        m = travel.rows[b]
+        if m >= 0:
+            B = mover_frame(travel, m, ray)
+            before = travel.eye_mesh[m, ray.key]
+            o = before + (travel.eye_mesh[m, ray.key + 1] - before) * ray.share
+            o += B @ ray.origin_m
+            d = B @ ray.direction
+        else:
+            o += world.bodies[b].B_mesh_camera @ ray.origin_m
     mesh = world.geometries[world.bodies[b].geometry].mesh
-    answer = wp.mesh_query_ray(mesh, world.bodies[b].eye_mesh, d, hit.range_m)
+    answer = wp.mesh_query_ray(mesh, o, d, hit.range_m)
     if answer.result:
         hit.range_m = answer.t
         hit.body = b
@@ -121,10 +174,26 @@ def nearer(world: World, b: int, ray: wp.vec3, hit: Nearest):
     return hit
 
 
+@wp.func
+def normal_of(scan: Scan, world: World, travel: Travel, ray: Ray, hit: Nearest):
+    """Interpolated unit normal of a hit, lidar frame."""
+    g = world.bodies[hit.body].geometry
+    corner = corners_of(world, g, hit.face)
+    n = normal_at(world, g, corner[0]) * hit.u
+    n += normal_at(world, g, corner[1]) * hit.v
+    n += normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
+    if travel.keys > 0:
+        m = travel.rows[hit.body]
+        if m >= 0:
+            return unit(wp.transpose(mover_frame(travel, m, ray)) @ n)
+    return wp.transpose(scan.R_world_lidar) @ (world.bodies[hit.body].R_world_mesh @ unit(n))
+
+
 @wp.kernel
 def scan_beams(
     scan: Scan,
     world: World,
+    travel: Travel,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
     ranges_m: wp.array(dtype=float),
@@ -141,18 +210,26 @@ def scan_beams(
     end = wp.min((t + 1) * scan.run, ranges_m.shape[0])
     last = int(-1)
     for i in range(t * scan.run, end):
-        ray = ray_of_beam(axes[i / scan.subrays], i % scan.subrays, scan.spread)
+        beam = i / scan.subrays
+        ray = Ray()
+        ray.direction = ray_of_beam(axes[beam], i % scan.subrays, scan.spread)
+        eye_m = scan.eye_m
+        if travel.keys > 0:
+            ray.origin_m = travel.origins_m[beam]
+            ray.key = wp.min(int(travel.phases[beam]), travel.keys - 2)
+            ray.share = travel.phases[beam] - float(ray.key)
+            eye_m += scan.R_world_lidar @ ray.origin_m
         hit = Nearest()
         hit.range_m = scan.reach_m
         hit.body = -1
         if last >= 0:
-            hit = nearer(world, last, ray, hit)
+            hit = nearer(world, travel, last, ray, hit)
         tried = last
-        candidates = wp.bvh_query_ray(world.tree, scan.eye_m, scan.R_world_lidar @ ray)
+        candidates = wp.bvh_query_ray(world.tree, eye_m, scan.R_world_lidar @ ray.direction)
         b = int(0)
         while wp.bvh_query_next(candidates, b, hit.range_m):
             if b != tried:
-                hit = nearer(world, b, ray, hit)
+                hit = nearer(world, travel, b, ray, hit)
         last = hit.body
         if hit.body < 0:
             hits[i] = wp.vec2i(-1, -1)
@@ -160,15 +237,8 @@ def scan_beams(
             reflectances[i] = 0.0
             cosines[i] = 0.0
         else:
-            g = world.bodies[hit.body].geometry
-            corner = corners_of(world, g, hit.face)
-            n = normal_at(world, g, corner[0]) * hit.u
-            n += normal_at(world, g, corner[1]) * hit.v
-            n += normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
-            n_lidar = wp.transpose(scan.R_world_lidar) @ (
-                world.bodies[hit.body].R_world_mesh @ unit(n)
-            )
-            cosine = wp.min(wp.abs(wp.dot(n_lidar, ray)), 1.0)
+            n_lidar = normal_of(scan, world, travel, ray, hit)
+            cosine = wp.min(wp.abs(wp.dot(n_lidar, ray.direction)), 1.0)
             material = surface_index(world, wp.vec2i(hit.body, hit.face))
             hits[i] = wp.vec2i(hit.body, material)
             ranges_m[i] = hit.range_m
