@@ -15,5 +15,6 @@ TABLE = PluginTable(
         "kitti": "exporters.kitti:Kitti",
         "pointclouds": "exporters.pointclouds:PointClouds",
         "semantickitti": "exporters.semantickitti:SemanticKitti",
+        "tables": "exporters.tables:Tables",
     },
 )

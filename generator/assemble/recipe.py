@@ -20,7 +20,7 @@ from generator.core.streams import Streams
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
 from generator.pipeline.pipeline import Blueprint, Recipe
-from generator.sensors.mounting import stride
+from generator.sensors.mounting import stride, within_steps
 from scene_templates.builder import build
 
 BLUEPRINTS_KEPT = 32
@@ -106,11 +106,11 @@ def recipe_of(
 
 
 def _strides(spec: Spec) -> dict[str, int]:
-    """Every how many steps cameras and laser scanners read."""
+    """Every how many steps a sensor reads; devices may also read several times in one."""
     return {
         s.name: stride(s.name, s.rate_hz, spec.head.step_s)
         for s in spec.sensors
-        if s.modality in IMAGING
+        if s.modality in IMAGING or not within_steps(s.rate_hz, spec.head.step_s)
     }
 
 
@@ -128,7 +128,7 @@ def blueprints(spec: Spec, assets: AssetIndex) -> Callable[[Streams], Blueprint]
 def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
     """The template's scene with every sensor mounted."""
     scene = build(spec.head.template or spec.name, layout.elements, assets)
-    scene = replace(scene, shared=layout.shared)
+    scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
     return scene

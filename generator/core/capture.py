@@ -127,7 +127,7 @@ class Table:
     """What a device measured: radar, inertial unit, satellite receiver, odometer, watcher.
 
     Attributes:
-        rows: Records [n] of the dtype that belongs to ``device.kind``; may be empty.
+        rows: Records [n] of ``generator.core.tables.table_dtype(device.kind)``; may be empty.
         time_s: The instant that ``device`` refers to.
     """
 

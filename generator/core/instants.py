@@ -199,5 +199,8 @@ def _placed_lidar(scene: Scene, lidar: Lidar) -> Lidar:
 
 
 def _placed_device(scene: Scene, device: Device) -> Device:
-    T_world_rig = scene.rig_pose(device.rig)
+    if device.rig:
+        T_world_rig = scene.rig_pose(device.rig)
+    else:
+        T_world_rig = scene.camera(device.camera).T_world_camera @ RIG_AXES
     return replace(device, T_world_device=(T_world_rig @ device.T_rig_device).rounded())

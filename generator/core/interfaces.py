@@ -280,3 +280,8 @@ def media_path(shard_dir: Path, sensor: str, channel: Channel, index: int) -> Pa
 def cloud_path(shard_dir: Path, sensor: str, index: int) -> Path:
     """Where the points of one sweep lie: a NumPy file with an array of ``POINT`` records."""
     return shard_dir / sensor / "points" / f"{index:09d}.npy"
+
+
+def table_path(shard_dir: Path, sensor: str, index: int) -> Path:
+    """Where the rows of one reading lie: a NumPy file of ``generator.core.tables`` records."""
+    return shard_dir / sensor / "rows" / f"{index:09d}.npy"

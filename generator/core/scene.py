@@ -344,11 +344,13 @@ class Device:
 
     Attributes:
         name: The sensor's name in the YAML.
-        kind: The modality: ``radar``, ``imu``, ``gnss``, ``odometer``, ``events``.
-        rig: Name of its rig.
+        kind: The modality: ``radar``, ``imu``, ``gnss``, ``odometer``, ``watcher``,
+            ``event_camera``.
+        rig: Name of its rig; empty = it rides with ``camera``.
         T_rig_device: Where it is on the rig. X forward, Y left, Z up.
         T_world_device: Its pose; follows the rig.
         model: What it is, for the labels.
+        camera: Name of the camera it looks through; empty = none.
     """
 
     name: str
@@ -357,6 +359,7 @@ class Device:
     T_rig_device: SE3 = IDENTITY
     T_world_device: SE3 = IDENTITY
     model: str = ""
+    camera: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,6 +380,7 @@ class Scene:
         lanes: Where things may move or stand, in a street.
         shared: Values that several draws have in common, ``(name, value)``, sorted by name.
         time_s: The instant it is shown at; 0 = when it was built.
+        step_s: Time between the instants of its sequence.
         tracks: How bodies move; at most one per body.
         changes: What changes at once, in order of time.
     """
@@ -399,6 +403,7 @@ class Scene:
     rigs: tuple[Rig, ...] = ()
     devices: tuple[Device, ...] = ()
     time_s: float = 0.0
+    step_s: float = 0.1
     tracks: tuple[Track, ...] = ()
     changes: tuple[Change, ...] = ()
 

@@ -9,5 +9,9 @@ TABLE = PluginTable(
     {
         "rgb_camera": "generator.sensors.rgb_camera:RgbCamera",
         "lidar": "generator.sensors.lidar:LidarSensor",
+        "imu": "generator.sensors.imu:Imu",
+        "gnss": "generator.sensors.gnss:Gnss",
+        "odometer": "generator.sensors.odometer:Odometer",
+        "watcher": "generator.sensors.watcher:Watcher",
     },
 )

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from generator.config.strict import Strict
 from generator.core.errors import ConfigError, did_you_mean
-from generator.core.scene import Scene
-from generator.core.se3 import SE3
+from generator.core.scene import Device, Scene
+from generator.core.se3 import SE3, Array
+from generator.core.tables import TIME_DECIMALS
 
 
 class Mounted(Strict):
@@ -43,6 +47,35 @@ class Mounted(Strict):
         return (turned @ upwards @ leaning).rounded()
 
 
+class Instrument(Mounted):
+    """A sensor on a rig that reports rows of a table.
+
+    Attributes:
+        name: What files call it.
+        rig: Name of the rig it is on.
+    """
+
+    modality: ClassVar[str]
+    name: str = Field("instrument", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    rig: str = "ego"
+
+    @property
+    def device_model(self) -> str:
+        """What it is, for the labels; empty = nothing in particular."""
+        return ""
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with this device on its rig.
+
+        Raises:
+            ConfigError: there is no such rig, or its rate does not fit the sequence.
+        """
+        rig = known_rig(scene, self.name, self.rig)
+        checked_rate(self.name, self.rate_hz, scene.step_s)
+        device = Device(self.name, self.modality, rig, self.T_rig_sensor, model=self.device_model)
+        return replace(scene, devices=(*scene.devices, device))
+
+
 def known_rig(scene: Scene, sensor: str, rig: str) -> str:
     """The rig's name, if the scene has it.
 
@@ -74,3 +107,41 @@ def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:
             f" whole number of steps between readings, such as {1.0 / (k * step_s):g} Hz"
         )
     return round(steps)
+
+
+def within_steps(rate_hz: float | None, step_s: float) -> bool:
+    """Whether a sensor reads more often than the sequence steps."""
+    return rate_hz is not None and rate_hz * step_s > 1.0 + 1e-6
+
+
+def checked_rate(sensor: str, rate_hz: float | None, step_s: float) -> None:
+    """Refuse a rate that does not fit the steps of the sequence.
+
+    Raises:
+        ConfigError: neither a whole number of readings per step nor of steps per reading.
+    """
+    if rate_hz is None or not within_steps(rate_hz, step_s):
+        stride(sensor, rate_hz, step_s)
+        return
+    readings = rate_hz * step_s
+    if abs(readings - round(readings)) > 1e-6 * readings:
+        raise ConfigError(
+            f"sensor '{sensor}': rate_hz {rate_hz:g} does not fit step_s {step_s:g}; expected a"
+            f" whole number of readings per step, such as {round(readings) / step_s:g} Hz"
+        )
+
+
+def reading_times(scene: Scene, rate_hz: float | None) -> Array:
+    """Instants of the readings of the step that ends now; at time 0 there is but one."""
+    step_s = scene.step_s
+    if scene.time_s <= 0.0 or rate_hz is None or not within_steps(rate_hz, step_s):
+        return np.array([scene.time_s])
+    count = round(rate_hz * step_s)
+    last = round(scene.time_s * rate_hz)
+    return np.round(np.arange(last - count + 1, last + 1) / rate_hz, TIME_DECIMALS)
+
+
+def window_s(scene: Scene, rate_hz: float | None) -> tuple[float, float]:
+    """The time that a reading now looks back on: a step, or the time since the last reading."""
+    period_s = max(scene.step_s, 1.0 / rate_hz if rate_hz else 0.0)
+    return max(round(scene.time_s - period_s, TIME_DECIMALS), 0.0), scene.time_s

@@ -26,13 +26,15 @@ from generator.core.capture import (
     PointCloud,
     Reading,
     Silhouette,
+    Table,
 )
 from generator.core.geometry import SURFACES, Keypoint
 from generator.core.interfaces import Annotator, DatasetInfo, Exporter
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import Sample
-from generator.core.scene import Camera, Instance, Lidar, Scene
+from generator.core.scene import Camera, Device, Instance, Lidar, Scene
 from generator.core.se3 import SE3, Array, look_at
+from generator.core.tables import table_rows
 
 CATEGORIES = ("car", "crate", "pedestrian")
 MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
@@ -192,9 +194,18 @@ def make_sample(
         for name, reading in readings.items()
     }
     lidar = Lidar("top", cameras[0].name, T_world_lidar=SE3((0.0, 0.0, 1.73)), model="VLP-16")
-    scene = replace(scene, lidars=(lidar,))
+    imu = Device("imu", "imu", "ego", T_world_device=SE3((0.0, 0.0, 0.5)), model="RT3003")
+    scene = replace(scene, lidars=(lidar,), devices=(imu,))
     clouds = {"top": PointCloud("top", lidar, scan(scene, lidar))}
-    return Sample(index, index, 0, split, scene, Capture(readings, clouds), truth)
+    tables = {"imu": Table("imu", imu, imu_rows(index))}
+    return Sample(index, index, 0, split, scene, Capture(readings, clouds, tables), truth)
+
+
+def imu_rows(index: int) -> NDArray[Any]:
+    """Three readings; the second has a figure of many digits."""
+    times_s = 0.1 * index + 0.01 * np.arange(3)
+    force = np.array([0.0, 1.0 / 3.0, -2.5e-7])
+    return table_rows("imu", 3, time_s=times_s, force_x_m_s2=force, force_z_m_s2=9.80665)
 
 
 def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:
@@ -237,6 +248,7 @@ def make_info(
         media=dict.fromkeys(sensors, MEDIA),
         depth_scale_m=0.001,
         lidars=lidars,
+        devices={"imu": "imu"},
     )
     return replace(info, **changes)
 
