@@ -27,11 +27,6 @@ def write_cloud(cloud: PointCloud, shard_dir: Path, index: int) -> None:
         np.lib.format.write_array(file, cloud.points, version=(1, 0), allow_pickle=False)
 
 
-def has_points(shard_dir: Path, sensor: str, index: int) -> bool:
-    """Whether a laser scanner read at a sample's step."""
-    return cloud_path(shard_dir, sensor, index).exists()
-
-
 def scanner_of(sample: Sample, lidar: str) -> Lidar:
     """A laser scanner at the instant of its sweep; as in the scene if it has not read."""
     cloud = sample.capture.clouds.get(lidar)

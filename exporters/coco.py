@@ -28,8 +28,14 @@ as their annotations are made:
     Pose of the object's own frame, 4 x 4, rows first.
 ``part_px``
     Visible pixels by part.
+``motion``
+    Velocity, acceleration and angular velocity over the ground, along the axes of ``world``,
+    ``camera`` and ``ego`` (the rig; absent without one), and ``speed_m_s``.
 ``keypoints_camera_m``
     In keypoint files: by name, positions in the camera frame.
+
+Images have ``lane_borders``, lists of image points in the direction of travel and whether each is
+visible (0 = hidden), and ``free_space``, run-length encoded, as far as these are made.
 
 Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
 covers ``[i, i + 1)``, as COCO's boxes do; OpenCV's principal point is 0.5 px less.
@@ -54,7 +60,9 @@ from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
+from generator.core.intrinsics import Intrinsics
+from generator.core.motion import Twist
+from generator.core.sample import ImageTruth, KeypointTruth, MotionTruth, ObjectTruth, Sample
 from generator.core.scene import Instance, Weather
 from generator.core.se3 import Array
 from generator.core.serial import canonical_json
@@ -99,7 +107,7 @@ class Coco(Strict):
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
         for sample in samples:
-            for sensor in (s for s in _sensors(info) if s in sample.truth):
+            for sensor in _sensors(info):
                 truth = sample.truth[sensor]
                 images = rows.setdefault(f"{sample.split}.images", [])
                 annotations = rows.setdefault(f"{sample.split}.annotations", [])
@@ -181,6 +189,37 @@ def _optional(thing: ObjectTruth) -> dict[str, Any]:
         keys["T_camera_object"] = _rows(thing.T_camera_object.matrix())
     if thing.part_px is not None:
         keys["part_px"] = thing.part_px
+    if thing.motion is not None:
+        keys["motion"] = motion_facts(thing.motion)
+    return keys
+
+
+def motion_facts(motion: MotionTruth) -> dict[str, Any]:
+    """How an object moves, by the frame along whose axes the numbers are."""
+    frames = {"world": motion.world, "camera": motion.camera, "ego": motion.ego}
+    facts: dict[str, Any] = {
+        name: {f.name: _rounded(getattr(twist, f.name)) for f in fields(Twist)}
+        for name, twist in frames.items()
+        if twist is not None
+    }
+    return {**facts, "speed_m_s": round(motion.speed_m_s, DECIMALS)}
+
+
+def _of_image(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
+    """The keys of annotations of the image as a whole; none for those that were not made."""
+    keys: dict[str, Any] = {}
+    if truth.borders is not None:
+        keys["lane_borders"] = [
+            {
+                "name": b.border,
+                "kind": b.kind,
+                "points_px": b.points_px,
+                "visible": [int(seen) for seen in b.visible],
+            }
+            for b in truth.borders
+        ]
+    if truth.free_space is not None:
+        keys["free_space"] = encoded(truth.free_space, camera.height_px, camera.width_px)
     return keys
 
 
@@ -202,7 +241,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "T_world_camera": _rows(camera.T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
-    }
+    } | _of_image(sample.truth[sensor], camera.intrinsics)
 
 
 def _weather(weather: Weather) -> dict[str, float]:

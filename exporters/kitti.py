@@ -45,7 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from exporters.clouds import T_camera_lidar, has_points, read_points, xyzi_bytes
+from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx, OrientedBox
@@ -158,18 +158,14 @@ class Kitti(Strict):
         camera = self._camera(info)
         folder = shard_dir / self.type
         frames = []
-        lidar = self._lidar(info)
         for sample in samples:
-            if camera not in sample.truth:
-                continue
-            if lidar and not has_points(shard_dir, lidar, sample.index):
-                continue
             truth = sample.truth[camera]
             frame = _frame(sample.index)
             _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self))
             T_camera_velo = self._velodyne_pose(info, sample)
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
             _write_text(folder / f"calib/{frame}.txt", calib)
+            lidar = self._lidar(info)
             if lidar:
                 points = read_points(shard_dir, lidar, sample.index)
                 _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))

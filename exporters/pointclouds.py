@@ -21,11 +21,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.clouds import has_points, read_points, scanner_of
+from exporters.clouds import read_points, scanner_of
 from exporters.images import link_or_copy
 from generator.config.strict import Strict
 from generator.core.boxes import OrientedBox
 from generator.core.errors import ConfigError
+from generator.core.instants import at
 from generator.core.interfaces import DatasetInfo
 from generator.core.sample import Sample
 from generator.core.scene import Instance
@@ -81,12 +82,11 @@ class PointClouds(Strict):
         for lidar in info.lidars:
             folder = shard_dir / self.type / lidar
             folder.mkdir(parents=True, exist_ok=True)
-            for sample in (s for s in kept if has_points(shard_dir, lidar, s.index)):
+            for sample in kept:
                 points = read_points(shard_dir, lidar, sample.index)
                 path = folder / f"{sample.index:09d}.{self.format}"
                 path.write_bytes(encoded(file_points(points)))
-            swept = (s for s in kept if has_points(shard_dir, lidar, s.index))
-            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in swept)
+            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in kept)
             (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -147,9 +147,11 @@ def pcd_bytes(points: NDArray[np.void]) -> bytes:
 
 
 def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
-    """Boxes of all annotated things in the frame of a laser scanner, by instance id."""
+    """Boxes of all annotated things in a laser scanner's frame at its sweep, by instance id."""
+    cloud = sample.capture.clouds.get(lidar)
+    scene = at(sample.scene, cloud.time_s) if cloud is not None else sample.scene
     T_lidar_world = scanner_of(sample, lidar).T_world_lidar.inverse()
-    things = sorted((i for i in sample.scene.instances if i.annotated), key=lambda i: i.instance_id)
+    things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     boxes = []
     for thing in things:
         low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)

@@ -27,7 +27,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.clouds import T_camera_lidar, has_points, read_points, xyzi_bytes
+from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.kitti import calib_matrices, matrix_lines
 from generator.config.strict import Strict
@@ -123,8 +123,6 @@ class SemanticKitti(Strict):
         folder.mkdir(parents=True, exist_ok=True)
         lines = []
         for sample in samples:
-            if camera not in sample.truth or not has_points(shard_dir, lidar, sample.index):
-                continue
             points = read_points(shard_dir, lidar, sample.index)
             stem = folder / f"{sample.index:09d}"
             stem.with_suffix(".bin").write_bytes(xyzi_bytes(points))

@@ -18,7 +18,7 @@ from generator.core.capture import Channel, Reading
 from generator.core.interfaces import AssetLibrary
 from generator.core.sample import ImageTruth, MaskPx
 from generator.core.scene import Body, Scene
-from generator.core.se3 import SE3, Array
+from generator.core.se3 import SE3
 
 TILE_M = 16.0
 """Grids are centred on multiples of this, so that the cameras of a rig share one."""
@@ -51,21 +51,13 @@ class FreeSpace(Strict):
         background = tuple(b for b in scene.bodies if b.instance_id == 0 and b.motion == "static")
         grid = Grid(SE3((*middle, 0.0)), CELL_M, 2 * round((self.far_m + TILE_M) / CELL_M))
         ground = _ground(background, assets, grid)
-        p_world = _seen(reading, rows, columns)
+        p_camera = reading.camera.intrinsics.unproject(depth)[rows, columns]
+        p_world = reading.camera.T_world_camera.apply(p_camera)
         here = (p_world[:, 0] - x) ** 2 + (p_world[:, 1] - y) ** 2 < self.far_m**2
         cells = grid.cells(p_world)
         on = np.where(here[:, None], np.floor(cells[:, :2]), 0.0).astype(np.intp)
         free[rows, columns] = here & (np.abs(cells[:, 2] - ground[on[:, 0], on[:, 1]]) < ON_IT_M)
         return replace(truth, free_space=_tight(free))
-
-
-def _seen(reading: Reading, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
-    """The points [n, 3] that pixels show, world."""
-    lens = reading.camera.intrinsics
-    z = reading.channels[Channel.Z_DEPTH][rows, columns].astype(np.float64)
-    x = (columns + 0.5 - lens.cx_px) / lens.fx_px * z
-    y = (rows + 0.5 - lens.cy_px) / lens.fy_px * z
-    return reading.camera.T_world_camera.apply(np.stack([x, y, z], axis=-1))
 
 
 @lru_cache(maxsize=2)

@@ -20,8 +20,6 @@ from generator.core.se3 import Array
 
 FINE_M = 0.1
 """Borders are followed in steps of this length before they are thinned."""
-NEAR_M = 0.1
-"""Nothing nearer than this, along the optical axis, is projected."""
 STANDS_M = 0.15
 """What is seen less than this above the ground hides no border: kerbs, wet leaves, rounding."""
 
@@ -32,11 +30,11 @@ class Lanes(Strict):
     Occluded points are listed, as in CULane and TuSimple, and marked as such.
 
     Attributes:
-        far_m: Points farther along the optical axis are left out.
+        far_m: Points farther from the camera are left out.
         step_px: Points of one line are about this far apart in the image.
     """
 
-    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.Z_DEPTH})
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.RANGE})
     type: Literal["lanes"] = "lanes"
     far_m: float = Field(100.0, gt=0)
     step_px: float = Field(8.0, ge=1)
@@ -66,12 +64,10 @@ class Lanes(Strict):
         lens = camera.intrinsics
         p_world = resampled(np.asarray(border.points_m), FINE_M)
         p_camera = camera.T_world_camera.inverse().apply(p_world)
-        ahead = (p_camera[:, 2] > NEAR_M) & (p_camera[:, 2] < self.far_m)
-        if not ahead.any():
-            return
-        p_camera[~ahead, 2] = np.nan
+        near = (p_camera * p_camera).sum(axis=1) < self.far_m**2
         uv = lens.project(p_camera)
-        inside = ahead & (uv >= 0.0).all(axis=1)
+        # What the lens does not show is NaN, and less than nothing.
+        inside = near & (uv >= 0.0).all(axis=1)
         inside &= (uv[:, 0] < lens.width_px) & (uv[:, 1] < lens.height_px)
         for start, end in runs(inside):
             if end - start < 2:
@@ -112,14 +108,14 @@ def is_seen(reading: Reading, p_camera: Array, uv: Array) -> NDArray[np.bool_]:
     """Whether points on the ground are seen: nothing that stands on it lies before them.
 
     Args:
-        reading: With z-depth.
+        reading: With ranges.
         p_camera: Points [n, 3].
         uv: Where they are in the image [n, 2].
     """
     columns, rows = (uv[:, k].astype(np.intp) for k in (0, 1))
-    depth = reading.channels[Channel.Z_DEPTH][rows, columns].astype(np.float64)
-    nearer = np.minimum(depth, p_camera[:, 2])
-    before = p_camera * (nearer / p_camera[:, 2])[:, None]
+    range_m = reading.channels[Channel.RANGE][rows, columns].astype(np.float64)
+    away_m = np.sqrt((p_camera * p_camera).sum(axis=1))
+    before = p_camera * (np.minimum(range_m, away_m) / away_m)[:, None]
     above_m = reading.camera.T_world_camera.rotate(before - p_camera)[:, 2]
     seen: NDArray[np.bool_] = above_m < STANDS_M
     return seen

@@ -9,9 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-
-from generator.core.capture import POINT, Capture, PointCloud, Reading
+from generator.core.capture import Capture, Reading
 from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.sample import Sample
 from generator.runner.plan import Plan
@@ -146,14 +144,14 @@ def _written(
 
 
 def without_pixels(sample: Sample) -> Sample:
-    """The sample with its sensors, labels and tables, and no image and no point."""
-    seen = sample.capture
+    """The sample with its labels, and of what its sensors saw only when and from where."""
+    capture = sample.capture
     readings = {
-        name: Reading(sensor=r.sensor, camera=r.camera, channels={}, time_s=r.time_s)
-        for name, r in seen.readings.items()
+        name: Reading(reading.sensor, reading.camera, {}, time_s=reading.time_s)
+        for name, reading in capture.readings.items()
     }
     clouds = {
-        name: PointCloud(c.sensor, c.lidar, np.zeros(0, POINT), c.time_s)
-        for name, c in seen.clouds.items()
+        name: replace(cloud, points=cloud.points[:0].copy())
+        for name, cloud in capture.clouds.items()
     }
-    return replace(sample, capture=Capture(readings, clouds, seen.tables))
+    return replace(sample, capture=Capture(readings, clouds))
