@@ -14,8 +14,8 @@ frame ``T_world_map``, which is level and has its origin at the ego's rig.
 A line of ``frames.jsonl``: ``index``, ``scene``, ``view``, ``step``, ``time_s``, ``split``;
 ``px_m``, ``size_px``, ``T_world_map``; ``ego``: ``T_world_ego`` and, world axes, its
 ``velocity_m_s``, ``acceleration_m_s2``, ``angular_velocity_rad_s``; ``borders``: of lanes near the
-map, each with ``name``, ``kind`` (``lane``, ``road``, ``edge``) and ``points_m`` in the map's frame;
-``boxes3d``: by frame, ``ego`` and each laser scanner's, ``instance_id``, ``category``,
+map, each with ``name``, ``kind`` (``lane``, ``road``, ``edge``) and ``points_m`` in the map's
+frame; ``boxes3d``: by frame, ``ego`` and each laser scanner's, ``instance_id``, ``category``,
 ``center_m``, full ``size_m`` and ``quaternion_wxyz``. Track ids are instance ids, and hold for a
 scene.
 

@@ -47,8 +47,7 @@ def complete_truth(
     Raises:
         SampleError, ConfigError: see ``image_truth``.
     """
-    of_objects = [a for a in annotators if isinstance(a, Annotator)]
-    truth = image_truth(scene, reading, of_objects, thresholds)
+    truth = image_truth(scene, reading, annotators, thresholds)
     for annotator in annotators:
         if isinstance(annotator, ImageAnnotator):
             truth = annotator.annotate_image(scene, assets, reading, truth)
@@ -79,15 +78,18 @@ def frame_truth(
 
 
 def image_truth(
-    scene: Scene, reading: Reading, annotators: Sequence[Annotator], thresholds: Thresholds
+    scene: Scene, reading: Reading, annotators: Sequence[AnyAnnotator], thresholds: Thresholds
 ) -> ImageTruth:
     """Annotations of the objects in one reading, in order of instance id.
+
+    Annotators that are about no single object are passed over.
 
     Raises:
         SampleError: if the labels of an instance contradict each other or the images.
         ConfigError: if a threshold needs an annotation that is not made.
     """
-    if not annotators:
+    of_objects = [a for a in annotators if isinstance(a, Annotator)]
+    if not of_objects:
         return ImageTruth(reading.camera, ())
     seen = extents(reading.channels[Channel.INSTANCE])
     instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
@@ -101,7 +103,7 @@ def image_truth(
             visible_px=extent.visible_px if extent else 0,
             box=extent.box if extent else None,
         )
-        for annotator in annotators:
+        for annotator in of_objects:
             truth = annotator.annotate(scene, reading, truth)
         check_truth(reading, truth)
         if is_listed(truth, thresholds):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from exporters.images import write_media
 from generator import annotations
+from generator.annotations.boxes3d import oriented_box
 from generator.annotations.truth import Thresholds, image_truth
 from generator.core.boxes import BoxPx, tight_box
 from generator.core.capture import (
@@ -29,9 +30,10 @@ from generator.core.capture import (
     Table,
 )
 from generator.core.geometry import SURFACES, Keypoint
-from generator.core.interfaces import Annotator, DatasetInfo, Exporter
+from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.intrinsics import Intrinsics
-from generator.core.sample import Sample
+from generator.core.lanes import LaneBorder
+from generator.core.sample import BirdseyeMap, FrameTruth, Sample
 from generator.core.scene import Camera, Device, Instance, Lidar, Scene
 from generator.core.se3 import SE3, Array, look_at
 from generator.core.tables import table_rows
@@ -187,8 +189,7 @@ def make_sample(
     """A sample with every annotation."""
     scene = Scene("street", instances=tuple(instances), cameras=tuple(cameras))
     readings = {camera.name: ray_cast(scene, camera) for camera in cameras}
-    every = [annotations.TABLE.load(name)() for name in annotations.TABLE]
-    annotators = [annotator for annotator in every if isinstance(annotator, Annotator)]
+    annotators = [annotations.TABLE.load(name)() for name in annotations.TABLE]
     truth = {
         name: image_truth(scene, reading, annotators, thresholds or Thresholds())
         for name, reading in readings.items()
@@ -198,7 +199,8 @@ def make_sample(
     scene = replace(scene, lidars=(lidar,), devices=(imu,))
     clouds = {"top": PointCloud("top", lidar, scan(scene, lidar))}
     tables = {"imu": Table("imu", imu, imu_rows(index))}
-    return Sample(index, index, 0, split, scene, Capture(readings, clouds, tables), truth)
+    capture, frame = Capture(readings, clouds, tables), frame_of(scene)
+    return Sample(index, index, 0, split, scene, capture, truth, frame=frame)
 
 
 def imu_rows(index: int) -> NDArray[Any]:
@@ -206,6 +208,18 @@ def imu_rows(index: int) -> NDArray[Any]:
     times_s = 0.1 * index + 0.01 * np.arange(3)
     force = np.array([0.0, 1.0 / 3.0, -2.5e-7])
     return table_rows("imu", 3, time_s=times_s, force_x_m_s2=force, force_z_m_s2=9.80665)
+
+
+def frame_of(scene: Scene) -> FrameTruth:
+    """A map of 40 m in which half of the ground is drivable, and boxes."""
+    drivable = np.zeros((80, 80), bool)
+    drivable[:, 40:] = True
+    return FrameTruth(
+        "ego",
+        boxes3d={"ego": {i.instance_id: oriented_box(i) for i in scene.instances}},
+        borders=(LaneBorder("lane:left", "road", ((-90.0, 0.0, 0.0), (90.0, 0.0, 0.0))),),
+        birdseye=BirdseyeMap(SE3(), 0.5, {"drivable": drivable, "vehicles": ~drivable}),
+    )
 
 
 def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:
