@@ -62,7 +62,8 @@ class BevMap(Strict):
         T_world_map = levelled(truth.T_world_ego)
         grid = Grid(T_world_map, self.px_m, 2 * math.ceil(self.reach_m / self.px_m))
         drivable = covered(grid, carriageways(scene, assets))
-        standing = [body for body in scene.bodies if body.instance_id > 0]
+        own = scene.body(scene.rig(truth.rig).body).instance_id
+        standing = [b for b in scene.bodies if b.instance_id not in (0, own)]
         kinds = {i.instance_id: frozenset(assets.get(i.asset).tags) for i in scene.instances}
         shown = [i for i in scene.instances if i.annotated]
         vehicles = [i for i in shown if "vehicle" in kinds[i.instance_id]]

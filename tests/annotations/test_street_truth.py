@@ -133,7 +133,7 @@ def test_points_behind_a_car_are_listed_and_hidden() -> None:
             # What is seen of the car just above the ground hides nothing.
             assert visible is not covered or (visible and 16.0 < depth < 21.0)
             hidden += not visible
-    assert hidden > 20
+    assert hidden > 5
 
 
 def test_free_space_is_the_carriageway_that_nothing_stands_on() -> None:
