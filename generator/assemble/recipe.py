@@ -20,7 +20,7 @@ from generator.core.streams import Streams
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
 from generator.pipeline.pipeline import Blueprint, Recipe
-from generator.sensors.mounting import stride, within_steps
+from generator.sensors.mounting import refuse_buried, stride, within_steps
 from scene_templates.builder import build
 
 BLUEPRINTS_KEPT = 32
@@ -131,6 +131,8 @@ def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
     scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
+        if sensor.modality in IMAGING:
+            refuse_buried(scene, sensor.name, sensor, assets)
     return scene
 
 

@@ -160,6 +160,25 @@ class Beams:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Detours:
+    """What rays meet through panes of glass or by way of a mirror; arrays are [m].
+
+    Attributes:
+        ray: Number of the ray: beam times subrays plus subray, int64; at most twice the same.
+        range_m, reflectance: As of Echoes; the whole way, and what glass or mirror leave of it.
+        instance_id, category_id, surface: As of Echoes. What a mirror shows has no ids, as it is
+            not where the point is.
+    """
+
+    ray: NDArray[np.int64]
+    range_m: NDArray[np.float32]
+    reflectance: NDArray[np.float32]
+    instance_id: NDArray[np.uint16]
+    category_id: NDArray[np.uint16]
+    surface: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Echoes:
     """What the rays of beams hit first; arrays are [n, subrays].
 
@@ -171,6 +190,7 @@ class Echoes:
         incidence_cos: Cosine of the angle to the surface's normal, float32; 0.
         instance_id, category_id: uint16; 0.
         surface: Number in ``generator.core.geometry.SURFACES``, uint8; 0.
+        detours: What some rays meet besides; None = nothing.
     """
 
     range_m: NDArray[np.float32]
@@ -179,6 +199,7 @@ class Echoes:
     instance_id: NDArray[np.uint16]
     category_id: NDArray[np.uint16]
     surface: NDArray[np.uint8]
+    detours: Detours | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

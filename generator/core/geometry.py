@@ -48,9 +48,10 @@ class Material:
 
 SURFACES = (
     "", "air", "asphalt", "marking", "pavement", "kerb", "grass", "leaf", "bark", "sign", "plate",
-    "glass", "window", "facade", "roof", "paint", "tyre", "skin", "lamp",
+    "glass", "window", "facade", "roof", "paint", "tyre", "skin", "lamp", "mirrored",
 )  # fmt: skip
-"""What a laser may have hit, by number: fog and rain, or the role of a material; 0 = any other."""
+"""What a laser may have hit, by number: fog and rain, something seen in a mirror and told to be
+behind it, or the role of a material; 0 = any other."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -7,10 +7,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import Field, WithJsonSchema, field_validator
 
 from generator.core.capture import POINT, Beams, Channel, PointCloud
-from generator.core.errors import ConfigError
+from generator.core.errors import ConfigError, did_you_mean
 from generator.core.interfaces import Renderer
 from generator.core.scene import Lidar, Scene, Weather
 from generator.core.streams import Rng
@@ -39,10 +39,17 @@ SUBRAYS = 7
 CLEAR = Weather()
 
 
-def _known(name: str) -> str:
-    if name not in model_names():
-        raise ValueError(f"expected one of {', '.join(model_names())}")
-    return name
+Angle = Annotated[float, Field(ge=-180, le=180)]
+Elevation = Annotated[float, Field(ge=-90, le=90)]
+Beam = tuple[Elevation, Angle]
+
+BEAMS_SCHEMA = {
+    "anyOf": [
+        {"type": "string", "pattern": r"\.csv$"},
+        {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
+    ]
+}
+"""A file takes the list's place before it is read: see ``generator.sensors.sheets``."""
 
 
 class LidarSensor(Mounted):
@@ -50,7 +57,11 @@ class LidarSensor(Mounted):
 
     Attributes:
         name: What labels and files call it.
-        model: A file of ``generator/sensors/lidars``.
+        model: A file of ``generator/sensors/lidars``, or one of the user's own like them:
+            ``./my_lidar.yaml``, looked for beside the configuration.
+        beams: Other lasers than the model's: elevation and azimuth offset to the left of each
+            [deg], or the name of a CSV file with the columns ``elevation_deg`` and
+            ``azimuth_offset_deg``. Pulses per second stay those of the model.
         camera: Without a rig: name of the camera it rides with, which is listed before it. The
             rig is then at the camera's centre and looks along its axis.
         returns: Which return of a pulse is reported; ``dual`` reports two.
@@ -65,12 +76,29 @@ class LidarSensor(Mounted):
     modality: ClassVar[Literal["camera", "lidar"]] = "lidar"
     type: Literal["lidar"] = "lidar"
     name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
-    model: Annotated[str, AfterValidator(_known)] = "HDL-64E"
+    model: str | LidarModel = "HDL-64E"
+    beams: Annotated[tuple[Beam, ...], WithJsonSchema(BEAMS_SCHEMA)] = Field((), max_length=4096)
     camera: str = "color"
     returns: Kept = "strongest"
     divergence: bool = False
     ideal: bool = False
     motion: Literal["raw", "compensated", "frozen"] = "compensated"
+
+    @field_validator("model")
+    @classmethod
+    def _is_known(cls, model: str | LidarModel) -> str | LidarModel:
+        if isinstance(model, str) and model not in model_names():
+            raise ValueError(
+                f"expected one of {', '.join(model_names())}, or the name of a .yaml file"
+                f"{did_you_mean(model, model_names())}"
+            )
+        return model
+
+    @property
+    def device(self) -> LidarModel:
+        """Its data sheet."""
+        model = lidar_model(self.model) if isinstance(self.model, str) else self.model
+        return model.with_beams(self.beams) if self.beams else model
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this scanner on its rig.
@@ -78,8 +106,9 @@ class LidarSensor(Mounted):
         Raises:
             ConfigError: the scene has no such rig or camera.
         """
-        sweep_s = round(1.0 / lidar_model(self.model).rotation_hz, 9)
-        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.model, sweep_s=sweep_s)
+        name = self.model if isinstance(self.model, str) else self.model.name
+        sweep_s = round(1.0 / self.device.rotation_hz, 9)
+        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
         if self.rig:
             rig = known_rig(scene, self.name, self.rig)
             return replace(scene, lidars=(*scene.lidars, replace(lidar, camera="", rig=rig)))
@@ -96,7 +125,7 @@ class LidarSensor(Mounted):
     ) -> PointCloud:
         """One sweep."""
         del channels
-        model = lidar_model(self.model)
+        model = self.device
         lidar = scene.lidar(self.name)
         sweep = sweep_of(model, float(rng.uniform(0.0, 3600.0)))
         shots = Shots(sweep.directions)
@@ -110,7 +139,7 @@ class LidarSensor(Mounted):
             shots.origins_m,
             shots.time_s,
         )
-        pulses = pulses_of(renderer.scan(scene, lidar, beams), model)
+        pulses = pulses_of(renderer.scan(scene, lidar, beams), model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
             pulses = _through_air(pulses, weather, model, lidar, shots, rng)
