@@ -22,6 +22,7 @@ TABLE = PluginTable(
         "materials": "randomizers.materials:Materials",
         "objects": "randomizers.objects:Objects",
         "physics_properties": "randomizers.physics_properties:PhysicsProperties",
+        "rig_calibration": "randomizers.rig_calibration:RigCalibration",
         "street_lights": "randomizers.street_lights:StreetLights",
         "textures": "randomizers.textures:Textures",
         "time_of_day": "randomizers.time_of_day:TimeOfDay",
