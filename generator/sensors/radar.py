@@ -67,7 +67,7 @@ class Radar(Instrument):
     """A radar: range, angles, radial velocity and radar cross section of what it detects.
 
     Attributes:
-        model: A file of ``generator/sensors/radars``.
+        model: ``ARS408-21`` or ``imaging``; a file of ``generator/sensors/radars``.
         false_alarms: Mean number of detections of nothing, per reading.
         noise: Factor on the model's errors; 0 = an ideal device: no errors, no fluctuation, no
             false alarms, and whatever is detected half of the time is detected always.
