@@ -14,7 +14,7 @@ from generator.core.motion import STILL, Track, Twist
 from generator.core.scene import Instance, Scene
 from generator.core.se3 import SE3, Array
 
-STEMS = ("pole", "street_light", "traffic_light", "traffic_sign", "tree")
+STEMS = ("pole", "street_light", "traffic_light", "traffic_sign", "tree", "utility_pole")
 """Categories whose box is mostly air: a stem stands for them."""
 STEM_M = 0.2
 """Half the width of a stem."""
