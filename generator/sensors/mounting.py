@@ -59,6 +59,7 @@ class Instrument(Mounted):
     Attributes:
         name: What files call it.
         rig: Name of the rig it is on.
+        rate_hz: Readings per second, a whole number per step, or of steps; null = one per step.
     """
 
     modality: ClassVar[str]
