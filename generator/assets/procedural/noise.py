@@ -65,7 +65,7 @@ def perlin(cells: Cells, rng: Rng, size_px: int = SIZE_PX) -> Float32:
         along_y, along_x = gy[row] * (fy - dy)[:, None], gx[row]
         left, right = (
             along_y.take(column, axis=1) + along_x.take(column, axis=1) * away
-            for column, away in ((ix, fx), ((ix + 1) % across, fx - 1))
+            for column, away in ((ix, fx), ((ix + 1) % across, fx - np.float32(1.0)))
         )
         mixed: Float32 = left * (1 - sx) + right * sx
         return mixed
