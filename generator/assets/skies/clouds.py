@@ -118,8 +118,9 @@ def _levels_of(up: Array, levels: int, rows: int) -> Array:
 def _halvings(layer: Float32) -> list[Float32]:
     levels = [layer]
     while levels[-1].shape[0] > 1:
-        n = levels[-1].shape[0] // 2
-        levels.append(levels[-1].reshape(n, 2, n, 2, -1).mean(axis=(1, 3), dtype=np.float32))
+        # Corner by corner: reducing over two short axes takes ten times as long.
+        a, b, c, d = (levels[-1][row::2, column::2] for row in (0, 1) for column in (0, 1))
+        levels.append((a + b + c + d) * np.float32(0.25))
     return levels
 
 
