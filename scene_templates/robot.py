@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
+from generator.core.geometry import RobotModel
 from generator.core.interfaces import AssetIndex
 from generator.core.kinematics import link_bodies
-from generator.core.scene import Articulation, Instance, Scene
+from generator.core.scene import Articulation, Instance, Rig, Scene
 from generator.core.se3 import SE3, Vec3
 from scene_templates.element import PlacedElement, next_instance_id, surfaces_of
 
 CATEGORY = "robot_arm"
+GRASP_RIG = SE3(quaternion_wxyz=(math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0))
+"""``T_grasp_rig``: X out of the hand, Y as before, Z where the grasp frame's -X is."""
 
 
 class Robot(PlacedElement):
     """A robot, standing at its home pose until a randomizer moves its arm.
+
+    Its wrist is a rig, ``<name>_wrist``, that sensors may be mounted on: X out of the hand, Y the
+    direction in which the fingers open.
 
     Attributes:
         asset: franka_panda, kuka_iiwa, xarm6, or a robot of yours.
@@ -60,7 +67,16 @@ class Robot(PlacedElement):
             instances=(*scene.instances, instance),
             articulations=(*scene.articulations, articulation),
             bodies=(*scene.bodies, *link_bodies(articulation, robot, parts)),
+            rigs=(*scene.rigs, *self._wrist(robot)),
         )
+
+    def _wrist(self, robot: RobotModel) -> tuple[Rig, ...]:
+        """The rig of the hand; none where there is no hand that can be seen."""
+        gripper = robot.gripper
+        if gripper is None or gripper.link not in robot.visuals:
+            return ()
+        turn = SE3(quaternion_wxyz=gripper.T_link_grasp.quaternion_wxyz) @ GRASP_RIG
+        return (Rig(f"{self.name}_wrist", f"{self.name}/{gripper.link}", turn),)
 
     def _workspace_m(self, scene: Scene, T_world_base: SE3) -> tuple[Vec3, Vec3]:
         """The air over the surface it stands on, as far as it reaches."""

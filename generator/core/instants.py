@@ -15,9 +15,9 @@ RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
 def at(scene: Scene, time_s: float) -> Scene:
     """The scene at another instant: what has a track, and all that rides with it, has moved.
 
-    Bodies, joints, lights, rigs, sensors and the frames of instances follow; so do the changes that have
-    happened by then. Changes are looked up from the beginning of time, so that the way there does
-    not matter; a body whose first change lies ahead keeps what it has.
+    Bodies, joints, lights, rigs, sensors and the frames of instances follow; so do the changes
+    that have happened by then. Changes are looked up from the beginning of time, so that the way
+    there does not matter; a body whose first change lies ahead keeps what it has.
 
     The boxes of instances of several bodies (robots) are measured again by whoever freezes scenes.
     """

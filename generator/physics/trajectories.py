@@ -1,8 +1,9 @@
 """Joint positions over time: straight legs in joint space, each from rest to rest.
 
-A leg runs through ``start + s(t / T) * (end - start)`` with ``s = 10 x^3 - 15 x^4 + 6 x^5``, whose speed and acceleration vanish at both ends; its peaks are 15/8 of the mean speed and
-10/sqrt(3) of ``(end - start) / T^2`` (Biagiotti & Melchiorri, Trajectory Planning for Automatic
-Machines and Robots, 2008, section 2.1.7).
+A leg runs through ``start + s(t / T) * (end - start)`` with ``s = 10 x^3 - 15 x^4 + 6 x^5``.
+Speed and acceleration vanish at both ends; their peaks are 15/8 of the mean speed and 10/sqrt(3)
+of ``(end - start) / T^2`` (Biagiotti & Melchiorri, Trajectory Planning for Automatic Machines and
+Robots, 2008, section 2.1.7).
 """
 
 from __future__ import annotations
