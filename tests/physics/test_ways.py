@@ -17,7 +17,7 @@ from generator.core.scene import ArmGoal, Body, Scene
 from generator.core.se3 import SE3
 from generator.physics import PhysicsConfig
 from generator.physics.engine import BulletEngine
-from generator.physics.trajectories import smooth_step
+from generator.physics.trajectories import smooth_step, speed_max
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, table_scene, thing, world_vertices
 from tests.physics.panda import panda
 from tests.physics.test_arms import above_table, armed
@@ -329,3 +329,12 @@ def test_two_arms_move_in_turn(engine: BulletEngine) -> None:
     assert one is not None
     assert two is not None
     assert two.start_s == pytest.approx(one.end_s)
+
+
+def test_speed_limits_that_no_arm_has_are_not_believed() -> None:
+    """A description that says 10 rad/s, and one that says nothing."""
+    joint = ROBOT.movable[0]
+
+    assert speed_max(joint) == 2.175
+    assert speed_max(replace(joint, speed_max=10.0)) == pytest.approx(math.pi)
+    assert speed_max(replace(joint, speed_max=0.0)) == 1.5
