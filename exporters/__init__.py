@@ -13,6 +13,9 @@ TABLE = PluginTable(
     {
         "coco": "exporters.coco:Coco",
         "kitti": "exporters.kitti:Kitti",
+        "kitti_raw": "exporters.kitti_raw:KittiRaw",
+        "kitti_tracking": "exporters.kitti_tracking:KittiTracking",
+        "motchallenge": "exporters.motchallenge:MotChallenge",
         "pointclouds": "exporters.pointclouds:PointClouds",
         "semantickitti": "exporters.semantickitti:SemanticKitti",
         "tables": "exporters.tables:Tables",

@@ -31,6 +31,10 @@ as their annotations are made:
 ``keypoints_camera_m``
     In keypoint files: by name, positions in the camera frame.
 
+Where views are sequences of several instants, images also have ``sequence_id``, ``frame_id`` (the
+instant's number in its sequence, from 0) and ``time_s``, and annotations have ``track_id``: the
+same for one object in all images of its sequence, whatever the camera, and unique in the data set.
+
 Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
 covers ``[i, i + 1)``, as COCO's boxes do; OpenCV's principal point is 0.5 px less.
 
@@ -49,12 +53,14 @@ from typing import Any, Literal
 
 from exporters.images import link_or_copy
 from exporters.rle import encoded
+from exporters.sensors import instant_s, rgb_cameras
+from exporters.sequences import sequence_of
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
+from generator.core.sample import ANNOTATION_STRIDE, KeypointTruth, ObjectTruth, Sample
 from generator.core.scene import Instance, Weather
 from generator.core.se3 import Array
 from generator.core.serial import canonical_json
@@ -84,7 +90,7 @@ class Coco(Strict):
         Raises:
             ConfigError: if no sensor writes the rgb channel.
         """
-        if not _sensors(info):
+        if not rgb_cameras(info):
             raise ConfigError(
                 f"exporter '{self.type}': no sensor of {', '.join(info.sensors)} writes the rgb "
                 "channel; add an rgb_camera"
@@ -99,7 +105,9 @@ class Coco(Strict):
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
         for sample in samples:
-            for sensor in _sensors(info):
+            for sensor in rgb_cameras(info):
+                if sensor not in sample.truth:
+                    continue
                 truth = sample.truth[sensor]
                 images = rows.setdefault(f"{sample.split}.images", [])
                 annotations = rows.setdefault(f"{sample.split}.annotations", [])
@@ -107,7 +115,7 @@ class Coco(Strict):
                 for thing in truth.objects:
                     if thing.box is None:
                         continue
-                    row = self._annotation(sample, sensor, truth, thing)
+                    row = self._annotation(info, sample, sensor, thing)
                     annotations.append(row)
                     if thing.keypoints is not None:
                         stem = f"{sample.split}.keypoints.{thing.instance.category_id}"
@@ -141,10 +149,10 @@ class Coco(Strict):
                     _link_images(json.loads(line), split, shard_dir, dataset_dir)
 
     def _annotation(
-        self, sample: Sample, sensor: str, truth: ImageTruth, thing: ObjectTruth
+        self, info: DatasetInfo, sample: Sample, sensor: str, thing: ObjectTruth
     ) -> dict[str, Any]:
         assert thing.box is not None, "invisible objects are not listed"
-        camera = truth.camera.intrinsics
+        camera = sample.truth[sensor].camera.intrinsics
         instance = thing.instance
         row: dict[str, Any] = {
             "id": sample.annotation_id(sensor, instance.instance_id),
@@ -157,6 +165,9 @@ class Coco(Strict):
             "instance_id": instance.instance_id,
             "attributes": _facts(instance),
         }
+        if info.steps_per_scene > 1:
+            sequence = sequence_of(info, sample.index)
+            row["track_id"] = sequence * ANNOTATION_STRIDE + instance.instance_id
         if self.segmentation == "rle":
             assert thing.mask is not None, "the annotation instance_masks is in `needs`"
             row["segmentation"] = encoded(thing.mask, camera.height_px, camera.width_px)
@@ -188,7 +199,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     camera = sample.truth[sensor].camera
     file_name = f"{sample.index:09d}_{sensor}.png"
     others = [c for c in info.media[sensor] if c is not Channel.RGB]
-    return {
+    row = {
         "id": sample.image_id(sensor),
         "file_name": file_name,
         "width": camera.intrinsics.width_px,
@@ -203,6 +214,11 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
     }
+    if info.steps_per_scene > 1:
+        row["sequence_id"] = sequence_of(info, sample.index)
+        row["frame_id"] = sample.index % info.steps_per_scene
+        row["time_s"] = round(instant_s(sample, sensor), DECIMALS)
+    return row
 
 
 def _weather(weather: Weather) -> dict[str, float]:
@@ -317,10 +333,6 @@ def _lines(path: Path) -> Iterator[str]:
         with path.open(encoding="utf-8", newline="\n") as file:
             for line in file:
                 yield line.rstrip("\n")
-
-
-def _sensors(info: DatasetInfo) -> tuple[str, ...]:
-    return tuple(s for s in info.sensors if Channel.RGB in info.media[s])
 
 
 def _xywh(box: BoxPx) -> list[int]:

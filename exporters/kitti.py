@@ -20,8 +20,13 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   box of the visible pixels, which COCO has.
 * **Things far off** are not labelled: KITTI's annotators saw what the laser scanner saw. They
   become ``DontCare`` regions.
-* **Points** are those of the data set's laser scanner, with labels per point; without one they are
-  thinned pixels of the depth image, with reflectance 0 and no labels.
+* **Points** are those of the data set's laser scanner; without one they are thinned pixels of the
+  depth image, with reflectance 0 and no labels.
+* **Point labels** are not KITTI's; they keep its rule that an object is what lies in its box. A
+  pulse that an object reflected, and that noise took more than 3 cm out of the box, has no row;
+  what lies as deep inside has the row whatever it is: the road between the wheels, where the box
+  of a car on a cambered street reaches below it. What a thing moved by itself between a pulse and
+  the instant of its box is taken back before. What reflected each pulse is in the lower half.
 * **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
   which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
 
@@ -31,10 +36,10 @@ Readers take ``calib`` by line number and need all printed digits of a rotation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,14 +47,15 @@ from pydantic import Field
 
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
+from exporters.sensors import laser_scanner, rgb_camera, scanned
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError, did_you_mean
+from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, ObjectTruth, Sample
-from generator.core.scene import Instance
+from generator.core.scene import Camera, Instance
 from generator.core.se3 import Array, Vec3
 
 OFFICIAL_TYPES = {
@@ -83,6 +89,9 @@ NEAR_M = 0.05
 """Boxes that come nearer than this depth are not projected."""
 LIDAR_RANGE_M = 120.0
 """Of Velodyne's HDL-64E, whose place the virtual scanner takes."""
+
+BORDER_M = 0.029
+"""How far on the wrong side of a box's face a point may be: 3 cm, less rounding."""
 
 PARTLY_OCCLUDED = 0.1
 """Hidden share of the silhouette above which ``occluded`` is 1."""
@@ -123,13 +132,7 @@ class Kitti(Strict):
                 samples for six digits.
         """
         media = info.media[self._camera(info)]
-        if self.lidar and self.lidar not in info.lidars:
-            known = ", ".join(info.lidars) or "none"
-            raise ConfigError(
-                f"exporter 'kitti': there is no lidar '{self.lidar}'; expected one of: {known}"
-                f"{did_you_mean(self.lidar, info.lidars)}"
-            )
-        if not info.lidars and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
+        if not self._lidar(info) and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
             raise ConfigError(
                 f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
                 "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
@@ -151,6 +154,8 @@ class Kitti(Strict):
         folder = shard_dir / self.type
         frames = []
         for sample in samples:
+            if camera not in sample.truth:
+                continue
             truth = sample.truth[camera]
             frame = _frame(sample.index)
             _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self))
@@ -158,12 +163,13 @@ class Kitti(Strict):
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
             _write_text(folder / f"calib/{frame}.txt", calib)
             lidar = self._lidar(info)
-            if lidar:
+            if scanned(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
                 _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
-                labels = point_labels(points, truth, self)
+                sweep_s = sample.scene.lidar(lidar).sweep_s
+                labels = point_labels(points, truth, self, T_camera_velo, sweep_s)
                 _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
-            elif self.velodyne_stride_px:
+            elif self.velodyne_stride_px and not lidar:
                 thinned = self._points(info, sample, shard_dir)
                 _write_bytes(folder / f"velodyne/{frame}.bin", thinned.astype("<f4").tobytes())
             frames.append(f"{sample.index} {sample.split}\n")
@@ -185,19 +191,10 @@ class Kitti(Strict):
         _write_text(dataset_dir / "README.txt", self._readme(info, camera))
 
     def _camera(self, info: DatasetInfo) -> str:
-        with_rgb = [s for s in info.sensors if Channel.RGB in info.media[s]]
-        if not self.camera and with_rgb:
-            return with_rgb[0]
-        if self.camera in with_rgb:
-            return self.camera
-        known = ", ".join(with_rgb) or "none"
-        raise ConfigError(
-            f"exporter 'kitti': camera '{self.camera}' is no sensor that writes the rgb channel; "
-            f"expected one of: {known}{did_you_mean(self.camera, with_rgb)}"
-        )
+        return rgb_camera(info, self.camera, self.type)
 
     def _lidar(self, info: DatasetInfo) -> str:
-        return self.lidar or next(iter(info.lidars), "")
+        return laser_scanner(info, self.lidar, self.type)
 
     def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> Array:
         """Points of the velodyne folder to the camera frame, [3, 4]."""
@@ -227,9 +224,10 @@ class Kitti(Strict):
         """Files of one frame, each with its place under ``training``."""
         frame = _frame(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
-        if self._lidar(info) or self.velodyne_stride_px:
+        lidar = self._lidar(info)
+        if scanned(shard_dir, lidar, index) or (self.velodyne_stride_px and not lidar):
             names.append(f"velodyne/{frame}.bin")
-        if self._lidar(info):
+        if scanned(shard_dir, lidar, index):
             names.append(f"velodyne_labels/{frame}.label")
         links = [(shard_dir / self.type / name, name) for name in names]
         rgb = media_path(shard_dir, camera, Channel.RGB, index)
@@ -258,6 +256,30 @@ class Kitti(Strict):
         return _THINNED.format(height=LIDAR_HEIGHT_M, stride=self.velodyne_stride_px)
 
 
+class LabelStyle(Protocol):
+    """What decides how an object is labelled; see the fields of ``Kitti``."""
+
+    @property
+    def types(self) -> Literal["official", "category"]:
+        """Whose names of types."""
+        ...
+
+    @property
+    def boxes(self) -> Literal["projected", "tight"]:
+        """What image boxes are around."""
+        ...
+
+    @property
+    def far_m(self) -> float:
+        """Beyond it things are DontCare."""
+        ...
+
+    @property
+    def low_px(self) -> int:
+        """Below it things are DontCare."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class UprightBox:
     """A box whose height is along the camera's y axis: what a KITTI label can say.
@@ -282,6 +304,16 @@ class UprightBox:
             i * length * along + j * width * across + (0.0, k * height, 0.0) for i, j, k in signs
         ]
         return np.asarray(self.bottom_m) + np.array(ends)
+
+    def depths_m(self, points_m: Array) -> Array:
+        """How deep points [n, 3] of the camera frame lie inside; negative outside."""
+        height, width, length = self.size_hwl_m
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        x, y, z = (points_m - self.bottom_m).T
+        along, across = c * x - s * z, s * x + c * z
+        sides = (0.5 * length - np.abs(along), 0.5 * width - np.abs(across))
+        depths: Array = np.minimum.reduce([*sides, -y, height + y])
+        return depths
 
 
 def upright_box(box: OrientedBox) -> UprightBox:
@@ -315,12 +347,12 @@ def upright_box(box: OrientedBox) -> UprightBox:
     )
 
 
-def label_text(truth: ImageTruth, style: Kitti) -> str:
+def label_text(truth: ImageTruth, style: LabelStyle) -> str:
     """The lines of one label file; DontCare rows last, as readers expect."""
     return "".join(f"{row}\n" for row, _ in label_rows(truth, style))
 
 
-def label_rows(truth: ImageTruth, style: Kitti) -> list[tuple[str, int]]:
+def label_rows(truth: ImageTruth, style: LabelStyle) -> list[tuple[str, int]]:
     """Each row of a label file with its instance id."""
     rows = [
         (label_row(thing, truth, style), thing.instance.instance_id)
@@ -331,20 +363,66 @@ def label_rows(truth: ImageTruth, style: Kitti) -> list[tuple[str, int]]:
     return rows
 
 
-def point_labels(points: NDArray[np.void], truth: ImageTruth, style: Kitti) -> NDArray[np.uint32]:
-    """Per point the category id, and in the upper half the row in label_2 from 1; 0 = no row."""
+def point_labels(
+    points: NDArray[np.void],
+    truth: ImageTruth,
+    style: LabelStyle,
+    T_camera_velo: Array,
+    sweep_s: float = 0.0,
+) -> NDArray[np.uint32]:
+    """Per point the category id of what reflected it, and in the upper half its row in label_2.
+
+    Args:
+        points: Records of ``POINT``.
+        truth: Of the image; its labels' rows are counted from 1, 0 = no row.
+        style: Of the labels.
+        T_camera_velo: Points to the camera frame, [3, 4].
+        sweep_s: How long the sweep took; its middle is the instant of the boxes.
+    """
     ids = points["instance_id"]
-    rows = np.zeros(1 + int(ids.max(initial=0)), np.uint32)
-    for number, (_, instance_id) in enumerate(label_rows(truth, style), 1):
-        if instance_id < len(rows):
-            rows[instance_id] = number
-    labels: NDArray[np.uint32] = (points["category_id"] | (rows[ids] << np.uint32(16))).astype(
-        "<u4"
-    )
+    table = np.zeros(1 + int(ids.max(initial=0)), np.uint32)
+    things = {thing.instance.instance_id: thing for thing in truth.objects}
+    boxed: dict[int, ObjectTruth] = {}
+    for number, (row, instance_id) in enumerate(label_rows(truth, style), 1):
+        if instance_id < len(table):
+            table[instance_id] = number
+        if not row.startswith("DontCare"):
+            boxed[number] = things[instance_id]
+    R_camera_velo, t_camera_velo = T_camera_velo[:, :3], T_camera_velo[:, 3]
+    p_camera = np.einsum("ij,nj->ni", R_camera_velo, points["position_m"], optimize=False)
+    p_camera += t_camera_velo
+    dt_s = points["time_s"] - 0.5 * sweep_s
+    rows = _rows_by_box(table[ids], p_camera, dt_s, boxed, truth.camera)
+    labels: NDArray[np.uint32] = (points["category_id"] | (rows << np.uint32(16))).astype("<u4")
     return labels
 
 
-def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
+def _rows_by_box(
+    rows: NDArray[np.uint32],
+    p_camera: Array,
+    dt_s: NDArray[np.floating],
+    boxed: Mapping[int, ObjectTruth],
+    camera: Camera,
+) -> NDArray[np.uint32]:
+    """Rows of points, from those of what reflected them; see the head of this file."""
+    T_camera_world = camera.T_world_camera.inverse()
+    boxes = {}
+    for number, thing in boxed.items():
+        assert thing.box3d_camera is not None
+        boxes[number] = upright_box(thing.box3d_camera)
+        (mine,) = np.nonzero(rows == number)
+        velocity_m_s = T_camera_world.rotate(np.asarray(thing.instance.twist.velocity_m_s))
+        then = p_camera[mine] - dt_s[mine, None] * velocity_m_s
+        rows[mine[boxes[number].depths_m(then) < -BORDER_M]] = 0
+    (free,) = np.nonzero(rows == 0)
+    for number, box in boxes.items():
+        reach_m = math.hypot(*box.size_hwl_m)
+        near = free[np.abs(p_camera[free] - box.bottom_m).max(axis=1) < reach_m]
+        rows[near[box.depths_m(p_camera[near]) > BORDER_M]] = number
+    return rows
+
+
+def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     """The fifteen columns of one visible object.
 
     A DontCare row where it is too far or too small for ``style``, less than two pixels wide, or
@@ -489,8 +567,9 @@ _BOXES = {
 }
 _SCANNED = """\
 velodyne    Points of the laser scanner '{lidar}'; float32 x y z reflectance [0, 1].
-velodyne_labels  One uint32 per point: lower half category id, upper half row in label_2, from 1;
-            0 = no row."""
+velodyne_labels  One uint32 per point: lower half the category id of what reflected it, upper half
+            row in label_2, from 1; 0 = no row. Objects are what lies in their boxes: points that
+            range noise took more than 3 cm out have no row, and what is deeper inside has one."""
 _THINNED = """\
 velodyne    Points of the depth image, one per {stride} x {stride} pixels (0: not written), as seen
             from {height:.2f} m above the camera; float32 x y z reflectance; reflectance is 0."""

@@ -1,4 +1,4 @@
-"""A pinhole camera with every label channel."""
+"""A camera with every label channel."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Region, Scene
 from generator.core.se3 import SE3, look_at
 from generator.core.streams import Rng
+from generator.sensors.formation.chain import Formation, photograph
 from generator.sensors.mounting import Mounted, known_rig
 
 Image = Literal[
@@ -37,6 +38,7 @@ class RgbCamera(Mounted):
         hfov_deg: Nominal horizontal field of view.
         channels: What is written as images.
         ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
+        formation: How its photographs come about; null = an ideal camera.
     """
 
     modality: ClassVar[Literal["camera", "lidar"]] = "camera"
@@ -46,6 +48,7 @@ class RgbCamera(Mounted):
     hfov_deg: float = Field(60.0, ge=1, le=170)
     channels: tuple[Image, ...] = Field(("rgb", "depth", "instance", "category"), min_length=1)
     ev100: float | None = None
+    formation: Formation | None = None
 
     @property
     def media(self) -> tuple[Channel, ...]:
@@ -71,9 +74,24 @@ class RgbCamera(Mounted):
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Reading:
-        """Its own channels and those asked for, as an ideal sensor without noise."""
-        del rng
-        return renderer.render(scene, scene.camera(self.name), channels | set(self.media))
+        """Its own channels and those asked for; only colour is subject to its optics and noise."""
+        asked = channels | set(self.media)
+        camera = scene.camera(self.name)
+        if self.formation is None or Channel.RGB not in asked:
+            return renderer.render(scene, camera, asked)
+        needed = (asked - {Channel.RGB}) | {Channel.RADIANCE, Channel.Z_DEPTH}
+        seen = renderer.render(scene, camera, needed)
+        assert seen.ev100 is not None, "who renders radiance meters it"
+        photo = photograph(
+            seen.channels[Channel.RADIANCE],
+            seen.channels[Channel.Z_DEPTH],
+            camera.intrinsics.fx_px,
+            seen.ev100,
+            self.formation,
+            rng,
+        )
+        images = {k: v for k, v in seen.channels.items() if k in asked}
+        return replace(seen, channels={**images, Channel.RGB: photo})
 
 
 def _nominal_pose(focus: Region, half_angle_rad: float) -> SE3:
