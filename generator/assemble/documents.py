@@ -121,7 +121,7 @@ def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
 
 
 def _elements(document: Node, template: Node | None) -> Node:
-    """The template's elements, each with the configuration's overrides merged in."""
+    """The template's elements with the configuration's overrides merged in, and its own ones."""
     given = document.get("elements")
     if template is None:
         assert given is not None
@@ -142,7 +142,11 @@ def _overridden(elements: Node, overrides: Node) -> Node:
         problems.add(overrides.position, "elements", "expected overrides by element name")
     else:
         for name, node in overrides.content.items():
-            if name not in by_name:
+            if name not in by_name and node.get("type") is not None:
+                # What the template lacks and says what it is comes after all of the template's.
+                named = Node(overrides.key_position(name), name)
+                by_name[name] = merge(Node(node.position, {"name": named}), node)
+            elif name not in by_name:
                 fact = f"the template has no element '{name}'; expected one of "
                 fact += ", ".join(by_name) + did_you_mean(name, by_name)
                 problems.add(overrides.key_position(name), f"elements.{name}", fact)

@@ -21,7 +21,8 @@ class Channel(str, Enum):
     ====================  ======================  ==========================================
     RGB                   uint8 [h, w, 3]         sRGB, anti-aliased
     RADIANCE              float32 [h, w, 3]       luminance, linear RGB [cd/m^2], anti-aliased
-    Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf
+    Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf, also beside and
+                                                  behind the camera, where wide lenses look
     RANGE                 float32 [h, w]          along the ray [m]; inf
     NORMALS               float32 [h, w, 3]       unit, camera frame, towards the camera; 0
     INSTANCE              uint16 [h, w]           instance id; 0
@@ -47,6 +48,9 @@ class Channel(str, Enum):
 @dataclass(frozen=True, eq=False, slots=True)
 class Silhouette:
     """One instance as if nothing stood before it, on a canvas three images wide and high.
+
+    Beside the image the canvas shows what a larger sensor would, as far as the lens does: nothing
+    lies beside the image of a lens whose whole field is in it.
 
     Attributes:
         x_px, y_px: Where the mask's first pixel lies in the image; may be negative.

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.core.geometry import Material
-from generator.core.se3 import SE3, Array, Vec3, multiply_quaternions, rotations_of
+from generator.core.se3 import (
+    SE3,
+    Array,
+    Vec3,
+    multiply_quaternions,
+    rotate_by_quaternion,
+    rotations_of,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +35,16 @@ class Twist:
     velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
     acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
     angular_velocity_rad_s: Vec3 = (0.0, 0.0, 0.0)
+
+    def seen_along(self, T_world_frame: SE3) -> Twist:
+        """The same motion along the axes of a frame."""
+        w, x, y, z = T_world_frame.quaternion_wxyz
+        inverse = (w, -x, -y, -z)
+        return Twist(
+            rotate_by_quaternion(inverse, self.velocity_m_s),
+            rotate_by_quaternion(inverse, self.acceleration_m_s2),
+            rotate_by_quaternion(inverse, self.angular_velocity_rad_s),
+        )
 
 
 STILL = Twist()

@@ -124,6 +124,7 @@ class Lane:
         left, right: Names of the lanes beside it that run the same way; empty = none.
         speed_m_s: Usual speed; 0 = things stand.
         junction: Whether it crosses a junction, where nothing may stop.
+        bank: How much its left side is higher than its right one, per metre of width.
     """
 
     name: str
@@ -136,6 +137,7 @@ class Lane:
     right: str = ""
     speed_m_s: float = 0.0
     junction: bool = False
+    bank: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,6 +62,8 @@ class LidarSensor(Mounted):
         beams: Other lasers than the model's: elevation and azimuth offset to the left of each
             [deg], or the name of a CSV file with the columns ``elevation_deg`` and
             ``azimuth_offset_deg``. Pulses per second stay those of the model.
+        rotation_hz: Sweeps per second; null = the model's. Pulses per second stay those of the
+            model.
         camera: Without a rig: name of the camera it rides with, which is listed before it. The
             rig is then at the camera's centre and looks along its axis.
         returns: Which return of a pulse is reported; ``dual`` reports two.
@@ -78,6 +80,7 @@ class LidarSensor(Mounted):
     name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: str | LidarModel = "HDL-64E"
     beams: Annotated[tuple[Beam, ...], WithJsonSchema(BEAMS_SCHEMA)] = Field((), max_length=4096)
+    rotation_hz: float | None = Field(None, gt=0, le=100)
     camera: str = "color"
     returns: Kept = "strongest"
     divergence: bool = False
@@ -98,6 +101,8 @@ class LidarSensor(Mounted):
     def device(self) -> LidarModel:
         """Its data sheet."""
         model = lidar_model(self.model) if isinstance(self.model, str) else self.model
+        if self.rotation_hz is not None:
+            model = model.model_copy(update={"rotation_hz": self.rotation_hz})
         return model.with_beams(self.beams) if self.beams else model
 
     def mount(self, scene: Scene) -> Scene:

@@ -29,6 +29,8 @@ class Mounted(Strict):
         yaw_deg, pitch_deg, roll_deg: Turn to the left, then upwards, then clockwise as seen from
             behind, from the rig's forward axis.
         rate_hz: Readings per second; null = one at every step.
+        time_offset_s: It reads this much later than the step's instant; what it saw then, and the
+            labels of that, belong to the step.
         inside: Whether it may be inside the body that its rig is on.
     """
 
@@ -38,6 +40,7 @@ class Mounted(Strict):
     pitch_deg: float = Field(0.0, ge=-90, le=90)
     roll_deg: float = Field(0.0, ge=-180, le=180)
     rate_hz: float | None = Field(None, gt=0, le=10_000)
+    time_offset_s: float = Field(0.0, ge=-10, le=10)
     inside: bool = False
 
     @property

@@ -13,7 +13,15 @@ import numpy as np
 import pytest
 
 from exporters.clouds import read_points
-from exporters.kitti import Kitti, official_type, point_labels, upright_box
+from exporters.kitti import (
+    Kitti,
+    label_rows,
+    label_text,
+    official_type,
+    point_labels,
+    point_members,
+    upright_box,
+)
 from exporters.pointclouds import PointClouds
 from exporters.semantickitti import SemanticKitti
 from exporters.semantickitti import point_labels as semantic_labels
@@ -128,7 +136,10 @@ def kitti_rows(changes: dict[str, Any], world: Any, **fields: Any) -> np.ndarray
     for name, value in fields.pop("points", {}).items():
         points[name] = value
     alone = replace(truth, objects=(car,))
-    labels_ = point_labels(points, alone, Kitti(far_m=100.0), np.eye(3, 4), **fields)
+    style = Kitti(far_m=100.0)
+    members, unseen = point_members(points, alone, style, np.eye(3, 4), **fields)
+    assert unseen == frozenset() if (members == 1).any() else unseen == {1}
+    labels_ = point_labels(points, members, label_rows(alone, style))
     np.testing.assert_array_equal(labels_ & 0xFFFF, points["category_id"])
     return labels_ >> 16
 
@@ -136,6 +147,23 @@ def kitti_rows(changes: dict[str, Any], world: Any, **fields: Any) -> np.ndarray
 def test_kitti_objects_are_what_lies_in_their_boxes(world: Any) -> None:
     """Noise of 3 cm is forgiven, more is not; road that reaches into the box is in it."""
     np.testing.assert_array_equal(kitti_rows({}, world), [1, 1, 0, 1])
+
+
+def test_what_the_scanner_did_not_see_is_dont_care(world: Any) -> None:
+    """All its points out of the box; with one point in it, it is a Car."""
+    sample = world.samples[0]
+    truth = sample.truth["color"]
+    alone = replace(truth, objects=truth.objects[:1])
+    style = Kitti(far_m=100.0)
+    points = sample.capture.clouds["top"].points
+    mine = points[points["instance_id"] == 1].copy()
+    T_camera_velo = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]], float)
+
+    _, unseen = point_members(mine[:0], alone, style, T_camera_velo)
+
+    assert unseen == {1}
+    assert label_text(alone, style, unseen).startswith("DontCare -1 -1 -10 ")
+    assert label_text(alone, style).startswith("Car ")
 
 
 def test_the_way_of_a_moving_thing_within_a_sweep_is_taken_back(world: Any) -> None:

@@ -191,3 +191,22 @@ def test_poses_of_many_instants_are_those_of_one_by_one() -> None:
         pose = track.pose(float(instant_s))
         assert tuple(t[k]) == pose.translation_m
         np.testing.assert_allclose(R[k], pose.rotation(), atol=1e-15)
+
+
+def test_a_moving_sweep_made_again_is_the_same() -> None:
+    """Byte by byte, by a renderer that has seen another scene before."""
+    start = (9.0, 4.0, 0.0)
+    box = Body("box", "box", SE3(start), instance_id=1)
+    scene = scene_of([box], moving("box", start), moving("cart", (0, 0, -3)))
+    other = scene_of([Body("wall", "wall", SE3((30.1, 0.0, 0.0)))], moving("cart", (0, 0, -3)))
+    sensor = LidarSensor(name="velodyne", model="VLP-16", returns="dual", divergence=True)
+    used = WarpRenderer(FakeLibrary(MESHES), "cpu")
+    sensor.capture(other, used, frozenset(), Streams(1, 2).rng("lidar"))
+
+    one, two = (
+        sensor.capture(scene, renderer, frozenset(), Streams(1, 2).rng("lidar")).points
+        for renderer in (used, WarpRenderer(FakeLibrary(MESHES), "cpu"))
+    )
+
+    assert len(one) > 100
+    assert one.tobytes() == two.tobytes()
