@@ -57,8 +57,8 @@ ENCODING = {
 def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     """Write every image channel of a sample that the data set keeps to its ``media_path``.
 
-    Laser scans go to their ``cloud_path``, rows of devices to their ``table_path``. Sensors that do
-    not read at the sample's step have no file.
+    Laser scans go to their ``cloud_path``, rows of devices to their ``table_path``. A sensor that
+    does not read at this sample has no file.
 
     Raises:
         ConfigError: if a channel is no image.

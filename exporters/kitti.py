@@ -40,7 +40,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,11 +48,12 @@ from pydantic import Field
 
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
+from exporters.sensors import laser_scanner, rgb_camera, scanned
 from exporters.upright import UprightBox, boxed_members, upright_box
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError, did_you_mean
+from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, ObjectTruth, Sample
@@ -128,20 +129,21 @@ class Kitti(Strict):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: no such camera, it does not write the images that are needed, or too many
-                samples for six digits.
+            ConfigError: no such camera, it is no pinhole or does not write the images that are
+                needed, or too many samples for six digits.
         """
         media = info.media[self._camera(info)]
-        if self.lidar and self.lidar not in info.lidars:
-            known = ", ".join(info.lidars) or "none"
-            raise ConfigError(
-                f"exporter 'kitti': there is no lidar '{self.lidar}'; expected one of: {known}"
-                f"{did_you_mean(self.lidar, info.lidars)}"
-            )
-        if not info.lidars and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
+        if not self._lidar(info) and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
             raise ConfigError(
                 f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
                 "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
+            )
+        model = info.lenses.get(self._camera(info), "pinhole")
+        if model != "pinhole":
+            raise ConfigError(
+                f"exporter 'kitti': sensor '{self._camera(info)}' has a lens of the model "
+                f"'{model}'; KITTI's images are rectified and its calibration has no distortion: "
+                "name a camera with a pinhole, or export this one as coco"
             )
         if info.n > FRAMES_MAX:
             raise ConfigError(
@@ -160,6 +162,8 @@ class Kitti(Strict):
         folder = shard_dir / self.type
         frames = []
         for sample in samples:
+            if camera not in sample.truth:
+                continue
             truth = sample.truth[camera]
             frame = _frame(sample.index)
             unseen: frozenset[int] = frozenset()
@@ -167,14 +171,14 @@ class Kitti(Strict):
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
             _write_text(folder / f"calib/{frame}.txt", calib)
             lidar = self._lidar(info)
-            if lidar:
+            if scanned(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
                 _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
                 sweep_s = sample.scene.lidar(lidar).sweep_s
                 members, unseen = point_members(points, truth, self, T_camera_velo, sweep_s)
                 labels = point_labels(points, members, label_rows(truth, self, unseen))
                 _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
-            elif self.velodyne_stride_px:
+            elif self.velodyne_stride_px and not lidar:
                 thinned = self._points(info, sample, shard_dir)
                 _write_bytes(folder / f"velodyne/{frame}.bin", thinned.astype("<f4").tobytes())
             _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self, unseen))
@@ -197,19 +201,10 @@ class Kitti(Strict):
         _write_text(dataset_dir / "README.txt", self._readme(info, camera))
 
     def _camera(self, info: DatasetInfo) -> str:
-        with_rgb = [s for s in info.sensors if Channel.RGB in info.media[s]]
-        if not self.camera and with_rgb:
-            return with_rgb[0]
-        if self.camera in with_rgb:
-            return self.camera
-        known = ", ".join(with_rgb) or "none"
-        raise ConfigError(
-            f"exporter 'kitti': camera '{self.camera}' is no sensor that writes the rgb channel; "
-            f"expected one of: {known}{did_you_mean(self.camera, with_rgb)}"
-        )
+        return rgb_camera(info, self.camera, self.type)
 
     def _lidar(self, info: DatasetInfo) -> str:
-        return self.lidar or next(iter(info.lidars), "")
+        return laser_scanner(info, self.lidar, self.type)
 
     def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> Array:
         """Points of the velodyne folder to the camera frame, [3, 4]."""
@@ -239,9 +234,10 @@ class Kitti(Strict):
         """Files of one frame, each with its place under ``training``."""
         frame = _frame(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
-        if self._lidar(info) or self.velodyne_stride_px:
+        lidar = self._lidar(info)
+        if scanned(shard_dir, lidar, index) or (self.velodyne_stride_px and not lidar):
             names.append(f"velodyne/{frame}.bin")
-        if self._lidar(info):
+        if scanned(shard_dir, lidar, index):
             names.append(f"velodyne_labels/{frame}.label")
         links = [(shard_dir / self.type / name, name) for name in names]
         rgb = media_path(shard_dir, camera, Channel.RGB, index)
@@ -271,13 +267,37 @@ class Kitti(Strict):
         return _THINNED.format(height=LIDAR_HEIGHT_M, stride=self.velodyne_stride_px)
 
 
-def label_text(truth: ImageTruth, style: Kitti, unseen: frozenset[int] = frozenset()) -> str:
+class LabelStyle(Protocol):
+    """What decides how an object is labelled; see the fields of ``Kitti``."""
+
+    @property
+    def types(self) -> Literal["official", "category"]:
+        """Whose names of types."""
+        ...
+
+    @property
+    def boxes(self) -> Literal["projected", "tight"]:
+        """What image boxes are around."""
+        ...
+
+    @property
+    def far_m(self) -> float:
+        """Beyond it things are DontCare."""
+        ...
+
+    @property
+    def low_px(self) -> int:
+        """Below it things are DontCare."""
+        ...
+
+
+def label_text(truth: ImageTruth, style: LabelStyle, unseen: frozenset[int] = frozenset()) -> str:
     """The lines of one label file; DontCare rows last, as readers expect."""
     return "".join(f"{row}\n" for row, _ in label_rows(truth, style, unseen))
 
 
 def label_rows(
-    truth: ImageTruth, style: Kitti, unseen: frozenset[int] = frozenset()
+    truth: ImageTruth, style: LabelStyle, unseen: frozenset[int] = frozenset()
 ) -> list[tuple[str, int]]:
     """Each row of a label file with its instance id; what is ``unseen`` is DontCare."""
     rows = []
@@ -295,7 +315,7 @@ def label_rows(
 def point_members(
     points: NDArray[np.void],
     truth: ImageTruth,
-    style: Kitti,
+    style: LabelStyle,
     T_camera_velo: Array,
     sweep_s: float = 0.0,
 ) -> tuple[NDArray[np.int64], frozenset[int]]:
@@ -345,7 +365,7 @@ def point_labels(
     return labels
 
 
-def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
+def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     """The fifteen columns of one visible object.
 
     A DontCare row where it is too far or too small for ``style``, less than two pixels wide, or

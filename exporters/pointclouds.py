@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from exporters.clouds import read_points, scanner_of
 from exporters.images import link_or_copy
+from exporters.sensors import scanned
 from generator.config.strict import Strict
 from generator.core.boxes import OrientedBox
 from generator.core.errors import ConfigError
@@ -82,11 +83,12 @@ class PointClouds(Strict):
         for lidar in info.lidars:
             folder = shard_dir / self.type / lidar
             folder.mkdir(parents=True, exist_ok=True)
-            for sample in kept:
+            mine = [sample for sample in kept if scanned(shard_dir, lidar, sample.index)]
+            for sample in mine:
                 points = read_points(shard_dir, lidar, sample.index)
                 path = folder / f"{sample.index:09d}.{self.format}"
                 path.write_bytes(encoded(file_points(points)))
-            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in kept)
+            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in mine)
             (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:

@@ -9,6 +9,7 @@ TABLE = PluginTable(
     {
         "along": "randomizers.along:Along",
         "arm_configuration": "randomizers.arm_configuration:ArmConfiguration",
+        "arm_motion": "randomizers.arm_motion:ArmMotion",
         "backdrop": "randomizers.backdrop:Backdrop",
         "camera_intrinsics": "randomizers.camera_intrinsics:CameraIntrinsics",
         "camera_on_lane": "randomizers.camera_on_lane:CameraOnLane",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 
 import cv2
 
@@ -46,13 +46,30 @@ class PipelineFactory:
         cv2.setNumThreads(1)
         spec = self.spec
         library = open_library(spec.asset_folders)
-        recipe = recipe_of(spec, library, self.n, self.extra_channels)
+        recipe = recipe_of(spec, library, self.n, self.categories, self.extra_channels)
         return Pipeline(
             recipe,
             library,
             open_physics=partial(open_engine, library, spec.head.physics),
-            renderer=_renderer(spec, library),
+            open_renderer=partial(_renderer, spec, library),
         )
+
+    @cached_property
+    def nominal(self) -> tuple[Scene, ...]:
+        """Nominal scenes that between them hold whatever a scene may hold."""
+        library = open_library(self.spec.asset_folders)
+        return tuple(nominal_scene(self.spec, layout, library) for layout in self.spec.probes)
+
+    @cached_property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names of all categories that a sample may contain."""
+        return categories_of(self.nominal, open_library(self.spec.asset_folders))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Other processes are told the categories, which take a second to find out."""
+        categories = self.categories
+        told = {name: value for name, value in self.__dict__.items() if name != "nominal"}
+        return {**told, "categories": categories}
 
 
 def open_pipeline(spec: Spec, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
@@ -61,7 +78,11 @@ def open_pipeline(spec: Spec, extra_channels: frozenset[Channel] = frozenset()) 
 
 
 def recipe_of(
-    spec: Spec, library: Library, n: int, extra_channels: frozenset[Channel] = frozenset()
+    spec: Spec,
+    library: Library,
+    n: int,
+    categories: tuple[str, ...],
+    extra_channels: frozenset[Channel],
 ) -> Recipe:
     """Everything that samples depend on, resolved.
 
@@ -75,7 +96,7 @@ def recipe_of(
         seed=spec.head.seed,
         n=n,
         views_per_scene=spec.head.views_per_scene,
-        categories=categories_of(nominal_scenes(spec, library), library),
+        categories=categories,
         sensors=tuple(sorted(s.name for s in spec.sensors if s.modality == "camera")),
         lidars=tuple(sorted(s.name for s in spec.sensors if s.modality == "lidar")),
         media={s.name: tuple(s.media) for s in spec.sensors if s.modality == "camera"},
@@ -83,6 +104,7 @@ def recipe_of(
         devices={s.name: s.modality for s in spec.sensors if s.modality not in IMAGING},
         steps_per_scene=spec.head.steps_per_scene,
         step_s=spec.head.step_s,
+        lenses={s.name: s.intrinsics().lens.model for s in spec.sensors if s.modality == "camera"},
     )
     exporters = _exporters(spec, info)
     needed = frozenset().union(*(a.channels for a in annotators), extra_channels)
@@ -134,11 +156,6 @@ def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
         if sensor.modality in IMAGING:
             refuse_buried(scene, sensor.name, sensor, assets)
     return scene
-
-
-def nominal_scenes(spec: Spec, assets: AssetIndex) -> tuple[Scene, ...]:
-    """Nominal scenes that between them hold whatever a scene may hold."""
-    return tuple(nominal_scene(spec, layout, assets) for layout in spec.probes)
 
 
 def _renderer(spec: Spec, library: Library) -> Renderer:

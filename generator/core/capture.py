@@ -20,7 +20,9 @@ class Channel(str, Enum):
     channel               array                   meaning; value for "nothing"
     ====================  ======================  ==========================================
     RGB                   uint8 [h, w, 3]         sRGB, anti-aliased
-    Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf
+    RADIANCE              float32 [h, w, 3]       luminance, linear RGB [cd/m^2], anti-aliased
+    Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf, also beside and
+                                                  behind the camera, where wide lenses look
     RANGE                 float32 [h, w]          along the ray [m]; inf
     NORMALS               float32 [h, w, 3]       unit, camera frame, towards the camera; 0
     INSTANCE              uint16 [h, w]           instance id; 0
@@ -32,6 +34,7 @@ class Channel(str, Enum):
     """
 
     RGB = "rgb"
+    RADIANCE = "radiance"
     Z_DEPTH = "depth"
     RANGE = "range"
     NORMALS = "normals"
@@ -45,6 +48,9 @@ class Channel(str, Enum):
 @dataclass(frozen=True, eq=False, slots=True)
 class Silhouette:
     """One instance as if nothing stood before it, on a canvas three images wide and high.
+
+    Beside the image the canvas shows what a larger sensor would, as far as the lens does: nothing
+    lies beside the image of a lens whose whole field is in it.
 
     Attributes:
         x_px, y_px: Where the mask's first pixel lies in the image; may be negative.
@@ -65,6 +71,7 @@ class Reading:
         channels: Arrays by channel, as listed at Channel.
         silhouettes: By instance id; empty unless AMODAL was asked for.
         time_s: The instant that depth, ids and boxes refer to.
+        ev100: Exposure value that was set or metered; None where there is no colour.
     """
 
     sensor: str
@@ -72,6 +79,7 @@ class Reading:
     channels: Mapping[Channel, NDArray[Any]]
     silhouettes: Mapping[int, Silhouette] = field(default_factory=dict)
     time_s: float = 0.0
+    ev100: float | None = None
 
 
 POINT = np.dtype(

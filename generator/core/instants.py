@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from generator.core.motion import STILL, Change, Twist
-from generator.core.scene import Body, Camera, Device, Instance, Lidar, Light, Rig, Scene
+from generator.core.scene import (
+    Articulation,
+    Body,
+    Camera,
+    Device,
+    Instance,
+    Lidar,
+    Light,
+    Rig,
+    Scene,
+)
 from generator.core.se3 import SE3, Vec3, rotate_by_quaternion
 
 RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
@@ -18,9 +28,9 @@ EGO = "ego"
 def at(scene: Scene, time_s: float) -> Scene:
     """The scene at another instant: what has a track, and all that rides with it, has moved.
 
-    Bodies, lights, rigs, sensors and the frames of instances follow; so do the changes that have
-    happened by then. Changes are looked up from the beginning of time, so that the way there does
-    not matter; a body whose first change lies ahead keeps what it has.
+    Bodies, joints, lights, rigs, sensors and the frames of instances follow; so do the changes
+    that have happened by then. Changes are looked up from the beginning of time, so that the way
+    there does not matter; a body whose first change lies ahead keeps what it has.
 
     The boxes of instances of several bodies (robots) are measured again by whoever freezes scenes.
     """
@@ -49,6 +59,7 @@ def at(scene: Scene, time_s: float) -> Scene:
             scene,
             time_s=time_s,
             bodies=bodies,
+            articulations=tuple(_moved_joints(a, time_s) for a in scene.articulations),
             instances=_moved_instances(scene, bodies, changes, time_s),
             lights=tuple(
                 _moved_light(light, moved[light.body]) if light.body in moved else light
@@ -171,6 +182,12 @@ def _moved_instances(
             )
         )
     return with_twists(replace(scene, time_s=time_s, instances=tuple(instances))).instances
+
+
+def _moved_joints(arm: Articulation, time_s: float) -> Articulation:
+    if arm.joint_track is None:
+        return arm
+    return replace(arm, joint_positions=arm.joint_track.positions(time_s))
 
 
 def _moved_light(light: Light, T_new_old: SE3) -> Light:

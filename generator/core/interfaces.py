@@ -24,6 +24,7 @@ from generator.core.geometry import (
     RobotModel,
     TextureData,
 )
+from generator.core.lens import LensModel
 from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth, Sample
 from generator.core.scene import Camera, Lane, Lidar, Scene
 from generator.core.se3 import Vec3
@@ -235,6 +236,7 @@ class DatasetInfo:
         devices: ``{sensor: kind}`` of all other sensors, sorted by name.
         steps_per_scene: Instants of one view: the length of a sequence.
         step_s: Time between them.
+        lenses: ``{camera: model of its lens}``; a pinhole where it is missing.
     """
 
     name: str
@@ -249,6 +251,7 @@ class DatasetInfo:
     devices: Mapping[str, str] = field(default_factory=dict)
     steps_per_scene: int = 1
     step_s: float = 0.1
+    lenses: Mapping[str, LensModel] = field(default_factory=dict)
 
 
 class Exporter(Protocol):

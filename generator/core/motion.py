@@ -173,6 +173,32 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True)
+class JointTrack:
+    """The joint positions of a robot through time; linear between knots.
+
+    Attributes:
+        step_s: Time between knots.
+        knots: One position per movable joint [rad or m], at ``start_s + k * step_s``.
+        start_s: Time of the first knot.
+    """
+
+    step_s: float
+    knots: tuple[tuple[float, ...], ...]
+    start_s: float = 0.0
+
+    def positions(self, time_s: float) -> tuple[float, ...]:
+        """Positions at one instant; those of the first or last knot outside their time."""
+        last = len(self.knots) - 1
+        steps = min(max(round((time_s - self.start_s) / self.step_s, 9), 0.0), float(last))
+        k = min(math.floor(steps), last - 1) if last else 0
+        one, other = self.knots[k], self.knots[min(k + 1, last)]
+        return tuple(
+            round((1.0 - (steps - k)) * a + (steps - k) * b, 6) + 0.0
+            for a, b in zip(one, other, strict=True)
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Change:
     """What a body is like from an instant on: a lamp that lights, the next step of a walk.
 

@@ -12,7 +12,7 @@ from typing import Literal, Protocol, TypeVar
 
 from generator.core.geometry import Keypoint, Material
 from generator.core.intrinsics import Intrinsics
-from generator.core.motion import STILL, Change, Track, Twist
+from generator.core.motion import STILL, Change, JointTrack, Track, Twist
 from generator.core.se3 import IDENTITY, SE3, Vec3
 
 SharedValue = str | float | int | bool
@@ -172,17 +172,24 @@ class ArmGoal:
     Attributes:
         kind: ``joints``: candidates are joint positions. ``reach``: candidates are poses of the
             grasp frame in the world. ``hold``: like reach, with ``held`` between the fingers.
+            Only on a way: ``grasp`` takes up one of ``objects`` from where it rests, ``place``
+            puts down what is held.
         joint_candidates: One tuple per candidate [rad or m], arm joints in order.
-        pose_candidates: ``T_world_grasp`` per candidate.
-        opening: Gripper opening in [0, 1]; ignored for ``hold``.
+        pose_candidates: ``T_world_grasp`` per candidate; for ``place``, a point on a surface and
+            a turn about Z that the object makes from how it lay or is held.
+        opening: Gripper opening in [0, 1]; ignored for ``hold``, ``grasp`` and ``place``.
         held: Name of the body that is held.
+        objects: Names of the bodies that may be grasped, the preferred one first.
+        speed: Share of the joints' speed limits that the way there may use.
     """
 
-    kind: Literal["joints", "reach", "hold"]
+    kind: Literal["joints", "reach", "hold", "grasp", "place"]
     joint_candidates: tuple[tuple[float, ...], ...] = ()
     pose_candidates: tuple[SE3, ...] = ()
     opening: float = 1.0
     held: str = ""
+    objects: tuple[str, ...] = ()
+    speed: float = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +198,11 @@ class Articulation:
 
     Attributes:
         joint_positions: One per movable joint, in the robot model's order [rad or m].
+        goal: What it does before anything moves.
         workspace_m: Low and high corner [m], world, where its hand may be sent.
+        way: What it does from then on, one after the other: ``joints``, ``reach``, ``grasp``
+            and ``place``.
+        joint_track: How its joints move; None = they stand still.
     """
 
     name: str
@@ -201,6 +212,8 @@ class Articulation:
     joint_positions: tuple[float, ...]
     goal: ArmGoal | None = None
     workspace_m: tuple[Vec3, Vec3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    way: tuple[ArmGoal, ...] = ()
+    joint_track: JointTrack | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -115,12 +116,12 @@ class Pipeline:
         recipe: Recipe,
         assets: AssetLibrary,
         open_physics: Callable[[], PhysicsEngine],
-        renderer: Renderer,
+        open_renderer: Callable[[], Renderer],
     ) -> None:
         self.recipe = recipe
         self.assets = assets
         self._open_physics = open_physics
-        self.renderer = renderer
+        self._open_renderer = open_renderer
         self._physics: PhysicsEngine | None = None
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
@@ -132,14 +133,21 @@ class Pipeline:
         """The data set as its exporters see it."""
         return self.recipe.info
 
+    @cached_property
+    def renderer(self) -> Renderer:
+        """Opened by the context, or when first asked for: who merges shards draws nothing."""
+        return self._open_renderer()
+
     @property
     def exporters(self) -> Mapping[str, Exporter]:
         """Exporters by name."""
         return self.recipe.exporters
 
     def __enter__(self) -> Pipeline:
-        """Start the physics engine."""
+        """Start the engines."""
         engine = self._open_physics()
+        # A machine that cannot draw says so before work begins.
+        _ = self.renderer
         if hasattr(engine, "__enter__"):
             engine = self._resources.enter_context(engine)  # type: ignore[arg-type]
         self._physics = engine

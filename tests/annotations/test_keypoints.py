@@ -40,7 +40,8 @@ def seen(
         PANEL, "panel", "panel", 1, "panel", T_world_instance=T_world_instance, keypoints=points
     )
     normals = np.full((H, W, 3), normal, np.float32)
-    channels = {Channel.INSTANCE: ids, Channel.Z_DEPTH: depth_m, Channel.NORMALS: normals}
+    range_m = depth_m / CAMERA.intrinsics.pixel_rays()[..., 2]
+    channels = {Channel.INSTANCE: ids, Channel.RANGE: range_m, Channel.NORMALS: normals}
     reading = Reading("color", CAMERA, channels)
     scene = Scene("panel", instances=(panel,))
     (truth,) = image_truth(scene, reading, [Keypoints()], Thresholds()).objects

@@ -223,23 +223,6 @@ def test_instances_of_different_scenes_have_different_ids(semantic: Path) -> Non
     assert len(seen) > 5
 
 
-def test_things_keep_their_id_over_the_steps_of_a_view_only(world: Any, tmp_path: Path) -> None:
-    """Three steps of one view, then another view of the same scene."""
-    numbers = ((0, 0, 0), (0, 0, 1), (0, 1, 0))
-    samples = [
-        replace(world.samples[0], index=k, scene_index=s, view_index=v, step_index=t, split="train")
-        for k, (s, v, t) in enumerate(numbers)
-    ]
-    info = world.info(3, lidars=("top",), steps_per_scene=2, step_s=0.2)
-    folder = world.export(SemanticKitti(), info, samples, tmp_path) / "sequences/00"
-
-    first, second, other = (labels(folder / f"labels/{k:06d}.label")[1] for k in range(3))
-    np.testing.assert_array_equal(first, second)
-    assert not set(first[first > 0]) & set(other[other > 0])
-    times = [float(t) for t in (folder / "times.txt").read_text().split()]
-    assert times == pytest.approx([0.0, 0.2, 0.4])
-
-
 def test_things_under_way_have_moving_classes(world: Any) -> None:
     """A car that moves is a moving-car, 252; one at rest a car, 10."""
     sample = world.samples[0]
