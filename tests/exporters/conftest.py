@@ -112,6 +112,7 @@ def ray_cast(scene: Scene, camera: Camera) -> Reading:
     channels: dict[Channel, NDArray[Any]] = {
         Channel.RGB: rgb,
         Channel.Z_DEPTH: depth.astype(np.float32),
+        Channel.RANGE: (depth * np.linalg.norm(rays[inside], axis=-1)).astype(np.float32),
         Channel.NORMALS: _normals(depth[..., None] * rays[inside]),
         Channel.INSTANCE: ids,
         Channel.CATEGORY: categories,
