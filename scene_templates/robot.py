@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
+from generator.core.geometry import RobotModel
 from generator.core.interfaces import AssetIndex
-from generator.core.kinematics import link_bodies
-from generator.core.scene import Articulation, Instance, Scene
+from generator.core.kinematics import finger_links, link_bodies, link_poses, rigid_group
+from generator.core.scene import Articulation, Instance, Rig, Scene
 from generator.core.se3 import SE3, Vec3
 from scene_templates.element import PlacedElement, next_instance_id, surfaces_of
 
 CATEGORY = "robot_arm"
+R_GRASP_RIG = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
+"""A rig's X axis is a grasp frame's Z axis; their Y axes are one."""
 
 
 class Robot(PlacedElement):
@@ -24,12 +28,15 @@ class Robot(PlacedElement):
         asset: franka_panda, kuka_iiwa, xarm6, or a robot of yours.
         reach_m: Its hand is sent no farther than this from its base.
         annotate: Whether labels are written for it.
+        wrist_rig: Name of a rig on its hand, for sensors; empty = none. X points out of the hand, Y
+            is the direction in which the fingers open, the origin is that of the hand.
     """
 
     type: Literal["robot"] = "robot"
     asset: str = "franka_panda"
     reach_m: float = Field(0.75, gt=0)
     annotate: bool = True
+    wrist_rig: str = Field("", pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$")
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """An articulation, one instance, and a body per visible link."""
@@ -55,8 +62,10 @@ class Robot(PlacedElement):
             joint_positions=robot.home,
             workspace_m=self._workspace_m(scene, T_world_base),
         )
+        rigs = (wrist(self.wrist_rig, self.name, robot),) if self.wrist_rig else ()
         return replace(
             scene,
+            rigs=(*scene.rigs, *rigs),
             instances=(*scene.instances, instance),
             articulations=(*scene.articulations, articulation),
             bodies=(*scene.bodies, *link_bodies(articulation, robot, parts)),
@@ -75,3 +84,19 @@ class Robot(PlacedElement):
             high = [min(high[k], float(around[:, k].max())) for k in (0, 1)]
         low, high = [round(v, 6) for v in low], [round(v, 6) for v in high]
         return (low[0], low[1], z + 0.10), (high[0], high[1], z + 0.50)
+
+
+def wrist(name: str, arm: str, robot: RobotModel) -> Rig:
+    """The rig on a robot's hand; on its last link if it has no gripper."""
+    fixed = [link for link in robot.links if link not in finger_links(robot)]
+    hand, turn = fixed[-1], SE3().quaternion_wxyz
+    if robot.gripper is not None:
+        hand, turn = robot.gripper.link, robot.gripper.T_link_grasp.quaternion_wxyz
+    # The hand may be a mere frame: what carries the rig is the last thing to be seen before it.
+    with_it = [k for k in fixed if k in robot.visuals and k in rigid_group(robot, hand)]
+    visible = with_it or [k for k in fixed if k in robot.visuals]
+    carrier = hand if hand in visible else visible[-1]
+    poses = link_poses(robot, SE3(), robot.home)
+    T_carrier_hand = poses[carrier].inverse() @ poses[hand]
+    T_hand_rig = SE3((0.0, 0.0, 0.0), turn) @ SE3((0.0, 0.0, 0.0), R_GRASP_RIG)
+    return Rig(name, f"{arm}/{carrier}", (T_carrier_hand @ T_hand_rig).rounded())

@@ -16,6 +16,7 @@ from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Region, Scene
 from generator.core.se3 import SE3, look_at
 from generator.core.streams import Rng
+from generator.sensors.formation.chain import Formation, photograph
 from generator.sensors.lenses import LensConfig, Pinhole, Published
 from generator.sensors.mounting import Mounted, known_rig
 
@@ -44,6 +45,7 @@ class RgbCamera(Mounted):
             calibration of a known camera.
         channels: What is written as images.
         ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
+        formation: How its photographs come about; null = an ideal camera.
     """
 
     modality: ClassVar[Literal["camera", "lidar"]] = "camera"
@@ -54,6 +56,7 @@ class RgbCamera(Mounted):
     lens: LensConfig = Pinhole()
     channels: tuple[Image, ...] = Field(("rgb", "depth", "instance", "category"), min_length=1)
     ev100: float | None = None
+    formation: Formation | None = None
 
     @model_validator(mode="after")
     def _has_a_lens(self) -> RgbCamera:
@@ -106,9 +109,24 @@ class RgbCamera(Mounted):
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Reading:
-        """Its own channels and those asked for, as an ideal sensor without noise."""
-        del rng
-        return renderer.render(scene, scene.camera(self.name), channels | set(self.media))
+        """Its own channels and those asked for; only colour is subject to its optics and noise."""
+        asked = channels | set(self.media)
+        camera = scene.camera(self.name)
+        if self.formation is None or Channel.RGB not in asked:
+            return renderer.render(scene, camera, asked)
+        needed = (asked - {Channel.RGB}) | {Channel.RADIANCE, Channel.Z_DEPTH}
+        seen = renderer.render(scene, camera, needed)
+        assert seen.ev100 is not None, "who renders radiance meters it"
+        photo = photograph(
+            seen.channels[Channel.RADIANCE],
+            seen.channels[Channel.Z_DEPTH],
+            camera.intrinsics.fx_px,
+            seen.ev100,
+            self.formation,
+            rng,
+        )
+        images = {k: v for k, v in seen.channels.items() if k in asked}
+        return replace(seen, channels={**images, Channel.RGB: photo})
 
 
 def _narrower_half_rad(intrinsics: Intrinsics) -> float:

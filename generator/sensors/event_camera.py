@@ -1,0 +1,156 @@
+"""An event camera: where and when pixels become brighter or darker."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from generator.core.capture import Channel, Table
+from generator.core.errors import ConfigError
+from generator.core.instants import RIG_AXES, at
+from generator.core.interfaces import Renderer
+from generator.core.intrinsics import Intrinsics
+from generator.core.scene import Camera, Device, Scene
+from generator.core.se3 import Array
+from generator.core.streams import Rng
+from generator.core.tables import table_rows
+from generator.sensors.event_pixels import (
+    Events,
+    Pixels,
+    after_rest,
+    linear_intensity,
+    logarithm_of,
+    noise_events,
+    signal_events,
+)
+from generator.sensors.mounting import Mounted, checked_rate, known_rig, window_s
+
+SidePx = Annotated[int, Field(ge=8, le=2048)]
+CHANNELS = frozenset({Channel.RGB, Channel.INSTANCE})
+
+
+class EventCamera(Mounted):
+    """An event camera: time, pixel and polarity of every change of brightness since the last step.
+
+    Frames between two steps are rendered with a fixed exposure and taken back to linear light;
+    their 8 bits are steps of at most 3 % of intensity, far below the threshold. Renders several
+    images per step: choose small images.
+
+    Attributes:
+        name: What files call it.
+        camera: Without a rig: name of the camera whose place and axis it shares, listed before it.
+        size_px: Width and height.
+        hfov_deg: Horizontal field of view.
+        frames_per_step: Images from one reading to the next, between which brightness changes
+            evenly; things should move by about a pixel from one to the next.
+        threshold: Change of the logarithm of intensity that makes an event.
+        threshold_spread: Its standard deviation over the pixels.
+        refractory_s: Time for which a pixel is silent after an event.
+        leak_hz: Events per pixel and second that leakage makes, all brighter.
+        shot_noise_hz: Events per pixel and second that noise makes in the dark.
+        ev100: Exposure value of the frames at ISO 100; left out, it follows from the scene's light.
+    """
+
+    modality: ClassVar[str] = "event_camera"
+    type: Literal["event_camera"] = "event_camera"
+    name: str = Field("events", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    camera: str = "color"
+    size_px: tuple[SidePx, SidePx] = (346, 260)
+    hfov_deg: float = Field(60.0, ge=1, le=170)
+    frames_per_step: int = Field(5, ge=1, le=1000)
+    threshold: float = Field(0.2, ge=0.01, le=5)
+    threshold_spread: float = Field(0.03, ge=0, le=1)
+    refractory_s: float = Field(0.0005, ge=0, le=1)
+    leak_hz: float = Field(0.1, ge=0, le=1000)
+    shot_noise_hz: float = Field(1.0, ge=0, le=1000)
+    ev100: float | None = None
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with this device on its rig, or at its camera.
+
+        Raises:
+            ConfigError: the scene has no such rig or camera, or the rate does not fit.
+        """
+        checked_rate(self.name, self.rate_hz, scene.step_s)
+        known = [camera.name for camera in scene.cameras]
+        rig = known_rig(scene, self.name, self.rig) if self.rig else ""
+        if not rig and self.camera not in known:
+            raise ConfigError(
+                f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
+                f" is {', '.join(known) or 'none'}"
+            )
+        device = Device(
+            self.name,
+            self.modality,
+            rig,
+            self.T_rig_sensor,
+            camera="" if rig else self.camera,
+        )
+        return replace(scene, devices=(*scene.devices, device))
+
+    def capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> Table:
+        """Events since the last reading, by time; none at time 0."""
+        del channels
+        start_s, end_s = window_s(scene, self.rate_hz)
+        device = scene.device(self.name)
+        if end_s <= start_s:
+            return Table(self.name, device, table_rows("event_camera", 0), scene.time_s)
+        times_s = start_s + (end_s - start_s) * np.linspace(0.0, 1.0, self.frames_per_step + 1)
+        intensities, shown = self._frames(scene, times_s, renderer)
+        width_px, height_px = self.size_px
+        shape = (height_px, width_px)
+        pixels = Pixels.drawn(shape, self.threshold, self.threshold_spread, rng.of_sequence())
+        told = signal_events([pixels.levels(logarithm_of(i)) for i in intensities], times_s)
+        noise = noise_events(intensities[-1], start_s, end_s, self.leak_hz, self.shot_noise_hz, rng)
+        events = after_rest(Events.joined([told, noise]), self.refractory_s)
+        frame = np.rint((events.time_s - start_s) / (times_s[1] - start_s)).astype(np.int64)
+        rows = table_rows(
+            "event_camera",
+            len(events.pixel),
+            time_s=np.round(events.time_s, 6),
+            x_px=events.pixel % width_px,
+            y_px=events.pixel // width_px,
+            polarity=events.polarity,
+            instance_id=shown.reshape(len(times_s), -1)[frame, events.pixel],
+        )
+        return Table(self.name, device, rows, scene.time_s)
+
+    def _frames(
+        self, scene: Scene, times_s: Array, renderer: Renderer
+    ) -> tuple[list[Array], np.ndarray]:
+        """Linear intensity, and instance ids [frames, h, w], at each of several instants."""
+        width_px, height_px = self.size_px
+        lens = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
+        ev100 = nominal_ev100(scene) if self.ev100 is None else self.ev100
+        intensities, shown = [], []
+        for time_s in times_s:
+            then = at(scene, float(time_s))
+            pose = then.device(self.name).T_world_device @ RIG_AXES.inverse()
+            seen = renderer.render(then, Camera(self.name, pose, lens, ev100), CHANNELS)
+            intensities.append(linear_intensity(seen.channels[Channel.RGB]))
+            shown.append(seen.channels[Channel.INSTANCE])
+        return intensities, np.stack(shown)
+
+
+def nominal_ev100(scene: Scene) -> float:
+    """The exposure value that suits what shines on the scene's focus, whatever moves.
+
+    A grey surface under E lux is middle grey at ``log2(E / (1.2 pi))`` (saturation-based speed, ISO
+    12232). Lights that ride on bodies do not count: exposure must not change with time.
+    """
+    lux = math.pi * scene.environment.luminance_cd_m2
+    for light in scene.lights:
+        if light.body:
+            continue
+        if light.kind == "sun":
+            lux += light.illuminance_lux * max(-light.direction[2], 0.0)
+        else:
+            away_m = math.dist(light.position_m, scene.focus.center_m)
+            lux += light.intensity_cd / max(away_m, 0.1) ** 2
+    return round(math.log2(max(lux, 0.1) / (1.2 * math.pi)) * 256.0) / 256.0
