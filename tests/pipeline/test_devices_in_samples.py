@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import recipe_of
+from generator.assemble.recipe import open_pipeline, recipe_of
 from generator.assemble.spec import load_spec
 from generator.assets.library import open_library
 from generator.core.capture import Channel
@@ -136,7 +136,7 @@ def test_configurations_without_a_rig_are_told_so() -> None:
     """Before anything is made."""
     spec = load_spec("tabletop.yaml", overrides=("sensors=[{type: radar}]", "exporters=[]"))
     with pytest.raises(ConfigError, match="sensor 'radar': there is no rig 'ego'; there is none"):
-        recipe_of(spec, open_library(()), 1, (), frozenset())
+        open_pipeline(spec)
 
 
 def test_rates_reach_the_recipe() -> None:
