@@ -64,7 +64,7 @@ class EventCamera(Mounted):
     threshold_spread: float = Field(0.03, ge=0, le=1)
     refractory_s: float = Field(0.0005, ge=0, le=1)
     leak_hz: float = Field(0.1, ge=0, le=1000)
-    shot_noise_hz: float = Field(1.0, ge=0, le=1000)
+    shot_noise_hz: float = Field(0.5, ge=0, le=1000)
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this device on its rig, or at its camera.

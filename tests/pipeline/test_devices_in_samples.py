@@ -132,10 +132,10 @@ def test_streams_of_a_sequence_are_the_same_at_every_step() -> None:
     assert shared[0] not in [rng.random() for rng in steps]
 
 
-def test_configurations_without_a_rig_are_told_so() -> None:
+def test_configurations_without_the_rig_are_told_so() -> None:
     """Before anything is made."""
     spec = load_spec("tabletop.yaml", overrides=("sensors=[{type: radar}]", "exporters=[]"))
-    with pytest.raises(ConfigError, match="sensor 'radar': there is no rig 'ego'; there is none"):
+    with pytest.raises(ConfigError, match="there is no rig 'ego'; there is arm_wrist"):
         open_pipeline(spec)
 
 

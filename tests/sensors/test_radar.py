@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from generator.core.geometry import SURFACES
 from generator.core.scene import Body, Instance, Scene, Weather
 from generator.core.se3 import SE3
 from generator.sensors.presets import preset, preset_names
 from generator.sensors.radar import MAKES, Radar, RadarModel
-from generator.sensors.reflectors import TARGETS, cross_section_m2, silhouette_m2
+from generator.sensors.reflectors import TARGETS, area_factor, cross_section_m2, silhouette_m2
 from tests.sensors.streetcar import (
     PERSON_M,
     WALL_M,
@@ -298,3 +299,13 @@ def test_unlabelled_motion_does_not_matter() -> None:
 
     rows = reading(ideal(), still, 0).rows
     assert np.allclose(rows["velocity_m_s"], 0.0)
+
+
+def test_every_surface_sends_back_what_its_kind_does() -> None:
+    """Whatever a ray may hit has a value; metal posts count by what they are."""
+    every = np.arange(len(SURFACES), dtype=np.uint8)
+    factors = area_factor("building", every)
+
+    assert (factors > 0.0).all()
+    assert factors[SURFACES.index("asphalt")] == pytest.approx(10.0**-2.8)
+    assert (area_factor("barrier", every) == 1.0).all()
