@@ -164,7 +164,7 @@ def sampled(index: int, **recipe: Any) -> tuple[Capture, dict[str, float], dict[
         exporters={},
         **recipe,
     )
-    pipeline = Pipeline(made, open_library(()), AtRest, None)  # type: ignore[arg-type]
+    pipeline = Pipeline(made, open_library(()), AtRest, lambda: None)  # type: ignore[arg-type]
     with pipeline:
         return pipeline.sample(index).capture, annotated, swept
 
