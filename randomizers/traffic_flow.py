@@ -38,12 +38,13 @@ from randomizers.traffic_members import (
     Driver,
     OnFoot,
     OnRoad,
+    Standing,
     ahead_of,
     approaches_of,
     cycles_axes,
     drivers_of,
     people_of,
-    standing_boxes,
+    standing_of,
     with_cycles,
 )
 
@@ -121,11 +122,11 @@ class TrafficFlow(RandomizerBase):
         drivers = drivers_of(scene, streets.driving, assets)
         people = people_of(scene, streets.sidewalks, streets.crosswalks, assets)
         taking_part = [m.body for m in drivers] + [m.body for m in people]
-        standing = standing_boxes(scene, taking_part, assets)
+        standing = standing_of(scene, taking_part, assets)
         fleet = self._fleet(drivers, streets, self._planned(scene, drivers, streets), rng)
-        walks = walks_of(streets.sidewalks, streets.crosswalks, (box for _, box in standing))
+        walks = walks_of(streets.sidewalks, streets.crosswalks, standing.boxes)
         walkers = self._walkers(people, walks, rng)
-        motion = simulated(fleet, walkers, approaches, self.duration_s)
+        motion = simulated(fleet, walkers, standing.boxes, approaches, self.duration_s)
         _check(motion, drivers, people, standing, self.name)
         tracks = _tracks(motion, drivers, people, assets)
         changes = [
@@ -329,7 +330,7 @@ def _check(
     motion: Motion,
     drivers: Sequence[OnRoad],
     people: Sequence[OnFoot],
-    standing: Sequence[tuple[str, tuple[float, ...]]],
+    standing: Standing,
     name: str,
 ) -> None:
     """Raises LayoutRejected if anything that moves overlaps anything."""
@@ -338,16 +339,15 @@ def _check(
     cars = np.concatenate([centres, motion.ahead], axis=2)
     persons = np.concatenate([motion.feet_m[..., :2], motion.look], axis=2)
     halves = [(0.5 * (m.axles.front_m + m.axles.rear_m), 0.5 * m.axles.width_m) for m in drivers]
-    boxes = np.array([box for _, box in standing]).reshape(-1, 6)
     found = first_overlap(
         np.concatenate([cars, persons], axis=1),
         np.array([*halves, *[BODY_M] * len(people)]).reshape(-1, 2),
-        boxes[:, [0, 1, 4, 5]],
-        boxes[:, 2:4],
+        standing.boxes[:, [0, 1, 4, 5]],
+        standing.boxes[:, 2:4],
     )
     if found is None:
         return
-    kinds = [m.category for m in drivers] + ["person"] * len(people) + [c for c, _ in standing]
+    kinds = [m.category for m in drivers] + ["person"] * len(people) + list(standing.categories)
     one, other = sorted((kinds[found[1]], kinds[found[2]]))
     remedy = f"fewer vehicles or people, or a shorter duration_s (randomizers.{name})"
     raise LayoutRejected(Rejection(f"{one} and {other} meet in traffic", remedy))

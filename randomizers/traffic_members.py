@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Body, Scene
-from generator.core.se3 import SE3
+from generator.core.se3 import SE3, Array
 from generator.traffic.axles import Axles, axles_of
 from generator.traffic.crossings import heading, zones
-from generator.traffic.paths import Box
 from generator.traffic.routes import LaneGraph, Place
 from generator.traffic.signals import Approach, Cycle
 from randomizers.footprints import Footprint
@@ -126,24 +127,37 @@ def people_of(
     return found
 
 
-def standing_boxes(
-    scene: Scene, taking_part: Iterable[Body], assets: AssetIndex
-) -> list[tuple[str, Box]]:
-    """Category and box of everything that stands on the ground and takes no part."""
+@dataclass(frozen=True, eq=False, slots=True)
+class Standing:
+    """What stands on the ground and takes no part.
+
+    Attributes:
+        categories: What it is.
+        boxes: What it covers [b, 6]: centre, half extents, cosine and sine of its direction.
+    """
+
+    categories: tuple[str, ...]
+    boxes: Array
+
+
+def standing_of(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex) -> Standing:
+    """Everything that has an instance, but roads and those who take part."""
     moving = {body.name for body in taking_part}
     roads = {lane.road for lane in scene.lanes}
-    found = []
+    categories: list[str] = []
+    rows: list[tuple[float, ...]] = []
     for body in scene.bodies:
         if not body.instance_id or body.name in moving or body.name.partition("/")[0] in roads:
             continue
         category = assets.get(body.asset).category
         if category in POSTS:
             x, y, _ = body.T_world_body.translation_m
-            found.append((category, (x, y, POST_M, POST_M, 1.0, 0.0)))
-            continue
-        row = Footprint.of(body.T_world_body, assets.bounds_m(body.asset), body.scale).row()
-        found.append((category, (row[0], row[1], row[2], row[3], row[4], row[5])))
-    return found
+            rows.append((x, y, POST_M, POST_M, 1.0, 0.0))
+        else:
+            bounds_m = assets.bounds_m(body.asset)
+            rows.append(Footprint.of(body.T_world_body, bounds_m, body.scale).row()[:6])
+        categories.append(category)
+    return Standing(tuple(categories), np.array(rows).reshape(-1, 6))
 
 
 def approaches_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -24,23 +24,25 @@ R_GRASP_RIG = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
 class Robot(PlacedElement):
     """A robot, standing at its home pose until a randomizer moves its arm.
 
+    Its wrist is a rig, ``<name>_wrist``, that sensors may be mounted on: X out of the hand, Y the
+    direction in which the fingers open.
+
     Attributes:
-        asset: franka_panda, kuka_iiwa, xarm6, or a robot of yours.
+        asset: franka_panda, kuka_iiwa, xarm6, one of a pack, or one of yours; of several, the
+            first that is installed.
         reach_m: Its hand is sent no farther than this from its base.
         annotate: Whether labels are written for it.
-        wrist_rig: Name of a rig on its hand, for sensors; empty = none. X points out of the hand, Y
-            is the direction in which the fingers open, the origin is that of the hand.
     """
 
     type: Literal["robot"] = "robot"
-    asset: str = "franka_panda"
+    asset: str | Annotated[tuple[str, ...], Field(min_length=1)] = "franka_panda"
     reach_m: float = Field(0.75, gt=0)
     annotate: bool = True
-    wrist_rig: str = Field("", pattern=r"^([A-Za-z][A-Za-z0-9_-]*)?$")
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """An articulation, one instance, and a body per visible link."""
-        robot = assets.robot(self.asset)
+        asset = self._installed(assets)
+        robot = assets.robot(asset)
         T_world_base = self.pose(scene).rounded()
         instance_id = next_instance_id(scene)
         parts = tuple(link for link in robot.links if link in robot.visuals)
@@ -49,27 +51,32 @@ class Robot(PlacedElement):
             self.name,
             CATEGORY,
             0,
-            self.asset,
+            asset,
             annotated=self.annotate,
             parts=parts,
             T_world_instance=T_world_base,
         )
         articulation = Articulation(
             name=self.name,
-            asset=self.asset,
+            asset=asset,
             instance_id=instance_id,
             T_world_base=T_world_base,
             joint_positions=robot.home,
             workspace_m=self._workspace_m(scene, T_world_base),
         )
-        rigs = (wrist(self.wrist_rig, self.name, robot),) if self.wrist_rig else ()
         return replace(
             scene,
-            rigs=(*scene.rigs, *rigs),
             instances=(*scene.instances, instance),
             articulations=(*scene.articulations, articulation),
             bodies=(*scene.bodies, *link_bodies(articulation, robot, parts)),
+            rigs=(*scene.rigs, wrist(f"{self.name}_wrist", self.name, robot)),
         )
+
+    def _installed(self, assets: AssetIndex) -> str:
+        """The first of its assets that there is; the first one, to be missed, if there is none."""
+        wanted = (self.asset,) if isinstance(self.asset, str) else self.asset
+        known = {asset.asset_id for asset in assets.find((), kind="robot")}
+        return next((name for name in wanted if name in known), wanted[0])
 
     def _workspace_m(self, scene: Scene, T_world_base: SE3) -> tuple[Vec3, Vec3]:
         """The air over the surface it stands on, as far as it reaches."""

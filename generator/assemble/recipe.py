@@ -25,6 +25,8 @@ from scene_templates.builder import build
 
 BLUEPRINTS_KEPT = 32
 IMAGING = ("camera", "lidar")
+LOOKING = (*IMAGING, "event_camera")
+"""Modalities that see nothing from inside the body that carries them."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
     scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
-        if sensor.modality in IMAGING:
+        if sensor.modality in LOOKING:
             refuse_buried(scene, sensor.name, sensor, assets)
     return scene
 

@@ -22,7 +22,7 @@ fish-eye lenses", PAMI 28, 2006; the equations of OpenCV's calib3d module (``pro
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -91,22 +91,24 @@ class Lens:
     def radius(self, angle_rad: float) -> float:
         """Distance from the axis, on the plane, of what is seen at an angle to it.
 
-        Tangential terms are left out.
+        Tangential terms are left out, and so is the end of its field.
 
         Raises:
-            ValueError: what is seen at that angle has no image.
+            ValueError: the model has no image of what is seen at that angle.
         """
         if self.model == "equirectangular":
             return angle_rad
         if self.model == "pinhole" and angle_rad < 0.5 * math.pi:
             return math.tan(angle_rad)
-        if self.coefficients and angle_rad <= _profile(self).end_rad:
-            argument = math.tan(angle_rad) if self.model == "brown_conrady" else angle_rad
-            return float(_radial(self, np.array([argument]))[0][0])
-        end_rad = _profile(self).end_rad if self.coefficients else 0.5 * math.pi
+        end_rad = 0.5 * math.pi
+        if self.coefficients:
+            end_rad = _profile(replace(self, half_field_rad=math.pi)).end_rad
+            if angle_rad <= end_rad:
+                argument = math.tan(angle_rad) if self.model == "brown_conrady" else angle_rad
+                return float(_radial(self, np.array([argument]))[0][0])
         raise ValueError(
             f"lens '{self.model}' shows nothing at {math.degrees(angle_rad):g} degrees from its "
-            f"axis: its field ends at {math.degrees(end_rad):.4g} degrees"
+            f"axis: its model ends at {math.degrees(end_rad):.4g} degrees"
         )
 
     def image_of(self, directions: Array) -> Array:

@@ -22,23 +22,22 @@ from generator.sensors.event_pixels import (
     Events,
     Pixels,
     after_rest,
-    linear_intensity,
     logarithm_of,
+    luminance_of,
     noise_events,
     signal_events,
 )
 from generator.sensors.mounting import Mounted, checked_rate, known_rig, window_s
 
 SidePx = Annotated[int, Field(ge=8, le=2048)]
-CHANNELS = frozenset({Channel.RGB, Channel.INSTANCE})
+CHANNELS = frozenset({Channel.RADIANCE, Channel.INSTANCE})
 
 
 class EventCamera(Mounted):
     """An event camera: time, pixel and polarity of every change of brightness since the last step.
 
-    Frames between two steps are rendered with a fixed exposure and taken back to linear light;
-    their 8 bits are steps of at most 3 % of intensity, far below the threshold. Renders several
-    images per step: choose small images.
+    It sees luminance, unexposed and in full precision. Several images are rendered per step: choose
+    small ones.
 
     Attributes:
         name: What files call it.
@@ -52,7 +51,6 @@ class EventCamera(Mounted):
         refractory_s: Time for which a pixel is silent after an event.
         leak_hz: Events per pixel and second that leakage makes, all brighter.
         shot_noise_hz: Events per pixel and second that noise makes in the dark.
-        ev100: Exposure value of the frames at ISO 100; left out, it follows from the scene's light.
     """
 
     modality: ClassVar[str] = "event_camera"
@@ -67,7 +65,6 @@ class EventCamera(Mounted):
     refractory_s: float = Field(0.0005, ge=0, le=1)
     leak_hz: float = Field(0.1, ge=0, le=1000)
     shot_noise_hz: float = Field(1.0, ge=0, le=1000)
-    ev100: float | None = None
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this device on its rig, or at its camera.
@@ -102,12 +99,12 @@ class EventCamera(Mounted):
         if end_s <= start_s:
             return Table(self.name, device, table_rows("event_camera", 0), scene.time_s)
         times_s = start_s + (end_s - start_s) * np.linspace(0.0, 1.0, self.frames_per_step + 1)
-        intensities, shown = self._frames(scene, times_s, renderer)
+        luminances, shown = self._frames(scene, times_s, renderer)
         width_px, height_px = self.size_px
         shape = (height_px, width_px)
         pixels = Pixels.drawn(shape, self.threshold, self.threshold_spread, rng.of_sequence())
-        told = signal_events([pixels.levels(logarithm_of(i)) for i in intensities], times_s)
-        noise = noise_events(intensities[-1], start_s, end_s, self.leak_hz, self.shot_noise_hz, rng)
+        told = signal_events([pixels.levels(logarithm_of(image)) for image in luminances], times_s)
+        noise = noise_events(luminances[-1], start_s, end_s, self.leak_hz, self.shot_noise_hz, rng)
         events = after_rest(Events.joined([told, noise]), self.refractory_s)
         frame = np.rint((events.time_s - start_s) / (times_s[1] - start_s)).astype(np.int64)
         rows = table_rows(
@@ -124,33 +121,14 @@ class EventCamera(Mounted):
     def _frames(
         self, scene: Scene, times_s: Array, renderer: Renderer
     ) -> tuple[list[Array], np.ndarray]:
-        """Linear intensity, and instance ids [frames, h, w], at each of several instants."""
+        """Luminance, and instance ids [frames, h, w], at each of several instants."""
         width_px, height_px = self.size_px
         lens = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
-        ev100 = nominal_ev100(scene) if self.ev100 is None else self.ev100
-        intensities, shown = [], []
+        luminances, shown = [], []
         for time_s in times_s:
             then = at(scene, float(time_s))
             pose = then.device(self.name).T_world_device @ RIG_AXES.inverse()
-            seen = renderer.render(then, Camera(self.name, pose, lens, ev100), CHANNELS)
-            intensities.append(linear_intensity(seen.channels[Channel.RGB]))
+            seen = renderer.render(then, Camera(self.name, pose, lens), CHANNELS)
+            luminances.append(luminance_of(seen.channels[Channel.RADIANCE]))
             shown.append(seen.channels[Channel.INSTANCE])
-        return intensities, np.stack(shown)
-
-
-def nominal_ev100(scene: Scene) -> float:
-    """The exposure value that suits what shines on the scene's focus, whatever moves.
-
-    A grey surface under E lux is middle grey at ``log2(E / (1.2 pi))`` (saturation-based speed, ISO
-    12232). Lights that ride on bodies do not count: exposure must not change with time.
-    """
-    lux = math.pi * scene.environment.luminance_cd_m2
-    for light in scene.lights:
-        if light.body:
-            continue
-        if light.kind == "sun":
-            lux += light.illuminance_lux * max(-light.direction[2], 0.0)
-        else:
-            away_m = math.dist(light.position_m, scene.focus.center_m)
-            lux += light.intensity_cd / max(away_m, 0.1) ** 2
-    return round(math.log2(max(lux, 0.1) / (1.2 * math.pi)) * 256.0) / 256.0
+        return luminances, np.stack(shown)

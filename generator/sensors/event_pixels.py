@@ -3,7 +3,7 @@
 A pixel reports whenever the logarithm of its intensity has changed by a threshold since its last
 event (Lichtsteiner, Posch and Delbruck 2008). It is simulated from frames as in Rebecq et al.,
 "ESIM", CoRL 2018, with times by linear interpolation, and in Hu, Liu and Delbruck, "v2e", CVPRW
-2021, from which the mapping of dark intensities, the spread of thresholds and the noise come.
+2021, from which the spread of thresholds and the noise come.
 
 Here the levels at which a pixel reports lie on a fixed grid, one per pixel and sequence, so that
 what it reports between two instants needs no memory of what it reported before them: nothing is
@@ -18,11 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.core.geometry import Float32
 from generator.core.se3 import Array
 from generator.core.streams import Rng
 
-LINEAR_BELOW = 20.0 / 255.0
-"""v2e: darker intensities are mapped in proportion, which keeps their quantisation small."""
+DARK_CD_M2 = 0.005
+"""Luminance that a pixel adds to all it sees: its dark current. White paper under 0.1 lx is six
+times as bright, the least at which a DVS128 works (Lichtsteiner et al. 2008)."""
 THRESHOLD_MIN = 0.01
 BRIGHT_SHARE = 0.25
 """v2e: shot noise of the brightest pixels, in units of that in the dark."""
@@ -70,22 +72,18 @@ class Events:
         return Events(time_s, pixel, polarity).taken(order)
 
 
-def linear_intensity(rgb: NDArray[np.uint8]) -> Array:
-    """Luminance of an sRGB image in linear light, [0, 1] (IEC 61966-2-1)."""
-    code = np.arange(256) / 255.0
-    linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-    luminance: Array = np.einsum("hwc,c->hw", linear[rgb], LUMINANCE, optimize=False)
+def luminance_of(radiance: Float32) -> Array:
+    """Luminance [cd/m^2] of linear RGB, [h, w]."""
+    luminance: Array = np.einsum(
+        "hwc,c->hw", radiance.astype(np.float64), LUMINANCE, optimize=False
+    )
     return luminance
 
 
-def logarithm_of(intensity: Array) -> Array:
-    """Natural logarithm of an intensity, in proportion where it is dark (v2e's ``lin_log``).
-
-    In units of 1/255, as there, so that both branches meet and dark is 0.
-    """
-    value, corner = 255.0 * intensity, 255.0 * LINEAR_BELOW
-    slope = np.log(corner) / corner
-    return np.where(value <= corner, slope * value, np.log(np.maximum(value, corner)))
+def logarithm_of(luminance: Array) -> Array:
+    """What a pixel responds to."""
+    logarithm: Array = np.log(np.maximum(luminance, 0.0) + DARK_CD_M2)
+    return logarithm
 
 
 def signal_events(levels: list[Array], times_s: Array) -> Events:
@@ -116,11 +114,16 @@ def signal_events(levels: list[Array], times_s: Array) -> Events:
 
 
 def noise_events(
-    intensity: Array, start_s: float, end_s: float, leak_hz: float, shot_hz: float, rng: Rng
+    luminance: Array, start_s: float, end_s: float, leak_hz: float, shot_hz: float, rng: Rng
 ) -> Events:
-    """Events without a change: leakage brightens, shot noise does either, more in the dark."""
+    """Events without a change: leakage brightens, shot noise does either, more in the dark.
+
+    Pixels of mean luminance are half way between dark and bright.
+    """
     duration_s = end_s - start_s
-    shot = shot_hz * (1.0 - (1.0 - BRIGHT_SHARE) * intensity.ravel())
+    seen = luminance.ravel() + DARK_CD_M2
+    brightness = seen / (seen + seen.mean())
+    shot = shot_hz * (1.0 - (1.0 - BRIGHT_SHARE) * brightness)
     parts = []
     for rate_hz, sign in ((leak_hz + 0.5 * shot, 1), (0.5 * shot, -1)):
         count = rng.poisson(rate_hz * duration_s)

@@ -38,8 +38,8 @@ class RgbCamera(Mounted):
     Attributes:
         name: What labels, files and randomizers call it.
         size_px: Width and height of its images.
-        hfov_deg: Nominal horizontal field of view: through the image's centre, tangential terms
-            left out.
+        hfov_deg: Nominal horizontal field of view, along the middle row; tangential terms are
+            left out, and what is dark beyond a lens's field counts.
         lens: How directions become image points: ``pinhole``, ``brown_conrady``,
             ``kannala_brandt`` (fisheye), ``equirectangular`` (panorama), or ``published``, the
             calibration of a known camera.
@@ -135,8 +135,8 @@ def _narrower_half_rad(intrinsics: Intrinsics) -> float:
     if intrinsics.straight:
         return math.atan(narrower_px / intrinsics.fx_px)
     rim = intrinsics.rays(np.array([intrinsics.cx_px + narrower_px, intrinsics.cy_px]))
-    # Where the image holds the lens's whole field, as good as any wide angle.
-    return float(np.arccos(np.clip(rim[2], 0.0, 1.0))) if np.isfinite(rim[2]) else 0.5 * math.pi
+    seen_rad = float(np.arccos(np.clip(rim[2], 0.0, 1.0))) if np.isfinite(rim[2]) else math.pi
+    return min(seen_rad, intrinsics.lens.half_field_rad, 0.5 * math.pi)
 
 
 def _nominal_pose(focus: Region, half_angle_rad: float) -> SE3:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,9 +25,6 @@ ASIDE = 0.35
 """How far people step aside per length of way."""
 KERB_M = 0.3
 """The step down to the road is spread over this length."""
-
-Box = tuple[float, float, float, float, float, float]
-"""Something that stands: centre, half extents [m], cosine and sine of its direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +85,14 @@ class Walks:
     room: Mapping[str, tuple[Array, Array, Array]]
 
 
-def walks_of(sidewalks: LaneGraph, crosswalks: LaneGraph, obstacles: Iterable[Box]) -> Walks:
-    """Everything that people walk on."""
-    boxes = np.array(list(obstacles)).reshape(-1, 6)
+def walks_of(sidewalks: LaneGraph, crosswalks: LaneGraph, obstacles: Array) -> Walks:
+    """Everything that people walk on.
+
+    Args:
+        sidewalks: Lanes of that kind.
+        crosswalks: Lanes of that kind.
+        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
+    """
     joins: dict[str, list[Join]] = {}
     for name in sorted(crosswalks.lines):
         points = crosswalks.lines[name].lane.center_m
@@ -103,7 +105,7 @@ def walks_of(sidewalks: LaneGraph, crosswalks: LaneGraph, obstacles: Iterable[Bo
         crosswalks,
         {name: tuple(sorted(found, key=lambda j: j.at_m)) for name, found in joins.items()},
         {
-            name: _room(line, boxes)
+            name: _room(line, obstacles)
             for graph in (sidewalks, crosswalks)
             for name, line in sorted(graph.lines.items())
         },
@@ -194,7 +196,8 @@ def drawn_path(
     else:
         place = (lane, at_m, forward)
     while place is not None and line.length_m < length_m:
-        place = _onward(line, walks, place, crossing, passages, rng)
+        left_m = length_m - line.length_m
+        place = _onward(line, walks, place, left_m, crossing, passages, rng)
     return _path(line, passages, length_m)
 
 
@@ -202,6 +205,7 @@ def _onward(
     line: _Line,
     walks: Walks,
     place: tuple[str, float, bool],
+    left_m: float,
     crossing: float,
     passages: list[Passage],
     rng: Rng,
@@ -212,9 +216,12 @@ def _onward(
     joins = walks.joins.get(name, ())
     for join in joins if forward else reversed(joins):
         gone = join.at_m - at_m if forward else at_m - join.at_m
-        if gone > 0.5 and float(rng.uniform()) < crossing:
+        if 0.5 < gone < left_m and float(rng.uniform()) < crossing:
             _along(line, walks, here, at_m, join.at_m)
             return _crossed(line, walks, join, passages, rng)
+    if left_m < (here.length_m - at_m if forward else at_m):
+        _along(line, walks, here, at_m, at_m + left_m if forward else at_m - left_m)
+        return None
     _along(line, walks, here, at_m, here.length_m if forward else 0.0)
     if forward:
         ways = walks.sidewalks.successors(name)
@@ -304,7 +311,7 @@ def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
         low,
         high,
         tuple(passages),
-        end_m if end_m < length_m else math.inf,
+        end_m if end_m < length_m - 1e-6 else math.inf,
     )
 
 

@@ -58,6 +58,7 @@ class Motion:
 def simulated(
     fleet: Fleet | None,
     walkers: Sequence[Walker],
+    obstacles: Array,
     approaches: Mapping[str, Approach],
     duration_s: float,
 ) -> Motion:
@@ -66,12 +67,13 @@ def simulated(
     Args:
         fleet: The vehicles; None = there are none.
         walkers: The people.
+        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
         approaches: Signals by the lanes into junctions and by the crosswalks that obey them.
         duration_s: How long.
     """
     steps = _PER_KNOT * math.ceil(duration_s / KNOT_S - 1e-9)
     driving = Driving(fleet, approaches) if fleet is not None else None
-    walking = Walking(walkers, approaches)
+    walking = Walking(walkers, approaches, obstacles)
     if driving is not None:
         driving.settle(walking.crossers())
     cars: list[tuple[Array, Array, Array]] = []

@@ -26,6 +26,8 @@ TIGHT_M, SLOW_M_S = 0.05, 0.4
 """Who is farther than this from where there is room walks no faster than that."""
 NEAR_M = 0.62
 """Middles of two people come no nearer."""
+TOUCH_M = 0.31
+"""Middles of people come no nearer to things."""
 CHANGE_M_S2 = 2.0
 """How quickly they change their pace."""
 TURN_PER_S = 4.0
@@ -59,6 +61,7 @@ class Walking:
     """The state of some people; ``step`` changes it.
 
     Attributes:
+        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
         xy_m, ahead: Of everybody [n, 2].
         speed_m_s: [n].
         walked_m: Distance so far [n].
@@ -68,6 +71,7 @@ class Walking:
 
     walkers: Sequence[Walker]
     approaches: Mapping[str, Approach]
+    obstacles: Array
     xy_m: Array = field(init=False)
     ahead: Array = field(init=False)
     speed_m_s: Array = field(init=False)
@@ -101,6 +105,7 @@ class Walking:
         self.walked_m, self.at_m = np.zeros(n), np.zeros(n)
         self.off_m = np.array([w.left_m for w in self.walkers])
         self.height_m = self._lines[:, 0, 2].copy()
+        self.obstacles = _within_reach(self.obstacles, self._lines)
         self._let = [
             sum(p.from_m < 0.05 for p in path.passages) if path is not None else 0 for path in paths
         ]
@@ -148,7 +153,7 @@ class Walking:
 
     def _advance(self, way: Array, away: Array, step_s: float) -> None:
         """Moves everybody whom nobody keeps from it, and turns them to where they go."""
-        moves = (self.speed_m_s * step_s)[:, None] * way
+        moves = self._around(way * (self.speed_m_s * step_s)[:, None])
         delta = self.xy_m[None] - self.xy_m[:, None]
         before = delta[..., 0] * delta[..., 0] + delta[..., 1] * delta[..., 1]
         after = delta - moves[:, None]
@@ -157,8 +162,9 @@ class Walking:
         np.fill_diagonal(hits, val=False)
         free: NDArray[np.bool_] = np.logical_not(hits.any(axis=1))
         self.speed_m_s = np.where(free, self.speed_m_s, 0.0)
-        gone = self.speed_m_s * step_s
-        self.xy_m = self.xy_m + np.where(free[:, None], moves, 0.0)
+        moves = np.where(free[:, None], moves, 0.0)
+        gone = np.sqrt(moves[:, 0] * moves[:, 0] + moves[:, 1] * moves[:, 1])
+        self.xy_m = self.xy_m + moves
         self.walked_m = self.walked_m + gone
         # The point ahead waits for who is late and hurries for who is early.
         self.at_m = self.at_m + gone * np.clip(1.5 - 0.5 * away / AHEAD_M, 0.0, 1.5)
@@ -171,6 +177,25 @@ class Walking:
         rows = np.arange(len(k))
         a, b = self._lines[rows, k, 2], self._lines[rows, k + 1, 2]
         self.height_m = a + np.minimum(f, 1.0) * (b - a)
+
+    def _around(self, moves: Array) -> Array:
+        """Moves [n, 2] without the part of each that leads into the nearest obstacle."""
+        if not len(self.obstacles):
+            return moves
+        x, y, hx, hy, c, s = self.obstacles.T
+        dx, dy = self.xy_m[:, :1] - x, self.xy_m[:, 1:] - y
+        u, v = c * dx + s * dy, c * dy - s * dx
+        # From the nearest point of the box to the person, in the box's axes.
+        u, v = u - np.clip(u, -hx, hx), v - np.clip(v, -hy, hy)
+        away = np.sqrt(u * u + v * v)
+        rows, k = np.arange(len(away)), np.argmin(away, axis=1)
+        near, u, v = away[rows, k], u[rows, k], v[rows, k]
+        scale = 1.0 / np.maximum(near, 1e-6)
+        out = np.stack([c[k] * u - s[k] * v, s[k] * u + c[k] * v], axis=1) * scale[:, None]
+        into = np.minimum(moves[:, 0] * out[:, 0] + moves[:, 1] * out[:, 1], 0.0)
+        too_far = np.minimum(into + np.maximum(near - TOUCH_M, 0.0), 0.0)
+        kept: Array = moves - too_far[:, None] * out
+        return kept
 
     def _room_m(self, time_s: float, lets_pass: Callable[[str], bool]) -> Array:
         """Length of path that everybody may walk [n]: up to kerbs, and the end."""
@@ -226,6 +251,17 @@ class Walking:
         most = SIDESTEP_M_S * step_s
         self.off_m = self.off_m + np.clip(aim - self.off_m, -most, most)
         return np.where(np.abs(self.off_m - aim) > TIGHT_M, SLOW_M_S, np.inf)
+
+
+def _within_reach(boxes: Array, lines: Array) -> Array:
+    """The boxes that are near the ways [n, m, 3] of any who walk."""
+    if not len(lines) or not len(boxes):
+        return np.zeros((0, 6))
+    low, high = lines[..., :2].min(axis=1) - SEEN_M, lines[..., :2].max(axis=1) + SEEN_M
+    size = np.sqrt(boxes[:, 2] * boxes[:, 2] + boxes[:, 3] * boxes[:, 3])[:, None]
+    near = (boxes[None, :, :2] + size > low[:, None]) & (boxes[None, :, :2] - size < high[:, None])
+    kept: Array = boxes[near.all(axis=2).any(axis=0)]
+    return kept
 
 
 def _left(vectors: Array) -> Array:

@@ -371,6 +371,11 @@ def test_without_a_scanner_no_depth_is_needed(world: Any, tmp_path: Path) -> Non
         ),
         (Kitti(), {"media": {"color": (Channel.Z_DEPTH,)}}, "expected one of: none"),
         (Kitti(), {"n": 1_000_001}, "six digits"),
+        (
+            Kitti(),
+            {"lenses": {"color": "kannala_brandt"}},
+            "'color' has a lens of the model 'kannala_brandt'.*rectified",
+        ),
     ],
 )
 def test_what_kitti_cannot_hold_is_refused_before_rendering(

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import recipe_of
+from generator.assemble.recipe import open_pipeline, recipe_of
 from generator.assemble.spec import load_spec
 from generator.assets.library import open_library
 from generator.core.capture import Channel
@@ -88,7 +88,7 @@ def pipeline(seed: int = 3) -> Pipeline:
         exporters={},
         strides={"gnss": 2},
     )
-    return Pipeline(recipe, Boxes(), AtRest, BoxRays())  # type: ignore[arg-type]
+    return Pipeline(recipe, Boxes(), AtRest, BoxRays)  # type: ignore[arg-type]
 
 
 def test_every_device_reports_at_its_rate() -> None:
@@ -136,14 +136,14 @@ def test_configurations_without_a_rig_are_told_so() -> None:
     """Before anything is made."""
     spec = load_spec("tabletop.yaml", overrides=("sensors=[{type: radar}]", "exporters=[]"))
     with pytest.raises(ConfigError, match="sensor 'radar': there is no rig 'ego'; there is none"):
-        recipe_of(spec, open_library(()), 1)
+        open_pipeline(spec)
 
 
 def test_rates_reach_the_recipe() -> None:
     """A slow event camera reads at every fifth step."""
     sensors = "sensors=[{type: rgb_camera}, {type: event_camera, rate_hz: 2}]"
     spec = load_spec("tabletop.yaml", overrides=(sensors, "exporters=[{type: tables}]"))
-    recipe = recipe_of(spec, open_library(()), 1)
+    recipe = recipe_of(spec, open_library(()), 1, (), frozenset())
 
     assert recipe.strides["events"] == 5
     assert recipe.info.devices == {"events": "event_camera"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,26 +15,25 @@ from generator.core.scene import Scene
 from generator.core.serial import from_plain, to_plain
 
 SMALL = (
-    "sensors[0].size_px=[128, 64]",
-    "sensors[1].model=VLP-16",
-    "sensors[1].ideal=true",
-    "sensors[1].motion=frozen",
-    "sensors[2].size_px=[64, 32]",
+    "sensors.image_02.size_px=[128, 64]",
+    "sensors.image_03.size_px=[128, 64]",
+    "sensors.velodyne.model=VLP-16",
+    "sensors.velodyne.ideal=true",
 )
 
 
 @pytest.fixture(scope="module")
 def samples() -> Iterator[list[Sample]]:
-    """Two instants of a drive, and the first made again in another pipeline."""
+    """Two views of a street, and the first made again in another pipeline."""
     spec = load_spec("kitti_rig.yaml", overrides=SMALL)
     with open_pipeline(spec) as pipeline:
-        made = [pipeline.sample(0), pipeline.sample(9)]
+        made = [pipeline.sample(0), pipeline.sample(1)]
     with open_pipeline(spec) as pipeline:
         yield [*made, pipeline.sample(0)]
 
 
-def test_the_scanner_is_where_kitti_has_it_at_every_instant(samples: list[Sample]) -> None:
-    """0.27 m behind, 0.08 m above and 0.06 m to the right of the camera; forward, left and up."""
+def test_the_scanner_is_where_kitti_has_it_on_every_view(samples: list[Sample]) -> None:
+    """0.27 m behind and 0.08 m above the camera, axes forward, left and up."""
     for sample in samples[:2]:
         camera = sample.scene.camera("image_02").T_world_camera
         scanner = sample.scene.lidar("velodyne").T_world_lidar
@@ -45,7 +45,7 @@ def test_the_scanner_is_where_kitti_has_it_at_every_instant(samples: list[Sample
 
 
 def test_every_labelled_point_lies_in_the_box_of_its_instance(samples: list[Sample]) -> None:
-    """To two millimetres, without noise; thousands of them."""
+    """To two millimetres, without noise, and as far as it moves during half a sweep."""
     checked = 0
     for sample in samples[:2]:
         points = sample.capture.clouds["velodyne"].points
@@ -53,8 +53,9 @@ def test_every_labelled_point_lies_in_the_box_of_its_instance(samples: list[Samp
         for thing in sample.scene.instances:
             mine = p_world[points["instance_id"] == thing.instance_id]
             local = thing.T_world_instance.inverse().apply(mine)
-            assert (local > np.asarray(thing.box_min_m) - 2e-3).all()
-            assert (local < np.asarray(thing.box_max_m) + 2e-3).all()
+            slack_m = 2e-3 + 0.06 * math.hypot(*thing.twist.velocity_m_s)
+            assert (local > np.asarray(thing.box_min_m) - slack_m).all()
+            assert (local < np.asarray(thing.box_max_m) + slack_m).all()
             checked += len(mine)
     assert checked > 1000
 

@@ -15,14 +15,15 @@ from generator.core.errors import ConfigError
 from generator.core.instants import at, with_placed_sensors
 from generator.core.interfaces import Renderer
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera, Environment, Light, Scene
+from generator.core.scene import Camera, Scene
 from generator.core.se3 import SE3
-from generator.sensors.event_camera import EventCamera, nominal_ev100
+from generator.sensors.event_camera import EventCamera
 from generator.sensors.event_pixels import (
+    DARK_CD_M2,
     Events,
     after_rest,
-    linear_intensity,
     logarithm_of,
+    luminance_of,
     noise_events,
 )
 from tests.sensors.streetcar import BoxRays, rng, world
@@ -32,20 +33,18 @@ QUIET = {"leak_hz": 0.0, "shot_noise_hz": 0.0, "refractory_s": 0.0, "size_px": S
 
 
 class Film(BoxRays):
-    """A renderer whose every pixel has the linear intensity that a function of time says."""
+    """A renderer whose every pixel has the luminance that a function of time says [cd/m^2]."""
 
-    def __init__(self, intensity: Callable[[float], float]) -> None:
-        self.intensity = intensity
-        self.exposures: list[float | None] = []
+    def __init__(self, luminance: Callable[[float], float]) -> None:
+        self.luminance = luminance
+        self.frames = 0
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """A grey image; instance 5 from 0.15 s on."""
-        self.exposures.append(camera.ev100)
+        self.frames += 1
         shape = (camera.intrinsics.height_px, camera.intrinsics.width_px)
-        linear = self.intensity(scene.time_s)
-        srgb = 1.055 * linear ** (1 / 2.4) - 0.055 if linear > 0.0031308 else 12.92 * linear
         images = {
-            Channel.RGB: np.full((*shape, 3), round(255 * srgb), np.uint8),
+            Channel.RADIANCE: np.full((*shape, 3), self.luminance(scene.time_s), np.float32),
             Channel.INSTANCE: np.full(shape, 5 if scene.time_s > 0.15 else 0, np.uint16),
         }
         return Reading(camera.name, camera, images, time_s=scene.time_s)
@@ -60,21 +59,21 @@ def seen(
 
 
 def test_brightness_that_grows_evenly_makes_events_at_an_even_rate() -> None:
-    """From 0.1 to 1 in a second: ln 10 / 0.2 = 11.5 events a pixel, none of them darker."""
+    """From 100 to 1000 cd/m^2 in a second: ln 10 / 0.2 = 11.5 events a pixel, all brighter."""
     sensor = EventCamera(rig="ego", threshold_spread=0.0, frames_per_step=4, **QUIET)
-    film = Film(lambda t: 0.1 * 10.0**t)
+    film = Film(lambda t: 100.0 * 10.0**t)
     rows = np.concatenate([seen(sensor, film, k).rows for k in range(11)])
 
     assert (rows["polarity"] == 1).all()
     assert len(rows) / (SIZE_PX[0] * SIZE_PX[1]) == pytest.approx(math.log(10.0) / 0.2, abs=0.1)
     per_pixel = np.sort(rows["time_s"][(rows["x_px"] == 3) & (rows["y_px"] == 2)])
-    # Codes of 8 bits move an event by up to half of 3 % of a threshold's 20 %.
-    assert np.allclose(np.diff(per_pixel), 0.2 / math.log(10.0), atol=0.015)
+    # Between frames of 25 ms an exponential is taken to be one.
+    assert np.allclose(np.diff(per_pixel), 0.2 / math.log(10.0), atol=1e-5)
 
 
 def test_no_event_is_lost_or_told_twice_between_steps() -> None:
     """Whether a fade is cut in two steps or in ten: the same count on every pixel."""
-    film = Film(lambda t: 0.9 * 0.1 ** (t / 1.0))
+    film = Film(lambda t: 90.0 * 0.1**t)
 
     def counts(step_s: float) -> np.ndarray:
         sensor = EventCamera(rig="ego", frames_per_step=round(step_s / 0.05), **QUIET)
@@ -95,7 +94,7 @@ def test_no_event_is_lost_or_told_twice_between_steps() -> None:
 def test_events_do_not_come_back_from_small_changes() -> None:
     """Up and down by a fifth of the threshold: at most one event where a level lies in between."""
     sensor = EventCamera(rig="ego", frames_per_step=20, **QUIET)
-    film = Film(lambda t: 0.5 * math.exp(0.04 * math.sin(200.0 * t)))
+    film = Film(lambda t: 50.0 * math.exp(0.04 * math.sin(200.0 * t)))
     rows = seen(sensor, film, 1).rows
     pixel = rows["y_px"].astype(int) * SIZE_PX[0] + rows["x_px"]
 
@@ -107,13 +106,12 @@ def test_thresholds_differ_from_pixel_to_pixel_and_stay() -> None:
     sensor = EventCamera(
         rig="ego", threshold=0.2, threshold_spread=0.05, **{**QUIET, "size_px": (64, 64)}
     )
-    film = Film(lambda t: 0.02 * 50.0 ** min(t, 1.0))
+    film = Film(lambda t: 20.0 * 50.0 ** min(t, 1.0))
     total = np.zeros((64, 64))
     for k in range(1, 11):
         rows = seen(sensor, film, k).rows
         np.add.at(total, (rows["y_px"], rows["x_px"]), 1)
-    span = math.log(1.0 / 0.0784) + (0.0784 - 0.02) * 255.0 * math.log(20.0) / 20.0
-    thresholds = span / total
+    thresholds = math.log(50.0) / total
 
     assert np.median(thresholds) == pytest.approx(0.2, rel=0.05)
     assert np.percentile(thresholds, 84) - np.median(thresholds) == pytest.approx(0.05, rel=0.3)
@@ -122,7 +120,7 @@ def test_thresholds_differ_from_pixel_to_pixel_and_stay() -> None:
 def test_events_come_in_order_of_time_within_their_step() -> None:
     """With noise and all."""
     rows = seen(
-        EventCamera(rig="ego", size_px=SIZE_PX, leak_hz=50.0), Film(lambda t: t + 0.1), 3
+        EventCamera(rig="ego", size_px=SIZE_PX, leak_hz=50.0), Film(lambda t: 100.0 * t + 10.0), 3
     ).rows
 
     assert len(rows) > 100
@@ -136,7 +134,7 @@ def test_events_come_in_order_of_time_within_their_step() -> None:
 def test_events_know_what_their_pixel_shows() -> None:
     """Instance 5 appears at 0.15 s."""
     sensor = EventCamera(rig="ego", frames_per_step=10, **QUIET)
-    rows = seen(sensor, Film(lambda t: 0.05 * 10.0 ** (5.0 * (t - 0.1))), 2).rows
+    rows = seen(sensor, Film(lambda t: 5.0 * 10.0 ** (5.0 * (t - 0.1))), 2).rows
 
     late = rows["time_s"] > 0.16
     assert (rows["instance_id"][late] == 5).all()
@@ -144,15 +142,18 @@ def test_events_know_what_their_pixel_shows() -> None:
 
 
 def test_still_pictures_make_no_events_but_noise() -> None:
-    """Leakage of 2 Hz and shot noise of 8 Hz in the dark, half as much again at mid-brightness."""
+    """Leakage of 2 Hz, shot noise of 8 Hz in the dark, a quarter of it in the light (v2e)."""
     quiet = EventCamera(rig="ego", **QUIET)
     assert len(seen(quiet, Film(lambda t: 0.5), 4).rows) == 0
 
-    dark = noise_events(np.zeros((100, 100)), 0.0, 1.0, 2.0, 8.0, rng())
-    bright = noise_events(np.ones((100, 100)), 0.0, 1.0, 2.0, 8.0, rng())
-    assert len(dark.pixel) / 1e4 == pytest.approx(10.0, rel=0.02)
-    assert len(bright.pixel) / 1e4 == pytest.approx(2.0 + 8.0 * 0.25, rel=0.02)
-    assert (dark.polarity == -1).mean() == pytest.approx(0.4, abs=0.01)
+    scene = np.full((100, 200), 1e-6)
+    scene[:, 100:] = 1e6
+    noise = noise_events(scene, 0.0, 1.0, 2.0, 8.0, rng())
+    bright = noise.pixel % 200 >= 100
+    assert (~bright).sum() / 1e4 == pytest.approx(10.0, rel=0.02)
+    # Light is twice the mean: two thirds of the way from dark to bright.
+    assert bright.sum() / 1e4 == pytest.approx(2.0 + 8.0 * (1.0 - 0.75 * 2 / 3), rel=0.02)
+    assert (noise.polarity[~bright] == -1).mean() == pytest.approx(0.4, abs=0.01)
 
 
 def test_pixels_rest_after_an_event() -> None:
@@ -170,37 +171,30 @@ def test_first_instant_has_no_events_and_needs_no_picture() -> None:
     film = Film(lambda t: 0.5)
 
     assert len(seen(EventCamera(rig="ego"), film, 0).rows) == 0
-    assert film.exposures == []
+    assert film.frames == 0
 
 
-def test_exposure_is_the_same_at_every_frame() -> None:
-    """Given, or from the light: 500 lx of lamps and sky need EV 7."""
+def test_every_reading_sees_its_first_and_last_instant() -> None:
+    """One image more than parts."""
     film = Film(lambda t: 0.5)
-    lamp = Light("lamp", "sphere", position_m=(0.0, 0.0, 2.0), intensity_cd=4.0 * 250.0)
-    sky = Environment(luminance_cd_m2=250.0 / math.pi)
-    scene = replace(world(), lights=(lamp,), environment=sky)
-    seen(EventCamera(rig="ego", size_px=SIZE_PX, frames_per_step=3), film, 1, scene)
+    seen(EventCamera(rig="ego", size_px=SIZE_PX, frames_per_step=3), film, 1)
 
-    assert film.exposures == [nominal_ev100(scene)] * 4
-    assert nominal_ev100(scene) == pytest.approx(math.log2(500.0 / (1.2 * math.pi)), abs=0.01)
-    fixed = Film(lambda t: 0.5)
-    seen(EventCamera(rig="ego", size_px=SIZE_PX, frames_per_step=1, ev100=9.0), fixed, 1, scene)
-    assert fixed.exposures == [9.0, 9.0]
+    assert film.frames == 4
 
 
-def test_logarithm_is_that_of_v2e() -> None:
-    """Proportional up to 20 of 255, then natural; both meet."""
-    values = np.array([0.0, 10.0, 20.0, 255.0]) / 255.0
+def test_darkness_hides_contrast() -> None:
+    """Far above the dark current only the ratio counts; as bright as it, half of the change."""
+    ratio = math.e
+    for luminance, expected in ((1e4, 1.0), (1.0, 0.997), (DARK_CD_M2, math.log((1 + ratio) / 2))):
+        change = np.diff(logarithm_of(np.array([luminance, ratio * luminance])))[0]
+        assert change == pytest.approx(expected, abs=1e-3)
 
-    expected = [0.0, math.log(20.0) / 2.0, math.log(20.0), math.log(255.0)]
-    assert np.allclose(logarithm_of(values), expected)
 
+def test_luminance_of_linear_colours_is_that_of_rec_709() -> None:
+    """Green is most of it."""
+    colours = np.array([[[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [2.0, 2.0, 2.0]]], np.float32)
 
-def test_linear_light_of_mid_grey() -> None:
-    """Code 188 of sRGB is half of white (IEC 61966-2-1)."""
-    grey = np.full((1, 1, 3), 188, np.uint8)
-
-    assert linear_intensity(grey)[0, 0] == pytest.approx(0.5029, abs=1e-4)
+    assert np.allclose(luminance_of(colours), [[0.2126, 0.7152, 0.0722, 2.0]])
 
 
 def test_it_may_share_the_place_of_a_camera() -> None:

@@ -200,10 +200,10 @@ def test_slower_sensors_are_missing_from_the_steps_between() -> None:
 def test_a_rig_on_a_wrist_looks_out_of_the_hand(robot: str) -> None:
     """Its X axis is the grasp frame's Z; where there is no gripper, the last link's."""
     library = open_library(())
-    scene = Robot(name="arm", asset=robot, wrist_rig="wrist").add(Scene("t"), library)
+    scene = Robot(name="arm", asset=robot).add(Scene("t"), library)
     model = library.robot(robot)
     (rig,) = scene.rigs
-    pose = scene.rig_pose("wrist")
+    pose = scene.rig_pose("arm_wrist")
 
     assert rig.body in {body.name for body in scene.bodies}
     if model.gripper is not None:
@@ -221,8 +221,8 @@ def test_a_rig_on_a_wrist_looks_out_of_the_hand(robot: str) -> None:
 def test_a_wrist_camera_follows_the_arm() -> None:
     """It moves with the body that carries it."""
     library = open_library(())
-    scene = Robot(name="arm", wrist_rig="wrist").add(Scene("t"), library)
-    scene = RgbCamera(name="eye", rig="wrist", offset_m=(0.0, 0.0, 0.07)).mount(scene)
+    scene = Robot(name="arm").add(Scene("t"), library)
+    scene = RgbCamera(name="eye", rig="arm_wrist", offset_m=(0.0, 0.0, 0.07)).mount(scene)
     before = with_placed_sensors(scene).camera("eye").T_world_camera
     hand = scene.body("arm/panda_hand")
     lifted = replace(hand, T_world_body=SE3((0.0, 0.0, 0.1)) @ hand.T_world_body)

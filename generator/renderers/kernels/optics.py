@@ -66,7 +66,8 @@ def pixel_of(view: View, q: wp.vec3):
     if j >= 0 and view.lens != PINHOLE:
         # Beyond the fold, and at what the model does not hold for, another direction is seen.
         d = view.directions[j]
-        if wp.dot(unit(q), wp.vec3(d[0], d[1], d[2])) < 0.999:
+        away = 2.0 * wp.max(d[3], view.pixel_rad)
+        if wp.dot(unit(q), wp.vec3(d[0], d[1], d[2])) < 1.0 - 0.5 * away * away:
             j = -1
     return j, depth_m
 
