@@ -25,10 +25,10 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
 * **Points** are those of the data set's laser scanner; without one they are thinned pixels of the
   depth image, with reflectance 0 and no labels.
 * **Point labels** are not KITTI's; they keep its rule that an object is what lies in its box. A
-  pulse that an object reflected, and that noise took more than 3 cm out of the box, has no row;
-  what lies as deep inside has the row whatever it is: the road between the wheels, where the box
-  of a car on a cambered street reaches below it. What a thing moved by itself between a pulse and
-  the instant of its box is taken back before. What reflected each pulse is in the lower half.
+  pulse that an object reflected has no row where noise, or the object's own way between the pulse
+  and the instant of its box, took it more than 3 cm out of the box; what lies as deep inside has
+  the row whatever it is: the road between the wheels, where the box of a car on a cambered street
+  reaches below it. What reflected each pulse is in the lower half.
 * **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
   which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
 
@@ -174,8 +174,7 @@ class Kitti(Strict):
             if scanned(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
                 _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
-                sweep_s = sample.scene.lidar(lidar).sweep_s
-                members, unseen = point_members(points, truth, self, T_camera_velo, sweep_s)
+                members, unseen = point_members(points, truth, self, T_camera_velo)
                 labels = point_labels(points, members, label_rows(truth, self, unseen))
                 _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
             elif self.velodyne_stride_px and not lidar:
@@ -317,7 +316,6 @@ def point_members(
     truth: ImageTruth,
     style: LabelStyle,
     T_camera_velo: Array,
-    sweep_s: float = 0.0,
 ) -> tuple[NDArray[np.int64], frozenset[int]]:
     """The instance that each point belongs to, and the labelled instances that have no point.
 
@@ -326,22 +324,18 @@ def point_members(
         truth: Of the image; things that are DontCare keep the points that they reflect.
         style: Of the labels.
         T_camera_velo: Points to the camera frame, [3, 4].
-        sweep_s: How long the sweep took; its middle is the instant of the boxes.
     """
     labelled = {i for row, i in label_rows(truth, style) if not row.startswith(DONT_CARE)}
-    things = [thing for thing in truth.objects if thing.instance.instance_id in labelled]
-    T_camera_world = truth.camera.T_world_camera.inverse()
-    moving = {}
-    for thing in things:
-        assert thing.box3d_camera is not None
-        velocity_m_s = T_camera_world.rotate(np.asarray(thing.instance.twist.velocity_m_s))
-        moving[thing.instance.instance_id] = (upright_box(thing.box3d_camera), velocity_m_s)
+    boxes = {
+        thing.instance.instance_id: upright_box(thing.box3d_camera)
+        for thing in truth.objects
+        if thing.instance.instance_id in labelled and thing.box3d_camera is not None
+    }
     R_camera_velo, t_camera_velo = T_camera_velo[:, :3], T_camera_velo[:, 3]
     p_camera = np.einsum("ij,nj->ni", R_camera_velo, points["position_m"], optimize=False)
     p_camera += t_camera_velo
-    dt_s = points["time_s"] - 0.5 * sweep_s
     ids = points["instance_id"].astype(np.int64)
-    members = boxed_members(ids, p_camera, dt_s, moving)
+    members = boxed_members(ids, p_camera, boxes)
     return members, frozenset(labelled) - frozenset(np.unique(ids[members == ids]).tolist())
 
 
