@@ -11,6 +11,7 @@ from generator.core.plugins import PluginTable
 TABLE = PluginTable(
     "exporter",
     {
+        "birdseye": "exporters.birdseye:Birdseye",
         "coco": "exporters.coco:Coco",
         "kitti": "exporters.kitti:Kitti",
         "kitti_raw": "exporters.kitti_raw:KittiRaw",

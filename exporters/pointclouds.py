@@ -21,12 +21,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.clouds import read_points
+from exporters.clouds import read_points, scanner_of
 from exporters.images import link_or_copy
 from exporters.sensors import scanned
 from generator.config.strict import Strict
 from generator.core.boxes import OrientedBox
 from generator.core.errors import ConfigError
+from generator.core.instants import at
 from generator.core.interfaces import DatasetInfo
 from generator.core.sample import Sample
 from generator.core.scene import Instance
@@ -148,9 +149,11 @@ def pcd_bytes(points: NDArray[np.void]) -> bytes:
 
 
 def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
-    """Boxes of all annotated things in the frame of a laser scanner, by instance id."""
-    T_lidar_world = sample.scene.lidar(lidar).T_world_lidar.inverse()
-    things = sorted((i for i in sample.scene.instances if i.annotated), key=lambda i: i.instance_id)
+    """Boxes of all annotated things in a laser scanner's frame at its sweep, by instance id."""
+    cloud = sample.capture.clouds.get(lidar)
+    scene = at(sample.scene, cloud.time_s) if cloud is not None else sample.scene
+    T_lidar_world = scanner_of(sample, lidar).T_world_lidar.inverse()
+    things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     boxes = []
     for thing in things:
         low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
@@ -162,7 +165,7 @@ def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]
 
 
 def _pose(sample: Sample, lidar: str) -> dict[str, Any]:
-    scanner = sample.scene.lidar(lidar)
+    scanner = scanner_of(sample, lidar)
     return {
         "index": sample.index,
         "model": scanner.model,

@@ -87,6 +87,7 @@ STUFF = {
 """Classes of scenery by category; everything else that has a category is other-object."""
 OF_SURFACE = {
     "air": 1,
+    "mirrored": 1,
     "asphalt": 40,
     "marking": 60,
     "pavement": 48,
@@ -95,7 +96,7 @@ OF_SURFACE = {
     "leaf": 70,
     "bark": 71,
 }
-"""Classes by surface, for what has no category; ``air`` is an outlier."""
+"""Classes by surface, for what has no category; air and what mirrors show are outliers."""
 OTHER_OBJECT, OTHER_GROUND, SIGN, VEGETATION, TRUNK = 99, 49, 81, 70, 71
 RIDDEN = {"bicycle": 31, "motorcycle": 32}
 """Classes of what has a rider, by its attribute ``rider``."""

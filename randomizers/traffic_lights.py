@@ -35,7 +35,7 @@ COLORS: Mapping[str, Vec3] = {
 
 
 @dataclass(frozen=True, slots=True)
-class _Signal:
+class Signal:
     """A traffic light's body, where it stands, and the axis of the traffic that it is for."""
 
     body: Body
@@ -65,17 +65,17 @@ class TrafficLights(RandomizerBase):
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with every lens lit or dark, and its state among the labels' attributes."""
-        signals = [_signal(body) for body in scene.bodies if _has_lenses(body, assets, self.ROLES)]
+        signals = [signal_of(body) for body in scene.bodies if has_lenses(body, assets, self.ROLES)]
         bodies: list[Body] = []
         states: dict[int, str] = {}
-        for junction in _junctions(signals, self.junction_m.draw(rng)):
+        for junction in junctions_of(signals, self.junction_m.draw(rng)):
             state, luminance = self._state(rng), round(self.luminance_cd_m2.draw(rng), 2)
             for signal in junction:
-                shown = state if _along(junction[0], signal) else _crossing(state)
-                bodies.append(_shown(signal.body, assets, shown, luminance))
-                states[signal.body.instance_id] = shown
+                own = state if runs_along(junction[0], signal) else _crossing(state)
+                bodies.append(shown(signal.body, assets, own, luminance))
+                states[signal.body.instance_id] = own
         instances = tuple(
-            _told(instance, states[instance.instance_id])
+            told(instance, states[instance.instance_id])
             if instance.instance_id in states
             else instance
             for instance in scene.instances
@@ -97,7 +97,7 @@ def _crossing(state: str) -> str:
     return "green" if state == "red" else "red"
 
 
-def _junctions(signals: Sequence[_Signal], radius_m: float) -> Iterator[list[_Signal]]:
+def junctions_of(signals: Sequence[Signal], radius_m: float) -> Iterator[list[Signal]]:
     """Signals in groups that are linked by distances below ``radius_m``, in order."""
     waiting = list(signals)
     while waiting:
@@ -111,22 +111,24 @@ def _junctions(signals: Sequence[_Signal], radius_m: float) -> Iterator[list[_Si
         yield group
 
 
-def _along(first: _Signal, other: _Signal) -> bool:
+def runs_along(first: Signal, other: Signal) -> bool:
     """Whether two signals are for traffic along the same axis, within 45 degrees."""
     (ax, ay), (bx, by) = first.axis, other.axis
     return abs(ax * bx + ay * by) >= abs(ax * by - ay * bx)
 
 
-def _signal(body: Body) -> _Signal:
+def signal_of(body: Body) -> Signal:
+    """A body as a signal: its front is towards the traffic that it is for."""
     x, y, _ = body.T_world_body.rotation()[:, 0].tolist()
-    return _Signal(body, body.T_world_body.translation_m, (x, y))
+    return Signal(body, body.T_world_body.translation_m, (x, y))
 
 
-def _has_lenses(body: Body, assets: AssetIndex, roles: frozenset[str]) -> bool:
+def has_lenses(body: Body, assets: AssetIndex, roles: frozenset[str]) -> bool:
+    """Whether a body has a slot of any of these roles."""
     return any(material.role in roles for material in materials_of(body, assets))
 
 
-def _shown(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: float) -> Body:
+def shown(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: float) -> Body:
     """The body with the lenses of a state lit and all others dark."""
 
     def lit(material: Material) -> Material:
@@ -139,7 +141,7 @@ def _shown(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: float) -
     return replace(body, materials=tuple(lit(m) for m in materials_of(body, assets)))
 
 
-def _told(instance: Instance, state: str) -> Instance:
+def told(instance: Instance, state: str) -> Instance:
     """The instance with its state among its attributes; for people: stop or walk."""
     if instance.subcategory == "pedestrian":
         state = "walk" if state == "green" else "stop"

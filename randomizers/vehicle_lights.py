@@ -17,8 +17,8 @@ from randomizers.base import LookRandomizer, materials_of
 from randomizers.daylight import is_dark
 
 _WHITE: Vec3 = (1.02, 1.0, 0.94)
-_RED: Vec3 = (4.2, 0.14, 0.06)
-_AMBER: Vec3 = (2.35, 0.66, 0.02)
+RED: Vec3 = (4.2, 0.14, 0.06)
+AMBER: Vec3 = (2.35, 0.66, 0.02)
 """Linear RGB of luminance 1."""
 _DOWN = 0.035
 """Slope of a beam's axis; its upper half stands for the stray light above the cut-off."""
@@ -62,7 +62,7 @@ class VehicleLights(LookRandomizer):
             side, beam_cd = self.indicator.draw(rng), self.beam_cd.draw(rng)
             on = on or dark
             glow = self._glow(on, braking, side, rng)
-            bodies.append(_lit(body, assets, glow))
+            bodies.append(with_glow(body, assets, glow))
             states[body.instance_id] = (
                 ("brake_lights", _word(braking)),
                 ("head_lights", _word(on)),
@@ -89,16 +89,18 @@ class VehicleLights(LookRandomizer):
         )
         glow: dict[str, Vec3] = {}
         if on:
-            glow |= {"headlight": _times(_WHITE, head), "taillight": _times(_RED, tail)}
+            glow |= {"headlight": times(_WHITE, head), "taillight": times(RED, tail)}
         if braking:
-            glow["brakelight"] = _times(_RED, brake)
+            glow["brakelight"] = times(RED, brake)
         for name in ("left", "right"):
             if side in (name, "both"):
-                glow[f"indicator_{name}"] = _times(_AMBER, blink)
+                glow[f"indicator_{name}"] = times(AMBER, blink)
         return glow
 
 
-def _lit(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
+def with_glow(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
+    """The body with the emission of some roles exchanged."""
+
     def lit(material: Material) -> Material:
         return replace(material, emission_cd_m2=glow.get(material.role, material.emission_cd_m2))
 
@@ -132,7 +134,8 @@ def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Li
         if point.name.startswith("headlight"):
             x, y, z = (body.scale * part for part in point.position_m)
             place = body.T_world_body @ SE3((x + _OUTSIDE_M, y, z))
-            lights.append(dipped_beam(f"{name}/{body.name}/{point.name}", place, beam_cd))
+            beam = dipped_beam(f"{name}/{body.name}/{point.name}", place, beam_cd)
+            lights.append(replace(beam, body=body.name))
     return lights
 
 
@@ -145,6 +148,7 @@ def _word(on: bool) -> str:
     return "on" if on else "off"
 
 
-def _times(color: Vec3, luminance_cd_m2: float) -> Vec3:
+def times(color: Vec3, luminance_cd_m2: float) -> Vec3:
+    """Emission of a colour of luminance 1."""
     red, green, blue = (round(part * luminance_cd_m2, 3) for part in color)
     return (red, green, blue)

@@ -11,6 +11,7 @@ TABLE = PluginTable(
         "backdrop": "scene_templates.backdrop:Backdrop",
         "bin": "scene_templates.bin:Bin",
         "crosswalk": "scene_templates.crosswalk:Crosswalk",
+        "ego": "scene_templates.ego:Ego",
         "ground": "scene_templates.ground:GroundElement",
         "junction": "scene_templates.junction:Junction",
         "light": "scene_templates.light:LightElement",

@@ -12,6 +12,7 @@ import scene_templates
 from generator.config.document import Node, load, merge, with_override
 from generator.config.problems import Position, Problems
 from generator.core.errors import ConfigError, did_you_mean
+from generator.sensors.sheets import with_files
 
 SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
@@ -67,7 +68,16 @@ def resolved_document(
         if not separator:
             raise ConfigError(f"--set {text}: expected KEY=VALUE")
         resolved = with_override(resolved, path.strip(), value.strip())
-    return _without_randomizers(resolved, without)
+    return _without_randomizers(_with_sensor_files(resolved), without)
+
+
+def _with_sensor_files(document: Node) -> Node:
+    """The document with what sensors keep in files in their places."""
+    content, sensors = dict(_mapping(document)), document.get("sensors")
+    if sensors is not None and isinstance(sensors.content, tuple):
+        listed = tuple(with_files(sensor) for sensor in sensors.content)
+        content["sensors"] = Node(sensors.position, listed, sensors.key_positions)
+    return Node(document.position, content, document.key_positions)
 
 
 def config_document(name: str) -> Node:
@@ -111,7 +121,7 @@ def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
 
 
 def _elements(document: Node, template: Node | None) -> Node:
-    """The template's elements, each with the configuration's overrides merged in."""
+    """The template's elements with the configuration's overrides merged in, and its own ones."""
     given = document.get("elements")
     if template is None:
         assert given is not None
@@ -132,7 +142,11 @@ def _overridden(elements: Node, overrides: Node) -> Node:
         problems.add(overrides.position, "elements", "expected overrides by element name")
     else:
         for name, node in overrides.content.items():
-            if name not in by_name:
+            if name not in by_name and node.get("type") is not None:
+                # What the template lacks and says what it is comes after all of the template's.
+                named = Node(overrides.key_position(name), name)
+                by_name[name] = merge(Node(node.position, {"name": named}), node)
+            elif name not in by_name:
                 fact = f"the template has no element '{name}'; expected one of "
                 fact += ", ".join(by_name) + did_you_mean(name, by_name)
                 problems.add(overrides.key_position(name), f"elements.{name}", fact)

@@ -8,23 +8,25 @@ from functools import cached_property, lru_cache, partial
 
 import cv2
 
-from generator.annotations.truth import image_truth
+from generator.annotations.truth import AnyAnnotator, complete_truth, frame_truth
 from generator.assemble.spec import Layout, Spec
 from generator.assemble.tables import TABLES
 from generator.assets.library import Library, open_library
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
-from generator.core.interfaces import Annotator, AssetIndex, DatasetInfo, Exporter, Renderer
+from generator.core.interfaces import AssetIndex, DatasetInfo, Exporter, Renderer
 from generator.core.scene import Scene, SharedValue
 from generator.core.streams import Streams
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
 from generator.pipeline.pipeline import Blueprint, Recipe
-from generator.sensors.mounting import stride, within_steps
+from generator.sensors.mounting import refuse_buried, stride, within_steps
 from scene_templates.builder import build
 
 BLUEPRINTS_KEPT = 32
 IMAGING = ("camera", "lidar")
+LOOKING = (*IMAGING, "event_camera")
+"""Modalities that see nothing from inside the body that carries them."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,7 @@ def recipe_of(
         devices={s.name: s.modality for s in spec.sensors if s.modality not in IMAGING},
         steps_per_scene=spec.head.steps_per_scene,
         step_s=spec.head.step_s,
+        lenses={s.name: s.intrinsics().lens.model for s in spec.sensors if s.modality == "camera"},
     )
     exporters = _exporters(spec, info)
     needed = frozenset().union(*(a.channels for a in annotators), extra_channels)
@@ -113,12 +116,16 @@ def recipe_of(
         blueprint=blueprints(spec, library),
         sensors=spec.sensors,
         channels=needed,
-        image_truth=partial(image_truth, annotators=annotators, thresholds=spec.head.labels),
+        image_truth=partial(
+            complete_truth, annotators=annotators, thresholds=spec.head.labels, assets=library
+        ),
+        frame_truth=partial(frame_truth, annotators=annotators, assets=library),
         split_shares=spec.split_shares,
         layout_attempts_max=spec.head.physics.layout_attempts_max,
         info=info,
         exporters=exporters,
         strides=_strides(spec),
+        offsets_s={s.name: s.time_offset_s for s in spec.sensors if s.time_offset_s},
     )
 
 
@@ -148,6 +155,8 @@ def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
     scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
+        if sensor.modality in LOOKING:
+            refuse_buried(scene, sensor.name, sensor, assets)
     return scene
 
 
@@ -172,12 +181,13 @@ def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...
     return tuple(sorted(placed | possible))
 
 
-def _annotators(spec: Spec) -> Sequence[Annotator]:
+def _annotators(spec: Spec) -> Sequence[AnyAnnotator]:
     """Those that were asked for, then those that exporters read besides."""
-    names = list(spec.annotations)
+    annotators = dict(spec.annotations)
     for exporter in spec.exporters:
-        names += sorted(exporter.needs - set(names))
-    return [TABLES["annotation"].load(name)() for name in names]
+        for name in sorted(exporter.needs - annotators.keys()):
+            annotators[name] = TABLES["annotation"].load(name)()
+    return list(annotators.values())
 
 
 def _exporters(spec: Spec, info: DatasetInfo) -> dict[str, Exporter]:

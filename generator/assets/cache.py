@@ -35,7 +35,8 @@ Arrays = dict[str, NDArray[Any]]
 
 FORMAT = 1
 """Raised whenever the same sources would be stored as other arrays."""
-_MEMORY_BYTES = 96 * 1024 * 1024
+# Little: renderers and physics engines keep what they made of it.
+_MEMORY_BYTES = 48 * 1024 * 1024
 _FRAME = struct.Struct("<II")
 _ALIGNMENT = 64
 

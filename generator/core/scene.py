@@ -124,6 +124,7 @@ class Lane:
         left, right: Names of the lanes beside it that run the same way; empty = none.
         speed_m_s: Usual speed; 0 = things stand.
         junction: Whether it crosses a junction, where nothing may stop.
+        bank: How much its left side is higher than its right one, per metre of width.
     """
 
     name: str
@@ -136,6 +137,7 @@ class Lane:
     right: str = ""
     speed_m_s: float = 0.0
     junction: bool = False
+    bank: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,6 +339,7 @@ class Lidar:
         T_world_lidar: Its pose; follows the rig.
         model: What it is, for the labels: ``HDL-64E``.
         rig: Name of its rig; empty = it rides with ``camera``.
+        sweep_s: How long a sweep takes; the scene's instant is its middle.
     """
 
     name: str
@@ -345,6 +348,7 @@ class Lidar:
     T_world_lidar: SE3 = IDENTITY
     model: str = ""
     rig: str = ""
+    sweep_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

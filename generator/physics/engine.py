@@ -147,7 +147,9 @@ class BulletEngine:
             if isinstance(legs, Rejection):
                 return legs
             resting = way.resting
-            recording.add(arm, legs, [link for link in arm.robot.links if link in arm.robot.visuals])
+            recording.add(
+                arm, legs, [link for link in arm.robot.links if link in arm.robot.visuals]
+            )
         return replace(
             scene,
             tracks=(*scene.tracks, *recording.tracks()),

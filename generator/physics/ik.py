@@ -127,9 +127,7 @@ def solve(
     return None
 
 
-def _completed(
-    chain: Chain, found: Sequence[float], others: Sequence[float]
-) -> tuple[float, ...]:
+def _completed(chain: Chain, found: Sequence[float], others: Sequence[float]) -> tuple[float, ...]:
     """The arm's positions: those found, and for joints off the chain the others."""
     positions = list(others)
     for index, value in zip(chain.indices, found, strict=True):

@@ -1,4 +1,4 @@
-"""Where an arm's joints may go: configurations for a pose of the hand, and free ways between them."""
+"""Where an arm may go: configurations for a pose of its hand, and free ways between them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 
 from generator.core.kinematics import all_positions, is_arm_joint, rounded_positions
+from generator.core.motion import Track
 from generator.core.se3 import SE3
 from generator.physics.bullet import World
 from generator.physics.goals import Arm
@@ -16,6 +17,7 @@ from generator.physics.trajectories import Held, Leg, speed_max
 Positions = tuple[float, ...]
 
 _SOLUTIONS_MAX = 4
+_LED_STEPS = 5
 _RISES_M = (0.10, 0.20, 0.35)
 """Of the hand on its detours, above the higher end of a way."""
 
@@ -42,7 +44,10 @@ class Router:
         if self._chain is None:
             return []
         target = self._T_base_world @ T_world_grasp
-        seeds = [self._of_arm(start), *islice(solutions(self._chain, target), _SOLUTIONS_MAX)]
+        seeds = [
+            self._led(T_world_grasp, start),
+            *islice(solutions(self._chain, target), _SOLUTIONS_MAX),
+        ]
         found: dict[Positions, None] = {}
         for seed in seeds:
             exact = neighbour(self._chain, target, seed)
@@ -107,6 +112,16 @@ class Router:
             for h, is_arm, position in zip(self._robot.home, self._is_arm, end, strict=True)
         ]
         yield [rounded_positions(home)]
+
+    def _led(self, T_world_grasp: SE3, start: Positions) -> list[float]:
+        """Arm positions near a pose that a hand led there from a start ends with."""
+        assert self._chain is not None
+        way = Track("hand", 1.0, (self._arm.grasp_pose(start), T_world_grasp))
+        positions = self._of_arm(start)
+        for k in range(1, _LED_STEPS):
+            target = self._T_base_world @ way.pose(k / _LED_STEPS)
+            positions = list(neighbour(self._chain, target, positions, 1.0) or positions)
+        return positions
 
     def _of_arm(self, positions: Sequence[float]) -> list[float]:
         return [p for p, is_arm in zip(positions, self._is_arm, strict=True) if is_arm]

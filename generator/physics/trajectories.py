@@ -1,8 +1,9 @@
 """Joint positions over time: straight legs in joint space, each from rest to rest.
 
-A leg runs through ``start + s(t / T) * (end - start)`` with ``s = 10 x^3 - 15 x^4 + 6 x^5``, whose speed and acceleration vanish at both ends; its peaks are 15/8 of the mean speed and
-10/sqrt(3) of ``(end - start) / T^2`` (Biagiotti & Melchiorri, Trajectory Planning for Automatic
-Machines and Robots, 2008, section 2.1.7).
+A leg runs through ``start + s(t / T) * (end - start)`` with ``s = 10 x^3 - 15 x^4 + 6 x^5``.
+Speed and acceleration vanish at both ends; their peaks are 15/8 of the mean speed and 10/sqrt(3)
+of ``(end - start) / T^2`` (Biagiotti & Melchiorri, Trajectory Planning for Automatic Machines and
+Robots, 2008, section 2.1.7).
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ _PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 _SPEED_RAD_S = 1.5
 _SPEED_M_S = 0.1
 """Of joints whose description gives no limit: slower than any arm in the catalogue."""
+_SPEED_CAP_RAD_S = math.pi
+"""Of turning joints: the limit of a UR5e and an xArm. Some descriptions name 10 rad/s for want of
+a figure."""
 _SPEED_UP_S = 0.25
 """In which a joint reaches its full speed; URDF knows no acceleration. A Panda's own limits
 (7.5 to 20 rad/s^2 at 2.2 to 2.6 rad/s) are reached in 0.13 to 0.29 s."""
@@ -75,8 +79,9 @@ def smooth_step(share: float) -> float:
 
 def speed_max(joint: Joint) -> float:
     """Limit of a joint's speed [rad/s or m/s]."""
-    unknown = _SPEED_M_S if joint.kind == "prismatic" else _SPEED_RAD_S
-    return joint.speed_max or unknown
+    if joint.kind == "prismatic":
+        return joint.speed_max or _SPEED_M_S
+    return min(joint.speed_max or _SPEED_RAD_S, _SPEED_CAP_RAD_S)
 
 
 def acceleration_max(joint: Joint) -> float:

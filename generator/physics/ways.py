@@ -28,7 +28,7 @@ _YAWS = 12
 _NARROW = 1.15
 """Hands take things across sides at most this much wider than the narrowest."""
 _TAKES_MAX = 8
-_SPOTS_AT_ONCE = 6
+_SPOTS_AT_ONCE = 3
 _PUTS_MAX = 4
 _ENDS_MAX = 3
 _FLOOR_GAP_M = 0.004
@@ -314,8 +314,7 @@ class Way:
         name = self._arm.articulation.name
         return Rejection(
             f"arm '{name}' {why} at goal {number} of its way",
-            f"other goals or more candidates for arm '{name}', "
-            "or fewer objects around it (count)",
+            f"other goals or more candidates for arm '{name}', or fewer objects around it (count)",
         )
 
 

@@ -164,7 +164,9 @@ class Recorder:
     def _record_image(self, name: str, reading: Reading, truth: ImageTruth) -> None:
         path = f"world/cameras/{name}"
         self.stream.log(path, transform(reading.camera.T_world_camera))
-        self.stream.log(f"{path}/image", pinhole(reading.camera.intrinsics))
+        # Rerun knows no other camera: images of other lenses are shown by themselves.
+        if reading.camera.intrinsics.straight:
+            self.stream.log(f"{path}/image", pinhole(reading.camera.intrinsics))
         channels = reading.channels
         if Channel.RGB in channels:
             self.stream.log(f"{path}/image/rgb", rr.Image(channels[Channel.RGB]).compress(90))

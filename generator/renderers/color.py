@@ -12,7 +12,7 @@ from generator.core.geometry import Float32
 from generator.core.scene import Camera
 from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
-from generator.renderers.kernels import antialias, gather, raster, records, shade, tone
+from generator.renderers.kernels import antialias, gather, optics, raster, records, shade, tone
 from generator.renderers.kernels import samples as mixing
 from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.raster import Z_NEAR_M
@@ -57,12 +57,14 @@ def lit_image(
     lattice = sampled_lattice(world, view, seen, stock)
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
+    _darken_outside(view, radiance)
     ev100 = camera.ev100
     if ev100 is None:
         ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
     draw_precipitation(world, camera, view, seen.z_m, radiance, ev100=ev100, stock=stock)
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
+    _darken_outside(view, radiance)
     if settings.antialias > 1:
         exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
         _mix_edges(world, view, seen, radiance, exposure, settings.antialias, stock)
@@ -114,6 +116,13 @@ def _mix_edges(
         inputs = [*frame, wp.array(parts, dtype=wp.vec2, device=device), exposure, Z_NEAR_M]
         wp.launch(antialias.antialias, len(edges), inputs, [mixed], device=device)
     wp.launch(tone.put_mixed, len(edges), [edges, mixed], [radiance], device=device)
+
+
+def _darken_outside(view: records.View, radiance: wp.array) -> None:
+    """Leave no light where the lens shows nothing, in place."""
+    if view.lens != records.PINHOLE:
+        n = view.width * view.height
+        wp.launch(optics.darken_outside, n, [view], [radiance], device=radiance.device)
 
 
 def _drawn_samples(

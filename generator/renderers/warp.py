@@ -47,7 +47,7 @@ class WarpRenderer:
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """Every asked channel of one camera."""
         world = pack_world(scene, camera, self._stock)
-        view = pack_view(camera)
+        view = pack_view(camera, self._stock)
         seen = see(world, view, self._stock, self._settings.visibility)
         if Channel.AMODAL in channels:
             channels = channels | {Channel.INSTANCE}
@@ -63,7 +63,7 @@ class WarpRenderer:
         outlines = {}
         if Channel.AMODAL in channels:
             ids = images[Channel.INSTANCE]
-            outlines = silhouettes(scene, world, view, self._stock, seen, ids)
+            outlines = silhouettes(scene, camera, world, view, self._stock, seen, ids)
         return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:

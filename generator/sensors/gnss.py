@@ -68,7 +68,7 @@ class Gnss(Instrument):
     """A satellite receiver: where it is on the earth, and how fast; worse where the sky is hidden.
 
     Attributes:
-        model: A file of ``generator/sensors/receivers``.
+        model: ``standalone``, ``ZED-F9P`` or ``RT3003``; a file of ``generator/sensors/receivers``.
         origin_deg: Latitude and longitude of the world's origin; its X axis points east.
         origin_altitude_m: Of the world's origin, above the ellipsoid.
         satellites: Above the horizon; drawn anew for every sequence.

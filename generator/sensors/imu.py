@@ -57,8 +57,7 @@ class Imu(Instrument):
     """An inertial unit: specific force and angular rate, several readings per step.
 
     Attributes:
-        model: A file of ``generator/sensors/imus``.
-        rate_hz: Readings per second; a whole number per step, or of steps.
+        model: ``RT3003``, ``ADIS16448`` or ``BMI088``; a file of ``generator/sensors/imus``.
         noise: Factor on the model's errors; 0 = an ideal device.
     """
 

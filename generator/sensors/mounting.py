@@ -11,9 +11,13 @@ from pydantic import Field
 
 from generator.config.strict import Strict
 from generator.core.errors import ConfigError, did_you_mean
+from generator.core.interfaces import AssetIndex
 from generator.core.scene import Device, Scene
 from generator.core.se3 import SE3, Array
 from generator.core.tables import TIME_DECIMALS
+
+BURIED_M = 0.05
+"""Sensors may sink in as deep as this: they are bolted on, and bounds are not the hull."""
 
 
 class Mounted(Strict):
@@ -25,6 +29,9 @@ class Mounted(Strict):
         yaw_deg, pitch_deg, roll_deg: Turn to the left, then upwards, then clockwise as seen from
             behind, from the rig's forward axis.
         rate_hz: Readings per second; null = one at every step.
+        time_offset_s: It reads this much later than the step's instant; what it saw then, and the
+            labels of that, belong to the step.
+        inside: Whether it may be inside the body that its rig is on.
     """
 
     rig: str = ""
@@ -33,6 +40,8 @@ class Mounted(Strict):
     pitch_deg: float = Field(0.0, ge=-90, le=90)
     roll_deg: float = Field(0.0, ge=-180, le=180)
     rate_hz: float | None = Field(None, gt=0, le=10_000)
+    time_offset_s: float = Field(0.0, ge=-10, le=10)
+    inside: bool = False
 
     @property
     def T_rig_sensor(self) -> SE3:  # noqa: N802
@@ -50,6 +59,7 @@ class Instrument(Mounted):
     Attributes:
         name: What files call it.
         rig: Name of the rig it is on.
+        rate_hz: Readings per second, a whole number per step, or of steps; null = one per step.
     """
 
     modality: ClassVar[str]
@@ -86,6 +96,39 @@ def known_rig(scene: Scene, sensor: str, rig: str) -> str:
             + did_you_mean(rig, known)
         )
     return rig
+
+
+def refuse_buried(scene: Scene, name: str, sensor: Mounted, assets: AssetIndex) -> None:
+    """Refuse a camera or laser scanner inside the body that carries it, where it sees nothing else.
+
+    Inside is what the body's bounding box holds, more than ``BURIED_M`` from each of its faces.
+
+    Args:
+        scene: With the sensor's rig.
+        name: Of the sensor.
+        sensor: On that rig; without one, or with ``inside``, anything goes.
+        assets: For the body's bounds.
+
+    Raises:
+        ConfigError: it is, and is not meant to be.
+    """
+    if not sensor.rig or sensor.inside:
+        return
+    rig = scene.rig(sensor.rig)
+    body = scene.body(rig.body)
+    low_m, high_m = assets.bounds_m(body.asset)
+    place_m = (rig.T_body_rig @ sensor.T_rig_sensor).translation_m
+    depth_m = min(
+        min(at - body.scale * low, body.scale * high - at)
+        for at, low, high in zip(place_m, low_m, high_m, strict=True)
+    )
+    if depth_m > BURIED_M:
+        top_m = body.scale * high_m[2] - rig.T_body_rig.translation_m[2]
+        raise ConfigError(
+            f"sensor '{name}': offset_m is {depth_m:.2f} m inside '{rig.body}', which carries rig"
+            f" '{rig.name}'; move it out (its top is at {top_m:.2f} m on the rig), or say"
+            " inside: true"
+        )
 
 
 def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:

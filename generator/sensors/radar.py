@@ -1,7 +1,7 @@
 """A radar: detections with range, angles, radial velocity and radar cross section.
 
 Rays through the world find what is lit, each standing for its solid angle. What falls into one
-cell of range, azimuth, elevation and velocity is one echo of the sum of its cross sections, and
+cell of range, azimuth, elevation and velocity is one echo of the sum of its cross sections, which
 fluctuates from reading to reading (Swerling's first case): the signal in units of noise is
 exponential with mean ``1 + SNR``, a detection what exceeds ``-ln(p)`` for a probability ``p`` of
 false alarm, so that
@@ -15,7 +15,6 @@ next to nothing at 77 GHz (ITU-R P.840). There is no multipath and no ambiguity 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal
 
@@ -32,6 +31,7 @@ from generator.core.streams import Rng
 from generator.core.tables import table_rows
 from generator.sensors.mounting import Instrument
 from generator.sensors.presets import known_preset, preset
+from generator.sensors.radar_cells import Echo, Look, along, cells_of, merged_by, peaks
 from generator.sensors.reflectors import TARGETS, area_factor, cross_section_m2, silhouette_m2
 from generator.sensors.riding import ride_of, velocity_at, without_carrier
 
@@ -42,40 +42,6 @@ THRESHOLD = -math.log(FALSE_ALARM)
 HALF_SNR = THRESHOLD / math.log(2.0) - 1.0
 """Signal over noise of what is detected half of the time."""
 
-Curve = tuple[tuple[float, float], ...]
-"""Pairs of azimuth [deg] and value; between them lines, the same on both sides."""
-
-
-class Fineness(Strict):
-    """Resolutions or deviations of the four quantities; elevation 0 = not measured."""
-
-    range_m: float = Field(gt=0)
-    velocity_m_s: float = Field(gt=0)
-    azimuth_deg: Curve = Field(min_length=1)
-    elevation_deg: float = Field(0.0, ge=0)
-
-
-class Look(Strict):
-    """One of the scans that make up a reading.
-
-    Attributes:
-        azimuth_deg: To either side.
-        elevation_deg: Upward and downward.
-        range_m: Nearest and farthest that it reports.
-        resolution: Sizes of cells.
-        noise: Standard deviations.
-        reach_m: Range at which the reference target is detected half of the time, by azimuth.
-        spacing_deg: Between rays, across and upward.
-    """
-
-    azimuth_deg: float = Field(gt=0, le=90)
-    elevation_deg: float = Field(gt=0, le=60)
-    range_m: tuple[float, float]
-    resolution: Fineness
-    noise: Fineness
-    reach_m: Curve = Field(min_length=1)
-    spacing_deg: tuple[float, float]
-
 
 class RadarModel(Strict):
     """A make of radar.
@@ -83,6 +49,7 @@ class RadarModel(Strict):
     Attributes:
         looks: Its scans.
         reference_dbsm: Radar cross section of the target that ``reach_m`` is about.
+        least_dbsm: Weaker echoes are held back, as devices do to keep the road out.
         velocity_m_s: Fastest approaching (negative) and receding.
         detections_max: The strongest of a reading are kept.
         rain: k and alpha of the specific attenuation ``k R^alpha`` [dB/km], R in mm/h.
@@ -90,6 +57,7 @@ class RadarModel(Strict):
 
     looks: tuple[Look, ...] = Field(min_length=1)
     reference_dbsm: float
+    least_dbsm: float
     velocity_m_s: tuple[float, float]
     detections_max: int = Field(gt=0)
     rain: tuple[float, float]
@@ -99,7 +67,7 @@ class Radar(Instrument):
     """A radar: range, angles, radial velocity and radar cross section of what it detects.
 
     Attributes:
-        model: A file of ``generator/sensors/radars``.
+        model: ``ARS408-21`` or ``imaging``; a file of ``generator/sensors/radars``.
         false_alarms: Mean number of detections of nothing, per reading.
         noise: Factor on the model's errors; 0 = an ideal device: no errors, no fluctuation, no
             false alarms, and whatever is detected half of the time is detected always.
@@ -139,13 +107,21 @@ class Radar(Instrument):
         around = without_carrier(scene, self.rig)
         echoes = renderer.scan(around, Lidar(self.name, "", T_world_lidar=eye), beams)
         lit = _lit(scene, self.name, rays, echoes)
-        cells = _cells(lit.taken(lit.range_m >= look.range_m[0]), look)
-        gain = _gain(look, make, scene.weather.rain_mm_h, cells)
-        cells = replace(cells, snr=gain * cells.rcs_m2)
-        if self.noise == 0.0:
-            return cells.taken(cells.snr >= HALF_SNR)
-        heard = (1.0 + cells.snr) * rng.standard_exponential(len(cells.snr))
-        found = replace(cells, snr=heard - 1.0).taken(heard > THRESHOLD)
+        cells = cells_of(lit.taken(lit.range_m >= look.range_m[0]), look)
+        gain = _gain(look, make, scene.weather.rain_mm_h, cells.echo)
+        signal = gain * cells.echo.rcs_m2
+        ideal = self.noise == 0.0
+        draws = np.ones(len(signal)) if ideal else rng.standard_exponential(len(signal))
+        signal = signal * draws
+        echo = replace(cells.echo, rcs_m2=cells.echo.rcs_m2 * draws, snr=signal)
+        peak = peaks(cells, signal)
+        found = merged_by(echo, peak, signal)
+        strong = found.rcs_m2 >= 10.0 ** (0.1 * make.least_dbsm)
+        if ideal:
+            return found.taken(strong & (found.snr >= HALF_SNR))
+        # Noise is added once, and together with the signal of a single cell it is one exponential.
+        heard = found.snr + draws[_firsts(peak, signal)]
+        found = replace(found, snr=heard - 1.0).taken(strong & (heard > THRESHOLD))
         found = found.and_more([_false_alarms(look, make, self.false_alarms, rng)])
         measured = _noisy(found, look, self.noise, rng)
         gain = _gain(look, make, scene.weather.rain_mm_h, measured)
@@ -183,32 +159,6 @@ class Rays:
     azimuth_rad: Array
     elevation_rad: Array
     solid_angle_sr: Array
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Echo:
-    """What rays, cells or detections send back; arrays [n]. ``origin`` as in the table."""
-
-    range_m: Array
-    azimuth_rad: Array
-    elevation_rad: Array
-    velocity_m_s: Array
-    rcs_m2: Array
-    snr: Array
-    instance_id: NDArray[np.int64]
-    origin: NDArray[np.int64]
-
-    def taken(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Echo:
-        """Some of them, in that order."""
-        return replace(self, **{name: getattr(self, name)[which] for name in Echo.__slots__})
-
-    def and_more(self, others: Sequence[Echo]) -> Echo:
-        """These and all of others, one after the other."""
-        every = (self, *others)
-        return replace(
-            self,
-            **{name: np.concatenate([getattr(e, name) for e in every]) for name in Echo.__slots__},
-        )
 
 
 def _rays(look: Look, rng: Rng) -> Rays:
@@ -275,45 +225,17 @@ def _of_thing(
     return areas_m2 / whole_m2 * cross_section_m2(target, thing, axis)
 
 
-def _cells(lit: Echo, look: Look) -> Echo:
-    """Echoes that the radar cannot tell apart are one; labels are those of the strongest ray."""
-    if len(lit.range_m) == 0:
-        return lit
-    fine = look.resolution
-    sizes = np.radians(_along(fine.azimuth_deg, lit.azimuth_rad))
-    upward = math.radians(fine.elevation_deg) or math.pi
-    bins = (
-        np.floor(lit.range_m / fine.range_m),
-        np.floor(lit.azimuth_rad / sizes),
-        np.floor(lit.elevation_rad / upward) if fine.elevation_deg else np.zeros_like(sizes),
-        np.floor(lit.velocity_m_s / fine.velocity_m_s),
-    )
-    keys = np.stack(bins, axis=1).astype(np.int64)
-    _, cell = np.unique(keys, axis=0, return_inverse=True)
-    cell = cell.reshape(-1)
-    total: Array = np.bincount(cell, lit.rcs_m2).astype(np.float64)
-
-    def mean(values: Array) -> Array:
-        return np.bincount(cell, lit.rcs_m2 * values) / total
-
-    order = np.lexsort((-lit.rcs_m2, cell))
-    strongest = order[np.searchsorted(cell[order], np.arange(len(total)))]
-    elevation = mean(lit.elevation_rad) if fine.elevation_deg else np.zeros(len(total))
-    return Echo(
-        mean(lit.range_m),
-        mean(lit.azimuth_rad),
-        elevation,
-        mean(lit.velocity_m_s),
-        total,
-        np.zeros(len(total)),
-        lit.instance_id[strongest],
-        lit.origin[strongest],
-    )
+def _firsts(group: NDArray[np.int64], power: Array) -> NDArray[np.intp]:
+    """The strongest member of every group."""
+    order = np.lexsort((-power, group))
+    count = int(group.max()) + 1 if len(group) else 0
+    firsts: NDArray[np.intp] = order[np.searchsorted(group[order], np.arange(count))]
+    return firsts
 
 
 def _gain(look: Look, make: RadarModel, rain_mm_h: float, echo: Echo) -> Array:
     """Signal over noise per square metre of cross section, [n]."""
-    reach_m = _along(look.reach_m, echo.azimuth_rad)
+    reach_m = along(look.reach_m, echo.azimuth_rad)
     reference_m2 = 10.0 ** (0.1 * make.reference_dbsm)
     k, alpha = make.rain
     loss_db = 2.0 * echo.range_m / 1000.0 * (k * rain_mm_h**alpha if rain_mm_h > 0.0 else 0.0)
@@ -344,7 +266,7 @@ def _noisy(echo: Echo, look: Look, factor: float, rng: Rng) -> Echo:
     """Detections with the errors of measurement."""
     draws = factor * rng.standard_normal((4, len(echo.range_m)))
     noise = look.noise
-    spread = np.radians(_along(noise.azimuth_deg, echo.azimuth_rad))
+    spread = np.radians(along(noise.azimuth_deg, echo.azimuth_rad))
     return replace(
         echo,
         range_m=np.clip(echo.range_m + noise.range_m * draws[0], *look.range_m),
@@ -352,9 +274,3 @@ def _noisy(echo: Echo, look: Look, factor: float, rng: Rng) -> Echo:
         elevation_rad=echo.elevation_rad + math.radians(noise.elevation_deg) * draws[2],
         velocity_m_s=echo.velocity_m_s + noise.velocity_m_s * draws[3],
     )
-
-
-def _along(curve: Curve, azimuth_rad: Array) -> Array:
-    """Values of a curve at azimuths, [n]."""
-    at_deg, values = np.array(curve).T
-    return np.asarray(np.interp(np.abs(np.degrees(azimuth_rad)), at_deg, values))

@@ -89,6 +89,7 @@ GAMMA_DB = {
     "tyre": -15.0,
     "skin": -8.0,
     "lamp": -5.0,
+    "mirrored": -99.0,
 }
 """RCS per area that faces the radar, by surface."""
 

@@ -14,7 +14,7 @@ from generator.config.describe import describe
 from generator.config.schema import json_schema
 from generator.core.interfaces import Stage
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Instance, Lane, ObjectGroup, Scene
+from generator.core.scene import Body, Camera, Instance, Lane, Lidar, ObjectGroup, Rig, Scene
 from generator.core.se3 import SE3, look_at
 from generator.core.serial import canonical_json, from_plain, to_plain
 from randomizers import TABLE
@@ -39,7 +39,7 @@ PHYSICS_BOUND = ("along", "arm_configuration", "distractors", "objects", "physic
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, lamps, a car, and two cameras."""
+    """A room with a table, an arm, objects, lamps, a car with a scanner, and two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -64,6 +64,8 @@ def nominal_scene() -> Scene:
         bodies=(*scene.bodies, lamp, signal, wagon),
         instances=(*scene.instances, labelled),
         cameras=cameras,
+        rigs=(Rig("car", "along/0"),),
+        lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
         lanes=lanes,
         groups=(*scene.groups, group),
     )

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from exporters.images import write_media
 from generator import annotations
+from generator.annotations.boxes3d import oriented_box
 from generator.annotations.truth import Thresholds, image_truth
 from generator.core.boxes import BoxPx, tight_box
 from generator.core.capture import (
@@ -33,8 +34,9 @@ from generator.core.geometry import SURFACES, Keypoint
 from generator.core.instants import RIG_AXES, at, with_placed_sensors, with_twists
 from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.intrinsics import Intrinsics
+from generator.core.lanes import LaneBorder
 from generator.core.motion import Track
-from generator.core.sample import ImageTruth, Sample
+from generator.core.sample import BirdseyeMap, FrameTruth, ImageTruth, Sample
 from generator.core.scene import Body, Camera, Device, Instance, Lidar, Rig, Scene
 from generator.core.se3 import SE3, Array, look_at
 from generator.core.tables import table_rows
@@ -118,6 +120,7 @@ def ray_cast(scene: Scene, camera: Camera) -> Reading:
     channels: dict[Channel, NDArray[Any]] = {
         Channel.RGB: rgb,
         Channel.Z_DEPTH: depth.astype(np.float32),
+        Channel.RANGE: (depth * np.linalg.norm(rays[inside], axis=-1)).astype(np.float32),
         Channel.NORMALS: _normals(depth[..., None] * rays[inside]),
         Channel.INSTANCE: ids,
         Channel.CATEGORY: categories,
@@ -197,7 +200,8 @@ def make_sample(
     scene = replace(scene, lidars=(lidar,), devices=(imu,))
     clouds = {"top": PointCloud("top", lidar, scan(scene, lidar))}
     tables = {"imu": Table("imu", imu, imu_rows(index))}
-    return Sample(index, index, 0, split, scene, Capture(readings, clouds, tables), truth)
+    capture, frame = Capture(readings, clouds, tables), frame_of(scene)
+    return Sample(index, index, 0, split, scene, capture, truth, frame=frame)
 
 
 def imu_rows(index: int) -> NDArray[Any]:
@@ -281,6 +285,18 @@ def make_drive(strides: Mapping[str, int] | None = None) -> list[Sample]:
             Sample(index, sequence, 0, split, scene, capture, truth, step_index=step, cameras=names)
         )
     return samples
+
+
+def frame_of(scene: Scene) -> FrameTruth:
+    """A map of 40 m in which half of the ground is drivable, and boxes."""
+    drivable = np.zeros((80, 80), bool)
+    drivable[:, 40:] = True
+    return FrameTruth(
+        "ego",
+        boxes3d={"ego": {i.instance_id: oriented_box(i) for i in scene.instances}},
+        borders=(LaneBorder("lane:left", "road", ((-90.0, 0.0, 0.0), (90.0, 0.0, 0.0))),),
+        birdseye=BirdseyeMap(SE3(), 0.5, {"drivable": drivable, "vehicles": ~drivable}),
+    )
 
 
 def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:

@@ -15,6 +15,7 @@ from generator.core.geometry import Keypoint, Material, MeshData
 from generator.core.instants import at
 from generator.core.interfaces import DatasetInfo
 from generator.core.intrinsics import Intrinsics
+from generator.core.lens import Lens
 from generator.core.motion import Track
 from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
 from generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
@@ -144,6 +145,40 @@ def test_box_behind_the_camera_leaves_no_trace() -> None:
     draw_box3d(image, OrientedBox(SE3((0.0, 0.0, -3.0)), (1.0, 1.0, 1.0)), intrinsics, (9, 9, 9))
 
     assert not image.any()
+
+
+def test_edges_of_boxes_bow_with_the_lens() -> None:
+    """The middle of a long edge is drawn where the lens puts it, and not on the chord."""
+    lens = Lens("kannala_brandt", (0.0,) * 4)
+    intrinsics = Intrinsics(200, 200, 60.0, 60.0, 100.0, 100.0, lens)
+    image = np.zeros((200, 200, 3), np.uint8)
+    bar = OrientedBox(SE3((0.0, 1.2, 1.0)), (6.0, 0.001, 0.001))
+
+    draw_box3d(image, bar, intrinsics, (200, 200, 200))
+
+    ends = intrinsics.project(np.array([[-3.0, 1.2, 1.0], [3.0, 1.2, 1.0]]))
+    row = int(intrinsics.project(np.array([0.0, 1.2, 1.0]))[1])
+    assert row - ends[:, 1].max() > 15
+    assert image[row - 1 : row + 2, 100].any()
+    assert not image[: int(ends[:, 1].min()) - 2].any()
+    assert not image[int(ends[0, 1]) + 3 : row - 2, 100].any()
+
+
+def test_images_that_rerun_cannot_place_in_space_are_shown_by_themselves() -> None:
+    """A pinhole is logged for a pinhole only."""
+    for lens, pinholes in ((Lens(), 1), (Lens("equirectangular"), 0)):
+        camera = Camera("color", IDENTITY, Intrinsics(8, 4, 1.3, 1.3, 4.0, 2.0, lens))
+        reading = Reading("color", camera, {})
+        stream = _Stream()
+        recorder = Recorder(stream, None, [])  # type: ignore[arg-type]
+        truth = {"color": ImageTruth(camera, ())}
+        sample = Sample(0, 0, 0, "train", Scene("s"), Capture({"color": reading}), truth)
+
+        recorder.start(["color"])
+        recorder.record(sample)
+
+        logged = [what for path, what in stream.logged if path == "world/cameras/color/image"]
+        assert len(logged) == pinholes
 
 
 def test_neighbouring_ids_look_different_and_nothing_is_black() -> None:

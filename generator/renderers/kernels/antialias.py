@@ -15,6 +15,7 @@ from generator.renderers.kernels.records import (
     View,
     World,
     pixel_direction,
+    shows,
     to_mesh_point,
     to_mesh_vector,
 )
@@ -213,6 +214,9 @@ def antialias(
     """
     row = wp.tid()
     i = pixels[row]
+    mixed[row] = radiance[i]
+    if not shows(view, i):
+        return
     x = i % view.width
     y = i / view.width
     parts = Parts()
@@ -235,6 +239,5 @@ def antialias(
             w = tone_weight(exposed)
             total += exposed * w
             weights += w
-    mixed[row] = radiance[i]
     if weights > 0.0:
         mixed[row] = total * (1.0 / (weights * exposure))

@@ -1,0 +1,83 @@
+"""The Intelligent Driver Model.
+
+Treiber, Hennecke, Helbing, "Congested traffic states in empirical observations and microscopic
+simulations", Physical Review E 62(2), 2000; parameters as in Treiber and Kesting, "Traffic flow
+dynamics", 2013, table 11.2 (city).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from generator.core.se3 import Array
+
+HARDEST_M_S2 = 8.0
+"""Nobody brakes harder: what tyres hold on a dry road."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Drivers:
+    """What drivers want; arrays [n].
+
+    Attributes:
+        headway_s: Time gap to the vehicle ahead.
+        standstill_m: Gap in a queue.
+        acceleration_m_s2: Greatest one.
+        braking_m_s2: Comfortable deceleration.
+    """
+
+    headway_s: Array
+    standstill_m: Array
+    acceleration_m_s2: Array
+    braking_m_s2: Array
+
+    @classmethod
+    def like(
+        cls,
+        n: int,
+        headway_s: float = 1.2,
+        standstill_m: float = 2.0,
+        acceleration_m_s2: float = 1.5,
+        braking_m_s2: float = 2.0,
+    ) -> Drivers:
+        """``n`` drivers who want the same."""
+        values = (headway_s, standstill_m, acceleration_m_s2, braking_m_s2)
+        return cls(*(np.full(n, value) for value in values))
+
+
+def free_acceleration(drivers: Drivers, speed_m_s: Array, wanted_m_s: Array) -> Array:
+    """Acceleration [n] on an empty road: ``a (1 - (v / v0)^4)``."""
+    ratio = speed_m_s / np.maximum(wanted_m_s, 0.1)
+    squared = ratio * ratio
+    free: Array = drivers.acceleration_m_s2 * (1.0 - squared * squared)
+    return free
+
+
+def interaction(drivers: Drivers, speed_m_s: Array, gap_m: Array, leader_m_s: Array) -> Array:
+    """What something ahead takes away from it [n]: ``a (s* / s)^2``.
+
+    Args:
+        drivers: Who drives.
+        speed_m_s: Own speeds [n].
+        gap_m: Free length to what is ahead [n]; ``inf`` = nothing.
+        leader_m_s: Its speeds [n].
+    """
+    scale = 2.0 * np.sqrt(drivers.acceleration_m_s2 * drivers.braking_m_s2)
+    closing = speed_m_s * (speed_m_s - leader_m_s) / scale
+    wanted = drivers.standstill_m + np.maximum(0.0, speed_m_s * drivers.headway_s + closing)
+    ratio = wanted / np.maximum(gap_m, 0.05)
+    taken: Array = drivers.acceleration_m_s2 * ratio * ratio
+    return taken
+
+
+def equilibrium_speed(drivers: Drivers, gap_m: Array, wanted_m_s: Array) -> Array:
+    """Speeds [n] at most as high as suit a gap behind a leader who is as fast.
+
+    The equilibrium gap is ``(s0 + v T) / sqrt(1 - (v / v0)^4)``; without the root it is an upper
+    bound of the speed that the wanted speed bounds as well.
+    """
+    room = np.maximum(gap_m - drivers.standstill_m, 0.0) / drivers.headway_s
+    speeds: Array = np.minimum(room, wanted_m_s)
+    return speeds

@@ -1,0 +1,107 @@
+"""What a vehicle drives when it follows a line: pure pursuit with a kinematic bicycle.
+
+Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992: the
+rear axle moves on the circle that meets its own direction and a point of the line some way ahead.
+A kinematic bicycle's path does not depend on its speed, so it is driven once, by distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.se3 import Array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Courses:
+    """Where the rear axles of n vehicles go, at m even stations of their lines.
+
+    Attributes:
+        xy_m: Middles of the rear axles [n, m, 2].
+        ahead: Directions [n, m, 2], unit.
+        curvature_per_m: Of the paths [n, m], positive to the left.
+    """
+
+    xy_m: Array
+    ahead: Array
+    curvature_per_m: Array
+
+    def poses(self, stations: Array) -> tuple[Array, Array]:
+        """Rear axles [..., n, 2] and directions [..., n, 2] at stations [..., n].
+
+        Args:
+            stations: In units of ``STATION_M`` from the beginning of each course.
+        """
+        last = self.xy_m.shape[1] - 2
+        k = np.clip(stations.astype(np.int64), 0, last)
+        f = np.clip(stations - k, 0.0, 1.0)[..., None]
+        rows = np.arange(len(self.xy_m))
+        a, b = self.xy_m[rows, k], self.xy_m[rows, k + 1]
+        u, v = self.ahead[rows, k], self.ahead[rows, k + 1]
+        chord = b - a
+        span = np.sqrt(chord[..., :1] * chord[..., :1] + chord[..., 1:] * chord[..., 1:])
+        g = 1.0 - f
+        # A cubic whose ends point where the axle points.
+        xy = (1.0 + 2.0 * f) * g * g * a + f * f * (3.0 - 2.0 * f) * b
+        xy = xy + span * (f * g * g * u + f * f * (f - 1.0) * v)
+        return xy, unit(g * u + f * v)
+
+
+def driven(
+    lines_m: Array,
+    xy_m: Array,
+    ahead: Array,
+    lookahead: NDArray[np.int64],
+    sharpest_per_m: Array,
+) -> Courses:
+    """What n vehicles drive along their lines.
+
+    Args:
+        lines_m: Points of the lines [n, m + l, 2], ``STATION_M`` apart, the first beside each
+            vehicle's rear axle.
+        xy_m: Where the rear axles are [n, 2].
+        ahead: Where the vehicles point [n, 2], unit.
+        lookahead: How many stations ahead they look [n, m], at most l.
+        sharpest_per_m: Greatest curvatures that they can steer [n].
+    """
+    n, m = lookahead.shape
+    tangents = unit(np.gradient(lines_m, axis=1))
+    rows = np.arange(n)
+    xy, way, curvature = np.zeros((n, m, 2)), np.zeros((n, m, 2)), np.zeros((n, m))
+    p, h = np.array(xy_m, dtype=np.float64), np.array(ahead, dtype=np.float64)
+    for k in range(m):
+        xy[:, k], way[:, k] = p, h
+        to = lines_m[rows, k + lookahead[:, k]] - p
+        across = h[:, 0] * to[:, 1] - h[:, 1] * to[:, 0]
+        bend = 2.0 * across / np.maximum(to[:, 0] * to[:, 0] + to[:, 1] * to[:, 1], 0.25)
+        bend = np.clip(bend, -sharpest_per_m, sharpest_per_m)
+        curvature[:, k] = bend
+        if k + 1 == m:
+            break
+        # As far as brings it beside the line's next station.
+        t, ahead_of = tangents[:, k + 1], lines_m[:, k + 1] - p
+        along = np.maximum(h[:, 0] * t[:, 0] + h[:, 1] * t[:, 1], 0.3)
+        step = np.maximum((ahead_of[:, 0] * t[:, 0] + ahead_of[:, 1] * t[:, 1]) / along, 0.0)
+        middle = turned(h, 0.5 * bend * step)
+        p = p + step[:, None] * middle
+        h = turned(middle, 0.5 * bend * step)
+    return Courses(xy, way, curvature)
+
+
+def turned(vectors: Array, angle_rad: Array) -> Array:
+    """Vectors [n, 2] turned to the left by small angles [n]; ``tan(x)`` is taken to be x."""
+    q = 0.5 * angle_rad
+    scale = 1.0 / (1.0 + q * q)
+    c, s = (1.0 - q * q) * scale, 2.0 * q * scale
+    x, y = vectors[:, 0], vectors[:, 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=1)
+
+
+def unit(vectors: Array) -> Array:
+    """Vectors [..., 2] at length 1."""
+    x, y = vectors[..., :1], vectors[..., 1:]
+    scaled: Array = vectors / np.maximum(np.sqrt(x * x + y * y), 1e-12)
+    return scaled

@@ -1,0 +1,121 @@
+"""Where the vehicle that carries the sensors starts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from generator.config.distributions import Bounds, Normal, Scalar
+from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from generator.core.interfaces import AssetIndex
+from generator.core.lanes import LaneLine
+from generator.core.scene import Body, Scene
+from generator.core.se3 import SE3
+from generator.core.streams import Rng
+from generator.traffic.axles import axles_of
+from generator.traffic.routes import LaneGraph, lanes_through
+from randomizers.base import RandomizerBase
+from randomizers.footprints import Footprint, ground_of
+
+TRIES = 32
+
+Stop = str | tuple[float, float]
+"""What a route leads through: a lane's name, or a point (x, y) [m]."""
+
+
+class EgoOnLane(RandomizerBase):
+    """Puts the ego vehicle on a driving lane; list it before the groups that stand along lanes.
+
+    Attributes:
+        ego: Name of the template's ``ego`` element.
+        roads: Names of the elements on whose lanes it may be; empty = all.
+        route: It starts on the first of these lanes, or of these points (x, y) in metres; give the
+            same route to ``traffic_flow``. Empty = on any lane.
+        ahead_m: Its lane goes on at least this far before its front; halved for lanes that are
+            shorter than twice as long.
+        lateral_m: To the left of the lane's middle.
+        spare_m: Nothing else is nearer than this.
+    """
+
+    type: Literal["ego_on_lane"] = "ego_on_lane"
+    every: Literal["scene"] = "scene"
+    ego: str = "ego"
+    roads: tuple[str, ...] = ()
+    route: tuple[Stop, ...] = ()
+    ahead_m: float = Field(40.0, ge=0)
+    lateral_m: Annotated[Scalar, Bounds(-5, 5)] = Normal(0.0, 0.1, clip=(-0.3, 0.3))
+    spare_m: float = Field(0.5, ge=0)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with the ego vehicle somewhere else.
+
+        Raises:
+            ConfigError: there is no such vehicle or lane, or the route is none.
+            LayoutRejected: no free place was found.
+        """
+        body = ego_of(scene, self.ego, f"randomizers.{self.name}.ego")
+        lines = self._lines(scene)
+        axles = axles_of(assets, body.asset, body.scale)
+        roads = {lane.road for lane in scene.lanes}
+        others = (
+            b
+            for b in scene.bodies
+            if b.instance_id and b.name != body.name and b.name.partition("/")[0] not in roads
+        )
+        ground = ground_of(others, assets)
+        total_m = sum(line.length_m for line in lines)
+        for _ in range(TRIES):
+            place, left_m = float(rng.uniform()) * total_m, self.lateral_m.draw(rng)
+            share = float(rng.uniform())
+            line = next((one for one in lines if (place := place - one.length_m) < 0.0), lines[-1])
+            ahead_m = min(self.ahead_m, 0.5 * line.length_m)
+            last_m = line.length_m - ahead_m - axles.front_m
+            if last_m <= axles.rear_m:
+                continue
+            at_m = axles.rear_m + share * (last_m - axles.rear_m)
+            pose = (line.pose(at_m, left_m) @ axles.T_body_rear.inverse()).rounded()
+            footprint = Footprint.of(pose, assets.bounds_m(body.asset), body.scale)
+            if ground.is_free(footprint.grown(self.spare_m)):
+                return scene.with_bodies(_moved(body, pose))
+        remedy = f"other roads, a smaller ahead_m or spare_m (randomizers.{self.name})"
+        raise LayoutRejected(Rejection("no free place for the ego vehicle", remedy))
+
+    def _lines(self, scene: Scene) -> list[LaneLine]:
+        """The lanes that it may start on."""
+        graph = LaneGraph.of(scene.lanes, "driving")
+        if self.route:
+            names = lanes_through(graph, self.route, f"randomizers.{self.name}.route")
+            return [graph.lines[names[0]]]
+        lines = [
+            line
+            for line in graph.lines.values()
+            if not line.lane.junction and (not self.roads or line.lane.road in self.roads)
+        ]
+        if not lines:
+            known = sorted({line.lane.road for line in graph.lines.values()})
+            raise ConfigError(
+                f"randomizers.{self.name}.roads: the scene has no driving lane on "
+                f"{' or '.join(self.roads) or 'any road'}; there is {', '.join(known) or 'none'}"
+            )
+        return lines
+
+
+def ego_of(scene: Scene, name: str, field: str) -> Body:
+    """The body of an ego vehicle.
+
+    Raises:
+        ConfigError: the template has none of that name.
+    """
+    known = [rig.name for rig in scene.rigs]
+    if name not in known:
+        raise ConfigError(
+            f"{field}: the template has no ego vehicle '{name}'; there is "
+            f"{', '.join(known) or 'none: list an element of type ego'}{did_you_mean(name, known)}"
+        )
+    return scene.body(scene.rig(name).body)
+
+
+def _moved(body: Body, pose: SE3) -> Body:
+    return replace(body, T_world_body=pose)

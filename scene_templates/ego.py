@@ -1,0 +1,77 @@
+"""The vehicle that carries the sensors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from pydantic import Field
+
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetIndex
+from generator.core.lanes import LaneLine
+from generator.core.scene import Body, Instance, Rig, Scene
+from generator.traffic.axles import axles_of
+from scene_templates.element import Element, next_instance_id
+
+CATEGORY = "ego"
+"""What its pixels are called; no data set has this category, so that they carry none."""
+
+
+class Ego(Element):
+    """A vehicle with a rig of its own name for sensors; never labelled.
+
+    The rig's origin is on the ground below the middle of the rear axle, X forward, Z up, as in
+    nuScenes (Caesar et al. 2020).
+
+    Attributes:
+        asset: Its id; empty = the first asset with all of ``tags``.
+        tags: What it is, unless ``asset`` says so.
+        lane: Name of the lane in whose middle it stands; empty = the first driving lane.
+    """
+
+    type: Literal["ego"] = "ego"
+    asset: str = ""
+    tags: tuple[str, ...] = Field(("car",), min_length=1)
+    lane: str = ""
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """The vehicle, and the rig on it.
+
+        Raises:
+            ConfigError: there is no such asset or lane.
+        """
+        asset = self.asset or self._first(assets)
+        lanes = [lane for lane in scene.lanes if lane.name == self.lane or not self.lane]
+        lanes = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]
+        if not lanes:
+            wanted = f"driving lane '{self.lane}'" if self.lane else "driving lane"
+            raise ConfigError(
+                f"elements.{self.name}.lane: there is no {wanted}; list the road before it"
+            )
+        line = LaneLine(lanes[0])
+        T_body_rig = axles_of(assets, asset, 1.0).T_body_rear
+        place = line.pose(0.5 * line.length_m)
+        instance_id = next_instance_id(scene)
+        body = Body(
+            self.name,
+            asset,
+            (place @ T_body_rig.inverse()).rounded(),
+            instance_id=instance_id,
+            collides=False,
+        )
+        instance = Instance(instance_id, self.name, CATEGORY, 0, asset, annotated=False)
+        return replace(
+            scene,
+            bodies=(*scene.bodies, body),
+            instances=(*scene.instances, instance),
+            rigs=(*scene.rigs, Rig(self.name, self.name, T_body_rig)),
+        )
+
+    def _first(self, assets: AssetIndex) -> str:
+        found = assets.find(self.tags)
+        if not found:
+            raise ConfigError(
+                f"elements.{self.name}.tags: no asset is tagged {', '.join(self.tags)}"
+            )
+        return found[0].asset_id
