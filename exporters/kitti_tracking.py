@@ -32,7 +32,7 @@ from exporters.images import link_or_copy
 from exporters.kitti import label_rows
 from exporters.kitti_raw import Latitude, Longitude, projection
 from exporters.oxts import motion_of, navigation_mount, oxts_row
-from exporters.sensors import laser_scanner, rgb_camera, scanned
+from exporters.sensors import laser_scanner, pinhole_camera, scanned
 from exporters.sequences import (
     Frame,
     Mount,
@@ -91,7 +91,8 @@ class KittiTracking(Strict):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: a sensor is not there, or there are too many sequences.
+            ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
+                sequences.
         """
         self._cameras(info)
         laser_scanner(info, self.lidar, self.type)
@@ -126,9 +127,9 @@ class KittiTracking(Strict):
 
     def _cameras(self, info: DatasetInfo) -> dict[str, str]:
         """Sensors by KITTI's number."""
-        cameras = {"02": rgb_camera(info, self.camera, self.type)}
+        cameras = {"02": pinhole_camera(info, self.camera, self.type)}
         if self.right_camera:
-            cameras["03"] = rgb_camera(info, self.right_camera, self.type)
+            cameras["03"] = pinhole_camera(info, self.right_camera, self.type)
         return cameras
 
     def _row(self, info: DatasetInfo, sample: Sample) -> dict[str, Any]:

@@ -606,6 +606,14 @@ def test_sensors_that_are_not_there_are_refused(exporter: Any, message: str, wor
         exporter.check(drive_info(world))
 
 
+@pytest.mark.parametrize("exporter", [KittiRaw(), KittiTracking(), Kitti()])
+def test_rectified_formats_refuse_other_lenses_than_pinholes(exporter: Any, world: Any) -> None:
+    """The message names the sensor and its lens."""
+    info = replace(drive_info(world), lenses={"left": "fisheye"})
+    with pytest.raises(ConfigError, match=r"'left' has a lens of the model 'fisheye'.*coco"):
+        exporter.check(info)
+
+
 def test_raw_data_needs_a_scanner(world: Any) -> None:
     """KITTI's readers do."""
     with pytest.raises(ConfigError, match="no lidar; add a sensor"):
