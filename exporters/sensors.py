@@ -33,6 +33,22 @@ def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
     )
 
 
+def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
+    """The same for formats that can describe no other camera than a pinhole.
+
+    Raises:
+        ConfigError: there is none, or it has another lens.
+    """
+    camera = rgb_camera(info, wanted, exporter)
+    model = info.lenses.get(camera, "pinhole")
+    if model != "pinhole":
+        raise ConfigError(
+            f"exporter '{exporter}': sensor '{camera}' has a lens of the model '{model}', but "
+            "KITTI's images are rectified; name a camera with a pinhole, or export this one as coco"
+        )
+    return camera
+
+
 def laser_scanner(info: DatasetInfo, wanted: str, exporter: str) -> str:
     """The laser scanner of that name; for an empty name the first, or none, which is empty.
 
