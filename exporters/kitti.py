@@ -48,7 +48,7 @@ from pydantic import Field
 
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
-from exporters.sensors import laser_scanner, rgb_camera, scanned
+from exporters.sensors import check_pinholes, laser_scanner, rgb_camera, scanned
 from exporters.upright import UprightBox, boxed_members, upright_box
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx
@@ -138,13 +138,7 @@ class Kitti(Strict):
                 f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
                 "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
             )
-        model = info.lenses.get(self._camera(info), "pinhole")
-        if model != "pinhole":
-            raise ConfigError(
-                f"exporter 'kitti': sensor '{self._camera(info)}' has a lens of the model "
-                f"'{model}'; KITTI's images are rectified and its calibration has no distortion: "
-                "name a camera with a pinhole, or export this one as coco"
-            )
+        check_pinholes(info, [self._camera(info)], self.type)
         if info.n > FRAMES_MAX:
             raise ConfigError(
                 f"exporter 'kitti': frame names have six digits, {info.n} samples do not fit; "

@@ -38,7 +38,14 @@ from exporters.clouds import read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.oxts import COLUMNS, motion_of, navigation_mount, oxts_row
 from exporters.png import RowFilter, encode_png
-from exporters.sensors import instant_s, laser_scanner, rgb_camera, rgb_cameras, scanned
+from exporters.sensors import (
+    check_pinholes,
+    instant_s,
+    laser_scanner,
+    rgb_camera,
+    rgb_cameras,
+    scanned,
+)
 from exporters.sequences import (
     Frame,
     Mount,
@@ -117,9 +124,9 @@ class KittiRaw(Strict):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: a sensor is not there, or there are too many sequences.
+            ConfigError: a sensor is not there or no pinhole, or there are too many sequences.
         """
-        self._cameras(info)
+        check_pinholes(info, self._cameras(info).values(), self.type)
         if not laser_scanner(info, self.lidar, self.type):
             raise ConfigError(
                 f"exporter '{self.type}': there is no lidar; add a sensor of that type"

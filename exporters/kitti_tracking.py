@@ -32,7 +32,7 @@ from exporters.images import link_or_copy
 from exporters.kitti import label_rows
 from exporters.kitti_raw import Latitude, Longitude, projection
 from exporters.oxts import motion_of, navigation_mount, oxts_row
-from exporters.sensors import laser_scanner, rgb_camera, scanned
+from exporters.sensors import check_pinholes, laser_scanner, rgb_camera, scanned
 from exporters.sequences import (
     Frame,
     between,
@@ -90,9 +90,9 @@ class KittiTracking(Strict):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: a sensor is not there, or there are too many sequences.
+            ConfigError: a sensor is not there or no pinhole, or there are too many sequences.
         """
-        self._cameras(info)
+        check_pinholes(info, self._cameras(info).values(), self.type)
         laser_scanner(info, self.lidar, self.type)
         check_sequence_count(info, SEQUENCES_MAX, self.type)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from generator.core.capture import Channel
@@ -31,6 +31,22 @@ def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
         f"exporter '{exporter}': camera '{wanted}' is no sensor that writes the rgb channel; "
         f"expected one of: {_listed(known)}{did_you_mean(wanted, known)}"
     )
+
+
+def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> None:
+    """Refuse cameras whose lens a rectified calibration cannot hold.
+
+    Raises:
+        ConfigError: naming the first of them.
+    """
+    for camera in cameras:
+        model = info.lenses.get(camera, "pinhole")
+        if model != "pinhole":
+            raise ConfigError(
+                f"exporter '{exporter}': camera '{camera}' has a lens of the model '{model}'; "
+                "KITTI's images are rectified and its calibration has no distortion: name a "
+                "camera with a pinhole, or export this one as coco"
+            )
 
 
 def laser_scanner(info: DatasetInfo, wanted: str, exporter: str) -> str:
