@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from generator.core.capture import Channel
@@ -33,6 +33,21 @@ def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
     )
 
 
+def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> None:
+    """Refuse lenses that a format of rectified images cannot tell.
+
+    Raises:
+        ConfigError: naming the first camera that is no pinhole.
+    """
+    for camera in cameras:
+        model = info.lenses.get(camera, "pinhole")
+        if model != "pinhole":
+            raise ConfigError(
+                f"exporter '{exporter}': camera '{camera}' has a lens of the model '{model}', but the"
+                " format holds rectified images; use a camera with a pinhole, or export it as coco"
+            )
+
+
 def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
     """The same for formats that can describe no other camera than a pinhole.
 
@@ -40,12 +55,7 @@ def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
         ConfigError: there is none, or it has another lens.
     """
     camera = rgb_camera(info, wanted, exporter)
-    model = info.lenses.get(camera, "pinhole")
-    if model != "pinhole":
-        raise ConfigError(
-            f"exporter '{exporter}': sensor '{camera}' has a lens of the model '{model}', but "
-            "KITTI's images are rectified; name a camera with a pinhole, or export this one as coco"
-        )
+    check_pinholes(info, [camera], exporter)
     return camera
 
 
