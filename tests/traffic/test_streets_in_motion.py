@@ -233,7 +233,7 @@ def test_what_cannot_be_is_told_in_one_message(message: str) -> None:
         "street_sequence", overrides=[*SMALL, f"randomizers[{names.index(name)}].{text}"]
     )
     with pytest.raises(ConfigError, match=message):
-        recipe_of(wrong, library(), n=1)
+        recipe_of(wrong, library(), 1, (), frozenset())
         moving_scene(1, wrong)
 
 
