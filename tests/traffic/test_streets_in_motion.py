@@ -232,9 +232,13 @@ def test_what_cannot_be_is_told_in_one_message(message: str) -> None:
     wrong = load_spec(
         "street_sequence", overrides=[*SMALL, f"randomizers[{names.index(name)}].{text}"]
     )
-    with pytest.raises(ConfigError, match=message):
+
+    def made() -> None:
         recipe_of(wrong, library(), 1, (), frozenset())
         moving_scene(1, wrong)
+
+    with pytest.raises(ConfigError, match=message):
+        made()
 
 
 def test_a_route_through_a_wall_is_refused() -> None:
