@@ -11,9 +11,14 @@ from generator.core.plugins import PluginTable
 TABLE = PluginTable(
     "exporter",
     {
+        "birdseye": "exporters.birdseye:Birdseye",
         "coco": "exporters.coco:Coco",
         "kitti": "exporters.kitti:Kitti",
+        "kitti_raw": "exporters.kitti_raw:KittiRaw",
+        "kitti_tracking": "exporters.kitti_tracking:KittiTracking",
+        "motchallenge": "exporters.motchallenge:MotChallenge",
         "pointclouds": "exporters.pointclouds:PointClouds",
         "semantickitti": "exporters.semantickitti:SemanticKitti",
+        "tables": "exporters.tables:Tables",
     },
 )

@@ -15,6 +15,7 @@ from generator.core.capture import POINT, PointCloud
 from generator.core.errors import StorageError
 from generator.core.interfaces import cloud_path
 from generator.core.sample import Sample
+from generator.core.scene import Lidar
 from generator.core.se3 import Array
 
 
@@ -24,6 +25,12 @@ def write_cloud(cloud: PointCloud, shard_dir: Path, index: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("wb") as file:
         np.lib.format.write_array(file, cloud.points, version=(1, 0), allow_pickle=False)
+
+
+def scanner_of(sample: Sample, lidar: str) -> Lidar:
+    """A laser scanner at the instant of its sweep; as in the scene if it has not read."""
+    cloud = sample.capture.clouds.get(lidar)
+    return cloud.lidar if cloud is not None else sample.scene.lidar(lidar)
 
 
 def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
@@ -48,6 +55,11 @@ def xyzi_bytes(points: NDArray[np.void]) -> bytes:
 
 
 def T_camera_lidar(sample: Sample, camera: str, lidar: str) -> Array:  # noqa: N802
-    """Lidar coordinates to camera coordinates, 4 x 4."""
-    T_camera_world = sample.truth[camera].camera.T_world_camera.inverse()
-    return (T_camera_world @ sample.scene.lidar(lidar).T_world_lidar).matrix()
+    """Lidar coordinates to camera coordinates, 4 x 4.
+
+    On one rig it is what the rig says, whatever instants the two read at.
+    """
+    view, scanner = sample.truth[camera].camera, scanner_of(sample, lidar)
+    if view.rig and view.rig == scanner.rig:
+        return (view.T_rig_camera.inverse() @ scanner.T_rig_lidar).matrix()
+    return (view.T_world_camera.inverse() @ scanner.T_world_lidar).matrix()

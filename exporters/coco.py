@@ -28,8 +28,22 @@ as their annotations are made:
     Pose of the object's own frame, 4 x 4, rows first.
 ``part_px``
     Visible pixels by part.
+``motion``
+    Velocity, acceleration and angular velocity over the ground, along the axes of ``world``,
+    ``camera`` and ``ego`` (the rig; absent without one), and ``speed_m_s``.
 ``keypoints_camera_m``
     In keypoint files: by name, positions in the camera frame.
+
+Where views are sequences of several instants, images also have ``sequence_id``, ``frame_id`` (the
+instant's number in its sequence, from 0) and ``time_s``, and annotations have ``track_id``: the
+same for one object in all images of its sequence, whatever the camera, and unique in the data set.
+
+Images have ``K`` and, where their camera is no pinhole, ``lens``: its ``model`` (one of those in
+``generator.core.lens``), the ``distortion`` that ``K`` maps on, which is OpenCV's vector, with the
+names of its ``coefficients``, and ``half_field_rad``, the angle to the axis where the image ends.
+
+Images have ``lane_borders``, lists of image points in the direction of travel and whether each is
+visible (0 = hidden), and ``free_space``, run-length encoded, as far as these are made.
 
 Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
 covers ``[i, i + 1)``, as COCO's boxes do; OpenCV's principal point is 0.5 px less.
@@ -49,12 +63,24 @@ from typing import Any, Literal
 
 from exporters.images import link_or_copy
 from exporters.rle import encoded
+from exporters.sensors import instant_s, rgb_cameras
+from exporters.sequences import sequence_of
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
+from generator.core.intrinsics import Intrinsics
+from generator.core.lens import COEFFICIENTS, Lens
+from generator.core.motion import Twist
+from generator.core.sample import (
+    ANNOTATION_STRIDE,
+    ImageTruth,
+    KeypointTruth,
+    MotionTruth,
+    ObjectTruth,
+    Sample,
+)
 from generator.core.scene import Instance, Weather
 from generator.core.se3 import Array
 from generator.core.serial import canonical_json
@@ -84,7 +110,7 @@ class Coco(Strict):
         Raises:
             ConfigError: if no sensor writes the rgb channel.
         """
-        if not _sensors(info):
+        if not rgb_cameras(info):
             raise ConfigError(
                 f"exporter '{self.type}': no sensor of {', '.join(info.sensors)} writes the rgb "
                 "channel; add an rgb_camera"
@@ -99,7 +125,9 @@ class Coco(Strict):
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
         for sample in samples:
-            for sensor in _sensors(info):
+            for sensor in rgb_cameras(info):
+                if sensor not in sample.truth:
+                    continue
                 truth = sample.truth[sensor]
                 images = rows.setdefault(f"{sample.split}.images", [])
                 annotations = rows.setdefault(f"{sample.split}.annotations", [])
@@ -107,7 +135,7 @@ class Coco(Strict):
                 for thing in truth.objects:
                     if thing.box is None:
                         continue
-                    row = self._annotation(sample, sensor, truth, thing)
+                    row = self._annotation(info, sample, sensor, thing)
                     annotations.append(row)
                     if thing.keypoints is not None:
                         stem = f"{sample.split}.keypoints.{thing.instance.category_id}"
@@ -141,10 +169,10 @@ class Coco(Strict):
                     _link_images(json.loads(line), split, shard_dir, dataset_dir)
 
     def _annotation(
-        self, sample: Sample, sensor: str, truth: ImageTruth, thing: ObjectTruth
+        self, info: DatasetInfo, sample: Sample, sensor: str, thing: ObjectTruth
     ) -> dict[str, Any]:
         assert thing.box is not None, "invisible objects are not listed"
-        camera = truth.camera.intrinsics
+        camera = sample.truth[sensor].camera.intrinsics
         instance = thing.instance
         row: dict[str, Any] = {
             "id": sample.annotation_id(sensor, instance.instance_id),
@@ -157,6 +185,9 @@ class Coco(Strict):
             "instance_id": instance.instance_id,
             "attributes": _facts(instance),
         }
+        if info.steps_per_scene > 1:
+            sequence = sequence_of(info, sample.index)
+            row["track_id"] = sequence * ANNOTATION_STRIDE + instance.instance_id
         if self.segmentation == "rle":
             assert thing.mask is not None, "the annotation instance_masks is in `needs`"
             row["segmentation"] = encoded(thing.mask, camera.height_px, camera.width_px)
@@ -181,6 +212,37 @@ def _optional(thing: ObjectTruth) -> dict[str, Any]:
         keys["T_camera_object"] = _rows(thing.T_camera_object.matrix())
     if thing.part_px is not None:
         keys["part_px"] = thing.part_px
+    if thing.motion is not None:
+        keys["motion"] = motion_facts(thing.motion)
+    return keys
+
+
+def motion_facts(motion: MotionTruth) -> dict[str, Any]:
+    """How an object moves, by the frame along whose axes the numbers are."""
+    frames = {"world": motion.world, "camera": motion.camera, "ego": motion.ego}
+    facts: dict[str, Any] = {
+        name: {f.name: _rounded(getattr(twist, f.name)) for f in fields(Twist)}
+        for name, twist in frames.items()
+        if twist is not None
+    }
+    return {**facts, "speed_m_s": round(motion.speed_m_s, DECIMALS)}
+
+
+def _of_image(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
+    """The keys of annotations of the image as a whole; none for those that were not made."""
+    keys: dict[str, Any] = {}
+    if truth.borders is not None:
+        keys["lane_borders"] = [
+            {
+                "name": b.border,
+                "kind": b.kind,
+                "points_px": b.points_px,
+                "visible": [int(seen) for seen in b.visible],
+            }
+            for b in truth.borders
+        ]
+    if truth.free_space is not None:
+        keys["free_space"] = encoded(truth.free_space, camera.height_px, camera.width_px)
     return keys
 
 
@@ -188,7 +250,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     camera = sample.truth[sensor].camera
     file_name = f"{sample.index:09d}_{sensor}.png"
     others = [c for c in info.media[sensor] if c is not Channel.RGB]
-    return {
+    row = {
         "id": sample.image_id(sensor),
         "file_name": file_name,
         "width": camera.intrinsics.width_px,
@@ -199,10 +261,28 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "view": sample.view_index,
         "sensor": sensor,
         "K": _rows(camera.intrinsics.matrix()),
+        **_lens(camera.intrinsics.lens),
         "T_world_camera": _rows(camera.T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
-    }
+    } | _of_image(sample.truth[sensor], camera.intrinsics)
+    if info.steps_per_scene > 1:
+        row["sequence_id"] = sequence_of(info, sample.index)
+        row["frame_id"] = sample.index % info.steps_per_scene
+        row["time_s"] = round(instant_s(sample, sensor), DECIMALS)
+    return row
+
+
+def _lens(lens: Lens) -> dict[str, Any]:
+    """Nothing for a pinhole."""
+    if lens.model == "pinhole":
+        return {}
+    names = COEFFICIENTS[lens.model]
+    known: dict[str, Any] = {"model": lens.model, "coefficients": list(names)}
+    if names:
+        known["distortion"] = list(lens.coefficients)
+        known["half_field_rad"] = lens.half_field_rad
+    return {"lens": known}
 
 
 def _weather(weather: Weather) -> dict[str, float]:
@@ -317,10 +397,6 @@ def _lines(path: Path) -> Iterator[str]:
         with path.open(encoding="utf-8", newline="\n") as file:
             for line in file:
                 yield line.rstrip("\n")
-
-
-def _sensors(info: DatasetInfo) -> tuple[str, ...]:
-    return tuple(s for s in info.sensors if Channel.RGB in info.media[s])
 
 
 def _xywh(box: BoxPx) -> list[int]:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from exporters.clouds import write_cloud
 from exporters.png import RowFilter, encode_png
+from exporters.tables import write_table
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError, SampleError, StorageError
 from generator.core.interfaces import DatasetInfo, media_path
@@ -56,20 +57,27 @@ ENCODING = {
 def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     """Write every image channel of a sample that the data set keeps to its ``media_path``.
 
-    Laser scans go to their ``cloud_path``.
+    Laser scans go to their ``cloud_path``, rows of devices to their ``table_path``. A sensor that
+    does not read at this sample has no file.
 
     Raises:
         ConfigError: if a channel is no image.
         SampleError: if a depth is negative or NaN.
     """
     for sensor in info.sensors:
-        reading = sample.capture.readings[sensor]
+        reading = sample.capture.readings.get(sensor)
+        if reading is None:
+            continue
         for channel in info.media[sensor]:
             path = media_path(shard_dir, sensor, channel, sample.index)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(png(channel, reading.channels[channel], info.depth_scale_m))
     for lidar in info.lidars:
-        write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
+        if lidar in sample.capture.clouds:
+            write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
+    for device in info.devices:
+        if device in sample.capture.tables:
+            write_table(sample.capture.tables[device], shard_dir, sample.index)
 
 
 def png(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:

@@ -19,9 +19,16 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   wide at 46.7 m, is labelled 27 pixels wide: 721 x 1.67 / 44.9); ``boxes: tight`` writes the tight
   box of the visible pixels, which COCO has.
 * **Things far off** are not labelled: KITTI's annotators saw what the laser scanner saw. They
-  become ``DontCare`` regions.
-* **Points** are those of the data set's laser scanner, with labels per point; without one they are
-  thinned pixels of the depth image, with reflectance 0 and no labels.
+  become ``DontCare`` regions; so does what has no laser point, in rain or behind others.
+* **Truncation** is the share of that projection outside the image, or, of tight boxes, the share of
+  the silhouette.
+* **Points** are those of the data set's laser scanner; without one they are thinned pixels of the
+  depth image, with reflectance 0 and no labels.
+* **Point labels** are not KITTI's; they keep its rule that an object is what lies in its box. A
+  pulse that an object reflected has no row where noise, or the object's own way between the pulse
+  and the instant of its box, took it more than 3 cm out of the box; what lies as deep inside has
+  the row whatever it is: the road between the wheels, where the box of a car on a cambered street
+  reaches below it. What reflected each pulse is in the lower half.
 * **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
   which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
 
@@ -32,9 +39,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,15 +48,17 @@ from pydantic import Field
 
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
+from exporters.sensors import laser_scanner, pinhole_camera, scanned
+from exporters.upright import UprightBox, boxed_members, upright_box
 from generator.config.strict import Strict
-from generator.core.boxes import BoxPx, OrientedBox
+from generator.core.boxes import BoxPx
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError, did_you_mean
+from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, ObjectTruth, Sample
 from generator.core.scene import Instance
-from generator.core.se3 import Array, Vec3
+from generator.core.se3 import Array
 
 OFFICIAL_TYPES = {
     "car": "Car",
@@ -71,6 +79,8 @@ SITTING = frozenset({"sit", "sitting"})
 SPLITS = ("train", "val", "test")
 FRAMES_MAX = 1_000_000
 """Frame names have six digits."""
+
+DONT_CARE = "DontCare"
 
 LIDAR_HEIGHT_M = 0.30
 """Of the virtual scanner above camera 0, axes parallel to the camera's."""
@@ -119,17 +129,11 @@ class Kitti(Strict):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: no such camera, it does not write the images that are needed, or too many
-                samples for six digits.
+            ConfigError: no such camera, it is no pinhole or does not write the images that are
+                needed, or too many samples for six digits.
         """
         media = info.media[self._camera(info)]
-        if self.lidar and self.lidar not in info.lidars:
-            known = ", ".join(info.lidars) or "none"
-            raise ConfigError(
-                f"exporter 'kitti': there is no lidar '{self.lidar}'; expected one of: {known}"
-                f"{did_you_mean(self.lidar, info.lidars)}"
-            )
-        if not info.lidars and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
+        if not self._lidar(info) and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
             raise ConfigError(
                 f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
                 "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
@@ -151,21 +155,25 @@ class Kitti(Strict):
         folder = shard_dir / self.type
         frames = []
         for sample in samples:
+            if camera not in sample.truth:
+                continue
             truth = sample.truth[camera]
             frame = _frame(sample.index)
-            _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self))
+            unseen: frozenset[int] = frozenset()
             T_camera_velo = self._velodyne_pose(info, sample)
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
             _write_text(folder / f"calib/{frame}.txt", calib)
             lidar = self._lidar(info)
-            if lidar:
+            if scanned(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
                 _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
-                labels = point_labels(points, truth, self)
+                members, unseen = point_members(points, truth, self, T_camera_velo)
+                labels = point_labels(points, members, label_rows(truth, self, unseen))
                 _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
-            elif self.velodyne_stride_px:
+            elif self.velodyne_stride_px and not lidar:
                 thinned = self._points(info, sample, shard_dir)
                 _write_bytes(folder / f"velodyne/{frame}.bin", thinned.astype("<f4").tobytes())
+            _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self, unseen))
             frames.append(f"{sample.index} {sample.split}\n")
         _write_text(folder / "frames.txt", "".join(frames))
 
@@ -185,19 +193,10 @@ class Kitti(Strict):
         _write_text(dataset_dir / "README.txt", self._readme(info, camera))
 
     def _camera(self, info: DatasetInfo) -> str:
-        with_rgb = [s for s in info.sensors if Channel.RGB in info.media[s]]
-        if not self.camera and with_rgb:
-            return with_rgb[0]
-        if self.camera in with_rgb:
-            return self.camera
-        known = ", ".join(with_rgb) or "none"
-        raise ConfigError(
-            f"exporter 'kitti': camera '{self.camera}' is no sensor that writes the rgb channel; "
-            f"expected one of: {known}{did_you_mean(self.camera, with_rgb)}"
-        )
+        return pinhole_camera(info, self.camera, self.type)
 
     def _lidar(self, info: DatasetInfo) -> str:
-        return self.lidar or next(iter(info.lidars), "")
+        return laser_scanner(info, self.lidar, self.type)
 
     def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> Array:
         """Points of the velodyne folder to the camera frame, [3, 4]."""
@@ -227,9 +226,10 @@ class Kitti(Strict):
         """Files of one frame, each with its place under ``training``."""
         frame = _frame(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
-        if self._lidar(info) or self.velodyne_stride_px:
+        lidar = self._lidar(info)
+        if scanned(shard_dir, lidar, index) or (self.velodyne_stride_px and not lidar):
             names.append(f"velodyne/{frame}.bin")
-        if self._lidar(info):
+        if scanned(shard_dir, lidar, index):
             names.append(f"velodyne_labels/{frame}.label")
         links = [(shard_dir / self.type / name, name) for name in names]
         rgb = media_path(shard_dir, camera, Channel.RGB, index)
@@ -246,6 +246,7 @@ class Kitti(Strict):
             scale=info.depth_scale_m,
             points=self._readme_points(info),
             boxes=_BOXES[self.boxes],
+            truncated="3D box's projection" if self.boxes == "projected" else "silhouette",
             far=self.far_m,
             low=self.low_px,
             partly=PARTLY_OCCLUDED,
@@ -258,93 +259,100 @@ class Kitti(Strict):
         return _THINNED.format(height=LIDAR_HEIGHT_M, stride=self.velodyne_stride_px)
 
 
-@dataclass(frozen=True, slots=True)
-class UprightBox:
-    """A box whose height is along the camera's y axis: what a KITTI label can say.
+class LabelStyle(Protocol):
+    """What decides how an object is labelled; see the fields of ``Kitti``."""
 
-    Attributes:
-        size_hwl_m: Extent along y, along the box's z, along the box's x.
-        bottom_m: Centre of the face with the largest y, camera frame.
-        heading_rad: Rotation about +y of the box's x axis; 0 = along the camera's x.
-    """
+    @property
+    def types(self) -> Literal["official", "category"]:
+        """Whose names of types."""
+        ...
 
-    size_hwl_m: Vec3
-    bottom_m: Vec3
-    heading_rad: float
+    @property
+    def boxes(self) -> Literal["projected", "tight"]:
+        """What image boxes are around."""
+        ...
 
-    def corners(self) -> Array:
-        """The eight corners in the camera frame [m], shape [8, 3]."""
-        height, width, length = self.size_hwl_m
-        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        along, across = np.array([c, 0.0, -s]), np.array([s, 0.0, c])
-        signs = [(i, j, k) for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (0.0, -1.0)]
-        ends = [
-            i * length * along + j * width * across + (0.0, k * height, 0.0) for i, j, k in signs
-        ]
-        return np.asarray(self.bottom_m) + np.array(ends)
+    @property
+    def far_m(self) -> float:
+        """Beyond it things are DontCare."""
+        ...
+
+    @property
+    def low_px(self) -> int:
+        """Below it things are DontCare."""
+        ...
 
 
-def upright_box(box: OrientedBox) -> UprightBox:
-    """The smallest upright box, headed like the object's x axis, around an oriented box.
-
-    Where that axis is vertical, the heading is that of the y axis less a quarter turn.
-    """
-    corners = box.corners()
-    rotation = box.T_frame_box.rotation()
-    x, z = float(rotation[0, 0]), float(rotation[2, 0])
-    if x * x + z * z < 1e-12:
-        x, z = float(rotation[2, 1]), -float(rotation[0, 1])
-    norm = math.sqrt(x * x + z * z)
-    x, z = x / norm, z / norm
-    along = corners[:, 0] * x + corners[:, 2] * z
-    across = corners[:, 2] * x - corners[:, 0] * z
-    middle_along = 0.5 * float(along.min() + along.max())
-    middle_across = 0.5 * float(across.min() + across.max())
-    return UprightBox(
-        size_hwl_m=(
-            float(np.ptp(corners[:, 1])),
-            float(np.ptp(across)),
-            float(np.ptp(along)),
-        ),
-        bottom_m=(
-            middle_along * x - middle_across * z,
-            float(corners[:, 1].max()),
-            middle_along * z + middle_across * x,
-        ),
-        heading_rad=math.atan2(-z, x),
-    )
-
-
-def label_text(truth: ImageTruth, style: Kitti) -> str:
+def label_text(truth: ImageTruth, style: LabelStyle, unseen: frozenset[int] = frozenset()) -> str:
     """The lines of one label file; DontCare rows last, as readers expect."""
-    return "".join(f"{row}\n" for row, _ in label_rows(truth, style))
+    return "".join(f"{row}\n" for row, _ in label_rows(truth, style, unseen))
 
 
-def label_rows(truth: ImageTruth, style: Kitti) -> list[tuple[str, int]]:
-    """Each row of a label file with its instance id."""
-    rows = [
-        (label_row(thing, truth, style), thing.instance.instance_id)
-        for thing in truth.objects
-        if thing.box is not None
-    ]
-    rows.sort(key=lambda row: row[0].startswith("DontCare"))
+def label_rows(
+    truth: ImageTruth, style: LabelStyle, unseen: frozenset[int] = frozenset()
+) -> list[tuple[str, int]]:
+    """Each row of a label file with its instance id; what is ``unseen`` is DontCare."""
+    rows = []
+    for thing in truth.objects:
+        if thing.box is not None:
+            number = thing.instance.instance_id
+            row = label_row(thing, truth, style)
+            if number in unseen and not row.startswith(DONT_CARE):
+                row = dont_care(thing.box, truth.camera.intrinsics)
+            rows.append((row, number))
+    rows.sort(key=lambda row: row[0].startswith(DONT_CARE))
     return rows
 
 
-def point_labels(points: NDArray[np.void], truth: ImageTruth, style: Kitti) -> NDArray[np.uint32]:
-    """Per point the category id, and in the upper half the row in label_2 from 1; 0 = no row."""
-    ids = points["instance_id"]
-    rows = np.zeros(1 + int(ids.max(initial=0)), np.uint32)
-    for number, (_, instance_id) in enumerate(label_rows(truth, style), 1):
-        if instance_id < len(rows):
-            rows[instance_id] = number
-    labels: NDArray[np.uint32] = (points["category_id"] | (rows[ids] << np.uint32(16))).astype(
+def point_members(
+    points: NDArray[np.void],
+    truth: ImageTruth,
+    style: LabelStyle,
+    T_camera_velo: Array,
+) -> tuple[NDArray[np.int64], frozenset[int]]:
+    """The instance that each point belongs to, and the labelled instances that have no point.
+
+    Args:
+        points: Records of ``POINT``.
+        truth: Of the image; things that are DontCare keep the points that they reflect.
+        style: Of the labels.
+        T_camera_velo: Points to the camera frame, [3, 4].
+    """
+    labelled = {i for row, i in label_rows(truth, style) if not row.startswith(DONT_CARE)}
+    boxes = {
+        thing.instance.instance_id: upright_box(thing.box3d_camera)
+        for thing in truth.objects
+        if thing.instance.instance_id in labelled and thing.box3d_camera is not None
+    }
+    R_camera_velo, t_camera_velo = T_camera_velo[:, :3], T_camera_velo[:, 3]
+    p_camera = np.einsum("ij,nj->ni", R_camera_velo, points["position_m"], optimize=False)
+    p_camera += t_camera_velo
+    ids = points["instance_id"].astype(np.int64)
+    members = boxed_members(ids, p_camera, boxes)
+    return members, frozenset(labelled) - frozenset(np.unique(ids[members == ids]).tolist())
+
+
+def point_labels(
+    points: NDArray[np.void], members: NDArray[np.int64], rows: Sequence[tuple[str, int]]
+) -> NDArray[np.uint32]:
+    """Per point the category id of what reflected it, and in the upper half its row in label_2.
+
+    Args:
+        points: Records of ``POINT``.
+        members: As ``point_members`` says.
+        rows: As ``label_rows`` says; they are counted from 1, 0 = no row.
+    """
+    table = np.zeros(1 + int(members.max(initial=0)), np.uint32)
+    for number, (_, instance_id) in enumerate(rows, 1):
+        if instance_id < len(table):
+            table[instance_id] = number
+    labels: NDArray[np.uint32] = (points["category_id"] | (table[members] << np.uint32(16))).astype(
         "<u4"
     )
     return labels
 
 
-def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
+def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     """The fifteen columns of one visible object.
 
     A DontCare row where it is too far or too small for ``style``, less than two pixels wide, or
@@ -359,31 +367,44 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: Kitti) -> str:
     k = truth.camera.intrinsics
     tiny = thing.box.width_px < 2 or thing.box.height_px < style.low_px
     if tiny or not 0 < z <= style.far_m or box.corners()[:, 2].min() < NEAR_M:
-        corners = _inclusive(_widened(thing.box, k))
-        return f"DontCare -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
+        return dont_care(thing.box, k)
     instance = thing.instance
     kind = official_type(instance) if style.types == "official" else _one_word(instance.category)
     alpha_rad = _wrapped(box.heading_rad - math.atan2(x, z))
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
+    truncation, corners = thing.truncation, _inclusive(thing.box)
+    if style.boxes == "projected":
+        truncation, corners = projected_box(box, k)
     return " ".join(
         (
             kind,
-            f"{thing.truncation:.2f}",
+            f"{truncation:.2f}",
             str(occlusion_level(thing.occlusion)),
             _decimal(alpha_rad),
-            projected_corners(box, k) if style.boxes == "projected" else _inclusive(thing.box),
+            corners,
             *map(_decimal, metric),
         )
     )
 
 
-def projected_corners(box: UprightBox, camera: Intrinsics) -> str:
-    """Left, top, right and bottom of a box's image, clipped; pixel centres at whole numbers."""
+def dont_care(box: BoxPx, camera: Intrinsics) -> str:
+    """The row of a region without a label."""
+    return (
+        f"{DONT_CARE} -1 -1 -10 {_inclusive(_widened(box, camera))} -1 -1 -1 -1000 -1000 -1000 -10"
+    )
+
+
+def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
+    """Share of a box's image that is outside the picture, and what is inside.
+
+    The latter as left, top, right and bottom, with pixel centres at whole numbers.
+    """
     uv = camera.project(box.corners()) - 0.5
     (left, top), (right, bottom) = uv.min(axis=0), uv.max(axis=0)
     x = np.clip([left, right], 0.0, camera.width_px - 1.0)
     y = np.clip([top, bottom], 0.0, camera.height_px - 1.0)
-    return f"{x[0]:.2f} {y[0]:.2f} {x[1]:.2f} {y[1]:.2f}"
+    inside = (x[1] - x[0]) * (y[1] - y[0]) / ((right - left) * (bottom - top))
+    return max(1.0 - float(inside), 0.0), f"{x[0]:.2f} {y[0]:.2f} {x[1]:.2f} {y[1]:.2f}"
 
 
 def official_type(instance: Instance) -> str:
@@ -489,8 +510,9 @@ _BOXES = {
 }
 _SCANNED = """\
 velodyne    Points of the laser scanner '{lidar}'; float32 x y z reflectance [0, 1].
-velodyne_labels  One uint32 per point: lower half category id, upper half row in label_2, from 1;
-            0 = no row."""
+velodyne_labels  One uint32 per point: lower half the category id of what reflected it, upper half
+            row in label_2, from 1; 0 = no row. Objects are what lies in their boxes: points that
+            range noise took more than 3 cm out have no row, and what is deeper inside has one."""
 _THINNED = """\
 velodyne    Points of the depth image, one per {stride} x {stride} pixels (0: not written), as seen
             from {height:.2f} m above the camera; float32 x y z reflectance; reflectance is 0."""
@@ -510,8 +532,8 @@ label_2     type truncated occluded alpha left top right bottom h w l x y z rota
             Boxes turn about the camera's y axis only: each is the smallest such box, headed like
             the object's x axis, around the object's own oriented box.
             left top right bottom: {boxes}.
-            DontCare: farther than {far:g} m, or lower than {low} pixels.
-            truncated: share of the silhouette outside the image. occluded, by the hidden share of
+            DontCare: farther than {far:g} m, lower than {low} pixels, or without a laser point.
+            truncated: share of the {truncated} outside the image. occluded, by the hidden share of
             the silhouette inside the image: 0 up to {partly}, 1 up to {largely}, 2 above.
             Metres and radians have six decimals.
 """

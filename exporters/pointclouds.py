@@ -21,11 +21,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.clouds import read_points
+from exporters.clouds import read_points, scanner_of
 from exporters.images import link_or_copy
+from exporters.sensors import scanned
 from generator.config.strict import Strict
 from generator.core.boxes import OrientedBox
 from generator.core.errors import ConfigError
+from generator.core.instants import at
 from generator.core.interfaces import DatasetInfo
 from generator.core.sample import Sample
 from generator.core.scene import Instance
@@ -81,11 +83,12 @@ class PointClouds(Strict):
         for lidar in info.lidars:
             folder = shard_dir / self.type / lidar
             folder.mkdir(parents=True, exist_ok=True)
-            for sample in kept:
+            mine = [sample for sample in kept if scanned(shard_dir, lidar, sample.index)]
+            for sample in mine:
                 points = read_points(shard_dir, lidar, sample.index)
                 path = folder / f"{sample.index:09d}.{self.format}"
                 path.write_bytes(encoded(file_points(points)))
-            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in kept)
+            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in mine)
             (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -146,9 +149,11 @@ def pcd_bytes(points: NDArray[np.void]) -> bytes:
 
 
 def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
-    """Boxes of all annotated things in the frame of a laser scanner, by instance id."""
-    T_lidar_world = sample.scene.lidar(lidar).T_world_lidar.inverse()
-    things = sorted((i for i in sample.scene.instances if i.annotated), key=lambda i: i.instance_id)
+    """Boxes of all annotated things in a laser scanner's frame at its sweep, by instance id."""
+    cloud = sample.capture.clouds.get(lidar)
+    scene = at(sample.scene, cloud.time_s) if cloud is not None else sample.scene
+    T_lidar_world = scanner_of(sample, lidar).T_world_lidar.inverse()
+    things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     boxes = []
     for thing in things:
         low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
@@ -160,7 +165,7 @@ def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]
 
 
 def _pose(sample: Sample, lidar: str) -> dict[str, Any]:
-    scanner = sample.scene.lidar(lidar)
+    scanner = scanner_of(sample, lidar)
     return {
         "index": sample.index,
         "model": scanner.model,

@@ -1,16 +1,21 @@
-"""SemanticKITTI: scans with a class and an instance per point, one sequence per split.
+"""SemanticKITTI: scans with a class and an instance per point, in sequences.
 
 ::
 
-    sequences/00/velodyne/000000.bin   float32 x y z intensity         train is 00, val 08, test 11:
-    sequences/00/labels/000000.label   uint32, class | instance << 16  a sequence of each official
-    sequences/00/calib.txt             P0 to P3, Tr                    split
+    sequences/00/velodyne/000000.bin   float32 x y z intensity
+    sequences/00/labels/000000.label   uint32, class | instance << 16
+    sequences/00/calib.txt             P0 to P3, Tr
     sequences/00/poses.txt             camera i in camera 0, 3 x 4
-    sequences/00/times.txt             seconds, one sweep apart
+    sequences/00/times.txt             seconds
+    split.yaml                         sequences of each split, as semantic-kitti.yaml lists them
 
-Scans are numbered without gaps in the order of samples; ``scans.txt`` names their samples. Views of
-one scene share a world, and things keep their instance id from scan to scan; the next scene begins
-elsewhere, with instance ids of its own.
+Scans are numbered without gaps in the order of samples; ``scans.txt`` names their samples.
+
+* **Views of several instants** are a sequence each, by the number of the view in the data set.
+  Instance ids are those of the scene. What moves at the instant of a scan has a moving class.
+* **Views of one instant** are one sequence per split: train is 00, val 08, test 11, a sequence of
+  each official split, one sweep apart. Views of one scene share a world, and things keep their
+  instance id from scan to scan; the next scene begins elsewhere, with instance ids of its own.
 
 Reference: Behley et al., "SemanticKITTI", ICCV 2019, and semantic-kitti-api, whose classes and
 numbers these are. A van is a car there; a mast is a pole, also that of a sign or a light.
@@ -18,24 +23,39 @@ numbers these are. A van is a car there; a mast is a pole, also that of a sign o
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
+from exporters.clouds import read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.kitti import calib_matrices, matrix_lines
+from exporters.sensors import check_pinholes, instant_s, scanned
+from exporters.sequences import (
+    Frame,
+    between,
+    camera_mount,
+    frame_facts,
+    lidar_mount,
+    matrix_numbers,
+    mounted_pose,
+    read_sequences,
+    write_bytes,
+    write_frames,
+    write_text,
+)
 from generator.config.strict import Strict
 from generator.core.errors import ConfigError
 from generator.core.geometry import SURFACES
 from generator.core.interfaces import DatasetInfo
 from generator.core.sample import Sample
 from generator.core.scene import Scene
-from generator.core.serial import canonical_json
+from generator.core.se3 import SE3
+from generator.core.serial import from_plain
 
 THINGS = {
     "car": 10,
@@ -67,6 +87,7 @@ STUFF = {
 """Classes of scenery by category; everything else that has a category is other-object."""
 OF_SURFACE = {
     "air": 1,
+    "mirrored": 1,
     "asphalt": 40,
     "marking": 60,
     "pavement": 48,
@@ -75,9 +96,17 @@ OF_SURFACE = {
     "leaf": 70,
     "bark": 71,
 }
-"""Classes by surface, for what has no category; ``air`` is an outlier."""
+"""Classes by surface, for what has no category; air and what mirrors show are outliers."""
 OTHER_OBJECT, OTHER_GROUND, SIGN, VEGETATION, TRUNK = 99, 49, 81, 70, 71
-SEQUENCES = {"train": "00", "val": "08", "test": "11"}
+RIDDEN = {"bicycle": 31, "motorcycle": 32}
+"""Classes of what has a rider, by its attribute ``rider``."""
+MOVING = {10: 252, 11: 253, 30: 254, 31: 253, 32: 255, 15: 255, 16: 256, 13: 257, 18: 258}
+"""Classes of things that move by those of things that stand; a bicycle or motorcycle that moves by
+itself has no class but that of its riders."""
+MOVING_M_S = 0.1
+"""What is faster than this moves."""
+SEQUENCES = {"train": 0, "val": 8, "test": 11}
+OFFICIAL_SPLITS = {"train": "train", "val": "valid", "test": "test"}
 SWEEP_S = 0.1
 INSTANCES_MAX = 65_535
 
@@ -97,7 +126,7 @@ class SemanticKitti(Strict):
         return frozenset()
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set without the sensors that are named.
+        """Refuse a data set without the sensors that are named, or whose camera is no pinhole.
 
         Raises:
             ConfigError: telling which.
@@ -111,40 +140,41 @@ class SemanticKitti(Strict):
                     f"exporter 'semantickitti': there is no {field} '{name}'; "
                     f"sensors of that kind: {', '.join(known) or 'none'}"
                 )
+        check_pinholes(info, [self.camera or info.sensors[0]], self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write points and labels of each sample, and a line about its scan."""
         self.check(info)
         lidar, camera = self.lidar or info.lidars[0], self.camera or info.sensors[0]
         folder = shard_dir / self.type
-        folder.mkdir(parents=True, exist_ok=True)
-        lines = []
+        rows = []
         for sample in samples:
+            if not scanned(shard_dir, lidar, sample.index):
+                continue
             points = read_points(shard_dir, lidar, sample.index)
             stem = folder / f"{sample.index:09d}"
-            stem.with_suffix(".bin").write_bytes(xyzi_bytes(points))
-            stem.with_suffix(".label").write_bytes(point_labels(points, sample.scene).tobytes())
-            view = sample.truth[camera].camera
-            calib = calib_matrices(view.intrinsics, T_camera_lidar(sample, camera, lidar)[:3])
-            scan = {
-                "index": sample.index,
+            write_bytes(stem.with_suffix(".bin"), xyzi_bytes(points))
+            write_bytes(stem.with_suffix(".label"), point_labels(points, sample.scene).tobytes())
+            row = {
                 "scene": sample.scene_index,
-                "split": sample.split,
-                "pose": [float(v) for v in view.T_world_camera.matrix().ravel()],
-                "calib": matrix_lines({k: calib[k] for k in ("P0", "P1", "P2", "P3")})
-                + matrix_lines({"Tr": calib["Tr_velo_to_cam"]}),
+                "time_s": instant_s(sample, lidar),
+                "T_world_camera": mounted_pose(sample.scene, camera_mount(sample.scene, camera)),
+                "calib": _calib(sample.scene, camera, lidar),
             }
-            lines.append(canonical_json(scan) + "\n")
-        (folder / "scans.jsonl").write_text("".join(lines), encoding="utf-8", newline="\n")
+            rows.append(frame_facts(info, sample) | row)
+        write_frames(folder, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
-        """Number the scans of each split, and the things in them."""
-        del info
-        scans = list(_scans([shard_dir / self.type for shard_dir in shard_dirs]))
-        for split, number in SEQUENCES.items():
-            mine = [(folder, scan) for folder, scan in scans if scan["split"] == split]
-            if mine:
-                _write_sequence(mine, dataset_dir / "sequences" / number)
+        """Number the scans of each sequence, and the things in them."""
+        sequences = read_sequences(shard_dirs, self.type)
+        if info.steps_per_scene == 1:
+            sequences = _by_split(sequences)
+        splits: dict[str, list[int]] = {}
+        for number, scans in sequences.items():
+            _write_sequence(info, scans, dataset_dir / f"sequences/{number:02d}")
+            splits.setdefault(scans[0].row["split"], []).append(number)
+        lines = (f"  {OFFICIAL_SPLITS[k]}: {splits.get(k, [])}\n" for k in OFFICIAL_SPLITS)
+        write_text(dataset_dir / "split.yaml", "split:\n" + "".join(lines))
 
 
 def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
@@ -158,6 +188,10 @@ def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
         k, category = thing.instance_id, thing.category
         counted[k] = category in THINGS
         named[k] = THINGS.get(category, STUFF.get(category, OTHER_OBJECT))
+        if dict(thing.attributes).get("rider") == "yes":
+            named[k] = RIDDEN.get(category, named[k])
+        if math.hypot(*thing.twist.velocity_m_s) > MOVING_M_S:
+            named[k] = MOVING.get(int(named[k]), named[k])
         leafy[k], signed[k] = named[k] == VEGETATION, category == "traffic_sign"
     ids, surfaces = points["instance_id"].astype(np.int64), points["surface"]
     ground = of_surface[surfaces]
@@ -170,29 +204,44 @@ def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
     return labels
 
 
-def _scans(folders: Sequence[Path]) -> Iterator[tuple[Path, dict[str, Any]]]:
-    for folder in folders:
-        for line in (folder / "scans.jsonl").read_text("utf-8").splitlines():
-            yield folder, json.loads(line)
+def _calib(scene: Scene, camera: str, lidar: str) -> str:
+    T_camera_lidar = between(scene, camera_mount(scene, camera), lidar_mount(scene, lidar))
+    calib = calib_matrices(scene.camera(camera).intrinsics, T_camera_lidar.matrix()[:3])
+    projections = {k: calib[k] for k in ("P0", "P1", "P2", "P3")}
+    return matrix_lines(projections | {"Tr": calib["Tr_velo_to_cam"]})
 
 
-def _write_sequence(scans: Sequence[tuple[Path, dict[str, Any]]], folder: Path) -> None:
-    (folder / "labels").mkdir(parents=True, exist_ok=True)
+def _by_split(sequences: Mapping[int, Sequence[Frame]]) -> dict[int, list[Frame]]:
+    """Scans of views of one instant, together by split."""
+    frames = [frame for scans in sequences.values() for frame in scans]
+    together = {
+        number: [frame for frame in frames if frame.row["split"] == split]
+        for split, number in SEQUENCES.items()
+    }
+    return {number: scans for number, scans in together.items() if scans}
+
+
+def _write_sequence(info: DatasetInfo, scans: Sequence[Frame], folder: Path) -> None:
+    single = info.steps_per_scene == 1
     numbers: dict[tuple[int, int], int] = {}
-    first = np.linalg.inv(np.array(scans[0][1]["pose"]).reshape(4, 4))
+    T_first_world = from_plain(SE3, scans[0].row["T_world_camera"]).inverse()
     poses = []
-    for k, (source, scan) in enumerate(scans):
-        stem = source / f"{scan['index']:09d}"
+    for k, scan in enumerate(scans):
+        stem = scan.shard_dir / "semantickitti" / f"{scan.index:09d}"
         link_or_copy(stem.with_suffix(".bin"), folder / f"velodyne/{k:06d}.bin")
-        labels = np.frombuffer(stem.with_suffix(".label").read_bytes(), "<u4")
-        labels = _renumbered(labels, scan["scene"], numbers)
-        (folder / f"labels/{k:06d}.label").write_bytes(labels.tobytes())
-        pose = first @ np.array(scan["pose"]).reshape(4, 4)
-        poses.append(" ".join(f"{v + 0.0:.9e}" for v in pose[:3].ravel()) + "\n")
-    _write(folder / "poses.txt", "".join(poses))
-    _write(folder / "times.txt", "".join(f"{SWEEP_S * k:.6e}\n" for k in range(len(scans))))
-    _write(folder / "calib.txt", scans[0][1]["calib"])
-    _write(folder / "scans.txt", "".join(f"{scan['index']}\n" for _, scan in scans))
+        target = folder / f"labels/{k:06d}.label"
+        if single:
+            labels = np.frombuffer(stem.with_suffix(".label").read_bytes(), "<u4")
+            write_bytes(target, _renumbered(labels, scan.row["scene"], numbers).tobytes())
+        else:
+            link_or_copy(stem.with_suffix(".label"), target)
+        pose = (T_first_world @ from_plain(SE3, scan.row["T_world_camera"])).rounded(9)
+        poses.append(matrix_numbers(pose.matrix()[:3]) + "\n")
+    times_s = [SWEEP_S * k if single else scan.row["time_s"] for k, scan in enumerate(scans)]
+    write_text(folder / "poses.txt", "".join(poses))
+    write_text(folder / "times.txt", "".join(f"{time_s:.6e}\n" for time_s in times_s))
+    write_text(folder / "calib.txt", scans[0].row["calib"])
+    write_text(folder / "scans.txt", "".join(f"{scan.index}\n" for scan in scans))
 
 
 def _renumbered(
@@ -211,7 +260,3 @@ def _renumbered(
         table[old] = new
     renumbered: NDArray[np.uint32] = (labels & np.uint32(0xFFFF)) | (table[ids] << np.uint32(16))
     return renumbered
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")

@@ -9,6 +9,7 @@ TABLE = PluginTable(
     {
         "along": "randomizers.along:Along",
         "arm_configuration": "randomizers.arm_configuration:ArmConfiguration",
+        "arm_motion": "randomizers.arm_motion:ArmMotion",
         "backdrop": "randomizers.backdrop:Backdrop",
         "camera_intrinsics": "randomizers.camera_intrinsics:CameraIntrinsics",
         "camera_on_lane": "randomizers.camera_on_lane:CameraOnLane",
@@ -22,6 +23,7 @@ TABLE = PluginTable(
         "materials": "randomizers.materials:Materials",
         "objects": "randomizers.objects:Objects",
         "physics_properties": "randomizers.physics_properties:PhysicsProperties",
+        "rig_calibration": "randomizers.rig_calibration:RigCalibration",
         "street_lights": "randomizers.street_lights:StreetLights",
         "textures": "randomizers.textures:Textures",
         "time_of_day": "randomizers.time_of_day:TimeOfDay",

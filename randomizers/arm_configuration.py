@@ -13,7 +13,7 @@ from generator.core.errors import ConfigError, did_you_mean
 from generator.core.geometry import Joint, RobotModel
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import ArmGoal, Articulation, Body, Scene
-from generator.core.se3 import SE3
+from generator.core.se3 import SE3, Vec3
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
 from randomizers.placing import half_extents_m
@@ -69,13 +69,13 @@ class ArmConfiguration(RandomizerBase):
         if mode == "joints" or robot.gripper is None:
             joints = tuple(self._joints(robot, rng) for _ in range(self.candidates))
             return ArmGoal("joints", joint_candidates=joints, opening=opening)
-        poses = tuple(self._pose(arm, rng) for _ in range(self.candidates))
+        poses = tuple(hand_over(arm, self.tilt_deg, rng) for _ in range(self.candidates))
         if held:
             return ArmGoal("hold", pose_candidates=poses, opening=opening, held=held)
         return ArmGoal("reach", pose_candidates=poses, opening=opening)
 
     def _joints(self, robot: RobotModel, rng: Rng) -> tuple[float, ...]:
-        return tuple(self._position(joint, rng) for joint in _arm_joints(robot))
+        return tuple(self._position(joint, rng) for joint in arm_joints(robot))
 
     def _position(self, joint: Joint, rng: Rng) -> float:
         low, high = joint.lower, joint.upper
@@ -84,25 +84,41 @@ class ArmConfiguration(RandomizerBase):
         middle, half = 0.5 * (low + high), 0.5 * (high - low) * self.range_share
         return round(middle + half * float(rng.uniform(-1.0, 1.0)), 6)
 
-    def _pose(self, arm: Articulation, rng: Rng) -> SE3:
-        """A hand over the workspace, pointing down but for a tilt in any direction."""
-        low, high = arm.workspace_m
-        x, y, z = (float(rng.uniform(a, b)) for a, b in zip(low, high, strict=True))
-        half_tilt = 0.5 * math.radians(self.tilt_deg.draw(rng))
-        towards = float(rng.uniform(0.0, 2.0 * math.pi))
-        lean = SE3(
-            quaternion_wxyz=(
-                math.cos(half_tilt),
-                math.sin(half_tilt) * math.cos(towards),
-                math.sin(half_tilt) * math.sin(towards),
-                0.0,
-            )
+
+def hand_over(arm: Articulation, tilt_deg: NonNegative, rng: Rng) -> SE3:
+    """``T_world_grasp`` over an arm's workspace, pointing down but for a tilt in any direction."""
+    low, high = arm.workspace_m
+    x, y, z = (float(rng.uniform(a, b)) for a, b in zip(low, high, strict=True))
+    tilt_rad = math.radians(tilt_deg.draw(rng))
+    towards_rad = float(rng.uniform(0.0, 2.0 * math.pi))
+    yaw_rad = float(rng.uniform(0.0, 2.0 * math.pi))
+    return hand_pose((x, y, z), yaw_rad, tilt_rad, towards_rad)
+
+
+def hand_pose(
+    position_m: Vec3, yaw_rad: float, tilt_rad: float = 0.0, towards_rad: float = 0.0
+) -> SE3:
+    """``T_world_grasp`` of a hand that points down.
+
+    Args:
+        position_m: Where the grasp frame is.
+        yaw_rad: Turn about Z.
+        tilt_rad: How far the hand leans from the vertical.
+        towards_rad: Direction of the level axis about which it leans.
+    """
+    half = 0.5 * tilt_rad
+    lean = SE3(
+        quaternion_wxyz=(
+            math.cos(half),
+            math.sin(half) * math.cos(towards_rad),
+            math.sin(half) * math.sin(towards_rad),
+            0.0,
         )
-        yaw = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)))
-        return (SE3((x, y, z)) @ lean @ yaw @ FLIP).rounded()
+    )
+    return (SE3(position_m) @ lean @ SE3.about_z(yaw_rad) @ FLIP).rounded()
 
 
-def _arm_joints(robot: RobotModel) -> tuple[Joint, ...]:
+def arm_joints(robot: RobotModel) -> tuple[Joint, ...]:
     """Joints that a goal has a position for: no finger, none that follows another."""
     fingers = robot.gripper.finger_joints if robot.gripper else ()
     return tuple(j for j in robot.movable if not j.mimic and j.name not in fingers)

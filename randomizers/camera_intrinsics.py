@@ -7,40 +7,125 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 from generator.config.distributions import Bounds, Normal, Scalar, Uniform
+from generator.config.strict import Strict
+from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
 from generator.core.interfaces import AssetIndex
 from generator.core.intrinsics import Intrinsics
+from generator.core.lens import COEFFICIENTS, Lens
 from generator.core.scene import Camera, Scene
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
 
+PINHOLE_MAX_DEG = 170.0
 
-class CameraIntrinsics(RandomizerBase):
-    """Draws the field of view and the principal point of every camera.
+
+class Coefficients(Strict):
+    """Coefficients of a camera's lens; null = as its sensor says.
 
     Attributes:
-        hfov_deg: Horizontal field of view.
-        principal_offset_px: How far the principal point is from the centre, along each axis.
+        k1, k2, k3, k4, k5, k6: Radial terms, as the lens's model has them.
+        p1, p2: Tangential terms.
+    """
+
+    k1: Scalar | None = None
+    k2: Scalar | None = None
+    k3: Scalar | None = None
+    k4: Scalar | None = None
+    k5: Scalar | None = None
+    k6: Scalar | None = None
+    p1: Scalar | None = None
+    p2: Scalar | None = None
+
+
+class CameraIntrinsics(RandomizerBase):
+    """Draws the field of view, the principal point and the distortion of cameras.
+
+    Attributes:
+        camera: Name of a sensor; empty = every camera, each drawn for itself.
+        hfov_deg: Horizontal field of view; null = as its sensor says, with its principal point.
+        principal_offset_px: How far the principal point is from there, along each axis.
+        lens: Coefficients of the model of lens that the sensor has.
     """
 
     type: Literal["camera_intrinsics"] = "camera_intrinsics"
     every: Literal["scene", "view"] = "view"
-    hfov_deg: Annotated[Scalar, Bounds(1, 170)] = Uniform(50.0, 70.0)
+    camera: str = ""
+    hfov_deg: Annotated[Scalar, Bounds(1, 360)] | None = Uniform(50.0, 70.0)
     principal_offset_px: Scalar = Normal(0.0, 3.0, clip=(-10.0, 10.0))
+    lens: Coefficients = Coefficients()
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with other lenses; square pixels, the same image size."""
+        """The scene with other lenses; the same models and image sizes.
+
+        Raises:
+            ConfigError: there is no such camera, or its lens is of a model without what is drawn.
+            LayoutRejected: what was drawn is no lens: it folds over inside the image.
+        """
         del assets
-        return replace(scene, cameras=tuple(self._with_lens(c, rng) for c in scene.cameras))
+        known = [camera.name for camera in scene.cameras]
+        if self.camera and self.camera not in known:
+            raise ConfigError(
+                f"randomizers.{self.name}.camera: there is no camera '{self.camera}'; expected one "
+                f"of {', '.join(known)}{did_you_mean(self.camera, known)}"
+            )
+        cameras = tuple(
+            self._with_lens(camera, rng) if self.camera in ("", camera.name) else camera
+            for camera in scene.cameras
+        )
+        return replace(scene, cameras=cameras)
 
     def _with_lens(self, camera: Camera, rng: Rng) -> Camera:
         before = camera.intrinsics
-        width, height = before.width_px, before.height_px
-        lens = Intrinsics.from_hfov(width, height, math.radians(self.hfov_deg.draw(rng)))
-        return replace(
-            camera,
-            intrinsics=replace(
-                lens,
-                cx_px=round(lens.cx_px + self.principal_offset_px.draw(rng), 4),
-                cy_px=round(lens.cy_px + self.principal_offset_px.draw(rng), 4),
-            ),
+        self._require_fitting(camera)
+        hfov_deg = None if self.hfov_deg is None else self.hfov_deg.draw(rng)
+        offset_x, offset_y = (self.principal_offset_px.draw(rng) for _ in range(2))
+        lens = self._lens(before.lens, rng)
+        try:
+            drawn = replace(before, lens=lens)
+            if hfov_deg is not None:
+                hfov_rad = math.radians(hfov_deg)
+                drawn = Intrinsics.from_hfov(before.width_px, before.height_px, hfov_rad, lens)
+        except ValueError as error:
+            raise self._rejected() from error
+        drawn = replace(
+            drawn,
+            cx_px=round(drawn.cx_px + offset_x, 4),
+            cy_px=round(drawn.cy_px + offset_y, 4),
+        )
+        if drawn.folds_over():
+            raise self._rejected()
+        return replace(camera, intrinsics=drawn)
+
+    def _lens(self, before: Lens, rng: Rng) -> Lens:
+        drawn = []
+        for name, usual in zip(COEFFICIENTS[before.model], before.coefficients, strict=True):
+            given: Scalar | None = getattr(self.lens, name)
+            drawn.append(usual if given is None else round(given.draw(rng), 9))
+        return replace(before, coefficients=tuple(drawn))
+
+    def _require_fitting(self, camera: Camera) -> None:
+        lens = camera.intrinsics.lens
+        given = [name for name, value in self.lens if value is not None]
+        missing = [name for name in given if name not in COEFFICIENTS[lens.model]]
+        if missing:
+            known = " ".join(COEFFICIENTS[lens.model]) or "no coefficients"
+            raise ConfigError(
+                f"randomizers.{self.name}.lens: camera '{camera.name}' has a lens of the model "
+                f"'{lens.model}' with {known}, not {' '.join(missing)}; give sensor "
+                f"'{camera.name}' another lens or name another camera"
+            )
+        widest_deg = 0.0 if self.hfov_deg is None else self.hfov_deg.support()[1]
+        if lens.model == "pinhole" and widest_deg > PINHOLE_MAX_DEG:
+            raise ConfigError(
+                f"randomizers.{self.name}.hfov_deg: {widest_deg:g} degrees are too wide for the "
+                f"pinhole of camera '{camera.name}'; expected at most {PINHOLE_MAX_DEG:g}"
+            )
+
+    def _rejected(self) -> LayoutRejected:
+        return LayoutRejected(
+            Rejection(
+                "the lens that was drawn folds over inside the image",
+                f"narrow hfov_deg or the coefficients of randomizers.{self.name}.lens, or end the "
+                "sensor's lens with field_deg",
+            )
         )

@@ -33,7 +33,7 @@ TRIES = 64
 
 
 class CameraOnLane(RandomizerBase):
-    """Puts every camera over a lane, looking along it.
+    """Puts every camera that is on no rig over a lane, looking along it.
 
     Attributes:
         lanes: Kinds of the lanes it may be on.
@@ -69,7 +69,7 @@ class CameraOnLane(RandomizerBase):
     beam_cd: NonNegative = Constant(0.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with all cameras at one place.
+        """The scene with all cameras without a rig at one place.
 
         Raises:
             ConfigError: there is no such lane.
@@ -92,7 +92,7 @@ class CameraOnLane(RandomizerBase):
         for _ in range(TRIES):
             pose = self._drawn(lines, ground, scene, assets, rng)
             if pose is not None:
-                cameras = tuple(_moved(camera, pose[1]) for camera in scene.cameras)
+                cameras = tuple(c if c.rig else _moved(c, pose[1]) for c in scene.cameras)
                 lit = replace(scene, cameras=cameras)
                 return self._with_beams(lit, pose[0], self.beam_cd.draw(rng))
         remedy = f"other lanes, a smaller free_m, or less traffic (randomizers.{self.name})"

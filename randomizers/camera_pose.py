@@ -24,7 +24,7 @@ class CameraPose(RandomizerBase):
     """An orbit around what the scene is about.
 
     Attributes:
-        camera: Name of a sensor; empty = every camera, each drawn for itself.
+        camera: Name of a sensor; empty = every camera that is on no rig, each drawn for itself.
         distance_m: From the point it looks at.
         azimuth_deg: Around the vertical; 0 is the side of +X, 90 that of +Y.
         elevation_deg: Height over the horizon.
@@ -45,14 +45,16 @@ class CameraPose(RandomizerBase):
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with cameras elsewhere; none is inside a body or outside the room."""
-        known = [camera.name for camera in scene.cameras]
+        known = [camera.name for camera in scene.cameras if not camera.rig]
         if self.camera and self.camera not in known:
             raise ConfigError(
-                f"randomizers.{self.name}.camera: there is no camera '{self.camera}'; expected one "
-                f"of {', '.join(known)}{did_you_mean(self.camera, known)}"
+                f"randomizers.{self.name}.camera: there is no camera '{self.camera}' off a rig; "
+                f"expected one of {', '.join(known) or 'none'}{did_you_mean(self.camera, known)}"
             )
         cameras = tuple(
-            self._moved(camera, scene, assets, rng) if self.camera in ("", camera.name) else camera
+            self._moved(camera, scene, assets, rng)
+            if camera.name in known and self.camera in ("", camera.name)
+            else camera
             for camera in scene.cameras
         )
         return replace(scene, cameras=cameras)

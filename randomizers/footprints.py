@@ -39,16 +39,17 @@ class Footprint:
         return Footprint(self.x_m, self.y_m, half_x_m, half_y_m, self.yaw_rad)
 
     def row(self) -> tuple[float, ...]:
-        """Centre, half extents, cosine and sine of the direction."""
+        """Centre, half extents, cosine and sine of the direction, half diagonal."""
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        return (self.x_m, self.y_m, self.half_x_m, self.half_y_m, c, s)
+        reach_m = math.hypot(self.half_x_m, self.half_y_m)
+        return (self.x_m, self.y_m, self.half_x_m, self.half_y_m, c, s, reach_m)
 
 
 @dataclass
 class Ground:
     """Footprints of all that stands already."""
 
-    _rows: Array = field(default_factory=lambda: np.zeros((64, 6)))
+    _rows: Array = field(default_factory=lambda: np.zeros((64, 7)))
     _count: int = 0
 
     def add(self, footprint: Footprint) -> None:
@@ -63,9 +64,10 @@ class Ground:
         others = self._rows[: self._count]
         own = np.array(footprint.row())
         delta = others[:, :2] - own[:2]
-        reach = np.hypot(others[:, 2], others[:, 3]) + math.hypot(own[2], own[3])
-        near = np.sum(delta * delta, axis=1) < reach * reach
-        return not bool(_overlap(own, others[near], delta[near]).any())
+        reach = others[:, 6] + own[6]
+        dx, dy = delta.T
+        near = np.flatnonzero(dx * dx + dy * dy < reach * reach)
+        return not (near.size and _overlap(own, others[near], delta[near]).any())
 
 
 def ground_of(bodies: Iterable[Body], assets: AssetIndex) -> Ground:

@@ -170,7 +170,7 @@ def standing_of(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex) -
             rows.append((x, y, POST_M, POST_M, 1.0, 0.0))
         else:
             bounds_m = assets.bounds_m(body.asset)
-            rows.append(Footprint.of(body.T_world_body, bounds_m, body.scale).row())
+            rows.append(Footprint.of(body.T_world_body, bounds_m, body.scale).row()[:6])
         names.append(body.name)
         categories.append(category)
     return Standing(tuple(names), tuple(categories), np.array(rows).reshape(-1, 6))

@@ -2,38 +2,47 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
+from generator.core.geometry import RobotModel
 from generator.core.interfaces import AssetIndex
-from generator.core.kinematics import link_bodies
-from generator.core.scene import Articulation, Instance, Scene
+from generator.core.kinematics import finger_links, link_bodies, link_poses, rigid_group
+from generator.core.scene import Articulation, Instance, Rig, Scene
 from generator.core.se3 import SE3, Vec3
 from scene_templates.element import PlacedElement, next_instance_id, surfaces_of
 
 CATEGORY = "robot_arm"
+R_GRASP_RIG = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
+"""A rig's X axis is a grasp frame's Z axis; their Y axes are one."""
 
 
 class Robot(PlacedElement):
     """A robot, standing at its home pose until a randomizer moves its arm.
 
+    Its wrist is a rig, ``<name>_wrist``, that sensors may be mounted on: X out of the hand, Y the
+    direction in which the fingers open.
+
     Attributes:
-        asset: franka_panda, kuka_iiwa, xarm6, or a robot of yours.
+        asset: franka_panda, kuka_iiwa, xarm6, one of a pack, or one of yours; of several, the
+            first that is installed.
         reach_m: Its hand is sent no farther than this from its base.
         annotate: Whether labels are written for it.
     """
 
     type: Literal["robot"] = "robot"
-    asset: str = "franka_panda"
+    asset: str | Annotated[tuple[str, ...], Field(min_length=1)] = "franka_panda"
     reach_m: float = Field(0.75, gt=0)
     annotate: bool = True
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """An articulation, one instance, and a body per visible link."""
-        robot = assets.robot(self.asset)
+        asset = self._installed(assets)
+        robot = assets.robot(asset)
         T_world_base = self.pose(scene).rounded()
         instance_id = next_instance_id(scene)
         parts = tuple(link for link in robot.links if link in robot.visuals)
@@ -42,14 +51,14 @@ class Robot(PlacedElement):
             self.name,
             CATEGORY,
             0,
-            self.asset,
+            asset,
             annotated=self.annotate,
             parts=parts,
             T_world_instance=T_world_base,
         )
         articulation = Articulation(
             name=self.name,
-            asset=self.asset,
+            asset=asset,
             instance_id=instance_id,
             T_world_base=T_world_base,
             joint_positions=robot.home,
@@ -60,7 +69,14 @@ class Robot(PlacedElement):
             instances=(*scene.instances, instance),
             articulations=(*scene.articulations, articulation),
             bodies=(*scene.bodies, *link_bodies(articulation, robot, parts)),
+            rigs=(*scene.rigs, wrist(f"{self.name}_wrist", self.name, robot)),
         )
+
+    def _installed(self, assets: AssetIndex) -> str:
+        """The first of its assets that there is; the first one, to be missed, if there is none."""
+        wanted = (self.asset,) if isinstance(self.asset, str) else self.asset
+        known = {asset.asset_id for asset in assets.find((), kind="robot")}
+        return next((name for name in wanted if name in known), wanted[0])
 
     def _workspace_m(self, scene: Scene, T_world_base: SE3) -> tuple[Vec3, Vec3]:
         """The air over the surface it stands on, as far as it reaches."""
@@ -75,3 +91,19 @@ class Robot(PlacedElement):
             high = [min(high[k], float(around[:, k].max())) for k in (0, 1)]
         low, high = [round(v, 6) for v in low], [round(v, 6) for v in high]
         return (low[0], low[1], z + 0.10), (high[0], high[1], z + 0.50)
+
+
+def wrist(name: str, arm: str, robot: RobotModel) -> Rig:
+    """The rig on a robot's hand; on its last link if it has no gripper."""
+    fixed = [link for link in robot.links if link not in finger_links(robot)]
+    hand, turn = fixed[-1], SE3().quaternion_wxyz
+    if robot.gripper is not None:
+        hand, turn = robot.gripper.link, robot.gripper.T_link_grasp.quaternion_wxyz
+    # The hand may be a mere frame: what carries the rig is the last thing to be seen before it.
+    with_it = [k for k in fixed if k in robot.visuals and k in rigid_group(robot, hand)]
+    visible = with_it or [k for k in fixed if k in robot.visuals]
+    carrier = hand if hand in visible else visible[-1]
+    poses = link_poses(robot, SE3(), robot.home)
+    T_carrier_hand = poses[carrier].inverse() @ poses[hand]
+    T_hand_rig = SE3((0.0, 0.0, 0.0), turn) @ SE3((0.0, 0.0, 0.0), R_GRASP_RIG)
+    return Rig(name, f"{arm}/{carrier}", (T_carrier_hand @ T_hand_rig).rounded())

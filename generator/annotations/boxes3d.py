@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from generator.core.boxes import OrientedBox
 from generator.core.capture import Channel, Reading
-from generator.core.sample import ObjectTruth
+from generator.core.interfaces import AssetLibrary
+from generator.core.sample import FrameTruth, ObjectTruth
 from generator.core.scene import Instance, Scene
 from generator.core.se3 import SE3
 
 
 @dataclass(frozen=True, slots=True)
 class Boxes3d:
-    """The instance's tight box along its own axes, in the world frame and in the camera frame."""
+    """The instance's tight box along its own axes, in the world and in sensors' frames."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
 
@@ -25,6 +27,23 @@ class Boxes3d:
         return replace(
             truth, box3d_world=box_world, box3d_camera=box_world.seen_from(T_camera_world)
         )
+
+    def annotate_frame(
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: FrameTruth
+    ) -> FrameTruth:
+        """Fill in ``boxes3d``: in the ego's frame, and in every laser scanner's at its instant."""
+        del assets
+        frames = {"ego": boxes_in(scenes[""], truth.T_world_ego)} if truth.rig else {}
+        for name in sorted(scenes.keys() - {""}):
+            frames[name] = boxes_in(scenes[name], scenes[name].lidar(name).T_world_lidar)
+        return replace(truth, boxes3d=frames)
+
+
+def boxes_in(scene: Scene, T_world_frame: SE3) -> dict[int, OrientedBox]:
+    """The boxes of all annotated instances in a frame, by instance id."""
+    T_frame_world = T_world_frame.inverse()
+    things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
+    return {i.instance_id: oriented_box(i).seen_from(T_frame_world) for i in things}
 
 
 def oriented_box(instance: Instance) -> OrientedBox:

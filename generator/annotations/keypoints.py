@@ -22,14 +22,14 @@ LEAST_COSINE = 1.0 / 3.0
 class Keypoints:
     """Points of instances that have them: image and camera coordinates, and COCO's visibility.
 
-    0 = not in the image (or behind the camera), 1 = in the image and hidden, by other things or
+    0 = not in the image (nor in the lens's field), 1 = in the image and hidden, by other things or
     by the object itself, 2 = visible. A point is seen through the surface of its own object as
     long as it lies no deeper below it than its radius. Depth is measured across the surface, as
     for a hub below the face of its wheel, which is seen from the side and obliquely alike.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset(
-        {Channel.INSTANCE, Channel.Z_DEPTH, Channel.NORMALS}
+        {Channel.INSTANCE, Channel.RANGE, Channel.NORMALS}
     )
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
@@ -49,8 +49,6 @@ def _found(reading: Reading, instance_id: int, point: Keypoint, p_camera: Array)
     camera = reading.camera.intrinsics
     x, y, z = (float(v) for v in p_camera)
     position_m: Vec3 = (x, y, z)
-    if z <= 0:
-        return KeypointTruth(point.name, position_m)
     u, v = (float(w) for w in camera.project(p_camera))
     if not (0 <= u < camera.width_px and 0 <= v < camera.height_px):
         return KeypointTruth(point.name, position_m)
@@ -67,9 +65,9 @@ def is_visible(
     silhouette: then one of the eight neighbours has to show the instance.
 
     Args:
-        reading: With ids, z-depth and normals.
+        reading: With ids, range and normals.
         instance_id: Of the instance that the point belongs to.
-        p_camera: The point [m], camera frame, in front of the camera.
+        p_camera: The point [m], camera frame.
         pixel: Column and row of its image.
         radius_m: How deep it may lie below the surface.
     """
@@ -79,7 +77,7 @@ def is_visible(
     centre = (row - top, column - left)
     own = reading.channels[Channel.INSTANCE][window] == instance_id
     distance_m = math.sqrt(float(p_camera @ p_camera))
-    along_m = (1.0 - reading.channels[Channel.Z_DEPTH][window] / p_camera[2]) * distance_m
+    along_m = distance_m - reading.channels[Channel.RANGE][window]
     cosine = np.abs(reading.channels[Channel.NORMALS][window] @ (p_camera / distance_m))
     shallow = along_m * np.maximum(cosine, LEAST_COSINE) <= radius_m
     if own[centre]:

@@ -1,8 +1,8 @@
-"""The truth about one image: which instances are in it, and what the annotators say of them."""
+"""The truth about one image or sample: what is in it, and what the annotators say of that."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from pydantic import Field
 
@@ -11,9 +11,12 @@ from generator.annotations.validity import check_truth
 from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.errors import ConfigError
-from generator.core.interfaces import Annotator
-from generator.core.sample import ImageTruth, ObjectTruth
+from generator.core.instants import ego_rig, rig_twist
+from generator.core.interfaces import Annotator, AssetLibrary, FrameAnnotator, ImageAnnotator
+from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth
 from generator.core.scene import Scene
+
+AnyAnnotator = Annotator | ImageAnnotator | FrameAnnotator
 
 
 class Thresholds(Strict):
@@ -32,16 +35,61 @@ class Thresholds(Strict):
     """Annotate every instance, hidden ones too; the other thresholds then do not apply."""
 
 
-def image_truth(
-    scene: Scene, reading: Reading, annotators: Sequence[Annotator], thresholds: Thresholds
+def complete_truth(
+    scene: Scene,
+    reading: Reading,
+    annotators: Sequence[AnyAnnotator],
+    thresholds: Thresholds,
+    assets: AssetLibrary,
 ) -> ImageTruth:
-    """Annotations of one reading, in order of instance id; none where nothing annotates.
+    """Annotations of one reading: of its objects, and of the image as a whole.
+
+    Raises:
+        SampleError, ConfigError: see ``image_truth``.
+    """
+    truth = image_truth(scene, reading, annotators, thresholds)
+    for annotator in annotators:
+        if isinstance(annotator, ImageAnnotator):
+            truth = annotator.annotate_image(scene, assets, reading, truth)
+    return truth
+
+
+def frame_truth(
+    scenes: Mapping[str, Scene], annotators: Sequence[AnyAnnotator], assets: AssetLibrary
+) -> FrameTruth | None:
+    """Annotations of one sample as a whole; None where nothing annotates it.
+
+    Args:
+        scenes: As ``FrameAnnotator`` has them.
+        annotators: All of the data set.
+        assets: Geometry.
+    """
+    of_frames = [a for a in annotators if isinstance(a, FrameAnnotator)]
+    if not of_frames:
+        return None
+    scene = scenes[""]
+    rig = ego_rig(scene)
+    truth = FrameTruth()
+    if rig is not None:
+        truth = FrameTruth(rig.name, scene.rig_pose(rig.name).rounded(), rig_twist(scene, rig))
+    for annotator in of_frames:
+        truth = annotator.annotate_frame(scenes, assets, truth)
+    return truth
+
+
+def image_truth(
+    scene: Scene, reading: Reading, annotators: Sequence[AnyAnnotator], thresholds: Thresholds
+) -> ImageTruth:
+    """Annotations of the objects in one reading, in order of instance id.
+
+    Annotators that are about no single object are passed over.
 
     Raises:
         SampleError: if the labels of an instance contradict each other or the images.
         ConfigError: if a threshold needs an annotation that is not made.
     """
-    if not annotators:
+    of_objects = [a for a in annotators if isinstance(a, Annotator)]
+    if not of_objects:
         return ImageTruth(reading.camera, ())
     seen = extents(reading.channels[Channel.INSTANCE])
     instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
@@ -55,7 +103,7 @@ def image_truth(
             visible_px=extent.visible_px if extent else 0,
             box=extent.box if extent else None,
         )
-        for annotator in annotators:
+        for annotator in of_objects:
             truth = annotator.annotate(scene, reading, truth)
         check_truth(reading, truth)
         if is_listed(truth, thresholds):

@@ -12,6 +12,7 @@ import scene_templates
 from generator.config.document import Node, load, merge, with_override
 from generator.config.problems import Position, Problems
 from generator.core.errors import ConfigError, did_you_mean
+from generator.sensors.sheets import with_files
 
 SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
@@ -67,7 +68,16 @@ def resolved_document(
         if not separator:
             raise ConfigError(f"--set {text}: expected KEY=VALUE")
         resolved = with_override(resolved, path.strip(), value.strip())
-    return _without_randomizers(resolved, without)
+    return _without_randomizers(_with_sensor_files(resolved), without)
+
+
+def _with_sensor_files(document: Node) -> Node:
+    """The document with what sensors keep in files in their places."""
+    content, sensors = dict(_mapping(document)), document.get("sensors")
+    if sensors is not None and isinstance(sensors.content, tuple):
+        listed = tuple(with_files(sensor) for sensor in sensors.content)
+        content["sensors"] = Node(sensors.position, listed, sensors.key_positions)
+    return Node(document.position, content, document.key_positions)
 
 
 def config_document(name: str) -> Node:

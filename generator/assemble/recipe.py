@@ -4,27 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 
 import cv2
 
-from generator.annotations.truth import image_truth
+from generator.annotations.truth import AnyAnnotator, complete_truth, frame_truth
 from generator.assemble.spec import Layout, Spec
 from generator.assemble.tables import TABLES
 from generator.assets.library import Library, open_library
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
-from generator.core.interfaces import Annotator, AssetIndex, DatasetInfo, Exporter, Renderer
+from generator.core.interfaces import AssetIndex, DatasetInfo, Exporter, Renderer
 from generator.core.scene import Scene, SharedValue
 from generator.core.streams import Streams
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
 from generator.pipeline.pipeline import Blueprint, Recipe
-from generator.sensors.mounting import stride
+from generator.sensors.mounting import refuse_buried, stride, within_steps
 from scene_templates.builder import build
 
 BLUEPRINTS_KEPT = 32
 IMAGING = ("camera", "lidar")
+LOOKING = (*IMAGING, "event_camera")
+"""Modalities that see nothing from inside the body that carries them."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +48,30 @@ class PipelineFactory:
         cv2.setNumThreads(1)
         spec = self.spec
         library = open_library(spec.asset_folders)
-        recipe = recipe_of(spec, library, self.n, self.extra_channels)
+        recipe = recipe_of(spec, library, self.n, self.categories, self.extra_channels)
         return Pipeline(
             recipe,
             library,
             open_physics=partial(open_engine, library, spec.head.physics),
-            renderer=_renderer(spec, library),
+            open_renderer=partial(_renderer, spec, library),
         )
+
+    @cached_property
+    def nominal(self) -> tuple[Scene, ...]:
+        """Nominal scenes that between them hold whatever a scene may hold."""
+        library = open_library(self.spec.asset_folders)
+        return tuple(nominal_scene(self.spec, layout, library) for layout in self.spec.probes)
+
+    @cached_property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names of all categories that a sample may contain."""
+        return categories_of(self.nominal, open_library(self.spec.asset_folders))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Other processes are told the categories, which take a second to find out."""
+        categories = self.categories
+        told = {name: value for name, value in self.__dict__.items() if name != "nominal"}
+        return {**told, "categories": categories}
 
 
 def open_pipeline(spec: Spec, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
@@ -61,7 +80,11 @@ def open_pipeline(spec: Spec, extra_channels: frozenset[Channel] = frozenset()) 
 
 
 def recipe_of(
-    spec: Spec, library: Library, n: int, extra_channels: frozenset[Channel] = frozenset()
+    spec: Spec,
+    library: Library,
+    n: int,
+    categories: tuple[str, ...],
+    extra_channels: frozenset[Channel],
 ) -> Recipe:
     """Everything that samples depend on, resolved.
 
@@ -76,7 +99,7 @@ def recipe_of(
         seed=spec.head.seed,
         n=n,
         views_per_scene=spec.head.views_per_scene,
-        categories=categories_of(nominal_scenes(spec, library), library),
+        categories=categories,
         sensors=tuple(sorted(s.name for s in spec.sensors if s.modality == "camera")),
         lidars=tuple(sorted(s.name for s in spec.sensors if s.modality == "lidar")),
         media={s.name: tuple(s.media) for s in spec.sensors if s.modality == "camera"},
@@ -84,6 +107,7 @@ def recipe_of(
         devices={s.name: s.modality for s in spec.sensors if s.modality not in IMAGING},
         steps_per_scene=spec.head.steps_per_scene,
         step_s=spec.head.step_s,
+        lenses={s.name: s.intrinsics().lens.model for s in spec.sensors if s.modality == "camera"},
     )
     exporters = _exporters(spec, info)
     needed = frozenset().union(*(a.channels for a in annotators), extra_channels)
@@ -93,12 +117,16 @@ def recipe_of(
         blueprint=blueprints(spec, library),
         sensors=spec.sensors,
         channels=needed,
-        image_truth=partial(image_truth, annotators=annotators, thresholds=spec.head.labels),
+        image_truth=partial(
+            complete_truth, annotators=annotators, thresholds=spec.head.labels, assets=library
+        ),
+        frame_truth=partial(frame_truth, annotators=annotators, assets=library),
         split_shares=spec.split_shares,
         layout_attempts_max=spec.head.physics.layout_attempts_max,
         info=info,
         exporters=exporters,
         strides=_strides(spec),
+        offsets_s={s.name: s.time_offset_s for s in spec.sensors if s.time_offset_s},
     )
 
 
@@ -117,11 +145,11 @@ def _check_durations(spec: Spec) -> None:
 
 
 def _strides(spec: Spec) -> dict[str, int]:
-    """Every how many steps cameras and laser scanners read."""
+    """Every how many steps a sensor reads; devices may also read several times in one."""
     return {
         s.name: stride(s.name, s.rate_hz, spec.head.step_s)
         for s in spec.sensors
-        if s.modality in IMAGING
+        if s.modality in IMAGING or not within_steps(s.rate_hz, spec.head.step_s)
     }
 
 
@@ -139,15 +167,12 @@ def blueprints(spec: Spec, assets: AssetIndex) -> Callable[[Streams], Blueprint]
 def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
     """The template's scene with every sensor mounted."""
     scene = build(spec.head.template or spec.name, layout.elements, assets)
-    scene = replace(scene, shared=layout.shared)
+    scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
+        if sensor.modality in LOOKING:
+            refuse_buried(scene, sensor.name, sensor, assets)
     return scene
-
-
-def nominal_scenes(spec: Spec, assets: AssetIndex) -> tuple[Scene, ...]:
-    """Nominal scenes that between them hold whatever a scene may hold."""
-    return tuple(nominal_scene(spec, layout, assets) for layout in spec.probes)
 
 
 def _renderer(spec: Spec, library: Library) -> Renderer:
@@ -171,12 +196,13 @@ def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...
     return tuple(sorted(placed | possible))
 
 
-def _annotators(spec: Spec) -> Sequence[Annotator]:
+def _annotators(spec: Spec) -> Sequence[AnyAnnotator]:
     """Those that were asked for, then those that exporters read besides."""
-    names = list(spec.annotations)
+    annotators = dict(spec.annotations)
     for exporter in spec.exporters:
-        names += sorted(exporter.needs - set(names))
-    return [TABLES["annotation"].load(name)() for name in names]
+        for name in sorted(exporter.needs - annotators.keys()):
+            annotators[name] = TABLES["annotation"].load(name)()
+    return list(annotators.values())
 
 
 def _exporters(spec: Spec, info: DatasetInfo) -> dict[str, Exporter]:

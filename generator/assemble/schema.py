@@ -7,6 +7,7 @@ from typing import Any
 from generator.assemble.spec import PLUGIN_LISTS, VARYING, Head
 from generator.assemble.tables import TABLES
 from generator.config.schema import json_schema
+from generator.config.strict import Strict
 
 SHARED: list[dict[str, Any]] = [
     {"type": "string", "pattern": r"^\$shared\.", "description": "A shared value."},
@@ -40,8 +41,8 @@ def config_schema() -> dict[str, Any]:
     }
     properties["annotations"] = {
         "type": "array",
-        "items": {"enum": list(TABLES["annotation"])},
-        "description": "What is computed about every object.",
+        "items": {"oneOf": [{"enum": list(TABLES["annotation"])}, *_parametric(definitions)]},
+        "description": "What is computed about every object, image and sample.",
     }
     return {
         "$schema": DRAFT,
@@ -49,6 +50,16 @@ def config_schema() -> dict[str, Any]:
         "title": "gen-data configuration",
         "$defs": dict(sorted(definitions.items())),
     }
+
+
+def _parametric(definitions: dict[str, Any]) -> list[dict[str, str]]:
+    """Annotators that have parameters, which may be written as mappings."""
+    table = TABLES["annotation"]
+    return [
+        _plugin("annotation", name, definitions)
+        for name in table
+        if issubclass(table.load(name), Strict)
+    ]
 
 
 def _plugin(kind: str, name: str, definitions: dict[str, Any]) -> dict[str, str]:

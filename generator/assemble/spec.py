@@ -125,7 +125,7 @@ class Spec:
         resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
             the same Spec again.
         sensors, exporters: Plug-ins, in order.
-        annotations: Names of annotators.
+        annotations: Annotators by name, in order.
         probes: Layouts that between them show what scenes can be; one where nothing is shared.
         document: The merged document; layouts are made from it.
     """
@@ -134,7 +134,7 @@ class Spec:
     resolved: Mapping[str, Any]
     head: Head
     sensors: tuple[Any, ...]
-    annotations: tuple[str, ...]
+    annotations: Mapping[str, Any]
     exporters: tuple[Any, ...]
     probes: tuple[Layout, ...]
     document: Node = field(compare=False)
@@ -323,16 +323,28 @@ def _plugin(node: Node, field: str, kind: str, problems: Problems) -> Any:
     return validate(node, plugin, problems, field)
 
 
-def _annotations(listed: Node, problems: Problems) -> tuple[str, ...]:
+def _annotations(listed: Node, problems: Problems) -> dict[str, Any]:
+    """Annotators by name; an item is a name, or a mapping with it as ``type`` and parameters."""
     table = TABLES["annotation"]
     items = listed.content if isinstance(listed.content, tuple) else (listed,)
-    names = []
+    made: dict[str, Any] = {}
     for number, node in enumerate(items):
-        name = node.content
+        field = f"annotations[{number}]"
+        kind = node.get("type") or node
+        name = kind.content
         if not isinstance(name, str) or name not in table:
             fact = f"unknown annotation {name!r}; expected one of {', '.join(table)}"
             fact += did_you_mean(str(name), table)
-            problems.add(node.position, f"annotations[{number}]", fact)
-        elif name not in names:
-            names.append(name)
-    return tuple(names)
+            problems.add(kind.position, field, fact)
+            continue
+        plugin = table.load(name)
+        if kind is node:
+            made.setdefault(name, plugin())
+        elif not issubclass(plugin, Strict):
+            fact = f"takes no parameters; expected the name alone: - {name}"
+            problems.add(node.position, field, fact)
+        elif name in made:
+            problems.add(node.position, field, f"the annotation '{name}' is listed twice")
+        else:
+            made[name] = validate(node, plugin, problems, field)
+    return made

@@ -133,7 +133,8 @@ class Generated:
         view: Callable[[Arrays], T],
     ) -> T:
         key = self._key(asset_id, family)
-        stored = isinstance(family, TextureFamily) or family.stored
+        offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
+        stored = offered or isinstance(family, TextureFamily) or family.stored
         try:
             return self._store.get(key, compute, view, stored=stored)
         except ValueError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from generator.assets.cache import DiskCache, Store
@@ -42,11 +43,21 @@ def open_library(
     return Library(roots, cache_dir or default_cache_dir(), packs or packs_dir())
 
 
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """What is small about an asset with a mesh."""
+
+    bounds_m: tuple[Vec3, Vec3]
+    materials: tuple[Material, ...]
+    keypoints: tuple[Keypoint, ...]
+
+
 class Library:
     """Implements ``AssetLibrary``. One per process; what it caches depends on content only.
 
-    Entries and bounds are looked up hundreds of times per scene, so they are remembered: an asset
-    whose files change while a process runs keeps the content that was read first.
+    Entries, bounds, materials and keypoints are looked up hundreds of times per scene, so they are
+    remembered: an asset whose files change while a process runs keeps the content that was read
+    first.
     """
 
     def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path, packs: Path) -> None:
@@ -56,7 +67,7 @@ class Library:
         self._files = Files(packs, user_roots, disk, store)
         self._entries: dict[str, Asset] = {}
         self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
-        self._bounds_m: dict[str, tuple[Vec3, Vec3]] = {}
+        self._known: dict[str, _Known] = {}
 
     def get(self, asset_id: str) -> Asset:
         """The entry of that id. Raises AssetError with the nearest id if unknown."""
@@ -77,17 +88,19 @@ class Library:
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """The asset's own materials, one per mesh slot."""
-        return self.mesh(asset_id).materials
+        return self._of_mesh(asset_id).materials
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
-        if asset_id not in self._bounds_m:
-            self._bounds_m[asset_id] = self.mesh(asset_id).bounds_m()
-        return self._bounds_m[asset_id]
+        return self._of_mesh(asset_id).bounds_m
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
-        return self._imported(asset_id).keypoints
+        if asset_id not in self._known:
+            imported = self._imported(asset_id)
+            if imported.mesh is None:
+                return imported.keypoints
+        return self._of_mesh(asset_id).keypoints
 
     def lanes(self, asset_id: str) -> tuple[Lane, ...]:
         """Lanes of a road network (an ``.xodr`` file), in its own frame; else empty."""
@@ -124,6 +137,14 @@ class Library:
         if self._is_generated(environment_id):
             return self._generated.environment(parse(environment_id))
         return self._files.environment(environment_id)
+
+    def _of_mesh(self, asset_id: str) -> _Known:
+        """Raises AssetError if there is no mesh."""
+        if asset_id not in self._known:
+            mesh = self.mesh(asset_id)
+            keypoints = self._imported(asset_id).keypoints
+            self._known[asset_id] = _Known(mesh.bounds_m(), mesh.materials, keypoints)
+        return self._known[asset_id]
 
     def _imported(self, asset_id: str) -> Imported:
         if self._is_generated(asset_id):

@@ -76,7 +76,7 @@ def _may_touch(urdf: Urdf, entry: RobotEntry) -> set[tuple[str, str]]:
     for joint in urdf.joints:
         above = piece[joint.parent]
         piece[joint.child] = len(piece) if joint.movable else above
-        connected.add((above, piece[joint.child]))
+        connected |= {(above, piece[joint.child]), (piece[joint.child], above)}
     names = list(piece)
     pairs = {
         (a, b)

@@ -199,6 +199,7 @@ def _joint(element: Element) -> Joint:
         lower=lower,
         upper=upper,
         mimic="" if mimic is None else mimic.attrib["joint"],
+        speed_max=0.0 if limit is None else abs(float(limit.get("velocity", 0.0))),
     )
 
 

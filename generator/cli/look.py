@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,12 +13,22 @@ from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.sample import Sample
 
+if TYPE_CHECKING:
+    from generator.preview.clouds import PointColors
+
 
 @click.command()
 @click.argument("source")
 @click.option("--n", "-n", type=int, default=8, show_default=True, help="Number of samples.")
 @click.option("--first", type=int, default=0, show_default=True, help="Index of the first sample.")
 @click.option("--save", type=click.Path(path_type=Path), help="Write a .rrd file instead.")
+@click.option(
+    "--points",
+    type=click.Choice(["class", "intensity"]),
+    default="class",
+    show_default=True,
+    help="What decides the colour of laser points.",
+)
 @click.option("--web", is_flag=True, help="Serve to a browser instead of the desktop viewer.")
 @configuration_options
 def preview(
@@ -25,12 +36,13 @@ def preview(
     n: int,
     first: int,
     save: Path | None,
+    points: PointColors,
     web: bool,
     seed: int | None,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
-    """Show samples in Rerun: the 3D scene, camera images, boxes; one timeline step per sample.
+    """Show samples in Rerun: the 3D scene, images, scans, boxes; sequences play in seconds.
 
     SOURCE is a configuration (a path or a shipped name), or the folder of a data set, whose
     samples are made again from its plan.
@@ -42,12 +54,11 @@ def preview(
     with open_pipeline(spec) as pipeline:
         samples = _samples(pipeline.sample, first, n)
         info = pipeline.info
-        about = {"categories": info.categories, "sensors": info.sensors}
         if save is not None:
-            save_recording(save, samples, pipeline.assets, **about)
+            save_recording(save, samples, pipeline.assets, info=info, points=points)
             click.echo(f"{save}: {n} samples; open it with: rerun {save}")
             return
-        where = show_samples(samples, pipeline.assets, **about, web=web)
+        where = show_samples(samples, pipeline.assets, info=info, points=points, web=web)
         if web:
             click.echo(f"serving {where}; open http://localhost:9090 (Ctrl-C ends)")
             click.pause("press any key to end ...")

@@ -18,7 +18,7 @@ def report(folder: Path, html: Path | None) -> None:
     """Count what a data set contains, beside what is published about KITTI.
 
     FOLDER is a data set that was exported as coco or kitti: objects, box sizes, occlusion,
-    truncation, distances and keypoints by category. Only label files are read.
+    truncation, distances and keypoints by category; laser points, where kitti has them.
     """
     from rich import box
     from rich.console import Console
@@ -26,11 +26,12 @@ def report(folder: Path, html: Path | None) -> None:
 
     from generator.report.labels import records
     from generator.report.page import page
+    from generator.report.scans import scans
     from generator.report.survey import survey
-    from generator.report.tables import histograms, tables
+    from generator.report.tables import histograms, scan_tables, tables
 
     found = survey(records(folder))
-    made = tables(found)
+    made = (*tables(found), *scan_tables(tuple(scans(folder))))
     console = Console()
     for table in made:
         shown = RichTable(title=table.title, caption=table.note or None, box=box.SIMPLE_HEAD)

@@ -24,8 +24,13 @@ _EXAMPLES: dict[Any, Any] = {int: 1, float: 1, str: "example", bool: True}
 _HEADINGS = ("field", "type", "default")
 
 
-def describe(model: type[BaseModel]) -> str:
-    """The first line of the docstring, a table of the fields, and an example in YAML."""
+def describe(model: type) -> str:
+    """The first line of the docstring, a table of the fields, and an example in YAML.
+
+    What takes no parameters, such as most annotators, is told by its docstring alone.
+    """
+    if not issubclass(model, BaseModel):
+        return summary_of(model) + "\n"
     attributes = documented_attributes(model)
     rows = [
         (name, _type_words(info), _default_words(info), _meaning(info, attributes.get(name, "")))
@@ -84,7 +89,7 @@ def plain_of(value: Any) -> Any:
     return value
 
 
-def summary_of(model: type[BaseModel]) -> str:
+def summary_of(model: type) -> str:
     """First paragraph of a class's docstring, on one line."""
     documented = inspect.cleandoc(model.__doc__ or "")
     return documented.partition("\n\n")[0].replace("\n", " ")

@@ -20,7 +20,9 @@ class Channel(str, Enum):
     channel               array                   meaning; value for "nothing"
     ====================  ======================  ==========================================
     RGB                   uint8 [h, w, 3]         sRGB, anti-aliased
-    Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf
+    RADIANCE              float32 [h, w, 3]       luminance, linear RGB [cd/m^2], anti-aliased
+    Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf, also beside and
+                                                  behind the camera, where wide lenses look
     RANGE                 float32 [h, w]          along the ray [m]; inf
     NORMALS               float32 [h, w, 3]       unit, camera frame, towards the camera; 0
     INSTANCE              uint16 [h, w]           instance id; 0
@@ -32,6 +34,7 @@ class Channel(str, Enum):
     """
 
     RGB = "rgb"
+    RADIANCE = "radiance"
     Z_DEPTH = "depth"
     RANGE = "range"
     NORMALS = "normals"
@@ -45,6 +48,9 @@ class Channel(str, Enum):
 @dataclass(frozen=True, eq=False, slots=True)
 class Silhouette:
     """One instance as if nothing stood before it, on a canvas three images wide and high.
+
+    Beside the image the canvas shows what a larger sensor would, as far as the lens does: nothing
+    lies beside the image of a lens whose whole field is in it.
 
     Attributes:
         x_px, y_px: Where the mask's first pixel lies in the image; may be negative.
@@ -65,6 +71,7 @@ class Reading:
         channels: Arrays by channel, as listed at Channel.
         silhouettes: By instance id; empty unless AMODAL was asked for.
         time_s: The instant that depth, ids and boxes refer to.
+        ev100: Exposure value that was set or metered; None where there is no colour.
     """
 
     sensor: str
@@ -72,6 +79,7 @@ class Reading:
     channels: Mapping[Channel, NDArray[Any]]
     silhouettes: Mapping[int, Silhouette] = field(default_factory=dict)
     time_s: float = 0.0
+    ev100: float | None = None
 
 
 POINT = np.dtype(
@@ -108,7 +116,7 @@ class PointCloud:
 
     Attributes:
         points: Records of ``POINT`` [n].
-        time_s: The instant that ``lidar`` and the boxes refer to.
+        time_s: The instant that ``lidar`` and the boxes refer to: the middle of the sweep.
     """
 
     sensor: str
@@ -116,13 +124,18 @@ class PointCloud:
     points: NDArray[np.void]
     time_s: float = 0.0
 
+    @property
+    def start_s(self) -> float:
+        """When the sweep began."""
+        return self.time_s - 0.5 * self.lidar.sweep_s
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Table:
     """What a device measured: radar, inertial unit, satellite receiver, odometer, watcher.
 
     Attributes:
-        rows: Records [n] of the dtype that belongs to ``device.kind``; may be empty.
+        rows: Records [n] of ``generator.core.tables.table_dtype(device.kind)``; may be empty.
         time_s: The instant that ``device`` refers to.
     """
 
@@ -134,19 +147,43 @@ class Table:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Beams:
-    """The light that a laser scanner sends out.
+    """The light that a laser scanner sends out; "lidar frame" is that of the scene's instant.
 
     Attributes:
         directions: Unit vectors in the lidar frame, float32 [n, 3].
         divergence_rad: Full angle of a beam.
         subrays: Rays that stand for one beam: 1, or 7, the axis and six around it.
         range_max_m: Beyond it nothing is looked for.
+        origins_m: Where beams begin in the lidar frame, float32 [n, 3]; None = at its origin.
+        time_s: When beams leave, counted from the scene's instant, float32 [n]: they meet bodies
+            with tracks where these are then. None = all at that instant.
     """
 
     directions: NDArray[np.float32]
     divergence_rad: float
     subrays: int
     range_max_m: float
+    origins_m: NDArray[np.float32] | None = None
+    time_s: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Detours:
+    """What rays meet through panes of glass or by way of a mirror; arrays are [m].
+
+    Attributes:
+        ray: Number of the ray: beam times subrays plus subray, int64; at most twice the same.
+        range_m, reflectance: As of Echoes; the whole way, and what glass or mirror leave of it.
+        instance_id, category_id, surface: As of Echoes. What a mirror shows has no ids, as it is
+            not where the point is.
+    """
+
+    ray: NDArray[np.int64]
+    range_m: NDArray[np.float32]
+    reflectance: NDArray[np.float32]
+    instance_id: NDArray[np.uint16]
+    category_id: NDArray[np.uint16]
+    surface: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -161,6 +198,7 @@ class Echoes:
         incidence_cos: Cosine of the angle to the surface's normal, float32; 0.
         instance_id, category_id: uint16; 0.
         surface: Number in ``generator.core.geometry.SURFACES``, uint8; 0.
+        detours: What some rays meet besides; None = nothing.
     """
 
     range_m: NDArray[np.float32]
@@ -169,6 +207,7 @@ class Echoes:
     instance_id: NDArray[np.uint16]
     category_id: NDArray[np.uint16]
     surface: NDArray[np.uint8]
+    detours: Detours | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

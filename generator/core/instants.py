@@ -4,20 +4,33 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from generator.core.motion import STILL, Change
-from generator.core.scene import Body, Camera, Device, Instance, Lidar, Light, Scene
-from generator.core.se3 import SE3
+from generator.core.motion import STILL, Change, Twist
+from generator.core.scene import (
+    Articulation,
+    Body,
+    Camera,
+    Device,
+    Instance,
+    Lidar,
+    Light,
+    Rig,
+    Scene,
+)
+from generator.core.se3 import SE3, Vec3, rotate_by_quaternion
 
 RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
 """``T_camera_rig``: X forward, Y left, Z up in the camera's X right, Y down, Z forward."""
+
+EGO = "ego"
+"""Name of the rig that truth about a sample as a whole refers to."""
 
 
 def at(scene: Scene, time_s: float) -> Scene:
     """The scene at another instant: what has a track, and all that rides with it, has moved.
 
-    Bodies, lights, rigs, sensors and the frames of instances follow; so do the changes that have
-    happened by then. Changes are looked up from the beginning of time, so that the way there does
-    not matter; a body whose first change lies ahead keeps what it has.
+    Bodies, joints, lights, rigs, sensors and the frames of instances follow; so do the changes
+    that have happened by then. Changes are looked up from the beginning of time, so that the way
+    there does not matter; a body whose first change lies ahead keeps what it has.
 
     The boxes of instances of several bodies (robots) are measured again by whoever freezes scenes.
     """
@@ -46,6 +59,7 @@ def at(scene: Scene, time_s: float) -> Scene:
             scene,
             time_s=time_s,
             bodies=bodies,
+            articulations=tuple(_moved_joints(a, time_s) for a in scene.articulations),
             instances=_moved_instances(scene, bodies, changes, time_s),
             lights=tuple(
                 _moved_light(light, moved[light.body]) if light.body in moved else light
@@ -83,6 +97,36 @@ def with_twists(scene: Scene) -> Scene:
             replace(i, twist=twists.get(i.instance_id, STILL)) for i in scene.instances
         ),
     )
+
+
+def ego_rig(scene: Scene, name: str = "") -> Rig | None:
+    """The rig of that name; by default the one called ``ego``, else the first; None if none."""
+    by_name = {rig.name: rig for rig in reversed(scene.rigs)}
+    if name:
+        return by_name.get(name)
+    return by_name.get(EGO) or next(iter(scene.rigs), None)
+
+
+def rig_twist(scene: Scene, rig: Rig) -> Twist:
+    """How a rig moves at the scene's instant: its origin, by the track of the body it rides on."""
+    track = scene.track(rig.body)
+    if track is None:
+        return STILL
+    body = track.twist(scene.time_s)
+    T_world_body = scene.body(rig.body).T_world_body
+    arm = rotate_by_quaternion(T_world_body.quaternion_wxyz, rig.T_body_rig.translation_m)
+    spin = body.angular_velocity_rad_s
+    lever = _cross(spin, arm)
+    inward = _cross(spin, lever)
+    return Twist(_sum(body.velocity_m_s, lever), _sum(body.acceleration_m_s2, inward), spin)
+
+
+def _cross(a: Vec3, b: Vec3) -> Vec3:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _sum(a: Vec3, b: Vec3) -> Vec3:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def _in_force(changes: tuple[Change, ...], time_s: float) -> dict[str, Change]:
@@ -140,6 +184,12 @@ def _moved_instances(
     return with_twists(replace(scene, time_s=time_s, instances=tuple(instances))).instances
 
 
+def _moved_joints(arm: Articulation, time_s: float) -> Articulation:
+    if arm.joint_track is None:
+        return arm
+    return replace(arm, joint_positions=arm.joint_track.positions(time_s))
+
+
 def _moved_light(light: Light, T_new_old: SE3) -> Light:
     x, y, z = (T_new_old @ SE3(light.position_m)).translation_m
     dx, dy, dz = (float(v) for v in T_new_old.rotate(light.direction))  # type: ignore[arg-type]
@@ -166,5 +216,8 @@ def _placed_lidar(scene: Scene, lidar: Lidar) -> Lidar:
 
 
 def _placed_device(scene: Scene, device: Device) -> Device:
-    T_world_rig = scene.rig_pose(device.rig)
+    if device.rig:
+        T_world_rig = scene.rig_pose(device.rig)
+    else:
+        T_world_rig = scene.camera(device.camera).T_world_camera @ RIG_AXES
     return replace(device, T_world_device=(T_world_rig @ device.T_rig_device).rounded())

@@ -24,7 +24,8 @@ from generator.core.geometry import (
     RobotModel,
     TextureData,
 )
-from generator.core.sample import ObjectTruth, Sample
+from generator.core.lens import LensModel
+from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth, Sample
 from generator.core.scene import Camera, Lane, Lidar, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
@@ -73,6 +74,10 @@ class AssetIndex(Protocol):
 
 class AssetLibrary(AssetIndex, Protocol):
     """The index, and the geometry behind it; everything is cached by content hash."""
+
+    def __hash__(self) -> int:
+        """Of its identity: what is worked out from its geometry may be remembered with it."""
+        ...
 
     def mesh(self, asset_id: str) -> MeshData:
         """Visual geometry. Also for robot links: ``franka_panda/panda_link3``."""
@@ -179,6 +184,45 @@ class Annotator(Protocol):
         ...
 
 
+@runtime_checkable
+class ImageAnnotator(Protocol):
+    """Truth about an image as a whole: what is no single object's. No randomness."""
+
+    @property
+    def channels(self) -> frozenset[Channel]:
+        """What it needs to have been rendered."""
+        ...
+
+    def annotate_image(
+        self, scene: Scene, assets: AssetLibrary, reading: Reading, truth: ImageTruth
+    ) -> ImageTruth:
+        """The truth with this annotator's fields filled in."""
+        ...
+
+
+@runtime_checkable
+class FrameAnnotator(Protocol):
+    """Truth about a sample as a whole. No randomness."""
+
+    @property
+    def channels(self) -> frozenset[Channel]:
+        """What it needs to have been rendered."""
+        ...
+
+    def annotate_frame(
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: FrameTruth
+    ) -> FrameTruth:
+        """The truth with this annotator's fields filled in.
+
+        Args:
+            scenes: The scene at the sample's instant by ``""``, and by the name of every laser
+                scanner that has read the scene at the instant of its reading.
+            assets: Geometry.
+            truth: So far.
+        """
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class DatasetInfo:
     """What every exporter may know about the data set as a whole.
@@ -192,6 +236,7 @@ class DatasetInfo:
         devices: ``{sensor: kind}`` of all other sensors, sorted by name.
         steps_per_scene: Instants of one view: the length of a sequence.
         step_s: Time between them.
+        lenses: ``{camera: model of its lens}``; a pinhole where it is missing.
     """
 
     name: str
@@ -206,6 +251,7 @@ class DatasetInfo:
     devices: Mapping[str, str] = field(default_factory=dict)
     steps_per_scene: int = 1
     step_s: float = 0.1
+    lenses: Mapping[str, LensModel] = field(default_factory=dict)
 
 
 class Exporter(Protocol):
@@ -237,3 +283,8 @@ def media_path(shard_dir: Path, sensor: str, channel: Channel, index: int) -> Pa
 def cloud_path(shard_dir: Path, sensor: str, index: int) -> Path:
     """Where the points of one sweep lie: a NumPy file with an array of ``POINT`` records."""
     return shard_dir / sensor / "points" / f"{index:09d}.npy"
+
+
+def table_path(shard_dir: Path, sensor: str, index: int) -> Path:
+    """Where the rows of one reading lie: a NumPy file of ``generator.core.tables`` records."""
+    return shard_dir / sensor / "rows" / f"{index:09d}.npy"

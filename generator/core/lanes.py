@@ -1,16 +1,22 @@
-"""Places along lanes."""
+"""Places along lanes, and the lines at their sides."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from generator.core.scene import Lane
-from generator.core.se3 import SE3, Vec3
+from generator.core.se3 import SE3, Array, Vec3
+
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
+MEETING_M = 0.25
+"""Borders whose ends are nearer than this are one."""
 
 
 @dataclass(frozen=True)
@@ -75,3 +81,78 @@ def standing_on_lane(
         turn_rad += 0.5 * math.pi
     anchor = x1 if lane.kind == "frontage" else 0.5 * (x0 + x1)
     return T_world_place @ SE3.about_z(turn_rad) @ SE3((-anchor, -0.5 * (y0 + y1), -z0))
+
+
+@dataclass(frozen=True, slots=True)
+class LaneBorder:
+    """The line at one side of driving lanes, painted or not.
+
+    Attributes:
+        name: Lane and side that it belongs to: ``main/forward0:left``.
+        kind: ``lane``: between lanes that run the same way; ``road``: between such that do not;
+            ``edge``: nothing drives beyond it.
+        points_m: World, on the ground, in the direction of travel of the lane it is named by.
+    """
+
+    name: str
+    kind: Literal["lane", "road", "edge"]
+    points_m: tuple[Vec3, ...]
+
+
+@lru_cache(maxsize=16)
+def lane_borders(lanes: tuple[Lane, ...]) -> tuple[LaneBorder, ...]:
+    """Borders of all driving lanes outside junctions, each once, in the order of the lanes."""
+    driving = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]
+    borders: list[LaneBorder] = []
+    alone: dict[Side, list[tuple[Vec3, Vec3]]] = {"left": [], "right": []}
+    for lane in driving:
+        for side in SIDES:
+            if side == "right" and lane.right:
+                continue
+            line = border_line(lane, side)
+            kind: Literal["lane", "road", "edge"] = "lane"
+            if not (lane.left if side == "left" else lane.right):
+                kind = "edge"
+                ends = (line[-1], line[0])
+                if _is_among(ends, alone[side]):
+                    continue
+                alone[side].append((line[0], line[-1]))
+                if _is_met(lane, driving, side, ends):
+                    kind = "road"
+            borders.append(LaneBorder(f"{lane.name}:{side}", kind, line))
+    return tuple(borders)
+
+
+def border_line(lane: Lane, side: Side) -> tuple[Vec3, ...]:
+    """The points of one side of a lane, as many as its centre line has."""
+    sign = 1.0 if side == "left" else -1.0
+    center = np.asarray(lane.center_m, dtype=np.float64)
+    half_m = 0.5 * lane.width_m * sign
+    lift = np.array([0.0, 0.0, lane.bank * half_m])
+    points = center + half_m * leftwards(center) + lift
+    return tuple((float(x), float(y), float(z)) for x, y, z in np.round(points, 6) + 0.0)
+
+
+def leftwards(line_m: Array) -> Array:
+    """Level unit vectors [n, 3] to the left of a line [n, 3] at each of its points."""
+    steps = np.diff(line_m[:, :2], axis=0)
+    steps = steps / np.sqrt((steps * steps).sum(axis=1, keepdims=True))
+    along = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+    along = along / np.sqrt((along * along).sum(axis=1, keepdims=True))
+    return np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(along))])
+
+
+def _is_met(lane: Lane, driving: list[Lane], side: Side, ends: tuple[Vec3, Vec3]) -> bool:
+    """Whether an oncoming lane has the same border on the same side."""
+    for other in driving:
+        if other.road == lane.road and not (other.left if side == "left" else other.right):
+            line = border_line(other, side)
+            if other.name != lane.name and _is_among((line[0], line[-1]), [ends]):
+                return True
+    return False
+
+
+def _is_among(ends: tuple[Vec3, Vec3], others: list[tuple[Vec3, Vec3]]) -> bool:
+    return any(
+        math.dist(ends[0], a) < MEETING_M and math.dist(ends[1], b) < MEETING_M for a, b in others
+    )

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.core.geometry import Material
-from generator.core.se3 import SE3, Array, Vec3, multiply_quaternions
+from generator.core.se3 import (
+    SE3,
+    Array,
+    Vec3,
+    multiply_quaternions,
+    rotate_by_quaternion,
+    rotations_of,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +35,16 @@ class Twist:
     velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
     acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
     angular_velocity_rad_s: Vec3 = (0.0, 0.0, 0.0)
+
+    def seen_along(self, T_world_frame: SE3) -> Twist:
+        """The same motion along the axes of a frame."""
+        w, x, y, z = T_world_frame.quaternion_wxyz
+        inverse = (w, -x, -y, -z)
+        return Twist(
+            rotate_by_quaternion(inverse, self.velocity_m_s),
+            rotate_by_quaternion(inverse, self.acceleration_m_s2),
+            rotate_by_quaternion(inverse, self.angular_velocity_rad_s),
+        )
 
 
 STILL = Twist()
@@ -83,12 +100,25 @@ class Track:
         return SE3(self._weighted(k, weights), self._turned(k, f))
 
     def poses(self, times_s: NDArray[np.floating]) -> tuple[Array, Array]:
-        """Rotation matrices [n, 3, 3] and translations [n, 3] at several instants."""
-        poses = [self.pose(float(t)) for t in times_s]
-        return (
-            np.stack([pose.rotation() for pose in poses]),
-            np.array([pose.translation_m for pose in poses]),
+        """Rotation matrices [n, 3, 3] and translations [n, 3] at several instants, as ``pose``."""
+        steps = (np.asarray(times_s, np.float64) - self.start_s) / self.step_s
+        steps = np.array([round(s, 9) for s in steps.tolist()])
+        k = np.clip(np.floor(steps), 0, len(self.knots) - 2).astype(np.intp)
+        f = np.clip(steps - k, 0.0, 1.0)[:, None]
+        places = np.array([knot.translation_m for knot in self.knots])
+        slopes = np.array([self._slope(i) for i in range(len(self.knots))])
+        g = 1.0 - f
+        translations = (
+            (1.0 + 2.0 * f) * g * g * places[k]
+            + f * g * g * slopes[k]
+            + f * f * (3.0 - 2.0 * f) * places[k + 1]
+            + f * f * (f - 1.0) * slopes[k + 1]
         )
+        turns = np.array([knot.quaternion_wxyz for knot in self.knots])
+        a, b = turns[k], turns[k + 1]
+        same = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2] + a[:, 3] * b[:, 3]
+        sign = np.where(same >= 0.0, 1.0, -1.0)[:, None]
+        return rotations_of(g * a + f * sign * b), translations
 
     def twist(self, time_s: float) -> Twist:
         """How the body moves at one instant; nothing moves outside the knots."""
@@ -140,6 +170,32 @@ class Track:
         w, x, y, z = ((1.0 - f) * p + f * sign * q for p, q in zip(a, b, strict=True))
         norm = math.sqrt(w * w + x * x + y * y + z * z)
         return (w / norm, x / norm, y / norm, z / norm)
+
+
+@dataclass(frozen=True, slots=True)
+class JointTrack:
+    """The joint positions of a robot through time; linear between knots.
+
+    Attributes:
+        step_s: Time between knots.
+        knots: One position per movable joint [rad or m], at ``start_s + k * step_s``.
+        start_s: Time of the first knot.
+    """
+
+    step_s: float
+    knots: tuple[tuple[float, ...], ...]
+    start_s: float = 0.0
+
+    def positions(self, time_s: float) -> tuple[float, ...]:
+        """Positions at one instant; those of the first or last knot outside their time."""
+        last = len(self.knots) - 1
+        steps = min(max(round((time_s - self.start_s) / self.step_s, 9), 0.0), float(last))
+        k = min(math.floor(steps), last - 1) if last else 0
+        one, other = self.knots[k], self.knots[min(k + 1, last)]
+        return tuple(
+            round((1.0 - (steps - k)) * a + (steps - k) * b, 6) + 0.0
+            for a, b in zip(one, other, strict=True)
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 
 from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Capture
+from generator.core.lanes import LaneBorder
+from generator.core.motion import STILL, Twist
 from generator.core.scene import Camera, Instance, Scene
-from generator.core.se3 import SE3, Vec3
+from generator.core.se3 import IDENTITY, SE3, Vec3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,6 +48,28 @@ class KeypointTruth:
     visibility: Literal[0, 1, 2] = 0
 
 
+@dataclass(frozen=True, slots=True)
+class MotionTruth:
+    """How an instance moves over the ground, in the axes of several frames.
+
+    All three tell the same motion, that of the instance's frame against the world: the camera's and
+    the ego's own motion are not taken away from it.
+
+    Attributes:
+        ego: None in a scene without a rig.
+    """
+
+    world: Twist
+    camera: Twist
+    ego: Twist | None = None
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of its frame's origin."""
+        x, y, z = self.world.velocity_m_s
+        return math.sqrt(x * x + y * y + z * z)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ObjectTruth:
     """Everything that is known about one instance in one image.
@@ -67,6 +92,7 @@ class ObjectTruth:
         part_px: Visible pixels per part name, for instances with parts (part_masks).
         keypoints: In the order of ``instance.keypoints``; empty if it has none (keypoints).
         lidar_points: Points of each laser scanner on the instance, by sensor; None without one.
+        motion: How it moves at the image's instant (motion).
     """
 
     instance: Instance
@@ -84,14 +110,82 @@ class ObjectTruth:
     part_px: Mapping[str, int] | None = None
     keypoints: tuple[KeypointTruth, ...] | None = None
     lidar_points: Mapping[str, int] | None = None
+    motion: MotionTruth | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BorderTruth:
+    """A stretch of a lane's border that lies in one image.
+
+    Attributes:
+        border: Name of the ``LaneBorder``; one that leaves the image and returns has several.
+        kind: As there.
+        points_px: Image coordinates, in the border's direction.
+        visible: Whether each point is seen, or hidden by what stands before it.
+    """
+
+    border: str
+    kind: Literal["lane", "road", "edge"]
+    points_px: tuple[tuple[float, float], ...]
+    visible: tuple[bool, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ImageTruth:
-    """The annotations of one camera image, in order of instance id."""
+    """The annotations of one camera image.
+
+    A field is None when its annotator was not asked for.
+
+    Attributes:
+        objects: In order of instance id.
+        borders: Of lanes, in order of the scene's (lanes).
+        free_space: Pixels that show ground on which one may drive and nothing stands (free_space).
+    """
 
     camera: Camera
     objects: tuple[ObjectTruth, ...]
+    borders: tuple[BorderTruth, ...] | None = None
+    free_space: MaskPx | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BirdseyeMap:
+    """The ground around the ego from above.
+
+    Attributes:
+        T_world_map: X forward, Y left, Z up; level, below the ego's rig.
+        px_m: Side of a pixel.
+        layers: Masks bool [n, n]. Row 0 is farthest ahead, column 0 farthest to the left; the
+            centre of pixel (r, c) is at x = (n / 2 - r - 0.5) px_m, y = (n / 2 - c - 0.5) px_m.
+    """
+
+    T_world_map: SE3
+    px_m: float
+    layers: Mapping[str, NDArray[np.bool_]]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FrameTruth:
+    """What is true of all sensors' readings together.
+
+    A field is None when its annotator was not asked for.
+
+    Attributes:
+        rig: Name of the ego's rig; empty in a scene without one.
+        T_world_ego: Its pose.
+        twist: How it moves, world axes.
+        boxes3d: By frame, the boxes of annotated instances, by instance id: ``ego``, and every
+            laser scanner at the instant of its own sweep (boxes3d).
+        borders: Of lanes, world (lanes).
+        birdseye: The ground from above (bev_map).
+    """
+
+    rig: str = ""
+    T_world_ego: SE3 = IDENTITY
+    twist: Twist = STILL
+    boxes3d: Mapping[str, Mapping[int, OrientedBox]] | None = None
+    borders: tuple[LaneBorder, ...] | None = None
+    birdseye: BirdseyeMap | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -104,6 +198,7 @@ class Sample:
         split: ``train``, ``val`` or ``test``: the same for all views of a scene.
         scene: The final world; rendering it again needs no randomizer and no physics.
         truth: Annotations by sensor name.
+        frame: Annotations of no single image; None where none was asked for.
         attempts: How many layouts were drawn before this one was accepted.
         timings_s: Seconds of CPU by stage. Never written to a data file.
         cameras: Sorted names of all cameras of the data set, also of those that do not read at
@@ -121,6 +216,7 @@ class Sample:
     timings_s: Mapping[str, float] = field(default_factory=dict)
     step_index: int = 0
     cameras: tuple[str, ...] = ()
+    frame: FrameTruth | None = None
 
     def image_id(self, sensor: str) -> int:
         """Number of one image of the sample, from 1, unique in the data set."""

@@ -12,7 +12,7 @@ from typing import Literal, Protocol, TypeVar
 
 from generator.core.geometry import Keypoint, Material
 from generator.core.intrinsics import Intrinsics
-from generator.core.motion import STILL, Change, Track, Twist
+from generator.core.motion import STILL, Change, JointTrack, Track, Twist
 from generator.core.se3 import IDENTITY, SE3, Vec3
 
 SharedValue = str | float | int | bool
@@ -124,6 +124,7 @@ class Lane:
         left, right: Names of the lanes beside it that run the same way; empty = none.
         speed_m_s: Usual speed; 0 = things stand.
         junction: Whether it crosses a junction, where nothing may stop.
+        bank: How much its left side is higher than its right one, per metre of width.
     """
 
     name: str
@@ -136,6 +137,7 @@ class Lane:
     right: str = ""
     speed_m_s: float = 0.0
     junction: bool = False
+    bank: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,17 +172,24 @@ class ArmGoal:
     Attributes:
         kind: ``joints``: candidates are joint positions. ``reach``: candidates are poses of the
             grasp frame in the world. ``hold``: like reach, with ``held`` between the fingers.
+            Only on a way: ``grasp`` takes up one of ``objects`` from where it rests, ``place``
+            puts down what is held.
         joint_candidates: One tuple per candidate [rad or m], arm joints in order.
-        pose_candidates: ``T_world_grasp`` per candidate.
-        opening: Gripper opening in [0, 1]; ignored for ``hold``.
+        pose_candidates: ``T_world_grasp`` per candidate; for ``place``, a point on a surface and
+            a turn about Z that the object makes from how it lay or is held.
+        opening: Gripper opening in [0, 1]; ignored for ``hold``, ``grasp`` and ``place``.
         held: Name of the body that is held.
+        objects: Names of the bodies that may be grasped, the preferred one first.
+        speed: Share of the joints' speed limits that the way there may use.
     """
 
-    kind: Literal["joints", "reach", "hold"]
+    kind: Literal["joints", "reach", "hold", "grasp", "place"]
     joint_candidates: tuple[tuple[float, ...], ...] = ()
     pose_candidates: tuple[SE3, ...] = ()
     opening: float = 1.0
     held: str = ""
+    objects: tuple[str, ...] = ()
+    speed: float = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +198,11 @@ class Articulation:
 
     Attributes:
         joint_positions: One per movable joint, in the robot model's order [rad or m].
+        goal: What it does before anything moves.
         workspace_m: Low and high corner [m], world, where its hand may be sent.
+        way: What it does from then on, one after the other: ``joints``, ``reach``, ``grasp``
+            and ``place``.
+        joint_track: How its joints move; None = they stand still.
     """
 
     name: str
@@ -199,6 +212,8 @@ class Articulation:
     joint_positions: tuple[float, ...]
     goal: ArmGoal | None = None
     workspace_m: tuple[Vec3, Vec3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    way: tuple[ArmGoal, ...] = ()
+    joint_track: JointTrack | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,6 +339,7 @@ class Lidar:
         T_world_lidar: Its pose; follows the rig.
         model: What it is, for the labels: ``HDL-64E``.
         rig: Name of its rig; empty = it rides with ``camera``.
+        sweep_s: How long a sweep takes; the scene's instant is its middle.
     """
 
     name: str
@@ -332,6 +348,7 @@ class Lidar:
     T_world_lidar: SE3 = IDENTITY
     model: str = ""
     rig: str = ""
+    sweep_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,11 +357,13 @@ class Device:
 
     Attributes:
         name: The sensor's name in the YAML.
-        kind: The modality: ``radar``, ``imu``, ``gnss``, ``odometer``, ``events``.
-        rig: Name of its rig.
+        kind: The modality: ``radar``, ``imu``, ``gnss``, ``odometer``, ``watcher``,
+            ``event_camera``.
+        rig: Name of its rig; empty = it rides with ``camera``.
         T_rig_device: Where it is on the rig. X forward, Y left, Z up.
         T_world_device: Its pose; follows the rig.
         model: What it is, for the labels.
+        camera: Name of the camera it looks through; empty = none.
     """
 
     name: str
@@ -353,6 +372,7 @@ class Device:
     T_rig_device: SE3 = IDENTITY
     T_world_device: SE3 = IDENTITY
     model: str = ""
+    camera: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -373,6 +393,7 @@ class Scene:
         lanes: Where things may move or stand, in a street.
         shared: Values that several draws have in common, ``(name, value)``, sorted by name.
         time_s: The instant it is shown at; 0 = when it was built.
+        step_s: Time between the instants of its sequence.
         tracks: How bodies move; at most one per body.
         changes: What changes at once, in order of time.
     """
@@ -395,6 +416,7 @@ class Scene:
     rigs: tuple[Rig, ...] = ()
     devices: tuple[Device, ...] = ()
     time_s: float = 0.0
+    step_s: float = 0.1
     tracks: tuple[Track, ...] = ()
     changes: tuple[Change, ...] = ()
 

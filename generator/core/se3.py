@@ -121,6 +121,20 @@ def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
+def rotations_of(quaternions_wxyz: Array) -> Array:
+    """Rotation matrices [n, 3, 3] of quaternions [n, 4] of any length above 0, scalar first."""
+    w, x, y, z = quaternions_wxyz.T
+    norm = np.sqrt(w * w + x * x + y * y + z * z)
+    w, x, y, z = w / norm, x / norm, y / norm, z / norm
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    rotations: Array = np.array(rows).transpose(2, 0, 1)
+    return rotations
+
+
 def quaternion_of_rotation(rotation: Array) -> Quaternion:
     """Unit quaternion (scalar first, scalar >= 0) of a rotation matrix, shape [3, 3].
 

@@ -9,9 +9,9 @@ import dataclasses
 import json
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -42,7 +42,8 @@ def from_plain(kind: type[T], plain: Any) -> T:
     Raises:
         TypeError, KeyError: if the value does not fit the type.
     """
-    return typing.cast(T, _build(kind, plain))
+    build: Callable[[Any], T] = _builder(typing.cast(Any, kind))
+    return build(plain)
 
 
 def canonical_json(value: Any) -> str:
@@ -64,27 +65,47 @@ def _field_names(kind: type) -> tuple[str, ...] | None:
 
 
 @cache
-def _hints(kind: type) -> dict[str, Any]:
-    return typing.get_type_hints(kind)
-
-
-def _build(kind: Any, plain: Any) -> Any:
+def _builder(kind: Any) -> Callable[[Any], Any]:
+    """What makes values of an annotation from plain ones; the annotation is looked at once."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-        hints = _hints(kind)
-        return kind(**{name: _build(hints[name], item) for name, item in plain.items()})
+        return _dataclass_builder(kind)
     if origin in (typing.Union, types.UnionType):
-        if plain is None:
-            return None
-        return _build(next(a for a in arguments if a is not type(None)), plain)
+        build = _builder(next(a for a in arguments if a is not type(None)))
+        return lambda plain: None if plain is None else build(plain)
     if origin is tuple:
-        if len(arguments) == 2 and arguments[1] is Ellipsis:
-            return tuple(_build(arguments[0], item) for item in plain)
-        return tuple(_build(a, item) for a, item in zip(arguments, plain, strict=True))
+        return _tuple_builder(arguments)
     if origin is typing.Literal:
-        if plain not in arguments:
-            raise TypeError(f"{plain!r} is not one of {arguments}")
-        return plain
-    if kind is float:
-        return float(plain)
+        return partial(_one_of, arguments)
+    return float if kind is float else _itself
+
+
+def _dataclass_builder(kind: type) -> Callable[[Any], Any]:
+    # Types may refer to themselves, so that fields are looked at when the first value comes.
+    @cache
+    def builders() -> dict[str, Callable[[Any], Any]]:
+        return {name: _builder(hint) for name, hint in typing.get_type_hints(kind).items()}
+
+    def build(plain: Any) -> Any:
+        by_name = builders()
+        return kind(**{name: by_name[name](item) for name, item in plain.items()})
+
+    return build
+
+
+def _tuple_builder(arguments: tuple[Any, ...]) -> Callable[[Any], Any]:
+    if len(arguments) == 2 and arguments[1] is Ellipsis:
+        build = _builder(arguments[0])
+        return lambda plain: tuple(build(item) for item in plain)
+    builders = [_builder(argument) for argument in arguments]
+    return lambda plain: tuple(b(item) for b, item in zip(builders, plain, strict=True))
+
+
+def _one_of(allowed: tuple[Any, ...], plain: Any) -> Any:
+    if plain not in allowed:
+        raise TypeError(f"{plain!r} is not one of {allowed}")
+    return plain
+
+
+def _itself(plain: Any) -> Any:
     return plain

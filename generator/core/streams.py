@@ -7,21 +7,33 @@ Counter-based generator: Salmon et al., "Parallel random numbers: as easy as 1, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 
 import numpy as np
 
 
 class Rng(np.random.Generator):
-    """A numpy generator that also knows the number of the scene or sample it draws for.
+    """A numpy generator that also knows what it draws for.
 
     Attributes:
         index: Scene index for draws that all views share, else the number of the view in the
             data set. What a ``sequence`` in YAML steps by, so that no distribution needs a memory.
+        name: What draws from it.
+        streams: The family it belongs to.
     """
 
     index: int = 0
+    name: str = ""
+    streams: Streams
+
+    def of_sequence(self) -> Rng:
+        """A new stream of the same name that all instants of the sequence share.
+
+        What goes on from one instant to the next, like the bias of a gyroscope, is drawn from it
+        anew at every instant, from the beginning of the sequence.
+        """
+        return replace(self.streams, step=0).rng(f"{self.name}/sequence")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,5 +62,5 @@ class Streams:
         text = "\0".join((str(self.seed), str(self.scene), view, str(self.attempt), name))
         key = blake2b(text.encode(), digest_size=16).digest()
         rng = Rng(np.random.Philox(key=int.from_bytes(key, "little")))
-        rng.index = self.index
+        rng.index, rng.name, rng.streams = self.index, name, self
         return rng

@@ -13,8 +13,10 @@ from generator.physics.bullet import World
 from generator.physics.config import PhysicsConfig
 from generator.physics.dropping import Drop
 from generator.physics.goals import Arm, Stance
+from generator.physics.recording import Recording
 from generator.physics.shapes import CollisionShape, collision_shape
 from generator.physics.support import surfaces_of
+from generator.physics.ways import Way
 
 _DENSITY_KG_M3 = 300.0
 """Of the bounding box of a thing whose mass is unknown: household things are mostly hollow."""
@@ -65,15 +67,19 @@ class BulletEngine:
         for body in _solids(scene):
             self._add(body, body in falling)
 
-        stances = self._obeyed(scene, fixed, _placed(scene, falling))
-        if isinstance(stances, Rejection):
-            return Settled(scene, stances)
+        obeyed = self._obeyed(scene, fixed, _placed(scene, falling))
+        if isinstance(obeyed, Rejection):
+            return Settled(scene, obeyed)
         surfaces = {body.name: surfaces_of(scene, body) for body in falling}
         arms = [name for name in self._world.names if name not in fixed and name not in surfaces]
         rejection = Drop(self._world, falling, surfaces, self._config).settle(fixed, arms)
         if rejection is not None:
             return Settled(scene, rejection)
-        return Settled(self._frozen(scene, falling, stances))
+        settled = self._frozen(scene, falling, tuple(stance for _, stance in obeyed))
+        moved = self._moved(settled, fixed, [body.name for body in falling], obeyed)
+        if isinstance(moved, Rejection):
+            return Settled(scene, moved)
+        return Settled(moved)
 
     def _add(self, body: Body, falls: bool) -> None:
         shape = self._shape(body.asset)
@@ -95,9 +101,9 @@ class BulletEngine:
 
     def _obeyed(
         self, scene: Scene, fixed: list[str], placed: list[str]
-    ) -> tuple[Stance, ...] | Rejection:
-        """What each arm does; arms avoid those before them."""
-        stances: list[Stance] = []
+    ) -> list[tuple[Arm, Stance]] | Rejection:
+        """Each arm and what it does; arms avoid those before them."""
+        obeyed: list[tuple[Arm, Stance]] = []
         obstacles = list(fixed)
         for articulation in scene.articulations:
             robot = self._assets.robot(articulation.asset)
@@ -106,11 +112,52 @@ class BulletEngine:
             stance = arm.obey(obstacles, placed)
             if isinstance(stance, Rejection):
                 return stance
-            stances.append(stance)
+            obeyed.append((arm, stance))
             obstacles += arm.bodies
             if articulation.goal and stance.T_world_held is not None:
                 obstacles.append(articulation.goal.held)
-        return tuple(stances)
+        return obeyed
+
+    def _moved(
+        self,
+        scene: Scene,
+        fixed: list[str],
+        fallen: list[str],
+        obeyed: list[tuple[Arm, Stance]],
+    ) -> Scene | Rejection:
+        """The scene with the tracks of arms that have a way, and of what they carry.
+
+        Arms move in turn, each when those before it have come to rest.
+        """
+        if not any(arm.articulation.way for arm, _ in obeyed):
+            return scene
+        held = [
+            arm.articulation.goal.held
+            for arm, stance in obeyed
+            if arm.articulation.goal and stance.T_world_held is not None
+        ]
+        resting = {name: scene.body(name).T_world_body for name in (*fallen, *held)}
+        recording = Recording(dict(resting))
+        for arm, stance in obeyed:
+            if not arm.articulation.way:
+                continue
+            others = [name for other, _ in obeyed if other is not arm for name in other.bodies]
+            way = Way(arm, stance, self._world, [*fixed, *others], resting, scene.surfaces)
+            legs = way.legs()
+            if isinstance(legs, Rejection):
+                return legs
+            resting = way.resting
+            recording.add(
+                arm, legs, [link for link in arm.robot.links if link in arm.robot.visuals]
+            )
+        return replace(
+            scene,
+            tracks=(*scene.tracks, *recording.tracks()),
+            articulations=tuple(
+                replace(a, joint_track=recording.joint_tracks.get(a.name))
+                for a in scene.articulations
+            ),
+        )
 
     def _frozen(self, scene: Scene, fallen: list[Body], stances: tuple[Stance, ...]) -> Scene:
         """The scene with what the world and the arms came to."""

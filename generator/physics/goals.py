@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from generator.core.errors import Rejection
 from generator.core.geometry import RobotModel
 from generator.core.kinematics import (
@@ -54,6 +56,7 @@ class Arm:
         self._articulation = articulation
         self._robot = robot
         self._world = world
+        self._shapes = shapes
         self._links = [link for link in robot.links if link in shapes]
         base = rigid_group(robot, robot.links[0])
         self._moving = [link for link in self._links if link not in base]
@@ -67,9 +70,49 @@ class Arm:
         """Names of all its links in the world."""
         return [self.body(link) for link in self._links]
 
+    @property
+    def articulation(self) -> Articulation:
+        """The robot in the scene."""
+        return self._articulation
+
+    @property
+    def robot(self) -> RobotModel:
+        """Its model."""
+        return self._robot
+
+    @property
+    def links(self) -> list[str]:
+        """Links that collide."""
+        return self._links
+
+    @property
+    def moving(self) -> list[str]:
+        """Links that collide and can move."""
+        return self._moving
+
+    def radius_m(self, link: str) -> float:
+        """Of the ball around a link's origin that holds its collision geometry."""
+        shape = self._shapes[link]
+        points = shape.vertices_m + np.array(shape.center_of_mass_m)
+        return float(np.sqrt((points * points).sum(axis=1).max()))
+
     def body(self, link: str) -> str:
         """Name of a link in the world."""
         return f"{self._articulation.name}/{link}"
+
+    def show(self, positions: Sequence[float]) -> None:
+        """Put the links in the world where these joint positions have them."""
+        poses = link_poses(self._robot, self._articulation.T_world_base, positions)
+        for link in self._moving:
+            self._world.place(self.body(link), poses[link])
+
+    def grasp_pose(self, positions: Sequence[float]) -> SE3:
+        """``T_world_grasp`` at these joint positions; of the root link without a gripper."""
+        poses = link_poses(self._robot, self._articulation.T_world_base, positions)
+        gripper = self._robot.gripper
+        if gripper is None:
+            return poses[self._robot.links[0]]
+        return poses[gripper.link] @ gripper.T_link_grasp
 
     def obey(self, fixed: Sequence[str], placed: Sequence[str]) -> Stance | Rejection:
         """Take the first candidate that works and stay there.
@@ -130,16 +173,12 @@ class Arm:
             yield Stance(positions) if ok else CANNOT_REACH
 
     def _held_pose(self, positions: tuple[float, ...], grasp: Grasp) -> SE3 | None:
-        gripper = self._robot.gripper
-        if gripper is None or grasp.T_grasp_held is None:
+        if grasp.T_grasp_held is None:
             return None
-        poses = link_poses(self._robot, self._articulation.T_world_base, positions)
-        return (poses[gripper.link] @ gripper.T_link_grasp @ grasp.T_grasp_held).rounded()
+        return (self.grasp_pose(positions) @ grasp.T_grasp_held).rounded()
 
     def _take(self, stance: Stance, held: str) -> None:
-        poses = link_poses(self._robot, self._articulation.T_world_base, stance.positions)
-        for link in self._moving:
-            self._world.place(self.body(link), poses[link])
+        self.show(stance.positions)
         if stance.T_world_held is not None:
             self._world.place(held, stance.T_world_held)
 

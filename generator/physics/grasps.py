@@ -13,6 +13,8 @@ from generator.core.se3 import SE3, Array, Vec3
 from generator.physics.bullet import World
 
 _PALM_GAP_M = 0.002
+_PAD_GAP_M = 0.002
+"""Both fingers must come this near to what lies between them."""
 _BISECTIONS = 14
 """Halvings of the opening: a stroke of 8 cm is closed to within 5 micrometres."""
 
@@ -52,6 +54,38 @@ class Hand:
         if (held, up) not in self._known:
             self._known[held, up] = self._closed(held, up)
         return self._known[held, up]
+
+    def grasp_as_it_lies(self, held: str, T_grasp_held: SE3) -> Grasp | None:
+        """Fingers closed on a body with its pose in the grasp frame given, but for Y.
+
+        None if open fingers would cut into it, or if closed ones would touch it on one side only.
+        """
+        self._spread(1.0)
+        self._world.place(held, T_grasp_held)
+        pose = self._centred(held, T_grasp_held)
+        if not self._clear(held, 1.0) or self._touches_palm(held):
+            return None
+        opening = self._narrowest(held)
+        self._spread(opening)
+        gaps = [self._world.gap_m(self._body(f), held, _PAD_GAP_M) for f in self._fingers]
+        if opening <= 0.0 or any(gap >= _PAD_GAP_M for gap in gaps):
+            return None
+        return Grasp(opening, pose)
+
+    def palm_height_m(self) -> float:
+        """How far behind the grasp frame's origin the hand without its fingers ends."""
+        self._spread(1.0)
+        return -self._palm_z_m() - _PALM_GAP_M
+
+    def tip_depth_m(self) -> float:
+        """How far before the grasp frame's origin the fingers end."""
+        self._spread(1.0)
+        return max(
+            (float(self._world.bounds_m(self._body(f))[1][2]) for f in self._fingers), default=0.0
+        )
+
+    def _touches_palm(self, held: str) -> bool:
+        return any(self._world.gap_m(self._body(link), held, 0.0) < 0.0 for link in self._palm)
 
     def _closed(self, held: str, up: Vec3) -> Grasp | None:
         self._world.place(held, SE3())

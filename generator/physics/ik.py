@@ -19,6 +19,9 @@ from generator.core.se3 import SE3, Vec3, rotate_by_quaternion
 POSITION_TOLERANCE_M = 1e-3
 ANGLE_TOLERANCE_RAD = math.radians(0.5)
 
+EXACT = 0.01
+"""Share of the tolerances within which a hand takes hold of what already lies somewhere."""
+
 _ITERATIONS_MAX = 40
 _STARTS_MAX = 6
 _LENGTH_M_PER_RAD = 0.25
@@ -92,22 +95,44 @@ def solutions(chain: Chain, T_base_grasp: SE3) -> Iterator[tuple[float, ...]]:
     for number in range(_STARTS_MAX):
         found = solve(chain, T_base_grasp, _start(chain, number))
         if found is not None:
-            positions = list(chain.rest)
-            for index, value in zip(chain.indices, found, strict=True):
-                positions[index] = value
-            yield tuple(positions)
+            yield _completed(chain, found, chain.rest)
 
 
-def solve(chain: Chain, T_base_grasp: SE3, start: Sequence[float]) -> tuple[float, ...] | None:
+def neighbour(
+    chain: Chain, T_base_grasp: SE3, positions: Sequence[float], share: float = EXACT
+) -> tuple[float, ...] | None:
+    """Arm positions that put the grasp frame at a pose, sought from others; None if none is near.
+
+    Args:
+        chain: The arm.
+        T_base_grasp: The pose.
+        positions: Where to begin, one per arm joint.
+        share: Of the tolerances, that may be left.
+    """
+    found = solve(chain, T_base_grasp, [positions[index] for index in chain.indices], share)
+    return None if found is None else _completed(chain, found, positions)
+
+
+def solve(
+    chain: Chain, T_base_grasp: SE3, start: Sequence[float], share: float = 1.0
+) -> tuple[float, ...] | None:
     """Positions of the chain's joints within limits, or None where the descent does not arrive."""
     positions = list(start)
     for _ in range(_ITERATIONS_MAX):
         pose, columns = _jacobian(chain, positions)
         error = _error(T_base_grasp, pose)
-        if _arrived(error):
+        if _arrived(error, share):
             return tuple(positions)
         _step(chain.joints, positions, columns, error)
     return None
+
+
+def _completed(chain: Chain, found: Sequence[float], others: Sequence[float]) -> tuple[float, ...]:
+    """The arm's positions: those found, and for joints off the chain the others."""
+    positions = list(others)
+    for index, value in zip(chain.indices, found, strict=True):
+        positions[index] = value
+    return tuple(positions)
 
 
 def _start(chain: Chain, number: int) -> list[float]:
@@ -176,11 +201,12 @@ def _error(target: SE3, pose: SE3) -> Row:
     ]
 
 
-def _arrived(error: Row) -> bool:
+def _arrived(error: Row, share: float) -> bool:
     # Half the tolerance, so that rounding the positions cannot leave it.
     distance = math.sqrt(sum(e * e for e in error[:3]))
     angle = math.sqrt(sum(e * e for e in error[3:])) / _LENGTH_M_PER_RAD
-    return distance < 0.5 * POSITION_TOLERANCE_M and angle < 0.5 * ANGLE_TOLERANCE_RAD
+    half = 0.5 * share
+    return distance < half * POSITION_TOLERANCE_M and angle < half * ANGLE_TOLERANCE_RAD
 
 
 def _step(joints: Sequence[Joint], positions: Row, columns: list[Row], error: Row) -> None:

@@ -38,6 +38,19 @@ def is_supported(surfaces: Iterable[Surface], low_m: Array, high_m: Array) -> bo
     return any(_holds(s, low_m, high_m, slack_m=size_m) for s in surfaces)
 
 
+def is_within(surfaces: Iterable[Surface], low_m: Array, high_m: Array) -> bool:
+    """Whether a body with these bounds lies over one of the surfaces with all of its footprint."""
+    corners = [(x, y) for x in (low_m[0], high_m[0]) for y in (low_m[1], high_m[1])]
+    bottom = float(low_m[2])
+    return any(
+        all(
+            _holds(s, np.array([x, y, bottom]), np.array([x, y, bottom]), slack_m=0.0)
+            for x, y in corners
+        )
+        for s in surfaces
+    )
+
+
 def guard_walls(surface: Surface) -> list[tuple[CollisionShape, SE3]]:
     """Four walls around an open surface; none around a walled one."""
     if surface.walled:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from generator.core.interfaces import (
     Sensor,
     Stage,
 )
-from generator.core.sample import ImageTruth, Sample
+from generator.core.sample import FrameTruth, ImageTruth, Sample
 from generator.core.scene import Scene
 from generator.core.streams import Streams
 from generator.pipeline.freeze import frozen_scene
@@ -52,10 +53,13 @@ class Recipe:
         blueprint: What the scene of these streams is made from: a pure function.
         channels: What the annotators need to have been rendered.
         image_truth: Annotates one reading.
+        frame_truth: Annotates a sample as a whole, given the scene at the sample's instant by
+            ``""`` and at each laser scanner's by its name; None if there is nothing to say.
         split_shares: ``{split: share}`` in order; shares sum to 1.
         layout_attempts_max: Bound on the attempts at one scene.
         info: The data set as its exporters see it.
         strides: Every how many steps a sensor reads, by name, where that is not every one.
+        offsets_s: How much later than its step a sensor reads, by name, where that is not 0.
     """
 
     seed: int
@@ -69,6 +73,8 @@ class Recipe:
     info: DatasetInfo
     exporters: Mapping[str, Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
+    offsets_s: Mapping[str, float] = field(default_factory=dict)
+    frame_truth: Callable[[Mapping[str, Scene]], FrameTruth | None] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,12 +116,12 @@ class Pipeline:
         recipe: Recipe,
         assets: AssetLibrary,
         open_physics: Callable[[], PhysicsEngine],
-        renderer: Renderer,
+        open_renderer: Callable[[], Renderer],
     ) -> None:
         self.recipe = recipe
         self.assets = assets
         self._open_physics = open_physics
-        self.renderer = renderer
+        self._open_renderer = open_renderer
         self._physics: PhysicsEngine | None = None
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
@@ -127,14 +133,21 @@ class Pipeline:
         """The data set as its exporters see it."""
         return self.recipe.info
 
+    @cached_property
+    def renderer(self) -> Renderer:
+        """Opened by the context, or when first asked for: who merges shards draws nothing."""
+        return self._open_renderer()
+
     @property
     def exporters(self) -> Mapping[str, Exporter]:
         """Exporters by name."""
         return self.recipe.exporters
 
     def __enter__(self) -> Pipeline:
-        """Start the physics engine."""
+        """Start the engines."""
         engine = self._open_physics()
+        # A machine that cannot draw says so before work begins.
+        _ = self.renderer
         if hasattr(engine, "__enter__"):
             engine = self._resources.enter_context(engine)  # type: ignore[arg-type]
         self._physics = engine
@@ -167,6 +180,10 @@ class Pipeline:
             scene = self._instant(view.scene, step_index * self.info.step_s)
             streams = replace(view.streams, step=step_index)
         capture, truth = self._captured(scene, streams, timings)
+        with _timed(timings, "annotate"):
+            swept = {n: self._instant(scene, c.time_s) for n, c in capture.clouds.items()}
+            described = self.recipe.frame_truth
+            frame = described({"": scene, **swept}) if described is not None else None
         return Sample(
             index=index,
             scene_index=scene_index,
@@ -179,12 +196,13 @@ class Pipeline:
             attempts=accepted.attempt + 1,
             timings_s=timings,
             cameras=self.info.sensors,
+            frame=frame,
         )
 
     def _captured(
         self, scene: Scene, streams: Streams, timings_s: dict[str, float]
     ) -> tuple[Capture, dict[str, ImageTruth]]:
-        """What every sensor sees, and the truth about every image at the image's instant."""
+        """What every sensor sees at its own instant, and the truth about every image at that."""
         readings: dict[str, Reading] = {}
         clouds: dict[str, PointCloud] = {}
         tables: dict[str, Table] = {}
@@ -193,15 +211,16 @@ class Pipeline:
             if streams.step % self.recipe.strides.get(sensor.name, 1):
                 continue
             rng = streams.rng(f"sensor/{sensor.name}")
+            then = self._instant(scene, scene.time_s + self.recipe.offsets_s.get(sensor.name, 0.0))
             with _timed(timings_s, "render"):
-                seen = sensor.capture(scene, self.renderer, self.recipe.channels, rng)
+                seen = sensor.capture(then, self.renderer, self.recipe.channels, rng)
             if isinstance(seen, PointCloud):
                 clouds[sensor.name] = seen
             elif isinstance(seen, Table):
                 tables[sensor.name] = seen
             else:
                 with _timed(timings_s, "annotate"):
-                    then = self._instant(scene, seen.time_s)
+                    then = self._instant(then, seen.time_s)
                     truth[sensor.name] = self.recipe.image_truth(then, seen)
                 readings[sensor.name] = seen
         return Capture(readings, clouds, tables), truth

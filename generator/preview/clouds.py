@@ -1,6 +1,8 @@
-"""Laser scans to look at: coloured points, and a view from above."""
+"""Laser scans to look at: coloured points, a view from above, and one from the scanner."""
 
 from __future__ import annotations
+
+from typing import Literal, get_args
 
 import cv2
 import numpy as np
@@ -12,12 +14,18 @@ from generator.core.geometry import SURFACES
 from generator.core.scene import Scene
 from generator.core.se3 import SE3
 from generator.preview.overlay import BOX_EDGES, Image
-from generator.preview.palette import color_of
+from generator.preview.palette import color_of, colored_shares
 
+PointColors = Literal["class", "intensity"]
+"""What decides the colour of a point."""
 PANEL_PX = 960
 """Width of a view from above before it is scaled to its tile."""
 AHEAD_M = 50.0
 """Shown before and behind the scanner."""
+NEAR_M, FAR_M = 2.0, 100.0
+"""Ranges between which colours differ in the view from the scanner."""
+ROW_PX = 2
+"""Height of a ring in the view from the scanner."""
 
 GREY = (120, 120, 120)
 COLORS = {
@@ -37,9 +45,17 @@ COLORS = {
 """Of what has no category, by surface."""
 
 
-def point_colors(cloud: PointCloud) -> NDArray[np.uint8]:
-    """SRGB colour of each point: that of its category, else of its surface, uint8 [n, 3]."""
+def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uint8]:
+    """SRGB colour of each point, uint8 [n, 3].
+
+    Args:
+        cloud: Whose points these are.
+        by: ``class`` is that of its category, else of its surface.
+    """
     points = cloud.points
+    if by == "intensity":
+        # Most surfaces return little: the root tells them apart.
+        return colored_shares(np.sqrt(points["intensity"]))
     categories = points["category_id"]
     of_category = [color_of(k) for k in range(int(categories.max(initial=0)) + 1)]
     of_surface = [COLORS.get(name, GREY) for name in SURFACES]
@@ -78,6 +94,34 @@ def top_view(cloud: PointCloud, scene: Scene, aspect: float) -> Image:
             )
             _outline(image, box, color_of(thing.category_id))
     return image
+
+
+def range_view(cloud: PointCloud) -> Image:
+    """What the scanner sees all around: range, intensity and class, one above the other.
+
+    A row is a ring, the highest first; the middle column is straight ahead, left is left. Of
+    several points in one pixel the nearest is shown. Near is blue, far is red.
+
+    Returns:
+        uint8 [h, w, 3]; black where no point is.
+    """
+    position_m = cloud.points["position_m"].astype(np.float64)
+    range_m = np.sqrt(np.einsum("ij,ij->i", position_m, position_m))
+    turn = 0.5 - np.arctan2(position_m[:, 1], position_m[:, 0]) / (2.0 * np.pi)
+    column = np.minimum((turn * PANEL_PX).astype(np.intp), PANEL_PX - 1)
+    row = cloud.points["ring"].astype(np.intp)
+    order = np.argsort(-range_m, kind="stable")
+    share = np.log(np.maximum(range_m, 1e-6) / NEAR_M) / np.log(FAR_M / NEAR_M)
+    looks = (
+        colored_shares(share),
+        *(point_colors(cloud, by) for by in get_args(PointColors)[::-1]),
+    )
+    panels = []
+    for colors in looks:
+        panel: Image = np.zeros((1 + int(row.max(initial=0)), PANEL_PX, 3), np.uint8)
+        panel[row[order], column[order]] = colors[order]
+        panels.append(np.repeat(panel, ROW_PX, axis=0))
+    return np.concatenate(panels)
 
 
 def _pixels(

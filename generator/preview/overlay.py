@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import cv2
@@ -23,6 +24,8 @@ BOX_EDGES = (
 )  # fmt: skip
 """Pairs of ``OrientedBox.corners`` that share an edge."""
 
+PIECES = 32
+"""That an edge is drawn in where a lens bends it."""
 NEAR_M = 0.01
 """Edges are cut where they come closer to the camera plane than this."""
 
@@ -65,12 +68,30 @@ def channel_image(reading: Reading, channel: Channel) -> Image:
 def draw_box3d(image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rgb) -> None:
     """Draw the edges of a box given in the camera frame into ``image``, in place."""
     corners = box.corners()
+    if not intrinsics.straight:
+        for a, b in BOX_EDGES:
+            _draw_bent(image, corners[a], corners[b], intrinsics, color)
+        return
     for a, b in BOX_EDGES:
         segment = _in_front(corners[a], corners[b])
         if segment is not None:
             (ua, va), (ub, vb) = np.clip(intrinsics.project(segment), -1e4, 1e4)
             start, end = (round(ua), round(va)), (round(ub), round(vb))
             cv2.line(image, start, end, color, 1, cv2.LINE_AA)
+
+
+def _draw_bent(
+    image: Image, a: NDArray[Any], b: NDArray[Any], intrinsics: Intrinsics, color: Rgb
+) -> None:
+    """Draw a segment in pieces, without those that the lens does not show or that jump a seam."""
+    share = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
+    places = intrinsics.project(a + (b - a) * share)
+    for start, end in pairwise(places):
+        shown = np.isfinite([start, end]).all() and np.abs(end - start).max() < image.shape[1] / 2
+        if shown:
+            (ua, va), (ub, vb) = np.clip([start, end], -1e4, 1e4)
+            ends = (round(ua), round(va)), (round(ub), round(vb))
+            cv2.line(image, *ends, color, 1, cv2.LINE_AA)
 
 
 def draw_keypoints(image: Image, points: Sequence[KeypointTruth], color: Rgb) -> None:

@@ -37,3 +37,16 @@ def colored_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
         scale = (far - z_depth_m[seen]) / max(float(far - near), 1e-6)
         grey[seen] = np.clip(40 + 215 * scale, 40, 255).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
+
+
+def colored_shares(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Shares [n] as colours from blue (0) over green to red (1), uint8 [n, 3]; others are clipped.
+
+    The hue runs from 240 degrees to 0 at full saturation.
+    """
+    hue = 4.0 * (1.0 - np.clip(shares, 0.0, 1.0).astype(np.float64))
+    ramps = [np.abs(hue - 3.0) - 1.0, 2.0 - np.abs(hue - 2.0), 2.0 - np.abs(hue - 4.0)]
+    colors: NDArray[np.uint8] = np.round(255.0 * np.clip(np.stack(ramps, -1), 0, 1)).astype(
+        np.uint8
+    )
+    return colors

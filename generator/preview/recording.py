@@ -1,7 +1,7 @@
-"""Samples as a Rerun recording: the 3D scene, the camera images, one timeline step per sample.
+"""Samples as a Rerun recording: the 3D scene, the images, the scans.
 
-Borders of the format: quaternions are x y z w, boxes have half sizes, the pinhole's principal point
-is in our own convention (pixel centres at i + 0.5).
+Timelines are ``sample``, the number of the sample, and for sequences ``time`` in seconds, on which
+sequences follow each other. What has not changed since the last sample is not sent again.
 """
 
 from __future__ import annotations
@@ -19,16 +19,20 @@ from numpy.typing import NDArray
 from generator.core.capture import Channel, PointCloud, Reading
 from generator.core.errors import StorageError
 from generator.core.geometry import MeshData
-from generator.core.interfaces import AssetLibrary
+from generator.core.interfaces import AssetLibrary, DatasetInfo
 from generator.core.sample import ImageTruth, Sample
 from generator.core.scene import Body, Instance, Scene
 from generator.core.se3 import SE3
 from generator.core.skeletons import Skeleton, skeleton_of
-from generator.preview.clouds import point_colors
+from generator.preview.clouds import PointColors, point_colors
 from generator.preview.palette import color_of
+from generator.preview.shapes import boxes_2d, boxes_3d, mesh_3d, pinhole, transform, ways
 
 TIMELINE = "sample"
+TIME = "time"
 APPLICATION = "gen-data"
+AXES_M = 0.5
+"""Length at which the axes of rigs and devices are drawn."""
 
 
 @dataclass
@@ -37,26 +41,29 @@ class Recorder:
 
     Attributes:
         stream: Where to write.
-        categories: Names; category id ``k`` is ``categories[k - 1]``.
+        info: The data set that the samples are of.
+        points: What decides the colour of a laser point.
     """
 
     stream: rr.RecordingStream
     assets: AssetLibrary
-    categories: Sequence[str]
+    info: DatasetInfo
+    points: PointColors = "class"
     _sent: dict[str, tuple[Any, ...]] = field(default_factory=dict)
     _skeletons: dict[int, Skeleton] = field(default_factory=dict)
+    _sequence: int = -1
 
-    def start(self, sensors: Sequence[str]) -> None:
+    def start(self) -> None:
         """Log what holds for every sample: axes, category names, the layout of the views."""
         self._name_classes()
         self.stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self.stream.send_blueprint(_layout(sensors))
+        self.stream.send_blueprint(_layout(self.info.sensors))
 
     def _name_classes(self) -> None:
         """Log names and colours of categories and, as far as they are known, their skeletons."""
         background = rr.AnnotationInfo(id=0, label="background", color=(60, 60, 60))
         described = [rr.ClassDescription(info=background)]
-        for k, name in enumerate(self.categories, 1):
+        for k, name in enumerate(self.info.categories, 1):
             info = rr.AnnotationInfo(id=k, label=name, color=color_of(k))
             skeleton = self._skeletons.get(k, Skeleton(()))
             described.append(
@@ -84,40 +91,64 @@ class Recorder:
             self._name_classes()
 
     def record(self, sample: Sample) -> None:
-        """Log one sample at its own step of the timeline."""
+        """Log one sample at its own place in time."""
         self._learn_skeletons(sample.scene.instances)
-        self.stream.set_time(TIMELINE, sequence=sample.index)
+        self._set_time(sample, sample.scene.time_s)
         self._record_bodies(sample.scene)
+        self._record_frames(sample.scene)
+        self._record_ways(sample)
+        if sample.truth:
+            self.stream.log("world/boxes", boxes_3d(sample))
         for name, reading in sorted(sample.capture.readings.items()):
+            self._set_time(sample, reading.time_s)
             self._record_image(name, reading, sample.truth[name])
         for name, cloud in sorted(sample.capture.clouds.items()):
+            self._set_time(sample, cloud.time_s)
             self._record_cloud(name, cloud)
-        self._record_boxes(sample)
+
+    def _set_time(self, sample: Sample, time_s: float) -> None:
+        """Log what follows at an instant of the sample's sequence."""
+        self.stream.set_time(TIMELINE, sequence=sample.index)
+        if self.info.steps_per_scene > 1:
+            begins_s = (sample.index - sample.step_index) * self.info.step_s
+            self.stream.set_time(TIME, duration=round(begins_s + time_s, 9))
 
     def _record_bodies(self, scene: Scene) -> None:
         paths = set()
         for body in scene.bodies:
             path = f"world/bodies/{body.name}"
             paths.add(path)
-            self.stream.log(path, _transform(body.T_world_body, body.scale))
-            look = (body.asset, body.materials)
-            if self._sent.get(path) != look:
-                self._sent[path] = look
+            look, place = (body.asset, body.materials), (body.T_world_body, body.scale)
+            before = self._sent.get(path, (None, None))
+            self._sent[path] = (look, place)
+            if before[1] != place:
+                self.stream.log(path, transform(*place))
+            if before[0] != look:
                 self.stream.log(path, self._mesh(body))
         for path in sorted(set(self._sent) - paths):
             del self._sent[path]
             self.stream.log(path, rr.Clear(recursive=False))
 
+    def _record_frames(self, scene: Scene) -> None:
+        """Log where rigs and devices are; cameras and scanners are logged as they read."""
+        frames: dict[str, SE3] = {
+            f"world/rigs/{rig.name}": scene.rig_pose(rig.name) for rig in scene.rigs
+        } | {f"world/devices/{device.name}": device.T_world_device for device in scene.devices}
+        for path, pose in frames.items():
+            self.stream.log(path, transform(pose), rr.TransformAxes3D(AXES_M))
+
+    def _record_ways(self, sample: Sample) -> None:
+        """Log where things go, once per sequence."""
+        sequence = sample.index // self.info.steps_per_scene
+        if self.info.steps_per_scene > 1 and sequence != self._sequence:
+            self._sequence = sequence
+            remaining = self.info.steps_per_scene - 1 - sample.step_index
+            until_s = sample.scene.time_s + remaining * self.info.step_s
+            self.stream.log("world/ways", ways(sample.scene, until_s))
+
     def _mesh(self, body: Body) -> rr.Mesh3D:
         mesh = self.assets.mesh(body.asset)
-        corners = mesh.faces.reshape(-1)
-        slots = np.repeat(mesh.face_slots, 3)
-        return rr.Mesh3D(
-            vertex_positions=mesh.vertices_m[corners],
-            vertex_normals=mesh.normals[corners],
-            vertex_colors=self._slot_colors(body, mesh)[slots],
-            triangle_indices=np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
-        )
+        return mesh_3d(mesh, self._slot_colors(body, mesh))
 
     def _slot_colors(self, body: Body, mesh: MeshData) -> NDArray[np.uint8]:
         """SRGB colour per material slot: base colour times the texture's mean."""
@@ -131,19 +162,11 @@ class Recorder:
         return np.asarray(colors).astype(np.uint8)
 
     def _record_image(self, name: str, reading: Reading, truth: ImageTruth) -> None:
-        camera, intrinsics = reading.camera, reading.camera.intrinsics
         path = f"world/cameras/{name}"
-        self.stream.log(path, _transform(camera.T_world_camera))
-        self.stream.log(
-            f"{path}/image",
-            rr.Pinhole(
-                image_from_camera=intrinsics.matrix(),
-                width=intrinsics.width_px,
-                height=intrinsics.height_px,
-                camera_xyz=rr.ViewCoordinates.RDF,
-                image_plane_distance=0.15,
-            ),
-        )
+        self.stream.log(path, transform(reading.camera.T_world_camera))
+        # Rerun knows no other camera: images of other lenses are shown by themselves.
+        if reading.camera.intrinsics.straight:
+            self.stream.log(f"{path}/image", pinhole(reading.camera.intrinsics))
         channels = reading.channels
         if Channel.RGB in channels:
             self.stream.log(f"{path}/image/rgb", rr.Image(channels[Channel.RGB]).compress(90))
@@ -154,7 +177,7 @@ class Recorder:
         if Channel.CATEGORY in channels:
             categories = rr.SegmentationImage(channels[Channel.CATEGORY], opacity=0.4)
             self.stream.log(f"{path}/image/category", categories)
-        self.stream.log(f"{path}/image/boxes", _boxes_2d(truth))
+        self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
         self._record_keypoints(f"{path}/image/keypoints", truth)
 
     def _record_keypoints(self, path: str, truth: ImageTruth) -> None:
@@ -176,30 +199,12 @@ class Recorder:
 
     def _record_cloud(self, name: str, cloud: PointCloud) -> None:
         path = f"world/lidars/{name}"
-        self.stream.log(path, _transform(cloud.lidar.T_world_lidar))
+        self.stream.log(path, transform(cloud.lidar.T_world_lidar))
+        colors = point_colors(cloud, self.points)
         points = rr.Points3D(
-            cloud.points["position_m"], colors=point_colors(cloud), radii=rr.Radius.ui_points(1.5)
+            cloud.points["position_m"], colors=colors, radii=rr.Radius.ui_points(1.5)
         )
         self.stream.log(f"{path}/points", points)
-
-    def _record_boxes(self, sample: Sample) -> None:
-        found = {
-            item.instance.instance_id: (item.instance, item.box3d_world)
-            for truth in sample.truth.values()
-            for item in truth.objects
-            if item.box3d_world is not None
-        }
-        boxes = [found[key] for key in sorted(found)]
-        self.stream.log(
-            "world/boxes",
-            rr.Boxes3D(
-                centers=[box.T_frame_box.translation_m for _, box in boxes if box],
-                half_sizes=[[0.5 * s for s in box.size_m] for _, box in boxes if box],
-                quaternions=[_xyzw(box.T_frame_box) for _, box in boxes if box],
-                labels=[instance.category for instance, _ in boxes],
-                class_ids=[instance.category_id for instance, _ in boxes],
-            ),
-        )
 
 
 def save_recording(
@@ -207,8 +212,8 @@ def save_recording(
     samples: Iterable[Sample],
     assets: AssetLibrary,
     *,
-    categories: Sequence[str],
-    sensors: Sequence[str],
+    info: DatasetInfo,
+    points: PointColors = "class",
 ) -> None:
     """Write samples to a ``.rrd`` file.
 
@@ -222,7 +227,7 @@ def save_recording(
         raise StorageError(f"{path}: {error.strerror}") from error
     stream = rr.RecordingStream(APPLICATION)
     stream.save(path)
-    _record_all(Recorder(stream, assets, categories), samples, sensors)
+    _record_all(Recorder(stream, assets, info, points), samples)
     stream.disconnect()
 
 
@@ -230,8 +235,8 @@ def show_samples(
     samples: Iterable[Sample],
     assets: AssetLibrary,
     *,
-    categories: Sequence[str],
-    sensors: Sequence[str],
+    info: DatasetInfo,
+    points: PointColors = "class",
     web: bool,
 ) -> str:
     """Show samples in the desktop viewer, or serve them to a browser.
@@ -246,13 +251,13 @@ def show_samples(
         rr.serve_web_viewer(open_browser=False, connect_to=where)
     else:
         stream.spawn()
-    _record_all(Recorder(stream, assets, categories), samples, sensors)
+    _record_all(Recorder(stream, assets, info, points), samples)
     stream.flush()
     return where
 
 
-def _record_all(recorder: Recorder, samples: Iterable[Sample], sensors: Sequence[str]) -> None:
-    recorder.start(sensors)
+def _record_all(recorder: Recorder, samples: Iterable[Sample]) -> None:
+    recorder.start()
     for sample in samples:
         recorder.record(sample)
 
@@ -263,26 +268,3 @@ def _layout(sensors: Sequence[str]) -> rrb.Blueprint:
     ]
     world = rrb.Spatial3DView(origin="world", name="scene")
     return rrb.Blueprint(rrb.Horizontal(world, rrb.Vertical(*cameras)), collapse_panels=True)
-
-
-def _boxes_2d(truth: ImageTruth) -> rr.Boxes2D:
-    items = [item for item in truth.objects if item.box is not None]
-    return rr.Boxes2D(
-        mins=[(item.box.x_min, item.box.y_min) for item in items if item.box],
-        sizes=[(item.box.width_px, item.box.height_px) for item in items if item.box],
-        labels=[item.instance.category for item in items],
-        class_ids=[item.instance.category_id for item in items],
-    )
-
-
-def _transform(pose: SE3, scale: float = 1.0) -> rr.Transform3D:
-    return rr.Transform3D(
-        translation=pose.translation_m,
-        quaternion=rr.Quaternion(xyzw=_xyzw(pose)),
-        scale=scale if scale != 1.0 else None,
-    )
-
-
-def _xyzw(pose: SE3) -> tuple[float, float, float, float]:
-    w, x, y, z = pose.quaternion_wxyz
-    return (x, y, z, w)

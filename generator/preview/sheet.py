@@ -12,7 +12,7 @@ import numpy as np
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError, StorageError
 from generator.core.sample import Sample
-from generator.preview.clouds import top_view
+from generator.preview.clouds import range_view, top_view
 from generator.preview.overlay import Image, channel_image, labelled_image
 
 GAP_PX = 4
@@ -22,7 +22,7 @@ BACKGROUND = 24
 def tiles(
     samples: Iterable[Sample], channels: Sequence[Channel], *, labels: bool, width_px: int
 ) -> list[Image]:
-    """One tile per sample, camera and channel, and one per scan, each ``width_px`` wide."""
+    """One tile per sample, camera and channel, and two per scan, each ``width_px`` wide."""
     shown = []
     for sample in samples:
         aspect = 1.0
@@ -35,8 +35,8 @@ def tiles(
                     if drawn
                     else channel_image(reading, channel)
                 )
-        clouds = sorted(sample.capture.clouds.items())
-        shown += [top_view(cloud, sample.scene, aspect) for _, cloud in clouds]
+        for _, cloud in sorted(sample.capture.clouds.items()):
+            shown += [top_view(cloud, sample.scene, aspect), range_view(cloud)]
     return [_scaled(image, width_px) for image in shown]
 
 

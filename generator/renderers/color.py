@@ -1,15 +1,18 @@
-"""The RGB image: light, shade, exposure."""
+"""The RGB image: light and shade, then exposure."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from generator.core.geometry import Float32
 from generator.core.scene import Camera
 from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
-from generator.renderers.kernels import antialias, gather, raster, records, shade, tone
+from generator.renderers.kernels import antialias, gather, optics, raster, records, shade, tone
 from generator.renderers.kernels import samples as mixing
 from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.raster import Z_NEAR_M
@@ -27,48 +30,99 @@ from generator.renderers.weather import expose_ground, fill_air
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
 
 
-def color_image(
+@dataclass(frozen=True, eq=False, slots=True)
+class LitImage:
+    """What a camera receives, and how it is exposed.
+
+    Attributes:
+        radiance: Luminance in linear RGB [cd/m^2], anti-aliased, flat; scratch memory.
+        ev100: The exposure that was set or metered.
+    """
+
+    radiance: wp.array
+    ev100: float
+
+
+def lit_image(
     camera: Camera,
     world: PackedWorld,
     view: records.View,
     seen: Seen,
     stock: AssetStock,
     settings: RenderSettings,
-) -> NDArray[np.uint8]:
-    """sRGB, uint8 [h, w, 3]."""
-    device, n = stock.device, view.width * view.height
+) -> LitImage:
+    """Light, shade and weather, before the camera's response."""
     images = _images(seen)
     keep_main_lamps(world, view, seen, stock, settings.max_lamps)
     lattice = sampled_lattice(world, view, seen, stock)
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
+    _darken_outside(view, radiance)
     ev100 = camera.ev100
     if ev100 is None:
         ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
     draw_precipitation(world, camera, view, seen.z_m, radiance, ev100=ev100, stock=stock)
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
-    exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
+    _darken_outside(view, radiance)
+    if settings.antialias > 1:
+        exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
+        _mix_edges(world, view, seen, radiance, exposure, settings.antialias, stock)
+    return LitImage(radiance, ev100)
+
+
+def radiance_image(lit: LitImage, view: records.View) -> Float32:
+    """Luminance in linear RGB [cd/m^2], float32 [h, w, 3]."""
+    image: Float32 = lit.radiance.numpy().reshape(view.height, view.width, 3).copy()
+    return image
+
+
+def color_image(
+    lit: LitImage, view: records.View, stock: AssetStock, settings: RenderSettings
+) -> NDArray[np.uint8]:
+    """sRGB, uint8 [h, w, 3]."""
+    device, n = stock.device, view.width * view.height
+    exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
     curve = wp.array(tone_curve(settings.tone), dtype=wp.uint8, device=device)
     rgb = wp.zeros((n, 3), dtype=wp.uint8, device=device)
-    wp.launch(tone.develop, n, [radiance, exposure, curve], [rgb], device=device)
-    if settings.antialias > 1:
-        count = wp.zeros(1, dtype=wp.int32, device=device)
-        pixels = stock.scratch("listed pixels", n, wp.int32)
-        wp.launch(antialias.find_edges, view.height, [view, images], [count, pixels], device=device)
-        edges = pixels[: int(count.numpy()[0])]
-        parts = pixel_parts(settings.antialias)
-        if seen.projected is not None:
-            samples = _drawn_samples(world, view, seen, seen.projected, edges, parts, stock)
-            inputs = [view, world.record, images, radiance, edges, samples, exposure, curve]
-            wp.launch(mixing.mix_samples, len(edges), inputs, [rgb], device=device)
-        else:
-            offsets = wp.array(parts, dtype=wp.vec2, device=device)
-            inputs = [view, world.record, images, radiance, edges, offsets]
-            inputs += [exposure, Z_NEAR_M, curve]
-            wp.launch(antialias.antialias, len(edges), inputs, [rgb], device=device)
+    wp.launch(tone.develop, n, [lit.radiance, exposure, curve], [rgb], device=device)
     image: NDArray[np.uint8] = rgb.numpy().reshape(view.height, view.width, 3)
     return image
+
+
+def _mix_edges(
+    world: PackedWorld,
+    view: records.View,
+    seen: Seen,
+    radiance: wp.array,
+    exposure: float,
+    samples: int,
+    stock: AssetStock,
+) -> None:
+    """Anti-alias, in place."""
+    device, images = stock.device, _images(seen)
+    count = wp.zeros(1, dtype=wp.int32, device=device)
+    pixels = stock.scratch("listed pixels", view.width * view.height, wp.int32)
+    wp.launch(antialias.find_edges, view.height, [view, images], [count, pixels], device=device)
+    edges = pixels[: int(count.numpy()[0])]
+    mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=device)
+    parts = pixel_parts(samples)
+    frame = [view, world.record, images, radiance, edges]
+    if seen.projected is not None:
+        drawn = _drawn_samples(world, view, seen, seen.projected, edges, parts, stock)
+        inputs = [*frame, drawn, exposure]
+        wp.launch(mixing.mix_samples, len(edges), inputs, [mixed], device=device)
+    else:
+        inputs = [*frame, wp.array(parts, dtype=wp.vec2, device=device), exposure, Z_NEAR_M]
+        wp.launch(antialias.antialias, len(edges), inputs, [mixed], device=device)
+    wp.launch(tone.put_mixed, len(edges), [edges, mixed], [radiance], device=device)
+
+
+def _darken_outside(view: records.View, radiance: wp.array) -> None:
+    """Leave no light where the lens shows nothing, in place."""
+    if view.lens != records.PINHOLE:
+        n = view.width * view.height
+        wp.launch(optics.darken_outside, n, [view], [radiance], device=radiance.device)
 
 
 def _drawn_samples(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ import warp as wp
 
 from generator.core.geometry import Float32
 from generator.core.se3 import Array
-from generator.renderers.kernels.sky import prefilter
+from generator.renderers.kernels.sky import prefilter, weigh_texels
 
 _GLOSSY_LEVELS = 4
 _GLOSSY_SIZE = 24
@@ -90,18 +91,28 @@ def bordered(maps: Float32) -> Float32:
 
 def _smoothed(image: Float32, level: int, device: wp.Device) -> wp.array:
     source = _shrunk(image, _SOURCE_HEIGHTS[level - 1])
-    directions, solid = texel_directions(source.shape[0])
+    shares = _shares(source.shape[0], level, device.alias)
+    smoothed = wp.zeros(_GLOSSY_SIZE**2, dtype=wp.vec3, device=device)
+    radiance = wp.array(source.reshape(-1, 3), dtype=wp.vec3, device=device)
+    wp.launch(prefilter, _GLOSSY_SIZE**2 // 4, [shares, radiance], [smoothed], device=device)
+    return smoothed.reshape((_GLOSSY_SIZE, _GLOSSY_SIZE))
+
+
+# Environments of one height share them, and every view may have another environment.
+@lru_cache(maxsize=_GLOSSY_LEVELS)
+def _shares(height: int, level: int, device: str) -> wp.array:
+    """What ``weigh_texels`` says for environments of a height, float [map texels, texels]."""
+    directions, solid = texel_directions(height)
     roughness = level / _GLOSSY_LEVELS
-    smoothed = wp.zeros((_GLOSSY_SIZE, _GLOSSY_SIZE), dtype=wp.vec3, device=device)
+    shares = wp.zeros((_GLOSSY_SIZE**2, solid.size), dtype=float, device=device)
     inputs = [
         wp.array(directions.reshape(-1, 3), dtype=wp.vec3, device=device),
-        wp.array(source.reshape(-1, 3), dtype=wp.vec3, device=device),
         wp.array(solid.reshape(-1), dtype=float, device=device),
         roughness * roughness,
         _GLOSSY_SIZE,
     ]
-    wp.launch(prefilter, smoothed.shape, inputs, [smoothed], device=device)
-    return smoothed
+    wp.launch(weigh_texels, _GLOSSY_SIZE**2, inputs, [shares], device=device)
+    return shares
 
 
 def _shrunk(image: Float32, height: int) -> Float32:

@@ -13,6 +13,9 @@ objects come first, and colour decides among what is left.
   stays visible to scanners because of it.
 * **Signs and plates**: coefficients of retro-reflection of ASTM D4956, 250 cd/lx/m^2 for type III
   and 70 for type I. A white matte surface has 1 / pi, so they are 785 and 220 times as bright.
+* **Glass**: tinted panes of vehicles pass about half of it (Rubin, "Optical properties of soda lime
+  silica glasses", 1985); panes of buildings mirror about a third with their silver coatings, and no
+  rooms are behind them here.
 * **Markings** send back some hundred mcd/lx/m^2 at 30 m geometry (EN 1436); a scanner looks more
   steeply and finds about twice white paint.
 """
@@ -62,6 +65,12 @@ ROUGH = frozenset(
 SLOPE_RAD = 0.5
 """Spread of the facets of rough surfaces."""
 
+CLEAR = {"glass": 0.5}
+"""What panes let through, one way, square on."""
+
+MIRRORS = {"glass": 0.06, "window": 0.3}
+"""Fresnel reflectance, square on, of what is flat and smooth enough to mirror a beam."""
+
 ALPHA_MIN = 0.03
 """Narrower lobes than this are wider than the material says: no glass is flat to a milliradian."""
 
@@ -94,8 +103,10 @@ def infrared_of(material: Material, color: Array) -> tuple[float, ...]:
     diffuse *= 1.0 - material.metallic
     even, rim = oren_nayar(SLOPE_RAD if material.role in ROUGH else 0.0)
     specular = material.metallic * red + (1.0 - material.metallic) * 0.08 * material.specular
+    mirror, clear = MIRRORS.get(material.role, 0.0), CLEAR.get(material.role, 0.0)
     alpha = max(material.roughness * material.roughness, ALPHA_MIN)
-    return (diffuse * even, diffuse * rim, specular, alpha, RETRO.get(material.role, 0.0))
+    retro = RETRO.get(material.role, 0.0)
+    return (diffuse * even, diffuse * rim, specular, alpha, retro, mirror, clear)
 
 
 def oren_nayar(slope_rad: float) -> tuple[float, float]:

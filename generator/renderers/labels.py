@@ -34,7 +34,7 @@ def label_images(
     for channel in sorted(channels & ids.keys(), key=lambda c: c.value):
         images[channel] = _ids(seen, ids[channel]).reshape(shape)
     if Channel.Z_DEPTH in channels:
-        images[Channel.Z_DEPTH] = seen.z_m.numpy().reshape(shape).copy()
+        images[Channel.Z_DEPTH] = _z_depths(view, seen).reshape(shape)
     if Channel.RANGE in channels:
         inputs = [view, seen.z_m]
         images[Channel.RANGE] = _launched(surface.label_ranges, inputs, float, seen).reshape(shape)
@@ -72,6 +72,13 @@ def box_frames(scene: Scene) -> NDArray[np.void]:
         frame["t_box_mesh"] = (np.asarray(T_instance_body.translation_m) - low) / size
         frame["labelled"] = 1
     return frames
+
+
+def _z_depths(view: records.View, seen: Seen) -> NDArray[np.float32]:
+    if view.lens == records.PINHOLE:
+        z_m: NDArray[np.float32] = seen.z_m.numpy().copy()
+        return z_m
+    return _launched(surface.label_z_depths, [view, seen.z_m], float, seen)
 
 
 def _ids(seen: Seen, of_bodies: Sequence[int]) -> NDArray[np.uint16]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
@@ -55,17 +57,24 @@ def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Arr
     """Of one lamp at points [lx], without shadows."""
     if lamp["kind"] == _SUN:
         return np.zeros(len(points_m))
-    to_lamp = lamp["position_m"].astype(np.float64) - points_m
-    squared = np.maximum((to_lamp * to_lamp).sum(axis=1), 1e-2)
-    direction = to_lamp / np.sqrt(squared)[:, None]
-    cosine = np.maximum((direction * normals).sum(axis=1), _TURNED_AWAY)
+    # Axis by axis: reducing over a short last axis takes three times as long.
+    away = [float(lamp["position_m"][k]) - points_m[:, k] for k in range(3)]
+    squared = np.maximum(away[0] * away[0] + away[1] * away[1] + away[2] * away[2], 1e-2)
+    distance = np.sqrt(squared)
+    direction = [along / distance for along in away]
+    cosine = np.maximum(_dot(direction, list(normals.T)), _TURNED_AWAY)
     lux: Array = float((lamp["power"] * _LUMINANCE).sum()) * cosine / squared
     if lamp["kind"] == _SPOT:
-        down = -(direction * lamp["direction"]).sum(axis=1)
+        down = -_dot(direction, [float(along) for along in lamp["direction"]])
         span = max(float(lamp["cos_inner"] - lamp["cos_outer"]), 1e-4)
         fade = np.clip((down - lamp["cos_outer"]) / span, 0.0, 1.0)
         lux = lux * fade * fade * (3.0 - 2.0 * fade)
     return lux
+
+
+def _dot(a: Sequence[Array], b: Sequence[Array] | Sequence[float]) -> Array:
+    product: Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return product
 
 
 def _sparse_points(view: records.View, seen: Seen) -> tuple[Array, Array]:
@@ -74,10 +83,19 @@ def _sparse_points(view: records.View, seen: Seen) -> tuple[Array, Array]:
     z = seen.z_m.numpy().reshape(shape)[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
     normals = seen.normals.numpy().reshape(*shape, 3)[::_STRIDE_PX, ::_STRIDE_PX]
     rows, columns = np.nonzero(np.isfinite(z))
-    x = (columns * _STRIDE_PX + 0.5 - view.cx) * view.inverse_fx
-    y = (rows * _STRIDE_PX + 0.5 - view.cy) * view.inverse_fy
-    p_camera = np.stack([x, y, np.ones_like(x)], axis=-1) * z[rows, columns, None]
+    directions = _directions(view, rows * _STRIDE_PX, columns * _STRIDE_PX)
+    p_camera = directions * z[rows, columns, None]
     R = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
     eye = np.array(view.eye_m, dtype=np.float64)
     points = np.einsum("ij,nj->ni", R, p_camera, optimize=False) + eye
     return points, normals[rows, columns].astype(np.float64)
+
+
+def _directions(view: records.View, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
+    """As kernels.records.pixel_direction, at pixel centres."""
+    if view.lens != records.PINHOLE:
+        directions: Array = view.directions.numpy()[rows * view.width + columns, :3]
+        return directions.astype(np.float64)
+    x = (columns + 0.5 - view.cx) * view.inverse_fx
+    y = (rows + 0.5 - view.cy) * view.inverse_fy
+    return np.stack([x, y, np.ones_like(x)], axis=-1)

@@ -77,13 +77,15 @@ def boxes_around(
     Faces whose middles lie in one cell of a coarse grid share a box; large ones have their own.
     """
     # Corner by corner: reducing over the short middle axis of [m, 3, 3] takes ten times as long.
-    a, b, c = (vertices_m[faces[:, k]] for k in range(3))
+    a, b, c = (vertices_m.take(faces[:, k], axis=0) for k in range(3))
     lows, highs = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    origin = lows.min(axis=0)
-    cell_m = max(float((highs.max(axis=0) - origin).max()) / _CELLS, 1e-9)
+    origin = np.array([column.min() for column in lows.T])
+    top = np.array([column.max() for column in highs.T])
+    cell_m = max(float((top - origin).max()) / _CELLS, 1e-9)
     places = ((0.5 * (lows + highs) - origin) / cell_m).astype(np.int64)
     cells = places @ np.array([1, _CELLS + 1, (_CELLS + 1) ** 2])
-    large = np.flatnonzero((highs - lows).max(axis=1) > 3.0 * cell_m)[:_LARGE_FACES_MAX]
+    x, y, z = (highs - lows).T
+    large = np.flatnonzero(np.maximum(np.maximum(x, y), z) > 3.0 * cell_m)[:_LARGE_FACES_MAX]
     cells[large] = -1 - large
     order = np.argsort(cells, kind="stable")
     starts = np.flatnonzero(np.diff(cells[order], prepend=np.iinfo(np.int64).min))

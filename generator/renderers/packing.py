@@ -12,12 +12,19 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.geometry import Material
+from generator.core.lens import LensModel
 from generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
 from generator.renderers.environments import DeviceEnvironment
 from generator.renderers.kernels import records
 from generator.renderers.meshes import DeviceMesh
 from generator.renderers.stock import AssetStock
 
+_LENSES: dict[LensModel, int] = {
+    "pinhole": records.PINHOLE,
+    "brown_conrady": records.BROWN_CONRADY,
+    "kannala_brandt": records.KANNALA_BRANDT,
+    "equirectangular": records.EQUIRECTANGULAR,
+}
 _LAMP_KINDS = {"sphere": 0, "spot": 1, "sun": 2}
 
 
@@ -84,7 +91,7 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     )
 
 
-def pack_view(camera: Camera) -> records.View:
+def pack_view(camera: Camera, stock: AssetStock) -> records.View:
     """The camera."""
     k = camera.intrinsics
     view = records.View()
@@ -94,6 +101,11 @@ def pack_view(camera: Camera) -> records.View:
     view.R_world_camera = wp.mat33(camera.T_world_camera.rotation())
     view.eye_m = wp.vec3(*camera.T_world_camera.translation_m)
     view.pixel_rad = 1.0 / k.fx_px
+    if not k.straight:
+        view.lens = _LENSES[k.lens.model]
+        coefficients = (*k.lens.coefficients, *[0.0] * 8)[:8]
+        view.coefficients = records.Coefficients(*coefficients)
+        view.directions = stock.optics(k).directions
     return view
 
 
@@ -161,14 +173,16 @@ def _sky(environment: Environment, light: DeviceEnvironment) -> records.Sky:
 def _surfaces(materials: Sequence[Material], textures: dict[str, int]) -> NDArray[np.void]:
     """Surface records; ``textures`` maps texture ids to their place among the textures."""
     values = np.zeros(max(len(materials), 1), dtype=records.Surface.numpy_dtype())
-    for value, material in zip(values, materials, strict=False):
-        value["base_color"] = material.base_color
-        value["roughness"] = material.roughness
-        value["metallic"] = material.metallic
-        value["specular"] = material.specular
-        value["texture"] = textures[material.texture] if material.texture else -1
-        value["texture_scale_m"] = material.texture_scale_m
-        value["emission_cd_m2"] = material.emission_cd_m2
+    if not materials:
+        return values
+    # Column by column: there are thousands in a street, and filling in one record takes long.
+    values["base_color"] = [m.base_color for m in materials]
+    values["roughness"] = [m.roughness for m in materials]
+    values["metallic"] = [m.metallic for m in materials]
+    values["specular"] = [m.specular for m in materials]
+    values["texture"] = [textures[m.texture] if m.texture else -1 for m in materials]
+    values["texture_scale_m"] = [m.texture_scale_m for m in materials]
+    values["emission_cd_m2"] = [m.emission_cd_m2 for m in materials]
     return values
 
 

@@ -18,6 +18,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Weather
 from generator.core.se3 import Array
 from generator.core.streams import Rng, Streams
@@ -31,6 +32,7 @@ _APERTURE_M = 0.002
 _EXPOSURE_S = (1.0 / 500.0, 1.0 / 40.0)
 _F_NUMBER = 2.0
 _COUNT_MAX = 60_000
+_SPHERE_MAX = 480_000
 # Diameter of a flake over that of the drop it melts to: its density is about 0.05.
 _FLAKE = 2.7
 
@@ -113,6 +115,8 @@ def traces(
 ) -> NDArray[np.void]:
     """Streak records of all particles of a kind that a camera sees."""
     k = camera.intrinsics
+    if not k.straight:
+        return bent_traces(kind, camera, weather, exposure_s, name)
     T = camera.T_world_camera
     rng = Streams(seed=weather.seed, scene=0).rng(
         f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
@@ -135,17 +139,83 @@ def traces(
         depth = np.maximum(q[:, 2], 0.5 * _NEAREST_M)
         values[end][:, 0] = q[:, 0] / depth * k.fx_px + k.cx_px
         values[end][:, 1] = q[:, 1] / depth * k.fy_px + k.cy_px
+    values["z_m"] = z
+    R_world_camera = R_camera_world.T
+    values["p_m"] = np.einsum("ij,nj->ni", R_world_camera, p, optimize=False) + T.translation_m
+    _spread_out(values, diameter_m, z, k.fx_px)
+    return values
+
+
+def _spread_out(
+    values: NDArray[np.void], diameter_m: Array, depth_m: Array, px_per_rad: Array | float
+) -> None:
+    """Fill in how wide and how opaque traces are, in place."""
     length = np.sqrt(((values["end_px"] - values["start_px"]) ** 2).sum(axis=1))
-    sharp = k.fx_px * diameter_m / z
-    wide = np.maximum(sharp + k.fx_px * _APERTURE_M / z, 1.0)
+    sharp = px_per_rad * diameter_m / depth_m
+    wide = np.maximum(sharp + px_per_rad * _APERTURE_M / depth_m, 1.0)
     # The disc's area over that of the trace it leaves.
     area = 0.25 * math.pi * sharp**2 / (wide * length + 0.25 * math.pi * wide**2)
     values["opacity"] = np.minimum(area, 1.0)
     values["radius_px"] = 0.5 * wide
-    values["z_m"] = z
-    R_world_camera = R_camera_world.T
-    values["p_m"] = np.einsum("ij,nj->ni", R_world_camera, p, optimize=False) + T.translation_m
+
+
+def bent_traces(
+    kind: Kind, camera: Camera, weather: Weather, exposure_s: float, name: str
+) -> NDArray[np.void]:
+    """As ``traces``, before a lens that is no pinhole: depths are ranges.
+
+    Particles are spread over the narrowest cone that holds the image; those in it are kept.
+    """
+    k, T = camera.intrinsics, camera.T_world_camera
+    rng = Streams(seed=weather.seed, scene=0).rng(
+        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
+    )
+    least_cosine = _rim_cosine(k)
+    cube_m3 = kind.farthest_m**3 - _NEAREST_M**3
+    expected = kind.density_per_m3 * 2.0 * math.pi * (1.0 - least_cosine) / 3.0 * cube_m3
+    u = rng.random((5, min(poisson(expected, rng), _SPHERE_MAX)))
+    range_m = np.cbrt(_NEAREST_M**3 + u[0] * cube_m3)
+    cosine = 1.0 - u[1] * (1.0 - least_cosine)
+    sine, turn = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0)), 2.0 * math.pi * u[2]
+    p = np.stack([sine * np.cos(turn), sine * np.sin(turn), cosine], axis=-1) * range_m[:, None]
+    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
+    R_camera_world = T.rotation().T
+    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
+    way = np.einsum("ij,nj->ni", R_camera_world, way, optimize=False)
+    ends = np.stack([k.project(p - 0.5 * way), k.project(p + 0.5 * way)], axis=1)
+    middle = k.project(p)
+    inside = ((middle >= 0.0) & (middle < (k.width_px, k.height_px))).all(axis=1)
+    # Ends apart by half an image lie on both sides of a seam.
+    whole = np.abs(ends[:, 1] - ends[:, 0]).max(axis=1) < 0.5 * k.width_px
+    kept = np.flatnonzero(inside & whole)[:_COUNT_MAX]
+    values = np.zeros(len(kept), dtype=particles.Streak.numpy_dtype())
+    values["start_px"], values["end_px"] = ends[kept, 0], ends[kept, 1]
+    values["z_m"] = range_m[kept]
+    there = np.einsum("ij,nj->ni", R_camera_world.T, p[kept], optimize=False)
+    values["p_m"] = there + T.translation_m
+    _spread_out(values, diameter_m[kept], range_m[kept], _px_per_rad(k, middle[kept]))
     return values
+
+
+def _rim_cosine(k: Intrinsics) -> float:
+    """Cosine of the widest angle to the axis in the image; -1 where its corners are dark."""
+    u, v = (np.linspace(0.0, size, 65) for size in (k.width_px, k.height_px))
+    sides = [np.stack(np.broadcast_arrays(u, end), axis=-1) for end in (0.0, float(k.height_px))]
+    sides += [np.stack(np.broadcast_arrays(end, v), axis=-1) for end in (0.0, float(k.width_px))]
+    cosines = k.rays(np.concatenate(sides))[:, 2]
+    return -1.0 if np.isnan(cosines).any() else float(max(cosines.min() - 1e-3, -1.0))
+
+
+def _px_per_rad(k: Intrinsics, places_px: Array) -> Array:
+    """Side of the square that a small square angle is in the image, shape [n]."""
+    right, below = np.array([0.5, 0.0]), np.array([0.0, 0.5])
+    across = k.rays(places_px + right) - k.rays(places_px - right)
+    down = k.rays(places_px + below) - k.rays(places_px - below)
+    area = np.cross(across, down)
+    usual = 1.0 / k.fx_px
+    angles = np.nan_to_num(np.sqrt(np.sqrt((area * area).sum(axis=1))), nan=usual)
+    scale: Array = 1.0 / np.maximum(angles, 0.05 * usual)
+    return scale
 
 
 def poisson(expected: float, rng: Rng) -> int:

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from generator.core.boxes import BoxPx, tight_box
 from generator.core.capture import Silhouette
-from generator.core.scene import Scene
+from generator.core.scene import Camera, Scene
 from generator.renderers.kernels import raster, records
 from generator.renderers.kernels.silhouette import Canvas, draw_silhouettes
+from generator.renderers.outlooks import around, traced_masks
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Projected, Seen, project
@@ -21,6 +22,7 @@ _UNSNAPPED = -(2**31)
 
 def silhouettes(
     scene: Scene,
+    camera: Camera,
     world: PackedWorld,
     view: records.View,
     stock: AssetStock,
@@ -29,19 +31,15 @@ def silhouettes(
 ) -> dict[int, Silhouette]:
     """The silhouette of every annotated instance, by instance id.
 
-    Coverage is the rasteriser's. ``seen_ids``, the image of visible instance ids, is united with
-    it: where rays decide visibility, they may differ from the rasteriser by a pixel at an edge.
+    Coverage is the rasteriser's before a pinhole, else that of rays. ``seen_ids``, the image of
+    visible instance ids, is united with it: where rays decide visibility, they may differ from the
+    rasteriser by a pixel at an edge.
     """
-    projected = seen.projected or project(world, view, stock)
-    p_camera, xy = projected.p_camera, projected.xy
-    boxes = _boxes_px(scene, world, view, projected)
-    canvases, size = _canvases(scene, boxes, projected.reached)
-    mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
-    if len(canvases):
-        drawn_into = wp.array(canvases, dtype=Canvas, device=stock.device)
-        inputs = [view, world.record, p_camera, xy, drawn_into]
-        wp.launch(draw_silhouettes, len(canvases), inputs, [mask], device=stock.device)
-    drawn = mask.numpy()
+    if view.lens == records.PINHOLE:
+        projected = seen.projected or project(world, view, stock)
+        boxes, drawn = _drawn_masks(scene, world, view, projected, stock)
+    else:
+        boxes, drawn = traced_masks(scene, world, view, camera, stock)
     found: dict[int, Silhouette] = {}
     first = 0
     for instance_id, box in boxes.items():
@@ -51,6 +49,22 @@ def silhouettes(
         found[instance_id] = _tight(instance_id, pixels, box)
         first = end
     return found
+
+
+def _drawn_masks(
+    scene: Scene, world: PackedWorld, view: records.View, projected: Projected, stock: AssetStock
+) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
+    """Per annotated instance a box that holds its silhouette, and the pixels of all boxes."""
+    p_camera, xy = projected.p_camera, projected.xy
+    boxes = _boxes_px(scene, world, view, projected)
+    canvases, size = _canvases(scene, boxes, projected.reached)
+    mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
+    if len(canvases):
+        drawn_into = wp.array(canvases, dtype=Canvas, device=stock.device)
+        inputs = [view, world.record, p_camera, xy, drawn_into]
+        wp.launch(draw_silhouettes, len(canvases), inputs, [mask], device=stock.device)
+    drawn: NDArray[np.uint8] = mask.numpy()
+    return boxes, drawn
 
 
 def _boxes_px(
@@ -70,7 +84,7 @@ def _boxes_px(
         if instance_id in boxes:
             part = slice(world.placed["first_vertex"][number], ends[number])
             reached = _reached(p_camera[part], xy[part], canvas)
-            boxes[instance_id] = _around(boxes[instance_id], reached)
+            boxes[instance_id] = around(boxes[instance_id], reached)
     return boxes
 
 
@@ -84,17 +98,6 @@ def _reached(p_camera: NDArray[np.float32], xy: NDArray[np.int32], canvas: BoxPx
     x_min, y_min = max(int(low[0]), canvas.x_min), max(int(low[1]), canvas.y_min)
     x_max, y_max = min(int(high[0]), canvas.x_max), min(int(high[1]), canvas.y_max)
     return BoxPx(x_min, y_min, max(x_max, x_min), max(y_max, y_min))
-
-
-def _around(a: BoxPx, b: BoxPx) -> BoxPx:
-    """Smallest box around two, of which either may be empty."""
-    if not a.width_px * a.height_px:
-        return b
-    if not b.width_px * b.height_px:
-        return a
-    return BoxPx(
-        min(a.x_min, b.x_min), min(a.y_min, b.y_min), max(a.x_max, b.x_max), max(a.y_max, b.y_max)
-    )
 
 
 def _canvases(

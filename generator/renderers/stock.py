@@ -1,4 +1,4 @@
-"""What a renderer keeps between frames: assets on the device and scratch memory, never scenes."""
+"""What a renderer keeps between frames: assets, lenses and scratch memory, never scenes."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ import warp as wp
 
 from generator.core.geometry import Material
 from generator.core.interfaces import AssetLibrary
+from generator.core.intrinsics import Intrinsics
 from generator.renderers.cache import ByteCache
 from generator.renderers.environments import DeviceEnvironment, upload_environment
 from generator.renderers.lobes import lobe_albedo
 from generator.renderers.meshes import DeviceMesh, upload_mesh
+from generator.renderers.optics import DeviceOptics, upload_optics
 from generator.renderers.textures import DeviceTexture, upload_texture
 
 _MESH_BYTES = 256 << 20
-_TEXTURE_BYTES = 160 << 20
+_TEXTURE_BYTES = 256 << 20
 _ENVIRONMENT_BYTES = 32 << 20
+_OPTICS_BYTES = 192 << 20
 _SCRATCH_BYTES = 96 << 20
 
 
@@ -38,6 +41,7 @@ class AssetStock:
         self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
         self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)
         self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)
+        self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES)
         self._scratch: ByteCache[_Scratch] = ByteCache(_SCRATCH_BYTES)
 
     def mesh(self, asset_id: str) -> DeviceMesh:
@@ -62,6 +66,10 @@ class AssetStock:
             environment_id,
             lambda: upload_environment(self.assets.environment(environment_id), self.device),
         )
+
+    def optics(self, intrinsics: Intrinsics) -> DeviceOptics:
+        """Directions through the pixels of a camera that is no pinhole."""
+        return self._optics.get(repr(intrinsics), lambda: upload_optics(intrinsics, self.device))
 
     def scratch(self, name: str, shape: int | tuple[int, ...], dtype: Any) -> wp.array:
         """An array with left-over contents: touching fresh memory costs as much as filling it.

@@ -38,7 +38,7 @@ class Seen:
 
     Attributes:
         hits: (body, face); (-1, -1) where there is nothing.
-        z_m: Depth along the optical axis; inf.
+        z_m: Depth along the optical axis before a pinhole, else along the ray; inf.
         weights: Barycentric (u, v); u + 2 where a triangle's inside is seen.
         normals: Smooth, unit, world frame, towards the camera; 0.
         projected: What was drawn; None where rays were traced.
@@ -59,7 +59,9 @@ def see(
 ) -> Seen:
     """The surfaces at all pixel centres of a view."""
     n = view.width * view.height
+    # Straight edges have straight images before a pinhole only.
     drawn = method == "raster" or (method == "auto" and stock.device.is_cpu)
+    drawn = drawn and view.lens == records.PINHOLE
     projected = project(world, view, stock) if drawn else None
     seen = Seen(
         stock.scratch("hits", n, wp.vec2i),

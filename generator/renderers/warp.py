@@ -6,7 +6,7 @@ from generator.core.capture import Beams, Channel, Echoes, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
-from generator.renderers.color import color_image
+from generator.renderers.color import color_image, lit_image, radiance_image
 from generator.renderers.device import open_device
 from generator.renderers.labels import label_images
 from generator.renderers.lidar import scanned
@@ -47,20 +47,24 @@ class WarpRenderer:
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """Every asked channel of one camera."""
         world = pack_world(scene, camera, self._stock)
-        view = pack_view(camera)
+        view = pack_view(camera, self._stock)
         seen = see(world, view, self._stock, self._settings.visibility)
         if Channel.AMODAL in channels:
             channels = channels | {Channel.INSTANCE}
         images = label_images(scene, world, view, seen, channels)
-        if Channel.RGB in channels:
-            images[Channel.RGB] = color_image(
-                camera, world, view, seen, self._stock, self._settings
-            )
+        ev100 = camera.ev100
+        if channels & {Channel.RGB, Channel.RADIANCE}:
+            lit = lit_image(camera, world, view, seen, self._stock, self._settings)
+            ev100 = lit.ev100
+            if Channel.RADIANCE in channels:
+                images[Channel.RADIANCE] = radiance_image(lit, view)
+            if Channel.RGB in channels:
+                images[Channel.RGB] = color_image(lit, view, self._stock, self._settings)
         outlines = {}
         if Channel.AMODAL in channels:
             ids = images[Channel.INSTANCE]
-            outlines = silhouettes(scene, world, view, self._stock, seen, ids)
-        return Reading(camera.name, camera, images, outlines, scene.time_s)
+            outlines = silhouettes(scene, camera, world, view, self._stock, seen, ids)
+        return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
         """What the rays of a laser scanner's beams hit first, and how well it reflects."""

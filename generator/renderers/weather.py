@@ -34,14 +34,25 @@ def expose_ground(world: PackedWorld, lattice: Lattice, stock: AssetStock) -> No
     wp.launch(water.find_shelter, points, inputs, [probed], device=stock.device)
     inputs = [lattice, probed]
     wp.launch(water.average_shelter, points, inputs, [exposed], device=stock.device)
+    world.record.ground = ground_of(weather, exposed)
+
+
+def ground_of(weather: Weather, exposed: wp.array | None = None) -> records.Ground:
+    """The Ground record: dry and bare where the weather has left nothing.
+
+    Args:
+        weather: Of the scene.
+        exposed: Share of what falls that reaches each point of a lattice, where there is one.
+    """
     ground = records.Ground()
-    ground.covered = 1
+    ground.covered = int(weather.wetness + weather.puddles + weather.snow_cover > 0.0)
     ground.wetness = weather.wetness
     ground.puddles, ground.puddle_level = weather.puddles, _level(weather.puddles)
     ground.snow_cover, ground.snow_level = weather.snow_cover, _level(weather.snow_cover)
     ground.seed = weather.seed % (1 << 30)
-    ground.exposed = exposed
-    world.record.ground = ground
+    if exposed is not None:
+        ground.exposed = exposed
+    return ground
 
 
 def fill_air(

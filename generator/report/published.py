@@ -5,6 +5,9 @@
   https://www.cvlibs.net/datasets/kitti/eval_object.php).
 * Mean sizes: ``g_type_mean_size`` of Frustum PointNets (C. R. Qi et al., CVPR 2018,
   models/model_util.py).
+* Points per scan: about 120,000 on average (A. Geiger et al., "Vision meets Robotics: The KITTI
+  Dataset", IJRR 2013). SemanticKITTI (J. Behley et al., ICCV 2019) counts 4,549 million in 43,552
+  scans of the odometry sequences: 104,450 each.
 * Difficulties: the devkit's evaluate_object.cpp.
 """
 
@@ -13,6 +16,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 IMAGES = 7481
+POINTS_PER_SCAN = (120_000, 104_450)
+"""Of the recordings, and of the odometry sequences."""
 
 
 @dataclass(frozen=True, slots=True)

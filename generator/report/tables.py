@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.report.published import DIFFICULTIES, IMAGES, TYPES, Difficulty
+from generator.report.published import (
+    DIFFICULTIES,
+    IMAGES,
+    POINTS_PER_SCAN,
+    TYPES,
+    Difficulty,
+)
+from generator.report.scans import Scan
 from generator.report.survey import Column, Survey
 
 NOTHING = "-"
@@ -48,6 +55,30 @@ def tables(found: Survey) -> tuple[Table, ...]:
     if any(kind in TYPES and kind != "Misc" for _, kind in found.numbers):
         made.append(_beside_kitti(found))
     return tuple(made)
+
+
+def scan_tables(scans: Sequence[Scan]) -> tuple[Table, ...]:
+    """Tables about laser scans; none where there are no scans."""
+    if not scans:
+        return ()
+    points = np.array([scan.points for scan in scans], np.float64)
+    dark = sum(scan.dark for scan in scans) / max(points.sum(), 1.0)
+    row = (f"{len(scans)}", f"{points.mean():.0f}", *(f"{n}" for n in POINTS_PER_SCAN))
+    header = ("scans", "points/scan", "KITTI", "KITTI odometry", "5 / 50 / 95 %", "reflectance 0")
+    note = "KITTI: Geiger et al., IJRR 2013; odometry: Behley et al., ICCV 2019."
+    rows = ((*row, _quantiles(points, 0), f"{100.0 * dark:.2f} %"),)
+    return (Table("Laser scans", header, rows, note), _car_points(scans))
+
+
+def _car_points(scans: Sequence[Scan]) -> Table:
+    cars = np.array([car for scan in scans for car in scan.cars], np.float64).reshape(-1, 2)
+    rows = []
+    for near_m in range(0, 80, 10):
+        counts = cars[(cars[:, 0] >= near_m) & (cars[:, 0] < near_m + 10), 1]
+        cells = (_number(counts, np.mean, 1), _quantiles(counts, 0), _share(counts == 0))
+        rows.append((f"{near_m} to {near_m + 10}", f"{counts.size}", *cells))
+    header = ("distance m", "cars", "points/car", "5 / 50 / 95 %", "without")
+    return Table("Laser points on cars", header, tuple(rows), "Cars that are not occluded.")
 
 
 def histograms(found: Survey) -> tuple[Histogram, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -145,6 +146,8 @@ class Fan:
         return heights
 
 
+# Every lane of a junction asks for its heights.
+@lru_cache(maxsize=16)
 def fan_of(shape: JunctionShape) -> Fan:
     """The carriageway of a junction; its mouths have the cross section of a crowned road."""
     parts = []

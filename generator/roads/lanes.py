@@ -36,8 +36,10 @@ def road_lanes(
             left, right = _neighbours(name, shape, side, strip.number, len(driving))
             center = path(line, strip.middle_m, strip.middle_z_m, forward, T_world_road)
             own = lane_name(name, side, strip.number, shape)
+            rise = (strip.inner_z_m - strip.outer_z_m) / strip.width_m
+            bank = round(rise if shape.traffic == "right" else -rise, 9) + 0.0
             lane = Lane(own, "driving", center, strip.width_m, name, (), left, right, speed_m_s)
-            lanes.append(lane)
+            lanes.append(replace(lane, bank=bank))
         for kind, t_m, z_m, width_m in _beside(row, side):
             center = path(line, t_m, z_m, side < 0, T_world_road)
             lanes.append(Lane(f"{name}/{kind}_{word}", kind, center, width_m, road=name))

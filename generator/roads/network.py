@@ -124,18 +124,25 @@ def _lane(road: Road, index: int, section: Section, number: int, T_body_file: SE
     course = _course(road, section, number)
     lift = np.full(len(course.s_m), 0.5 * sum(heights_m(record)))
     points = road.points(course.s_m, 0.5 * (course.inner_m + course.outer_m), lift)
+    low_m, high_m = heights_m(record)
+    inner = road.points(course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2].mean()
+    outer = road.points(course.s_m, course.outer_m, np.full(len(lift), high_m))[:, 2].mean()
+    width_m = round(float(np.abs(course.outer_m - course.inner_m).mean()), 6)
+    # The inner edge of a lane with a negative number is on the left, seen along the road.
+    bank = float(inner - outer) / width_m * (1.0 if number < 0 else -1.0) if width_m else 0.0
     if not runs_forward(road, number, record.kind):
-        points = points[::-1]
+        points, bank = points[::-1], -bank
     kind = KINDS[record.kind]
     drives = kind == "driving"
     return Lane(
         name=_name((road.road_id, index, number)),
         kind=kind,
         center_m=world_points(points, T_body_file),
-        width_m=round(float(np.abs(course.outer_m - course.inner_m).mean()), 6),
+        width_m=width_m,
         road=road.road_id,
         speed_m_s=(road.speed_m_s or DEFAULT_SPEED_M_S) if drives else 0.0,
         junction=bool(road.junction),
+        bank=round(bank, 9) + 0.0,
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 from generator import __version__
-from generator.assemble.recipe import PipelineFactory, nominal_scenes
+from generator.assemble.recipe import PipelineFactory
 from generator.assets.library import open_library
 from generator.assets.packs import TAG, installed
 from generator.assets.paths import packs_dir
@@ -63,8 +63,7 @@ def licences_text(factory: PipelineFactory, used: Sequence[str]) -> str:
 def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
     """Every object, robot and panorama that a sample may contain, sorted by id."""
     library = open_library(factory.spec.asset_folders)
-    scenes = nominal_scenes(factory.spec, library)
-    ids = {asset_id for scene in scenes for asset_id in _ids(scene)}
+    ids = {asset_id for scene in factory.nominal for asset_id in _ids(scene)}
     drawn = {
         asset_id
         for layout in factory.spec.probes

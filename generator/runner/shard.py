@@ -144,9 +144,14 @@ def _written(
 
 
 def without_pixels(sample: Sample) -> Sample:
-    """The sample with its cameras and labels, and no image."""
+    """The sample with its labels, and of what its sensors saw only when and from where."""
+    capture = sample.capture
     readings = {
-        name: Reading(sensor=reading.sensor, camera=reading.camera, channels={})
-        for name, reading in sample.capture.readings.items()
+        name: Reading(reading.sensor, reading.camera, {}, time_s=reading.time_s)
+        for name, reading in capture.readings.items()
     }
-    return replace(sample, capture=Capture(readings))
+    clouds = {
+        name: replace(cloud, points=cloud.points[:0].copy())
+        for name, cloud in capture.clouds.items()
+    }
+    return replace(sample, capture=Capture(readings, clouds))

@@ -9,5 +9,11 @@ TABLE = PluginTable(
     {
         "rgb_camera": "generator.sensors.rgb_camera:RgbCamera",
         "lidar": "generator.sensors.lidar:LidarSensor",
+        "imu": "generator.sensors.imu:Imu",
+        "event_camera": "generator.sensors.event_camera:EventCamera",
+        "gnss": "generator.sensors.gnss:Gnss",
+        "odometer": "generator.sensors.odometer:Odometer",
+        "radar": "generator.sensors.radar:Radar",
+        "watcher": "generator.sensors.watcher:Watcher",
     },
 )

@@ -7,10 +7,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import Field, WithJsonSchema, field_validator
 
 from generator.core.capture import POINT, Beams, Channel, PointCloud
-from generator.core.errors import ConfigError
+from generator.core.errors import ConfigError, did_you_mean
 from generator.core.interfaces import Renderer
 from generator.core.scene import Lidar, Scene, Weather
 from generator.core.streams import Rng
@@ -31,6 +31,7 @@ from generator.sensors.returns import (
     selected,
 )
 from generator.sensors.scanning import LidarModel, Sweep, sweep_of
+from generator.sensors.travel import Shots, shots_of
 
 SUBRAYS = 7
 """Rays that stand for a beam with a width."""
@@ -38,10 +39,17 @@ SUBRAYS = 7
 CLEAR = Weather()
 
 
-def _known(name: str) -> str:
-    if name not in model_names():
-        raise ValueError(f"expected one of {', '.join(model_names())}")
-    return name
+Angle = Annotated[float, Field(ge=-180, le=180)]
+Elevation = Annotated[float, Field(ge=-90, le=90)]
+Beam = tuple[Elevation, Angle]
+
+BEAMS_SCHEMA = {
+    "anyOf": [
+        {"type": "string", "pattern": r"\.csv$"},
+        {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
+    ]
+}
+"""A file takes the list's place before it is read: see ``generator.sensors.sheets``."""
 
 
 class LidarSensor(Mounted):
@@ -49,22 +57,53 @@ class LidarSensor(Mounted):
 
     Attributes:
         name: What labels and files call it.
-        model: A file of ``generator/sensors/lidars``.
+        model: A file of ``generator/sensors/lidars``, or one of the user's own like them:
+            ``./my_lidar.yaml``, looked for beside the configuration.
+        beams: Other lasers than the model's: elevation and azimuth offset to the left of each
+            [deg], or the name of a CSV file with the columns ``elevation_deg`` and
+            ``azimuth_offset_deg``. Pulses per second stay those of the model.
+        rotation_hz: Sweeps per second; null = the model's. Pulses per second stay those of the
+            model.
         camera: Without a rig: name of the camera it rides with, which is listed before it. The
             rig is then at the camera's centre and looks along its axis.
         returns: Which return of a pulse is reported; ``dual`` reports two.
         divergence: Whether beams have a width; costs seven rays instead of one.
         ideal: No noise, no missed return, no weather: every hit within range.
+        motion: What becomes of the scanner's way during a sweep. ``raw``: points are in the lidar
+            frame of each pulse's own instant. ``compensated``: in that of the sweep's middle, as in
+            KITTI's files; what moves by itself is where each pulse met it. ``frozen``: all pulses
+            leave in the middle of the sweep.
     """
 
     modality: ClassVar[Literal["camera", "lidar"]] = "lidar"
     type: Literal["lidar"] = "lidar"
     name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
-    model: Annotated[str, AfterValidator(_known)] = "HDL-64E"
+    model: str | LidarModel = "HDL-64E"
+    beams: Annotated[tuple[Beam, ...], WithJsonSchema(BEAMS_SCHEMA)] = Field((), max_length=4096)
+    rotation_hz: float | None = Field(None, gt=0, le=100)
     camera: str = "color"
     returns: Kept = "strongest"
     divergence: bool = False
     ideal: bool = False
+    motion: Literal["raw", "compensated", "frozen"] = "compensated"
+
+    @field_validator("model")
+    @classmethod
+    def _is_known(cls, model: str | LidarModel) -> str | LidarModel:
+        if isinstance(model, str) and model not in model_names():
+            raise ValueError(
+                f"expected one of {', '.join(model_names())}, or the name of a .yaml file"
+                f"{did_you_mean(model, model_names())}"
+            )
+        return model
+
+    @property
+    def device(self) -> LidarModel:
+        """Its data sheet."""
+        model = lidar_model(self.model) if isinstance(self.model, str) else self.model
+        if self.rotation_hz is not None:
+            model = model.model_copy(update={"rotation_hz": self.rotation_hz})
+        return model.with_beams(self.beams) if self.beams else model
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this scanner on its rig.
@@ -72,17 +111,18 @@ class LidarSensor(Mounted):
         Raises:
             ConfigError: the scene has no such rig or camera.
         """
+        name = self.model if isinstance(self.model, str) else self.model.name
+        sweep_s = round(1.0 / self.device.rotation_hz, 9)
+        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
         if self.rig:
             rig = known_rig(scene, self.name, self.rig)
-            lidar = Lidar(self.name, "", self.T_rig_sensor, model=self.model, rig=rig)
-            return replace(scene, lidars=(*scene.lidars, lidar))
+            return replace(scene, lidars=(*scene.lidars, replace(lidar, camera="", rig=rig)))
         known = [camera.name for camera in scene.cameras]
         if self.camera not in known:
             raise ConfigError(
                 f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
                 f" is {', '.join(known) or 'none'}"
             )
-        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.model)
         return replace(scene, lidars=(*scene.lidars, lidar))
 
     def capture(
@@ -90,26 +130,33 @@ class LidarSensor(Mounted):
     ) -> PointCloud:
         """One sweep."""
         del channels
-        model = lidar_model(self.model)
+        model = self.device
         lidar = scene.lidar(self.name)
         sweep = sweep_of(model, float(rng.uniform(0.0, 3600.0)))
+        shots = Shots(sweep.directions)
+        if self.motion != "frozen":
+            shots = shots_of(scene, lidar, sweep)
         beams = Beams(
-            sweep.directions,
+            shots.directions,
             1e-3 * model.divergence_mrad,
             SUBRAYS if self.divergence else 1,
             model.range_m[1],
+            shots.origins_m,
+            shots.time_s,
         )
-        pulses = pulses_of(renderer.scan(scene, lidar, beams), model)
+        pulses = pulses_of(renderer.scan(scene, lidar, beams), model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
-            pulses = _through_air(pulses, weather, model, lidar, sweep, rng)
+            pulses = _through_air(pulses, weather, model, lidar, shots, rng)
         pulses = beyond_reach(pulses, model)
         noticed = pulses.light > 0.0 if self.ideal else detected(pulses, rng)
         rows, picks = selected(pulses, noticed, self.returns)
         found = Found.of(pulses, rows, picks)
         if not self.ideal:
             found = _noisy(found, model, weather, rng)
-        return PointCloud(self.name, lidar, _points(found, sweep, model), scene.time_s)
+        seen_from = Shots(sweep.directions) if self.motion == "raw" else shots
+        points = _points(found, seen_from, sweep, model)
+        return PointCloud(self.name, lidar, points, scene.time_s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -137,11 +184,11 @@ class Found:
 
 
 def _through_air(
-    pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, sweep: Sweep, rng: Rng
+    pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, shots: Shots, rng: Rng
 ) -> Pulses:
     """The pulses after fog, rain and snow, and what these send back themselves."""
     height_m = lidar.T_world_lidar.translation_m[2]
-    up = sweep.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
+    up = shots.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
     finite = np.where(np.isfinite(pulses.range_m), pulses.range_m, np.float32(model.range_m[1]))
     depth = optical_depth(weather, model, height_m, up[:, None], finite)
     return with_air(dimmed(pulses, depth), weather, model, height_m, rng)
@@ -157,11 +204,11 @@ def _noisy(found: Found, model: LidarModel, weather: Weather, rng: Rng) -> Found
     return replace(found, range_m=range_m.astype(np.float32))
 
 
-def _points(found: Found, sweep: Sweep, model: LidarModel) -> NDArray[np.void]:
+def _points(found: Found, shots: Shots, sweep: Sweep, model: LidarModel) -> NDArray[np.void]:
     """Records of ``POINT``; returns of a pulse follow each other, nearest first."""
     rows = found.row
     points: NDArray[Any] = np.zeros(len(rows), POINT)
-    points["position_m"] = sweep.directions[rows] * found.range_m[:, None]
+    points["position_m"] = shots.points_m(rows, found.range_m)
     points["intensity"] = reported_intensity(found.reflectance, model)
     points["time_s"] = sweep.time_s[rows]
     points["ring"] = sweep.ring[rows]

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from generator.config.strict import Strict
 from generator.core.errors import ConfigError, did_you_mean
-from generator.core.scene import Scene
-from generator.core.se3 import SE3
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Device, Scene
+from generator.core.se3 import SE3, Array
+from generator.core.tables import TIME_DECIMALS
+
+BURIED_M = 0.05
+"""Sensors may sink in as deep as this: they are bolted on, and bounds are not the hull."""
 
 
 class Mounted(Strict):
@@ -21,6 +29,9 @@ class Mounted(Strict):
         yaw_deg, pitch_deg, roll_deg: Turn to the left, then upwards, then clockwise as seen from
             behind, from the rig's forward axis.
         rate_hz: Readings per second; null = one at every step.
+        time_offset_s: It reads this much later than the step's instant; what it saw then, and the
+            labels of that, belong to the step.
+        inside: Whether it may be inside the body that its rig is on.
     """
 
     rig: str = ""
@@ -29,6 +40,8 @@ class Mounted(Strict):
     pitch_deg: float = Field(0.0, ge=-90, le=90)
     roll_deg: float = Field(0.0, ge=-180, le=180)
     rate_hz: float | None = Field(None, gt=0, le=10_000)
+    time_offset_s: float = Field(0.0, ge=-10, le=10)
+    inside: bool = False
 
     @property
     def T_rig_sensor(self) -> SE3:  # noqa: N802
@@ -38,6 +51,36 @@ class Mounted(Strict):
         leaning = SE3((0.0, 0.0, 0.0), (math.cos(roll), math.sin(roll), 0.0, 0.0))
         turned = SE3.about_z(math.radians(self.yaw_deg), self.offset_m)
         return (turned @ upwards @ leaning).rounded()
+
+
+class Instrument(Mounted):
+    """A sensor on a rig that reports rows of a table.
+
+    Attributes:
+        name: What files call it.
+        rig: Name of the rig it is on.
+        rate_hz: Readings per second, a whole number per step, or of steps; null = one per step.
+    """
+
+    modality: ClassVar[str]
+    name: str = Field("instrument", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    rig: str = "ego"
+
+    @property
+    def device_model(self) -> str:
+        """What it is, for the labels; empty = nothing in particular."""
+        return ""
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with this device on its rig.
+
+        Raises:
+            ConfigError: there is no such rig, or its rate does not fit the sequence.
+        """
+        rig = known_rig(scene, self.name, self.rig)
+        checked_rate(self.name, self.rate_hz, scene.step_s)
+        device = Device(self.name, self.modality, rig, self.T_rig_sensor, model=self.device_model)
+        return replace(scene, devices=(*scene.devices, device))
 
 
 def known_rig(scene: Scene, sensor: str, rig: str) -> str:
@@ -53,6 +96,39 @@ def known_rig(scene: Scene, sensor: str, rig: str) -> str:
             + did_you_mean(rig, known)
         )
     return rig
+
+
+def refuse_buried(scene: Scene, name: str, sensor: Mounted, assets: AssetIndex) -> None:
+    """Refuse a camera or laser scanner inside the body that carries it, where it sees nothing else.
+
+    Inside is what the body's bounding box holds, more than ``BURIED_M`` from each of its faces.
+
+    Args:
+        scene: With the sensor's rig.
+        name: Of the sensor.
+        sensor: On that rig; without one, or with ``inside``, anything goes.
+        assets: For the body's bounds.
+
+    Raises:
+        ConfigError: it is, and is not meant to be.
+    """
+    if not sensor.rig or sensor.inside:
+        return
+    rig = scene.rig(sensor.rig)
+    body = scene.body(rig.body)
+    low_m, high_m = assets.bounds_m(body.asset)
+    place_m = (rig.T_body_rig @ sensor.T_rig_sensor).translation_m
+    depth_m = min(
+        min(at - body.scale * low, body.scale * high - at)
+        for at, low, high in zip(place_m, low_m, high_m, strict=True)
+    )
+    if depth_m > BURIED_M:
+        top_m = body.scale * high_m[2] - rig.T_body_rig.translation_m[2]
+        raise ConfigError(
+            f"sensor '{name}': offset_m is {depth_m:.2f} m inside '{rig.body}', which carries rig"
+            f" '{rig.name}'; move it out (its top is at {top_m:.2f} m on the rig), or say"
+            " inside: true"
+        )
 
 
 def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:
@@ -71,3 +147,41 @@ def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:
             f" whole number of steps between readings, such as {1.0 / (k * step_s):g} Hz"
         )
     return round(steps)
+
+
+def within_steps(rate_hz: float | None, step_s: float) -> bool:
+    """Whether a sensor reads more often than the sequence steps."""
+    return rate_hz is not None and rate_hz * step_s > 1.0 + 1e-6
+
+
+def checked_rate(sensor: str, rate_hz: float | None, step_s: float) -> None:
+    """Refuse a rate that does not fit the steps of the sequence.
+
+    Raises:
+        ConfigError: neither a whole number of readings per step nor of steps per reading.
+    """
+    if rate_hz is None or not within_steps(rate_hz, step_s):
+        stride(sensor, rate_hz, step_s)
+        return
+    readings = rate_hz * step_s
+    if abs(readings - round(readings)) > 1e-6 * readings:
+        raise ConfigError(
+            f"sensor '{sensor}': rate_hz {rate_hz:g} does not fit step_s {step_s:g}; expected a"
+            f" whole number of readings per step, such as {round(readings) / step_s:g} Hz"
+        )
+
+
+def reading_times(scene: Scene, rate_hz: float | None) -> Array:
+    """Instants of the readings of the step that ends now; at time 0 there is but one."""
+    step_s = scene.step_s
+    if scene.time_s <= 0.0 or rate_hz is None or not within_steps(rate_hz, step_s):
+        return np.array([scene.time_s])
+    count = round(rate_hz * step_s)
+    last = round(scene.time_s * rate_hz)
+    return np.round(np.arange(last - count + 1, last + 1) / rate_hz, TIME_DECIMALS)
+
+
+def window_s(scene: Scene, rate_hz: float | None) -> tuple[float, float]:
+    """The time that a reading now looks back on: a step, or the time since the last reading."""
+    period_s = max(scene.step_s, 1.0 / rate_hz if rate_hz else 0.0)
+    return max(round(scene.time_s - period_s, TIME_DECIMALS), 0.0), scene.time_s

@@ -7,13 +7,14 @@ unit: 1 is the light that answers half of the time.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.capture import Echoes
+from generator.core.capture import Detours, Echoes
 from generator.core.streams import Rng
 from generator.sensors.scanning import LidarModel
 
@@ -21,6 +22,9 @@ Float32 = NDArray[np.float32]
 UInt16 = NDArray[np.uint16]
 UInt8 = NDArray[np.uint8]
 LABELS = ("instance_id", "category_id", "surface")
+FIELDS = ("range_m", "reflectance", *LABELS)
+DETOURS_MAX = 2
+"""Of one ray: through glass, and by a mirror."""
 Kept = Literal["strongest", "last", "dual"]
 
 STEEPNESS = 6.0
@@ -49,19 +53,29 @@ class Pulses:
     surface: UInt8
 
 
-def pulses_of(echoes: Echoes, model: LidarModel) -> Pulses:
-    """The peaks in the light that comes back to a scanner; one per beam of a single ray."""
-    reflectance = echoes.reflectance
-    if reflectance.shape[1] > 1:
-        return _merged(echoes, model)
-    return Pulses(
-        echoes.range_m,
-        light_of(reflectance, echoes.range_m, model),
-        reflectance,
-        echoes.instance_id,
-        echoes.category_id,
-        echoes.surface,
-    )
+def pulses_of(echoes: Echoes, model: LidarModel, keep: Kept = "dual") -> Pulses:
+    """The peaks in the light that comes back to a scanner.
+
+    One per beam of a single ray, unless glass or mirrors show it more and more than the strongest
+    is kept; else as many as there are rays.
+    """
+    fields = {name: getattr(echoes, name) for name in FIELDS}
+    rays = echoes.range_m.shape[1]
+    if rays == 1:
+        light = light_of(echoes.reflectance, echoes.range_m, model)
+        pulses = Pulses(echoes.range_m, light, *(fields[name] for name in FIELDS[1:]))
+    else:
+        pulses = _merged(fields, rays, model)
+    if echoes.detours is None:
+        return pulses
+    pulses = Pulses(*(getattr(pulses, name).copy() for name in Pulses.__slots__))
+    if rays == 1 and keep != "strongest":
+        none = {name: np.repeat(_nothing(fields[name]), DETOURS_MAX, axis=1) for name in FIELDS}
+        dark: Float32 = np.zeros(none["range_m"].shape, np.float32)
+        more = Pulses(none["range_m"], dark, *(none[name] for name in FIELDS[1:]))
+        pulses = joined(pulses, more)
+    _put_detours(pulses, fields, echoes.detours, model)
+    return pulses
 
 
 def light_of(reflectance: Float32, range_m: Float32, model: LidarModel) -> Float32:
@@ -133,18 +147,48 @@ def reported_intensity(reflectance: Float32, model: LidarModel) -> Float32:
     return np.asarray(told, dtype=np.float32)
 
 
-def _merged(echoes: Echoes, model: LidarModel) -> Pulses:
-    """Rays of one beam that end close to each other are one peak; [pulses, subrays].
+def _nothing(field: NDArray[Any]) -> NDArray[Any]:
+    """What a field of echoes [n, 1] says of nothing."""
+    return np.full((len(field), 1), np.inf if field.dtype == np.float32 else 0, field.dtype)
+
+
+def _put_detours(
+    pulses: Pulses, fields: Mapping[str, NDArray[Any]], detours: Detours, model: LidarModel
+) -> None:
+    """Merge what rays met besides into the peaks of their beams, in place; the strongest stay."""
+    rays = fields["range_m"].shape[1]
+    order = np.argsort(detours.ray, kind="stable")
+    ray = detours.ray[order]
+    # A ray's second detour, if it has two, goes into a slot of its own.
+    again = (np.diff(ray, prepend=-1) == 0).astype(np.int64)
+    rows, place = np.unique(ray // rays, return_inverse=True)
+    slot = rays * (1 + again) + ray % rays
+    wide = {}
+    for name in FIELDS:
+        nothing = np.inf if name == "range_m" else 0
+        further = np.full((len(rows), DETOURS_MAX * rays), nothing, fields[name].dtype)
+        wide[name] = np.concatenate([fields[name][rows], further], axis=1)
+        wide[name][place, slot] = getattr(detours, name)[order]
+    peaks = _merged(wide, rays, model)
+    best = np.argsort(-peaks.light, axis=1, kind="stable")[:, : pulses.light.shape[1]]
+    for name in Pulses.__slots__:
+        getattr(pulses, name)[rows] = np.take_along_axis(getattr(peaks, name), best, axis=1)
+
+
+def _merged(fields: Mapping[str, NDArray[Any]], rays: int, model: LidarModel) -> Pulses:
+    """Ends of one beam's rays that are close to each other are one peak; [pulses, ends].
 
     A peak has the range and the labels of the ray in it that sends the most light.
+
+    Args:
+        fields: Of echoes, [pulses, ends].
+        rays: Rays per beam, each with an equal share of its light.
+        model: Of the scanner.
     """
-    order = np.argsort(echoes.range_m, axis=1, kind="stable")
-    sorted_ = {
-        name: np.take_along_axis(getattr(echoes, name), order, axis=1)
-        for name in ("range_m", "reflectance", *LABELS)
-    }
+    order = np.argsort(fields["range_m"], axis=1, kind="stable")
+    sorted_ = {name: np.take_along_axis(fields[name], order, axis=1) for name in FIELDS}
     range_m = sorted_["range_m"]
-    share = np.float32(1.0 / range_m.shape[1])
+    share = np.float32(1.0 / rays)
     light = light_of(sorted_["reflectance"], range_m, model) * share
     finite = np.isfinite(range_m)
     gaps = np.diff(np.where(finite, range_m, np.float32(1e9)), axis=1, prepend=range_m[:, :1])

@@ -1,4 +1,4 @@
-"""A pinhole camera with every label channel."""
+"""A camera with every label channel."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import math
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
 from generator.core.capture import Channel, Reading
 from generator.core.instants import RIG_AXES
@@ -15,6 +16,8 @@ from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Region, Scene
 from generator.core.se3 import SE3, look_at
 from generator.core.streams import Rng
+from generator.sensors.formation.chain import Formation, photograph
+from generator.sensors.lenses import LensConfig, Pinhole, Published
 from generator.sensors.mounting import Mounted, known_rig
 
 Image = Literal[
@@ -24,28 +27,65 @@ Image = Literal[
 
 SidePx = Annotated[int, Field(ge=8, le=8192)]
 
+PINHOLE_MAX_DEG = 170.0
 NOMINAL_AZIMUTH_RAD = math.radians(-60.0)
 NOMINAL_ELEVATION_RAD = math.radians(35.0)
 
 
 class RgbCamera(Mounted):
-    """A camera without distortion; its pose and lens are varied by randomizers.
+    """A camera, by default without distortion; its pose and lens are varied by randomizers.
 
     Attributes:
         name: What labels, files and randomizers call it.
         size_px: Width and height of its images.
-        hfov_deg: Nominal horizontal field of view.
+        hfov_deg: Nominal horizontal field of view, along the middle row; tangential terms are
+            left out, and what is dark beyond a lens's field counts.
+        lens: How directions become image points: ``pinhole``, ``brown_conrady``,
+            ``kannala_brandt`` (fisheye), ``equirectangular`` (panorama), or ``published``, the
+            calibration of a known camera.
         channels: What is written as images.
         ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
+        formation: How its photographs come about; null = an ideal camera.
     """
 
     modality: ClassVar[Literal["camera", "lidar"]] = "camera"
     type: Literal["rgb_camera"] = "rgb_camera"
     name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     size_px: tuple[SidePx, SidePx] = (640, 480)
-    hfov_deg: float = Field(60.0, ge=1, le=170)
+    hfov_deg: float = Field(60.0, ge=1, le=360)
+    lens: LensConfig = Pinhole()
     channels: tuple[Image, ...] = Field(("rgb", "depth", "instance", "category"), min_length=1)
     ev100: float | None = None
+    formation: Formation | None = None
+
+    @model_validator(mode="after")
+    def _has_a_lens(self) -> RgbCamera:
+        if isinstance(self.lens, Pinhole) and self.hfov_deg > PINHOLE_MAX_DEG:
+            raise ValueError(
+                f"hfov_deg {self.hfov_deg:g} is too wide for a pinhole; expected at most "
+                f"{PINHOLE_MAX_DEG:g}, or another lens, such as {{model: kannala_brandt}}"
+            )
+        if isinstance(self.lens, Published) and "hfov_deg" in self.model_fields_set:
+            raise ValueError("a published lens has its own field of view: leave out hfov_deg")
+        if self.intrinsics().folds_over():
+            raise ValueError(
+                f"lens {self.lens.model}: its polynomial folds over inside the image, where no "
+                "lens does; check the signs and size of its coefficients, make hfov_deg smaller, "
+                "or end its field before with field_deg"
+            )
+        return self
+
+    def intrinsics(self) -> Intrinsics:
+        """Nominal intrinsics.
+
+        Raises:
+            ValueError: the lens does not show as wide a field as ``hfov_deg``.
+        """
+        width_px, height_px = self.size_px
+        if isinstance(self.lens, Published):
+            return self.lens.intrinsics(width_px, height_px)
+        hfov_rad = math.radians(self.hfov_deg)
+        return Intrinsics.from_hfov(width_px, height_px, hfov_rad, self.lens.lens())
 
     @property
     def media(self) -> tuple[Channel, ...]:
@@ -56,24 +96,49 @@ class RgbCamera(Mounted):
         """The scene with this camera in it, looking at the scene's focus; as it is if it was."""
         if any(camera.name == self.name for camera in scene.cameras):
             return scene
-        width_px, height_px = self.size_px
-        intrinsics = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
+        intrinsics = self.intrinsics()
         if self.rig:
             rig = known_rig(scene, self.name, self.rig)
             T_rig_camera = self.T_rig_sensor @ RIG_AXES.inverse()
             camera = Camera(self.name, SE3(), intrinsics, self.ev100, rig, T_rig_camera)
             return replace(scene, cameras=(*scene.cameras, camera))
-        narrower_px = 0.5 * min(width_px, height_px)
-        pose = _nominal_pose(scene.focus, math.atan(narrower_px / intrinsics.fx_px))
+        pose = _nominal_pose(scene.focus, _narrower_half_rad(intrinsics))
         camera = Camera(self.name, pose, intrinsics, self.ev100)
         return replace(scene, cameras=(*scene.cameras, camera))
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Reading:
-        """Its own channels and those asked for, as an ideal sensor without noise."""
-        del rng
-        return renderer.render(scene, scene.camera(self.name), channels | set(self.media))
+        """Its own channels and those asked for; only colour is subject to its optics and noise."""
+        asked = channels | set(self.media)
+        camera = scene.camera(self.name)
+        if self.formation is None or Channel.RGB not in asked:
+            return renderer.render(scene, camera, asked)
+        # Wide lenses see what has no depth along the axis, and are focused at a distance.
+        depth = Channel.Z_DEPTH if camera.intrinsics.straight else Channel.RANGE
+        needed = (asked - {Channel.RGB}) | {Channel.RADIANCE, depth}
+        seen = renderer.render(scene, camera, needed)
+        assert seen.ev100 is not None, "who renders radiance meters it"
+        photo = photograph(
+            seen.channels[Channel.RADIANCE],
+            seen.channels[depth],
+            camera.intrinsics.fx_px,
+            seen.ev100,
+            self.formation,
+            rng,
+        )
+        images = {k: v for k, v in seen.channels.items() if k in asked}
+        return replace(seen, channels={**images, Channel.RGB: photo})
+
+
+def _narrower_half_rad(intrinsics: Intrinsics) -> float:
+    """Half the field of view along the image's shorter side."""
+    narrower_px = 0.5 * min(intrinsics.width_px, intrinsics.height_px)
+    if intrinsics.straight:
+        return math.atan(narrower_px / intrinsics.fx_px)
+    rim = intrinsics.rays(np.array([intrinsics.cx_px + narrower_px, intrinsics.cy_px]))
+    seen_rad = float(np.arccos(np.clip(rim[2], 0.0, 1.0))) if np.isfinite(rim[2]) else math.pi
+    return min(seen_rad, intrinsics.lens.half_field_rad, 0.5 * math.pi)
 
 
 def _nominal_pose(focus: Region, half_angle_rad: float) -> SE3:

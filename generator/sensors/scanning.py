@@ -7,6 +7,7 @@ above, so that it looks ahead in the middle of its sweep.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -45,6 +46,7 @@ class LidarModel(Strict):
     """A laser scanner's data sheet.
 
     Attributes:
+        name: What labels call it; empty = the file it is in.
         elevations_deg: Blocks of lasers, from the top; none for a rosette.
         azimuth_offsets_deg: Of the lasers to the left, repeated down the table.
         prisms: What draws a rosette; none for a scanner that turns.
@@ -60,6 +62,7 @@ class LidarModel(Strict):
         white_intensity: Reported for a white matte surface, of 1; above it are retro-reflectors.
     """
 
+    name: str = ""
     elevations_deg: tuple[Block, ...] = ()
     azimuth_offsets_deg: tuple[float, ...] = ()
     prisms: Prisms | None = None
@@ -82,6 +85,14 @@ class LidarModel(Strict):
         if not 0 <= low < high:
             raise ValueError(f"range_m must rise from 0 or more, got [{low:g}, {high:g}]")
         return self
+
+    def with_beams(self, beams: Sequence[tuple[float, float]]) -> LidarModel:
+        """The same device with other lasers: (elevation, azimuth offset) in degrees, any order."""
+        sorted_ = sorted(beams, key=lambda beam: -beam[0])
+        blocks = tuple(Block(first=up, last=up, count=1) for up, _ in sorted_)
+        offsets = tuple(left for _, left in sorted_)
+        changed = {"elevations_deg": blocks, "azimuth_offsets_deg": offsets, "prisms": None}
+        return self.model_copy(update=changed)
 
     def elevations_rad(self) -> NDArray[np.float64]:
         """Elevation of every laser, the highest first [rings]; empty for a rosette."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from generator.annotations.truth import Thresholds, image_truth
 from generator.core.capture import Channel, Reading
 from generator.core.geometry import Keypoint
 from generator.core.intrinsics import Intrinsics
+from generator.core.lens import Lens
 from generator.core.sample import KeypointTruth
 from generator.core.scene import Camera, Instance, Scene
 from generator.core.se3 import IDENTITY, SE3
@@ -40,7 +43,8 @@ def seen(
         PANEL, "panel", "panel", 1, "panel", T_world_instance=T_world_instance, keypoints=points
     )
     normals = np.full((H, W, 3), normal, np.float32)
-    channels = {Channel.INSTANCE: ids, Channel.Z_DEPTH: depth_m, Channel.NORMALS: normals}
+    range_m = depth_m / CAMERA.intrinsics.pixel_rays()[..., 2]
+    channels = {Channel.INSTANCE: ids, Channel.RANGE: range_m, Channel.NORMALS: normals}
     reading = Reading("color", CAMERA, channels)
     scene = Scene("panel", instances=(panel,))
     (truth,) = image_truth(scene, reading, [Keypoints()], Thresholds()).objects
@@ -160,3 +164,27 @@ def test_a_skeleton_is_found_by_any_of_its_names() -> None:
     assert skeleton_of(["lid", "handle", "lid"]).names == ("lid", "handle")
     assert skeleton_of(["lid"]).bones == ()
     assert len(skeleton_of([*PERSON.names, "wheel_front"]).names) == 21
+
+
+def test_a_fisheye_sees_points_beside_and_behind_it() -> None:
+    """A ball of keypoints at 100 degrees from the axis: in the image, at the angle's place."""
+    lens = Lens("kannala_brandt", (0.0,) * 4)
+    camera = replace(CAMERA, intrinsics=Intrinsics(200, 40, 50.0, 50.0, 100.0, 20.0, lens))
+    angle = math.radians(100.0)
+    place = (2.0 * math.sin(angle), 0.0, 2.0 * math.cos(angle))
+    thing = Instance(1, "thing", "thing", 1, "thing", keypoints=(Keypoint("tip", place, 0.05),))
+    channels = {
+        Channel.INSTANCE: np.ones((40, 200), np.uint16),
+        Channel.RANGE: np.full((40, 200), 2.0, np.float32),
+        Channel.NORMALS: np.asarray(-camera.intrinsics.pixel_rays(), np.float32),
+    }
+    scene = Scene("test", instances=(thing,))
+
+    (truth,) = image_truth(
+        scene, Reading("color", camera, channels), [Keypoints()], Thresholds()
+    ).objects
+
+    assert truth.keypoints is not None
+    (point,) = truth.keypoints
+    assert point.visibility == 2
+    assert point.image_px == pytest.approx((100.0 + 50.0 * angle, 20.0))

@@ -30,7 +30,7 @@ def assert_same(a: MeshData, b: MeshData) -> None:
 
 
 def entries(folder: Path) -> list[Path]:
-    return sorted(folder.rglob("*.npz"))
+    return sorted(folder.rglob("*.arrays"))
 
 
 def test_cold_warm_and_another_cache_give_the_same_bytes(tmp_path: Path) -> None:

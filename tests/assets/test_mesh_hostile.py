@@ -221,7 +221,7 @@ def refused(tmp_path: Path, file: str, ask: Callable[[Any], object]) -> str:
     assert SECRET not in message
     assert len(message) < 600
     assert Path(file).name.partition(".")[0] in message or "secret" in message
-    assert not list((tmp_path / "cache").rglob("*.npz"))
+    assert not list((tmp_path / "cache").rglob("*.arrays"))
     return message
 
 

@@ -14,7 +14,7 @@ from generator.config.describe import describe
 from generator.config.schema import json_schema
 from generator.core.interfaces import Stage
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Instance, Lane, ObjectGroup, Rig, Scene
+from generator.core.scene import Body, Camera, Instance, Lane, Lidar, ObjectGroup, Rig, Scene
 from generator.core.se3 import SE3, look_at
 from generator.core.serial import canonical_json, from_plain, to_plain
 from randomizers import TABLE
@@ -42,7 +42,7 @@ PHYSICS_BOUND = (
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, lamps, a car, an ego vehicle, and two cameras."""
+    """A room with a table, an arm, objects, lamps, cars, one of them the ego, and two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -68,8 +68,9 @@ def nominal_scene() -> Scene:
         scene,
         bodies=(*scene.bodies, lamp, signal, wagon, ego),
         instances=(*scene.instances, labelled, carrier),
-        rigs=(Rig("ego", "ego"),),
+        rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "along/0")),
         cameras=cameras,
+        lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
         lanes=lanes,
         groups=(*scene.groups, group),
     )

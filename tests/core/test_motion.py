@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from generator.core.instants import at, with_placed_sensors
 from generator.core.intrinsics import Intrinsics
-from generator.core.motion import STILL, Change, Track
+from generator.core.motion import STILL, Change, JointTrack, Track
 from generator.core.scene import Body, Camera, Device, Instance, Lidar, Light, Rig, Scene
 from generator.core.se3 import SE3
 
@@ -157,3 +157,11 @@ def test_what_moves_is_known_to_its_instance() -> None:
     then = at(scene(), 0.5)
     assert then.instance(1).twist.velocity_m_s == pytest.approx((1.0, 0.0, 0.0))
     assert then.instance(2).twist == STILL
+
+
+def test_joint_positions_are_linear_between_knots_and_constant_outside() -> None:
+    """Half a radian in half a second, from the first second on."""
+    track = JointTrack(0.5, ((0.0, 1.0), (0.5, 1.0)), start_s=1.0)
+    assert track.positions(0.0) == (0.0, 1.0)
+    assert track.positions(1.25) == (0.25, 1.0)
+    assert track.positions(9.0) == (0.5, 1.0)

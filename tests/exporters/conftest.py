@@ -6,7 +6,8 @@ geometry.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from exporters.images import write_media
 from generator import annotations
+from generator.annotations.boxes3d import oriented_box
 from generator.annotations.truth import Thresholds, image_truth
 from generator.core.boxes import BoxPx, tight_box
 from generator.core.capture import (
@@ -26,13 +28,19 @@ from generator.core.capture import (
     PointCloud,
     Reading,
     Silhouette,
+    Table,
 )
 from generator.core.geometry import SURFACES, Keypoint
+from generator.core.instants import RIG_AXES, at, with_placed_sensors, with_twists
 from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.intrinsics import Intrinsics
-from generator.core.sample import Sample
-from generator.core.scene import Camera, Instance, Lidar, Scene
+from generator.core.lanes import LaneBorder
+from generator.core.motion import Track
+from generator.core.sample import BirdseyeMap, FrameTruth, ImageTruth, Sample
+from generator.core.scene import Body, Camera, Device, Instance, Lidar, Rig, Scene
 from generator.core.se3 import SE3, Array, look_at
+from generator.core.tables import table_rows
+from generator.runner.shard import without_pixels
 
 CATEGORIES = ("car", "crate", "pedestrian")
 MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
@@ -112,6 +120,7 @@ def ray_cast(scene: Scene, camera: Camera) -> Reading:
     channels: dict[Channel, NDArray[Any]] = {
         Channel.RGB: rgb,
         Channel.Z_DEPTH: depth.astype(np.float32),
+        Channel.RANGE: (depth * np.linalg.norm(rays[inside], axis=-1)).astype(np.float32),
         Channel.NORMALS: _normals(depth[..., None] * rays[inside]),
         Channel.INSTANCE: ids,
         Channel.CATEGORY: categories,
@@ -185,15 +194,109 @@ def make_sample(
     """A sample with every annotation."""
     scene = Scene("street", instances=tuple(instances), cameras=tuple(cameras))
     readings = {camera.name: ray_cast(scene, camera) for camera in cameras}
+    truth = annotated(scene, readings, thresholds or Thresholds())
+    lidar = Lidar("top", cameras[0].name, T_world_lidar=SE3((0.0, 0.0, 1.73)), model="VLP-16")
+    imu = Device("imu", "imu", "ego", T_world_device=SE3((0.0, 0.0, 0.5)), model="RT3003")
+    scene = replace(scene, lidars=(lidar,), devices=(imu,))
+    clouds = {"top": PointCloud("top", lidar, scan(scene, lidar))}
+    tables = {"imu": Table("imu", imu, imu_rows(index))}
+    capture, frame = Capture(readings, clouds, tables), frame_of(scene)
+    return Sample(index, index, 0, split, scene, capture, truth, frame=frame)
+
+
+def imu_rows(index: int) -> NDArray[Any]:
+    """Three readings; the second has a figure of many digits."""
+    times_s = 0.1 * index + 0.01 * np.arange(3)
+    force = np.array([0.0, 1.0 / 3.0, -2.5e-7])
+    return table_rows("imu", 3, time_s=times_s, force_x_m_s2=force, force_z_m_s2=9.80665)
+
+
+def annotated(
+    scene: Scene, readings: Mapping[str, Reading], thresholds: Thresholds
+) -> dict[str, ImageTruth]:
+    """Every annotation of every reading."""
     annotators = [annotations.TABLE.load(name)() for name in annotations.TABLE]
-    truth = {
-        name: image_truth(scene, reading, annotators, thresholds or Thresholds())
+    return {
+        name: image_truth(scene, reading, annotators, thresholds)
         for name, reading in readings.items()
     }
-    lidar = Lidar("top", cameras[0].name, T_world_lidar=SE3((0.0, 0.0, 1.73)), model="VLP-16")
-    scene = replace(scene, lidars=(lidar,))
-    clouds = {"top": PointCloud("top", lidar, scan(scene, lidar))}
-    return Sample(index, index, 0, split, scene, Capture(readings, clouds), truth)
+
+
+SPEED_M_S, TURN_RAD_S, STEP_S = 10.0, 0.2, 0.1
+"""Of the ego vehicle of a drive: a circle to the left."""
+
+
+def ego_pose(time_s: float) -> SE3:
+    """Where the ego is after a time: on its circle, headed along it."""
+    angle, radius_m = TURN_RAD_S * time_s, SPEED_M_S / TURN_RAD_S
+    place = (radius_m * math.sin(angle), radius_m * (1.0 - math.cos(angle)), 0.0)
+    return SE3.about_z(angle, place)
+
+
+def driving_scene() -> Scene:
+    """A rig with two cameras and a scanner; a car ahead, a crossing pedestrian, a crate."""
+    things = (
+        instance(1, "car", 16.0, 0.5, 0.05),
+        instance(2, "pedestrian", 12.0, -4.0, 1.5),
+        instance(4, "crate", 14.0, 4.0, 0.3),
+    )
+    bodies = tuple(Body(t.name, t.asset, t.T_world_instance, 1.0, t.instance_id) for t in things)
+    times_s = [STEP_S * k for k in range(-2, 9)]
+    ways = {
+        "ego": [ego_pose(t) for t in times_s],
+        "car/1": [things[0].T_world_instance @ SE3((8.0 * t, 0.0, 0.0)) for t in times_s],
+        "pedestrian/2": [things[1].T_world_instance @ SE3((1.5 * t, 0.0, 0.0)) for t in times_s],
+    }
+    level = level_camera("left")
+    cameras = tuple(
+        replace(level, name=name, rig="ego", T_rig_camera=SE3((0.3, y_m, 1.6)) @ RIG_AXES.inverse())
+        for name, y_m in (("left", 0.0), ("right", -0.54))
+    )
+    scene = Scene(
+        "street",
+        bodies=(*bodies, Body("ego", "car")),
+        instances=things,
+        cameras=cameras,
+        lidars=(Lidar("top", "", SE3((0.0, 0.0, 1.73)), model="VLP-16", rig="ego"),),
+        rigs=(Rig("ego", "ego"),),
+        tracks=tuple(Track(name, STEP_S, tuple(way), -0.2) for name, way in ways.items()),
+    )
+    return with_twists(with_placed_sensors(scene))
+
+
+def make_drive(strides: Mapping[str, int] | None = None) -> list[Sample]:
+    """Two sequences of four steps, the first for training; sensors read at every stride-th step."""
+    samples = []
+    for index in range(8):
+        sequence, step = divmod(index, 4)
+        scene = at(driving_scene(), STEP_S * step)
+        reads = [n for n in ("left", "right", "top") if step % (strides or {}).get(n, 1) == 0]
+        readings = {
+            camera.name: replace(ray_cast(scene, camera), time_s=scene.time_s)
+            for camera in scene.cameras
+            if camera.name in reads
+        }
+        (lidar,) = scene.lidars
+        cloud = PointCloud("top", lidar, scan(scene, lidar), scene.time_s)
+        capture = Capture(readings, {"top": cloud} if "top" in reads else {})
+        truth = annotated(scene, readings, Thresholds())
+        split, names = ("train", "val")[sequence], ("left", "right")
+        samples.append(
+            Sample(index, sequence, 0, split, scene, capture, truth, step_index=step, cameras=names)
+        )
+    return samples
+
+
+def frame_of(scene: Scene) -> FrameTruth:
+    """A map of 40 m in which half of the ground is drivable, and boxes."""
+    drivable = np.zeros((80, 80), bool)
+    drivable[:, 40:] = True
+    return FrameTruth(
+        "ego",
+        boxes3d={"ego": {i.instance_id: oriented_box(i) for i in scene.instances}},
+        borders=(LaneBorder("lane:left", "road", ((-90.0, 0.0, 0.0), (90.0, 0.0, 0.0))),),
+        birdseye=BirdseyeMap(SE3(), 0.5, {"drivable": drivable, "vehicles": ~drivable}),
+    )
 
 
 def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:
@@ -236,13 +339,9 @@ def make_info(
         media=dict.fromkeys(sensors, MEDIA),
         depth_scale_m=0.001,
         lidars=lidars,
+        devices={"imu": "imu"},
     )
     return replace(info, **changes)
-
-
-def without_arrays(sample: Sample) -> Sample:
-    """The sample after its images were written and dropped."""
-    return replace(sample, capture=Capture({}))
 
 
 def export(
@@ -262,7 +361,7 @@ def export(
     for shard, shard_dir in reversed(work) if backwards else work:
         for sample in shard:
             write_media(info, sample, shard_dir)
-        exporter.write_shard(info, shard if keep_arrays else map(without_arrays, shard), shard_dir)
+        exporter.write_shard(info, shard if keep_arrays else map(without_pixels, shard), shard_dir)
     exporter.finalize(info, shard_dirs, folder / "dataset")
     return folder / "dataset"
 
@@ -277,6 +376,8 @@ class World:
     info = staticmethod(make_info)
     sample = staticmethod(make_sample)
     export = staticmethod(export)
+    ego_pose = staticmethod(ego_pose)
+    drive = staticmethod(make_drive)
 
     def __init__(self) -> None:
         splits = ("train", "train", "val", "train", "val", "train", "train")

@@ -151,7 +151,7 @@ def test_silhouettes_cannot_be_written_as_an_image() -> None:
 
 def test_every_channel_of_the_media_is_written_to_its_path(world: Any, tmp_path: Path) -> None:
     """Of the sensor's own image, and nothing else."""
-    info, sample = world.info(7), world.samples[4]
+    info, sample = world.info(7, devices={}), world.samples[4]
 
     write_media(info, sample, tmp_path)
 

@@ -240,7 +240,7 @@ def test_calibration_puts_pixel_centres_at_whole_numbers() -> None:
 
 
 def test_image_boxes_bound_the_projected_boxes_inside_the_image(dataset: Path) -> None:
-    """P2 R0 x, clipped, to the hundredth of a pixel that is written."""
+    """P2 R0 x, clipped, to the hundredth of a pixel; what is clipped off is the truncation."""
     compared = 0
     for path in sorted((dataset / "training/label_2").iterdir()):
         calib = devkit_calib(dataset / f"training/calib/{path.stem}.txt")
@@ -251,7 +251,10 @@ def test_image_boxes_bound_the_projected_boxes_inside_the_image(dataset: Path) -
             if row.startswith("DontCare") or (corners[:, 2] < 0.05).any():
                 continue
             projected = np.c_[corners, np.ones(8)] @ calib["P2"].T
-            uv = np.clip(projected[:, :2] / projected[:, 2:], 0.0, last_px)
+            whole = projected[:, :2] / projected[:, 2:]
+            uv = np.clip(whole, 0.0, last_px)
+            inside = np.prod(np.ptp(uv, axis=0)) / np.prod(np.ptp(whole, axis=0))
+            assert float(row.split(" ")[1]) == pytest.approx(1.0 - inside, abs=0.006)
             label = [float(v) for v in row.split(" ")[4:8]]
             np.testing.assert_allclose([*uv.min(axis=0), *uv.max(axis=0)], label, atol=0.006)
             compared += 1
@@ -368,6 +371,11 @@ def test_without_a_scanner_no_depth_is_needed(world: Any, tmp_path: Path) -> Non
         ),
         (Kitti(), {"media": {"color": (Channel.Z_DEPTH,)}}, "expected one of: none"),
         (Kitti(), {"n": 1_000_001}, "six digits"),
+        (
+            Kitti(),
+            {"lenses": {"color": "kannala_brandt"}},
+            "camera 'color' has a lens of the model 'kannala_brandt'.*rectified",
+        ),
     ],
 )
 def test_what_kitti_cannot_hold_is_refused_before_rendering(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +13,22 @@ import numpy as np
 import pytest
 
 from exporters.clouds import read_points
-from exporters.kitti import Kitti, official_type
+from exporters.kitti import (
+    Kitti,
+    label_rows,
+    label_text,
+    official_type,
+    point_labels,
+    point_members,
+    upright_box,
+)
 from exporters.pointclouds import PointClouds
 from exporters.semantickitti import SemanticKitti
+from exporters.semantickitti import point_labels as semantic_labels
+from generator.core.capture import POINT
 from generator.core.errors import ConfigError, StorageError
 from generator.core.geometry import SURFACES
+from generator.core.motion import Twist
 
 POINT_FIELDS = [
     *("x", "y", "z", "intensity", "time", "ring", "instance", "category", "surface"),
@@ -107,6 +120,48 @@ def test_kitti_point_labels_name_the_row_of_the_label_file(kitti: Path, world: A
     assert checked > 10
 
 
+def kitti_rows(world: Any) -> np.ndarray:
+    """Rows of four points of the first car: on it, 2 cm and 4 cm before it, road 4 cm inside."""
+    truth = world.samples[0].truth["color"]
+    alone = replace(truth, objects=truth.objects[:1])
+    box = upright_box(truth.objects[0].box3d_camera)
+    ahead = np.array([math.cos(box.heading_rad), 0.0, -math.sin(box.heading_rad)])
+    face = np.asarray(box.bottom_m) - (0.0, 0.5, 0.0) + ahead * 0.5 * box.size_hwl_m[2]
+    middle = np.asarray(box.bottom_m) - (0.0, 0.04, 0.0)
+    points = np.zeros(4, POINT)
+    points["position_m"] = [face, face + 0.02 * ahead, face + 0.04 * ahead, middle]
+    points["instance_id"] = [1, 1, 1, 0]
+    points["category_id"] = [1, 1, 1, 0]
+    style = Kitti(far_m=100.0)
+    members, unseen = point_members(points, alone, style, np.eye(3, 4))
+    assert unseen == frozenset()
+    both = point_labels(points, members, label_rows(alone, style))
+    np.testing.assert_array_equal(both & 0xFFFF, points["category_id"])
+    return both >> 16
+
+
+def test_kitti_objects_are_what_lies_in_their_boxes(world: Any) -> None:
+    """Noise of 3 cm is forgiven, more is not; road that reaches into the box is in it."""
+    np.testing.assert_array_equal(kitti_rows(world), [1, 1, 0, 1])
+
+
+def test_what_the_scanner_did_not_see_is_dont_care(world: Any) -> None:
+    """All its points out of the box; with one point in it, it is a Car."""
+    sample = world.samples[0]
+    truth = sample.truth["color"]
+    alone = replace(truth, objects=truth.objects[:1])
+    style = Kitti(far_m=100.0)
+    points = sample.capture.clouds["top"].points
+    mine = points[points["instance_id"] == 1].copy()
+    T_camera_velo = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]], float)
+
+    _, unseen = point_members(mine[:0], alone, style, T_camera_velo)
+
+    assert unseen == {1}
+    assert label_text(alone, style, unseen).startswith("DontCare -1 -1 -10 ")
+    assert label_text(alone, style).startswith("Car ")
+
+
 def test_semantic_scans_are_numbered_without_gaps_in_official_splits(semantic: Path) -> None:
     """Train is sequence 00, val is 08; points, labels, poses and times agree in number."""
     counts = {"00": 5, "08": 2}
@@ -147,6 +202,21 @@ def test_instances_of_different_scenes_have_different_ids(semantic: Path) -> Non
         assert not mine & seen
         seen |= mine
     assert len(seen) > 5
+
+
+def test_things_under_way_have_moving_classes(world: Any) -> None:
+    """A car that moves is a moving-car, 252; one at rest a car, 10."""
+    sample = world.samples[0]
+    points = sample.capture.clouds["top"].points
+    moving = Twist((0.0, 3.0, 0.0))
+    things = tuple(
+        replace(i, twist=moving if i.instance_id == 1 else i.twist) for i in sample.scene.instances
+    )
+
+    classes = semantic_labels(points, replace(sample.scene, instances=things)) & 0xFFFF
+
+    assert set(classes[points["instance_id"] == 1]) == {252}
+    assert set(classes[points["instance_id"] == 2]) == {30}
 
 
 @pytest.mark.parametrize("kind", ["ply", "pcd"])

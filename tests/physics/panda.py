@@ -69,6 +69,7 @@ def _joint(element: ElementTree.Element) -> Joint:
         lower=float(limit.get("lower", 0.0)),
         upper=float(limit.get("upper", 0.0)),
         mimic=attributes("mimic").get("joint", ""),
+        speed_max=float(limit.get("velocity", 0.0)),
     )
 
 

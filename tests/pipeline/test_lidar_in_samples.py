@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,9 +15,10 @@ from generator.core.scene import Scene
 from generator.core.serial import from_plain, to_plain
 
 SMALL = (
-    "sensors[0].size_px=[128, 64]",
-    "sensors[1].model=VLP-16",
-    "sensors[1].ideal=true",
+    "sensors.image_02.size_px=[128, 64]",
+    "sensors.image_03.size_px=[128, 64]",
+    "sensors.velodyne.model=VLP-16",
+    "sensors.velodyne.ideal=true",
 )
 
 
@@ -33,17 +35,17 @@ def samples() -> Iterator[list[Sample]]:
 def test_the_scanner_is_where_kitti_has_it_on_every_view(samples: list[Sample]) -> None:
     """0.27 m behind and 0.08 m above the camera, axes forward, left and up."""
     for sample in samples[:2]:
-        camera = sample.scene.camera("color").T_world_camera
+        camera = sample.scene.camera("image_02").T_world_camera
         scanner = sample.scene.lidar("velodyne").T_world_lidar
         T_camera_lidar = (camera.inverse() @ scanner).matrix()
-        expected = [[0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]]
+        expected = [[0, -1, 0, 0.06], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]]
         np.testing.assert_allclose(T_camera_lidar, expected, atol=1e-5)
     one, two = (s.scene.lidar("velodyne").T_world_lidar.translation_m for s in samples[:2])
     assert one != two
 
 
 def test_every_labelled_point_lies_in_the_box_of_its_instance(samples: list[Sample]) -> None:
-    """To two millimetres, without noise; thousands of them."""
+    """To two millimetres, without noise, and as far as it moves during half a sweep."""
     checked = 0
     for sample in samples[:2]:
         points = sample.capture.clouds["velodyne"].points
@@ -51,8 +53,9 @@ def test_every_labelled_point_lies_in_the_box_of_its_instance(samples: list[Samp
         for thing in sample.scene.instances:
             mine = p_world[points["instance_id"] == thing.instance_id]
             local = thing.T_world_instance.inverse().apply(mine)
-            assert (local > np.asarray(thing.box_min_m) - 2e-3).all()
-            assert (local < np.asarray(thing.box_max_m) + 2e-3).all()
+            slack_m = 2e-3 + 0.06 * math.hypot(*thing.twist.velocity_m_s)
+            assert (local > np.asarray(thing.box_min_m) - slack_m).all()
+            assert (local < np.asarray(thing.box_max_m) + slack_m).all()
             checked += len(mine)
     assert checked > 1000
 
@@ -62,7 +65,7 @@ def test_objects_know_how_many_points_are_on_them(samples: list[Sample]) -> None
     counted = 0
     for sample in samples[:2]:
         ids = sample.capture.clouds["velodyne"].points["instance_id"]
-        for thing in sample.truth["color"].objects:
+        for thing in sample.truth["image_02"].objects:
             assert thing.lidar_points == {
                 "velodyne": int((ids == thing.instance.instance_id).sum())
             }

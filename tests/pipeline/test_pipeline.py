@@ -112,7 +112,7 @@ def pipeline(
         exporters={},
     )
     engine = physics or AcceptingPhysics()
-    return Pipeline(recipe, None, lambda: engine, None)  # type: ignore[arg-type]
+    return Pipeline(recipe, None, lambda: engine, lambda: None)  # type: ignore[arg-type]
 
 
 def seen(made: Pipeline, index: int) -> np.ndarray:

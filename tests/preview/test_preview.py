@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,15 +11,19 @@ import pytest
 from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import POINT, Capture, PointCloud, Reading
 from generator.core.errors import ConfigError
-from generator.core.geometry import Keypoint
+from generator.core.geometry import Keypoint, Material, MeshData
+from generator.core.instants import at
+from generator.core.interfaces import DatasetInfo
 from generator.core.intrinsics import Intrinsics
+from generator.core.lens import Lens
+from generator.core.motion import Track
 from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
-from generator.core.scene import Camera, Instance, Lidar, Scene
+from generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
 from generator.core.se3 import IDENTITY, SE3
 from generator.core.skeletons import PERSON
-from generator.preview.clouds import top_view
+from generator.preview.clouds import ROW_PX, point_colors, range_view, top_view
 from generator.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
-from generator.preview.palette import color_of, colored_depth, colored_ids
+from generator.preview.palette import color_of, colored_depth, colored_ids, colored_shares
 from generator.preview.recording import Recorder
 from generator.preview.sheet import GAP_PX, arranged
 
@@ -65,19 +70,31 @@ def test_a_skeleton_is_drawn_at_its_points_and_hidden_ones_are_rings() -> None:
 
 
 class _Stream:
-    """Keeps what is logged, in order."""
+    """Keeps what is logged, in order, and when."""
 
     def __init__(self) -> None:
         self.logged: list[tuple[str, Any]] = []
+        self.seconds: list[tuple[str, float | None]] = []
+        self._time_s: float | None = None
 
-    def log(self, path: str, what: Any, *, static: bool = False) -> None:
+    def log(self, path: str, what: Any, *more: Any, static: bool = False) -> None:
         self.logged.append((path, what))
+        self.seconds.append((path, self._time_s))
 
-    def set_time(self, timeline: str, *, sequence: int) -> None:
-        """Time is of no interest here."""
+    def set_time(
+        self, timeline: str, *, sequence: int | None = None, duration: float | None = None
+    ) -> None:
+        """Only seconds are of interest here."""
+        if timeline == "time":
+            self._time_s = duration
 
     def send_blueprint(self, blueprint: object) -> None:
         """Nor are views."""
+
+
+def _info(**changes: Any) -> DatasetInfo:
+    about = DatasetInfo("street", 1, 1, 1, ("car",), ("color",), {})
+    return replace(about, **changes)
 
 
 def test_a_recording_joins_the_keypoints_of_each_object_by_itself() -> None:
@@ -102,9 +119,9 @@ def test_a_recording_joins_the_keypoints_of_each_object_by_itself() -> None:
     scene = Scene("street", instances=tuple(item.instance for item in truth.objects))
     capture = Capture({"color": Reading("color", camera, {})})
     stream = _Stream()
-    recorder = Recorder(stream, None, ["person"])  # type: ignore[arg-type]
+    recorder = Recorder(stream, None, _info(categories=("person",)))  # type: ignore[arg-type]
 
-    recorder.start(["color"])
+    recorder.start()
     recorder.record(Sample(0, 0, 0, "train", scene, capture, {"color": truth}))
 
     prefix = "world/cameras/color/image/keypoints"
@@ -128,6 +145,40 @@ def test_box_behind_the_camera_leaves_no_trace() -> None:
     draw_box3d(image, OrientedBox(SE3((0.0, 0.0, -3.0)), (1.0, 1.0, 1.0)), intrinsics, (9, 9, 9))
 
     assert not image.any()
+
+
+def test_edges_of_boxes_bow_with_the_lens() -> None:
+    """The middle of a long edge is drawn where the lens puts it, and not on the chord."""
+    lens = Lens("kannala_brandt", (0.0,) * 4)
+    intrinsics = Intrinsics(200, 200, 60.0, 60.0, 100.0, 100.0, lens)
+    image = np.zeros((200, 200, 3), np.uint8)
+    bar = OrientedBox(SE3((0.0, 1.2, 1.0)), (6.0, 0.001, 0.001))
+
+    draw_box3d(image, bar, intrinsics, (200, 200, 200))
+
+    ends = intrinsics.project(np.array([[-3.0, 1.2, 1.0], [3.0, 1.2, 1.0]]))
+    row = int(intrinsics.project(np.array([0.0, 1.2, 1.0]))[1])
+    assert row - ends[:, 1].max() > 15
+    assert image[row - 1 : row + 2, 100].any()
+    assert not image[: int(ends[:, 1].min()) - 2].any()
+    assert not image[int(ends[0, 1]) + 3 : row - 2, 100].any()
+
+
+def test_images_that_rerun_cannot_place_in_space_are_shown_by_themselves() -> None:
+    """A pinhole is logged for a pinhole only."""
+    for lens, pinholes in ((Lens(), 1), (Lens("equirectangular"), 0)):
+        camera = Camera("color", IDENTITY, Intrinsics(8, 4, 1.3, 1.3, 4.0, 2.0, lens))
+        reading = Reading("color", camera, {})
+        stream = _Stream()
+        recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
+        truth = {"color": ImageTruth(camera, ())}
+        sample = Sample(0, 0, 0, "train", Scene("s"), Capture({"color": reading}), truth)
+
+        recorder.start()
+        recorder.record(sample)
+
+        logged = [what for path, what in stream.logged if path == "world/cameras/color/image"]
+        assert len(logged) == pinholes
 
 
 def test_neighbouring_ids_look_different_and_nothing_is_black() -> None:
@@ -177,3 +228,102 @@ def test_a_scan_from_above_has_its_points_where_they_are() -> None:
     (row,), (column,) = np.nonzero(view.any(axis=-1))
     assert (row, column) == (240 - 96, 480 + 240)
     assert tuple(view[row, column]) == color_of(3)
+
+
+class _Triangles:
+    """A library in which every asset is one triangle."""
+
+    def mesh(self, asset_id: str) -> MeshData:
+        corners = np.eye(3, dtype=np.float32)
+        return MeshData(
+            vertices_m=corners,
+            faces=np.array([[0, 1, 2]], np.int32),
+            normals=corners,
+            uvs=np.zeros((3, 2), np.float32),
+            face_slots=np.zeros(1, np.int32),
+            materials=(Material(),),
+        )
+
+
+def _moving(step_index: int, *, first: int = 0) -> Sample:
+    """An ego car that drives 1 m per step beside a house; frames 0.1 s apart."""
+    knots = tuple(SE3((float(k), 0.0, 0.0)) for k in range(4))
+    scene = Scene(
+        "street",
+        bodies=(Body("house", "house"), Body("ego", "car")),
+        rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 2.0))),),
+        tracks=(Track("ego", 0.1, knots),),
+    )
+    shown = at(scene, 0.1 * step_index)
+    index = first + step_index
+    return Sample(index, 0, 0, "train", shown, Capture({}), {}, step_index=step_index)
+
+
+def _recorded(samples: list[Sample]) -> _Stream:
+    stream = _Stream()
+    recorder = Recorder(stream, _Triangles(), _info(steps_per_scene=4))  # type: ignore[arg-type]
+    for sample in samples:
+        recorder.record(sample)
+    return stream
+
+
+def test_a_sequence_sends_meshes_once_and_transforms_of_what_moves() -> None:
+    """The house is sent once, the car's mesh once and its place at each of three steps."""
+    logged = _recorded([_moving(k) for k in range(3)]).logged
+
+    def count(path: str, kind: str) -> int:
+        return sum(p == path and type(what).__name__ == kind for p, what in logged)
+
+    assert [count("world/bodies/house", k) for k in ("Mesh3D", "Transform3D")] == [1, 1]
+    assert [count("world/bodies/ego", k) for k in ("Mesh3D", "Transform3D")] == [1, 3]
+    assert count("world/rigs/ego", "Transform3D") == 3
+
+
+def test_sequences_follow_each_other_in_seconds() -> None:
+    """Four steps of 0.1 s make a sequence of 0.4 s; the second begins where the first ended."""
+    stream = _recorded([_moving(2), _moving(0, first=4)])
+
+    seconds = dict.fromkeys(s for path, s in stream.seconds if path == "world/rigs/ego")
+    assert list(seconds) == pytest.approx([0.2, 0.4])
+
+
+def test_a_way_is_where_a_body_goes_until_the_end_of_its_sequence() -> None:
+    """3 m ahead from the first step, logged once; it is lifted off the ground."""
+    logged = _recorded([_moving(k) for k in range(3)]).logged
+
+    (way,) = [what for path, what in logged if path == "world/ways"]
+    (strip,) = way.strips.as_arrow_array().to_pylist()
+    assert strip[0] == pytest.approx([0.0, 0.0, 0.05])
+    assert strip[-1] == pytest.approx([3.0, 0.0, 0.05])
+
+
+def test_colors_of_shares_run_from_blue_over_green_to_red() -> None:
+    """Shares outside [0, 1] are clipped."""
+    shown = colored_shares(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])).tolist()
+
+    blue, green, red = [0, 0, 255], [0, 255, 0], [255, 0, 0]
+    assert shown == [blue, blue, green, red, red]
+
+
+def test_points_are_colored_by_intensity_if_asked() -> None:
+    """Strong returns are red, weak ones blue, whatever they are."""
+    points = np.zeros(2, POINT)
+    points["intensity"] = [0.0, 1.0]
+    points["category_id"] = 3
+    cloud = PointCloud("top", Lidar("top", "color"), points)
+
+    assert point_colors(cloud, "intensity").tolist() == [[0, 0, 255], [255, 0, 0]]
+    assert tuple(point_colors(cloud)[0]) == color_of(3)
+
+
+def test_a_range_image_has_ahead_in_the_middle_and_left_on_the_left() -> None:
+    """Three panels of two rings; the nearer of two points in one pixel is shown."""
+    points = np.zeros(3, POINT)
+    points["position_m"] = [(2.0, -0.001, 0.0), (50.0, -0.025, 0.0), (0.0, 100.0, 0.0)]
+    points["ring"] = [0, 0, 1]
+    view = range_view(PointCloud("top", Lidar("top", "color"), points))
+
+    assert view.shape == (3 * 2 * ROW_PX, 960, 3)
+    assert view[0, 480].tolist() == [0, 0, 255]
+    assert view[ROW_PX, 240].tolist() == [255, 0, 0]
+    assert int(view[: 2 * ROW_PX].any(axis=-1).sum()) == 2 * ROW_PX

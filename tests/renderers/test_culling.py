@@ -45,7 +45,9 @@ def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
     """Vertices are projected by Intrinsics; most bodies are left out all the same."""
     scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
     stock = AssetStock(FakeLibrary(MESHES), open_device("cpu"))
-    kept = set(bodies_within(pack_world(scene, camera, stock).placed, pack_view(camera), margin))
+    kept = set(
+        bodies_within(pack_world(scene, camera, stock).placed, pack_view(camera, stock), margin)
+    )
     size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
     needed = set()
     for number, body in enumerate(scene.bodies):
@@ -78,7 +80,7 @@ def test_whatever_is_drawn_was_projected() -> None:
     apart = 0
     for target in ((1.0, 0.2, 0.1), (-1.0, 0.4, -0.3), (0.2, 1.0, 0.5)):
         camera = camera_at((0.0, 0.0, 0.0), target)
-        world, view = pack_world(scene, camera, stock), pack_view(camera)
+        world, view = pack_world(scene, camera, stock), pack_view(camera, stock)
         projected = project(world, view, stock)
         narrow = bodies_within(world.placed, view, 0.0)
         apart += len(np.setdiff1d(narrow, projected.reached))

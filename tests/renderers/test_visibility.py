@@ -21,7 +21,7 @@ from tests.renderers.fake_library import (
     sphere_mesh,
 )
 
-LABELS = frozenset(Channel) - {Channel.RGB, Channel.AMODAL}
+LABELS = frozenset(Channel) - {Channel.RGB, Channel.RADIANCE, Channel.AMODAL}
 MESHES = {
     "box": box_mesh(),
     "plane": plane_mesh(100.0),

@@ -16,8 +16,16 @@ from generator.core.errors import StorageError
 from generator.report.labels import Label, Picture, Points, records
 from generator.report.page import page
 from generator.report.published import DIFFICULTIES, TYPES
+from generator.report.scans import SCANS_MAX, scans
 from generator.report.survey import Survey, survey
-from generator.report.tables import Histogram, Table, counts_at, histograms, tables
+from generator.report.tables import (
+    Histogram,
+    Table,
+    counts_at,
+    histograms,
+    scan_tables,
+    tables,
+)
 
 
 def annotation(number: int, image_id: int, category_id: int, **keys: Any) -> dict[str, Any]:
@@ -238,3 +246,59 @@ def test_memory_grows_by_nine_numbers_per_object() -> None:
     found: Survey = survey(label for _ in range(1000))
 
     assert found.numbers[("mug", "Misc")].buffer_info()[1] == 9000
+
+
+def write_scan(folder: Path, name: str, rows: list[int], labels: str) -> None:
+    """A point per row, every other one with reflectance 0."""
+    points = np.zeros((len(rows), 4), "<f4")
+    points[1::2, 3] = 0.5
+    for part in ("velodyne", "velodyne_labels", "label_2"):
+        (folder / "training" / part).mkdir(parents=True, exist_ok=True)
+    points.tofile(folder / f"training/velodyne/{name}.bin")
+    (np.array(rows, "<u4") << 16).astype("<u4").tofile(
+        folder / f"training/velodyne_labels/{name}.label"
+    )
+    (folder / f"training/label_2/{name}.txt").write_text(labels, encoding="utf-8")
+
+
+CAR_ROWS = """\
+Car 0.00 0 0.00 1.00 1.00 9.00 9.00 1.50 1.60 4.00 3.00 1.70 4.00 0.00
+Pedestrian 0.00 0 0.00 1.00 1.00 9.00 9.00 1.50 1.60 4.00 3.00 1.70 14.00 0.00
+Car 0.00 1 0.00 1.00 1.00 9.00 9.00 1.50 1.60 4.00 3.00 1.70 14.00 0.00
+Car 0.00 0 0.00 1.00 1.00 9.00 9.00 1.50 1.60 4.00 12.00 1.70 16.00 0.00
+"""
+
+
+def test_points_on_cars_are_counted_by_distance(tmp_path: Path) -> None:
+    """Two cars in view, 5 m and 20 m away, with three points and none."""
+    write_scan(tmp_path / "kitti", "000000", [1, 1, 1, 2, 3, 0], CAR_ROWS)
+
+    (scan,) = scans(tmp_path)
+    whole, cars = scan_tables([scan])
+
+    assert (scan.points, scan.dark) == (6, 3)
+    assert scan.cars == ((5.0, 3), (20.0, 0))
+    assert whole.rows[0][1:4] == ("6", "120000", "104450")
+    assert whole.rows[0][-1] == "50.00 %"
+    assert [row[1] for row in cars.rows] == ["1", "0", "1", "0", "0", "0", "0", "0"]
+    assert cars.rows[0][2] == "3.0" and cars.rows[2][4] == "100.0 %"
+
+
+def test_of_many_scans_some_are_read(tmp_path: Path) -> None:
+    """Evenly chosen, from the first on; none of a data set without a scanner."""
+    assert list(scans(tmp_path)) == [] and scan_tables([]) == ()
+    for k in range(SCANS_MAX + 1):
+        write_scan(tmp_path, f"{k:06d}", [0] * (k + 1), "")
+
+    read = [scan.points for scan in scans(tmp_path)]
+
+    assert read == list(range(1, SCANS_MAX + 2, 2))
+
+
+def test_a_scan_whose_labels_do_not_fit_is_refused(tmp_path: Path) -> None:
+    """The message names the file."""
+    write_scan(tmp_path, "000007", [0, 0], "")
+    (tmp_path / "training/velodyne/000007.bin").write_bytes(b"1234")
+
+    with pytest.raises(StorageError, match=r"000007.label: not a scan"):
+        list(scans(tmp_path))

@@ -34,7 +34,7 @@ def _people(name: str, version: int, *tags: str) -> Family:
         parameters={"pose": "", "phase": -1.0},
         build=Lazy(f"{_PACKAGE}.families:{name}"),
         facts=Lazy(f"{_PACKAGE}.person:facts"),
-        # Making one is as quick as reading it.
+        # In other poses there are too many of them.
         stored=False,
         origin=_PACK if "pack" in tags else OURS,
     )

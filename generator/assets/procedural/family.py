@@ -66,7 +66,8 @@ class Family:
         parameters: ``{name: default}`` of a parametric family.
         build: Pure function of its arguments.
         facts: Pure and quick function of the same arguments; None = nothing more is known.
-        stored: Whether results are kept on disk; not if making one is quicker than reading it.
+        stored: Whether the disk also keeps results that are not offered for selection; not if
+            hardly any is asked for twice.
         origin: Where it comes from, if it is not all ours.
     """
 
@@ -107,7 +108,8 @@ class EnvironmentFamily:
     ``build(seed, **parameters)`` is a pure function.
 
     Attributes:
-        stored: Whether images are kept on disk; not if hardly any is asked for twice.
+        stored: Whether the disk also keeps images that are not offered for selection; not if
+            hardly any is asked for twice.
     """
 
     name: str

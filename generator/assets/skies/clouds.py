@@ -75,8 +75,8 @@ def _seen_from_below(
 ) -> tuple[Float32, Float32]:
     """Cover and brightness of the layer: thin rims shine, thick middles are dark below."""
     field = _heaps(rng)
-    ordered = np.sort(field, axis=None)
-    threshold = float(ordered[int((1.0 - min(cloudiness, 1.0)) * (ordered.size - 1))])
+    rank = int((1.0 - min(cloudiness, 1.0)) * (field.size - 1))
+    threshold = float(np.partition(field, rank, axis=None)[rank])
     depth = np.maximum(field - np.float32(threshold), np.float32(0.0))
     cover = smoothstep(0.0, 0.16, depth)
     # The way of the light through the layer, towards the sun: a lower one passes more cloud.
@@ -118,8 +118,9 @@ def _levels_of(up: Array, levels: int, rows: int) -> Array:
 def _halvings(layer: Float32) -> list[Float32]:
     levels = [layer]
     while levels[-1].shape[0] > 1:
-        n = levels[-1].shape[0] // 2
-        levels.append(levels[-1].reshape(n, 2, n, 2, -1).mean(axis=(1, 3), dtype=np.float32))
+        # Corner by corner: reducing over two short axes takes ten times as long.
+        a, b, c, d = (levels[-1][row::2, column::2] for row in (0, 1) for column in (0, 1))
+        levels.append((a + b + c + d) * np.float32(0.25))
     return levels
 
 
@@ -131,7 +132,9 @@ def _sampled(layer: Float32, place: Array) -> Array:
     part = position - first
     (x0, y0), (x1, y1) = (((first[..., 0] + s) % size, (first[..., 1] + s) % size) for s in (0, 1))
     fx, fy = part[..., 0, None], part[..., 1, None]
-    lower = layer[y0, x0] * (1.0 - fx) + layer[y0, x1] * fx
-    upper = layer[y1, x0] * (1.0 - fx) + layer[y1, x1] * fx
+    cells = layer.reshape(size * size, -1)
+    a, b, c, d = (cells.take(y * size + x, axis=0) for y in (y0, y1) for x in (x0, x1))
+    lower = a * (1.0 - fx) + b * fx
+    upper = c * (1.0 - fx) + d * fx
     mixed: Array = lower * (1.0 - fy) + upper * fy
     return mixed

@@ -142,10 +142,14 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
     angle = np.arccos(np.clip(towards, -1.0, 1.0))
 
+    # Gradation is the same along a row, and all three formulas ask for the same cosines.
+    rows_up, cosine_squared = up[:, :1], np.cos(angle) ** 2
+
     def relative(coefficients: tuple[tuple[float, float], ...]) -> Array:
         c = [factor * turbidity + constant for factor, constant in coefficients]
-        at_zenith = _perez(np.ones(1), np.full(1, zenith_distance), c)
-        return _perez(up, angle, c) / at_zenith
+        zenith = np.full(1, zenith_distance)
+        at_zenith = _perez(np.ones(1), zenith, np.cos(zenith) ** 2, c)
+        return _perez(rows_up, angle, cosine_squared, c) / at_zenith
 
     powers = np.array([zenith_distance**3, zenith_distance**2, zenith_distance, 1.0])
     turbidities = np.array([turbidity**2, turbidity, 1.0])
@@ -156,7 +160,7 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     xyz = np.stack([x / y, np.ones_like(x), (1.0 - x - y) / y], axis=-1)
     rgb = np.maximum(np.einsum("hwc,kc->hwk", xyz, _RGB_OF_XYZ, optimize=False), 0.02)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
-    pale = np.exp(-up / 0.22)[..., None] * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
+    pale = np.exp(-rows_up / 0.22)[..., None] * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
     rgb += pale * (_HORIZON - rgb)
     rgb /= np.einsum("hwc,c->hw", rgb, _LUMINANCE, optimize=False)[..., None]
     sky_rgb: Array = rgb * luminance[..., None]
@@ -169,9 +173,9 @@ def overcast_sky(d: Array) -> Array:
     return graded
 
 
-def _perez(up: Array, angle: Array, c: list[float]) -> Array:
+def _perez(up: Array, angle: Array, cosine_squared: Array, c: list[float]) -> Array:
     gradation = 1.0 + c[0] * np.exp(c[1] / up)
-    luminance: Array = gradation * (1.0 + c[2] * np.exp(c[3] * angle) + c[4] * np.cos(angle) ** 2)
+    luminance: Array = gradation * (1.0 + c[2] * np.exp(c[3] * angle) + c[4] * cosine_squared)
     return luminance
 
 

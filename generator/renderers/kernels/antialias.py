@@ -15,12 +15,12 @@ from generator.renderers.kernels.records import (
     View,
     World,
     pixel_direction,
+    shows,
     to_mesh_point,
     to_mesh_vector,
 )
 from generator.renderers.kernels.shade import Images
 from generator.renderers.kernels.surface import facet_of
-from generator.renderers.kernels.tone import developed
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -204,16 +204,19 @@ def antialias(
     offsets: wp.array(dtype=wp.vec2),
     exposure: float,
     t_min: float,
-    curve: wp.array(dtype=wp.uint8),
-    rgb: wp.array(dtype=wp.uint8, ndim=2),
+    mixed: wp.array(dtype=wp.vec3),
 ):
-    """Replace the bytes of listed pixels by the mean over parts of the pixel.
+    """Radiance of listed pixels: the mean over parts of the pixel, in the order of the list.
 
     Args:
         offsets: At most eight sample positions within the pixel, [0, 1).
         t_min: z-depth from which surfaces are seen.
     """
-    i = pixels[wp.tid()]
+    row = wp.tid()
+    i = pixels[row]
+    mixed[row] = radiance[i]
+    if not shows(view, i):
+        return
     x = i % view.width
     y = i / view.width
     parts = Parts()
@@ -237,7 +240,4 @@ def antialias(
             total += exposed * w
             weights += w
     if weights > 0.0:
-        mean = total * (1.0 / weights)
-        rgb[i, 0] = developed(mean[0], curve)
-        rgb[i, 1] = developed(mean[1], curve)
-        rgb[i, 2] = developed(mean[2], curve)
+        mixed[row] = total * (1.0 / (weights * exposure))

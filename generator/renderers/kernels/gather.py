@@ -14,7 +14,14 @@ from generator.renderers.kernels.lattice import Cell, Lattice, agree, cell_at, c
 from generator.renderers.kernels.look import look_at_hit
 from generator.renderers.kernels.occlusion import surface_tolerance
 from generator.renderers.kernels.patch import Patch, patch_at
-from generator.renderers.kernels.records import View, World, pixel_direction, surface_index, unit
+from generator.renderers.kernels.records import (
+    View,
+    World,
+    pixel_direction,
+    pixel_width,
+    surface_index,
+    unit,
+)
 from generator.renderers.kernels.shade import Images, Light, gatherable
 from generator.renderers.kernels.sky import sky_image
 from generator.renderers.kernels.texturing import Sampler, sampler_of, texel_at
@@ -218,8 +225,8 @@ def gathered_radiance(
     if texture >= 0:
         v = unit(-d)
         n = images.normals[i]
-        z = images.z_m[i]
-        look = look_at_hit(view, world, surface, hit, images.weights[i], n, z, v)
+        width_m = pixel_width(view, i, images.z_m[i])
+        look = look_at_hit(world, surface, hit, images.weights[i], n, width_m, v)
         albedo = look.albedo
         if bumpy:
             if covered:
@@ -291,8 +298,9 @@ def light_patch(
     sampler = Sampler()
     tilt = Tilt()
     if texture >= 0:
-        z = images.z_m[lattice.pixel[q]]
-        sampler = quad_sampler(world, texture, quad, patch, z * view.pixel_rad)
+        i = lattice.pixel[q]
+        width_m = pixel_width(view, i, images.z_m[i])
+        sampler = quad_sampler(world, texture, quad, patch, width_m)
         if world.textures[texture].has_bumps != 0:
             tilt = quad_tilt(lattice, lights, q, quad)
     bumpy = tilt.before > 0.0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.ground import Coat, coat_at, porosity_of
+from generator.renderers.kernels.rays import unsheltered
 from generator.renderers.kernels.records import (
     World,
     corners_of,
@@ -15,6 +17,18 @@ from generator.renderers.kernels.records import (
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 PI = wp.constant(3.14159265)
+WATER_F0 = wp.constant(0.02)
+# Fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral albedo of
+# snow", 1980: 0.9 to 0.75 for grains of 0.1 to 1 mm).
+SNOW = wp.constant(0.85)
+# Wet markings keep a quarter of what their beads send back (EN 1436, classes R and RW).
+DROWNED = wp.constant(0.75)
+# Rays that leave a surface start this far from it.
+LIFT_M = wp.constant(2.0e-3)
+# Faces of glass on the way of a ray, and what is behind them.
+FACES_MAX = wp.constant(9)
+# Two faces of glass that are nearer to each other are one pane.
+PANE_M = wp.constant(0.05)
 
 
 @wp.struct
@@ -26,6 +40,8 @@ class Infrared:
         specular: Fresnel reflectance at normal incidence.
         alpha: Width of the specular lobe (GGX).
         retro: Reflectance of a retro-reflector, in units of a white matte surface seen square on.
+        mirror: Fresnel reflectance at normal incidence of what mirrors a beam; 0 = it does not.
+        clear: What it lets through one way, square on.
     """
 
     even: float
@@ -33,6 +49,8 @@ class Infrared:
     specular: float
     alpha: float
     retro: float
+    mirror: float
+    clear: float
 
 
 @wp.struct
@@ -45,6 +63,7 @@ class Scan:
         spread: Tangent of the angle between a beam's axis and the rays around it.
         subrays: 1 or 7.
         run: Rays per thread.
+        divergence_rad: Angle of a beam: what it lights on a surface.
     """
 
     R_world_lidar: wp.mat33
@@ -53,6 +72,42 @@ class Scan:
     spread: float
     subrays: int
     run: int
+    divergence_rad: float
+
+
+@wp.struct
+class Travel:
+    """What moves while beams leave one after the other.
+
+    Attributes:
+        keys: Poses that every mover has over the sweep; 0 = nothing moves, nothing else is read.
+        rows: Row of each body among the movers; -1 = it stands still.
+        B_mesh_lidar, eye_mesh: Directions and origin of the lidar frame in movers' mesh frames,
+            [mover, key].
+        phases: When each beam leaves, in keys.
+        origins_m: Where it begins in the lidar frame.
+    """
+
+    keys: int
+    rows: wp.array(dtype=int)
+    B_mesh_lidar: wp.array(dtype=wp.mat33, ndim=2)
+    eye_mesh: wp.array(dtype=wp.vec3, ndim=2)
+    phases: wp.array(dtype=float)
+    origins_m: wp.array(dtype=wp.vec3)
+
+
+@wp.struct
+class Ray:
+    """A ray in the lidar frame.
+
+    Attributes:
+        key, share: It leaves this share of a step after this key.
+    """
+
+    direction: wp.vec3
+    origin_m: wp.vec3
+    key: int
+    share: float
 
 
 @wp.func
@@ -104,14 +159,33 @@ class Nearest:
 
 
 @wp.func
-def nearer(world: World, b: int, ray: wp.vec3, hit: Nearest):
+def mover_frame(travel: Travel, m: int, ray: Ray):
+    """Directions of the lidar frame in the mesh frame of mover m when a ray leaves."""
+    before = travel.B_mesh_lidar[m, ray.key]
+    return before + (travel.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
+
+
+@wp.func
+def nearer(world: World, travel: Travel, b: int, ray: Ray, hit: Nearest, offset: bool):
     """The hit, or a nearer one on a body.
 
     From the scanner's own frame: what is far from the world's origin loses nothing.
     """
-    d = world.bodies[b].B_mesh_camera @ ray
+    d = world.bodies[b].B_mesh_camera @ ray.direction
+    o = world.bodies[b].eye_mesh
+    m = int(-1)
+    if travel.keys > 0:
+        m = travel.rows[b]
+    if m >= 0:
+        B = mover_frame(travel, m, ray)
+        before = travel.eye_mesh[m, ray.key]
+        o = before + (travel.eye_mesh[m, ray.key + 1] - before) * ray.share
+        o += B @ ray.origin_m
+        d = B @ ray.direction
+    elif offset:
+        o += world.bodies[b].B_mesh_camera @ ray.origin_m
     mesh = world.geometries[world.bodies[b].geometry].mesh
-    answer = wp.mesh_query_ray(mesh, world.bodies[b].eye_mesh, d, hit.range_m)
+    answer = wp.mesh_query_ray(mesh, o, d, hit.range_m)
     if answer.result:
         hit.range_m = answer.t
         hit.body = b
@@ -121,56 +195,241 @@ def nearer(world: World, b: int, ray: wp.vec3, hit: Nearest):
     return hit
 
 
+@wp.func
+def normal_of(scan: Scan, world: World, travel: Travel, ray: Ray, hit: Nearest):
+    """Interpolated unit normal of a hit, lidar frame."""
+    g = world.bodies[hit.body].geometry
+    corner = corners_of(world, g, hit.face)
+    n = normal_at(world, g, corner[0]) * hit.u
+    n += normal_at(world, g, corner[1]) * hit.v
+    n += normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
+    if travel.keys > 0:
+        m = travel.rows[hit.body]
+        if m >= 0:
+            return unit(wp.transpose(mover_frame(travel, m, ray)) @ n)
+    return wp.transpose(scan.R_world_lidar) @ (world.bodies[hit.body].R_world_mesh @ unit(n))
+
+
+@wp.func
+def ray_number(scan: Scan, travel: Travel, axes: wp.array(dtype=wp.vec3), i: int):
+    """Ray i of all."""
+    beam = i / scan.subrays
+    ray = Ray()
+    ray.direction = ray_of_beam(axes[beam], i % scan.subrays, scan.spread)
+    if travel.keys > 0:
+        ray.origin_m = travel.origins_m[beam]
+        ray.key = wp.min(int(travel.phases[beam]), travel.keys - 2)
+        ray.share = travel.phases[beam] - float(ray.key)
+    return ray
+
+
+@wp.func
+def first_hit(scan: Scan, world: World, travel: Travel, ray: Ray, likely: int, offset: bool):
+    """What a ray hits first; the ``likely`` body, if not -1, is tried first.
+
+    Args:
+        offset: Whether the ray may begin elsewhere than at the lidar frame's origin.
+    """
+    hit = Nearest()
+    hit.range_m = scan.reach_m
+    hit.body = -1
+    eye_m = scan.eye_m
+    if offset:
+        eye_m += scan.R_world_lidar @ ray.origin_m
+    if likely >= 0:
+        hit = nearer(world, travel, likely, ray, hit, offset)
+    candidates = wp.bvh_query_ray(world.tree, eye_m, scan.R_world_lidar @ ray.direction)
+    b = int(0)
+    while wp.bvh_query_next(candidates, b, hit.range_m):
+        if b != likely:
+            hit = nearer(world, travel, b, ray, hit, offset)
+    return hit
+
+
+@wp.func
+def fresnel(f0: float, cosine: float):
+    """Schlick, "An inexpensive BRDF model for physically-based rendering", 1994."""
+    grazing = 1.0 - cosine
+    squared = grazing * grazing
+    return f0 + (1.0 - f0) * squared * squared * grazing
+
+
+@wp.func
+def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_lidar: wp.vec3):
+    """What weather has laid where a ray ends."""
+    n = scan.R_world_lidar @ n_lidar
+    if wp.dot(n_lidar, ray.direction) > 0.0:
+        n = -n
+    p = scan.eye_m + scan.R_world_lidar @ (ray.origin_m + ray.direction * range_m)
+    exposed = float(1.0)
+    if n[2] > 0.1:
+        exposed = unsheltered(world, p + n * 0.02)
+    slant = wp.max(wp.abs(wp.dot(n_lidar, ray.direction)), 0.02)
+    return coat_at(world, surface, p, n, exposed, scan.divergence_rad * range_m / slant)
+
+
+@wp.func
+def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: float):
+    """A surface under water and snow.
+
+    Water darkens rough ground at every wavelength that it does not absorb (Lekner and Dorf, "Why
+    some things are darker when wet", 1988), and reflects away what comes aslant, on both ways:
+    wet roads vanish at a distance. Wojtanowski et al., "Comparison of 905 nm and 1550 nm
+    semiconductor laser rangefinders' performance deterioration due to adverse environmental
+    conditions", 2014, measured it.
+    """
+    porous = porosity_of(world, surface)
+    film = wp.max(coat.puddle, 0.5 * porous * coat.wet)
+    passes = 1.0 - film * fresnel(WATER_F0, cosine)
+    kept = coat.mixable[0] * passes * passes
+    bare = 1.0 - wp.min(coat.snow, 1.0)
+    below = Infrared()
+    below.even = light.even * kept * bare + SNOW * (1.0 - bare)
+    below.rim = light.rim * kept * bare
+    below.specular = light.specular * (1.0 - coat.puddle) * bare
+    below.alpha = light.alpha
+    below.retro = light.retro * (1.0 - DROWNED * porous * coat.wet) * bare
+    return below
+
+
 @wp.kernel
 def scan_beams(
     scan: Scan,
     world: World,
+    travel: Travel,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
     ranges_m: wp.array(dtype=float),
     reflectances: wp.array(dtype=float),
     cosines: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
+    puddles: wp.array(dtype=float),
 ):
     """First hit of every ray; ray k of beam i is at ``i * subrays + k``.
 
     Each thread takes ``run`` rays, one after the other: what the last one hit is tried first, and
-    mostly leaves nothing else to try. Hits are (body, material), (-1, -1) where there is nothing.
+    mostly leaves nothing else to try. Hits are (body, material), (-1, -1) where there is nothing;
+    puddles are shares of standing water, written only where weather has left something.
     """
     t = wp.tid()
     end = wp.min((t + 1) * scan.run, ranges_m.shape[0])
     last = int(-1)
     for i in range(t * scan.run, end):
-        ray = ray_of_beam(axes[i / scan.subrays], i % scan.subrays, scan.spread)
-        hit = Nearest()
-        hit.range_m = scan.reach_m
-        hit.body = -1
-        if last >= 0:
-            hit = nearer(world, last, ray, hit)
-        tried = last
-        candidates = wp.bvh_query_ray(world.tree, scan.eye_m, scan.R_world_lidar @ ray)
-        b = int(0)
-        while wp.bvh_query_next(candidates, b, hit.range_m):
-            if b != tried:
-                hit = nearer(world, b, ray, hit)
+        ray = ray_number(scan, travel, axes, i)
+        hit = first_hit(scan, world, travel, ray, last, travel.keys > 0)
         last = hit.body
         if hit.body < 0:
             hits[i] = wp.vec2i(-1, -1)
             ranges_m[i] = wp.inf
             reflectances[i] = 0.0
             cosines[i] = 0.0
+            if world.ground.covered != 0:
+                puddles[i] = 0.0
         else:
-            g = world.bodies[hit.body].geometry
-            corner = corners_of(world, g, hit.face)
-            n = normal_at(world, g, corner[0]) * hit.u
-            n += normal_at(world, g, corner[1]) * hit.v
-            n += normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
-            n_lidar = wp.transpose(scan.R_world_lidar) @ (
-                world.bodies[hit.body].R_world_mesh @ unit(n)
-            )
-            cosine = wp.min(wp.abs(wp.dot(n_lidar, ray)), 1.0)
+            n_lidar = normal_of(scan, world, travel, ray, hit)
+            cosine = wp.min(wp.abs(wp.dot(n_lidar, ray.direction)), 1.0)
             material = surface_index(world, wp.vec2i(hit.body, hit.face))
             hits[i] = wp.vec2i(hit.body, material)
             ranges_m[i] = hit.range_m
             cosines[i] = cosine
-            reflectances[i] = returned(lights[material], cosine)
+            if world.ground.covered == 0:
+                reflectances[i] = returned(lights[material], cosine)
+            else:
+                coat = coat_of(scan, world, ray, hit.range_m, material, n_lidar)
+                light = weathered(world, lights[material], coat, material, cosine)
+                reflectances[i] = returned(light, cosine)
+                puddles[i] = coat.puddle * (1.0 - wp.min(coat.snow, 1.0))
+
+
+@wp.kernel
+def look_through(
+    scan: Scan,
+    world: World,
+    travel: Travel,
+    lights: wp.array(dtype=Infrared),
+    axes: wp.array(dtype=wp.vec3),
+    picked: wp.array(dtype=int),
+    first_m: wp.array(dtype=float),
+    ranges_m: wp.array(dtype=float),
+    reflectances: wp.array(dtype=float),
+    hits: wp.array(dtype=wp.vec2i),
+):
+    """What picked rays, which have met a pane, meet behind it and behind any further pane."""
+    j = wp.tid()
+    hits[j] = wp.vec2i(-1, -1)
+    ray = ray_number(scan, travel, axes, picked[j])
+    begin_m = ray.origin_m
+    way_m = wp.max(first_m[picked[j]] - LIFT_M, 0.0)
+    passed = float(1.0)
+    for face in range(FACES_MAX):
+        if passed > 0.0:
+            ray.origin_m = begin_m + ray.direction * way_m
+            hit = first_hit(scan, world, travel, ray, -1, True)
+            if hit.body < 0:
+                passed = 0.0
+            else:
+                way_m += hit.range_m + LIFT_M
+                n = normal_of(scan, world, travel, ray, hit)
+                cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
+                material = surface_index(world, wp.vec2i(hit.body, hit.face))
+                if face > 0:
+                    # Each further pane is overwritten by what is behind it, if anything is.
+                    hits[j] = wp.vec2i(hit.body, material)
+                    ranges_m[j] = way_m - LIFT_M
+                    reflectances[j] = passed * returned(lights[material], cosine)
+                if lights[material].clear == 0.0:
+                    passed = 0.0
+                elif face == 0 or hit.range_m > PANE_M:
+                    kept = lights[material].clear * (1.0 - fresnel(lights[material].mirror, cosine))
+                    passed *= kept * kept
+
+
+@wp.kernel
+def look_in_mirrors(
+    scan: Scan,
+    world: World,
+    travel: Travel,
+    lights: wp.array(dtype=Infrared),
+    axes: wp.array(dtype=wp.vec3),
+    picked: wp.array(dtype=int),
+    first_m: wp.array(dtype=float),
+    first_hits: wp.array(dtype=wp.vec2i),
+    waters: wp.array(dtype=float),
+    ranges_m: wp.array(dtype=float),
+    reflectances: wp.array(dtype=float),
+    hits: wp.array(dtype=wp.vec2i),
+):
+    """What picked rays, which have met a mirror, meet after one reflection.
+
+    The light comes back the same way, so the mirror weakens it twice.
+
+    Args:
+        waters: Share of each picked ray's end that is a puddle; 0 = the material mirrors.
+    """
+    j = wp.tid()
+    i = picked[j]
+    hits[j] = wp.vec2i(-1, -1)
+    ray = ray_number(scan, travel, axes, i)
+    near = Nearest()
+    near.range_m = first_m[i] + LIFT_M
+    near.body = -1
+    near = nearer(world, travel, first_hits[i][0], ray, near, True)
+    if near.body < 0:
+        return
+    n = normal_of(scan, world, travel, ray, near)
+    facing = wp.dot(n, ray.direction)
+    cosine = wp.min(wp.abs(facing), 1.0)
+    mirrored = fresnel(lights[first_hits[i][1]].mirror, cosine)
+    if waters[j] > 0.0:
+        mirrored = waters[j] * fresnel(WATER_F0, cosine)
+    ray.origin_m = ray.origin_m + ray.direction * near.range_m
+    ray.direction = unit(ray.direction - n * (2.0 * facing))
+    ray.origin_m += ray.direction * LIFT_M - n * (wp.sign(facing) * LIFT_M)
+    hit = first_hit(scan, world, travel, ray, -1, True)
+    if hit.body >= 0:
+        n2 = normal_of(scan, world, travel, ray, hit)
+        material = surface_index(world, wp.vec2i(hit.body, hit.face))
+        hits[j] = wp.vec2i(hit.body, material)
+        ranges_m[j] = near.range_m + LIFT_M + hit.range_m
+        cosine = wp.min(wp.abs(wp.dot(n2, ray.direction)), 1.0)
+        reflectances[j] = mirrored * mirrored * returned(lights[material], cosine)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.records import (
-    View,
     World,
     corners_of,
     unit,
@@ -143,22 +142,24 @@ def plain_look(world: World, surface: int, normal: wp.vec3):
 
 @wp.func
 def look_at_hit(
-    view: View,
     world: World,
     surface: int,
     hit: wp.vec2i,
     weight: wp.vec2,
     normal: wp.vec3,
-    z_m: float,
+    width_m: float,
     v: wp.vec3,
 ):
-    """The material at a pixel, with its textures looked up; ``v`` points to the viewer."""
+    """The material at a pixel that is that wide there, with its textures looked up.
+
+    ``v`` points to the viewer.
+    """
     look = plain_look(world, surface, normal)
     texture = world.surfaces[surface].texture
     if texture >= 0:
         # Half-way between the short and the long axis of the footprint's ellipse.
         slant = wp.sqrt(wp.max(wp.dot(normal, v), 0.05))
-        footprint_m = z_m * view.pixel_rad / slant
+        footprint_m = width_m / slant
         scale_m = world.surfaces[surface].texture_scale_m
         if scale_m > 0.0:
             p_mesh = mesh_point(world, hit, weight)

@@ -10,6 +10,7 @@ from generator.renderers.kernels.records import (
     greater,
     lesser,
     pixel_direction,
+    shows,
     to_mesh_point,
     to_mesh_vector,
 )
@@ -50,7 +51,10 @@ def trace_pixels(view: View, world: World, t_min: float, hits: wp.array(dtype=wp
     x = float(i % view.width) + 0.5
     y = float(i / view.width) + 0.5
     d = view.R_world_camera @ pixel_direction(view, x, y)
-    hits[i] = nearest_hit(world, view.eye_m, d, t_min)
+    hit = wp.vec2i(-1, -1)
+    if shows(view, i):
+        hit = nearest_hit(world, view.eye_m, d, t_min)
+    hits[i] = hit
 
 
 @wp.struct

@@ -5,14 +5,24 @@ from __future__ import annotations
 import warp as wp
 
 NOTHING = wp.constant(-1)
+PINHOLE = wp.constant(0)
+BROWN_CONRADY = wp.constant(1)
+KANNALA_BRANDT = wp.constant(2)
+EQUIRECTANGULAR = wp.constant(3)
+
+Coefficients = wp.types.vector(length=8, dtype=wp.float32)
 
 
 @wp.struct
 class View:
-    """A pinhole camera; image coordinates have pixel centres at i + 0.5.
+    """A camera; image coordinates have pixel centres at i + 0.5.
 
     Attributes:
         inverse_fx, inverse_fy: Reciprocal focal lengths [1/px].
+        lens: PINHOLE, or one of the models of generator.core.lens.
+        coefficients: Of the lens.
+        directions: Unit, camera frame, through every pixel centre, and in the fourth place the
+            angle that the pixel covers, 0 where the lens shows nothing; empty for a pinhole.
         R_world_camera: Camera X right, Y down, Z forward.
         eye_m: Camera centre in the world.
         pixel_rad: Angle one pixel covers at the image centre.
@@ -26,6 +36,9 @@ class View:
     cy: float
     inverse_fx: float
     inverse_fy: float
+    lens: int
+    coefficients: Coefficients
+    directions: wp.array(dtype=wp.vec4)
     R_world_camera: wp.mat33
     eye_m: wp.vec3
     pixel_rad: float
@@ -185,8 +198,66 @@ class Ground:
 
 @wp.func
 def pixel_direction(view: View, x_px: float, y_px: float):
-    """Direction in the camera frame, with z = 1, so that a ray's parameter is its z-depth."""
-    return wp.vec3((x_px - view.cx) * view.inverse_fx, (y_px - view.cy) * view.inverse_fy, 1.0)
+    """Direction in the camera frame: before a pinhole with z = 1, else of length 1.
+
+    A ray's parameter, which images of depths hold, is its z-depth before a pinhole, else its range.
+    """
+    d = wp.vec3((x_px - view.cx) * view.inverse_fx, (y_px - view.cy) * view.inverse_fy, 1.0)
+    if view.lens != PINHOLE:
+        d = bent_direction(view, x_px, y_px)
+    return d
+
+
+@wp.func
+def bent_direction(view: View, x_px: float, y_px: float):
+    """Unit direction through a point of the image, from those through the centres around it."""
+    x = wp.clamp(int(x_px), 0, view.width - 1)
+    y = wp.clamp(int(y_px), 0, view.height - 1)
+    i = y * view.width + x
+    right = x_px - (float(x) + 0.5)
+    down = y_px - (float(y) + 0.5)
+    d = view.directions[i]
+    if right != 0.0 or down != 0.0:
+        across = bend_between(view, i, wp.max(x - 1, 0) - x, wp.min(x + 1, view.width - 1) - x, 1)
+        below = wp.min(y + 1, view.height - 1) - y
+        along = bend_between(view, i, wp.max(y - 1, 0) - y, below, view.width)
+        d += across * right + along * down
+        return unit(wp.vec3(d[0], d[1], d[2]))
+    return wp.vec3(d[0], d[1], d[2])
+
+
+@wp.func
+def bend_between(view: View, i: int, before: int, after: int, stride: int):
+    """Change of direction per pixel at pixel i, from neighbours that show something."""
+    first = before
+    last = after
+    if view.directions[i + first * stride][3] == 0.0:
+        first = 0
+    if view.directions[i + last * stride][3] == 0.0:
+        last = 0
+    change = wp.vec4(0.0)
+    if last > first:
+        change = view.directions[i + last * stride] - view.directions[i + first * stride]
+        change = change / float(last - first)
+    return change
+
+
+@wp.func
+def shows(view: View, i: int):
+    """Whether the lens shows anything at pixel i."""
+    seen = bool(True)
+    if view.lens != PINHOLE:
+        seen = view.directions[i][3] > 0.0
+    return seen
+
+
+@wp.func
+def pixel_width(view: View, i: int, depth_m: float):
+    """Width of pixel i at what it sees there [m]; depths as ``pixel_direction`` has them."""
+    width_m = depth_m * view.pixel_rad
+    if view.lens != PINHOLE:
+        width_m = depth_m * view.directions[i][3]
+    return width_m
 
 
 @wp.func

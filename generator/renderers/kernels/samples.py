@@ -23,7 +23,6 @@ from generator.renderers.kernels.raster import (
 )
 from generator.renderers.kernels.records import View, World, corners_of, lesser, vertex_at
 from generator.renderers.kernels.shade import Images
-from generator.renderers.kernels.tone import developed
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -292,10 +291,9 @@ def mix_samples(
     pixels: wp.array(dtype=int),
     hits: wp.array(dtype=wp.vec2i, ndim=2),
     exposure: float,
-    curve: wp.array(dtype=wp.uint8),
-    rgb: wp.array(dtype=wp.uint8, ndim=2),
+    mixed: wp.array(dtype=wp.vec3),
 ):
-    """Replace the bytes of listed pixels by the mean over their samples."""
+    """Radiance of listed pixels: the mean over their samples, in the order of the list."""
     row = wp.tid()
     i = pixels[row]
     x = i % view.width
@@ -314,8 +312,6 @@ def mix_samples(
             w = tone_weight(exposed)
             total += exposed * w
             weights += w
+    mixed[row] = radiance[i]
     if weights > 0.0:
-        mean = total * (1.0 / weights)
-        rgb[i, 0] = developed(mean[0], curve)
-        rgb[i, 1] = developed(mean[1], curve)
-        rgb[i, 2] = developed(mean[2], curve)
+        mixed[row] = total * (1.0 / (weights * exposure))

@@ -16,6 +16,7 @@ from generator.renderers.kernels.records import (
     View,
     World,
     pixel_direction,
+    pixel_width,
     surface_index,
     unit,
 )
@@ -147,7 +148,8 @@ def light_lattice(
     if world.surfaces[surface].texture >= 0:
         z = images.z_m[i]
         weight = images.weights[i]
-        look = look_at_hit(view, world, surface, images.hits[i], weight, lattice.normal[k], z, v)
+        width_m = pixel_width(view, i, z)
+        look = look_at_hit(world, surface, images.hits[i], weight, lattice.normal[k], width_m, v)
     if world.ground.covered != 0:
         size_m = footprint(view, p, lattice.normal[k], float(lattice.stride))
         coat = coat_at(world, surface, p, lattice.normal[k], world.ground.exposed[k], size_m)
@@ -178,7 +180,8 @@ def shade_points(
     v = unit(-d)
     z = images.z_m[i]
     surface = surface_index(world, hit)
-    look = look_at_hit(view, world, surface, hit, images.weights[i], images.normals[i], z, v)
+    width_m = pixel_width(view, i, z)
+    look = look_at_hit(world, surface, hit, images.weights[i], images.normals[i], width_m, v)
     p = view.eye_m + d * z
     if world.ground.covered != 0:
         n = images.normals[i]

@@ -113,35 +113,63 @@ def octahedral_direction(x: float, y: float):
 
 
 @wp.kernel
-def prefilter(
+def weigh_texels(
     directions: wp.array(dtype=wp.vec3),
-    radiance: wp.array(dtype=wp.vec3),
     solid_angles: wp.array(dtype=float),
     alpha: float,
     size: int,
-    smoothed: wp.array(dtype=wp.vec3, ndim=2),
+    shares: wp.array(dtype=float, ndim=2),
 ):
-    """Average an environment over the GGX lobe around each direction of an octahedral map.
+    """Shares that an environment's texels have in the GGX lobe around each of a map's directions.
 
     The lobe is that of a surface seen head-on, weighted by the cosine to the light as by Karis.
 
     Args:
-        directions, radiance, solid_angles: Of the environment's texels.
-        size: Texels along the map's edge, without its border.
+        directions, solid_angles: Of the environment's texels.
+        size: Texels along the octahedral map's edge, without its border.
+        shares: One row per texel of the map, one column per texel of the environment.
     """
-    row, column = wp.tid()
-    x = float(column) + 0.5
-    y = float(row) + 0.5
+    texel = wp.tid()
+    x = float(texel % size) + 0.5
+    y = float(texel / size) + 0.5
     n = octahedral_direction(x / float(size) * 2.0 - 1.0, y / float(size) * 2.0 - 1.0)
-    total = wp.vec3(0.0)
     weight = float(0.0)
     a2 = alpha * alpha
     for i in range(directions.shape[0]):
         c = wp.dot(n, directions[i])
+        share = float(0.0)
         if c > 0.0:
             # With the viewer along n, cos^2 of the half angle is (1 + c) / 2.
             q = 0.5 * (1.0 + c) * (a2 - 1.0) + 1.0
-            w = c / (q * q) * solid_angles[i]
-            total += radiance[i] * w
-            weight += w
-    smoothed[row, column] = total / weight
+            share = c / (q * q) * solid_angles[i]
+        shares[texel, i] = share
+        weight += share
+    for i in range(directions.shape[0]):
+        shares[texel, i] = shares[texel, i] / weight
+
+
+@wp.kernel
+def prefilter(
+    shares: wp.array(dtype=float, ndim=2),
+    radiance: wp.array(dtype=wp.vec3),
+    smoothed: wp.array(dtype=wp.vec3),
+):
+    """Average an environment over the lobe around each direction of an octahedral map.
+
+    Four texels of the map per thread: their sums do not wait for each other.
+    """
+    first = 4 * wp.tid()
+    a = wp.vec3(0.0)
+    b = wp.vec3(0.0)
+    c = wp.vec3(0.0)
+    d = wp.vec3(0.0)
+    for i in range(radiance.shape[0]):
+        light = radiance[i]
+        a += light * shares[first, i]
+        b += light * shares[first + 1, i]
+        c += light * shares[first + 2, i]
+        d += light * shares[first + 3, i]
+    smoothed[first] = a
+    smoothed[first + 1] = b
+    smoothed[first + 2] = c
+    smoothed[first + 3] = d

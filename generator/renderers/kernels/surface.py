@@ -5,6 +5,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.records import (
+    PINHOLE,
     View,
     World,
     corners_of,
@@ -93,12 +94,13 @@ def resolve(
     weights: wp.array(dtype=wp.vec2),
     normals: wp.array(dtype=wp.vec3),
 ):
-    """z-depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
+    """Depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
 
     Weights are stored as (u, v), with 2 added to u where the inside of the triangle is seen.
 
     Args:
         run: Pixels in a row per thread: neighbours on one triangle share its preparation.
+        z_m: Parameters of the pixels' rays: z-depths before a pinhole, else ranges.
     """
     y, segment = wp.tid()
     x = segment * run
@@ -125,6 +127,8 @@ def resolve(
                     u = wp.clamp(u, 0.0, 1.0)
                     v = wp.clamp(v, 0.0, 1.0 - u)
                     z = facet.z_m[0] * (1.0 - u - v) + facet.z_m[1] * u + facet.z_m[2] * v
+                    if view.lens != PINHOLE:
+                        z = range_of(world, hit, wp.vec2(u, v))
                 n = facet.n + facet.n_u * u + facet.n_v * v
                 side = wp.where(det < 0.0, -1.0, 1.0)
                 z_m[row + x] = z
@@ -154,6 +158,16 @@ def label_ranges(view: View, z_m: wp.array(dtype=float), ranges_m: wp.array(dtyp
     x = float(i % view.width) + 0.5
     y = float(i / view.width) + 0.5
     ranges_m[i] = z_m[i] * wp.length(pixel_direction(view, x, y))
+
+
+@wp.kernel
+def label_z_depths(view: View, ranges_m: wp.array(dtype=float), z_m: wp.array(dtype=float)):
+    """Distance along the optical axis; inf for what is not before the camera."""
+    i = wp.tid()
+    z = ranges_m[i] * view.directions[i][2]
+    if not z > 0.0:
+        z = wp.inf
+    z_m[i] = z
 
 
 @wp.kernel
@@ -194,6 +208,14 @@ def label_object_coordinates(
                 wp.clamp(q[0], 0.0, 1.0), wp.clamp(q[1], 0.0, 1.0), wp.clamp(q[2], 0.0, 1.0)
             )
     coordinates[i] = p
+
+
+@wp.func
+def range_of(world: World, hit: wp.vec2i, weight: wp.vec2):
+    """Distance from the camera's centre to a point of a (body, face)."""
+    b = hit[0]
+    m = mesh_point(world, hit, weight)
+    return wp.length(world.bodies[b].A_camera_mesh @ m + world.bodies[b].t_camera_mesh)
 
 
 @wp.func

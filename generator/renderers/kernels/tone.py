@@ -15,6 +15,15 @@ def developed(value: float, curve: wp.array(dtype=wp.uint8)):
 
 
 @wp.kernel
+def put_mixed(
+    pixels: wp.array(dtype=int), mixed: wp.array(dtype=wp.vec3), radiance: wp.array(dtype=wp.vec3)
+):
+    """Put the mixed radiance of listed pixels in its place."""
+    row = wp.tid()
+    radiance[pixels[row]] = mixed[row]
+
+
+@wp.kernel
 def develop(
     radiance: wp.array(dtype=wp.vec3),
     exposure: float,

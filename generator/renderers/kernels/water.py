@@ -17,6 +17,7 @@ from generator.renderers.kernels.ground import (
 )
 from generator.renderers.kernels.lattice import Lattice, cell_at, corner_of, ray_origin
 from generator.renderers.kernels.lighting import SUN, beam_from
+from generator.renderers.kernels.optics import pixel_of
 from generator.renderers.kernels.rays import unsheltered
 from generator.renderers.kernels.records import (
     View,
@@ -131,13 +132,10 @@ def mirrored_body(
     p = origin + d * t
     q = wp.transpose(view.R_world_camera) @ (p - view.eye_m)
     c = wp.vec3(-1.0)
-    if q[2] > 0.05:
-        x = int(q[0] / q[2] * view.fx + view.cx)
-        y = int(q[1] / q[2] * view.fy + view.cy)
-        if x >= 0 and x < view.width and y >= 0 and y < view.height:
-            j = y * view.width + x
-            if images.hits[j][0] == hit[0] and wp.abs(images.z_m[j] - q[2]) < 0.05 + 0.02 * q[2]:
-                c = radiance[j]
+    j, depth_m = pixel_of(view, q)
+    if j >= 0:
+        if images.hits[j][0] == hit[0] and wp.abs(images.z_m[j] - depth_m) < 0.05 + 0.02 * depth_m:
+            c = radiance[j]
     if c[0] < 0.0:
         surface = surface_index(world, hit)
         n = normal

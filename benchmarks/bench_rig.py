@@ -1,0 +1,31 @@
+"""Frames per second of whole rigs in traffic to disk: ``python -m benchmarks.bench_rig``.
+
+KITTI's rig: two cameras of 1242x375, an HDL-64E, an inertial unit and a satellite receiver, with
+COCO, KITTI, SemanticKITTI and tables on disk. nuScenes' rig: six cameras of 1600x900, an HDL-32E
+and five radars, with COCO, point clouds, bird's-eye maps and tables. All weathers.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from benchmarks.runs import described, machine, measured_run
+from generator.assemble.spec import load_spec
+
+
+def main() -> None:
+    """Print the table that the README records."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--n", type=int, default=80, help="frames; sequences have 20")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--rig", default="kitti_rig", help="name of a configuration")
+    arguments = parser.parse_args()
+
+    print(f"{machine()}, {arguments.workers} workers, {arguments.n} frames")
+    spec = load_spec(arguments.rig, seed=1)
+    summary = measured_run(spec, arguments.n, arguments.workers)
+    print(f"{spec.name}: {described(summary)}")
+
+
+if __name__ == "__main__":
+    main()

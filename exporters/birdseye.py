@@ -1,0 +1,195 @@
+"""What surrounds the ego, from above: layers as images, lanes and boxes as JSON.
+
+::
+
+    <layer>/000000012.png    8-bit grey, 255 where the layer is: drivable, parking, crosswalk,
+                             sidewalk, lane_divider, road_divider, vehicles, people, free_space
+    frames.jsonl             one line per sample
+    lanes/<camera>.jsonl     one line per image, in TuSimple's form
+
+The ego is in the middle of every image and looks up: the centre of pixel (row r, column c) of n x n
+is at ``x = (n / 2 - r - 0.5) px_m`` ahead and ``y = (n / 2 - c - 0.5) px_m`` to the left, in the
+frame ``T_world_map``, which is level and has its origin at the ego's rig.
+
+A line of ``frames.jsonl``: ``index``, ``scene``, ``view``, ``step``, ``time_s``, ``split``;
+``px_m``, ``size_px``, ``T_world_map``; ``ego``: ``T_world_ego`` and, world axes, its
+``velocity_m_s``, ``acceleration_m_s2``, ``angular_velocity_rad_s``; ``borders``: of lanes near the
+map, each with ``name``, ``kind`` (``lane``, ``road``, ``edge``) and ``points_m`` in the map's
+frame; ``boxes3d``: by frame, ``ego`` and each laser scanner's, ``instance_id``, ``category``,
+``center_m``, full ``size_m`` and ``quaternion_wxyz``. Track ids are instance ids, and hold for a
+scene.
+
+A line of ``lanes/<camera>.jsonl``: ``raw_file``, ``h_samples`` (image rows) and ``lanes``: per line
+the columns at those rows, -2 where there is none, as TuSimple's benchmark has it (pixel centres are
+whole numbers there: ours less 0.5); and ``borders``, the points as they are, with ``visible``.
+
+References: the map expansion of nuScenes (Caesar et al., CVPR 2020); Philion and Fidler, "Lift,
+Splat, Shoot", ECCV 2020; TuSimple lane detection benchmark, 2017.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from exporters.images import link_or_copy
+from exporters.png import RowFilter, encode_png
+from generator.config.strict import Strict
+from generator.core.capture import Channel
+from generator.core.interfaces import DatasetInfo
+from generator.core.lanes import LaneBorder
+from generator.core.motion import Twist
+from generator.core.sample import BirdseyeMap, BorderTruth, FrameTruth, Sample
+from generator.core.serial import canonical_json
+
+FRAMES, LANES = "frames.jsonl", "lanes"
+ROWS_PX = 10
+"""Between the image rows at which TuSimple lists columns."""
+ABSENT = -2
+MARGIN = 1.2
+"""Borders are listed as far as this many times the map's reach."""
+DECIMALS = 4
+
+
+class Birdseye(Strict):
+    """Bird's-eye layers, lanes and boxes around the ego, for map and BEV perception."""
+
+    type: Literal["birdseye"] = "birdseye"
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it reads."""
+        return frozenset({"bev_map", "boxes3d", "lanes"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Every data set has what it takes; a scene without a rig is refused by ``bev_map``."""
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write the layers of each sample, and a line about it and each of its images."""
+        folder = shard_dir / self.type
+        frames: list[str] = []
+        images: dict[str, list[str]] = {sensor: [] for sensor in info.sensors}
+        for sample in samples:
+            truth = sample.frame
+            assert truth is not None, "bev_map is in `needs`"
+            assert truth.birdseye is not None, "bev_map is in `needs`"
+            for name, mask in truth.birdseye.layers.items():
+                path = folder / "layers" / name / f"{sample.index:09d}.png"
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(encode_png(mask * np.uint8(255), RowFilter.UP, 2))
+            frames.append(canonical_json(_frame(sample, truth, truth.birdseye)) + "\n")
+            for sensor in (s for s in info.sensors if s in sample.truth):
+                images[sensor].append(canonical_json(_image(sample, sensor)) + "\n")
+        _write_lines(folder / FRAMES, frames)
+        for sensor, lines in images.items():
+            _write_lines(folder / LANES / f"{sensor}.jsonl", lines)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link the layers of all shards, given in index order, and join their lines."""
+        folders = [shard_dir / self.type for shard_dir in shard_dirs]
+        for folder in folders:
+            for layer in sorted((folder / "layers").iterdir()):
+                for path in sorted(layer.iterdir()):
+                    link_or_copy(path, dataset_dir / layer.name / path.name)
+        for name in (FRAMES, *(f"{LANES}/{sensor}.jsonl" for sensor in info.sensors)):
+            _write_lines(dataset_dir / name, ((f / name).read_text("utf-8") for f in folders))
+
+
+def _frame(sample: Sample, truth: FrameTruth, birdseye: BirdseyeMap) -> dict[str, Any]:
+    size_px = len(next(iter(birdseye.layers.values())))
+    return {
+        "index": sample.index,
+        "scene": sample.scene_index,
+        "view": sample.view_index,
+        "step": sample.step_index,
+        "time_s": sample.scene.time_s,
+        "split": sample.split,
+        "px_m": birdseye.px_m,
+        "size_px": size_px,
+        "T_world_map": birdseye.T_world_map.matrix().tolist(),
+        "ego": {
+            "T_world_ego": truth.T_world_ego.matrix().tolist(),
+            **{f.name: getattr(truth.twist, f.name) for f in fields(Twist)},
+        },
+        "borders": list(_borders(truth.borders or (), birdseye, 0.5 * size_px * birdseye.px_m)),
+        "boxes3d": _boxes(sample, truth),
+    }
+
+
+def _borders(
+    borders: Iterable[LaneBorder], birdseye: BirdseyeMap, reach_m: float
+) -> Iterator[dict[str, Any]]:
+    """The stretches of borders that are on the map or near it, in its frame."""
+    T_map_world = birdseye.T_world_map.inverse()
+    for border in borders:
+        line = T_map_world.apply(np.asarray(border.points_m))
+        near = (np.abs(line[:, :2]) < MARGIN * reach_m).all(axis=1)
+        edges = np.flatnonzero(np.diff(near, prepend=False, append=False))
+        for start, end in zip(edges[::2], edges[1::2], strict=True):
+            points = (np.round(line[start:end], DECIMALS) + 0.0).tolist()
+            yield {"name": border.name, "kind": border.kind, "points_m": points}
+
+
+def _boxes(sample: Sample, truth: FrameTruth) -> dict[str, list[dict[str, Any]]]:
+    categories = {i.instance_id: i.category for i in sample.scene.instances}
+    return {
+        frame: [
+            {
+                "instance_id": number,
+                "category": categories[number],
+                "center_m": [round(v, DECIMALS) + 0.0 for v in box.T_frame_box.translation_m],
+                "size_m": box.size_m,
+                "quaternion_wxyz": [round(v, 8) + 0.0 for v in box.T_frame_box.quaternion_wxyz],
+            }
+            for number, box in boxes.items()
+        ]
+        for frame, boxes in (truth.boxes3d or {}).items()
+    }
+
+
+def _image(sample: Sample, sensor: str) -> dict[str, Any]:
+    truth = sample.truth[sensor]
+    rows = list(range(0, truth.camera.intrinsics.height_px, ROWS_PX))
+    borders = truth.borders or ()
+    return {
+        "index": sample.index,
+        "raw_file": f"{sensor}/{Channel.RGB.value}/{sample.index:09d}.png",
+        "h_samples": rows,
+        "lanes": [columns_at(border, rows) for border in borders],
+        "borders": [
+            {
+                "name": border.border,
+                "kind": border.kind,
+                "points_px": border.points_px,
+                "visible": [int(seen) for seen in border.visible],
+            }
+            for border in borders
+        ],
+    }
+
+
+def columns_at(border: BorderTruth, rows: Sequence[int]) -> list[float]:
+    """Columns at which a line crosses image rows, pixel centres at whole numbers; -2 = nowhere.
+
+    A line that crosses a row more than once is listed where it does so nearest to its start.
+    """
+    u, v = (np.array([point[k] for point in border.points_px]) - 0.5 for k in (0, 1))
+    columns: list[float] = []
+    for row in rows:
+        crossing = np.flatnonzero((v[:-1] - row) * (v[1:] - row) <= 0.0)
+        if len(crossing) == 0:
+            columns.append(ABSENT)
+            continue
+        k = crossing[0]
+        share = (row - v[k]) / (v[k + 1] - v[k]) if v[k + 1] != v[k] else 0.0
+        columns.append(round(float(u[k] + share * (u[k + 1] - u[k])), 2) + 0.0)
+    return columns
+
+
+def _write_lines(path: Path, lines: Iterable[str]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("".join(lines), encoding="utf-8", newline="\n")

@@ -1,0 +1,335 @@
+"""KITTI raw data, synchronised and rectified: one drive per sequence.
+
+::
+
+    2011_09_26/calib_cam_to_cam.txt  calib_velo_to_cam.txt  calib_imu_to_velo.txt
+    2011_09_26/2011_09_26_drive_0003_sync/
+      image_02/data/0000000012.png          image_02/timestamps.txt     (03, and grey 00 and 01)
+      velodyne_points/data/0000000012.bin   velodyne_points/timestamps{,_start,_end}.txt
+      oxts/data/0000000012.txt              oxts/timestamps.txt, dataformat.txt
+      tracklet_labels.xml                   3D boxes of what image_02 sees
+    drives.txt                              drive, split, first sample
+
+* A frame is an instant at which camera 02 reads; files of sensors that do not read then are absent,
+  and line ``k`` of a ``timestamps.txt`` is the time of the ``k``-th file of its folder.
+* A date has one calibration. Where scenes differ in it (an extrinsic randomizer), each further one
+  becomes the next date.
+* Cameras of a drive look the same way: the images are rectified. Reference is camera 00, or 02
+  where the data set has no grey one; a camera that is not there has the matrices of the reference.
+* Points, boxes and ``oxts`` are exact; each drive begins at noon. ``exporters.oxts`` and
+  ``exporters.tracklets`` describe their files.
+
+Reference: Geiger et al., "Vision meets Robotics: The KITTI Dataset", IJRR 2013.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from exporters.clouds import read_points, xyzi_bytes
+from exporters.images import link_or_copy
+from exporters.oxts import COLUMNS, motion_of, navigation_mount, oxts_row
+from exporters.png import RowFilter, encode_png
+from exporters.sensors import instant_s, laser_scanner, pinhole_camera, rgb_cameras, scanned
+from exporters.sequences import (
+    Frame,
+    Mount,
+    between,
+    camera_mount,
+    check_sequence_count,
+    frame_facts,
+    lidar_mount,
+    matrix_numbers,
+    read_sequences,
+    timestamp,
+    write_bytes,
+    write_frames,
+    write_text,
+)
+from exporters.tracklets import frame_boxes, tracklets_text
+from generator.config.strict import Strict
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.interfaces import DatasetInfo, media_path
+from generator.core.intrinsics import Intrinsics
+from generator.core.sample import Sample
+from generator.core.scene import Scene
+from generator.core.se3 import SE3, Array, Vec3
+
+DRIVES_MAX = 10_000
+"""Drive numbers have four digits."""
+NOON_H = 12
+CALIB_TIME = "calib_time: 01-Jan-2000 00:00:00\n"
+"""Readers skip it, but expect it."""
+GREY = ("00", "01")
+DATE_FORMAT = "%Y_%m_%d"
+Latitude = Annotated[float, Field(gt=-85, lt=85)]
+Longitude = Annotated[float, Field(ge=-180, le=180)]
+PARALLEL_RAD = 1e-4
+"""Rectified cameras differ in direction by less than this."""
+
+
+def _a_day(text: str) -> str:
+    try:
+        day = datetime.strptime(text, DATE_FORMAT)
+    except ValueError as error:
+        raise ValueError("expected a date such as 2011_09_26") from error
+    if day.strftime(DATE_FORMAT) != text:
+        raise ValueError("expected a date with all its digits, such as 2011_09_26")
+    return text
+
+
+class KittiRaw(Strict):
+    """KITTI raw data: cameras, laser scanner, navigation and tracklets of every sequence."""
+
+    type: Literal["kitti_raw"] = "kitti_raw"
+    date: Annotated[str, AfterValidator(_a_day)] = "2011_09_26"
+    """Day of the recordings, as year_month_day."""
+    image_02: str = ""
+    """Sensor that is the left colour camera; empty = the one of that name, else the first one."""
+    image_03: str = ""
+    """The right colour camera; empty = the one of that name, if there is one."""
+    image_00: str = ""
+    """The left grey camera, made grey from its colours; empty = the one of that name, if any."""
+    image_01: str = ""
+    """The right grey camera; empty = the one of that name, if any."""
+    lidar: str = ""
+    """The laser scanner; empty = the first one by name."""
+    oxts: str = ""
+    """Device whose place the navigation rows are of; empty = the rig itself."""
+    origin_deg: tuple[Latitude, Longitude] = (49.01, 8.43)
+    """Latitude and longitude of the world's origin."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it reads."""
+        return frozenset({"visibility"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set that this format cannot hold.
+
+        Raises:
+            ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
+                sequences.
+        """
+        self._cameras(info)
+        if not laser_scanner(info, self.lidar, self.type):
+            raise ConfigError(
+                f"exporter '{self.type}': there is no lidar; add a sensor of that type"
+            )
+        if self.oxts and self.oxts not in info.devices:
+            known = ", ".join(info.devices) or "none"
+            raise ConfigError(
+                f"exporter '{self.type}': there is no device '{self.oxts}' for oxts; "
+                f"expected one of: {known}"
+            )
+        check_sequence_count(info, DRIVES_MAX, self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write points and grey images of each frame, and a line about it.
+
+        Raises:
+            ConfigError: see ``check``, or cameras that are not parallel.
+        """
+        self.check(info)
+        cameras = self._cameras(info)
+        rows = []
+        for sample in samples:
+            if cameras["02"] in sample.truth:
+                rows.append(self._row(info, sample, shard_dir))
+                self._write_grey(cameras, sample, shard_dir)
+        write_frames(shard_dir / self.type, rows)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Lay out one drive per sequence; every distinct calibration has its date."""
+        dates: dict[str, str] = {}
+        drives = []
+        for number, frames in read_sequences(shard_dirs, self.type).items():
+            calibration = frames[0].row["calibration"]
+            key = "".join(calibration[name] for name in sorted(calibration))
+            day = datetime.strptime(self.date, DATE_FORMAT) + timedelta(days=len(dates))
+            date = dates.setdefault(key, day.strftime(DATE_FORMAT))
+            for name, text in calibration.items():
+                write_text(dataset_dir / date / name, text)
+            drive = f"{date}/{date}_drive_{number:04d}_sync"
+            self._write_drive(info, frames, dataset_dir / drive, date)
+            drives.append(f"{drive} {frames[0].row['split']} {frames[0].index}\n")
+        write_text(dataset_dir / "drives.txt", "".join(drives))
+
+    def _cameras(self, info: DatasetInfo) -> dict[str, str]:
+        """Sensors by KITTI's number, as far as they are there."""
+        known = rgb_cameras(info)
+        asked = {
+            number: getattr(self, f"image_{number}") or _own(known, f"image_{number}")
+            for number in ("00", "01", "02", "03")
+        }
+        first = pinhole_camera(info, asked["02"], self.type)
+        rest = {
+            number: pinhole_camera(info, name, self.type)
+            for number, name in asked.items()
+            if name and number != "02"
+        }
+        return {"02": first, **rest}
+
+    def _row(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> dict[str, Any]:
+        cameras, lidar = self._cameras(info), laser_scanner(info, self.lidar, self.type)
+        carrier = camera_mount(sample.scene, cameras["02"]).rig
+        unit = navigation_mount(sample.scene, self.oxts, carrier, self.type)
+        row = frame_facts(info, sample) | {
+            "time_s": sample.scene.time_s,
+            "cameras": {
+                number: instant_s(sample, name)
+                for number, name in cameras.items()
+                if name in sample.truth
+            },
+            "scan": None,
+            "oxts": oxts_row(motion_of(sample.scene, unit), self.origin_deg),
+            "boxes": frame_boxes(sample, cameras["02"], lidar),
+            "calibration": calibration_texts(sample, cameras, lidar, unit),
+        }
+        if scanned(shard_dir, lidar, sample.index):
+            points = read_points(shard_dir, lidar, sample.index)
+            path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
+            write_bytes(path, xyzi_bytes(points))
+            row["scan"] = sweep_times_s(points, instant_s(sample, lidar))
+        return row
+
+    def _write_grey(self, cameras: Mapping[str, str], sample: Sample, shard_dir: Path) -> None:
+        for number in GREY:
+            name = cameras.get(number, "")
+            if name in sample.truth:
+                image = cv2.imread(str(media_path(shard_dir, name, Channel.RGB, sample.index)))
+                path = shard_dir / self.type / f"image_{number}/{sample.index:09d}.png"
+                assert image is not None, "images are written before labels"
+                write_bytes(path, encode_png(luma(image[..., ::-1]), RowFilter.SUB, 1))
+
+    def _write_drive(
+        self, info: DatasetInfo, frames: Sequence[Frame], folder: Path, date: str
+    ) -> None:
+        noon = datetime.strptime(date, DATE_FORMAT) + timedelta(hours=NOON_H)
+
+        def times(name: str, instants_s: Iterable[float]) -> None:
+            lines = (timestamp(noon, time_s) + "\n" for time_s in instants_s)
+            write_text(folder / name, "".join(lines))
+
+        for number, camera in self._cameras(info).items():
+            times(f"image_{number}/timestamps.txt", _instants(frames, number))
+            for k, frame in enumerate(frames):
+                if number in frame.row["cameras"]:
+                    target = folder / f"image_{number}/data/{k:010d}.png"
+                    link_or_copy(self._image(frame, number, camera), target)
+        scans = [frame.row["scan"] for frame in frames if frame.row["scan"]]
+        for i, name in enumerate(("timestamps_start.txt", "timestamps.txt", "timestamps_end.txt")):
+            times(f"velodyne_points/{name}", (scan[i] for scan in scans))
+        times("oxts/timestamps.txt", (frame.row["time_s"] for frame in frames))
+        write_text(folder / "oxts/dataformat.txt", COLUMNS)
+        for k, frame in enumerate(frames):
+            write_text(folder / f"oxts/data/{k:010d}.txt", frame.row["oxts"] + "\n")
+            if frame.row["scan"]:
+                source = frame.shard_dir / self.type / f"velodyne/{frame.index:09d}.bin"
+                link_or_copy(source, folder / f"velodyne_points/data/{k:010d}.bin")
+        boxes = tracklets_text([frame.row["boxes"] for frame in frames])
+        write_text(folder / "tracklet_labels.xml", boxes)
+
+    def _image(self, frame: Frame, number: str, camera: str) -> Path:
+        if number in GREY:
+            return frame.shard_dir / self.type / f"image_{number}/{frame.index:09d}.png"
+        return media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
+
+
+def calibration_texts(
+    sample: Sample, cameras: Mapping[str, str], lidar: str, unit: Mount
+) -> dict[str, str]:
+    """The three files of a date, by name."""
+    scene = sample.scene
+    reference = camera_mount(scene, cameras.get("00", cameras["02"]))
+    scanner = lidar_mount(scene, lidar)
+    return {
+        "calib_cam_to_cam.txt": _cameras_text(scene, cameras, reference),
+        "calib_velo_to_cam.txt": _rigid_text(between(scene, reference, scanner))
+        + "delta_f: 0.000000e+00 0.000000e+00\ndelta_c: 0.000000e+00 0.000000e+00\n",
+        "calib_imu_to_velo.txt": _rigid_text(between(scene, scanner, unit)),
+    }
+
+
+def sweep_times_s(points: NDArray[np.void], time_s: float) -> list[float]:
+    """Start, reference and end of a sweep.
+
+    A sweep that takes no time begins and ends when it is.
+    """
+    last_s = float(points["time_s"].max(initial=0.0))
+    return [round(v, 9) for v in (time_s - 0.5 * last_s, time_s, time_s + 0.5 * last_s)]
+
+
+def luma(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Grey of an RGB image: the weights of Rec. ITU-R BT.601, in 65536ths."""
+    weighted = image.astype(np.uint32) @ np.array([19_595, 38_470, 7_471], np.uint32)
+    grey: NDArray[np.uint8] = ((weighted + 32_768) >> 16).astype(np.uint8)
+    return grey
+
+
+def projection(camera: Intrinsics, shift_m: Vec3) -> Array:
+    """``P``, [3, 4], of a camera; pixel centres at whole numbers.
+
+    Args:
+        camera: Its intrinsics.
+        shift_m: Where the reference camera is, in the camera's frame.
+    """
+    K = camera.matrix()
+    K[:2, 2] -= 0.5
+    # einsum keeps one order of summation; BLAS may not.
+    return np.column_stack([K, np.einsum("ij,j->i", K, np.array(shift_m), optimize=False)])
+
+
+def _cameras_text(scene: Scene, cameras: Mapping[str, str], reference: Mount) -> str:
+    text = CALIB_TIME + "corner_dist: 0.000000e+00\n"
+    for number in ("00", "01", "02", "03"):
+        name = cameras.get(number, cameras.get("00", cameras["02"]))
+        pose = between(scene, camera_mount(scene, name), reference)
+        if 2.0 * float(np.linalg.norm(pose.quaternion_wxyz[1:])) > PARALLEL_RAD:
+            raise ConfigError(
+                f"exporter 'kitti_raw': camera '{name}' is not parallel to the reference camera, "
+                "but KITTI's images are rectified; give both the same yaw, pitch and roll"
+            )
+        text += _camera_text(number, scene.camera(name).intrinsics, pose)
+    return text
+
+
+def _camera_text(number: str, camera: Intrinsics, T_camera_reference: SE3) -> str:
+    shift_m = T_camera_reference.translation_m
+    P = projection(camera, shift_m)
+    size_px = np.array([camera.width_px, camera.height_px], float)
+    lines: dict[str, Array] = {
+        "S": size_px,
+        "K": P[:, :3],
+        "D": np.zeros(5),
+        "R": np.eye(3),
+        "T": np.array(shift_m),
+        "S_rect": size_px,
+        "R_rect": np.eye(3),
+        "P_rect": P,
+    }
+    return "".join(f"{name}_{number}: {matrix_numbers(values)}\n" for name, values in lines.items())
+
+
+def _rigid_text(pose: SE3) -> str:
+    rotation = matrix_numbers(pose.rotation())
+    translation = matrix_numbers(np.array(pose.translation_m))
+    return f"{CALIB_TIME}R: {rotation}\nT: {translation}\n"
+
+
+def _instants(frames: Sequence[Frame], number: str) -> list[float]:
+    times = (frame.row["cameras"].get(number) for frame in frames)
+    return [time_s for time_s in times if time_s is not None]
+
+
+def _own(known: Sequence[str], name: str) -> str:
+    return name if name in known else ""

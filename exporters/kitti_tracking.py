@@ -1,0 +1,202 @@
+"""KITTI tracking: one sequence per view, labels with an identity that lasts.
+
+::
+
+    training/image_02/0003/000012.png    training/label_02/0003.txt
+    training/image_03/0003/000012.png    training/calib/0003.txt
+    training/velodyne/0003/000012.bin    training/oxts/0003.txt
+    training/evaluate_tracking.seqmap.training   all sequences, with their number of frames
+    training/evaluate_tracking.seqmap.train      those of one split: also val, test
+
+A frame is an instant at which camera 02 reads, numbered without gaps. Labels have 17 columns, one
+blank apart: ``frame track_id type truncated occluded alpha left top right bottom h w l x y z
+rotation_y``. They are those of the exporter ``kitti``, but ``track_id`` is the instance id (-1 for
+DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as KITTI's evaluators
+spell it.
+
+Reference: Geiger et al., "Are we ready for Autonomous Driving?", CVPR 2012, and the readme of the
+tracking development kit; TrackEval reads the folder ``training`` as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from exporters.clouds import read_points, xyzi_bytes
+from exporters.images import link_or_copy
+from exporters.kitti import label_rows
+from exporters.kitti_raw import Latitude, Longitude, projection
+from exporters.oxts import motion_of, navigation_mount, oxts_row
+from exporters.sensors import laser_scanner, pinhole_camera, scanned
+from exporters.sequences import (
+    Frame,
+    Mount,
+    between,
+    camera_mount,
+    check_sequence_count,
+    frame_facts,
+    lidar_mount,
+    matrix_numbers,
+    read_sequences,
+    write_bytes,
+    write_frames,
+    write_text,
+)
+from generator.config.strict import Strict
+from generator.core.capture import Channel
+from generator.core.interfaces import DatasetInfo, media_path
+from generator.core.sample import ObjectTruth, Sample
+from generator.core.scene import Scene
+
+SEQUENCES_MAX = 10_000
+"""Names of sequences have four digits."""
+SLIGHTLY_TRUNCATED, LARGELY_TRUNCATED = 0.15, 0.5
+"""Shares outside the image above which ``truncated`` is 1 and 2: KITTI's easy and hard limits."""
+
+
+class KittiTracking(Strict):
+    """KITTI tracking: images, labels, scans and navigation of every sequence."""
+
+    type: Literal["kitti_tracking"] = "kitti_tracking"
+    camera: str = ""
+    """Sensor that becomes camera 02; empty = the first one, by name, with the rgb channel."""
+    right_camera: str = ""
+    """Sensor that becomes camera 03; empty = none."""
+    lidar: str = ""
+    """The laser scanner; empty = the first one by name, if there is one."""
+    oxts: str = ""
+    """Device whose place the navigation rows are of; empty = the rig itself."""
+    origin_deg: tuple[Latitude, Longitude] = (49.01, 8.43)
+    """Latitude and longitude of the world's origin."""
+    types: Literal["official", "category"] = "official"
+    """KITTI's own types, or category names as they are (blanks become underscores)."""
+    boxes: Literal["projected", "tight"] = "projected"
+    """Image boxes: around the projected 3D box, or around the visible pixels."""
+    far_m: float = Field(80.0, gt=0)
+    """What is farther than this along the optical axis becomes DontCare."""
+    low_px: int = Field(10, ge=2)
+    """What has fewer visible pixel rows than this becomes DontCare."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it reads."""
+        return frozenset({"boxes3d", "visibility"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set that this format cannot hold.
+
+        Raises:
+            ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
+                sequences.
+        """
+        self._cameras(info)
+        laser_scanner(info, self.lidar, self.type)
+        check_sequence_count(info, SEQUENCES_MAX, self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write the points of each frame, and a line about it with its labels."""
+        self.check(info)
+        camera, lidar = self._cameras(info)["02"], laser_scanner(info, self.lidar, self.type)
+        rows = []
+        for sample in samples:
+            if camera not in sample.truth:
+                continue
+            rows.append(self._row(info, sample))
+            if scanned(shard_dir, lidar, sample.index):
+                path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
+                write_bytes(path, xyzi_bytes(read_points(shard_dir, lidar, sample.index)))
+        write_frames(shard_dir / self.type, rows)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link images and scans, join labels, and list the sequences."""
+        folder = dataset_dir / "training"
+        seqmaps: dict[str, list[str]] = {"training": [], "train": [], "val": [], "test": []}
+        for number, frames in read_sequences(shard_dirs, self.type).items():
+            name = f"{number:04d}"
+            self._write_sequence(info, frames, folder, name)
+            for split in ("training", frames[0].row["split"]):
+                line = f"{name} empty 000000 {len(frames):06d}\n"
+                seqmaps.setdefault(split, []).append(line)
+        for split, lines in seqmaps.items():
+            write_text(folder / f"evaluate_tracking.seqmap.{split}", "".join(lines))
+
+    def _cameras(self, info: DatasetInfo) -> dict[str, str]:
+        """Sensors by KITTI's number."""
+        cameras = {"02": pinhole_camera(info, self.camera, self.type)}
+        if self.right_camera:
+            cameras["03"] = pinhole_camera(info, self.right_camera, self.type)
+        return cameras
+
+    def _row(self, info: DatasetInfo, sample: Sample) -> dict[str, Any]:
+        cameras, scene = self._cameras(info), sample.scene
+        carrier = camera_mount(scene, cameras["02"]).rig
+        unit = navigation_mount(scene, self.oxts, carrier, self.type)
+        truth = sample.truth[cameras["02"]]
+        things = {thing.instance.instance_id: thing for thing in truth.objects}
+        return frame_facts(info, sample) | {
+            "cameras": [number for number, name in cameras.items() if name in sample.truth],
+            "oxts": oxts_row(motion_of(scene, unit), self.origin_deg),
+            "calib": calib_text(scene, cameras, laser_scanner(info, self.lidar, self.type), unit),
+            "labels": [
+                tracking_label(row, things[instance_id])
+                for row, instance_id in label_rows(truth, self)
+            ],
+        }
+
+    def _write_sequence(
+        self, info: DatasetInfo, frames: Sequence[Frame], folder: Path, name: str
+    ) -> None:
+        labels = [f"{k} {row}\n" for k, frame in enumerate(frames) for row in frame.row["labels"]]
+        write_text(folder / f"label_02/{name}.txt", "".join(labels))
+        write_text(folder / f"oxts/{name}.txt", "".join(f.row["oxts"] + "\n" for f in frames))
+        write_text(folder / f"calib/{name}.txt", frames[0].row["calib"])
+        for k, frame in enumerate(frames):
+            for number, camera in self._cameras(info).items():
+                if number in frame.row["cameras"]:
+                    source = media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
+                    link_or_copy(source, folder / f"image_{number}/{name}/{k:06d}.png")
+            scan = frame.shard_dir / self.type / f"velodyne/{frame.index:09d}.bin"
+            if scan.exists():
+                link_or_copy(scan, folder / f"velodyne/{name}/{k:06d}.bin")
+
+
+def tracking_label(row: str, thing: ObjectTruth) -> str:
+    """The columns behind the frame's number, of a row of ``label_2``."""
+    kind, _, *rest = row.split(" ")
+    if kind == "DontCare":
+        return f"-1 {row}"
+    assert thing.truncation is not None, "the annotation visibility is in `needs`"
+    kind = "Person" if kind == "Person_sitting" else kind
+    columns = (thing.instance.instance_id, kind, truncation_level(thing.truncation), *rest)
+    return " ".join(map(str, columns))
+
+
+def truncation_level(truncation: float) -> int:
+    """KITTI's 0, 1 or 2, by the share of the silhouette that lies outside the image."""
+    return int(truncation > SLIGHTLY_TRUNCATED) + int(truncation > LARGELY_TRUNCATED)
+
+
+def calib_text(scene: Scene, cameras: Mapping[str, str], lidar: str, unit: Mount) -> str:
+    """The seven lines of a sequence's calibration; camera 02 is the reference.
+
+    Without a laser scanner, the camera's frame stands for the scanner's.
+    """
+    reference = camera_mount(scene, cameras["02"])
+    scanner = lidar_mount(scene, lidar) if lidar else reference
+    T_camera_velo = between(scene, reference, scanner).matrix()[:3]
+    T_velo_imu = between(scene, scanner, unit).matrix()[:3]
+    lines = []
+    for k in range(4):
+        name = cameras.get(f"{k:02d}", cameras["02"])
+        shift_m = between(scene, camera_mount(scene, name), reference).translation_m
+        P = projection(scene.camera(name).intrinsics, shift_m)
+        lines.append(f"P{k}: {matrix_numbers(P)}\n")
+    lines.append(f"R_rect {matrix_numbers(np.eye(3))}\n")
+    lines.append(f"Tr_velo_cam {matrix_numbers(T_camera_velo)}\n")
+    lines.append(f"Tr_imu_velo {matrix_numbers(T_velo_imu)}\n")
+    return "".join(lines)

@@ -1,0 +1,157 @@
+"""MOTChallenge: one folder per sequence, in the layout of MOT16 to MOT20.
+
+::
+
+    street-train/street-0003/seqinfo.ini        street-train/street-0003/img1/000001.png
+    street-train/street-0003/gt/gt.txt          street-val/..., street-test/...
+    seqmaps/street-train.txt                    the sequences of a split, as TrackEval reads them
+
+Rows of ``gt.txt``: ``frame,id,left,top,width,height,flag,class,visibility``. Frames, ids and pixels
+begin at 1; ids are instance ids; ``flag`` is 1 for what is scored, which is pedestrians alone, as
+in MOT16. ``visibility`` is the visible share of the whole silhouette. A frame is an instant at
+which the camera reads.
+
+Reference: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, table 5 (classes); to
+it a static person (7) is one that sits or lies. Vans, trucks and buses are cars here; categories
+without a class have no rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from exporters.images import link_or_copy
+from exporters.sensors import rgb_camera
+from exporters.sequences import (
+    Frame,
+    check_sequence_count,
+    frame_facts,
+    frame_rate_hz,
+    read_sequences,
+    write_frames,
+    write_text,
+)
+from generator.config.strict import Strict
+from generator.core.capture import Channel
+from generator.core.interfaces import DatasetInfo, media_path
+from generator.core.sample import ImageTruth, ObjectTruth, Sample
+from generator.core.scene import Instance
+
+PEDESTRIAN, PERSON_ON_VEHICLE, BICYCLE, MOTORBIKE, STATIC_PERSON = 1, 2, 4, 5, 7
+CLASSES = {
+    "pedestrian": PEDESTRIAN,
+    "person": PEDESTRIAN,
+    "cyclist": PERSON_ON_VEHICLE,
+    "motorcyclist": PERSON_ON_VEHICLE,
+    "car": 3,
+    "van": 3,
+    "truck": 3,
+    "bus": 3,
+    "bicycle": BICYCLE,
+    "motorcycle": MOTORBIKE,
+}
+"""MOT16's numbers by our category names."""
+RIDDEN = frozenset({BICYCLE, MOTORBIKE})
+"""Classes that become persons on vehicles by the attribute ``rider``."""
+STATIC_POSES = frozenset({"sit", "sitting", "lie", "lying"})
+"""Values of a person's attribute ``pose`` that make it a static person."""
+SEQUENCES_MAX = 10_000
+"""Names of sequences have four digits."""
+
+
+class MotChallenge(Strict):
+    """MOTChallenge: images and tracks of every sequence of one camera."""
+
+    type: Literal["motchallenge"] = "motchallenge"
+    camera: str = ""
+    """Sensor whose images these are; empty = the first one, by name, with the rgb channel."""
+    boxes: Literal["visible", "whole"] = "visible"
+    """Around the visible pixels; or around the whole silhouette, as MOT16's annotators guessed it,
+    hidden parts and parts outside the image included."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it reads."""
+        return frozenset({"boxes2d", "visibility"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set that this format cannot hold.
+
+        Raises:
+            ConfigError: the camera is not there, or there are too many sequences.
+        """
+        rgb_camera(info, self.camera, self.type)
+        check_sequence_count(info, SEQUENCES_MAX, self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write a line per frame with the rows of its objects."""
+        self.check(info)
+        camera = rgb_camera(info, self.camera, self.type)
+        rows = [
+            self._row(info, sample, sample.truth[camera])
+            for sample in samples
+            if camera in sample.truth
+        ]
+        write_frames(shard_dir / self.type, rows)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link images, join rows, and list the sequences of each split."""
+        benchmark = "_".join(info.name.split())
+        names: dict[str, list[str]] = {}
+        for number, frames in read_sequences(shard_dirs, self.type).items():
+            name = f"{benchmark}-{number:04d}"
+            split = frames[0].row["split"]
+            names.setdefault(split, []).append(name)
+            self._write_sequence(info, frames, dataset_dir / f"{benchmark}-{split}" / name)
+        for split, listed in names.items():
+            lines = "".join(f"{name}\n" for name in ("name", *listed))
+            write_text(dataset_dir / f"seqmaps/{benchmark}-{split}.txt", lines)
+
+    def _row(self, info: DatasetInfo, sample: Sample, truth: ImageTruth) -> dict[str, Any]:
+        rows = (gt_columns(thing, self.boxes) for thing in truth.objects)
+        camera = truth.camera.intrinsics
+        return frame_facts(info, sample) | {
+            "size_px": [camera.width_px, camera.height_px],
+            "gt": [row for row in rows if row],
+        }
+
+    def _write_sequence(self, info: DatasetInfo, frames: Sequence[Frame], folder: Path) -> None:
+        camera = rgb_camera(info, self.camera, self.type)
+        width_px, height_px = frames[0].row["size_px"]
+        lines = [f"{k},{row}\n" for k, frame in enumerate(frames, 1) for row in frame.row["gt"]]
+        write_text(folder / "gt/gt.txt", "".join(lines))
+        write_text(
+            folder / "seqinfo.ini",
+            f"[Sequence]\nname={folder.name}\nimDir=img1\n"
+            f"frameRate={frame_rate_hz(info, frames):g}\nseqLength={len(frames)}\n"
+            f"imWidth={width_px}\nimHeight={height_px}\nimExt=.png\n",
+        )
+        for k, frame in enumerate(frames, 1):
+            source = media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
+            link_or_copy(source, folder / f"img1/{k:06d}.png")
+
+
+def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:
+    """The eight columns behind the frame's number; empty for what has no row."""
+    box = thing.box if boxes == "visible" else thing.amodal_box
+    number = mot_class(thing.instance)
+    if thing.box is None or box is None or not number:
+        return ""
+    assert thing.visible_fraction is not None, "the annotation visibility is in `needs`"
+    flag = int(number == PEDESTRIAN)
+    corner = f"{box.x_min + 1},{box.y_min + 1},{box.width_px},{box.height_px}"
+    visibility = f"{min(thing.visible_fraction, 1.0):.6f}"
+    return f"{thing.instance.instance_id},{corner},{flag},{number},{visibility}"
+
+
+def mot_class(instance: Instance) -> int:
+    """MOT16's number of an object's class; 0 = none."""
+    number = CLASSES.get("_".join(instance.category.lower().split()), 0)
+    facts = dict(instance.attributes)
+    if number == PEDESTRIAN and facts.get("pose") in STATIC_POSES:
+        return STATIC_PERSON
+    if number in RIDDEN and facts.get("rider") == "yes":
+        return PERSON_ON_VEHICLE
+    return number

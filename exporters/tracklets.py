@@ -1,0 +1,140 @@
+"""``tracklet_labels.xml``: the 3D boxes of a recording of KITTI's raw data, object by object.
+
+A tracklet lasts from the first to the last frame in which its object is in the image; the boxes of
+frames in between, where it is hidden or outside, are known, too. Poses are in the frame of the
+laser scanner: the centre of the bottom face, and a turn about Z. A tracklet has one size, the
+largest its object has (people swing their arms).
+
+Reference: the element names and the numbers of states are those of KITTI's raw data development
+kit (``tracklets.h``), which reads the file by Boost.Serialization.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from exporters.kitti import occlusion_level, official_type
+from exporters.pointclouds import lidar_boxes
+from generator.core.boxes import OrientedBox
+from generator.core.sample import ImageTruth, ObjectTruth, Sample
+
+INTERPOLATED, LABELLED = 1, 2
+"""States of a box: not seen in this frame; seen."""
+OCCLUSION_UNSET = 255
+IN_IMAGE, TRUNCATED, OUT_OF_IMAGE, BEHIND_IMAGE = range(4)
+TRUNCATED_SHARE = 0.02
+"""Share of the silhouette outside the image from which a box counts as truncated."""
+
+_HEAD = """\
+<?xml version="1.0" encoding="UTF-8" standalone="yes" ?>
+<!DOCTYPE boost_serialization>
+<boost_serialization signature="serialization::archive" version="9">
+"""
+_UNKNOWN = "".join(
+    f"<{name}>-1</{name}>"
+    for name in ("amt_occlusion", "amt_occlusion_kf", "amt_border_l", "amt_border_r")
+)
+
+
+def frame_boxes(sample: Sample, camera: str, lidar: str) -> list[dict[str, Any]]:
+    """Every annotated object of one frame, by instance id, as JSON."""
+    truth = sample.truth[camera]
+    seen = {thing.instance.instance_id: thing for thing in truth.objects}
+    T_camera_lidar = truth.camera.T_world_camera.inverse() @ sample.scene.lidar(lidar).T_world_lidar
+    return [
+        {
+            "id": instance.instance_id,
+            "type": official_type(instance),
+            "size_m": [round(v, 6) for v in box.size_m],
+            "pose": _pose(box),
+            **_visibility(seen.get(instance.instance_id), box.seen_from(T_camera_lidar), truth),
+        }
+        for instance, box in lidar_boxes(sample, lidar)
+    ]
+
+
+def tracklets_text(frames: Sequence[Sequence[Mapping[str, Any]]]) -> str:
+    """The whole file.
+
+    Args:
+        frames: What ``frame_boxes`` gave, frame by frame.
+    """
+    ways: dict[int, list[tuple[int, Mapping[str, Any]]]] = {}
+    for number, boxes in enumerate(frames):
+        for box in boxes:
+            ways.setdefault(box["id"], []).append((number, box))
+    kept = [_while_seen(ways[key]) for key in sorted(ways)]
+    kept = [way for way in kept if way]
+    body = "".join(_tracklet(way, first=k == 0) for k, way in enumerate(kept))
+    count = f"<count>{len(kept)}</count>\n<item_version>1</item_version>\n"
+    head = _HEAD + '<tracklets class_id="0" tracking_level="0" version="0">\n' + count
+    return head + body + "</tracklets>\n</boost_serialization>\n"
+
+
+def _while_seen(
+    way: Sequence[tuple[int, Mapping[str, Any]]],
+) -> Sequence[tuple[int, Mapping[str, Any]]]:
+    """From the first to the last frame in which it is seen; empty if it never is."""
+    shown = [k for k, (_, box) in enumerate(way) if box["state"] == LABELLED]
+    return way[shown[0] : shown[-1] + 1] if shown else ()
+
+
+def _tracklet(way: Sequence[tuple[int, Mapping[str, Any]]], *, first: bool) -> str:
+    # Boost writes the version of a class where it meets it first.
+    marks = [
+        f' class_id="{k}" tracking_level="0" version="{v}"' if first else ""
+        for k, v in ((1, 1), (2, 0), (3, 2))
+    ]
+    sizes_m = np.array([box["size_m"] for _, box in way]).max(axis=0)
+    length, width, height = (f"{v:.6f}" for v in sizes_m)
+    items = "".join(_item(box, marks[2] if k == 0 else "") for k, (_, box) in enumerate(way))
+    return (
+        f"<item{marks[0]}>\n<objectType>{way[0][1]['type']}</objectType>\n"
+        f"<h>{height}</h><w>{width}</w><l>{length}</l>\n"
+        f"<first_frame>{way[0][0]}</first_frame>\n<poses{marks[1]}>\n"
+        f"<count>{len(way)}</count>\n<item_version>2</item_version>\n{items}"
+        "</poses>\n<finished>1</finished>\n</item>\n"
+    )
+
+
+def _item(box: Mapping[str, Any], mark: str) -> str:
+    tx, ty, tz, rz = (f"{v:.6f}" for v in box["pose"])
+    return (
+        f"<item{mark}><tx>{tx}</tx><ty>{ty}</ty><tz>{tz}</tz><rx>0</rx><ry>0</ry><rz>{rz}</rz>"
+        f"<state>{box['state']}</state><occlusion>{box['occlusion']}</occlusion>"
+        f"<occlusion_kf>-1</occlusion_kf><truncation>{box['truncation']}</truncation>"
+        f"{_UNKNOWN}<amt_border_kf>-1</amt_border_kf></item>\n"
+    )
+
+
+def _pose(box: OrientedBox) -> list[float]:
+    """Centre of the bottom face and turn about Z, in the frame of the box's pose."""
+    rotation = box.T_frame_box.rotation()
+    x, y, z = box.T_frame_box.apply(np.array([0.0, 0.0, -0.5 * box.size_m[2]]))
+    yaw_rad = math.atan2(rotation[1, 0], rotation[0, 0])
+    return [round(float(v), 6) + 0.0 for v in (x, y, z, yaw_rad)]
+
+
+def _visibility(
+    thing: ObjectTruth | None, box_camera: OrientedBox, truth: ImageTruth
+) -> dict[str, int]:
+    if thing is None or thing.box is None:
+        uv = truth.camera.intrinsics.project(np.array(box_camera.T_frame_box.translation_m))
+        k = truth.camera.intrinsics
+        if not np.isfinite(uv).all():
+            return {"state": INTERPOLATED, "occlusion": OCCLUSION_UNSET, "truncation": BEHIND_IMAGE}
+        inside = 0 <= uv[0] < k.width_px and 0 <= uv[1] < k.height_px
+        occlusion, truncation = (2, IN_IMAGE) if inside else (OCCLUSION_UNSET, OUT_OF_IMAGE)
+        return {"state": INTERPOLATED, "occlusion": occlusion, "truncation": truncation}
+    assert thing.occlusion is not None, "the annotation visibility is in `needs`"
+    assert thing.truncation is not None, "the annotation visibility is in `needs`"
+    cut = TRUNCATED if thing.truncation > TRUNCATED_SHARE else IN_IMAGE
+    return {
+        "state": LABELLED,
+        "occlusion": occlusion_level(thing.occlusion),
+        "truncation": cut,
+    }

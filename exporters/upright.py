@@ -1,0 +1,108 @@
+"""Boxes that turn about a camera's y axis only, and which laser points lie in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.boxes import OrientedBox
+from generator.core.se3 import Array, Vec3
+
+BORDER_M = 0.029
+"""How far on the wrong side of a box's face a point may be: 3 cm, less rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class UprightBox:
+    """A box whose height is along the camera's y axis: what a KITTI label can say.
+
+    Attributes:
+        size_hwl_m: Extent along y, along the box's z, along the box's x.
+        bottom_m: Centre of the face with the largest y, camera frame.
+        heading_rad: Rotation about +y of the box's x axis; 0 = along the camera's x.
+    """
+
+    size_hwl_m: Vec3
+    bottom_m: Vec3
+    heading_rad: float
+
+    def corners(self) -> Array:
+        """The eight corners in the camera frame [m], shape [8, 3]."""
+        height, width, length = self.size_hwl_m
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        along, across = np.array([c, 0.0, -s]), np.array([s, 0.0, c])
+        signs = [(i, j, k) for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (0.0, -1.0)]
+        ends = [
+            i * length * along + j * width * across + (0.0, k * height, 0.0) for i, j, k in signs
+        ]
+        return np.asarray(self.bottom_m) + np.array(ends)
+
+    def depths_m(self, points_m: Array) -> Array:
+        """How deep points [n, 3] of the camera frame lie inside; negative outside."""
+        height, width, length = self.size_hwl_m
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        x, y, z = (points_m - self.bottom_m).T
+        along, across = c * x - s * z, s * x + c * z
+        sides = (0.5 * length - np.abs(along), 0.5 * width - np.abs(across))
+        depths: Array = np.minimum.reduce([*sides, -y, height + y])
+        return depths
+
+
+def upright_box(box: OrientedBox) -> UprightBox:
+    """The smallest upright box, headed like the object's x axis, around an oriented box.
+
+    Where that axis is vertical, the heading is that of the y axis less a quarter turn.
+    """
+    corners = box.corners()
+    rotation = box.T_frame_box.rotation()
+    x, z = float(rotation[0, 0]), float(rotation[2, 0])
+    if x * x + z * z < 1e-12:
+        x, z = float(rotation[2, 1]), -float(rotation[0, 1])
+    norm = math.sqrt(x * x + z * z)
+    x, z = x / norm, z / norm
+    along = corners[:, 0] * x + corners[:, 2] * z
+    across = corners[:, 2] * x - corners[:, 0] * z
+    middle_along = 0.5 * float(along.min() + along.max())
+    middle_across = 0.5 * float(across.min() + across.max())
+    return UprightBox(
+        size_hwl_m=(
+            float(np.ptp(corners[:, 1])),
+            float(np.ptp(across)),
+            float(np.ptp(along)),
+        ),
+        bottom_m=(
+            middle_along * x - middle_across * z,
+            float(corners[:, 1].max()),
+            middle_along * z + middle_across * x,
+        ),
+        heading_rad=math.atan2(-z, x),
+    )
+
+
+def boxed_members(
+    ids: NDArray[np.int64], p_camera: Array, boxes: Mapping[int, UprightBox]
+) -> NDArray[np.int64]:
+    """The instance that each point belongs to: that of the box it lies in; 0 = none.
+
+    An instance loses what it reflected and what lies more than ``BORDER_M`` outside its box, and
+    gains what is as deep inside and belongs to no other. Instances without a box keep their points.
+
+    Args:
+        ids: What reflected each point [n].
+        p_camera: The points in the camera frame [n, 3].
+        boxes: By instance.
+    """
+    members: NDArray[np.int64] = ids.copy()
+    for instance_id, box in boxes.items():
+        (mine,) = np.nonzero(ids == instance_id)
+        members[mine[box.depths_m(p_camera[mine]) < -BORDER_M]] = 0
+    free = np.flatnonzero(~np.isin(members, list(boxes)))
+    for instance_id, box in boxes.items():
+        reach_m = math.hypot(*box.size_hwl_m)
+        near = free[np.abs(p_camera[free] - box.bottom_m).max(axis=1) < reach_m]
+        members[near[box.depths_m(p_camera[near]) > BORDER_M]] = instance_id
+    return members

@@ -1,0 +1,121 @@
+"""The ground around the ego from above."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from generator.annotations.boxes3d import oriented_box
+from generator.annotations.grounds import carriageways, footprints, ribbon, strips
+from generator.annotations.raster import Grid, covered
+from generator.config.strict import Strict
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetLibrary
+from generator.core.lanes import lane_borders, leftwards
+from generator.core.sample import BirdseyeMap, FrameTruth
+from generator.core.scene import Instance, Scene
+from generator.core.se3 import SE3, Array
+
+LINE_PX = 1.5
+"""Width of borders: enough that none is broken by the centres it misses."""
+PEOPLE = frozenset({"pedestrian", "person"})
+
+
+class BevMap(Strict):
+    """Masks of the ground around the ego's rig, seen from above, its front up.
+
+    ``drivable``: carriageways, parking strips and junctions; ``parking``, ``crosswalk``,
+    ``sidewalk``: strips of those lanes; ``lane_divider``, ``road_divider``: borders between lanes
+    that run the same way, and the opposite way; ``vehicles``, ``people``: footprints of the boxes
+    of annotated instances, by their assets' tags; ``free_space``: drivable, and nothing stands
+    there. The layers are those of nuScenes' maps, as far as a street has them.
+
+    Attributes:
+        px_m: Side of a pixel.
+        reach_m: From the ego to the nearest edge of the map.
+    """
+
+    channels: ClassVar[frozenset[Channel]] = frozenset()
+    type: Literal["bev_map"] = "bev_map"
+    px_m: float = Field(0.2, ge=0.02, le=5)
+    reach_m: float = Field(40.0, ge=1, le=500)
+
+    def annotate_frame(
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: FrameTruth
+    ) -> FrameTruth:
+        """Fill in ``birdseye``.
+
+        Raises:
+            ConfigError: the scene has no rig.
+        """
+        if not truth.rig:
+            raise ConfigError(
+                "annotation 'bev_map': the scene has no rig to look down on; add an element 'ego'"
+            )
+        scene = scenes[""]
+        T_world_map = levelled(truth.T_world_ego)
+        grid = Grid(T_world_map, self.px_m, 2 * math.ceil(self.reach_m / self.px_m))
+        drivable = covered(grid, carriageways(scene, assets))
+        own = scene.body(scene.rig(truth.rig).body).instance_id
+        standing = [b for b in scene.bodies if b.instance_id not in (0, own)]
+        kinds = {i.instance_id: frozenset(assets.get(i.asset).tags) for i in scene.instances}
+        shown = [i for i in scene.instances if i.annotated]
+        vehicles = [i for i in shown if "vehicle" in kinds[i.instance_id]]
+        people = [i for i in shown if kinds[i.instance_id] & PEOPLE]
+        layers = {
+            "drivable": drivable,
+            "parking": covered(grid, _lanes(scene, "parking")),
+            "crosswalk": covered(grid, _lanes(scene, "crosswalk")),
+            "sidewalk": covered(grid, _lanes(scene, "sidewalk")),
+            "lane_divider": covered(grid, _borders(scene, "lane", LINE_PX * self.px_m)),
+            "road_divider": covered(grid, _borders(scene, "road", LINE_PX * self.px_m)),
+            "vehicles": covered(grid, _floors(vehicles)),
+            "people": covered(grid, _floors(people)),
+            "free_space": drivable & ~covered(grid, footprints(standing, assets)),
+        }
+        return replace(truth, birdseye=BirdseyeMap(T_world_map, self.px_m, layers))
+
+
+def levelled(pose: SE3) -> SE3:
+    """The pose turned upright: its X axis points where it did, but level.
+
+    Only square roots decide it, so that it has the same bits on every processor.
+    """
+    ahead = pose.rotate(np.array([1.0, 0.0, 0.0]))
+    length = math.sqrt(float(ahead[0]) ** 2 + float(ahead[1]) ** 2)
+    if length < 1e-6:
+        return SE3(pose.translation_m)
+    c, s = float(ahead[0]) / length, float(ahead[1]) / length
+    turn = (math.sqrt(0.5 * max(1.0 + c, 0.0)), math.sqrt(0.5 * max(1.0 - c, 0.0)))
+    return SE3(pose.translation_m, (turn[0], 0.0, 0.0, math.copysign(turn[1], s))).rounded()
+
+
+def _lanes(scene: Scene, kind: str) -> Array:
+    return strips(lane for lane in scene.lanes if lane.kind == kind)
+
+
+def _borders(scene: Scene, kind: str, width_m: float) -> Array:
+    """Ribbons [n, 3, 3] along borders of lanes."""
+    parts = [np.zeros((0, 3, 3))]
+    for border in lane_borders(scene.lanes):
+        if border.kind == kind:
+            line = np.asarray(border.points_m)
+            aside = 0.5 * width_m * leftwards(line)
+            parts.append(ribbon(line + aside, line - aside))
+    return np.concatenate(parts)
+
+
+def _floors(instances: list[Instance]) -> Array:
+    """The ground below boxes, as triangles [n, 3, 3]."""
+    parts = [np.zeros((0, 3, 3))]
+    for instance in instances:
+        corners = oriented_box(instance).corners()
+        # Corners 0, 2, 4, 6 are the lower ones: (x-, y-), (x-, y+), (x+, y-), (x+, y+).
+        parts.append(np.stack([corners[[0, 4, 6]], corners[[0, 6, 2]]]))
+    return np.concatenate(parts)

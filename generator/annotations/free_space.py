@@ -1,0 +1,76 @@
+"""Where one may drive, in images."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from generator.annotations.grounds import carriageway
+from generator.annotations.raster import Float32, Grid, heights_m
+from generator.config.strict import Strict
+from generator.core.boxes import tight_box
+from generator.core.capture import Channel, Reading
+from generator.core.interfaces import AssetLibrary
+from generator.core.sample import ImageTruth, MaskPx
+from generator.core.scene import Body, Scene
+from generator.core.se3 import SE3
+
+TILE_M = 16.0
+"""Grids are centred on multiples of this, so that the cameras of a rig share one."""
+CELL_M = 0.1
+ON_IT_M = 0.03
+"""A point this near the carriageway's surface is on it: half of what it rises within a cell where
+streets are steepest, and lower than any kerb."""
+
+
+class FreeSpace(Strict):
+    """Pixels that show a carriageway with nothing on it, by the point that each of them sees.
+
+    Attributes:
+        far_m: Pixels that see something farther away than this, over the ground, are left out.
+    """
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.RANGE, Channel.INSTANCE})
+    type: Literal["free_space"] = "free_space"
+    far_m: float = Field(60.0, gt=0, le=200)
+
+    def annotate_image(
+        self, scene: Scene, assets: AssetLibrary, reading: Reading, truth: ImageTruth
+    ) -> ImageTruth:
+        """Fill in ``free_space``; an empty mask where there is none."""
+        ranges_m = reading.channels[Channel.RANGE]
+        # From above, what is near over the ground may be farther away.
+        free = (reading.channels[Channel.INSTANCE] == 0) & (ranges_m < 2.0 * self.far_m)
+        rows, columns = np.nonzero(free)
+        x, y, _ = reading.camera.T_world_camera.translation_m
+        middle = (TILE_M * round(x / TILE_M), TILE_M * round(y / TILE_M))
+        background = tuple(b for b in scene.bodies if b.instance_id == 0 and b.motion == "static")
+        grid = Grid(SE3((*middle, 0.0)), CELL_M, 2 * round((self.far_m + TILE_M) / CELL_M))
+        ground = _ground(background, assets, grid)
+        p_camera = reading.camera.intrinsics.pixel_rays()[rows, columns]
+        p_camera = p_camera * ranges_m[rows, columns, None].astype(np.float64)
+        p_world = reading.camera.T_world_camera.apply(p_camera)
+        here = (p_world[:, 0] - x) ** 2 + (p_world[:, 1] - y) ** 2 < self.far_m**2
+        cells = grid.cells(p_world)
+        on = np.where(here[:, None], np.floor(cells[:, :2]), 0.0).astype(np.intp)
+        free[rows, columns] = here & (np.abs(cells[:, 2] - ground[on[:, 0], on[:, 1]]) < ON_IT_M)
+        return replace(truth, free_space=_tight(free))
+
+
+@lru_cache(maxsize=2)
+def _ground(background: tuple[Body, ...], assets: AssetLibrary, grid: Grid) -> Float32:
+    """Height of the carriageway over the world's origin; -inf where there is none."""
+    parts = [np.zeros((0, 3, 3)), *(carriageway(body, assets) for body in background)]
+    return heights_m(grid, np.concatenate(parts))
+
+
+def _tight(mask: NDArray[np.bool_]) -> MaskPx:
+    box = tight_box(mask)
+    if box is None:
+        return MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
+    return MaskPx(box.x_min, box.y_min, mask[box.y_min : box.y_max, box.x_min : box.x_max].copy())

@@ -1,0 +1,121 @@
+"""Borders of lanes, in the world and in images."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from generator.config.strict import Strict
+from generator.core.capture import Channel, Reading
+from generator.core.interfaces import AssetLibrary
+from generator.core.lanes import LaneBorder, lane_borders
+from generator.core.sample import BorderTruth, FrameTruth, ImageTruth
+from generator.core.scene import Scene
+from generator.core.se3 import Array
+
+FINE_M = 0.1
+"""Borders are followed in steps of this length before they are thinned."""
+STANDS_M = 0.15
+"""What is seen less than this above the ground hides no border: kerbs, wet leaves, rounding."""
+
+
+class Lanes(Strict):
+    """The borders of driving lanes: lines in the world, and their points in every image.
+
+    Occluded points are listed, as in CULane and TuSimple, and marked as such.
+
+    Attributes:
+        far_m: Points farther from the camera are left out.
+        step_px: Points of one line are about this far apart in the image.
+    """
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.RANGE})
+    type: Literal["lanes"] = "lanes"
+    far_m: float = Field(100.0, gt=0)
+    step_px: float = Field(8.0, ge=1)
+
+    def annotate_image(
+        self, scene: Scene, assets: AssetLibrary, reading: Reading, truth: ImageTruth
+    ) -> ImageTruth:
+        """Fill in ``borders``, in the order of the scene's lanes."""
+        del assets
+        found = tuple(
+            line
+            for border in lane_borders(scene.lanes)
+            for line in self._projected(border, reading)
+        )
+        return replace(truth, borders=found)
+
+    def annotate_frame(
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: FrameTruth
+    ) -> FrameTruth:
+        """Fill in ``borders``."""
+        del assets
+        return replace(truth, borders=lane_borders(scenes[""].lanes))
+
+    def _projected(self, border: LaneBorder, reading: Reading) -> Iterator[BorderTruth]:
+        """The stretches of a border that lie in the image."""
+        camera = reading.camera
+        lens = camera.intrinsics
+        p_world = resampled(np.asarray(border.points_m), FINE_M)
+        p_camera = camera.T_world_camera.inverse().apply(p_world)
+        near = (p_camera * p_camera).sum(axis=1) < self.far_m**2
+        uv = lens.project(p_camera)
+        # What the lens does not show is NaN, and less than nothing.
+        inside = near & (uv >= 0.0).all(axis=1)
+        inside &= (uv[:, 0] < lens.width_px) & (uv[:, 1] < lens.height_px)
+        for start, end in runs(inside):
+            if end - start < 2:
+                continue
+            rows = start + thinned(uv[start:end], self.step_px)
+            visible = is_seen(reading, p_camera[rows], uv[rows])
+            yield BorderTruth(
+                border.name,
+                border.kind,
+                tuple((round(float(u), 2), round(float(v), 2)) for u, v in uv[rows]),
+                tuple(bool(seen) for seen in visible),
+            )
+
+
+def resampled(line_m: Array, step_m: float) -> Array:
+    """Points [n, 3] along a line, at most a step apart, its own points included at the ends."""
+    lengths = np.sqrt((np.diff(line_m, axis=0) ** 2).sum(axis=1))
+    at_m = np.concatenate([[0.0], np.cumsum(lengths)])
+    even = np.linspace(0.0, at_m[-1], int(at_m[-1] / step_m) + 2)
+    return np.stack([np.interp(even, at_m, line_m[:, k]) for k in range(3)], axis=1)
+
+
+def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Half-open ranges in which the flags are set."""
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def thinned(uv: Array, step_px: float) -> NDArray[np.intp]:
+    """Rows of points about a step apart along a line of image points, both ends included."""
+    way = np.sqrt((np.diff(uv, axis=0) ** 2).sum(axis=1))
+    bins = (np.concatenate([[0.0], np.cumsum(way)]) / step_px).astype(np.int64)
+    first = np.flatnonzero(np.diff(bins, prepend=-1))
+    return np.unique(np.append(first, len(uv) - 1))
+
+
+def is_seen(reading: Reading, p_camera: Array, uv: Array) -> NDArray[np.bool_]:
+    """Whether points on the ground are seen: nothing that stands on it lies before them.
+
+    Args:
+        reading: With ranges.
+        p_camera: Points [n, 3].
+        uv: Where they are in the image [n, 2].
+    """
+    columns, rows = (uv[:, k].astype(np.intp) for k in (0, 1))
+    range_m = reading.channels[Channel.RANGE][rows, columns].astype(np.float64)
+    away_m = np.sqrt((p_camera * p_camera).sum(axis=1))
+    before = p_camera * (np.minimum(range_m, away_m) / away_m)[:, None]
+    above_m = reading.camera.T_world_camera.rotate(before - p_camera)[:, 2]
+    seen: NDArray[np.bool_] = above_m < STANDS_M
+    return seen

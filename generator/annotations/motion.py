@@ -1,0 +1,33 @@
+"""How objects move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from generator.core.capture import Channel, Reading
+from generator.core.instants import ego_rig
+from generator.core.sample import MotionTruth, ObjectTruth
+from generator.core.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Velocity, acceleration and angular velocity along the world's, camera's and ego's axes.
+
+    They are those of the object over the ground; whoever wants them against a moving camera
+    subtracts the camera's. The track id of an object is its instance id.
+    """
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
+
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+        """Fill in ``motion``."""
+        twist = truth.instance.twist
+        rig = ego_rig(scene)
+        motion = MotionTruth(
+            world=twist,
+            camera=twist.seen_along(reading.camera.T_world_camera),
+            ego=twist.seen_along(scene.rig_pose(rig.name)) if rig is not None else None,
+        )
+        return replace(truth, motion=motion)

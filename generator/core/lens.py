@@ -1,0 +1,359 @@
+"""Lens models: from directions to the plane at focal length 1, and back.
+
+====================  =============================================================================
+model                 image of a direction (x, y, z); coefficients
+====================  =============================================================================
+``pinhole``           ``x / z, y / z``; none
+``brown_conrady``     that, bent by OpenCV's rational model; ``k1 k2 p1 p2 k3 k4 k5 k6``
+``kannala_brandt``    along (x, y), at ``t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9`` where t is the
+                      angle to the axis (OpenCV's fisheye); ``k1 k2 k3 k4``
+``equirectangular``   longitude ``atan2(x, z)`` and latitude ``atan2(y, hypot(x, z))``; none
+====================  =============================================================================
+
+Polynomials fold over: from some angle on, the image of what lies farther out moves back inwards.
+What is farther out than that has no image here, as glass would show none.
+
+Sources: Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32, 1966; Kannala
+and Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
+fish-eye lenses", PAMI 28, 2006; the equations of OpenCV's calib3d module (``projectPoints``,
+``fisheye::projectPoints``).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.se3 import Array
+
+LensModel = Literal["pinhole", "brown_conrady", "kannala_brandt", "equirectangular"]
+
+COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {
+    "pinhole": (),
+    "brown_conrady": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+    "kannala_brandt": ("k1", "k2", "k3", "k4"),
+    "equirectangular": (),
+}
+"""Names of the coefficients of each model, in OpenCV's order."""
+
+_PLANE_MAX = 100.0
+"""Farthest point of the plane at focal length 1: 89.4 degrees off the axis."""
+_SAMPLES = 1025
+_ITERATIONS_MAX = 64
+_PRECISION = 1e-14
+_MISSED = 1e-11
+"""How far a solution's image may be from where it should be, at focal length 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lens:
+    """How directions become points of an image.
+
+    Attributes:
+        model: As in the table above.
+        coefficients: In the order of ``COEFFICIENTS``, all of them.
+        half_field_rad: Angle to the axis beyond which the lens shows nothing; pi = its model's end.
+    """
+
+    model: LensModel = "pinhole"
+    coefficients: tuple[float, ...] = ()
+    half_field_rad: float = math.pi
+
+    def __post_init__(self) -> None:
+        """Refuse a wrong number of coefficients, and a field where the model has none.
+
+        Raises:
+            ValueError: then.
+        """
+        names = COEFFICIENTS[self.model]
+        if len(self.coefficients) != len(names):
+            raise ValueError(
+                f"lens '{self.model}' has {len(names)} coefficients {' '.join(names)}, "
+                f"got {len(self.coefficients)}"
+            )
+        if not names and self.half_field_rad != math.pi:
+            raise ValueError(f"lens '{self.model}' has no limit to its field")
+
+    @property
+    def folds(self) -> bool:
+        """Whether it folds over within its field, rather than showing all of it."""
+        if not self.coefficients:
+            return False
+        whole = self.model == "brown_conrady" and self.half_field_rad >= 0.5 * math.pi
+        # Tangential terms may fold by themselves.
+        return _profile(self).folds or (whole and any(self.coefficients[2:4]))
+
+    def radius(self, angle_rad: float) -> float:
+        """Distance from the axis, on the plane, of what is seen at an angle to it.
+
+        Tangential terms are left out, and so is the end of its field.
+
+        Raises:
+            ValueError: the model has no image of what is seen at that angle.
+        """
+        if self.model == "equirectangular":
+            return angle_rad
+        if self.model == "pinhole" and angle_rad < 0.5 * math.pi:
+            return math.tan(angle_rad)
+        end_rad = 0.5 * math.pi
+        if self.coefficients:
+            end_rad = _profile(replace(self, half_field_rad=math.pi)).end_rad
+            if angle_rad <= end_rad:
+                argument = math.tan(angle_rad) if self.model == "brown_conrady" else angle_rad
+                return float(_radial(self, np.array([argument]))[0][0])
+        raise ValueError(
+            f"lens '{self.model}' shows nothing at {math.degrees(angle_rad):g} degrees from its "
+            f"axis: its model ends at {math.degrees(end_rad):.4g} degrees"
+        )
+
+    def image_of(self, directions: Array) -> Array:
+        """Points of the plane, shape [..., 2]; NaN for what has no image.
+
+        Args:
+            directions: Camera frame, of any length but 0, shape [..., 3].
+        """
+        x, y, z = np.moveaxis(np.asarray(directions, dtype=np.float64), -1, 0)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            if self.model == "equirectangular":
+                across = np.sqrt(x * x + z * z)
+                angles = np.stack([np.arctan2(x, z), np.arctan2(y, across)], axis=-1)
+                return np.where(((across == 0.0) & (y == 0.0))[..., None], np.nan, angles)
+            if self.model == "kannala_brandt":
+                return _fisheye_image(self, x, y, z)
+            front = np.where(z > 0, z, np.nan)
+            plane = np.stack([x / front, y / front], axis=-1)
+            return plane if self.model == "pinhole" else _bent(self, plane)
+
+    def directions_of(self, points: Array) -> Array:
+        """Unit directions, camera frame, shape [..., 3]; NaN for points that show nothing.
+
+        The inverse of ``image_of``, to about 1e-13.
+
+        Args:
+            points: On the plane, shape [..., 2].
+        """
+        points = np.asarray(points, dtype=np.float64)
+        flat = points.reshape(-1, 2)
+        if self.model == "equirectangular":
+            directions = _globe(flat)
+        elif self.model == "kannala_brandt":
+            directions = _fisheye_directions(self, flat)
+        else:
+            plane = flat if self.model == "pinhole" else _straightened(self, flat)
+            directions = np.column_stack([plane, np.ones(len(plane))])
+            directions /= np.sqrt((directions * directions).sum(axis=1))[:, None]
+        return directions.reshape(*points.shape[:-1], 3)
+
+
+PINHOLE = Lens()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Profile:
+    """The rising part of a radial function.
+
+    Attributes:
+        arguments: From 0 to the end: tangents of angles (Brown-Conrady) or angles.
+        radii: Of their images, strictly rising.
+        end_rad: Angle at the end.
+        folds: Whether the lens folds over there, or ends for another reason.
+    """
+
+    arguments: Array
+    radii: Array
+    end_rad: float
+    folds: bool
+
+
+@lru_cache(maxsize=256)
+def _profile(lens: Lens) -> _Profile:
+    """The rising part of a lens that has coefficients."""
+    plane = lens.model == "brown_conrady"
+    end_rad = min(lens.half_field_rad, math.atan(_PLANE_MAX)) if plane else lens.half_field_rad
+    fold_rad = _first_fold(lens, end_rad)
+    if fold_rad is not None:
+        # A grain before, where the radius still rises.
+        end_rad = fold_rad * (1.0 - 1e-9)
+    angles = np.linspace(0.0, end_rad, _SAMPLES)
+    arguments = np.tan(angles) if plane else angles
+    radii = np.maximum.accumulate(_radial(lens, arguments)[0])
+    return _Profile(arguments, radii, end_rad, fold_rad is not None)
+
+
+def _first_fold(lens: Lens, end_rad: float) -> float | None:
+    """The first angle up to ``end_rad`` at which the radius stops rising; None if it never does."""
+
+    def rises(angles: Array) -> NDArray[np.bool_]:
+        arguments = np.tan(angles) if lens.model == "brown_conrady" else angles
+        with np.errstate(all="ignore"):
+            _, slope, divisor = _radial(lens, arguments)
+        rising: NDArray[np.bool_] = (slope > 0.0) & (divisor > 0.0)
+        return rising
+
+    angles = np.linspace(0.0, end_rad, 4 * _SAMPLES)
+    falls = np.flatnonzero(~rises(angles))
+    if not len(falls):
+        return None
+    low, high = float(angles[falls[0] - 1]), float(angles[falls[0]])
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if rises(np.array([middle]))[0] else (low, middle)
+    return low
+
+
+def _radial(lens: Lens, u: Array) -> tuple[Array, Array, Array]:
+    """Radius of the image, its derivative, and the divisor, which must be positive."""
+    s = u * u
+    if lens.model == "kannala_brandt":
+        k1, k2, k3, k4 = lens.coefficients
+        value = u * (1.0 + s * (k1 + s * (k2 + s * (k3 + s * k4))))
+        slope = 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * (7.0 * k3 + s * 9.0 * k4)))
+        return value, slope, np.ones_like(u)
+    k1, k2, _, _, k3, k4, k5, k6 = lens.coefficients
+    over = 1.0 + s * (k1 + s * (k2 + s * k3))
+    over_slope = k1 + s * (2.0 * k2 + s * 3.0 * k3)
+    under = 1.0 + s * (k4 + s * (k5 + s * k6))
+    under_slope = k4 + s * (2.0 * k5 + s * 3.0 * k6)
+    slope = ((over + 2.0 * s * over_slope) * under - 2.0 * s * over * under_slope) / (under * under)
+    return u * over / under, slope, under
+
+
+def _argument_of(lens: Lens, radii: Array) -> Array:
+    """The argument whose image has that radius, shape [n]; NaN beyond the end.
+
+    Newton's method between bounds: a step that leaves them is replaced by halving.
+    """
+    profile = _profile(lens)
+    within = radii <= profile.radii[-1]
+    target = np.where(within, radii, 0.0)
+    cell = np.searchsorted(profile.radii, target, side="right") - 1
+    cell = np.clip(cell, 0, _SAMPLES - 2)
+    low, high = profile.arguments[cell], profile.arguments[cell + 1]
+    first, last = profile.radii[cell], profile.radii[cell + 1]
+    u = low + (target - first) / np.maximum(last - first, 1e-300) * (high - low)
+    u = np.clip(u, low, high)
+    for _ in range(_ITERATIONS_MAX):
+        value, slope, _ = _radial(lens, u)
+        beyond = value > target
+        low, high = np.where(beyond, low, u), np.where(beyond, u, high)
+        step = u - (value - target) / np.maximum(slope, 1e-300)
+        step = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
+        moved = float((np.abs(step - u) / (1.0 + u)).max(initial=0.0))
+        u = step
+        if moved <= _PRECISION:
+            break
+    return np.where(within, u, np.nan)
+
+
+def _fisheye_image(lens: Lens, x: Array, y: Array, z: Array) -> Array:
+    across = np.sqrt(x * x + y * y)
+    angle = np.arctan2(across, z)
+    angle = np.where(angle <= _profile(lens).end_rad, angle, np.nan)
+    # On the axis the angle is that of every azimuth; behind it there is no telling which.
+    stretch = _radial(lens, angle)[0] / np.where(across > 0, across, np.nan)
+    stretch = np.where((across == 0) & (z > 0), 0.0, stretch)
+    return np.stack([x * stretch, y * stretch], axis=-1)
+
+
+def _fisheye_directions(lens: Lens, points: Array) -> Array:
+    x, y = points.T
+    radius = np.sqrt(x * x + y * y)
+    angle = _argument_of(lens, radius)
+    # sin(a) / r goes to 1 at the centre.
+    share = np.where(radius > 0, np.sin(angle) / np.where(radius > 0, radius, 1.0), 1.0)
+    return np.column_stack([x * share, y * share, np.cos(angle)])
+
+
+def _globe(points: Array) -> Array:
+    longitude, latitude = points.T
+    seen = (np.abs(longitude) <= math.pi) & (np.abs(latitude) <= 0.5 * math.pi)
+    longitude, latitude = np.where(seen, longitude, np.nan), np.where(seen, latitude, np.nan)
+    across = np.cos(latitude)
+    return np.column_stack(
+        [across * np.sin(longitude), np.sin(latitude), across * np.cos(longitude)]
+    )
+
+
+def _bent(lens: Lens, plane: Array) -> Array:
+    """Brown and Conrady's distortion of points of the plane; NaN where it folds over."""
+    x, y = plane[..., 0], plane[..., 1]
+    radius = np.sqrt(x * x + y * y)
+    inside = np.where(radius <= _profile(lens).arguments[-1], 1.0, np.nan)
+    bent, jacobian = _bending(lens, x * inside, y * inside)
+    upright = jacobian[0] * jacobian[3] - jacobian[1] * jacobian[2] > 0.0
+    return np.where(upright[..., None], np.stack(bent, axis=-1), np.nan)
+
+
+def _bending(
+    lens: Lens, x: Array, y: Array
+) -> tuple[tuple[Array, Array], tuple[Array, Array, Array, Array]]:
+    """Bent coordinates of points, and their derivatives by x and y, rows first."""
+    _, _, p1, p2, *_ = lens.coefficients
+    s = x * x + y * y
+    r = np.sqrt(s)
+    value, slope, _ = _radial(lens, r)
+    away = np.where(r > 0, r, 1.0)
+    radial = np.where(r > 0, value / away, 1.0)
+    # d(radial) / ds, times 2: radial depends on x and y by s alone.
+    twice = np.where(r > 0, (slope - radial) / (away * away), 0.0)
+    bent_x = x * radial + 2.0 * p1 * x * y + p2 * (s + 2.0 * x * x)
+    bent_y = y * radial + p1 * (s + 2.0 * y * y) + 2.0 * p2 * x * y
+    xx = radial + x * x * twice + 2.0 * p1 * y + 6.0 * p2 * x
+    yy = radial + y * y * twice + 6.0 * p1 * y + 2.0 * p2 * x
+    xy = x * y * twice + 2.0 * p1 * x + 2.0 * p2 * y
+    return (bent_x, bent_y), (xx, xy, xy, yy)
+
+
+def _straightened(lens: Lens, points: Array) -> Array:
+    """The inverse of ``_bent``, shape [n, 2]."""
+    radius = np.sqrt((points * points).sum(axis=1))
+    end = float(_profile(lens).radii[-1])
+    tangential = any(lens.coefficients[2:4])
+    # Tangential terms move the rim: what is a little beyond it may still have an inverse.
+    start = np.minimum(radius, end * (1.0 - 1e-6)) if tangential else radius
+    stretch = np.where(radius > 0, _argument_of(lens, start) / np.where(radius > 0, radius, 1), 1.0)
+    plane = points * stretch[:, None]
+    return _refined(lens, plane, points) if tangential else plane
+
+
+def _refined(lens: Lens, plane: Array, target: Array) -> Array:
+    """Newton's method in both coordinates; steps that do not come nearer are halved.
+
+    Args:
+        lens: With tangential terms.
+        plane: Where to begin, shape [n, 2].
+        target: Bent points, shape [n, 2].
+
+    Returns:
+        Where the target is met, shape [n, 2]; NaN where it is not.
+    """
+    miss, step = _newton_step(lens, plane, target)
+    pace = np.ones(len(plane))
+    for _ in range(_ITERATIONS_MAX):
+        trial = plane - pace[:, None] * step
+        trial_miss, trial_step = _newton_step(lens, trial, target)
+        nearer = trial_miss < miss
+        plane = np.where(nearer[:, None], trial, plane)
+        step = np.where(nearer[:, None], trial_step, step)
+        miss = np.where(nearer, trial_miss, miss)
+        pace = np.where(nearer, 1.0, 0.5 * pace)
+        if not ((miss > _PRECISION) & (pace > 1e-6)).any():
+            break
+    return np.where((miss <= _MISSED)[:, None], plane, np.nan)
+
+
+def _newton_step(lens: Lens, plane: Array, target: Array) -> tuple[Array, Array]:
+    """How far images are from the target, inf where the lens has none, and a way back, [n, 2]."""
+    bent, (xx, xy, yx, yy) = _bending(lens, plane[:, 0], plane[:, 1])
+    ex, ey = bent[0] - target[:, 0], bent[1] - target[:, 1]
+    determinant = xx * yy - xy * yx
+    end = float(_profile(lens).arguments[-1])
+    valid = ((plane * plane).sum(axis=1) <= end * end) & (determinant > 0.0)
+    divisor = np.where(valid, determinant, 1.0)
+    step = np.column_stack([(yy * ex - xy * ey) / divisor, (xx * ey - yx * ex) / divisor])
+    return np.where(valid, np.maximum(np.abs(ex), np.abs(ey)), np.inf), step

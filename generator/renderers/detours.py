@@ -1,0 +1,130 @@
+"""What laser rays meet through glass and by way of mirrors.
+
+Few rays come to a pane, a mirror or a puddle; only these are followed, after all first hits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from generator.core.capture import Detours
+from generator.core.geometry import SURFACES, Material
+from generator.core.scene import Scene
+from generator.renderers.kernels import lidar as kernels
+from generator.renderers.labels import category_ids
+from generator.renderers.stock import AssetStock
+
+_SURFACE = {role: number for number, role in enumerate(SURFACES)}
+
+PUDDLE_MIN = 0.05
+"""Less of standing water than this mirrors nothing."""
+
+Labels = tuple[NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint8]]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class HitLabels:
+    """Tables from body and material to labels; the first entry is that of nothing."""
+
+    instances: NDArray[np.uint16]
+    categories: NDArray[np.uint16]
+    surfaces: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, scene: Scene, materials: Sequence[Material]) -> HitLabels:
+        """Of a scene, whose bodies' materials these are."""
+        instances = [0, *(body.instance_id for body in scene.bodies)]
+        surfaces = [0, *(_SURFACE.get(material.role, 0) for material in materials)]
+        return cls(
+            np.array(instances, np.uint16),
+            np.array([0, *category_ids(scene)], np.uint16),
+            np.array(surfaces, np.uint8),
+        )
+
+    def at(self, hits: NDArray[np.int32]) -> Labels:
+        """Instance, category and surface of (body, material) pairs [n, 2]."""
+        bodies, materials = hits[:, 0] + 1, hits[:, 1] + 1
+        return self.instances[bodies], self.categories[bodies], self.surfaces[materials]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FirstHits:
+    """First hits of all rays: ranges and (body, material) on the device, the latter also here.
+
+    Attributes:
+        puddles: Share of each ray's end that is standing water; None where everything is dry.
+    """
+
+    ranges_m: wp.array
+    on_device: wp.array
+    hits: NDArray[np.int32]
+    puddles: NDArray[np.float32] | None
+
+
+def detours(
+    inputs: Sequence[Any],
+    first: FirstHits,
+    infrared: NDArray[np.void],
+    labels: HitLabels,
+    stock: AssetStock,
+) -> Detours | None:
+    """What rays meet besides their first hits; None = nothing.
+
+    Args:
+        inputs: Of the kernel that found the first hits.
+        first: What it found.
+        infrared: Records of the materials.
+        labels: Of the scene.
+        stock: Of the renderer.
+    """
+    material = first.hits[:, 1]
+    clear = np.append(infrared["clear"] > 0.0, False)[material]
+    mirror = np.append(infrared["mirror"] > 0.0, False)[material]
+    if first.puddles is not None:
+        mirror = mirror | (first.puddles > PUDDLE_MIN)
+    found = []
+    panes, mirrors = (np.flatnonzero(which).astype(np.int32) for which in (clear, mirror))
+    if len(panes):
+        given = [wp.array(panes, dtype=int, device=stock.device), first.ranges_m]
+        found.append(_launched(kernels.look_through, [*inputs, *given], panes, labels, stock))
+    if len(mirrors):
+        water = np.zeros(len(mirrors), np.float32)
+        if first.puddles is not None:
+            water = np.where(first.puddles[mirrors] > PUDDLE_MIN, first.puddles[mirrors], 0.0)
+        given = [
+            wp.array(mirrors, dtype=int, device=stock.device),
+            first.ranges_m,
+            first.on_device,
+            wp.array(water, dtype=float, device=stock.device),
+        ]
+        seen = _launched(kernels.look_in_mirrors, [*inputs, *given], mirrors, labels, stock)
+        seen[3][:], seen[4][:], seen[5][:] = 0, 0, SURFACES.index("mirrored")
+        found.append(seen)
+    if not found:
+        return None
+    return Detours(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _launched(
+    kernel: wp.Kernel,
+    inputs: Sequence[Any],
+    picked: NDArray[np.int32],
+    labels: HitLabels,
+    stock: AssetStock,
+) -> list[NDArray[Any]]:
+    """The fields of Detours of picked rays that meet something."""
+    count = len(picked)
+    ranges_m, reflectances = (wp.zeros(count, dtype=float, device=stock.device) for _ in range(2))
+    hits_ = wp.zeros(count, dtype=wp.vec2i, device=stock.device)
+    outputs = [ranges_m, reflectances, hits_]
+    wp.launch(kernel, count, list(inputs), outputs, device=stock.device)
+    hits = hits_.numpy()
+    there = hits[:, 0] >= 0
+    seen = (ranges_m.numpy()[there], reflectances.numpy()[there])
+    return [picked[there].astype(np.int64), *seen, *labels.at(hits[there])]

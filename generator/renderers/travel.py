@@ -1,0 +1,114 @@
+"""Bodies that move while laser pulses leave one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from generator.core.capture import Beams
+from generator.core.scene import Body, Lidar, Scene
+from generator.core.se3 import Array
+from generator.renderers.kernels import lidar as kernels
+from generator.renderers.packing import PackedWorld
+from generator.renderers.stock import AssetStock
+
+KEYS = 9
+"""Poses over a sweep, straight between them: at 10 m/s^2 and 0.1 s within 0.2 mm."""
+
+SLACK_M = 2e-3
+"""Between keys a body may leave the boxes it has there by as much."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mover:
+    """A body that moves: its number, rotation matrices [KEYS, 3, 3] and positions [KEYS, 3]."""
+
+    number: int
+    body: Body
+    R_world_mesh: Array
+    t_world_mesh: Array
+
+
+def travelling(
+    scene: Scene, lidar: Lidar, beams: Beams, world: PackedWorld, stock: AssetStock
+) -> tuple[PackedWorld, kernels.Travel]:
+    """The world with boxes around all the ways that bodies take, and these ways."""
+    device = stock.device
+    travel = kernels.Travel()
+    travel.keys = 0
+    movers = _movers(scene, beams.time_s)
+    if beams.time_s is None or not (movers or beams.origins_m is not None):
+        return world, travel
+    rows = np.full(max(len(scene.bodies), 1), -1, np.int32)
+    rows[[mover.number for mover in movers]] = np.arange(len(movers))
+    start_s, end_s = float(beams.time_s.min()), float(beams.time_s.max())
+    phases = (beams.time_s - start_s) * np.float32((KEYS - 1) / max(end_s - start_s, 1e-9))
+    origins_m = beams.origins_m
+    if origins_m is None:
+        origins_m = np.zeros((len(beams.time_s), 3), np.float32)
+    B_mesh_lidar, eye_mesh = _seen_from(lidar, movers)
+    travel.keys = KEYS
+    travel.rows = wp.array(rows, dtype=int, device=device)
+    travel.B_mesh_lidar = wp.array(B_mesh_lidar, dtype=wp.mat33, device=device)
+    travel.eye_mesh = wp.array(eye_mesh, dtype=wp.vec3, device=device)
+    travel.phases = wp.array(phases, dtype=float, device=device)
+    travel.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device)
+    return _enclosing(world, movers, stock), travel
+
+
+def _movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
+    """Bodies whose pose changes while pulses leave."""
+    if time_s is None or not scene.tracks:
+        return []
+    keys_s = scene.time_s + np.linspace(float(time_s.min()), float(time_s.max()), KEYS)
+    numbers = {body.name: k for k, body in enumerate(scene.bodies)}
+    movers = []
+    for track in scene.tracks:
+        if track.end_s <= keys_s[0] or track.start_s >= keys_s[-1] or track.body not in numbers:
+            continue
+        R, t = track.poses(keys_s)
+        if (t != t[0]).any() or (R[0] != R).any():
+            number = numbers[track.body]
+            movers.append(Mover(number, scene.bodies[number], R, t))
+    return sorted(movers, key=lambda mover: mover.number)
+
+
+def _seen_from(
+    lidar: Lidar, movers: list[Mover]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Directions and the origin of the lidar frame in each mover's mesh frame, at each key."""
+    if not movers:
+        return np.zeros((1, KEYS, 3, 3), np.float32), np.zeros((1, KEYS, 3), np.float32)
+    R_world_lidar = lidar.T_world_lidar.rotation()
+    R = np.stack([mover.R_world_mesh for mover in movers])
+    t = np.stack([mover.t_world_mesh for mover in movers])
+    scale = np.array([mover.body.scale for mover in movers])[:, None, None]
+    away = np.asarray(lidar.T_world_lidar.translation_m) - t
+    B = np.einsum("nkji,jl->nkil", R, R_world_lidar, optimize=False) / scale[..., None]
+    eye = np.einsum("nkji,nkj->nki", R, away, optimize=False) / scale
+    return B.astype(np.float32), eye.astype(np.float32)
+
+
+def _enclosing(world: PackedWorld, movers: list[Mover], stock: AssetStock) -> PackedWorld:
+    """The world with a hierarchy that finds movers wherever they are."""
+    if not movers:
+        return world
+    low_m, high_m = world.placed["low_m"].copy(), world.placed["high_m"].copy()
+    for mover in movers:
+        mesh = stock.mesh(mover.body.asset)
+        middle = 0.5 * (mesh.low_m + mesh.high_m) * mover.body.scale
+        half = 0.5 * (mesh.high_m - mesh.low_m) * mover.body.scale
+        R = mover.R_world_mesh
+        centre = mover.t_world_mesh + np.einsum("kij,j->ki", R, middle, optimize=False)
+        reach = np.einsum("kij,j->ki", np.abs(R), half, optimize=False) + SLACK_M
+        low_m[mover.number] = (centre - reach).min(axis=0)
+        high_m[mover.number] = (centre + reach).max(axis=0)
+    tree = wp.Bvh(
+        wp.array(low_m, dtype=wp.vec3, device=stock.device),
+        wp.array(high_m, dtype=wp.vec3, device=stock.device),
+    )
+    world.record.tree = tree.id
+    return replace(world, keep=(*world.keep, tree))

@@ -1,0 +1,161 @@
+"""What a lens does to an image of luminance: float32 [h, w, 3], linear, any unit."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.geometry import Float32
+
+_BLUR_LEVELS = (0.0, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0)
+"""Radii of the layers between which a defocused image is composed [px]."""
+
+_BLOOM_RADII = (0.004, 0.02, 0.08)
+_BLOOM_SHARES = (0.5, 0.3, 0.2)
+_GHOSTS = (
+    (-0.35, 0.02, (0.5, 1.0, 0.6)),
+    (-0.8, 0.05, (1.0, 0.5, 0.5)),
+    (0.5, 0.03, (0.5, 0.6, 1.0)),
+)
+"""Ghosts of a bright spot: place on the line through the centre, radius over width, tint."""
+
+
+def blur_radius_px(
+    z_m: NDArray[np.floating], focus_m: float, focal_m: float, f_number: float, pitch_m: float
+) -> Float32:
+    """Radius of the circle of confusion of a thin lens [px], signed: negative before the focus.
+
+    ``c = (f^2 / N) |z - s| / (z (s - f))``; see Potmesil and Chakravarty, "A lens and aperture
+    camera model for synthetic image generation", SIGGRAPH 1981. ``z`` of infinity is allowed.
+    """
+    inverse = np.where(np.isfinite(z_m), 1.0 / np.maximum(z_m, 1e-3), 0.0)
+    diameter_m = focal_m * focal_m / f_number / (focus_m - focal_m) * (1.0 - focus_m * inverse)
+    return np.asarray(0.5 * diameter_m / pitch_m, np.float32)
+
+
+def defocused(image: Float32, radius_px: Float32) -> Float32:
+    """The image with every point spread over its circle of confusion.
+
+    Layers of like radius are blurred and laid over each other from far to near, so that what is
+    sharp does not bleed into what is blurred behind it. After Kraus and Strengert, "Depth-of-field
+    rendering by pyramidal image processing", Eurographics 2007.
+    """
+    levels = np.asarray(_BLUR_LEVELS, np.float32)
+    level = np.searchsorted(0.5 * (levels[1:] + levels[:-1]), np.abs(radius_px))
+    signed = np.where(radius_px < 0.0, -level, level)
+    out = np.zeros_like(image)
+    weight = np.zeros(image.shape[:2], np.float32)
+    for layer in sorted(np.unique(signed).tolist(), reverse=True):
+        alpha = (signed == layer).astype(np.float32)
+        kernel = _disc(float(levels[abs(layer)]))
+        color = cv2.filter2D(image * alpha[..., None], -1, kernel, borderType=cv2.BORDER_REPLICATE)
+        cover = cv2.filter2D(alpha, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+        cover = np.clip(cover, 0.0, 1.0)
+        out = color + out * (1.0 - cover)[..., None]
+        weight = cover + weight * (1.0 - cover)
+    return np.asarray(out / np.maximum(weight, 1e-4)[..., None], np.float32)
+
+
+def vignetted(image: Float32, focal_px: float, natural: bool, corner_loss: float) -> Float32:
+    """Darker towards the corners.
+
+    Args:
+        image: What to darken.
+        focal_px: Focal length.
+        natural: Whether light falls off with the fourth power of the cosine, as geometry asks.
+        corner_loss: Share that the barrel takes away at the corners, growing with the square of
+            the distance (Goldman, "Vignette and exposure calibration and compensation", 2010).
+    """
+    height, width = image.shape[:2]
+    x = np.arange(width, dtype=np.float32) + np.float32(0.5 - 0.5 * width)
+    y = np.arange(height, dtype=np.float32) + np.float32(0.5 - 0.5 * height)
+    r2 = x[None, :] ** 2 + y[:, None] ** 2
+    gain = 1.0 - corner_loss * r2 / (0.25 * (width * width + height * height))
+    if natural:
+        cos2 = 1.0 / (1.0 + r2 / (focal_px * focal_px))
+        gain = gain * cos2 * cos2
+    return np.asarray(image * gain[..., None].astype(np.float32), np.float32)
+
+
+def with_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
+    """Red images are larger and blue ones smaller, by so many pixels at the corner (lateral)."""
+    height, width = image.shape[:2]
+    share = corner_px / (0.5 * math.hypot(width, height))
+    out = image.copy()
+    for channel, scale in ((0, 1.0 + share), (2, 1.0 - share)):
+        shift = np.array(
+            [
+                [scale, 0.0, (1.0 - scale) * 0.5 * (width - 1)],
+                [0.0, scale, (1.0 - scale) * 0.5 * (height - 1)],
+            ]
+        )
+        out[..., channel] = cv2.warpAffine(
+            image[..., channel],
+            shift,
+            (width, height),
+            flags=cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+    return np.asarray(out, np.float32)
+
+
+def bloomed(image: Float32, share: float) -> Float32:
+    """A share of all light is scattered in the lens: a narrow core and a wide veil.
+
+    Energy is kept. The sum of Gaussians stands for the point spread of Spencer et al.,
+    "Physically-based glare effects for digital images", SIGGRAPH 1995.
+    """
+    width = image.shape[1]
+    veil = np.zeros_like(image)
+    for radius, part in zip(_BLOOM_RADII, _BLOOM_SHARES, strict=True):
+        veil += part * _gaussian(image, radius * width)
+    return np.asarray((1.0 - share) * image + share * veil, np.float32)
+
+
+def flared(image: Float32, share: float, white: float) -> Float32:
+    """Ghosts of what is far brighter than white, mirrored about the centre of the image.
+
+    Args:
+        image: What is seen.
+        share: Of the light beyond white that comes back as ghosts.
+        white: Luminance that saturates.
+    """
+    beyond = np.maximum(image - 4.0 * white, 0.0)
+    if not beyond.any():
+        return image
+    height, width = image.shape[:2]
+    out = image.copy()
+    for place, radius, tint in _GHOSTS:
+        shift = np.array(
+            [
+                [place, 0.0, (1.0 - place) * 0.5 * (width - 1)],
+                [0.0, place, (1.0 - place) * 0.5 * (height - 1)],
+            ]
+        )
+        # Shrunk images gather the light of what they shrink.
+        ghost = cv2.warpAffine(beyond, shift, (width, height), flags=cv2.INTER_AREA)
+        ghost = _gaussian(ghost, radius * width)
+        out += share * place * place * ghost * np.asarray(tint, np.float32)
+    return np.asarray(out, np.float32)
+
+
+def _gaussian(image: Float32, sigma_px: float) -> Float32:
+    """A wide blur at a coarse scale: smooth images need few pixels."""
+    halvings = max(0, int(math.log2(max(sigma_px, 1.0) / 2.0)))
+    small = image
+    for _ in range(halvings):
+        small = cv2.resize(small, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    small = cv2.GaussianBlur(small, (0, 0), sigma_px / 2**halvings, borderType=cv2.BORDER_REPLICATE)
+    size = (image.shape[1], image.shape[0])
+    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def _disc(radius_px: float) -> Float32:
+    """A disc of uniform weight that sums to 1, anti-aliased at its rim."""
+    reach = math.ceil(radius_px)
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float32)
+    disc = np.clip(radius_px + 0.5 - np.hypot(x, y), 0.0, 1.0)
+    return np.asarray(disc / disc.sum(), np.float32)

@@ -1,0 +1,127 @@
+"""Photosites: from light to numbers, with the noise of the way.
+
+The model is that of EMVA standard 1288: electrons are Poisson around light times response plus dark
+current times time; a gain, read noise and a converter of so many bits follow.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from generator.config.distributions import NonNegative
+from generator.config.distributions.discrete import Constant
+from generator.config.strict import Strict
+from generator.core.geometry import Float32
+from generator.core.streams import Rng, Streams
+
+Pattern = Literal["rggb", "bggr", "grbg", "gbrg", "mono"]
+
+_FILTERS = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "grbg": (1, 0, 2, 1), "gbrg": (1, 2, 0, 1)}
+
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class Photosites(Strict):
+    """An image sensor's data sheet.
+
+    Attributes:
+        pattern: Colours of its filters, first row then second; ``mono`` = none.
+        full_well_e: Electrons that saturate a photosite at base gain.
+        read_noise_e: Standard deviation of a reading of nothing, at base gain.
+        read_noise_high_e: The same at the highest gain; between them it falls with the gain.
+        dark_current_e_s: Electrons per second that come without light.
+        prnu: Standard deviation of the photosites' response about 1.
+        dsnu_e: Standard deviation of the photosites' dark level.
+        hot_pixels: Share of photosites with two hundred times the dark current.
+        bits: Of the converter.
+        exposures: Readings at falling exposure that are joined to one of high range.
+        exposure_ratio: Between one of them and the next.
+        device_seed: Which piece of its kind: its fixed pattern.
+    """
+
+    pattern: Pattern = "rggb"
+    full_well_e: float = Field(10_000.0, gt=0)
+    read_noise_e: NonNegative = Constant(3.0)
+    dark_current_e_s: NonNegative = Constant(5.0)
+    prnu: Share = 0.005
+    dsnu_e: float = Field(0.5, ge=0)
+    hot_pixels: Share = 0.0
+    bits: int = Field(12, ge=8, le=16)
+    exposures: int = Field(1, ge=1, le=4)
+    exposure_ratio: float = Field(16.0, gt=1)
+    device_seed: int = 0
+
+
+def mosaic(image: Float32, pattern: Pattern) -> Float32:
+    """What photosites behind their filters receive, float32 [h, w].
+
+    Args:
+        image: Linear response of the three filters, float32 [h, w, 3].
+        pattern: Filters; ``mono`` takes luminance.
+    """
+    if pattern == "mono":
+        return np.asarray(image @ np.array([0.2126, 0.7152, 0.0722], np.float32), np.float32)
+    raw = np.empty_like(image[..., 0])
+    for k, channel in enumerate(_FILTERS[pattern]):
+        raw[k // 2 :: 2, k % 2 :: 2] = image[k // 2 :: 2, k % 2 :: 2, channel]
+    return raw
+
+
+def filter_at(pattern: Pattern, height: int, width: int) -> NDArray[np.intp]:
+    """Number of the colour of every photosite's filter [h, w]; 1 everywhere for ``mono``."""
+    filters = np.ones((height, width), np.intp)
+    if pattern != "mono":
+        for k, channel in enumerate(_FILTERS[pattern]):
+            filters[k // 2 :: 2, k % 2 :: 2] = channel
+    return filters
+
+
+def exposed(light: Float32, gain: float, time_s: float, sites: Photosites, rng: Rng) -> Float32:
+    """Numbers of the converter for light on the photosites, float32 [h, w]; 1 = saturated.
+
+    Args:
+        light: 1 saturates the photosites at this gain; any range.
+        gain: ISO over base ISO, 1 or more: the well is used up to ``full_well_e / gain``.
+        time_s: How long it is exposed.
+        sites: The sensor.
+        rng: Draws the noise.
+
+    Returns:
+        Linear values from 0; above 1 only where several exposures are joined.
+    """
+    joined = _reading(light, gain, time_s, sites, rng)
+    reach = 1.0
+    for _ in range(1, sites.exposures):
+        reach *= sites.exposure_ratio
+        shorter = _reading(light / reach, gain, time_s / reach, sites, rng)
+        # A photosite that is nearly full is read from the next shorter exposure.
+        joined = np.where(joined >= 0.95 * reach / sites.exposure_ratio, shorter * reach, joined)
+    return joined.astype(np.float32)
+
+
+def _reading(light: Float32, gain: float, time_s: float, sites: Photosites, rng: Rng) -> Float32:
+    well_e = sites.full_well_e / gain
+    response, offset_e, dark = _fixed_pattern(light.shape, sites)
+    dark_e = sites.dark_current_e_s.draw(rng) * time_s
+    mean_e = np.clip(light, 0.0, 8.0) * response * well_e + dark_e * dark
+    # A photosite that light overfills eight times over is as full as one that it fills.
+    electrons = rng.poisson(mean_e).astype(np.float32)
+    noise = rng.standard_normal(light.shape, dtype=np.float32)
+    level = electrons + sites.read_noise_e.draw(rng) * noise + offset_e - dark_e
+    steps = np.float32((1 << sites.bits) - 1)
+    return np.asarray(np.clip(np.rint(level / well_e * steps), 0, steps) / steps, np.float32)
+
+
+@lru_cache(maxsize=8)
+def _fixed_pattern(shape: tuple[int, int], sites: Photosites) -> tuple[Float32, Float32, Float32]:
+    """Response, dark level [e] and dark current over its mean of every photosite: one device's."""
+    rng = Streams(seed=sites.device_seed, scene=0).rng("photosites")
+    response = 1.0 + sites.prnu * rng.standard_normal(shape, dtype=np.float32)
+    offset_e = sites.dsnu_e * rng.standard_normal(shape, dtype=np.float32)
+    dark = np.where(rng.random(shape) < sites.hot_pixels, np.float32(200.0), np.float32(1.0))
+    return response.astype(np.float32), offset_e.astype(np.float32), dark.astype(np.float32)

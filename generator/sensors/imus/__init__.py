@@ -1,0 +1,1 @@
+"""Inertial units as data: one YAML file each, with its sources."""

@@ -1,0 +1,1 @@
+"""Radars as data: one YAML file each, with its sources."""

@@ -1,0 +1,1 @@
+"""Satellite receivers as data: one YAML file each, with its sources."""

@@ -1,0 +1,256 @@
+"""What the robot arm does in the course of a sequence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from generator.config.distributions import Bounds, Choice, Name, NonNegative, Scalar, Uniform
+from generator.config.strict import Strict
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import ArmGoal, Articulation, Body, Scene, Surface
+from generator.core.se3 import SE3
+from generator.core.streams import Rng
+from randomizers.arm_configuration import GRASP_MARGIN, arm_joints, hand_over, hand_pose
+from randomizers.base import RandomizerBase
+from randomizers.placing import half_extents_m
+
+TASKS = ("pick_and_place", "reach")
+EDGE_M = 0.08
+"""Things are put down this far from the edges of a surface, or farther."""
+CANDIDATES_MAX = 12
+"""Objects that are tried in turn."""
+
+Speed = Annotated[Scalar, Bounds(0.01, 1.0)]
+
+
+class Stop(Strict):
+    """One goal of a given way: exactly one of joints_deg, reach_m, grasp and place_m.
+
+    Attributes:
+        joints_deg: Position of every arm joint; metres for joints that slide.
+        reach_m: Where the hand goes, in the world; it points down.
+        yaw_deg: Turn of the hand about Z, or of an object that is put down.
+        tilt_deg: How far the hand leans.
+        towards_deg: Direction of the level axis about which it leans.
+        opening: Of the gripper; 0 is closed, 1 is open.
+        grasp: Names of object groups; one of their members is lifted from above.
+        place_m: Where on a surface the object in the hand is put down, in the world.
+    """
+
+    joints_deg: tuple[float, ...] | None = None
+    reach_m: tuple[float, float, float] | None = None
+    yaw_deg: float = 0.0
+    tilt_deg: float = Field(0.0, ge=0, le=90)
+    towards_deg: float = 0.0
+    opening: float = Field(1.0, ge=0, le=1)
+    grasp: tuple[str, ...] | None = None
+    place_m: tuple[float, float] | None = None
+
+    @model_validator(mode="after")
+    def _one_thing(self) -> Stop:
+        given = [v for v in (self.joints_deg, self.reach_m, self.grasp, self.place_m) if v]
+        if len(given) != 1:
+            raise ValueError("give exactly one of joints_deg, reach_m, grasp and place_m")
+        return self
+
+
+class ArmMotion(RandomizerBase):
+    """Draws or states a way for every arm; physics finds trajectories that hit nothing.
+
+    It comes after arm_configuration, which draws where arms are at time 0.
+
+    Attributes:
+        task: pick_and_place: an object is lifted, carried and put down elsewhere. reach: the hand
+            visits poses over the workspace.
+        way: Goals in turn, instead of a task.
+        objects: Names of the object groups that are handled; empty = all.
+        count: How many objects are moved, or how many poses are visited.
+        candidates: How many places or poses are drawn for each.
+        tilt_deg: How far the hand leans from pointing straight down when it visits poses.
+        speed: Share of the joints' speed and acceleration limits that is used.
+    """
+
+    type: Literal["arm_motion"] = "arm_motion"
+    every: Literal["scene"] = "scene"
+    task: Name = Choice({"pick_and_place": 1.0})
+    way: tuple[Stop, ...] = ()
+    objects: tuple[str, ...] = ()
+    count: int = Field(1, ge=1, le=20)
+    candidates: int = Field(16, ge=1, le=256)
+    tilt_deg: NonNegative = Uniform(0.0, 25.0)
+    speed: Speed = Uniform(0.4, 0.7)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with a way for every articulation.
+
+        Raises:
+            ConfigError: a task, group or surface that does not exist, or the wrong number of
+                joints.
+        """
+        return replace(
+            scene,
+            articulations=tuple(
+                replace(arm, way=self._way(arm, scene, assets, rng)) for arm in scene.articulations
+            ),
+        )
+
+    def _way(
+        self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng
+    ) -> tuple[ArmGoal, ...]:
+        speed = round(self.speed.draw(rng), 4)
+        if self.way:
+            goals = [
+                self._given(stop, f"randomizers.{self.name}.way[{k}]", arm, scene, assets, rng)
+                for k, stop in enumerate(self.way)
+            ]
+        elif self._task(rng) == "reach" or assets.robot(arm.asset).gripper is None:
+            goals = [self._visit(arm, assets, rng) for _ in range(self.count)]
+        else:
+            goals = self._errands(arm, scene, assets, rng)
+        return tuple(replace(goal, speed=speed) for goal in goals)
+
+    def _task(self, rng: Rng) -> str:
+        task = self.task.draw(rng)
+        if task not in TASKS:
+            raise ConfigError(
+                f"randomizers.{self.name}.task: unknown task '{task}'; expected one of "
+                f"{', '.join(TASKS)}{did_you_mean(task, TASKS)}"
+            )
+        return task
+
+    def _visit(self, arm: Articulation, assets: AssetIndex, rng: Rng) -> ArmGoal:
+        robot = assets.robot(arm.asset)
+        if robot.gripper is not None:
+            poses = tuple(hand_over(arm, self.tilt_deg, rng) for _ in range(self.candidates))
+            return ArmGoal("reach", pose_candidates=poses)
+        candidates = tuple(
+            tuple(round(float(rng.uniform(j.lower, j.upper)), 6) for j in arm_joints(robot))
+            for _ in range(self.candidates)
+        )
+        return ArmGoal("joints", joint_candidates=candidates)
+
+    def _errands(
+        self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng
+    ) -> list[ArmGoal]:
+        """Objects lifted and put down; what the arm holds from the beginning comes first."""
+        holds = arm.goal is not None and arm.goal.kind == "hold"
+        goals: list[ArmGoal] = []
+        for number in range(self.count):
+            if number > 0 or not holds:
+                names = self._graspable(arm, self.objects, scene, assets, rng)
+                goals.append(ArmGoal("grasp", objects=names))
+            goals.append(ArmGoal("place", pose_candidates=self._spots(arm, scene, rng)))
+        return goals
+
+    def _graspable(
+        self,
+        arm: Articulation,
+        groups: tuple[str, ...],
+        scene: Scene,
+        assets: AssetIndex,
+        rng: Rng,
+    ) -> tuple[str, ...]:
+        """Names of objects with a side that fits between the fingers, in a drawn order."""
+        gripper = assets.robot(arm.asset).gripper
+        known = [group.name for group in scene.groups]
+        for name in groups:
+            if name not in known:
+                raise ConfigError(
+                    f"randomizers.{self.name}: there is no object group '{name}'; expected one of "
+                    f"{', '.join(known)}{did_you_mean(name, known)}"
+                )
+        limit_m = GRASP_MARGIN * gripper.stroke_m if gripper else 0.0
+        wanted = groups or tuple(known)
+        held = arm.goal.held if arm.goal else ""
+        fitting = [
+            body.name
+            for body in scene.bodies
+            if body.group in wanted and body.name != held and _narrowest_m(body, assets) < limit_m
+        ]
+        order = rng.permutation(len(fitting))
+        return tuple(fitting[int(k)] for k in order)[:CANDIDATES_MAX]
+
+    def _spots(self, arm: Articulation, scene: Scene, rng: Rng) -> tuple[SE3, ...]:
+        """Points on the surfaces within an arm's reach, each with up to a quarter turn."""
+        wanted = self.objects or tuple(group.name for group in scene.groups)
+        names = {s for group in scene.groups if group.name in wanted for s in group.surfaces}
+        surfaces = [s for s in scene.surfaces if s.name in names and not s.walled]
+        surfaces = surfaces or [s for s in scene.surfaces if s.name in names]
+        if not surfaces:
+            raise ConfigError(
+                f"randomizers.{self.name}: there is no surface to put things on; "
+                "name object groups that lie on one (objects)"
+            )
+        return tuple(
+            _spot(surfaces[int(rng.integers(len(surfaces)))], arm, rng)
+            for _ in range(self.candidates)
+        )
+
+    def _given(
+        self,
+        stop: Stop,
+        field: str,
+        arm: Articulation,
+        scene: Scene,
+        assets: AssetIndex,
+        rng: Rng,
+    ) -> ArmGoal:
+        if stop.grasp:
+            return ArmGoal("grasp", objects=self._graspable(arm, stop.grasp, scene, assets, rng))
+        yaw_rad = math.radians(stop.yaw_deg)
+        if stop.place_m:
+            return ArmGoal("place", pose_candidates=(_on_surface(stop, yaw_rad, scene, field),))
+        if stop.reach_m:
+            tilt_rad, towards_rad = math.radians(stop.tilt_deg), math.radians(stop.towards_deg)
+            pose = hand_pose(stop.reach_m, yaw_rad, tilt_rad, towards_rad)
+            return ArmGoal("reach", pose_candidates=(pose,), opening=stop.opening)
+        joints = arm_joints(assets.robot(arm.asset))
+        given = stop.joints_deg or ()
+        if len(given) != len(joints):
+            raise ConfigError(
+                f"{field}.joints_deg: {len(given)} positions for the {len(joints)} joints of arm "
+                f"'{arm.name}' ({', '.join(joint.name for joint in joints)})"
+            )
+        positions = tuple(
+            value if joint.kind == "prismatic" else round(math.radians(value), 6)
+            for joint, value in zip(joints, given, strict=True)
+        )
+        return ArmGoal("joints", joint_candidates=(positions,), opening=stop.opening)
+
+
+def _spot(surface: Surface, arm: Articulation, rng: Rng) -> SE3:
+    """A point of a surface, away from its edges, moved to below the arm's workspace."""
+    low, high = arm.workspace_m
+    half_x, half_y = (max(0.0, 0.5 * size - EDGE_M) for size in surface.size_m)
+    u, v = float(rng.uniform(-half_x, half_x)), float(rng.uniform(-half_y, half_y))
+    yaw = SE3.about_z(float(rng.uniform(-0.5 * math.pi, 0.5 * math.pi)))
+    x, y, z = (surface.T_world_surface @ SE3((u, v, 0.0))).translation_m
+    x, y = min(max(x, low[0]), high[0]), min(max(y, low[1]), high[1])
+    return (SE3((x, y, z)) @ yaw).rounded()
+
+
+def _on_surface(stop: Stop, yaw_rad: float, scene: Scene, field: str) -> SE3:
+    """The given point on the highest surface that is there."""
+    assert stop.place_m is not None
+    x, y = stop.place_m
+    heights = []
+    for surface in scene.surfaces:
+        u, v, _ = (surface.T_world_surface.inverse() @ SE3((x, y, 0.0))).translation_m
+        if abs(u) <= 0.5 * surface.size_m[0] and abs(v) <= 0.5 * surface.size_m[1]:
+            heights.append(surface.T_world_surface.translation_m[2])
+    if not heights:
+        raise ConfigError(
+            f"{field}.place_m: there is no surface at ({x}, {y}); expected a point over one of "
+            f"{', '.join(surface.name for surface in scene.surfaces)}"
+        )
+    return SE3.about_z(yaw_rad, (x, y, max(heights))).rounded()
+
+
+def _narrowest_m(body: Body, assets: AssetIndex) -> float:
+    """The smallest extent of an object."""
+    return 2.0 * min(half_extents_m(*assets.bounds_m(body.asset), body.scale))

@@ -1,0 +1,82 @@
+"""How far sensors are from where a rig's drawing has them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Literal
+
+from generator.config.distributions import Normal, Scalar
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.instants import with_placed_sensors
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Camera, Device, Lidar, Scene
+from generator.core.se3 import SE3, multiply_quaternions
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase
+
+
+class RigCalibration(RandomizerBase):
+    """Mounts every sensor of a rig a little beside its place, as no two vehicles are built alike.
+
+    Labels and calibration files know where the sensors really are.
+
+    Attributes:
+        rig: Name of a rig; empty = every rig.
+        offset_m: Along each axis of the sensor.
+        turn_deg: About each axis of the sensor.
+    """
+
+    type: Literal["rig_calibration"] = "rig_calibration"
+    rig: str = ""
+    offset_m: Scalar = Normal(0.0, 0.005, clip=(-0.02, 0.02))
+    turn_deg: Scalar = Normal(0.0, 0.2, clip=(-1.0, 1.0))
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with other poses of sensors on their rigs.
+
+        Raises:
+            ConfigError: there is no such rig, or nothing is mounted on it.
+        """
+        del assets
+        sensors: tuple[Camera | Lidar | Device, ...]
+        sensors = (*scene.cameras, *scene.lidars, *scene.devices)
+        known = sorted({sensor.rig for sensor in sensors if sensor.rig})
+        if not known or (self.rig and self.rig not in known):
+            raise ConfigError(
+                f"randomizers.{self.name}.rig: no sensor is on a rig '{self.rig}'; rigs with "
+                f"sensors: {', '.join(known) or 'none'}{did_you_mean(self.rig, known)}"
+            )
+        rigs = {self.rig} if self.rig else set(known)
+        return with_placed_sensors(
+            replace(
+                scene,
+                cameras=tuple(
+                    replace(c, T_rig_camera=self._moved(c.T_rig_camera, rng))
+                    if c.rig in rigs
+                    else c
+                    for c in scene.cameras
+                ),
+                lidars=tuple(
+                    replace(s, T_rig_lidar=self._moved(s.T_rig_lidar, rng)) if s.rig in rigs else s
+                    for s in scene.lidars
+                ),
+                devices=tuple(
+                    replace(d, T_rig_device=self._moved(d.T_rig_device, rng))
+                    if d.rig in rigs
+                    else d
+                    for d in scene.devices
+                ),
+            )
+        )
+
+    def _moved(self, T_rig_sensor: SE3, rng: Rng) -> SE3:
+        """The pose after an offset and three turns, each about an axis of the sensor."""
+        x, y, z = (self.offset_m.draw(rng) for _ in range(3))
+        half = [0.5 * math.radians(self.turn_deg.draw(rng)) for _ in range(3)]
+        turn = (1.0, 0.0, 0.0, 0.0)
+        for axis, angle in enumerate(half):
+            about = [math.cos(angle), 0.0, 0.0, 0.0]
+            about[axis + 1] = math.sin(angle)
+            turn = multiply_quaternions(turn, (about[0], about[1], about[2], about[3]))
+        return (T_rig_sensor @ SE3((x, y, z), turn)).rounded()

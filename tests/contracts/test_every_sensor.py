@@ -1,0 +1,212 @@
+"""What must hold for every sensor in the table, ours or anybody's."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from generator.config.describe import describe
+from generator.config.schema import json_schema
+from generator.core.capture import POINT, Channel, PointCloud, Reading, Table
+from generator.core.errors import ConfigError
+from generator.core.instants import at, with_placed_sensors, with_twists
+from generator.core.interfaces import Renderer
+from generator.core.intrinsics import Intrinsics
+from generator.core.motion import Track
+from generator.core.scene import Body, Camera, Environment, Instance, Light, Rig, Scene
+from generator.core.se3 import SE3
+from generator.core.serial import canonical_json, from_plain
+from generator.core.streams import Streams
+from generator.core.tables import TABLE_COLUMNS, table_dtype
+from generator.renderers.warp import WarpRenderer
+from generator.sensors import TABLE
+from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
+
+GIVEN: dict[str, dict[str, Any]] = {
+    "rgb_camera": {"size_px": [32, 24]},
+    "lidar": {"model": "VLP-16"},
+    "event_camera": {"size_px": [32, 24], "frames_per_step": 2},
+}
+"""Fields by which a sensor is quicker than by default."""
+
+IMAGING = ("camera", "lidar")
+each = pytest.mark.parametrize("kind", list(TABLE))
+device = pytest.mark.parametrize(
+    "kind", [kind for kind in TABLE if TABLE.load(kind).modality not in IMAGING]
+)
+
+
+@cache
+def renderer() -> Renderer:
+    """The renderer of the project, on small pictures."""
+    meshes = {"box": box_mesh((4.0, 1.8, 1.0)), "ground": plane_mesh(300.0)}
+    return WarpRenderer(FakeLibrary(meshes), "cpu")
+
+
+@cache
+def street() -> Scene:
+    """A box that drives at 8 m/s with a rig on it, another that meets it, and the ground."""
+    poses = {
+        "ego": tuple(SE3((0.8 * k, 0.0, 0.5)) for k in range(31)),
+        "car": tuple(SE3((30.0 - 0.5 * k, 3.0, 0.5)) for k in range(31)),
+    }
+    boxes = [
+        Body(name, "box", way[0], instance_id=k) for k, (name, way) in enumerate(poses.items(), 1)
+    ]
+    bounds = ((-2.0, -0.9, -0.5), (2.0, 0.9, 0.5))
+    things = [
+        Instance(k, b.name, "car", 1, b.asset, True, (), b.T_world_body, *bounds)
+        for k, b in enumerate(boxes, 1)
+    ]
+    lens = Intrinsics.from_hfov(32, 24, 1.0)
+    return with_twists(
+        Scene(
+            "test",
+            bodies=(*boxes, Body("ground", "ground")),
+            instances=tuple(things),
+            cameras=(Camera("color", SE3(), lens, rig="ego"),),
+            rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 1.0))),),
+            lights=(Light("sun", "sun", direction=(0.0, 0.6, -0.8), illuminance_lux=5e4),),
+            environment=Environment(luminance_cd_m2=3000.0),
+            tracks=tuple(Track(name, 0.1, way) for name, way in poses.items()),
+        )
+    )
+
+
+def made(kind: str, **fields: Any) -> Any:
+    """A sensor of that type on the rig, read as YAML would be."""
+    plain = {"type": kind, "name": "unit", "rig": "ego", **GIVEN.get(kind, {}), **fields}
+    return TABLE.load(kind).model_validate_json(json.dumps(plain))
+
+
+def seen(sensor: Any, step: int = 3, seed: int = 0) -> Reading | PointCloud | Table:
+    """What it returns at one step."""
+    scene = with_placed_sensors(sensor.mount(street()))
+    rng = Streams(seed, scene=0, view=0, step=step).rng("sensor/unit")
+    channels = frozenset({Channel.INSTANCE})
+    return sensor.capture(at(scene, 0.1 * step), renderer(), channels, rng)
+
+
+def data(returned: Reading | PointCloud | Table) -> bytes:
+    """All bytes of what was returned."""
+    if isinstance(returned, Reading):
+        return b"".join(returned.channels[c].tobytes() for c in sorted(returned.channels))
+    return (returned.rows if isinstance(returned, Table) else returned.points).tobytes()
+
+
+@each
+def test_mounting_adds_it_by_its_name_and_leaves_the_scene_alone(kind: str) -> None:
+    """The new scene has it among cameras, lidars or devices; it survives serialisation."""
+    before = canonical_json(street())
+    sensor = made(kind)
+    scene = with_placed_sensors(sensor.mount(street()))
+
+    assert canonical_json(street()) == before
+    names = [s.name for s in (*scene.cameras, *scene.lidars, *scene.devices)]
+    assert names.count("unit") == 1
+    assert from_plain(Scene, json.loads(canonical_json(scene))) == scene
+
+
+@each
+def test_an_unknown_rig_is_named_with_those_there_are(kind: str) -> None:
+    """Before anything is made."""
+    with pytest.raises(ConfigError, match=r"sensor 'unit': there is no rig 'eg'; there is ego"):
+        made(kind, rig="eg").mount(street())
+
+
+@each
+def test_it_moves_with_its_rig(kind: str) -> None:
+    """0.8 m in 0.1 s."""
+    scene = with_placed_sensors(made(kind, offset_m=[0.5, 0.0, 0.2]).mount(street()))
+
+    def place(s: Scene) -> np.ndarray:
+        poses = [c.T_world_camera for c in s.cameras if c.name == "unit"]
+        poses += [lidar.T_world_lidar for lidar in s.lidars]
+        poses += [d.T_world_device for d in s.devices]
+        return np.array(poses[0].translation_m)
+
+    assert np.allclose(place(scene), [0.5, 0.0, 1.7], atol=1e-6)
+    assert np.allclose(place(at(scene, 0.1)), [1.3, 0.0, 1.7], atol=1e-6)
+
+
+@each
+def test_a_step_made_alone_has_the_same_bytes_in_any_process(kind: str) -> None:
+    """By a copy that was sent to another process, after another step."""
+    sensor = made(kind)
+    copy = pickle.loads(pickle.dumps(sensor))
+    seen(copy, step=2)
+
+    assert data(seen(copy)) == data(seen(sensor))
+
+
+@each
+def test_it_explains_itself(kind: str) -> None:
+    """Schema and description exist, and every field of ours is described."""
+    model = TABLE.load(kind)
+    schema = json_schema(model)
+    undescribed = [
+        name
+        for name, entry in schema["properties"].items()
+        if not entry.get("description") and name != "type"
+    ]
+
+    assert not undescribed
+    assert describe(model)
+    assert schema["properties"]["type"]["const"] == kind
+
+
+@each
+def test_unknown_fields_are_refused(kind: str) -> None:
+    """A misspelt field is an error, never ignored."""
+    with pytest.raises(ValidationError, match="no_such_field"):
+        made(kind, no_such_field=1)
+
+
+@device
+def test_rows_are_of_the_type_that_is_documented(kind: str) -> None:
+    """And every column says what it means, its unit at its name's end."""
+    returned = seen(made(kind))
+
+    assert isinstance(returned, Table)
+    assert returned.rows.dtype == table_dtype(TABLE.load(kind).modality)
+    assert returned.device.name == "unit"
+    assert returned.device.T_world_device.translation_m[0] == pytest.approx(2.4)
+    assert returned.time_s == pytest.approx(0.3)
+    for column in TABLE_COLUMNS[TABLE.load(kind).modality]:
+        assert column.meaning
+
+
+@device
+def test_rows_lie_between_the_last_step_and_this_one(kind: str) -> None:
+    """In order of time."""
+    for step in range(4):
+        returned = seen(made(kind), step)
+        assert isinstance(returned, Table)
+        times_s = returned.rows["time_s"]
+        assert (np.diff(times_s) >= 0.0).all()
+        assert (times_s <= 0.1 * step + 1e-9).all()
+        assert (times_s > 0.1 * (step - 1) - 1e-9).all()
+
+
+@device
+def test_a_rate_that_does_not_fit_is_told_with_one_that_does(kind: str) -> None:
+    """Neither a whole number of readings per step nor of steps per reading."""
+    scene = replace(street(), step_s=0.1)
+    for rate_hz, remedy in ((23.0, "such as 20 Hz"), (4.0, "such as 5 Hz")):
+        with pytest.raises(ConfigError, match=f"rate_hz {rate_hz:g} does not fit .*{remedy}"):
+            made(kind, rate_hz=rate_hz).mount(scene)
+
+
+def test_points_of_laser_scanners_are_of_the_type_that_is_documented() -> None:
+    """For completeness of the table."""
+    returned = seen(made("lidar"))
+
+    assert isinstance(returned, PointCloud)
+    assert returned.points.dtype == POINT

@@ -1,0 +1,157 @@
+"""Devices on a rig in the samples of a sequence: rates, steps made alone, bytes."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from generator.assemble.recipe import open_pipeline, recipe_of
+from generator.assemble.spec import load_spec
+from generator.assets.library import open_library
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.interfaces import DatasetInfo, Settled
+from generator.core.scene import Instance
+from generator.core.se3 import SE3
+from generator.core.streams import Streams
+from generator.pipeline import Pipeline
+from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.sensors.gnss import Gnss
+from generator.sensors.imu import Imu
+from generator.sensors.mounting import Instrument
+from generator.sensors.odometer import Odometer
+from generator.sensors.radar import Radar
+from generator.sensors.watcher import Watcher
+from tests.sensors.streetcar import CAR_M, BoxRays, thing, world
+
+SENSORS: tuple[Instrument, ...] = (
+    Imu(),
+    Gnss(rate_hz=5.0),
+    Odometer(),
+    Radar(offset_m=(2.2, 0.0, 0.5)),
+    Watcher(),
+)
+STEPS = 4
+
+
+class Boxes:
+    """Assets that are all as large as a car."""
+
+    def get(self, asset_id: str) -> SimpleNamespace:
+        """An entry without facts."""
+        return SimpleNamespace(attributes=(), subcategory="")
+
+    def bounds_m(self, asset_id: str) -> tuple:
+        """A car's."""
+        return CAR_M
+
+    def keypoints(self, asset_id: str) -> tuple:
+        """None."""
+        return ()
+
+
+class AtRest:
+    """Physics that finds every scene at rest."""
+
+    def settle(self, scene: object) -> Settled:
+        """The scene as it is."""
+        return Settled(scene)  # type: ignore[arg-type]
+
+
+def pipeline(seed: int = 3) -> Pipeline:
+    """Two views of an ego car behind a parked one, four steps each."""
+    scene = world(others=[thing(2, "parked", "car", SE3((15.0, 0.0, 0.0)))])
+    for sensor in SENSORS:
+        scene = sensor.mount(scene)
+    recipe = Recipe(
+        seed=seed,
+        views_per_scene=2,
+        blueprint=lambda streams: Blueprint(scene, ()),
+        sensors=SENSORS,
+        channels=frozenset({Channel.INSTANCE}),
+        image_truth=lambda scene, reading: None,  # type: ignore[arg-type, return-value]
+        split_shares={"train": 1.0},
+        layout_attempts_max=1,
+        info=DatasetInfo(
+            "test",
+            seed,
+            8,
+            2,
+            ("car",),
+            (),
+            {},
+            devices={s.name: s.modality for s in SENSORS},
+            steps_per_scene=STEPS,
+        ),
+        exporters={},
+        strides={"gnss": 2},
+    )
+    return Pipeline(recipe, Boxes(), AtRest, BoxRays)  # type: ignore[arg-type]
+
+
+def test_every_device_reports_at_its_rate() -> None:
+    """The receiver at every second step, the inertial unit ten times in each."""
+    with pipeline() as made:
+        tables = [made.sample(k).capture.tables for k in range(STEPS)]
+
+    assert ["gnss" in t for t in tables] == [True, False, True, False]
+    assert [len(t["imu"].rows) for t in tables] == [1, 10, 10, 10]
+    assert all(2 in t["radar"].rows["instance_id"] for t in tables)
+    gap_m = [float(t["watcher"].rows["value"].min()) for t in tables]
+    assert gap_m == pytest.approx([15.0 - 4.4 - k for k in range(STEPS)], abs=1e-4)
+
+
+def test_a_sample_made_alone_has_the_rows_of_the_sequence() -> None:
+    """Byte by byte."""
+    with pipeline() as one, pipeline() as other:
+        for k in range(STEPS - 1):
+            one.sample(k)
+        after, alone = one.sample(STEPS - 1), other.sample(STEPS - 1)
+
+    for name, table in alone.capture.tables.items():
+        assert table.rows.tobytes() == after.capture.tables[name].rows.tobytes()
+
+
+def test_views_have_sequences_of_their_own() -> None:
+    """The same way, another bias of the inertial unit."""
+    with pipeline() as made:
+        first, second = (made.sample(k).capture.tables["imu"].rows for k in (1, STEPS + 1))
+
+    assert np.array_equal(first["time_s"], second["time_s"])
+    assert not np.array_equal(first["rate_z_rad_s"], second["rate_z_rad_s"])
+
+
+def test_streams_of_a_sequence_are_the_same_at_every_step() -> None:
+    """And none of those that steps draw from."""
+    steps = [Streams(1, 2, view=0, step=k).rng("sensor/imu") for k in range(3)]
+    shared = [rng.of_sequence().random() for rng in steps]
+
+    assert len(set(shared)) == 1
+    assert shared[0] not in [rng.random() for rng in steps]
+
+
+def test_configurations_without_the_rig_are_told_so() -> None:
+    """Before anything is made."""
+    spec = load_spec("tabletop.yaml", overrides=("sensors=[{type: radar}]", "exporters=[]"))
+    with pytest.raises(ConfigError, match="there is no rig 'ego'; there is arm_wrist"):
+        open_pipeline(spec)
+
+
+def test_rates_reach_the_recipe() -> None:
+    """A slow event camera reads at every fifth step."""
+    sensors = "sensors=[{type: rgb_camera}, {type: event_camera, rate_hz: 2}]"
+    spec = load_spec("tabletop.yaml", overrides=(sensors, "exporters=[{type: tables}]"))
+    recipe = recipe_of(spec, open_library(()), 1, (), frozenset())
+
+    assert recipe.strides["events"] == 5
+    assert recipe.info.devices == {"events": "event_camera"}
+
+
+def test_boxes_of_instances_are_those_of_their_assets() -> None:
+    """What the doubles of this file rest on."""
+    with pipeline() as made:
+        instance: Instance = made.sample(0).scene.instance(2)
+
+    assert (instance.box_min_m, instance.box_max_m) == CAR_M

@@ -1,0 +1,45 @@
+"""Robots in scenes: which one, and where its wrist is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from generator.core.errors import AssetError
+from generator.core.scene import Scene
+from scene_templates.robot import Robot
+from tests.randomizers.doubles import FakeAssets, two_link_arm
+
+
+def scene(asset: str | tuple[str, ...]) -> Scene:
+    """A robot on the ground; the library knows no other than ``two_link``."""
+    return Robot(name="arm", asset=asset).add(Scene("test"), FakeAssets())
+
+
+def test_of_several_robots_the_first_that_is_installed_stands_there() -> None:
+    """A pack's arm is missing, so the next one is taken, in every place that names it."""
+    built = scene(("robots/ur5e", "two_link", "robots/sawyer"))
+
+    assert built.articulations[0].asset == built.instances[0].asset == "two_link"
+
+
+@pytest.mark.parametrize("asset", ["two_lnk", ("two_lnk", "robots/ur5e")])
+def test_a_robot_that_is_not_there_is_a_mistake(asset: str | tuple[str, ...]) -> None:
+    """The message is about the first that was asked for."""
+    with pytest.raises(AssetError, match=r"two_lnk.*did you mean 'two_link'"):
+        scene(asset)
+
+
+def test_the_wrist_is_a_rig_that_looks_out_of_the_hand() -> None:
+    """X along the grasp frame's Z, Y along the fingers' way, on the hand's link."""
+    built = scene("two_link")
+    gripper = two_link_arm().gripper
+    assert gripper is not None
+    rig = built.rig("arm_wrist")
+
+    assert rig.body == "arm/hand"
+    for axis, wanted in (([1.0, 0, 0], [0, 0, 1.0]), ([0, 1.0, 0], [0, 1.0, 0])):
+        direction = rig.T_body_rig.rotate(np.array(axis))
+        np.testing.assert_allclose(
+            direction, gripper.T_link_grasp.rotate(np.array(wanted)), atol=1e-9
+        )

@@ -1,0 +1,156 @@
+"""A world of boxes with a car that carries devices: rays and motion by a few lines of numpy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from generator.core.capture import Beams, Channel, Echoes, Reading, Table
+from generator.core.geometry import SURFACES
+from generator.core.instants import at, with_placed_sensors, with_twists
+from generator.core.motion import Track
+from generator.core.scene import Body, Camera, Instance, Lane, Lidar, Rig, Scene
+from generator.core.se3 import SE3, Vec3
+from generator.core.streams import Rng, Streams
+from generator.sensors.mounting import Instrument
+
+CAR_M = ((-2.2, -0.9, 0.0), (2.2, 0.9, 1.5))
+PERSON_M = ((-0.25, -0.3, 0.0), (0.25, 0.3, 1.8))
+WALL_M = ((-0.1, -10.0, 0.0), (0.1, 10.0, 4.0))
+CATEGORIES = {"car": 1, "person": 2, "building": 3, "traffic_light": 4, "tree": 5}
+KNOT_S = 0.05
+
+Way = Callable[[float], SE3]
+Box = tuple[Vec3, Vec3]
+
+
+def straight(start: tuple[float, float], velocity: tuple[float, float], yaw: float = 0.0) -> Way:
+    """A way at constant velocity."""
+
+    def pose(t: float) -> SE3:
+        return SE3.about_z(yaw, (start[0] + velocity[0] * t, start[1] + velocity[1] * t, 0.0))
+
+    return pose
+
+
+def circle(radius_m: float, speed_m_s: float) -> Way:
+    """A left turn around the origin, from (radius, 0), heading along Y."""
+
+    def pose(t: float) -> SE3:
+        a = speed_m_s / radius_m * t
+        return SE3.about_z(a + 0.5 * math.pi, (radius_m * math.cos(a), radius_m * math.sin(a), 0.0))
+
+    return pose
+
+
+def track_of(body: str, pose: Way, seconds: float = 4.0) -> Track:
+    """Knots of a way from time 0."""
+    count = round(seconds / KNOT_S)
+    return Track(body, KNOT_S, tuple(pose(k * KNOT_S) for k in range(count + 1)))
+
+
+def thing(
+    number: int, name: str, category: str, pose: SE3, box_m: Box = CAR_M, **facts: str
+) -> tuple[Body, Instance]:
+    """A labelled box that stands somewhere."""
+    body = Body(name, f"{category}?", pose, instance_id=number)
+    instance = Instance(
+        number,
+        name,
+        category,
+        CATEGORIES[category],
+        f"{category}?",
+        T_world_instance=pose,
+        box_min_m=box_m[0],
+        box_max_m=box_m[1],
+        attributes=tuple(sorted(facts.items())),
+    )
+    return body, instance
+
+
+def world(
+    ego: Way | None = None,
+    others: Sequence[tuple[Body, Instance]] = (),
+    tracks: Sequence[Track] = (),
+    lanes: Sequence[Lane] = (),
+    step_s: float = 0.1,
+    seconds: float = 4.0,
+) -> Scene:
+    """An ego car with a rig at its origin, at 10 m/s along X, and what is around it."""
+    ego = ego or straight((0.0, 0.0), (10.0, 0.0))
+    things = [thing(1, "ego", "car", ego(0.0)), *others]
+    return with_twists(
+        Scene(
+            "test",
+            bodies=tuple(body for body, _ in things),
+            instances=tuple(instance for _, instance in things),
+            tracks=(track_of("ego", ego, seconds), *tracks),
+            rigs=(Rig("ego", "ego"),),
+            lanes=tuple(lanes),
+            step_s=step_s,
+        )
+    )
+
+
+def rng(step: int = 0, seed: int = 0, name: str = "sensor/device") -> Rng:
+    return Streams(seed, scene=0, view=0, step=step).rng(name)
+
+
+def reading(sensor: Instrument, scene: Scene, step: int = 0, seed: int = 0) -> Table:
+    """What a device reports at one step of a sequence."""
+    mounted = with_placed_sensors(sensor.mount(scene))
+    then = with_twists(at(mounted, step * scene.step_s))
+    return sensor.capture(then, BoxRays(), frozenset(), rng(step, seed))
+
+
+def readings(sensor: Instrument, scene: Scene, steps: int, seed: int = 0) -> np.ndarray:
+    """Rows of the first steps of a sequence, each step made alone."""
+    return np.concatenate([reading(sensor, scene, k, seed).rows for k in range(steps)])
+
+
+class BoxRays:
+    """A renderer whose world are the boxes of instances; reflectance 0.5 everywhere."""
+
+    def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
+        """First hits by the slab method."""
+        shape = (len(beams.directions), beams.subrays)
+        best = np.full(len(beams.directions), np.inf)
+        ids, categories = np.zeros(len(best), int), np.zeros(len(best), int)
+        present = {body.instance_id for body in scene.bodies}
+        for thing_ in scene.instances:
+            if thing_.instance_id not in present:
+                continue
+            T = thing_.T_world_instance.inverse() @ lidar.T_world_lidar
+            origin, ray = np.array(T.translation_m), T.rotate(beams.directions)
+            ray = np.where(np.abs(ray) < 1e-9, 1e-9, ray)
+            slabs = (np.stack([thing_.box_min_m, thing_.box_max_m])[:, None] - origin) / ray
+            enter, leave = slabs.min(axis=0).max(axis=1), slabs.max(axis=0).min(axis=1)
+            hit = (enter < leave) & (enter > 0.0) & (enter < best)
+            best[hit], ids[hit] = enter[hit], thing_.instance_id
+            categories[hit] = thing_.category_id
+        best[best > beams.range_max_m] = np.inf
+        found = np.isfinite(best)
+
+        def wide(values: np.ndarray, kind: type) -> np.ndarray:
+            return np.broadcast_to(values[:, None], shape).astype(kind)
+
+        return Echoes(
+            wide(best, np.float32),
+            wide(np.where(found, 0.5, 0.0), np.float32),
+            wide(found, np.float32),
+            wide(ids, np.uint16),
+            wide(categories, np.uint16),
+            np.full(shape, SURFACES.index(""), np.uint8),
+        )
+
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+        """Pictures are made by other doubles."""
+        raise AssertionError("this device does not look at pictures")
+
+
+def moved(scene: Scene, **changes: object) -> Scene:
+    """The scene with other fields."""
+    return replace(scene, **changes)  # type: ignore[arg-type]

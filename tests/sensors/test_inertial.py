@@ -1,0 +1,302 @@
+"""Inertial units, satellite receivers and odometers against analytic motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from generator.core.errors import ConfigError
+from generator.core.geodesy import Origin, earth_centred, from_earth_centred, geodetic
+from generator.core.scene import Scene
+from generator.core.se3 import SE3
+from generator.sensors.gnss import Gnss
+from generator.sensors.imu import Imu
+from generator.sensors.odometer import Odometer
+from tests.sensors.streetcar import WALL_M, circle, reading, readings, straight, thing, world
+
+GRAVITY = 9.80665
+
+
+def forces(rows: np.ndarray) -> np.ndarray:
+    return np.stack([rows[f"force_{axis}_m_s2"] for axis in "xyz"], axis=1)
+
+
+def rates(rows: np.ndarray) -> np.ndarray:
+    return np.stack([rows[f"rate_{axis}_rad_s"] for axis in "xyz"], axis=1)
+
+
+def test_device_at_rest_feels_gravity_alone() -> None:
+    """Upwards, in its own axes: pitched up by 30 degrees, half of it is forward."""
+    still = world(straight((0.0, 0.0), (0.0, 0.0)))
+
+    rows = readings(Imu(noise=0, pitch_deg=30), still, 3)
+
+    expected = [GRAVITY * 0.5, 0.0, GRAVITY * math.cos(math.radians(30))]
+    assert np.allclose(forces(rows), expected, atol=1e-6)
+    assert np.allclose(rates(rows), 0.0, atol=1e-9)
+
+
+def test_circular_motion_is_felt_as_its_centripetal_acceleration() -> None:
+    """v^2 / r to the left and v / r about the upward axis: 20 m, 8 m/s."""
+    rows = readings(Imu(noise=0), world(circle(20.0, 8.0)), 10)
+
+    assert np.allclose(forces(rows), [0.0, 3.2, GRAVITY], atol=5e-3)
+    assert np.allclose(rates(rows), [0.0, 0.0, 0.4], atol=1e-4)
+
+
+def test_lever_arm_adds_its_own_centripetal_acceleration() -> None:
+    """1.5 m ahead of the origin: omega^2 * 1.5 m backwards."""
+    rows = readings(Imu(noise=0, offset_m=(1.5, 0.0, 0.0)), world(circle(20.0, 8.0)), 5)
+
+    assert np.allclose(forces(rows)[:, 0], -(0.4**2) * 1.5, atol=5e-3)
+
+
+def test_braking_is_felt_backwards() -> None:
+    """At 3 m/s^2."""
+
+    def braking(t: float) -> SE3:
+        return SE3((20.0 * t - 1.5 * t * t, 0.0, 0.0))
+
+    rows = readings(Imu(noise=0), world(braking), 10)
+
+    assert np.allclose(forces(rows), [-3.0, 0.0, GRAVITY], atol=1e-6)
+
+
+def test_readings_follow_each_other_evenly_over_steps() -> None:
+    """One at time 0, then ten in every step of 0.1 s; none twice, none missing."""
+    rows = readings(Imu(rate_hz=100), world(), 4)
+
+    assert np.allclose(rows["time_s"], np.arange(31) / 100.0, atol=1e-12)
+
+
+def test_bias_walks_on_from_step_to_step() -> None:
+    """Steps made alone share one walk: its changes grow with time as a walk's do."""
+    still = world(straight((0.0, 0.0), (0.0, 0.0)), seconds=20.0)
+    sensor = Imu(model="ADIS16448", rate_hz=10)
+    walks = np.stack([rates(readings(sensor, still, 101, seed))[:, 0] for seed in range(60)])
+    biases = walks.mean(axis=1)
+
+    assert abs(biases.std() / 8.7e-3 - 1.0) < 0.35
+    # Differences of neighbours hold twice the white noise, and one step of the walk.
+    white = 1.6968e-4 * math.sqrt(10.0)
+    step = 1.9393e-5 / math.sqrt(10.0)
+    assert abs(np.diff(walks, axis=1).std() / math.hypot(math.sqrt(2) * white, step) - 1) < 0.05
+
+
+def test_walk_grows_with_the_root_of_time() -> None:
+    """A unit whose walk is all there is: after 100 readings ten times that of one."""
+    still = world(straight((0.0, 0.0), (0.0, 0.0)), seconds=20.0)
+    sensor = Imu(model="ADIS16448", rate_hz=10)
+    ends = np.array(
+        [
+            forces(reading(sensor, still, 100, seed).rows)[0, 0]
+            - forces(reading(sensor, still, 0, seed).rows)[0, 0]
+            for seed in range(400)
+        ]
+    )
+    white, walk = 2.0e-3 * math.sqrt(10.0), 3.0e-3 / math.sqrt(10.0)
+
+    assert abs(ends.std() / math.hypot(math.sqrt(2) * white, 10.0 * walk) - 1.0) < 0.1
+
+
+def test_a_step_made_alone_has_the_same_bytes() -> None:
+    """Whatever was made before it, in this process or another."""
+    sensor, scene = Imu(), world(circle(20.0, 8.0))
+    alone = reading(sensor, scene, 7).rows.tobytes()
+    for k in range(7):
+        reading(sensor, scene, k)
+
+    assert reading(sensor, scene, 7).rows.tobytes() == alone
+
+
+def test_white_noise_has_the_density_of_the_data_sheet() -> None:
+    """0.2 degrees per root hour at 100 Hz: 5.8e-4 rad/s; 0.005 m/s per root hour: 8.3e-4 m/s^2."""
+    still = world(straight((0.0, 0.0), (0.0, 0.0)))
+    rows = readings(Imu(model="RT3003"), still, 40)
+
+    gyro = math.radians(0.2) / 60.0 * 10.0
+    accelerometer = 0.005 / 60.0 * 10.0
+    assert abs(np.diff(rates(rows), axis=0).std() / (gyro * math.sqrt(2)) - 1.0) < 0.05
+    assert abs(np.diff(forces(rows), axis=0).std() / (accelerometer * math.sqrt(2)) - 1.0) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"rate_hz": 33.0}, "rate_hz 33 does not fit step_s 0.1"),
+        ({"rig": "egg"}, "there is no rig 'egg'; there is ego"),
+    ],
+)
+def test_what_does_not_fit_the_scene_is_told(fields: dict, words: str) -> None:
+    """When it is mounted, before anything is made."""
+    with pytest.raises(ConfigError, match=words):
+        Imu(**fields).mount(world())
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        (Imu, {"noise": -1.0}),
+        (Imu, {"model": "RT3004"}),
+        (Gnss, {"noise": -0.1}),
+        (Gnss, {"origin_deg": (91.0, 0.0)}),
+        (Odometer, {"scale_error": -0.1}),
+        (Odometer, {"speed_noise_m_s": -0.1}),
+    ],
+)
+def test_impossible_values_are_refused(kind: type, fields: dict) -> None:
+    """When they are read."""
+    with pytest.raises(ValidationError):
+        kind(**fields)
+
+
+def test_geodetic_coordinates_of_known_places() -> None:
+    """Equator, pole and 45 degrees, from the ellipsoid's published axes."""
+    places = np.array([[0.0, 0.0, 0.0], [0.0, 90.0, 10.0], [90.0, 0.0, 5.0], [45.0, -90.0, 0.0]])
+    # The last: N = a / sqrt(1 - e^2 / 2) = 6388838.290 m; x = N cos 45, z = (1 - e^2) N sin 45.
+    centred = np.array(
+        [
+            [6378137.0, 0.0, 0.0],
+            [0.0, 6378147.0, 0.0],
+            [0.0, 0.0, 6356757.314245],
+            [0.0, -4517590.878849, 4487348.408866],
+        ]
+    )
+
+    assert np.allclose(earth_centred(places), centred, atol=1e-4)
+    back = from_earth_centred(centred)
+    assert np.allclose(back[:, [0, 2]], places[:, [0, 2]], atol=1e-6)
+    assert np.allclose(back[[0, 1, 3], 1], places[[0, 1, 3], 1], atol=1e-9)
+
+
+def test_a_kilometre_north_and_east_is_the_published_share_of_a_degree() -> None:
+    """At 49 degrees, one of latitude is 111.2095 km, one of longitude 73.1727 km (WGS 84)."""
+    ends = geodetic(np.array([[1000.0, 0.0, 0.0], [0.0, 1000.0, 0.0]]), Origin(49.0, 8.0))
+
+    assert ends[1, 0] - 49.0 == pytest.approx(1000.0 / 111_209.5, rel=3e-5)
+    assert ends[0, 1] - 8.0 == pytest.approx(1000.0 / 73_172.7, rel=3e-5)
+
+
+def test_ideal_receiver_tells_where_the_antenna_is() -> None:
+    """Within a tenth of a millimetre, and its velocity."""
+    sensor = Gnss(noise=0, offset_m=(0.5, 0.0, 1.6), origin_deg=(49.0, 8.0), origin_altitude_m=100)
+    row = reading(sensor, world(), 5).rows[0]
+
+    place = np.array([[row["latitude_deg"], row["longitude_deg"], row["altitude_m"]]])
+    turned = (
+        Origin(49.0, 8.0).axes().T
+        @ (earth_centred(place) - earth_centred(np.array([[49.0, 8.0, 100.0]])))[0]
+    )
+    assert np.allclose(turned, [5.5, 0.0, 1.6], atol=1e-4)
+    assert row["velocity_east_m_s"] == pytest.approx(10.0, abs=1e-4)
+    assert (row["quality"], row["satellites"]) == (1, 12)
+
+
+def test_receiver_errs_as_its_data_sheet_says() -> None:
+    """2.5 m CEP: half of the fixes of many sequences are within 2.5 m."""
+    still = world(straight((0.0, 0.0), (0.0, 0.0)))
+    origin = Origin(49.0114, 8.4244, 115.0)
+    errors = []
+    for seed in range(300):
+        row = reading(Gnss(), still, 0, seed).rows[0]
+        place = np.array([[row["latitude_deg"], row["longitude_deg"], row["altitude_m"]]])
+        centre = earth_centred(
+            np.array([[origin.latitude_deg, origin.longitude_deg, origin.altitude_m]])
+        )
+        errors.append((origin.axes().T @ (earth_centred(place) - centre)[0])[:2])
+    circular = np.hypot(*np.array(errors).T)
+
+    assert np.median(circular) == pytest.approx(2.5, rel=0.12)
+
+
+def test_errors_of_position_wander_slowly() -> None:
+    """Neighbouring fixes share most of their error: the white part alone differs."""
+    still = world(straight((0.0, 0.0), (0.0, 0.0)), seconds=20.0)
+    rows = readings(Gnss(), still, 100)
+    north = (rows["latitude_deg"] - rows["latitude_deg"][0]) * 111_209.5
+
+    assert np.diff(north).std() == pytest.approx(0.5 * math.sqrt(2), rel=0.25)
+
+
+def canyon(walls: int) -> Scene:
+    """Tall walls around a car that stands."""
+    tall = ((-1.0, -60.0, 0.0), (1.0, 60.0, 80.0))
+    poses = [SE3.about_z(k * 0.5 * math.pi) @ SE3((4.0, 0.0, 0.0)) for k in range(walls)]
+    others = [thing(k + 2, f"wall/{k}", "building", p, tall) for k, p in enumerate(poses)]
+    return world(straight((0.0, 0.0), (0.0, 0.0)), others)
+
+
+def test_walls_hide_satellites_and_spoil_the_fix() -> None:
+    """Between four of 80 m there is none; between two it is worse than in the open."""
+    sensor = Gnss(satellites=24)
+    free, between, shut = (reading(sensor, canyon(k)).rows[0] for k in (0, 1, 4))
+
+    assert free["satellites"] == 24
+    assert 4 <= between["satellites"] < 24
+    assert between["horizontal_sigma_m"] > free["horizontal_sigma_m"]
+    assert shut["satellites"] < 4
+    assert shut["quality"] == 0
+    assert np.isnan(shut["latitude_deg"])
+
+
+def ideal_odometer(**fields: float) -> Odometer:
+    zero = dict.fromkeys(
+        (
+            "scale_error",
+            "distance_step_m",
+            "speed_noise_m_s",
+            "yaw_rate_noise_rad_s",
+            "yaw_rate_bias_rad_s",
+            "steering_noise_rad",
+        ),
+        0.0,
+    )
+    return Odometer(**{**zero, **fields})
+
+
+def test_ideal_odometer_on_a_circle() -> None:
+    """20 m, 8 m/s: way, yaw rate, steering angle and wheels are those of the Ackermann geometry."""
+    rows = readings(ideal_odometer(wheelbase_m=2.7, track_m=1.6), world(circle(20.0, 8.0)), 11)
+    last = rows[-1]
+
+    assert last["distance_m"] == pytest.approx(8.0, rel=1e-4)
+    assert last["speed_m_s"] == pytest.approx(8.0, rel=1e-3)
+    assert last["yaw_rate_rad_s"] == pytest.approx(0.4, rel=1e-3)
+    assert last["steering_rad"] == pytest.approx(math.atan(2.7 / 20.0), rel=2e-3)
+    assert last["wheel_rear_left_m_s"] == pytest.approx(0.4 * 19.2, rel=1e-3)
+    assert last["wheel_front_right_m_s"] == pytest.approx(0.4 * math.hypot(20.8, 2.7), rel=1e-3)
+
+
+def test_going_backwards_counts_down() -> None:
+    """2 m/s against its heading."""
+    rows = readings(ideal_odometer(), world(straight((0.0, 0.0), (-2.0, 0.0))), 6)
+
+    assert rows["distance_m"][-1] == pytest.approx(-1.0, abs=1e-6)
+    assert rows["speed_m_s"][-1] == pytest.approx(-2.0, abs=1e-5)
+
+
+def test_scale_error_stays_through_a_sequence() -> None:
+    """Distance and speed are wrong by one share, another in every sequence."""
+    sensor = ideal_odometer(scale_error=0.05)
+    shares = [readings(sensor, world(), 6, seed)["speed_m_s"] / 10.0 for seed in range(40)]
+
+    assert all(np.ptp(share) < 1e-4 for share in shares)
+    assert np.std([share[0] for share in shares]) == pytest.approx(0.05, rel=0.35)
+
+
+def test_encoder_counts_whole_pulses() -> None:
+    """Of 4 cm."""
+    rows = readings(ideal_odometer(distance_step_m=0.04), world(), 6)
+    pulses = rows["distance_m"] / 0.04
+
+    assert np.allclose(pulses, np.rint(pulses), atol=1e-4)
+
+
+def test_unused_walls_leave_inertial_readings_alone() -> None:
+    """What stands around changes no inertial reading."""
+    walled = world(others=[thing(9, "wall", "building", SE3((30.0, 0.0, 0.0)), WALL_M)])
+
+    assert reading(Imu(), walled, 3).rows.tobytes() == reading(Imu(), world(), 3).rows.tobytes()
