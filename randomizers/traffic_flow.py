@@ -123,7 +123,7 @@ class TrafficFlow(RandomizerBase):
         people = people_of(scene, streets.sidewalks, streets.crosswalks, assets)
         taking_part = [m.body for m in drivers] + [m.body for m in people]
         standing = standing_of(scene, taking_part, assets)
-        fleet = self._fleet(drivers, streets, self._planned(scene, drivers, streets), rng)
+        fleet = self._fleet(drivers, streets, self._planned(drivers, standing, streets), rng)
         walks = walks_of(streets.sidewalks, streets.crosswalks, standing.boxes)
         walkers = self._walkers(people, walks, rng)
         motion = simulated(fleet, walkers, standing.boxes, approaches, self.duration_s)
@@ -149,7 +149,7 @@ class TrafficFlow(RandomizerBase):
         return with_cycles(junctions)
 
     def _planned(
-        self, scene: Scene, drivers: Sequence[OnRoad], streets: Streets
+        self, drivers: Sequence[OnRoad], standing: Standing, streets: Streets
     ) -> dict[str, tuple[str, ...]]:
         """Lanes of the routes that were given, by the vehicles' names."""
         places = {driver.body.name: driver.place for driver in drivers}
@@ -162,7 +162,7 @@ class TrafficFlow(RandomizerBase):
                     f"{where}: no vehicle '{name}' is on a driving lane; expected one of "
                     f"{', '.join(known) or 'none'}{did_you_mean(name, known)}"
                 )
-            _check_points(scene, stops, where)
+            _check_points(standing, stops, where)
             lanes = lanes_through(streets.driving, stops, where)
             start = places[name].lane
             if start not in lanes:
@@ -281,14 +281,14 @@ class TrafficFlow(RandomizerBase):
         return made
 
 
-def _check_points(scene: Scene, stops: Sequence[Stop], where: str) -> None:
-    """Raises ConfigError if a route's point is beyond the scene's borders."""
-    (x0, y0, _), (x1, y1, _) = scene.interior_m
+def _check_points(standing: Standing, stops: Sequence[Stop], where: str) -> None:
+    """Raises ConfigError if a route's point is where something stands."""
     for k, stop in enumerate(stops):
-        if not isinstance(stop, str) and not (x0 <= stop[0] <= x1 and y0 <= stop[1] <= y1):
+        wall = "" if isinstance(stop, str) else standing.at(*stop)
+        if wall and not isinstance(stop, str):
             raise ConfigError(
-                f"{where}[{k}]: ({stop[0]:g}, {stop[1]:g}) is outside the scene, which reaches "
-                f"from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g})"
+                f"{where}[{k}]: ({stop[0]:g}, {stop[1]:g}) is inside '{wall}': a vehicle cannot "
+                "drive through it; expected a point on a driving lane"
             )
 
 

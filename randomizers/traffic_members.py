@@ -132,18 +132,28 @@ class Standing:
     """What stands on the ground and takes no part.
 
     Attributes:
+        names: Of the bodies.
         categories: What it is.
         boxes: What it covers [b, 6]: centre, half extents, cosine and sine of its direction.
     """
 
+    names: tuple[str, ...]
     categories: tuple[str, ...]
     boxes: Array
+
+    def at(self, x_m: float, y_m: float) -> str:
+        """Name of what covers a point; empty = nothing."""
+        x, y, hx, hy, c, s = self.boxes.T
+        dx, dy = x_m - x, y_m - y
+        inside = (np.abs(c * dx + s * dy) < hx) & (np.abs(c * dy - s * dx) < hy)
+        return self.names[int(np.argmax(inside))] if inside.any() else ""
 
 
 def standing_of(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex) -> Standing:
     """Everything that has an instance, but roads and those who take part."""
     moving = {body.name for body in taking_part}
     roads = {lane.road for lane in scene.lanes}
+    names: list[str] = []
     categories: list[str] = []
     rows: list[tuple[float, ...]] = []
     for body in scene.bodies:
@@ -156,8 +166,9 @@ def standing_of(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex) -
         else:
             bounds_m = assets.bounds_m(body.asset)
             rows.append(Footprint.of(body.T_world_body, bounds_m, body.scale).row()[:6])
+        names.append(body.name)
         categories.append(category)
-    return Standing(tuple(categories), np.array(rows).reshape(-1, 6))
+    return Standing(tuple(names), tuple(categories), np.array(rows).reshape(-1, 6))
 
 
 def approaches_of(

@@ -92,6 +92,7 @@ def recipe_of(
         ConfigError: when parts do not fit together, such as an exporter whose images no sensor
             writes.
     """
+    _check_durations(spec)
     annotators = _annotators(spec)
     info = DatasetInfo(
         name=spec.name,
@@ -127,6 +128,20 @@ def recipe_of(
         strides=_strides(spec),
         offsets_s={s.name: s.time_offset_s for s in spec.sensors if s.time_offset_s},
     )
+
+
+def _check_durations(spec: Spec) -> None:
+    """Raises ConfigError if a sequence goes on after what moves in it has come to its end."""
+    lasts_s = (spec.head.steps_per_scene - 1) * spec.head.step_s
+    for layout in spec.probes:
+        for randomizer in layout.randomizers:
+            duration_s = getattr(randomizer, "duration_s", None)
+            if isinstance(duration_s, float) and duration_s < lasts_s - 1e-9:
+                raise ConfigError(
+                    f"randomizers.{randomizer.name}.duration_s: {duration_s:g} s is shorter than "
+                    f"the sequences, {spec.head.steps_per_scene} steps of {spec.head.step_s:g} s; "
+                    f"expected at least {lasts_s:g}"
+                )
 
 
 def _strides(spec: Spec) -> dict[str, int]:

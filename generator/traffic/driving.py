@@ -3,35 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from generator.core.se3 import Array
+from generator.traffic.crossings import Zone
 from generator.traffic.fleet import EASY_M_S2, Entry, Fleet
-from generator.traffic.idm import HARDEST_M_S2, equilibrium_speed, free_acceleration, interaction
+from generator.traffic.idm import (
+    HARDEST_M_S2,
+    Drivers,
+    equilibrium_speed,
+    free_acceleration,
+    interaction,
+)
 from generator.traffic.routes import STATION_M
 from generator.traffic.signals import Approach
 
 SEEN_M = 12.0
 """Drivers decide about a junction this far before it at the latest, and in time to brake."""
 CAN_STOP_M_S2 = 3.0
-"""Whoever would have to brake harder than this for amber drives on."""
+"""Whoever would have to brake harder than this for amber, or for people who wait, drives on."""
 MUST_STOP_M_S2 = 6.0
 """Whoever would have to brake harder than this for people drives on; they have waited for it."""
 GAP_S = 1.0
 """Spare time between who crosses before and who comes."""
 PATIENCE_S = 3.0
 """After waiting that long, drivers go in the order in which they came."""
-BEFORE_LINE_M = 0.5
+AT_LINE_S = 0.4
+"""Time gap to lines, which do not brake as who is ahead may."""
+BEFORE_LINE_M = 1.0
 """They stop this far before a line."""
 
 
 @dataclass(frozen=True, slots=True)
 class Crosser:
-    """Somebody on a crosswalk, or about to step on it.
+    """Somebody on a crosswalk, or waiting to step on it.
 
     Attributes:
+        waits: Whether they still stand at the kerb: who can stop easily does.
         at_m: Station on the crosswalk.
         forward: Whether they walk along it.
     """
@@ -39,6 +49,7 @@ class Crosser:
     crosswalk: str
     at_m: float
     forward: bool
+    waits: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +82,12 @@ class Driving:
     acceleration_m_s2: Array = field(init=False)
     entered: list[int] = field(init=False)
     waited_s: Array = field(init=False)
+    _at_lines: Drivers = field(init=False)
 
     def __post_init__(self) -> None:
         """Everybody at the speed that suits the place."""
         n = len(self.fleet.vehicles)
+        self._at_lines = replace(self.fleet.drivers, headway_s=np.full(n, AT_LINE_S))
         self.station_m = self.fleet.first_m.copy()
         self.acceleration_m_s2 = np.zeros(n)
         self.waited_s = np.zeros(n)
@@ -108,7 +121,8 @@ class Driving:
         stops = self._stops(time_s, crossers, gap, leader)
         to_stop = stops - self.station_m - fleet.front_m + drivers.standstill_m - BEFORE_LINE_M
         taken = np.maximum(
-            interaction(drivers, v, gap, leader), interaction(drivers, v, to_stop, np.zeros_like(v))
+            interaction(drivers, v, gap, leader),
+            interaction(self._at_lines, v, to_stop, np.zeros_like(v)),
         )
         a = free_acceleration(drivers, v, self._allowed(v)) - taken
         a = np.maximum(np.minimum(a, drivers.acceleration_m_s2), -HARDEST_M_S2)
@@ -129,7 +143,7 @@ class Driving:
                 front = float(self.station_m[i]) + self.fleet.vehicles[i].front_m
                 rear = float(self.station_m[i]) - self.fleet.vehicles[i].rear_m
                 v = float(self.speed_m_s[i])
-                needed = 0.5 * v * v / EASY_M_S2 + v * 0.5
+                needed = 0.5 * v * v / CAN_STOP_M_S2 + 0.5 * v
                 if front > zone.enter_m - needed and rear < zone.leave_m:
                     return False
         return True
@@ -287,15 +301,25 @@ class Driving:
             v = float(self.speed_m_s[i])
             for zone in zones:
                 left = zone.enter_m - front
-                if left < 0.0 or v * v > 2.0 * MUST_STOP_M_S2 * left or left > v * v + 30.0:
+                if left < 0.0 or left > v * v + 30.0:
                     continue
-                if any(_is_in_the_way(one, zone.zone.at_m, zone.zone.width_m)
-                       for one in crossers if one.crosswalk == zone.zone.crosswalk):  # fmt: skip
+                needed = 0.5 * v * v / max(left, 0.01)
+                if any(_is_in_the_way(one, zone.zone, needed) for one in crossers):
                     stops[i] = min(stops[i], zone.enter_m)
                     break
 
 
-def _is_in_the_way(crosser: Crosser, at_m: float, width_m: float) -> bool:
-    """Whether somebody is yet to leave the strip of a lane."""
-    passed = crosser.at_m - at_m if crosser.forward else at_m - crosser.at_m
-    return passed < 0.5 * width_m + 0.5
+def _is_in_the_way(crosser: Crosser, zone: Zone, needed_m_s2: float) -> bool:
+    """Whether to stop before a zone for somebody who has not left the lane's strip of it.
+
+    Args:
+        crosser: Who crosses.
+        zone: Where the lane leads over the crosswalk.
+        needed_m_s2: Deceleration that this takes.
+    """
+    if crosser.crosswalk != zone.crosswalk:
+        return False
+    if needed_m_s2 > (CAN_STOP_M_S2 if crosser.waits else MUST_STOP_M_S2):
+        return False
+    passed = crosser.at_m - zone.at_m if crosser.forward else zone.at_m - crosser.at_m
+    return passed < 0.5 * zone.width_m + 0.5

@@ -32,6 +32,8 @@ CHANGE_M_S2 = 2.0
 """How quickly they change their pace."""
 TURN_PER_S = 4.0
 """How quickly they turn to where they go: the inverse of a time constant."""
+AT_KERB_M = 2.0
+"""Who is this near to a crosswalk on their way wants to cross."""
 HURRY = 1.25
 """Who starts to cross must be over before the cars get green, if need be this much faster."""
 
@@ -80,6 +82,7 @@ class Walking:
     off_m: Array = field(init=False)
     height_m: Array = field(init=False)
     _let: list[int] = field(init=False)
+    _asks: list[bool] = field(init=False)
     _lines: Array = field(init=False)
     _sides: Array = field(init=False)
     _wanted: Array = field(init=False)
@@ -106,22 +109,24 @@ class Walking:
         self.off_m = np.array([w.left_m for w in self.walkers])
         self.height_m = self._lines[:, 0, 2].copy()
         self.obstacles = _within_reach(self.obstacles, self._lines)
+        self._asks = [False] * n
         self._let = [
             sum(p.from_m < 0.05 for p in path.passages) if path is not None else 0 for path in paths
         ]
 
     def crossers(self) -> list[Crosser]:
-        """Everybody on a crosswalk or about to step on it."""
+        """Everybody on a crosswalk or at the kerb before it, but who waits for their own light."""
         found = []
         for k, walker in enumerate(self.walkers):
-            if walker.path is None or self._let[k] == 0:
-                continue
-            passage = walker.path.passages[self._let[k] - 1]
-            done = float(self.at_m[k]) - passage.from_m
-            if done < passage.to_m - passage.from_m + 0.3:
-                covered = passage.length_m - (passage.to_m - passage.from_m)
-                at_m = covered + done if passage.forward else passage.length_m - covered - done
-                found.append(Crosser(passage.crosswalk, at_m, passage.forward))
+            passages = walker.path.passages if walker.path is not None else ()
+            if self._let[k] > 0 or self._asks[k]:
+                passage = passages[self._let[k] - (0 if self._asks[k] else 1)]
+                done = float(self.at_m[k]) - passage.from_m
+                if done < passage.to_m - passage.from_m + 0.3:
+                    covered = passage.length_m - (passage.to_m - passage.from_m)
+                    at_m = covered + max(done, 0.0)
+                    at_m = at_m if passage.forward else passage.length_m - at_m
+                    found.append(Crosser(passage.crosswalk, at_m, passage.forward, self._asks[k]))
         return found
 
     def step(self, time_s: float, step_s: float, lets_pass: Callable[[str], bool]) -> None:
@@ -205,13 +210,13 @@ class Walking:
                 continue
             passage = walker.path.passages[self._let[k]]
             left = passage.from_m - 0.3 - float(self.at_m[k])
-            if left > 1.0:
+            if left > AT_KERB_M:
                 continue
-            if self._may_cross(passage.crosswalk, passage.length_m, k, time_s) and lets_pass(
-                passage.crosswalk
-            ):
+            self._asks[k] = self._may_cross(passage.crosswalk, passage.length_m, k, time_s)
+            if self._asks[k] and lets_pass(passage.crosswalk):
                 self._let[k] += 1
-            else:
+                self._asks[k] = False
+            elif left < 1.0:
                 room[k] = min(float(room[k]), max(left, 0.0))
         return room
 

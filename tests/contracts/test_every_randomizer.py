@@ -34,12 +34,15 @@ GIVEN: dict[str, dict[str, Any]] = {
 }
 """Fields without which a randomizer cannot be made, or may leave a scene as it is."""
 
-PHYSICS_BOUND = ("along", "arm_configuration", "distractors", "objects", "physics_properties")
+PHYSICS_BOUND = (
+    "along", "arm_configuration", "arm_motion", "distractors", "ego_on_lane", "objects",
+    "physics_properties", "traffic_flow",
+)  # fmt: skip
 """Randomizers whose draws physics has to see."""
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, lamps, a car with a scanner, and two cameras."""
+    """A room with a table, an arm, objects, lamps, a car, an ego with a scanner, two cameras."""
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -56,16 +59,18 @@ def nominal_scene() -> Scene:
     group = ObjectGroup("along", (), ("wagon",), 1, "along", lanes=("driving",))
     wagon = Body("along/0", "wagon", SE3((0.0, 5.0, 0.75)), instance_id=99, group="along")
     labelled = Instance(99, "along/0", "car", 0, "wagon")
+    ego = Body("ego", "wagon", SE3((-20.0, 5.0, 0.75)), instance_id=98)
+    carrier = Instance(98, "ego", "ego", 0, "wagon", annotated=False)
     scene = build("test", elements, FakeAssets())
     lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
     signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
     return replace(
         scene,
-        bodies=(*scene.bodies, lamp, signal, wagon),
-        instances=(*scene.instances, labelled),
+        bodies=(*scene.bodies, lamp, signal, wagon, ego),
+        instances=(*scene.instances, labelled, carrier),
+        rigs=(Rig("ego", "ego"),),
         cameras=cameras,
-        rigs=(Rig("car", "along/0"),),
-        lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
+        lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="ego"),),
         lanes=lanes,
         groups=(*scene.groups, group),
     )
