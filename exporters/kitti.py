@@ -25,10 +25,10 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
 * **Points** are those of the data set's laser scanner; without one they are thinned pixels of the
   depth image, with reflectance 0 and no labels.
 * **Point labels** are not KITTI's; they keep its rule that an object is what lies in its box. A
-  pulse that an object reflected, and that noise took more than 3 cm out of the box, has no row;
-  what lies as deep inside has the row whatever it is: the road between the wheels, where the box
-  of a car on a cambered street reaches below it. What a thing moved by itself between a pulse and
-  the instant of its box is taken back before. What reflected each pulse is in the lower half.
+  pulse that an object reflected has no row where noise, or the object's own way between the pulse
+  and the instant of its box, took it more than 3 cm out of the box; what lies as deep inside has
+  the row whatever it is: the road between the wheels, where the box of a car on a cambered street
+  reaches below it. What reflected each pulse is in the lower half.
 * **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
   which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
 
@@ -48,7 +48,7 @@ from pydantic import Field
 
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
-from exporters.sensors import laser_scanner, rgb_camera, scanned
+from exporters.sensors import laser_scanner, pinhole_camera, scanned
 from exporters.upright import UprightBox, boxed_members, upright_box
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx
@@ -138,13 +138,6 @@ class Kitti(Strict):
                 f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
                 "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
             )
-        model = info.lenses.get(self._camera(info), "pinhole")
-        if model != "pinhole":
-            raise ConfigError(
-                f"exporter 'kitti': sensor '{self._camera(info)}' has a lens of the model "
-                f"'{model}'; KITTI's images are rectified and its calibration has no distortion: "
-                "name a camera with a pinhole, or export this one as coco"
-            )
         if info.n > FRAMES_MAX:
             raise ConfigError(
                 f"exporter 'kitti': frame names have six digits, {info.n} samples do not fit; "
@@ -174,8 +167,7 @@ class Kitti(Strict):
             if scanned(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
                 _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
-                sweep_s = sample.scene.lidar(lidar).sweep_s
-                members, unseen = point_members(points, truth, self, T_camera_velo, sweep_s)
+                members, unseen = point_members(points, truth, self, T_camera_velo)
                 labels = point_labels(points, members, label_rows(truth, self, unseen))
                 _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
             elif self.velodyne_stride_px and not lidar:
@@ -201,7 +193,7 @@ class Kitti(Strict):
         _write_text(dataset_dir / "README.txt", self._readme(info, camera))
 
     def _camera(self, info: DatasetInfo) -> str:
-        return rgb_camera(info, self.camera, self.type)
+        return pinhole_camera(info, self.camera, self.type)
 
     def _lidar(self, info: DatasetInfo) -> str:
         return laser_scanner(info, self.lidar, self.type)
@@ -317,7 +309,6 @@ def point_members(
     truth: ImageTruth,
     style: LabelStyle,
     T_camera_velo: Array,
-    sweep_s: float = 0.0,
 ) -> tuple[NDArray[np.int64], frozenset[int]]:
     """The instance that each point belongs to, and the labelled instances that have no point.
 
@@ -326,22 +317,18 @@ def point_members(
         truth: Of the image; things that are DontCare keep the points that they reflect.
         style: Of the labels.
         T_camera_velo: Points to the camera frame, [3, 4].
-        sweep_s: How long the sweep took; its middle is the instant of the boxes.
     """
     labelled = {i for row, i in label_rows(truth, style) if not row.startswith(DONT_CARE)}
-    things = [thing for thing in truth.objects if thing.instance.instance_id in labelled]
-    T_camera_world = truth.camera.T_world_camera.inverse()
-    moving = {}
-    for thing in things:
-        assert thing.box3d_camera is not None
-        velocity_m_s = T_camera_world.rotate(np.asarray(thing.instance.twist.velocity_m_s))
-        moving[thing.instance.instance_id] = (upright_box(thing.box3d_camera), velocity_m_s)
+    boxes = {
+        thing.instance.instance_id: upright_box(thing.box3d_camera)
+        for thing in truth.objects
+        if thing.instance.instance_id in labelled and thing.box3d_camera is not None
+    }
     R_camera_velo, t_camera_velo = T_camera_velo[:, :3], T_camera_velo[:, 3]
     p_camera = np.einsum("ij,nj->ni", R_camera_velo, points["position_m"], optimize=False)
     p_camera += t_camera_velo
-    dt_s = points["time_s"] - 0.5 * sweep_s
     ids = points["instance_id"].astype(np.int64)
-    members = boxed_members(ids, p_camera, dt_s, moving)
+    members = boxed_members(ids, p_camera, boxes)
     return members, frozenset(labelled) - frozenset(np.unique(ids[members == ids]).tolist())
 
 

@@ -38,7 +38,7 @@ from exporters.clouds import read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.oxts import COLUMNS, motion_of, navigation_mount, oxts_row
 from exporters.png import RowFilter, encode_png
-from exporters.sensors import instant_s, laser_scanner, rgb_camera, rgb_cameras, scanned
+from exporters.sensors import instant_s, laser_scanner, pinhole_camera, rgb_cameras, scanned
 from exporters.sequences import (
     Frame,
     Mount,
@@ -117,7 +117,8 @@ class KittiRaw(Strict):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: a sensor is not there, or there are too many sequences.
+            ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
+                sequences.
         """
         self._cameras(info)
         if not laser_scanner(info, self.lidar, self.type):
@@ -170,9 +171,9 @@ class KittiRaw(Strict):
             number: getattr(self, f"image_{number}") or _own(known, f"image_{number}")
             for number in ("00", "01", "02", "03")
         }
-        first = rgb_camera(info, asked["02"], self.type)
+        first = pinhole_camera(info, asked["02"], self.type)
         rest = {
-            number: rgb_camera(info, name, self.type)
+            number: pinhole_camera(info, name, self.type)
             for number, name in asked.items()
             if name and number != "02"
         }

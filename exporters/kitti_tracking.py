@@ -32,9 +32,10 @@ from exporters.images import link_or_copy
 from exporters.kitti import label_rows
 from exporters.kitti_raw import Latitude, Longitude, projection
 from exporters.oxts import motion_of, navigation_mount, oxts_row
-from exporters.sensors import laser_scanner, rgb_camera, scanned
+from exporters.sensors import laser_scanner, pinhole_camera, scanned
 from exporters.sequences import (
     Frame,
+    Mount,
     between,
     camera_mount,
     check_sequence_count,
@@ -50,7 +51,7 @@ from generator.config.strict import Strict
 from generator.core.capture import Channel
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.sample import ObjectTruth, Sample
-from generator.core.se3 import SE3
+from generator.core.scene import Scene
 
 SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""
@@ -90,7 +91,8 @@ class KittiTracking(Strict):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: a sensor is not there, or there are too many sequences.
+            ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
+                sequences.
         """
         self._cameras(info)
         laser_scanner(info, self.lidar, self.type)
@@ -125,9 +127,9 @@ class KittiTracking(Strict):
 
     def _cameras(self, info: DatasetInfo) -> dict[str, str]:
         """Sensors by KITTI's number."""
-        cameras = {"02": rgb_camera(info, self.camera, self.type)}
+        cameras = {"02": pinhole_camera(info, self.camera, self.type)}
         if self.right_camera:
-            cameras["03"] = rgb_camera(info, self.right_camera, self.type)
+            cameras["03"] = pinhole_camera(info, self.right_camera, self.type)
         return cameras
 
     def _row(self, info: DatasetInfo, sample: Sample) -> dict[str, Any]:
@@ -139,7 +141,7 @@ class KittiTracking(Strict):
         return frame_facts(info, sample) | {
             "cameras": [number for number, name in cameras.items() if name in sample.truth],
             "oxts": oxts_row(motion_of(scene, unit), self.origin_deg),
-            "calib": calib_text(sample, cameras, laser_scanner(info, self.lidar, self.type)),
+            "calib": calib_text(scene, cameras, laser_scanner(info, self.lidar, self.type), unit),
             "labels": [
                 tracking_label(row, things[instance_id])
                 for row, instance_id in label_rows(truth, self)
@@ -179,11 +181,15 @@ def truncation_level(truncation: float) -> int:
     return int(truncation > SLIGHTLY_TRUNCATED) + int(truncation > LARGELY_TRUNCATED)
 
 
-def calib_text(sample: Sample, cameras: Mapping[str, str], lidar: str) -> str:
-    """The seven lines of a sequence's calibration; camera 02 is the reference."""
-    scene = sample.scene
+def calib_text(scene: Scene, cameras: Mapping[str, str], lidar: str, unit: Mount) -> str:
+    """The seven lines of a sequence's calibration; camera 02 is the reference.
+
+    Without a laser scanner, the camera's frame stands for the scanner's.
+    """
     reference = camera_mount(scene, cameras["02"])
-    T_camera_velo = between(scene, reference, lidar_mount(scene, lidar)) if lidar else SE3()
+    scanner = lidar_mount(scene, lidar) if lidar else reference
+    T_camera_velo = between(scene, reference, scanner).matrix()[:3]
+    T_velo_imu = between(scene, scanner, unit).matrix()[:3]
     lines = []
     for k in range(4):
         name = cameras.get(f"{k:02d}", cameras["02"])
@@ -191,6 +197,6 @@ def calib_text(sample: Sample, cameras: Mapping[str, str], lidar: str) -> str:
         P = projection(scene.camera(name).intrinsics, shift_m)
         lines.append(f"P{k}: {matrix_numbers(P)}\n")
     lines.append(f"R_rect {matrix_numbers(np.eye(3))}\n")
-    lines.append(f"Tr_velo_cam {matrix_numbers(T_camera_velo.matrix()[:3])}\n")
-    lines.append(f"Tr_imu_velo {matrix_numbers(np.eye(3, 4))}\n")
+    lines.append(f"Tr_velo_cam {matrix_numbers(T_camera_velo)}\n")
+    lines.append(f"Tr_imu_velo {matrix_numbers(T_velo_imu)}\n")
     return "".join(lines)

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from exporters.clouds import read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.kitti import calib_matrices, matrix_lines
-from exporters.sensors import instant_s, scanned
+from exporters.sensors import check_pinholes, instant_s, scanned
 from exporters.sequences import (
     Frame,
     between,
@@ -126,7 +126,7 @@ class SemanticKitti(Strict):
         return frozenset()
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set without the sensors that are named.
+        """Refuse a data set without the sensors that are named, or whose camera is no pinhole.
 
         Raises:
             ConfigError: telling which.
@@ -140,6 +140,7 @@ class SemanticKitti(Strict):
                     f"exporter 'semantickitti': there is no {field} '{name}'; "
                     f"sensors of that kind: {', '.join(known) or 'none'}"
                 )
+        check_pinholes(info, [self.camera or info.sensors[0]], self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write points and labels of each sample, and a line about its scan."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from generator.core.capture import Channel
@@ -31,6 +31,32 @@ def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
         f"exporter '{exporter}': camera '{wanted}' is no sensor that writes the rgb channel; "
         f"expected one of: {_listed(known)}{did_you_mean(wanted, known)}"
     )
+
+
+def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> None:
+    """Refuse lenses that a format of rectified images cannot tell.
+
+    Raises:
+        ConfigError: naming the first camera that is no pinhole.
+    """
+    for camera in cameras:
+        model = info.lenses.get(camera, "pinhole")
+        if model != "pinhole":
+            raise ConfigError(
+                f"exporter '{exporter}': camera '{camera}' has a lens of the model '{model}', but the"
+                " format holds rectified images; use a camera with a pinhole, or export it as coco"
+            )
+
+
+def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
+    """The same for formats that can describe no other camera than a pinhole.
+
+    Raises:
+        ConfigError: there is none, or it has another lens.
+    """
+    camera = rgb_camera(info, wanted, exporter)
+    check_pinholes(info, [camera], exporter)
+    return camera
 
 
 def laser_scanner(info: DatasetInfo, wanted: str, exporter: str) -> str:

@@ -84,10 +84,7 @@ def upright_box(box: OrientedBox) -> UprightBox:
 
 
 def boxed_members(
-    ids: NDArray[np.int64],
-    p_camera: Array,
-    dt_s: NDArray[np.floating],
-    boxes: Mapping[int, tuple[UprightBox, Array]],
+    ids: NDArray[np.int64], p_camera: Array, boxes: Mapping[int, UprightBox]
 ) -> NDArray[np.int64]:
     """The instance that each point belongs to: that of the box it lies in; 0 = none.
 
@@ -97,17 +94,14 @@ def boxed_members(
     Args:
         ids: What reflected each point [n].
         p_camera: The points in the camera frame [n, 3].
-        dt_s: When their pulses left, from the instant of the boxes on [n].
-        boxes: By instance, the box and its velocity in the camera frame [3]: what a thing moved
-            between pulse and instant is taken back before.
+        boxes: By instance.
     """
     members: NDArray[np.int64] = ids.copy()
-    for instance_id, (box, velocity_m_s) in boxes.items():
+    for instance_id, box in boxes.items():
         (mine,) = np.nonzero(ids == instance_id)
-        then = p_camera[mine] - dt_s[mine, None] * velocity_m_s
-        members[mine[box.depths_m(then) < -BORDER_M]] = 0
+        members[mine[box.depths_m(p_camera[mine]) < -BORDER_M]] = 0
     free = np.flatnonzero(~np.isin(members, list(boxes)))
-    for instance_id, (box, _) in boxes.items():
+    for instance_id, box in boxes.items():
         reach_m = math.hypot(*box.size_hwl_m)
         near = free[np.abs(p_camera[free] - box.bottom_m).max(axis=1) < reach_m]
         members[near[box.depths_m(p_camera[near]) > BORDER_M]] = instance_id

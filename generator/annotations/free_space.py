@@ -35,7 +35,7 @@ class FreeSpace(Strict):
         far_m: Pixels that see something farther away than this, over the ground, are left out.
     """
 
-    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.Z_DEPTH, Channel.INSTANCE})
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.RANGE, Channel.INSTANCE})
     type: Literal["free_space"] = "free_space"
     far_m: float = Field(60.0, gt=0, le=200)
 
@@ -43,15 +43,17 @@ class FreeSpace(Strict):
         self, scene: Scene, assets: AssetLibrary, reading: Reading, truth: ImageTruth
     ) -> ImageTruth:
         """Fill in ``free_space``; an empty mask where there is none."""
-        depth = reading.channels[Channel.Z_DEPTH]
-        free = (reading.channels[Channel.INSTANCE] == 0) & (depth < self.far_m)
+        ranges_m = reading.channels[Channel.RANGE]
+        # From above, what is near over the ground may be farther away.
+        free = (reading.channels[Channel.INSTANCE] == 0) & (ranges_m < 2.0 * self.far_m)
         rows, columns = np.nonzero(free)
         x, y, _ = reading.camera.T_world_camera.translation_m
         middle = (TILE_M * round(x / TILE_M), TILE_M * round(y / TILE_M))
         background = tuple(b for b in scene.bodies if b.instance_id == 0 and b.motion == "static")
         grid = Grid(SE3((*middle, 0.0)), CELL_M, 2 * round((self.far_m + TILE_M) / CELL_M))
         ground = _ground(background, assets, grid)
-        p_camera = reading.camera.intrinsics.unproject(depth)[rows, columns]
+        p_camera = reading.camera.intrinsics.pixel_rays()[rows, columns]
+        p_camera = p_camera * ranges_m[rows, columns, None].astype(np.float64)
         p_world = reading.camera.T_world_camera.apply(p_camera)
         here = (p_world[:, 0] - x) ** 2 + (p_world[:, 1] - y) ** 2 < self.far_m**2
         cells = grid.cells(p_world)

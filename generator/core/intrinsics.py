@@ -8,6 +8,7 @@ their exporters subtract 0.5 from ``cx_px`` and ``cy_px``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,13 +85,11 @@ class Intrinsics:
         return self.lens.directions_of(points / (self.fx_px, self.fy_px))
 
     def pixel_rays(self) -> Array:
-        """Unit directions through all pixel centres, shape [height, width, 3]; NaN for none."""
-        rays = np.zeros((self.height_px, self.width_px, 3))
-        u = np.arange(self.width_px) + 0.5
-        for first in range(0, self.height_px, _ROWS_AT_ONCE):
-            v = np.arange(first, min(first + _ROWS_AT_ONCE, self.height_px)) + 0.5
-            rays[first : first + len(v)] = self.rays(np.stack(np.meshgrid(u, v), axis=-1))
-        return rays
+        """Unit directions through all pixel centres, shape [height, width, 3]; NaN for none.
+
+        Those of the last few cameras are remembered: the array cannot be written to.
+        """
+        return _pixel_rays(self)
 
     def unproject(self, z_depth_m: NDArray[np.floating]) -> Array:
         """Points in the camera frame [m], shape [height, width, 3], of a z-depth image.
@@ -124,3 +123,14 @@ class Intrinsics:
         columns = [np.stack(np.broadcast_arrays(end, v), -1) for end in (0.0, u[-1])]
         dark = np.isnan(self.rays(np.concatenate(rows + columns))).any()
         return bool(dark) and self.lens.folds
+
+
+@lru_cache(maxsize=4)
+def _pixel_rays(intrinsics: Intrinsics) -> Array:
+    rays = np.zeros((intrinsics.height_px, intrinsics.width_px, 3))
+    u = np.arange(intrinsics.width_px) + 0.5
+    for first in range(0, intrinsics.height_px, _ROWS_AT_ONCE):
+        v = np.arange(first, min(first + _ROWS_AT_ONCE, intrinsics.height_px)) + 0.5
+        rays[first : first + len(v)] = intrinsics.rays(np.stack(np.meshgrid(u, v), axis=-1))
+    rays.flags.writeable = False
+    return rays

@@ -24,6 +24,7 @@ from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
 
 EMPTY = BoxPx(0, 0, 0, 0)
+_CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
 
 
 def traced_masks(
@@ -38,11 +39,11 @@ def traced_masks(
     step_rad = _widest_step(optics.nodes)
     for number, body in enumerate(scene.bodies):
         if body.instance_id in boxes:
-            low_m = world.placed["low_m"][number].astype(np.float64)
-            high_m = world.placed["high_m"][number].astype(np.float64)
-            away = R_camera_world @ (0.5 * (low_m + high_m) - camera.T_world_camera.translation_m)
-            radius_m = 0.5 * math.sqrt(float(((high_m - low_m) ** 2).sum()))
-            box = box_around_ball(optics.nodes, step_rad, away, radius_m)
+            ends_m = np.stack([world.placed[end][number] for end in ("low_m", "high_m")])
+            axis, half_rad = cone_around(ends_m - np.array(camera.T_world_camera.translation_m))
+            cosines = optics.nodes @ (R_camera_world @ axis).astype(np.float32)
+            # Every pixel that is shown has a node within a diagonal of a cell.
+            box = box_around(cosines >= math.cos(min(half_rad + 1.5 * step_rad, math.pi)))
             of_bodies[number] = _on_canvas(box, view)
             boxes[body.instance_id] = around(boxes[body.instance_id], of_bodies[number])
     outlooks, size = _outlooks(scene, boxes, of_bodies)
@@ -56,23 +57,32 @@ def traced_masks(
     return boxes, pixels
 
 
-def box_around_ball(nodes: Float32, step_rad: float, away_m: Array, radius_m: float) -> BoxPx:
-    """Pixels, counted from the canvas's first, outside of which no ray meets a ball; may be empty.
+def cone_around(ends_m: Array) -> tuple[Array, float]:
+    """Axis and half angle of a cone from the origin that holds a box; pi where it holds that.
 
     Args:
-        nodes: Unit directions at every few pixels of the canvas, NaN where nothing is shown.
-        step_rad: Widest angle between neighbours of them.
-        away_m: The ball's centre in the camera frame.
-        radius_m: Its radius.
+        ends_m: Low and high corner, [2, 3].
     """
-    rows, columns = nodes.shape[:2]
-    distance_m = math.sqrt(float((away_m * away_m).sum()))
+    centre = ends_m.mean(axis=0)
+    distance_m = math.sqrt(float((centre * centre).sum()))
+    radius_m = 0.5 * math.sqrt(float(((ends_m[1] - ends_m[0]) ** 2).sum()))
     if distance_m <= radius_m:
-        return BoxPx(0, 0, columns * NODE_STRIDE_PX, rows * NODE_STRIDE_PX)
-    # Every pixel that is shown has a node within a diagonal of a cell.
-    reach_rad = math.asin(radius_m / distance_m) + 1.5 * step_rad
-    cosines = nodes @ (away_m / distance_m).astype(np.float32)
-    near = cosines >= math.cos(min(reach_rad, math.pi))
+        return np.array([0.0, 0.0, 1.0]), math.pi
+    axis = centre / distance_m
+    corners = ends_m[_CORNERS, [0, 1, 2]]
+    cosines = corners @ axis / np.sqrt((corners * corners).sum(axis=1))
+    least = float(cosines.min())
+    # Narrow cones are convex: one that holds all corners holds the box.
+    narrow_rad = math.acos(min(least, 1.0)) if least > 0.0 else math.pi
+    return axis, min(narrow_rad, math.asin(radius_m / distance_m))
+
+
+def box_around(near: NDArray[np.bool_]) -> BoxPx:
+    """Pixels around set nodes, counted from the canvas's first, and two cells more; may be empty.
+
+    Args:
+        near: By node, [rows, columns].
+    """
     if not near.any():
         return EMPTY
     ys, xs = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))

@@ -114,12 +114,14 @@ class RgbCamera(Mounted):
         camera = scene.camera(self.name)
         if self.formation is None or Channel.RGB not in asked:
             return renderer.render(scene, camera, asked)
-        needed = (asked - {Channel.RGB}) | {Channel.RADIANCE, Channel.Z_DEPTH}
+        # Wide lenses see what has no depth along the axis, and are focused at a distance.
+        depth = Channel.Z_DEPTH if camera.intrinsics.straight else Channel.RANGE
+        needed = (asked - {Channel.RGB}) | {Channel.RADIANCE, depth}
         seen = renderer.render(scene, camera, needed)
         assert seen.ev100 is not None, "who renders radiance meters it"
         photo = photograph(
             seen.channels[Channel.RADIANCE],
-            seen.channels[Channel.Z_DEPTH],
+            seen.channels[depth],
             camera.intrinsics.fx_px,
             seen.ev100,
             self.formation,

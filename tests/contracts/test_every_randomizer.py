@@ -42,7 +42,11 @@ PHYSICS_BOUND = (
 
 
 def nominal_scene() -> Scene:
+<<<<<<< HEAD
     """A room with a table, an arm, objects, lamps, a car, an ego with a scanner, two cameras."""
+=======
+    """A room with a table, an arm, objects, lamps, cars, one of them the ego, and two cameras."""
+>>>>>>> 6c0cafe5852bfc21448d7e383bb7953787345b9e
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -68,9 +72,13 @@ def nominal_scene() -> Scene:
         scene,
         bodies=(*scene.bodies, lamp, signal, wagon, ego),
         instances=(*scene.instances, labelled, carrier),
-        rigs=(Rig("ego", "ego"),),
+        rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "along/0")),
         cameras=cameras,
+<<<<<<< HEAD
         lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="ego"),),
+=======
+        lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
+>>>>>>> 6c0cafe5852bfc21448d7e383bb7953787345b9e
         lanes=lanes,
         groups=(*scene.groups, group),
     )

@@ -374,7 +374,7 @@ def test_without_a_scanner_no_depth_is_needed(world: Any, tmp_path: Path) -> Non
         (
             Kitti(),
             {"lenses": {"color": "kannala_brandt"}},
-            "'color' has a lens of the model 'kannala_brandt'.*rectified",
+            "camera 'color' has a lens of the model 'kannala_brandt'.*rectified",
         ),
     ],
 )

@@ -20,12 +20,20 @@ from exporters.kitti import Kitti
 from exporters.kitti_raw import KittiRaw, luma
 from exporters.kitti_tracking import KittiTracking, truncation_level
 from exporters.motchallenge import MotChallenge, mot_class
-from exporters.oxts import GRAVITY_M_S2, Motion, oxts_row, roll_pitch_yaw
+from exporters.oxts import (
+    GRAVITY_M_S2,
+    Motion,
+    motion_of,
+    navigation_mount,
+    oxts_row,
+    roll_pitch_yaw,
+)
 from exporters.pointclouds import PointClouds
 from exporters.semantickitti import SemanticKitti
 from exporters.sequences import timestamp
 from generator.core.errors import ConfigError
 from generator.core.motion import STILL, Twist
+from generator.core.scene import Device
 from generator.core.se3 import SE3
 
 DRIVE = "2011_09_26/2011_09_26_drive_{:04d}_sync"
@@ -212,6 +220,20 @@ def test_navigation_of_a_leaning_unit_at_rest_feels_gravity_along_its_own_axes()
     )
 
 
+def test_navigation_of_a_device_is_that_of_its_place_on_the_rig(samples: Any) -> None:
+    """1 m to the left in a left turn of 50 m: slower by its share of the radius."""
+    device = Device("gnss", "gnss", "ego", SE3((0.0, 1.0, 0.5)))
+    scene = replace(samples[1].scene, devices=(device,))
+    mount = navigation_mount(scene, "gnss", "ego", "kitti_raw")
+    row = np.array(oxts_row(motion_of(scene, mount), (0.0, 0.0)).split(), float)
+
+    assert row[8:11] == pytest.approx([9.8, 0.0, 0.0], abs=2e-3)
+    assert row[12] == pytest.approx(9.8 * 0.2, abs=0.01)
+    assert row[2] == pytest.approx(0.5)
+    with pytest.raises(ConfigError, match=r"no device 'imu'.*gnss"):
+        navigation_mount(scene, "imu", "ego", "kitti_raw")
+
+
 def test_navigation_north_and_east() -> None:
     """World Y is north, X is east; heading north makes both forward and leftward differ."""
     north = SE3.about_z(math.radians(90))
@@ -345,6 +367,7 @@ def test_tracking_calibration_projects_labels_onto_their_boxes(exported: Any) ->
     calib = calibration(folder / "calib/0000.txt")
     assert list(calib) == ["P0", "P1", "P2", "P3", "R_rect", "Tr_velo_cam", "Tr_imu_velo"]
 
+    assert calib["Tr_imu_velo"].reshape(3, 4)[:, 3] == pytest.approx([0.0, 0.0, -1.73])
     rows = [line.split(" ") for line in (folder / "label_02/0000.txt").read_text().splitlines()]
     assert len(rows) == 12
     for row in rows:
@@ -581,6 +604,14 @@ def test_sensors_that_are_not_there_are_refused(exporter: Any, message: str, wor
     """Before anything is rendered, naming what there is."""
     with pytest.raises(ConfigError, match=message):
         exporter.check(drive_info(world))
+
+
+@pytest.mark.parametrize("exporter", [KittiRaw(), KittiTracking(), Kitti()])
+def test_rectified_formats_refuse_other_lenses_than_pinholes(exporter: Any, world: Any) -> None:
+    """The message names the sensor and its lens."""
+    info = replace(drive_info(world), lenses={"left": "fisheye"})
+    with pytest.raises(ConfigError, match=r"'left' has a lens of the model 'fisheye'.*coco"):
+        exporter.check(info)
 
 
 def test_raw_data_needs_a_scanner(world: Any) -> None:

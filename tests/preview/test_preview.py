@@ -170,11 +170,11 @@ def test_images_that_rerun_cannot_place_in_space_are_shown_by_themselves() -> No
         camera = Camera("color", IDENTITY, Intrinsics(8, 4, 1.3, 1.3, 4.0, 2.0, lens))
         reading = Reading("color", camera, {})
         stream = _Stream()
-        recorder = Recorder(stream, None, [])  # type: ignore[arg-type]
+        recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
         truth = {"color": ImageTruth(camera, ())}
         sample = Sample(0, 0, 0, "train", Scene("s"), Capture({"color": reading}), truth)
 
-        recorder.start(["color"])
+        recorder.start()
         recorder.record(sample)
 
         logged = [what for path, what in stream.logged if path == "world/cameras/color/image"]

@@ -18,8 +18,7 @@ from generator.core.se3 import SE3, look_at
 from generator.renderers.device import open_device
 from generator.renderers.kernels.optics import pixel_of
 from generator.renderers.kernels.records import View
-from generator.renderers.optics import canvas_nodes
-from generator.renderers.outlooks import box_around_ball
+from generator.renderers.outlooks import cone_around
 from generator.renderers.packing import pack_view
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
@@ -278,26 +277,19 @@ def test_what_hides_does_not_change_a_silhouette() -> None:
     assert silhouette.mask.sum() == (alone.channels[Channel.INSTANCE] == 2).sum()
 
 
-def test_a_box_around_a_ball_holds_every_ray_that_meets_it() -> None:
-    """For balls all around a fisheye, also where they hold the camera."""
-    k = CAMERAS["fisheye"]
-    nodes = canvas_nodes(k)
-    step = float(np.nanmax(np.arccos(np.clip((nodes[1:] * nodes[:-1]).sum(axis=-1), -1, 1))))
-    u, v = np.meshgrid(np.arange(-160, 320) + 0.5, np.arange(-160, 320) + 0.5)
-    rays = k.rays(np.stack([u, v], axis=-1))
-    rng = np.random.default_rng(4)
-    met = 0
-    for away in rng.normal(size=(40, 3)):
-        radius = float(rng.uniform(0.05, 1.2)) * math.sqrt(away @ away)
-        box = box_around_ball(nodes, step, away, radius)
-        nearest = away - (rays @ away)[..., None] * rays
-        meets = ((nearest**2).sum(axis=-1) <= radius**2) & (rays @ away > 0.0)
-        rows, columns = np.nonzero(meets)
-        met += len(rows) > 0
-        if len(rows):
-            assert box.x_min <= columns.min() and columns.max() < box.x_max
-            assert box.y_min <= rows.min() and rows.max() < box.y_max
-    assert met > 20
+def test_a_cone_around_a_box_holds_all_of_it() -> None:
+    """Points of boxes near and far, thin and thick; the whole sphere where the eye is inside."""
+    rng = np.random.default_rng(6)
+    halves = []
+    for _ in range(300):
+        low = rng.normal(size=3) * 2.0
+        ends = np.stack([low, low + rng.uniform(0.05, 4.0, 3)])
+        axis, half_rad = cone_around(ends)
+        points = ends[0] + rng.random((500, 3)) * (ends[1] - ends[0])
+        cosines = points @ axis / np.linalg.norm(points, axis=1)
+        assert half_rad == math.pi or (np.arccos(np.clip(cosines, -1, 1)) <= half_rad + 1e-6).all()
+        halves.append(half_rad)
+    assert 0.2 < np.mean(np.array(halves) < 1.0) < 0.95
 
 
 def test_a_panorama_sees_all_around() -> None:

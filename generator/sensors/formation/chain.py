@@ -185,7 +185,8 @@ def photograph(
 
     Args:
         luminance: Linear Rec. 709 colours [cd/m^2], float32 [h, w, 3].
-        z_m: Along the optical axis [m], [h, w]; inf = nothing. Read only for depth of field.
+        z_m: Along the optical axis or, before a lens that is no pinhole, along the ray [m], [h, w];
+            inf = nothing. Read only for depth of field.
         focal_px: Focal length of the lens.
         metered_ev100: What the camera's meter says.
         formation: The camera.
