@@ -35,18 +35,14 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields without which a randomizer cannot be made, or may leave a scene as it is."""
 
 PHYSICS_BOUND = (
-    "along", "arm_configuration", "arm_motion", "distractors", "ego_on_lane", "objects",
-    "physics_properties", "traffic_flow",
+    "along", "arm_configuration", "distractors", "ego_on_lane", "objects", "physics_properties",
+    "traffic_flow",
 )  # fmt: skip
 """Randomizers whose draws physics has to see."""
 
 
 def nominal_scene() -> Scene:
-<<<<<<< HEAD
-    """A room with a table, an arm, objects, lamps, a car, an ego with a scanner, two cameras."""
-=======
     """A room with a table, an arm, objects, lamps, cars, one of them the ego, and two cameras."""
->>>>>>> 6c0cafe5852bfc21448d7e383bb7953787345b9e
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -74,11 +70,7 @@ def nominal_scene() -> Scene:
         instances=(*scene.instances, labelled, carrier),
         rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "along/0")),
         cameras=cameras,
-<<<<<<< HEAD
-        lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="ego"),),
-=======
         lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
->>>>>>> 6c0cafe5852bfc21448d7e383bb7953787345b9e
         lanes=lanes,
         groups=(*scene.groups, group),
     )
