@@ -1,8 +1,8 @@
 """Frames per second of whole rigs in traffic to disk: ``python -m benchmarks.bench_rig``.
 
 KITTI's rig: two cameras of 1242x375, an HDL-64E, an inertial unit and a satellite receiver, with
-COCO, KITTI, SemanticKITTI and tables on disk. nuScenes' rig: six cameras of 1600x900, an HDL-32E
-and five radars, with COCO, point clouds, bird's-eye maps and tables. All weathers.
+COCO, KITTI, KITTI raw, SemanticKITTI and tables on disk. nuScenes' rig: six cameras of 1600x900, an
+HDL-32E and five radars, with COCO, point clouds, bird's-eye maps and tables. All weathers.
 """
 
 from __future__ import annotations

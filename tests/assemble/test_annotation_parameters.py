@@ -1,0 +1,67 @@
+"""Annotations in configurations: names, or mappings with parameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from generator.annotations import TABLE
+from generator.annotations.bev_map import BevMap
+from generator.annotations.boxes2d import Boxes2d
+from generator.annotations.lanes import Lanes
+from generator.assemble.schema import config_schema
+from generator.assemble.spec import load_spec
+from generator.config.describe import describe
+from generator.core.errors import ConfigError
+
+CAMERA = "template: tabletop\nsensors:\n  - {type: rgb_camera, name: color}\n"
+
+
+def loaded(tmp_path: Path, annotations: str) -> dict[str, object]:
+    """The annotators of a configuration, by name."""
+    path = tmp_path / "some.yaml"
+    path.write_text(f"{CAMERA}annotations: {annotations}\n")
+    return dict(load_spec(str(path)).annotations)
+
+
+def test_names_and_mappings_may_be_mixed(tmp_path: Path) -> None:
+    """In order; what is not given has its default."""
+    found = loaded(tmp_path, "[boxes2d, {type: bev_map, px_m: 0.5}, lanes]")
+
+    assert found == {"boxes2d": Boxes2d(), "bev_map": BevMap(px_m=0.5), "lanes": Lanes()}
+    assert list(found) == ["boxes2d", "bev_map", "lanes"]
+
+
+@pytest.mark.parametrize(
+    ("annotations", "fault"),
+    [
+        ("[{type: bev_map, pxm: 0.5}]", r"annotations\[0\].pxm: unknown key .*'px_m'"),
+        ("[{type: bev_map, px_m: -1}]", r"annotations\[0\].px_m: "),
+        ("[{type: boxes2d, px_m: 1}]", "takes no parameters; expected the name alone: - boxes2d"),
+        ("[lanes, {type: lanes, far_m: 9}]", "the annotation 'lanes' is listed twice"),
+        ("[{type: bev_mpa}]", "unknown annotation 'bev_mpa'; .*did you mean 'bev_map'"),
+        ("[{px_m: 1}]", "unknown annotation"),
+    ],
+)
+def test_what_cannot_be_is_told_at_its_place(tmp_path: Path, annotations: str, fault: str) -> None:
+    """File, line, column, and what was expected."""
+    with pytest.raises(ConfigError, match=rf"some.yaml:4:\d+: .*{fault}"):
+        loaded(tmp_path, annotations)
+
+
+def test_editors_know_both_spellings() -> None:
+    """The schema lists every name, and a mapping for each that has parameters."""
+    names, *mappings = config_schema()["properties"]["annotations"]["items"]["oneOf"]
+
+    assert names == {"enum": list(TABLE)}
+    assert {m["$ref"].rpartition(".")[2] for m in mappings} == {"bev_map", "free_space", "lanes"}
+
+
+@pytest.mark.parametrize("name", TABLE.names())
+def test_every_annotator_explains_itself(name: str) -> None:
+    """By its docstring, and a table of its fields if it has any."""
+    text = describe(TABLE.load(name))
+
+    assert len(text.splitlines()[0]) > 20
+    assert ("px_m" in text) == (name == "bev_map")
