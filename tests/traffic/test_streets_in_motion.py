@@ -213,7 +213,7 @@ def test_the_camera_rides_on_the_ego_vehicle() -> None:
 
 def checked_and_moving(wrong: Spec) -> Scene:
     """What a run does first: everything is resolved, then a scene is drawn."""
-    recipe_of(wrong, library(), n=1)
+    recipe_of(wrong, library(), 1, (), frozenset())
     return moving_scene(1, wrong)
 
 
