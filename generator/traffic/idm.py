@@ -1,8 +1,7 @@
 """The Intelligent Driver Model.
 
 Treiber, Hennecke, Helbing, "Congested traffic states in empirical observations and microscopic
-simulations", Physical Review E 62(2), 2000; parameters as in Treiber and Kesting, "Traffic flow
-dynamics", 2013, table 11.2 (city).
+simulations", Physical Review E 62(2), 2000.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Cycles of traffic lights.
 
-Amber lasts 3 s, red and amber together 1 s (RiLSA 2015, 2.5: at 50 km/h); between the end of one
+Amber lasts 3 s, red and amber together 1 s (RiLSA, at 50 km/h); between the end of one
 green and the beginning of the next lie amber and a time in which all is red.
 """
 
