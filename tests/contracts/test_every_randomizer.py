@@ -35,8 +35,8 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields without which a randomizer cannot be made, or may leave a scene as it is."""
 
 PHYSICS_BOUND = (
-    "along", "arm_configuration", "distractors", "ego_on_lane", "objects", "physics_properties",
-    "traffic_flow",
+    "along", "arm_configuration", "arm_motion", "distractors", "ego_on_lane", "objects",
+    "physics_properties", "traffic_flow",
 )  # fmt: skip
 """Randomizers whose draws physics has to see."""
 
