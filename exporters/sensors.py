@@ -44,8 +44,7 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
         if model != "pinhole":
             raise ConfigError(
                 f"exporter '{exporter}': camera '{camera}' has a lens of the model '{model}', but "
-                "the format holds rectified images; use a camera with a pinhole, or export it as "
-                "coco"
+                "the format holds rectified images; use a pinhole, or export this one as coco"
             )
 
 

@@ -14,6 +14,7 @@ from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_yo
 from generator.core.interfaces import AssetIndex
 from generator.core.motion import Change, Track
 from generator.core.scene import Body, Scene
+from generator.core.se3 import Array
 from generator.core.streams import Rng
 from generator.traffic.collisions import first_overlap
 from generator.traffic.fleet import LOOKAHEAD_M, Fleet, Vehicle, fleet_of
@@ -123,7 +124,8 @@ class TrafficFlow(RandomizerBase):
         people = people_of(scene, streets.sidewalks, streets.crosswalks, assets)
         taking_part = [m.body for m in drivers] + [m.body for m in people]
         standing = standing_of(scene, taking_part, assets)
-        fleet = self._fleet(drivers, streets, self._planned(drivers, standing, streets), rng)
+        planned = self._planned(drivers, standing, streets)
+        fleet = self._fleet(drivers, streets, planned, standing.boxes, rng)
         walks = walks_of(streets.sidewalks, streets.crosswalks, standing.boxes)
         walkers = self._walkers(people, walks, rng)
         motion = simulated(fleet, walkers, standing.boxes, approaches, self.duration_s)
@@ -178,6 +180,7 @@ class TrafficFlow(RandomizerBase):
         drivers: Sequence[OnRoad],
         streets: Streets,
         planned: dict[str, tuple[str, ...]],
+        obstacles: Array,
         rng: Rng,
     ) -> Fleet | None:
         """Vehicles with drivers and routes; draws the same number for each of them."""
@@ -214,9 +217,8 @@ class TrafficFlow(RandomizerBase):
             for v in vehicles
             for n in v.route.lanes
         )
-        return fleet_of(
-            vehicles, streets.driving, streets.crosswalks, fastest * self.duration_s + 5.0
-        )
+        reach_m = fastest * self.duration_s + 5.0
+        return fleet_of(vehicles, streets.driving, streets.crosswalks, obstacles, reach_m)
 
     def _walkers(self, people: Sequence[OnFoot], walks: Walks, rng: Rng) -> list[Walker]:
         walkers = []

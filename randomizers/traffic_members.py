@@ -83,12 +83,14 @@ def drivers_of(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnRoa
     """
     groups = {group.name for group in scene.groups}
     carriers = {rig.body for rig in scene.rigs}
+    near_m = max((line.lane.width_m for line in graph.lines.values()), default=0.0)
     found = []
     for body in scene.bodies:
         if not body.instance_id or not (body.group in groups or body.name in carriers):
             continue
         category = assets.get(body.asset).category
-        if category == PERSON:
+        near = graph.nearest(*body.T_world_body.translation_m[:2])
+        if category == PERSON or near is None or near.away_m > near_m:
             continue
         axles = axles_of(assets, body.asset, body.scale)
         T_world_rear = body.T_world_body @ axles.T_body_rear
@@ -123,7 +125,10 @@ def people_of(
         if near:
             place = min(near, key=lambda pair: pair[0])[1]
             pose = dict(asset.attributes).get("pose", "walk")
-            found.append(OnFoot(body, place, pose in MOVING_POSES))
+            walks = pose in MOVING_POSES
+            # Who stands on a crosswalk is in the way.
+            if walks or place.lane in sidewalks.lines:
+                found.append(OnFoot(body, place, walks))
     return found
 
 

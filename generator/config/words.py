@@ -85,9 +85,29 @@ def _scalar(annotation: Any) -> str:
     if typing.get_origin(annotation) is Literal:
         return _alternatives([flow(a) for a in typing.get_args(annotation)])
     if is_union(annotation):
-        return _alternatives([in_words(a) for a in typing.get_args(annotation)])
+        words = [in_words(a) for a in typing.get_args(annotation)]
+        return _tagged(branches(annotation)) or _alternatives(words)
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         return _alternatives([flow(member.value) for member in annotation])
+    return ""
+
+
+def _tagged(models: tuple[Any, ...]) -> str:
+    """Words for models that one field tells apart by its single value in each; else empty."""
+    if not all(isinstance(m, type) and issubclass(m, BaseModel) for m in models):
+        return ""
+    tags = [
+        {
+            name: typing.get_args(info.annotation)
+            for name, info in model.model_fields.items()
+            if typing.get_origin(info.annotation) is Literal
+        }
+        for model in models
+    ]
+    for name in tags[0]:
+        values = [tag.get(name, ()) for tag in tags]
+        if len(set(values)) == len(models) and all(len(value) == 1 for value in values):
+            return f"a mapping with {name}: {_alternatives([flow(v[0]) for v in values])}"
     return ""
 
 

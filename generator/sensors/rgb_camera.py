@@ -40,9 +40,11 @@ class RgbCamera(Mounted):
         size_px: Width and height of its images.
         hfov_deg: Nominal horizontal field of view, along the middle row; tangential terms are
             left out, and what is dark beyond a lens's field counts.
-        lens: How directions become image points: ``pinhole``, ``brown_conrady``,
-            ``kannala_brandt`` (fisheye), ``equirectangular`` (panorama), or ``published``, the
-            calibration of a known camera.
+        lens: How directions become image points: a pinhole; brown_conrady, OpenCV's usual model
+            with k1 to k6, p1 and p2; kannala_brandt, its fisheye with k1 to k4; both with
+            field_deg, the full angle beyond which they show nothing; equirectangular, a panorama;
+            or published, a known ``camera`` with its own field of view: kitti_raw_02, euroc_cam0
+            or tum_vi_cam0.
         channels: What is written as images.
         ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
         formation: How its photographs come about; null = an ideal camera.

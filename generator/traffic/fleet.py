@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from generator.core.se3 import Array
+from generator.traffic.collisions import overlapping
 from generator.traffic.crossings import Overlap, Zone, heading, overlaps, zones
 from generator.traffic.idm import Drivers
 from generator.traffic.routes import STATION_M, LaneGraph, Route, points_at
@@ -20,6 +21,8 @@ LATERAL_M_S2 = 2.0
 """Sideways acceleration that drivers take bends with."""
 EASY_M_S2 = 1.5
 """Deceleration with which they come to bends and stops that they see from afar."""
+CLEAR_M = 1.5
+"""Drivers see what stands in their way and come no nearer."""
 STEERED_RAD_TAN = 0.75
 """Tangent of the greatest steering angle, 37 degrees."""
 
@@ -90,7 +93,8 @@ class Fleet:
         height_m: Of the ground under the rear and the front axle [n, m, 2].
         offset_m: What turns a station of vehicle j into one of vehicle i [n, n].
         from_m, to_m: Stations of i between which j is on i's way [n, n].
-        end_m: Where the network ends on each route; ``inf`` = it does not.
+        end_m: Where the network ends on each route, or something stands in the way; ``inf`` =
+            neither.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -112,9 +116,21 @@ class Fleet:
 
 
 def fleet_of(
-    vehicles: Sequence[Vehicle], graph: LaneGraph, crosswalks: LaneGraph, reach_m: float
+    vehicles: Sequence[Vehicle],
+    graph: LaneGraph,
+    crosswalks: LaneGraph,
+    obstacles: Array,
+    reach_m: float,
 ) -> Fleet:
-    """The fleet of vehicles that drive no farther than ``reach_m``."""
+    """The fleet of some vehicles.
+
+    Args:
+        vehicles: At least one.
+        graph: Of the driving lanes.
+        crosswalks: Lanes of that kind.
+        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
+        reach_m: Nobody drives farther.
+    """
     m = math.ceil((reach_m + 1.0) / STATION_M)
     first = np.array([v.station_m for v in vehicles])
     beyond = math.ceil(max([LOOKAHEAD_M[1], *(v.wheelbase_m for v in vehicles)]) / STATION_M) + 2
@@ -152,7 +168,10 @@ def fleet_of(
         offset_m=offset,
         from_m=low,
         to_m=high,
-        end_m=np.array([v.route.end_m if v.route.dead_end else np.inf for v in vehicles]),
+        end_m=np.minimum(
+            np.array([v.route.end_m if v.route.dead_end else np.inf for v in vehicles]),
+            [_free_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)],
+        ),
         entries=tuple(_entries(graph, v.route) for v in vehicles),
         zones=tuple(_zones(v.route, walked) for v in vehicles),
         overlaps=crossed,
@@ -166,6 +185,29 @@ def eased(limits: Array) -> None:
         after = limits[:, k + 1]
         reachable = np.sqrt(after * after + 2.0 * EASY_M_S2 * STATION_M)
         limits[:, k] = np.minimum(limits[:, k], reachable)
+
+
+def _free_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
+    """Station that a vehicle's front may reach before it meets what stands; ``inf`` = any."""
+    xy, ahead = courses.xy_m[k], courses.ahead[k]
+    half = np.array([0.5 * (vehicle.front_m + vehicle.rear_m), 0.5 * vehicle.width_m])
+    swept = np.column_stack([xy + (half[0] - vehicle.rear_m) * ahead, ahead])
+    reach = np.sqrt(half[0] * half[0] + half[1] * half[1])
+    low, high = swept[:, :2].min(axis=0) - reach, swept[:, :2].max(axis=0) + reach
+    size = np.sqrt(obstacles[:, 2] * obstacles[:, 2] + obstacles[:, 3] * obstacles[:, 3])
+    centres = obstacles[:, :2]
+    near = ((centres + size[:, None] > low) & (centres - size[:, None] < high)).all(axis=1)
+    free_m = math.inf
+    for box in obstacles[near]:
+        delta = swept[:, :2] - box[:2]
+        apart = float(reach) + math.hypot(box[2], box[3])
+        beside = np.flatnonzero(delta[:, 0] * delta[:, 0] + delta[:, 1] * delta[:, 1] < apart**2)
+        standing = np.broadcast_to(box[[0, 1, 4, 5]], (len(beside), 4))
+        hit = overlapping(swept[beside], half, standing, box[2:4])
+        if hit.any():
+            met_m = STATION_M * float(beside[int(np.argmax(hit))]) - CLEAR_M
+            free_m = min(free_m, vehicle.station_m + vehicle.front_m + met_m)
+    return free_m
 
 
 def _limits(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:

@@ -225,3 +225,26 @@ def test_a_default_may_be_any_value() -> None:
 
     assert rows[4].split("  ")[-1] == "0.5"
     assert rows[5].split("  ")[-1] == "[0, 0, 1]"
+
+
+def test_models_that_a_field_tells_apart_are_told_by_it() -> None:
+    """Rather than by all their fields."""
+
+    class Disc(Strict):
+        """Round."""
+
+        shape: Literal["disc"]
+        radius_m: float = 1.0
+
+    class Square(Strict):
+        """Not round."""
+
+        shape: Literal["square"]
+        side_m: float = 1.0
+
+    class Outline(Strict):
+        """One of both."""
+
+        outline: Annotated[Disc | Square, Field(discriminator="shape")]
+
+    assert "mapping with shape: disc or square" in describe(Outline)

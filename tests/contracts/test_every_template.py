@@ -17,6 +17,7 @@ from generator.config.describe import describe
 from generator.config.document import load
 from generator.config.schema import json_schema
 from generator.core.errors import LayoutRejected
+from generator.core.instants import with_placed_sensors
 from generator.core.interfaces import Stage
 from generator.core.scene import Body, Scene
 from generator.core.serial import canonical_json
@@ -145,7 +146,8 @@ def test_randomizers_draw_valid_scenes(name: str) -> None:
             scene = randomized(name, Streams(1, scene_index, attempt=attempts))
         low, high = (np.array(corner) for corner in scene.interior_m)
         places = [light.position_m for light in scene.lights if light.kind != "sun"]
-        places += [camera.T_world_camera.translation_m for camera in scene.cameras]
+        placed = with_placed_sensors(scene).cameras
+        places += [camera.T_world_camera.translation_m for camera in placed]
 
         assert all(((low <= place) & (place <= high)).all() for place in map(np.array, places))
         assert len({body.name for body in scene.bodies}) == len(scene.bodies)

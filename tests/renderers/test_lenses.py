@@ -13,13 +13,14 @@ import warp as wp
 from generator.core.capture import Channel, Reading
 from generator.core.intrinsics import Intrinsics
 from generator.core.lens import Lens
-from generator.core.scene import Body, Camera, Instance, Light, Scene
+from generator.core.scene import Body, Camera, Instance, Light, Scene, Weather
 from generator.core.se3 import SE3, look_at
 from generator.renderers.device import open_device
 from generator.renderers.kernels.optics import pixel_of
 from generator.renderers.kernels.records import View
 from generator.renderers.outlooks import cone_around
 from generator.renderers.packing import pack_view
+from generator.renderers.precipitation import rain, traces
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.warp import WarpRenderer
@@ -326,6 +327,23 @@ def test_panoramas_have_no_seam() -> None:
     assert steps[0] < 2.0 * np.median(steps[1:]) + 1.0
 
 
+def test_a_frame_does_not_depend_on_the_lenses_before_it() -> None:
+    """The first and the third of three are the same, byte by byte."""
+    renderer = WarpRenderer(LIBRARY, "cpu")
+    box = Body("box", "box", SE3((0.3, 0.2, 2.0), turned(1)), instance_id=1)
+    lamp = Light("lamp", "sphere", (0.0, 0.0, 0.0), intensity_cd=300.0)
+    scene = replace(scene_of(Body("room", "room", SE3((0.0, 0.0, -2.0))), box), lights=(lamp,))
+    names = ("barrel", "fisheye", "barrel")
+
+    first, _, third = (
+        renderer.render(scene, ahead(CAMERAS[name]), LABELS | {Channel.RGB}) for name in names
+    )
+
+    for channel, image in first.channels.items():
+        assert np.array_equal(image, third.channels[channel])
+    assert np.array_equal(first.silhouettes[1].mask, third.silhouettes[1].mask)
+
+
 def test_dark_corners_see_nothing() -> None:
     """Outside a fisheye's field: black, no depth, no ids, no light from around."""
     k = Intrinsics(96, 96, 40.0, 40.0, 48.0, 48.0, replace(FISHEYE, half_field_rad=1.0))
@@ -361,6 +379,37 @@ def test_edges_are_smooth() -> None:
     between = (level[rim] > 0.15 * inner) & (level[rim] < 0.75 * inner)
     assert inner > 40.0
     assert between.mean() > 0.25
+
+
+def test_rain_before_a_lens_is_as_dense_as_before_a_pinhole() -> None:
+    """Without coefficients, in the space that both fill: as many streaks, as long and as opaque."""
+    pinhole = Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)
+    found = []
+    for lens in (Lens(), Lens("brown_conrady", (0.0,) * 8)):
+        camera = ahead(replace(pinhole, lens=lens))
+        views = [traces(rain(2.0), camera, Weather(seed=k), 0.01, "rain") for k in range(9)]
+        all_ = np.concatenate(views)
+        away_m = np.linalg.norm(all_["p_m"], axis=1)
+        found.append(all_[(away_m < 6.0) & (all_["p_m"][:, 2] > 0.5)])
+
+    plain, bent = found
+    assert len(plain) > 2000
+    assert abs(len(plain) - len(bent)) < 5.0 * math.sqrt(len(plain) + len(bent))
+    lengths = [np.linalg.norm(s["end_px"] - s["start_px"], axis=1).mean() for s in found]
+    assert lengths[1] == pytest.approx(lengths[0], rel=0.1)
+    for field in ("radius_px", "opacity"):
+        assert bent[field].mean() == pytest.approx(plain[field].mean(), rel=0.1)
+
+
+def test_rain_falls_all_around_a_panorama() -> None:
+    """Streaks in every quarter of the image, none across the seam."""
+    k = Intrinsics.from_hfov(256, 128, 2.0 * math.pi, Lens("equirectangular"))
+
+    streaks = traces(rain(20.0), ahead(k), Weather(seed=3), 0.01, "rain")
+
+    quarters = np.bincount((streaks["start_px"][:, 0] // 64).astype(int).clip(0, 3), minlength=4)
+    assert quarters.min() > 0.8 * quarters.mean()
+    assert np.abs(streaks["end_px"] - streaks["start_px"]).max() < 128.0
 
 
 @wp.kernel

@@ -62,11 +62,13 @@ def car(graph: LaneGraph, name: str, on: str, at_m: float, **changes: float) -> 
     )  # fmt: skip
 
 
-def fleet(lanes: Sequence[Lane], *cars: tuple[str, float]) -> Fleet:
+def fleet(
+    lanes: Sequence[Lane], *cars: tuple[str, float], obstacles: np.ndarray = NO_BOXES
+) -> Fleet:
     """Cars on lanes at stations."""
     graph = LaneGraph.of(lanes, "driving")
     vehicles = [car(graph, f"car/{k}", on, at_m) for k, (on, at_m) in enumerate(cars)]
-    return fleet_of(vehicles, graph, LaneGraph.of(lanes, "crosswalk"), REACH_M)
+    return fleet_of(vehicles, graph, LaneGraph.of(lanes, "crosswalk"), obstacles, REACH_M)
 
 
 def driven(
@@ -75,10 +77,11 @@ def driven(
     duration_s: float = 15.0,
     approaches: Mapping[str, Approach] | None = None,
     walkers: Sequence[Walker] = (),
+    obstacles: np.ndarray = NO_BOXES,
 ) -> tuple[Fleet, Motion]:
     """What cars and people do."""
-    made = fleet(lanes, *cars)
-    return made, simulated(made, walkers, NO_BOXES, approaches or {}, duration_s)
+    made = fleet(lanes, *cars, obstacles=obstacles)
+    return made, simulated(made, walkers, obstacles, approaches or {}, duration_s)
 
 
 def fronts_m(made: Fleet, motion: Motion) -> np.ndarray:

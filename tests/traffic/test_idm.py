@@ -66,7 +66,7 @@ def test_a_car_settles_in_the_equilibrium_gap_behind_a_slow_one() -> None:
         car(graph, "slow", "long", 50.0, speed_max_m_s=8.0),
         car(graph, "eager", "long", 5.0),
     )
-    made = fleet_of([slow, eager], graph, LaneGraph.of([], "crosswalk"), 700.0)
+    made = fleet_of([slow, eager], graph, LaneGraph.of([], "crosswalk"), NO_BOXES, 700.0)
     motion = simulated(made, [], NO_BOXES, {}, 60.0)
     gap = motion.station_m[-1, 0] - slow.rear_m - motion.station_m[-1, 1] - eager.front_m
     v = motion.speed_m_s[-1, 0]

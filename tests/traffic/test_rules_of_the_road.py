@@ -191,6 +191,16 @@ def test_people_walk_around_each_other_and_around_things() -> None:
     assert motion.feet_m[-1, 1, 0] < 12.0
 
 
+def test_a_car_stops_before_what_stands_on_its_lane() -> None:
+    """A box of one metre at 100 m; one beside the lane at 60 m is passed."""
+    boxes_ = np.array([[100.0, 0.5, 0.5, 0.5, 1.0, 0.0], [60.0, 2.0, 0.5, 0.5, 1.0, 0.0]])
+    made, motion = driven(zebra()[:1], ("road", 20.0), obstacles=boxes_, duration_s=20.0)
+    front = fronts_m(made, motion)[:, 0]
+
+    assert 95.0 < front[-1] < 99.0
+    assert motion.speed_m_s[-1, 0] == 0.0
+
+
 def test_nothing_teleports() -> None:
     """From knot to knot nobody goes farther than their speed allows."""
     made, motion = driven(

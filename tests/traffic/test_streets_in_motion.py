@@ -211,6 +211,12 @@ def test_the_camera_rides_on_the_ego_vehicle() -> None:
     assert not scenes[1].instance(scenes[1].body("ego").instance_id).annotated
 
 
+def checked_and_moving(wrong: Spec) -> Scene:
+    """What a run does first: everything is resolved, then a scene is drawn."""
+    recipe_of(wrong, library(), 1, (), frozenset())
+    return moving_scene(1, wrong)
+
+
 BAD = {
     "duration_s: 3 s is shorter than the sequences": ("flow", "duration_s=3"),
     "no vehicle 'ega' is on a driving lane": ("flow", "routes={ega: [main/forward0]}"),
@@ -233,8 +239,7 @@ def test_what_cannot_be_is_told_in_one_message(message: str) -> None:
         "street_sequence", overrides=[*SMALL, f"randomizers[{names.index(name)}].{text}"]
     )
     with pytest.raises(ConfigError, match=message):
-        recipe_of(wrong, library(), n=1)
-        moving_scene(1, wrong)
+        checked_and_moving(wrong)
 
 
 def test_a_route_through_a_wall_is_refused() -> None:
