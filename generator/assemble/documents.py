@@ -144,7 +144,7 @@ def _overridden(elements: Node, overrides: Node) -> Node:
         for name, node in overrides.content.items():
             if name not in by_name and node.get("type") is not None:
                 # What the template lacks and says what it is comes after all of the template's.
-                named = Node(overrides.key_position(name), name)
+                named = Node(overrides.key_position(name), name, text=name)
                 by_name[name] = merge(Node(node.position, {"name": named}), node)
             elif name not in by_name:
                 fact = f"the template has no element '{name}'; expected one of "
