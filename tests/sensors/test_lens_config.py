@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from generator.core.capture import Channel, Reading
 from generator.core.lens import COEFFICIENTS
 from generator.core.scene import Camera, Region, Scene
+from generator.core.streams import Streams
 from generator.sensors.lenses import CALIBRATIONS
 from generator.sensors.rgb_camera import RgbCamera
 
@@ -130,3 +132,48 @@ def test_a_wide_camera_is_mounted_with_the_focus_in_view(given: dict[str, Any]) 
     corners = np.asarray(focus.center_m) + 0.5 * signs * np.asarray(focus.size_m)
     image = found.intrinsics.project(found.T_world_camera.inverse().apply(corners))
     assert ((image > 0) & (image < [640, 480])).all()
+
+
+class Rendering:
+    """A renderer of even light, 2 m away in every direction, that remembers what was asked for."""
+
+    def __init__(self) -> None:
+        self.asked: frozenset[Channel] = frozenset()
+
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+        """Whatever there is."""
+        del scene
+        self.asked = channels
+        shape = (camera.intrinsics.height_px, camera.intrinsics.width_px)
+        images = {
+            Channel.RADIANCE: np.full((*shape, 3), 50.0, np.float32),
+            Channel.RANGE: np.full(shape, 2.0, np.float32),
+            Channel.Z_DEPTH: np.full(shape, 2.0, np.float32),
+        }
+        return Reading(camera.name, camera, images, ev100=8.0)
+
+
+@pytest.mark.parametrize(
+    ("lens", "depth"),
+    [("pinhole", Channel.Z_DEPTH), ("kannala_brandt", Channel.RANGE)],
+)
+def test_photographs_are_focused_along_the_axis_or_at_a_distance(lens: str, depth: Channel) -> None:
+    """What lies beside a fisheye has no depth along its axis."""
+    sensor = RgbCamera.model_validate(
+        {
+            "name": "eye",
+            "size_px": (32, 24),
+            "lens": {"model": lens},
+            "channels": ("rgb",),
+            "formation": {"focus": {"pixel_um": 3.0}},
+        }
+    )
+    renderer = Rendering()
+
+    reading = sensor.capture(
+        sensor.mount(Scene("t")), renderer, frozenset(), Streams(seed=0, scene=0).rng("eye")
+    )
+
+    assert renderer.asked == {Channel.RADIANCE, depth}
+    assert reading.channels[Channel.RGB].shape == (24, 32, 3)
+    assert set(reading.channels) == {Channel.RGB}
