@@ -275,6 +275,15 @@ class Exporter(Protocol):
         ...
 
 
+@runtime_checkable
+class GeometryExporter(Exporter, Protocol):
+    """An exporter of a format that holds geometry."""
+
+    def with_assets(self, assets: AssetLibrary) -> Exporter:
+        """The exporter that writes; what scenes are made of, it takes from the library."""
+        ...
+
+
 def media_path(shard_dir: Path, sensor: str, channel: Channel, index: int) -> Path:
     """Where the image of one channel of one sample lies."""
     return shard_dir / sensor / channel.value / f"{index:09d}.png"
