@@ -26,7 +26,7 @@ from generator.core.geometry import (
 )
 from generator.core.lens import LensModel
 from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth, Sample
-from generator.core.scene import Camera, Lane, Lidar, Scene
+from generator.core.scene import Camera, Lane, Lidar, Scene, StageModel
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 
@@ -69,6 +69,10 @@ class AssetIndex(Protocol):
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is no robot."""
+        ...
+
+    def stage(self, asset_id: str) -> StageModel:
+        """What a stage file holds. Raises AssetError if the asset is no stage."""
         ...
 
 

@@ -32,11 +32,13 @@ def bind_materials(
     stage: Any, mesh_path: str, scope: str, materials: Sequence[Material], textures: TextureFinder
 ) -> None:
     """Define the materials of a mesh's slots in a scope, and bind them to it and its subsets."""
-    from pxr import UsdGeom, UsdShade
+    from pxr import Usd, UsdGeom, UsdShade
 
     mesh = stage.GetPrimAtPath(mesh_path)
-    subsets = UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsets()
-    parts = {_slot_of(part.GetPrim().GetName()): part.GetPrim() for part in subsets} or {0: mesh}
+    # All children: those of a class are abstract, and are not listed otherwise.
+    children = mesh.GetFilteredChildren(Usd.PrimAllPrimsPredicate)
+    subsets = [child for child in children if child.IsA(UsdGeom.Subset)]
+    parts = {_slot_of(part.GetName()): part for part in subsets} or {0: mesh}
     UsdGeom.Scope.Define(stage, scope)
     for slot, part in parts.items():
         material = define_material(stage, f"{scope}/{SLOT}{slot}", materials[slot], textures)
