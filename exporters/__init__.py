@@ -20,5 +20,6 @@ TABLE = PluginTable(
         "pointclouds": "exporters.pointclouds:PointClouds",
         "semantickitti": "exporters.semantickitti:SemanticKitti",
         "tables": "exporters.tables:Tables",
+        "usd": "exporters.usd:Usd",
     },
 )

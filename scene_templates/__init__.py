@@ -25,5 +25,6 @@ TABLE = PluginTable(
         "shelf": "scene_templates.shelf:Shelf",
         "signals": "scene_templates.signals:Signals",
         "surface": "scene_templates.surface:SurfaceElement",
+        "usd_stage": "scene_templates.usd_stage:UsdStage",
     },
 )

@@ -14,7 +14,7 @@ from generator.assemble.tables import TABLES
 from generator.assets.library import Library, open_library
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex, DatasetInfo, Exporter, Renderer
+from generator.core.interfaces import AssetIndex, DatasetInfo, Exporter, GeometryExporter, Renderer
 from generator.core.scene import Scene, SharedValue
 from generator.core.streams import Streams
 from generator.physics import open_engine
@@ -109,7 +109,7 @@ def recipe_of(
         step_s=spec.head.step_s,
         lenses={s.name: s.intrinsics().lens.model for s in spec.sensors if s.modality == "camera"},
     )
-    exporters = _exporters(spec, info)
+    exporters = _exporters(spec, info, library)
     needed = frozenset().union(*(a.channels for a in annotators), extra_channels)
     return Recipe(
         seed=spec.head.seed,
@@ -205,12 +205,14 @@ def _annotators(spec: Spec) -> Sequence[AnyAnnotator]:
     return list(annotators.values())
 
 
-def _exporters(spec: Spec, info: DatasetInfo) -> dict[str, Exporter]:
+def _exporters(spec: Spec, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
     exporters: dict[str, Exporter] = {}
     for exporter in spec.exporters:
         name = exporter.type
         if name in exporters:
             raise ConfigError(f"exporters: '{name}' is listed twice")
         exporter.check(info)
-        exporters[name] = exporter
+        exporters[name] = (
+            exporter.with_assets(library) if isinstance(exporter, GeometryExporter) else exporter
+        )
     return exporters

@@ -28,10 +28,11 @@ from generator.assets.packing import pack, unpack
 from generator.assets.packs import pack_assets
 from generator.assets.road_files import import_road_network, road_network_lanes
 from generator.assets.robots import robot_model
+from generator.assets.stages import is_stage, stage_model
 from generator.assets.urdf import Urdf, read_urdf
 from generator.core.errors import AssetError
 from generator.core.geometry import Asset, Float32, RobotModel, TextureData
-from generator.core.scene import Lane
+from generator.core.scene import Lane, StageModel
 
 _BUILT_IN = Path(__file__).with_name("pybullet.yaml")
 
@@ -41,8 +42,8 @@ T = TypeVar("T")
 class Files:
     """The part of the library that is read from folders.
 
-    Ids are those of the indices; ``<robot>/<link>`` is a robot's link, and ``<asset>#<image>``
-    an image that an asset's materials refer to.
+    Ids are those of the indices; ``<robot>/<link>`` is a robot's link, ``<stage>/<piece>`` a
+    stage's mesh, and ``<asset>#<image>`` an image that an asset's materials refer to.
     """
 
     def __init__(
@@ -54,14 +55,15 @@ class Files:
         self._digests = Digests(disk)
         self._listed: dict[str, Listed] | None = None
         self._urdfs: dict[str, Urdf] = {}
+        self._stages: dict[str, StageModel] = {}
 
     def names(self) -> Iterator[str]:
         """Every id."""
         yield from self._all()
 
     def __contains__(self, asset_id: str) -> bool:
-        """Whether an asset or a robot's link has that id."""
-        return asset_id in self._all() or self._link(asset_id) is not None
+        """Whether an asset, a robot's link or a stage's piece has that id."""
+        return asset_id in self._all() or self._part(asset_id) is not None
 
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
         """All assets of a kind that carry every tag."""
@@ -71,22 +73,22 @@ class Files:
         self._digests.save()
 
     def get(self, asset_id: str) -> Asset:
-        """The asset, or a robot's link as an object of its own."""
-        link = self._link(asset_id)
-        if link is None:
+        """The asset, or a robot's link or a stage's piece as an object of its own."""
+        part = self._part(asset_id)
+        if part is None:
             asset = self._asset(self._all()[asset_id])
         else:
-            robot = self._asset(link[0])
-            asset = replace(robot, asset_id=asset_id, kind="object")
+            whole = self._asset(part[0])
+            asset = replace(whole, asset_id=asset_id, kind="object")
         self._digests.save()
         return asset
 
     def imported(self, asset_id: str) -> Imported:
-        """Geometry of an object or of a robot's link."""
-        link = self._link(asset_id)
-        one = link[0] if link else self._all()[asset_id]
+        """Geometry of an object, of a robot's link or of a stage's piece."""
+        part = self._part(asset_id)
+        one = part[0] if part else self._all()[asset_id]
         entry, folder = one.entry, Folder(one.root)
-        name = link[1] if link else ""
+        name = part[1] if part else ""
 
         def compute() -> Arrays:
             if isinstance(entry, RobotEntry):
@@ -94,13 +96,13 @@ class Files:
             elif _is_road_network(entry):
                 made = import_road_network(folder, entry.file)
             elif isinstance(entry, MeshEntry):
-                made = import_object(folder, entry, asset_id)
+                made = import_object(folder, entry, one.asset_id, name)
             else:
                 raise AssetError(f"asset '{asset_id}': is no object but one of kind {one.kind}")
             self._check_unchanged(one, folder)
             return pack(made)
 
-        if isinstance(entry, RobotEntry) and not link:
+        if isinstance(entry, RobotEntry) and not part:
             links = ", ".join(f"{asset_id}/{n}" for n in list(self._urdf(one).links)[:2])
             raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
         key = content_key({"asset": self._key(one), "link": name})
@@ -123,10 +125,23 @@ class Files:
             raise AssetError(f"asset '{asset_id}': is no robot but one of kind {one.kind}")
         return robot_model(asset_id, self._urdf(one), one.entry, str(one.root / one.entry.file))
 
+    def stage(self, asset_id: str) -> StageModel:
+        """What a stage holds."""
+        one = self._all()[asset_id]
+        entry = one.entry
+        if not isinstance(entry, MeshEntry) or not is_stage(entry):
+            raise AssetError(f"asset '{asset_id}': is no stage; give a .usd, .usda, .usdc or .usdz")
+        if asset_id not in self._stages:
+            folder = Folder(one.root)
+            self._stages[asset_id] = stage_model(folder, entry, asset_id)
+            self._check_unchanged(one, folder)
+        return self._stages[asset_id]
+
     def texture(self, texture_id: str) -> TextureData:
         """Images of a listed texture, or of a mesh's material (``<asset>#<image>``)."""
         owner, _, name = texture_id.partition("#")
-        one = self._all()[owner]
+        part = self._part(owner)
+        one = part[0] if part else self._all()[owner]
         folder = Folder(one.root)
         if not name:
             if one.kind != "texture":
@@ -181,13 +196,17 @@ class Files:
                 self._listed[one.asset_id] = one
         return self._listed
 
-    def _link(self, asset_id: str) -> tuple[Listed, str] | None:
-        """Robot and link name of an id ``<robot>/<link>``."""
-        robot, slash, link = asset_id.rpartition("/")
-        one = self._all().get(robot) if slash else None
-        if one is None or one.kind != "robot" or link not in self._urdf(one).links:
+    def _part(self, asset_id: str) -> tuple[Listed, str] | None:
+        """Robot and link of an id ``<robot>/<link>``, stage and piece of ``<stage>/<piece>``."""
+        whole, slash, part = asset_id.rpartition("/")
+        one = self._all().get(whole) if slash else None
+        if one is None or asset_id in self._all():
             return None
-        return one, link
+        if one.kind == "robot":
+            return (one, part) if part in self._urdf(one).links else None
+        if not is_stage(one.entry):
+            return None
+        return (one, part) if part in {p.name for p in self.stage(whole).pieces} else None
 
     def _urdf(self, one: Listed) -> Urdf:
         if one.asset_id not in self._urdfs:

@@ -22,7 +22,8 @@ from generator.assets.images import decode
 from generator.assets.mesh import NormalForm, check_coordinates, normal_form
 from generator.assets.primitives import box, cylinder, sphere
 from generator.assets.readers import read_mesh
-from generator.assets.readers.source import linear_of_srgb
+from generator.assets.readers.source import Source, linear_of_srgb
+from generator.assets.readers.usd import opened
 from generator.assets.soup import Float64, Int64, Slot, Soup, joined
 from generator.assets.urdf import Shape, Urdf, read_urdf
 from generator.core.errors import AssetError
@@ -53,14 +54,27 @@ class Imported:
     keypoints: tuple[Keypoint, ...] = ()
 
 
-def import_object(folder: Folder, entry: MeshEntry, asset_id: str) -> Imported:
-    """An object from its mesh or URDF file. Raises AssetError if it is unfit."""
+def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = "") -> Imported:
+    """An object from its mesh or URDF file. Raises AssetError if it is unfit.
+
+    Args:
+        folder: Where its files lie.
+        entry: What they are.
+        asset_id: Of the entry.
+        piece: Name of the only mesh of a stage that is wanted; empty = all of it is.
+    """
     place = str(folder.root / entry.file)
-    looks, collides, images = _raw(folder, entry)
+    if piece:
+        source = _piece(folder, entry, piece)
+        looks, collides, images = [source.soup], list[Soup](), source.images
+        asset_id = f"{asset_id}/{piece}" if images else asset_id
+        entry = entry.model_copy(update={"origin": "center"})
+    else:
+        looks, collides, images = _raw(folder, entry)
     soup = _finished(joined(looks), entry.materials, place, asset_id)
-    matrix = _upright(entry)
+    matrix = upright(entry)
     soup = soup.transformed(matrix)
-    scale, shift = _scale_and_shift(soup, entry, place)
+    scale, shift = scale_and_shift(soup, entry, place)
     soup = _with_regions(soup.transformed(_scaling(scale, shift)), entry.regions)
     mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
     if collides:
@@ -133,6 +147,15 @@ def _raw(folder: Folder, entry: MeshEntry) -> tuple[list[Soup], list[Soup], Mapp
     if entry.collision:
         collides = [read_mesh(folder, entry.collision, materials=False).soup]
     return looks, collides, images
+
+
+def _piece(folder: Folder, entry: MeshEntry, name: str) -> Source:
+    """One mesh of a stage. Raises AssetError if there is none of that name."""
+    with opened(folder, entry.file) as stage:
+        pieces = tuple(piece for piece in stage.pieces() if piece.name == name)
+        if not pieces:
+            raise AssetError(f"{folder.root / entry.file}: has no mesh '{name}'; correct the id")
+        return stage.source(pieces)
 
 
 def _geometry(placed: tuple[Shape, SE3]) -> tuple[object, ...]:
@@ -264,7 +287,7 @@ def _pixels(uvs: Float64, shape: tuple[int, ...]) -> tuple[Int64, Int64]:
     return rows, columns
 
 
-def _upright(entry: MeshEntry) -> Float64:
+def upright(entry: MeshEntry) -> Float64:
     """Affine map that turns the file's axes to Z up and the front to +X."""
     suffix = entry.file.lower().rpartition(".")[2]
     up = entry.up or ("y" if suffix in ("glb", "gltf") else "z")
@@ -277,7 +300,12 @@ def _upright(entry: MeshEntry) -> Float64:
     return matrix
 
 
-def _scale_and_shift(soup: Soup, entry: MeshEntry, place: str) -> tuple[float, Float64]:
+def scale_and_shift(soup: Soup, entry: MeshEntry, place: str) -> tuple[float, Float64]:
+    """Metres per unit, and how the scaled soup is moved so that its origin is the entry's.
+
+    Raises:
+        AssetError: if it is not finite, or has no extent that could become the entry's size.
+    """
     if not np.isfinite(soup.corners).all():
         raise AssetError(f"{place}: holds vertices that are not finite; export it again")
     points = soup.corners.reshape(-1, 3)

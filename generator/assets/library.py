@@ -23,7 +23,7 @@ from generator.core.geometry import (
     RobotModel,
     TextureData,
 )
-from generator.core.scene import Lane
+from generator.core.scene import Lane, StageModel
 from generator.core.se3 import Vec3
 
 
@@ -111,6 +111,12 @@ class Library:
         if self._is_generated(asset_id):
             raise AssetError(f"asset '{asset_id}': is no robot")
         return self._files.robot(asset_id)
+
+    def stage(self, asset_id: str) -> StageModel:
+        """What a stage file (OpenUSD) holds. Raises AssetError if the asset is no stage."""
+        if self._is_generated(asset_id):
+            raise AssetError(f"asset '{asset_id}': is no stage")
+        return self._files.stage(asset_id)
 
     def mesh(self, asset_id: str) -> MeshData:
         """Visual geometry. Also for robot links: ``franka_panda/panda_link3``."""

@@ -12,6 +12,7 @@ from urllib.parse import unquote
 from generator.assets.folder import Folder
 from generator.assets.urdf import read_urdf
 from generator.core.errors import AssetError
+from generator.usd.reading import SUFFIXES, layer_references
 
 _MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", re.MULTILINE)
 _MAP = re.compile(rb"^[ \t]*map_Kd[ \t]+(?:.*[ \t])?(\S+?)[ \t\r]*$", re.MULTILINE)
@@ -53,6 +54,8 @@ def _references(folder: Folder, name: str) -> Iterator[str]:
             yield reference.decode("utf-8", errors="replace")
     elif suffix == ".gltf":
         yield from (unquote(uri) for uri in _uris(folder.read(name)))
+    elif suffix in SUFFIXES:
+        yield from layer_references(folder.path(name))
 
 
 def _uris(data: bytes) -> list[str]:

@@ -26,7 +26,7 @@ from generator.core.geometry import (
 )
 from generator.core.lens import LensModel
 from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth, Sample
-from generator.core.scene import Camera, Lane, Lidar, Scene
+from generator.core.scene import Camera, Lane, Lidar, Scene, StageModel
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 
@@ -69,6 +69,10 @@ class AssetIndex(Protocol):
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is no robot."""
+        ...
+
+    def stage(self, asset_id: str) -> StageModel:
+        """What a stage file holds. Raises AssetError if the asset is no stage."""
         ...
 
 
@@ -272,6 +276,15 @@ class Exporter(Protocol):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Merge all shards, given in index order, into the format's own layout."""
+        ...
+
+
+@runtime_checkable
+class GeometryExporter(Exporter, Protocol):
+    """An exporter of a format that holds geometry."""
+
+    def with_assets(self, assets: AssetLibrary) -> Exporter:
+        """The exporter that writes; what scenes are made of, it takes from the library."""
         ...
 
 

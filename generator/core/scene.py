@@ -384,6 +384,38 @@ class Region:
 
 
 @dataclass(frozen=True, slots=True)
+class StagePiece:
+    """One mesh of a stage file.
+
+    Attributes:
+        name: Unique in the stage.
+        asset: Id of its mesh.
+        T_stage_piece: Where the mesh is in the stage.
+        thing: Name of the labelled prim that it belongs to; empty = none.
+        category: The label of that prim.
+    """
+
+    name: str
+    asset: str
+    T_stage_piece: SE3
+    thing: str = ""
+    category: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StageModel:
+    """A world that somebody has built elsewhere, in its own frame: metres, Z up.
+
+    Attributes:
+        cameras: Names and ``T_stage_camera``.
+    """
+
+    pieces: tuple[StagePiece, ...]
+    lights: tuple[Light, ...] = ()
+    cameras: tuple[tuple[str, SE3], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Scene:
     """One world. Change it with ``dataclasses.replace``.
 

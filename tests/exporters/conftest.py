@@ -30,9 +30,9 @@ from generator.core.capture import (
     Silhouette,
     Table,
 )
-from generator.core.geometry import SURFACES, Keypoint
+from generator.core.geometry import SURFACES, Keypoint, Material
 from generator.core.instants import RIG_AXES, at, with_placed_sensors, with_twists
-from generator.core.interfaces import DatasetInfo, Exporter
+from generator.core.interfaces import DatasetInfo, Exporter, GeometryExporter
 from generator.core.intrinsics import Intrinsics
 from generator.core.lanes import LaneBorder
 from generator.core.motion import Track
@@ -344,6 +344,16 @@ def make_info(
     return replace(info, **changes)
 
 
+class Sky:
+    """A library of which a world without bodies takes no more than light."""
+
+    def materials(self, asset_id: str) -> tuple[Material, ...]:
+        return ()
+
+    def environment(self, environment_id: str) -> NDArray[np.float32]:
+        return np.ones((8, 16, 3), np.float32)
+
+
 def export(
     exporter: Exporter,
     info: DatasetInfo,
@@ -355,6 +365,8 @@ def export(
     keep_arrays: bool = False,
 ) -> Path:
     """Write samples shard by shard, merge the shards, and return the data set's folder."""
+    if isinstance(exporter, GeometryExporter):
+        exporter = exporter.with_assets(Sky())
     shards = [list(samples[i : i + shard_size]) for i in range(0, len(samples), shard_size)]
     shard_dirs = [folder / f"shards/{k:06d}" for k in range(len(shards))]
     work = list(zip(shards, shard_dirs, strict=True))

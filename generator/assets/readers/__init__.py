@@ -11,6 +11,7 @@ from generator.assets.readers.obj import read_obj
 from generator.assets.readers.ply import read_ply
 from generator.assets.readers.source import MAX_FACES, Source
 from generator.assets.readers.stl import read_stl
+from generator.assets.readers.usd import read_usd
 from generator.core.errors import AssetError, did_you_mean
 
 __all__ = ["MESH_SUFFIXES", "Source", "read_mesh"]
@@ -21,6 +22,10 @@ _READERS: dict[str, Callable[[Folder, str, bool], Source]] = {
     ".obj": read_obj,
     ".ply": read_ply,
     ".stl": read_stl,
+    ".usd": read_usd,
+    ".usda": read_usd,
+    ".usdc": read_usd,
+    ".usdz": read_usd,
 }
 MESH_SUFFIXES = frozenset(_READERS)
 

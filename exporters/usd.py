@@ -1,0 +1,164 @@
+"""OpenUSD: the world that every view shows, as a stage.
+
+::
+
+    000000012.usdc      number of the first sample; a sequence is one stage, its steps time codes
+    assets/<asset>.usdc    meshes with their own materials, shared by all stages
+    textures/<texture>.png, environments/<sky>.hdr
+    stages.jsonl        one line per stage: file, first sample, scene, view, split, steps
+
+What is in a stage and where: ``generator.usd.stage``. Metres, Z up; ``time code = step``. Labels
+are ``UsdSemantics.LabelsAPI`` with the taxonomies ``category``, ``subcategory`` (annotated
+instances) and ``instance_id`` (all, as in the masks). Cameras reproduce the intrinsics of pinholes
+to the last bits of a float; lights are photometric, in UsdLux's units. Triplanar mapping becomes a
+projection along each face's dominant axis; weather and the bending of lenses have no counterpart.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PrivateAttr
+
+from exporters.images import link_or_copy
+from exporters.png import RowFilter, encode_png
+from exporters.sequences import write_bytes, write_text
+from generator.config.strict import Strict
+from generator.core.instants import at
+from generator.core.interfaces import AssetLibrary, DatasetInfo
+from generator.core.sample import Sample
+from generator.core.serial import canonical_json
+from generator.usd.asset_layer import write_asset_layer
+from generator.usd.materials import TextureFiles
+from generator.usd.stage import Files, write_stage
+
+STAGES = "stages.jsonl"
+
+
+class Usd(Strict):
+    """One OpenUSD stage per view, with meshes, materials, lights, cameras and labels.
+
+    Attributes:
+        format: Of all layers: binary, or text.
+    """
+
+    type: Literal["usd"] = "usd"
+    format: Literal["usdc", "usda"] = "usdc"
+
+    _assets: AssetLibrary | None = PrivateAttr(None)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it reads."""
+        return frozenset()
+
+    def check(self, info: DatasetInfo) -> None:
+        """Every data set has what it takes."""
+
+    def with_assets(self, assets: AssetLibrary) -> Usd:
+        """The exporter that takes meshes, textures and skies from a library."""
+        bound = self.model_copy()
+        bound._assets = assets
+        return bound
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write a stage for every sequence that begins in the shard, and what it refers to."""
+        assert self._assets is not None, "it writes only with_assets"
+        folder = shard_dir / self.type
+        shared = _SharedFiles(folder, self.format, self._assets)
+        rows = []
+        for sample in samples:
+            if sample.step_index:
+                continue
+            count = min(info.steps_per_scene, info.n - sample.index)
+            steps = [at(sample.scene, round(k * info.step_s, 9)) for k in range(count)]
+            path = folder / f"{sample.index:09d}.{self.format}"
+            write_stage(path, steps, info.step_s, shared.files())
+            rows.append(_row(sample, path.name, count))
+        write_text(folder / STAGES, "".join(canonical_json(row) + "\n" for row in rows))
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link stages and what they share, and join the lines."""
+        del info
+        folders = [shard_dir / self.type for shard_dir in shard_dirs]
+        for folder in folders:
+            for path in sorted(p for p in folder.rglob("*") if p.is_file() and p.name != STAGES):
+                target = dataset_dir / path.relative_to(folder)
+                # Shards that share an asset hold the same bytes of it.
+                if not target.exists():
+                    link_or_copy(path, target)
+        lines = "".join((folder / STAGES).read_text("utf-8") for folder in folders)
+        write_text(dataset_dir / STAGES, lines)
+
+
+def _row(sample: Sample, name: str, steps: int) -> dict[str, Any]:
+    return {
+        "file": name,
+        "index": sample.index,
+        "scene": sample.scene_index,
+        "view": sample.view_index,
+        "split": sample.split,
+        "steps": steps,
+    }
+
+
+class _SharedFiles:
+    """The files of one shard that stages share; each is written when it is first asked for."""
+
+    def __init__(self, folder: Path, suffix: str, assets: AssetLibrary) -> None:
+        self._folder, self._suffix, self._assets = folder, suffix, assets
+
+    def files(self) -> Files:
+        """They, as stages beside the folders of shared files refer to them."""
+        return Files(
+            layer=lambda asset: f"./{self._layer(asset)}",
+            textures=lambda texture: self._textures(texture, "./"),
+            panorama=lambda sky: f"./{self._panorama(sky)}",
+            materials=self._assets.materials,
+        )
+
+    def _layer(self, asset: str) -> str:
+        name = f"assets/{_file_name(asset)}.{self._suffix}"
+        if not (self._folder / name).exists():
+            mesh = self._assets.mesh(asset)
+            write_asset_layer(self._folder / name, mesh, lambda t: self._textures(t, "../"))
+        return name
+
+    def _textures(self, texture: str, up: str) -> TextureFiles:
+        stem = f"textures/{_file_name(texture)}"
+        images = self._assets.texture(texture)
+        return TextureFiles(
+            albedo=up + self._image(f"{stem}.png", images.albedo),
+            roughness=up + self._image(f"{stem}.roughness.png", images.roughness)
+            if images.roughness is not None
+            else "",
+            normal=up + self._image(f"{stem}.normal.png", images.normal)
+            if images.normal is not None
+            else "",
+        )
+
+    def _image(self, name: str, pixels: NDArray[Any]) -> str:
+        if not (self._folder / name).exists():
+            write_bytes(self._folder / name, encode_png(pixels, RowFilter.SUB, 2))
+        return name
+
+    def _panorama(self, sky: str) -> str:
+        name = f"environments/{_file_name(sky)}.hdr"
+        if not (self._folder / name).exists():
+            bgr = np.ascontiguousarray(self._assets.environment(sky)[..., ::-1])
+            _, data = cv2.imencode(".hdr", bgr)
+            write_bytes(self._folder / name, data.tobytes())
+        return name
+
+
+def _file_name(identity: str) -> str:
+    """A file name that tells an id, and no other id has."""
+    digest = sha256(identity.encode()).hexdigest()[:10]
+    return f"{re.sub(r'[^A-Za-z0-9]+', '_', identity)[:48].strip('_')}-{digest}"

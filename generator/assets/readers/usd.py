@@ -1,0 +1,155 @@
+"""OpenUSD: layers, text and binary, and usdz archives.
+
+Read are meshes, subsets, UsdPreviewSurface with its images, transforms, instances, unit and up
+axis. Nothing outside the asset folder is opened: what layers refer to is looked at beforehand.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from generator.assets.folder import Folder
+from generator.assets.images import decode
+from generator.assets.readers.source import Source
+from generator.assets.soup import Slot, Soup, joined
+from generator.core.errors import AssetError
+from generator.usd.looks import SurfaceLook
+from generator.usd.reading import SUFFIXES, OpenStage, Piece, layer_references
+
+ARCHIVE = ".usdz"
+
+
+def read_usd(folder: Folder, relative: str, materials: bool) -> Source:
+    """Triangles of all visible meshes of a stage, in metres, Z up.
+
+    Raises:
+        AssetError: if it is malformed or holds no mesh, refers to what is missing or outside the
+            folder, or has a material that is not read.
+    """
+    with opened(folder, relative) as stage:
+        return stage.source(stage.pieces(), materials=materials)
+
+
+@dataclass(frozen=True)
+class StageFile:
+    """An open stage in a folder.
+
+    Attributes:
+        folder: Where its files are: the user's, or that of an unpacked archive.
+        packed: Whether it is such an archive.
+    """
+
+    stage: OpenStage
+    folder: Folder
+    packed: bool
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Its visible meshes."""
+        return self.stage.pieces()
+
+    def source(self, pieces: tuple[Piece, ...], *, materials: bool = True) -> Source:
+        """Triangles of some of its meshes, each a group."""
+        images: dict[str, bytes] = {}
+        soups = []
+        for piece in pieces:
+            mesh = self.stage.mesh(piece)
+            slots = tuple(self._slot(k, images) if materials else Slot() for k in mesh.looks)
+            zeros = np.zeros(len(mesh.corners), dtype=np.int64)
+            soup = Soup(mesh.corners, mesh.uvs, mesh.normals, mesh.face_slots, zeros, slots)
+            soups.append(soup.transformed(piece.T_stage_prim[:3]))
+        return Source(joined(soups), images)
+
+    def _slot(self, look: SurfaceLook, images: dict[str, bytes]) -> Slot:
+        material = replace(
+            look.material,
+            roughness=self._dimmed(look.material.roughness, look.roughness_image),
+            metallic=self._dimmed(look.material.metallic, look.metallic_image),
+            texture=self._name(look.texture) if look.texture else "",
+        )
+        if material.texture and self.packed:
+            images[material.texture] = self.folder.read(material.texture)
+        return Slot(look.name, material, from_file=True)
+
+    def _dimmed(self, value: float, image: tuple[str, int]) -> float:
+        """The mean of what an image makes of a number: a surface has one."""
+        path, channel = image
+        if not path:
+            return value
+        pixels = decode(self.folder.read(self._name(path)), f"{self.stage.place}: {path}")
+        return round(value * float(pixels[..., channel].mean()) / 255.0, 4)
+
+    def _name(self, path: str) -> str:
+        """An image's path relative to the folder. Raises AssetError if it is outside."""
+        root = self.folder.root.resolve()
+        resolved = Path(path).resolve()
+        if not resolved.is_relative_to(root):
+            raise AssetError(
+                f"{self.stage.place}: refers to the image '{path[:80]}' outside its folder; put it "
+                "beside the layer"
+            )
+        return resolved.relative_to(root).as_posix()
+
+
+@contextmanager
+def opened(folder: Folder, relative: str) -> Iterator[StageFile]:
+    """A stage, open while the block lasts.
+
+    Raises:
+        AssetError: if it cannot be read, or refers to layers that are missing or outside.
+    """
+    place = str(folder.root / relative)
+    if PurePosixPath(relative).suffix.lower() != ARCHIVE:
+        _check_layers(folder, relative)
+        yield StageFile(OpenStage(folder.path(relative), place), folder, packed=False)
+        return
+    with TemporaryDirectory(prefix="gen-data-usdz-") as name:
+        inside = Folder(Path(name))
+        first = _unpacked(folder.read(relative), inside, place)
+        _check_layers(inside, first)
+        yield StageFile(OpenStage(inside.path(first), place), inside, packed=True)
+
+
+def _check_layers(folder: Folder, relative: str) -> None:
+    """Refuse layers outside the folder, and missing ones, before anything opens them."""
+    pending, seen = [relative], set()
+    while pending:
+        name = pending.pop()
+        if name in seen:
+            continue
+        seen.add(name)
+        folder.read(name)
+        for reference in layer_references(folder.path(name)):
+            if PurePosixPath(reference).suffix.lower() in (*SUFFIXES, ARCHIVE):
+                pending.append(folder.refer(name, reference))
+
+
+def _unpacked(data: bytes, target: Folder, place: str) -> str:
+    """Write the files of an archive to a folder; name of the first, which is the root layer.
+
+    An archive's files are stored as they are ("usdz File Format Specification"): it cannot unpack
+    to more than it is.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            entries = [entry for entry in archive.infolist() if not entry.is_dir()]
+            for entry in entries:
+                if entry.compress_type != zipfile.ZIP_STORED or entry.file_size > len(data):
+                    raise AssetError(
+                        f"{place}: its files are compressed; pack it again with usdzip"
+                    )
+                path = target.path(entry.filename)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(archive.read(entry))
+    except (zipfile.BadZipFile, OSError, NotImplementedError):
+        raise AssetError(f"{place}: unreadable usdz archive; export it again") from None
+    if not entries:
+        raise AssetError(f"{place}: an empty usdz archive; export it again")
+    return entries[0].filename

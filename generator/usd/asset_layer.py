@@ -1,0 +1,98 @@
+"""The layer of one asset: its mesh, and the materials that it has by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from generator.core.geometry import Float32, Material, MeshData
+from generator.usd.materials import BOX_UV, UV, TextureFinder, define_material
+from generator.usd.opening import writing_stage
+
+MESH = "Mesh"
+ASSET = "/Asset"
+SLOT = "slot_"
+
+
+def write_asset_layer(path: Path, mesh: MeshData, textures: TextureFinder) -> None:
+    """Write the layer of an asset; its default prim holds a mesh in metres, Z up.
+
+    Raises:
+        StorageError: if it cannot be written.
+    """
+    with writing_stage(path, ASSET) as stage:
+        _define_mesh(stage, f"{ASSET}/{MESH}", mesh)
+        bind_materials(stage, f"{ASSET}/{MESH}", f"{ASSET}/Looks", mesh.materials, textures)
+
+
+def bind_materials(
+    stage: Any, mesh_path: str, scope: str, materials: Sequence[Material], textures: TextureFinder
+) -> None:
+    """Define the materials of a mesh's slots in a scope, and bind them to it and its subsets."""
+    from pxr import Usd, UsdGeom, UsdShade
+
+    mesh = stage.GetPrimAtPath(mesh_path)
+    # All children: those of a class are abstract, and are not listed otherwise.
+    children = mesh.GetFilteredChildren(Usd.PrimAllPrimsPredicate)
+    subsets = [child for child in children if child.IsA(UsdGeom.Subset)]
+    parts = {_slot_of(part.GetName()): part for part in subsets} or {0: mesh}
+    UsdGeom.Scope.Define(stage, scope)
+    for slot, part in parts.items():
+        material = define_material(stage, f"{scope}/{SLOT}{slot}", materials[slot], textures)
+        UsdShade.MaterialBindingAPI.Apply(part).Bind(material)
+        if part is not mesh and slot == min(parts):
+            # For readers that do not know subsets.
+            UsdShade.MaterialBindingAPI.Apply(mesh).Bind(material)
+
+
+def _slot_of(subset: str) -> int:
+    return int(subset.removeprefix(SLOT))
+
+
+def _define_mesh(stage: Any, path: str, mesh: MeshData) -> None:
+    from pxr import Sdf, UsdGeom, UsdShade, Vt
+
+    prim = UsdGeom.Mesh.Define(stage, path)
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.vertices_m)))
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.faces), 3))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.faces.ravel()))
+    prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.normals)))
+    prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    low, high = mesh.bounds_m()
+    prim.CreateExtentAttr([low, high])
+    primvars = UsdGeom.PrimvarsAPI(prim)
+    for name, values, interpolation in (
+        (UV, mesh.uvs, UsdGeom.Tokens.vertex),
+        (BOX_UV, _box_uvs(mesh), UsdGeom.Tokens.faceVarying),
+    ):
+        kind = Sdf.ValueTypeNames.TexCoord2fArray
+        primvar = primvars.CreatePrimvar(name, kind, interpolation)
+        primvar.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(values)))
+    slots = np.unique(mesh.face_slots).tolist()
+    if len(slots) > 1:
+        binding = UsdShade.MaterialBindingAPI.Apply(prim.GetPrim())
+        for slot in slots:
+            faces = np.flatnonzero(mesh.face_slots == slot).astype(np.int32)
+            binding.CreateMaterialBindSubset(f"{SLOT}{slot}", Vt.IntArray.FromNumpy(faces))
+        binding.SetMaterialBindSubsetsFamilyType(UsdGeom.Tokens.partition)
+
+
+def _box_uvs(mesh: MeshData) -> Float32:
+    """Coordinates [m] of every face's corners, float32 [3 * m, 2], along its dominant axis.
+
+    What the renderer blends where the surface turns changes at once here: USD has no node for it.
+    """
+    corners = mesh.vertices_m[mesh.faces]
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    axis = np.abs(crosses).argmax(axis=1)
+    # X and Y faces keep Z upright.
+    u, v = np.array([1, 0, 0])[axis], np.array([2, 2, 1])[axis]
+    face = np.arange(len(corners))[:, None]
+    corner = np.arange(3)[None, :]
+    pairs = [corners[face, corner, u[:, None]], corners[face, corner, v[:, None]]]
+    uvs: Float32 = np.stack(pairs, axis=-1).reshape(-1, 2).astype(np.float32)
+    return uvs

@@ -1,0 +1,135 @@
+"""Light sources, both ways (UsdLux: radiance in nits, colours linear)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from generator.core.scene import Environment, Light
+from generator.core.se3 import SE3, Array, Vec3
+from generator.usd.placing import along_minus_z, place
+
+RADIUS_M_MIN = 1e-3
+"""A point is written as a ball of this size: it has a radiance, which USD asks for."""
+
+T_WORLD_DOME = SE3((0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5))
+"""USD's sky has its pole along +Y and the image's centre along +Z; ours along +Z and +X."""
+
+
+def define_light(stage: Any, path: str, steps: Sequence[Light]) -> None:
+    """A light, and where it is at every time code."""
+    from pxr import UsdLux
+
+    light = steps[0]
+    if light.kind == "sun":
+        prim = UsdLux.DistantLight.Define(stage, path)
+        prim.CreateAngleAttr(math.degrees(2.0 * light.angular_radius_rad))
+        # Normalised, a distant light's intensity is the illuminance of what faces it.
+        prim.CreateNormalizeAttr(True)
+        prim.CreateIntensityAttr(light.illuminance_lux)
+    else:
+        radius_m = max(light.radius_m, RADIUS_M_MIN)
+        prim = UsdLux.SphereLight.Define(stage, path)
+        prim.CreateRadiusAttr(radius_m)
+        prim.CreateIntensityAttr(light.intensity_cd / _disc_m2(radius_m))
+        if light.kind == "spot":
+            shaping = UsdLux.ShapingAPI.Apply(prim.GetPrim())
+            shaping.CreateShapingConeAngleAttr(math.degrees(light.cone_rad))
+            shaping.CreateShapingConeSoftnessAttr(1.0 - light.even)
+    prim.CreateColorAttr(light.color)
+    place(prim.GetPrim(), [_pose(step).matrix() for step in steps])
+
+
+def define_sky(stage: Any, path: str, environment: Environment, image: str) -> None:
+    """Light from all around; ``image`` is a panorama of mean luminance 1."""
+    from pxr import UsdLux
+
+    prim = UsdLux.DomeLight.Define(stage, path)
+    prim.CreateTextureFileAttr(image)
+    prim.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
+    prim.CreateIntensityAttr(environment.luminance_cd_m2)
+    place(prim.GetPrim(), [(SE3.about_z(environment.yaw_rad) @ T_WORLD_DOME).matrix()])
+
+
+def read_light(prim: Any, name: str, T_stage_light: Array) -> Light | None:
+    """A light in the stage's frame, metres and Z up; None if the prim is no light of these kinds.
+
+    Args:
+        prim: Of any type.
+        name: What it will be called.
+        T_stage_light: Column-vector matrix [4, 4], scale included.
+    """
+    from pxr import UsdLux
+
+    if not (prim.IsA(UsdLux.SphereLight) or prim.IsA(UsdLux.DistantLight)):
+        return None
+    lux = UsdLux.LightAPI(prim)
+    color, strength = _color_and_strength(lux)
+    x, y, z = (float(v) for v in -T_stage_light[:3, 2] / _length(T_stage_light[:3, 2]))
+    if prim.IsA(UsdLux.DistantLight):
+        half_rad = math.radians(0.5 * float(UsdLux.DistantLight(prim).GetAngleAttr().Get()))
+        if not lux.GetNormalizeAttr().Get() and half_rad > 0.0:
+            strength *= math.pi * math.sin(half_rad) ** 2
+        return Light(
+            name,
+            "sun",
+            direction=(x, y, z),
+            color=color,
+            illuminance_lux=strength,
+            angular_radius_rad=half_rad,
+        )
+    sphere, shaping = UsdLux.SphereLight(prim), UsdLux.ShapingAPI(prim)
+    radius_m = float(sphere.GetRadiusAttr().Get()) * _length(T_stage_light[:3, 0])
+    # Normalised power is spread over the ball's surface, four times the disc that is seen.
+    candela = strength * (0.25 if lux.GetNormalizeAttr().Get() else _disc_m2(radius_m))
+    place_m = T_stage_light[:3, 3]
+    cone = shaping.GetShapingConeAngleAttr()
+    spot = prim.HasAPI(UsdLux.ShapingAPI) and cone.Get() is not None and cone.Get() < 90.0
+    light = Light(
+        name,
+        "spot" if spot else "sphere",
+        position_m=(float(place_m[0]), float(place_m[1]), float(place_m[2])),
+        direction=(x, y, z),
+        color=color,
+        intensity_cd=candela,
+        radius_m=radius_m,
+    )
+    return light if not spot else _with_cone(light, shaping)
+
+
+def _with_cone(light: Light, shaping: Any) -> Light:
+    from dataclasses import replace
+
+    softness = float(shaping.GetShapingConeSoftnessAttr().Get() or 0.0)
+    return replace(
+        light,
+        cone_rad=math.radians(float(shaping.GetShapingConeAngleAttr().Get())),
+        even=min(max(1.0 - softness, 0.0), 1.0),
+    )
+
+
+def _pose(light: Light) -> SE3:
+    turn = along_minus_z(light.direction) if light.kind != "sphere" else SE3()
+    at = (0.0, 0.0, 0.0) if light.kind == "sun" else light.position_m
+    return SE3(at, turn.quaternion_wxyz)
+
+
+def _color_and_strength(lux: Any) -> tuple[Vec3, float]:
+    """Colour of luminance 1 (Rec. 709), and the intensity that goes with it."""
+    red, green, blue = (float(c) for c in lux.GetColorAttr().Get())
+    luminance = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    strength = float(lux.GetIntensityAttr().Get()) * 2.0 ** float(lux.GetExposureAttr().Get())
+    if luminance <= 0.0:
+        return (1.0, 1.0, 1.0), 0.0
+    return (red / luminance, green / luminance, blue / luminance), strength * luminance
+
+
+def _disc_m2(radius_m: float) -> float:
+    return math.pi * radius_m * radius_m
+
+
+def _length(vector: Array) -> float:
+    return float(np.sqrt((vector * vector).sum()))

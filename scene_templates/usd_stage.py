@@ -1,0 +1,84 @@
+"""A whole OpenUSD stage."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from generator.core.instants import RIG_AXES
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body, Instance, Light, Rig, Scene, StageModel, StagePiece
+from generator.core.se3 import SE3, rotate_by_quaternion
+from scene_templates.element import PlacedElement, next_instance_id
+
+
+class UsdStage(PlacedElement):
+    """The stage in a ``.usd``, ``.usda``, ``.usdc`` or ``.usdz`` file of the user's asset folders.
+
+    Attributes:
+        asset: Its id: ``user/kitchen`` for ``kitchen.usdc``.
+        annotate: Whether prims with semantic labels (UsdSemantics, taxonomy ``category`` or
+            ``class``) become labelled things; else all of it is background.
+        lights: Whether its lamps and suns shine; a ``lighting`` randomizer replaces them.
+        cameras: Whether each of its cameras becomes a rig ``<name>/<prim>`` for a sensor's ``rig``:
+            X along the camera's axis, Z up in its image.
+        collides: Whether things can rest on it, and bump into it.
+    """
+
+    type: Literal["usd_stage"] = "usd_stage"
+    asset: str
+    annotate: bool = False
+    lights: bool = True
+    cameras: bool = False
+    collides: bool = True
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """A static body per mesh, ``<name>/<prim>``; its lights and, as rigs, its cameras."""
+        stage, pose = assets.stage(self.asset), self.pose(scene)
+        first = next_instance_id(scene)
+        things = self._things(stage, first) if self.annotate else {}
+        bodies = tuple(
+            Body(
+                f"{self.name}/{piece.name}",
+                piece.asset,
+                (pose @ piece.T_stage_piece).rounded(),
+                instance_id=things[piece.thing].instance_id if piece.thing in things else 0,
+                collides=self.collides,
+            )
+            for piece in stage.pieces
+        )
+        lights = tuple(self._placed(light, pose) for light in stage.lights) if self.lights else ()
+        rigs = tuple(
+            self._rig(name, pose @ T_stage_camera, bodies[0])
+            for name, T_stage_camera in (stage.cameras if self.cameras else ())
+        )
+        return replace(
+            scene,
+            bodies=(*scene.bodies, *bodies),
+            instances=(*scene.instances, *things.values()),
+            lights=(*scene.lights, *lights),
+            rigs=(*scene.rigs, *rigs),
+        )
+
+    def _things(self, stage: StageModel, first_id: int) -> dict[str, Instance]:
+        """Instances by the name of their labelled prim."""
+        first: dict[str, StagePiece] = {}
+        for piece in stage.pieces:
+            if piece.thing:
+                first.setdefault(piece.thing, piece)
+        return {
+            thing: Instance(first_id + k, f"{self.name}/{thing}", piece.category, 0, piece.asset)
+            for k, (thing, piece) in enumerate(first.items())
+        }
+
+    def _placed(self, light: Light, pose: SE3) -> Light:
+        return replace(
+            light,
+            name=f"{self.name}/{light.name}",
+            position_m=(pose @ SE3(light.position_m)).translation_m,
+            direction=rotate_by_quaternion(pose.quaternion_wxyz, light.direction),
+        )
+
+    def _rig(self, name: str, T_world_camera: SE3, carrier: Body) -> Rig:
+        T_body_rig = carrier.T_world_body.inverse() @ T_world_camera @ RIG_AXES
+        return Rig(f"{self.name}/{name}", carrier.name, T_body_rig)

@@ -1,0 +1,164 @@
+"""The stage shows what the labels say; read by OpenUSD's own classes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom, UsdLux, UsdSemantics, UsdShade, UsdUtils, UsdValidation
+
+from generator.assets.library import Library, open_library
+from generator.core.capture import Channel
+from generator.core.instants import at
+from generator.core.motion import Change
+from generator.core.scene import Scene
+from generator.renderers.warp import WarpRenderer
+from tests.usd.worlds import STEP_S, STEPS, exported, off_centre_camera, table_world
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    return open_library(cache_dir=tmp_path_factory.mktemp("cache"), packs=Path("/nonexistent"))
+
+
+@pytest.fixture(scope="module")
+def sequence(library: Library, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The stage of three steps."""
+    path = exported(table_world(library), library, tmp_path_factory.mktemp("out"), steps=STEPS)
+    return Usd.Stage.Open(str(path))
+
+
+def labelled_boxes(stage: Any, camera_path: str, code: int, width_px: int, height_px: int) -> Any:
+    """By instance id: x_min, y_min, x_max, y_max of all its points, by OpenUSD's own frustum."""
+    frustum = UsdGeom.Camera(stage.GetPrimAtPath(camera_path)).GetCamera(code).frustum
+    view = np.array(frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix())
+    found: dict[int, Any] = {}
+    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
+        if (
+            not prim.IsA(UsdGeom.Mesh)
+            or UsdGeom.Imageable(prim).ComputeVisibility(code) != "inherited"
+        ):
+            continue
+        owner = prim
+        while owner and not owner.HasAPI(UsdSemantics.LabelsAPI):
+            owner = owner.GetParent()
+        if not owner:
+            continue
+        number = int(UsdSemantics.LabelsAPI(owner, "instance_id").GetLabelsAttr().Get()[0])
+        points = np.array(UsdGeom.Mesh(prim).GetPointsAttr().Get(), float)
+        world = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(code))
+        clip = np.c_[points, np.ones(len(points))] @ world @ view
+        u = (clip[:, 0] / clip[:, 3] + 1) / 2 * width_px
+        v = (1 - clip[:, 1] / clip[:, 3]) / 2 * height_px
+        found[number] = np.array([u.min(), v.min(), u.max(), v.max()])
+    return found
+
+
+@pytest.mark.parametrize("step", range(STEPS))
+def test_the_stages_camera_reproduces_the_label_boxes(
+    sequence: Any, library: Library, step: int
+) -> None:
+    """Points seen through the stage's camera span the rendered silhouettes within half a pixel."""
+    camera = off_centre_camera()
+    scene = at(table_world(library), step * STEP_S)
+    reading = WarpRenderer(library, "cpu").render(scene, camera, frozenset({Channel.AMODAL}))
+    k = camera.intrinsics
+
+    boxes = labelled_boxes(sequence, "/World/Cameras/color", step, k.width_px, k.height_px)
+
+    assert sorted(boxes) == [1, 2, 3, 4]
+    for number, silhouette in reading.silhouettes.items():
+        height, width = silhouette.mask.shape
+        x, y = silhouette.x_px, silhouette.y_px
+        assert boxes[number] == pytest.approx([x, y, x + width, y + height], abs=0.5)
+
+
+def test_every_validator_of_openusd_accepts_it(sequence: Any) -> None:
+    """Stage, geometry, shading, lights and their dependencies."""
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    errors = UsdValidation.ValidationContext(validators).Validate(sequence)
+    assert [error.GetMessage() for error in errors] == []
+    path = sequence.GetRootLayer().realPath
+    assert UsdUtils.ComputeAllDependencies(path)[2] == []
+    assert UsdGeom.GetStageMetersPerUnit(sequence) == 1.0
+    assert UsdGeom.GetStageUpAxis(sequence) == "Z"
+    assert (sequence.GetStartTimeCode(), sequence.GetEndTimeCode()) == (0.0, STEPS - 1.0)
+    assert sequence.GetTimeCodesPerSecond() == 10.0
+
+
+def test_lights_are_photometric(sequence: Any) -> None:
+    """900 cd of a ball of 8 cm are 900 / (pi 0.08^2) nits; 4000 lx of a sun stay 4000 lx."""
+    lamp = UsdLux.SphereLight(sequence.GetPrimAtPath("/World/Lights/lamp"))
+    sun = UsdLux.DistantLight(sequence.GetPrimAtPath("/World/Lights/sun"))
+    spot = UsdLux.ShapingAPI(sequence.GetPrimAtPath("/World/Lights/spot"))
+    assert lamp.GetIntensityAttr().Get() == pytest.approx(44762.3, rel=1e-5)
+    assert sun.GetNormalizeAttr().Get() and sun.GetIntensityAttr().Get() == 4000.0
+    shone = UsdGeom.Xformable(sun).ComputeLocalToWorldTransform(0).TransformDir((0, 0, -1))
+    assert list(shone) == pytest.approx([0.6, 0.0, -0.8])
+    assert spot.GetShapingConeAngleAttr().Get() == pytest.approx(np.degrees(0.6))
+    sky = UsdGeom.Xformable(sequence.GetPrimAtPath("/World/Lights/sky"))
+    up = sky.ComputeLocalToWorldTransform(0).TransformDir((0, 1, 0))
+    assert list(up) == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_materials_of_a_body_replace_those_of_its_mesh(sequence: Any) -> None:
+    """The red thing is red in every part, and no image is left of what it was."""
+    reds = 0
+    for prim in Usd.PrimRange(
+        sequence.GetPrimAtPath("/World/clutter_0"), Usd.TraverseInstanceProxies()
+    ):
+        if prim.IsA(UsdGeom.Mesh) or prim.IsA(UsdGeom.Subset):
+            material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+            surface = material.ComputeSurfaceSource()[0]
+            color = surface.GetInput("diffuseColor")
+            assert not color.HasConnectedSource()
+            assert list(color.Get()) == pytest.approx([0.7, 0.05, 0.05])
+            reds += 1
+    assert reds >= 1
+
+
+def test_a_body_that_changes_its_look_shows_one_at_a_time(library: Library, tmp_path: Path) -> None:
+    """A step of a walk: another mesh from an instant on."""
+    scene = table_world(library)
+    scene = replace(scene, changes=(Change(STEP_S, "clutter/2", "ball?seed=5"),))
+    stage = Usd.Stage.Open(str(exported(scene, library, tmp_path, steps=STEPS)))
+    looks = stage.GetPrimAtPath("/World/clutter_2/clutter_2").GetChildren()
+    shown = [
+        [UsdGeom.Imageable(look).ComputeVisibility(code) for look in looks] for code in range(STEPS)
+    ]
+    assert shown[0] == ["inherited", "invisible"]
+    assert shown[1] == shown[2] == ["invisible", "inherited"]
+
+
+@pytest.mark.parametrize("kind", ["usda", "usdc"])
+def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_path: Path) -> None:
+    """Text and binary layers, images and all."""
+    here = exported(table_world(library), library, tmp_path / "a", format=kind)
+    program = (
+        "import sys; from pathlib import Path\n"
+        "from generator.assets.library import open_library\n"
+        "from tests.usd.worlds import exported, table_world\n"
+        "library = open_library(cache_dir=Path(sys.argv[1]) / 'cache', packs=Path('/nonexistent'))\n"
+        "exported(table_world(library), library, Path(sys.argv[1]), format=sys.argv[2])\n"
+    )
+    root = Path(__file__).parents[2]
+    subprocess.run([sys.executable, "-c", program, str(tmp_path / "b"), kind], cwd=root, check=True)
+    there = tmp_path / "b" / "usd"
+    names = sorted(p.relative_to(here.parent) for p in here.parent.rglob("*") if p.is_file())
+    assert names == sorted(p.relative_to(there) for p in there.rglob("*") if p.is_file())
+    for name in names:
+        assert (here.parent / name).read_bytes() == (there / name).read_bytes(), name
+
+
+def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Path) -> None:
+    """One step: nothing varies, and no range is claimed."""
+    scene: Scene = table_world(library)
+    stage = Usd.Stage.Open(str(exported(scene, library, tmp_path, format="usda")))
+    assert not stage.HasAuthoredTimeCodeRange()
+    attributes = [a for p in stage.Traverse() for a in p.GetAttributes()]
+    assert attributes and not any(a.ValueMightBeTimeVarying() for a in attributes)

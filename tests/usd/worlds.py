@@ -1,0 +1,69 @@
+"""A small world of the library's own things, and its stage on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from exporters.usd import Usd
+from generator.assets.library import Library
+from generator.core.capture import Capture
+from generator.core.geometry import Material
+from generator.core.interfaces import DatasetInfo
+from generator.core.intrinsics import Intrinsics
+from generator.core.motion import Track
+from generator.core.sample import Sample
+from generator.core.scene import Body, Camera, Environment, Instance, Light, Scene
+from generator.core.se3 import SE3, look_at
+
+STEPS, STEP_S = 3, 0.1
+RED = Material(base_color=(0.7, 0.05, 0.05), roughness=0.3)
+THINGS = ("mug?seed=3", "bottle?seed=1", "ball?seed=2", "wrench?seed=4")
+
+
+def off_centre_camera() -> Camera:
+    """Neither square pixels nor a centred principal point."""
+    intrinsics = Intrinsics(320, 240, 300.0, 310.0, 171.3, 110.9)
+    return Camera("color", look_at((0.5, -0.7, 0.6), (0.0, 0.0, 0.05), 0.1), intrinsics)
+
+
+def table_world(library: Library) -> Scene:
+    """Four things on a plane; the first, in red, moves; the second is half as large again."""
+    poses = [SE3.about_z(0.7 * k, (0.16 * (k % 2), 0.18 * (k // 2), 0.08)) for k in range(4)]
+    bodies = [Body("ground", "plane")]
+    instances = []
+    for k, (asset, pose) in enumerate(zip(THINGS, poses, strict=True)):
+        scale = 1.5 if k == 1 else 1.0
+        slots = len(library.materials(asset))
+        worn = (RED,) * slots if k == 0 else ()
+        bodies.append(Body(f"clutter/{k}", asset, pose, scale, instance_id=k + 1, materials=worn))
+        category = library.get(asset).category
+        instances.append(Instance(k + 1, f"clutter/{k}", category, 1, asset, T_world_instance=pose))
+    way = tuple(SE3((0.02 * k, 0.0, 0.0)) @ poses[0] for k in range(STEPS))
+    lights = (
+        Light("lamp", "sphere", (0.4, -0.9, 2.2), intensity_cd=900.0, radius_m=0.08),
+        Light("spot", "spot", (0.0, 0.5, 1.5), (0.0, -0.6, -0.8), (1.2, 0.97, 0.7), 250.0),
+        Light("sun", "sun", direction=(0.6, 0.0, -0.8), illuminance_lux=4000.0),
+    )
+    return Scene(
+        "table",
+        tuple(bodies),
+        tuple(instances),
+        lights=lights,
+        cameras=(off_centre_camera(),),
+        environment=Environment(luminance_cd_m2=80.0, yaw_rad=0.4),
+        tracks=(Track("clutter/0", STEP_S, way),),
+    )
+
+
+def exported(
+    scene: Scene, library: Library, folder: Path, *, steps: int = 1, **options: str
+) -> Path:
+    """The stage of a scene, as the exporter leaves it."""
+    info = DatasetInfo(
+        "t", 7, steps, 1, ("thing",), ("color",), {}, steps_per_scene=steps, step_s=STEP_S
+    )
+    sample = Sample(0, 0, 0, "train", scene, Capture({}), {})
+    exporter = Usd.model_validate(options).with_assets(library)
+    exporter.write_shard(info, [sample], folder / "shard")
+    exporter.finalize(info, [folder / "shard"], folder / "usd")
+    return next((folder / "usd").glob("000000000.usd?"))
