@@ -22,6 +22,11 @@ def preset_names(package: str) -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in Path(str(files(package))).glob("*.yaml")))
 
 
+def preset_path(package: str, name: str) -> Path:
+    """The file of a make."""
+    return Path(str(files(package))) / f"{name}.yaml"
+
+
 @cache
 def preset(package: str, name: str, kind: type[M]) -> M:
     """The make of that name.
@@ -36,7 +41,7 @@ def preset(package: str, name: str, kind: type[M]) -> M:
             f"{did_you_mean(name, known)}"
         )
     problems = Problems()
-    made = validate(load(Path(str(files(package))) / f"{name}.yaml"), kind, problems)
+    made = validate(load(preset_path(package, name)), kind, problems)
     problems.raise_if_any()
     assert made is not None
     return made

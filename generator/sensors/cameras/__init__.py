@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from generator.config.document import load
-from generator.core.errors import did_you_mean
+from generator.sensors.presets import known_preset, preset_names, preset_path
 
 
 def camera_names() -> tuple[str, ...]:
     """Names of all presets, sorted."""
-    return tuple(sorted(path.stem for path in Path(str(files(__name__))).glob("*.yaml")))
+    return preset_names(__name__)
 
 
 @cache
@@ -23,12 +21,6 @@ def camera_preset(name: str) -> dict[str, Any]:
     Raises:
         ValueError: there is no such preset.
     """
-    known = camera_names()
-    if name not in known:
-        raise ValueError(
-            f"there is no camera '{name}'; expected one of {', '.join(known)}"
-            f"{did_you_mean(name, known)}"
-        )
-    plain = load(Path(str(files(__name__))) / f"{name}.yaml").plain()
+    plain = load(preset_path(__name__, known_preset(__name__, name))).plain()
     assert isinstance(plain, dict)
     return plain
