@@ -49,7 +49,7 @@ from pydantic import Field
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
 from exporters.sensors import laser_scanner, pinhole_camera, scanned
-from exporters.upright import UprightBox, boxed_members, upright_box
+from exporters.upright import BORDER_M, UprightBox, boxed_members, upright_box
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx
 from generator.core.capture import Channel
@@ -173,6 +173,7 @@ class Kitti(Strict):
             elif self.velodyne_stride_px and not lidar:
                 thinned = self._points(info, sample, shard_dir)
                 _write_bytes(folder / f"velodyne/{frame}.bin", thinned.astype("<f4").tobytes())
+                unseen = missed(thinned, truth, self, T_camera_velo, self.velodyne_stride_px)
             _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self, unseen))
             frames.append(f"{sample.index} {sample.split}\n")
         _write_text(folder / "frames.txt", "".join(frames))
@@ -330,6 +331,37 @@ def point_members(
     ids = points["instance_id"].astype(np.int64)
     members = boxed_members(ids, p_camera, boxes)
     return members, frozenset(labelled) - frozenset(np.unique(ids[members == ids]).tolist())
+
+
+def missed(
+    thinned: Array, truth: ImageTruth, style: LabelStyle, T_camera_velo: Array, stride_px: int
+) -> frozenset[int]:
+    """Labelled instances that a thinned depth image has no point of.
+
+    Args:
+        thinned: Its points in the scanner frame [n, 4].
+        truth: Of the image.
+        style: Of the labels.
+        T_camera_velo: Points to the camera frame, [3, 4].
+        stride_px: Distance of the pixels; what shows many times its square is not looked at.
+    """
+    small = {
+        thing.instance.instance_id: thing.box3d_camera
+        for thing in truth.objects
+        if thing.visible_px < 16 * stride_px * stride_px
+    }
+    if not small:
+        return frozenset()
+    p_camera = np.einsum("ij,nj->ni", T_camera_velo[:, :3], thinned[:, :3], optimize=False)
+    p_camera += T_camera_velo[:, 3]
+    labelled = {i for row, i in label_rows(truth, style) if not row.startswith(DONT_CARE)}
+    return frozenset(
+        number
+        for number, box in small.items()
+        if number in labelled
+        and box is not None
+        and not (upright_box(box).depths_m(p_camera) >= -BORDER_M).any()
+    )
 
 
 def point_labels(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from exporters.kitti import (
     Kitti,
     calib_text,
     label_row,
+    missed,
     occlusion_level,
     official_type,
     upright_box,
@@ -384,3 +386,20 @@ def test_what_kitti_cannot_hold_is_refused_before_rendering(
     """One message, naming the option to change."""
     with pytest.raises(ConfigError, match=message):
         exporter.check(world.info(changes.pop("n", 7), **changes))
+
+
+def test_what_a_thinned_depth_image_misses_is_not_labelled(world: Any) -> None:
+    """Few pixels and no point in its box: a detector of points could not know; else it is."""
+    truth = next(iter(world.samples[0].truth.values()))
+    thing = next(t for t in truth.objects if not label_row(t, truth, Kitti()).startswith("Dont"))
+    small = replace(truth, objects=(replace(thing, visible_px=20),))
+    number = thing.instance.instance_id
+    assert thing.box3d_camera is not None
+    x, y, z = thing.box3d_camera.T_frame_box.translation_m
+    T_camera_velo = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]])
+    inside, away = np.array([[z, -x, -y, 0.0]]), np.array([[z + 50.0, -x, -y, 0.0]])
+
+    assert missed(away, small, Kitti(), T_camera_velo, 4) == {number}
+    assert missed(inside, small, Kitti(), T_camera_velo, 4) == frozenset()
+    large = replace(truth, objects=(replace(thing, visible_px=9000),))
+    assert missed(away, large, Kitti(), T_camera_velo, 4) == frozenset()
