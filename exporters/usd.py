@@ -114,6 +114,7 @@ class _SharedFiles:
 
     def __init__(self, folder: Path, suffix: str, assets: AssetLibrary) -> None:
         self._folder, self._suffix, self._assets = folder, suffix, assets
+        self._written: dict[str, tuple[str, str, str]] = {}
 
     def files(self) -> Files:
         """They, as stages beside the folders of shared files refer to them."""
@@ -132,21 +133,21 @@ class _SharedFiles:
         return name
 
     def _textures(self, texture: str, up: str) -> TextureFiles:
-        stem = f"textures/{_file_name(texture)}"
-        images = self._assets.texture(texture)
-        return TextureFiles(
-            albedo=up + self._image(f"{stem}.png", images.albedo),
-            roughness=up + self._image(f"{stem}.roughness.png", images.roughness)
-            if images.roughness is not None
-            else "",
-            normal=up + self._image(f"{stem}.normal.png", images.normal)
-            if images.normal is not None
-            else "",
-        )
+        if texture not in self._written:
+            stem = f"textures/{_file_name(texture)}"
+            images = self._assets.texture(texture)
+            self._written[texture] = (
+                self._image(f"{stem}.png", images.albedo),
+                self._image(f"{stem}.roughness.png", images.roughness),
+                self._image(f"{stem}.normal.png", images.normal),
+            )
+        return TextureFiles(*(up + name if name else "" for name in self._written[texture]))
 
-    def _image(self, name: str, pixels: NDArray[Any]) -> str:
-        if not (self._folder / name).exists():
-            write_bytes(self._folder / name, encode_png(pixels, RowFilter.SUB, 2))
+    def _image(self, name: str, pixels: NDArray[Any] | None) -> str:
+        """Name of an image, once it is written; empty if there is none."""
+        if pixels is None:
+            return ""
+        write_bytes(self._folder / name, encode_png(pixels, RowFilter.SUB, 2))
         return name
 
     def _panorama(self, sky: str) -> str:

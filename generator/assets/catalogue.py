@@ -97,7 +97,8 @@ class MeshEntry(Origin):
     size_m: Annotated[float, Field(gt=0.0)] | None = None
     """Longest edge of the bounding box; instead of scale."""
     up: Literal["y", "z"] | None = None
-    """Axis of the file that points up; by default y for glTF and z for all else."""
+    """Axis of the file that points up; by default y for glTF, what a USD stage says, and z for
+    all else."""
     yaw_deg: float = 0.0
     """Turn about the vertical that brings the front to +X."""
     origin: Literal["center", "floor"] = "center"

@@ -73,7 +73,7 @@ def _define_mesh(stage: Any, path: str, mesh: MeshData) -> None:
         primvar = primvars.CreatePrimvar(name, kind, interpolation)
         primvar.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(values)))
     slots = np.unique(mesh.face_slots).tolist()
-    if len(slots) > 1:
+    if slots != [0]:
         binding = UsdShade.MaterialBindingAPI.Apply(prim.GetPrim())
         for slot in slots:
             faces = np.flatnonzero(mesh.face_slots == slot).astype(np.int32)

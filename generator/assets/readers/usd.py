@@ -127,8 +127,10 @@ def _check_layers(folder: Folder, relative: str) -> None:
         seen.add(name)
         folder.read(name)
         for reference in layer_references(folder.path(name)):
-            if PurePosixPath(reference).suffix.lower() in (*SUFFIXES, ARCHIVE):
-                pending.append(folder.refer(name, reference))
+            # ``room.usdz[lamp.usda]`` is a layer within an archive.
+            file = reference.partition("[")[0]
+            if PurePosixPath(file).suffix.lower() in (*SUFFIXES, ARCHIVE):
+                pending.append(folder.refer(name, file))
 
 
 def _unpacked(data: bytes, target: Folder, place: str) -> str:

@@ -1,0 +1,323 @@
+"""Stages as assets: what OpenUSD wrote is what is read, and bad files are told apart."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
+
+from generator.assets.library import Library, open_library
+from generator.core.capture import Channel
+from generator.core.errors import AssetError
+from generator.core.scene import Scene
+from generator.renderers.warp import WarpRenderer
+from scene_templates.usd_stage import UsdStage
+from tests.usd.worlds import exported, table_world
+
+QUAD = [(0, 0, 0), (100, 0, 0), (100, 50, 0), (0, 50, 0)]
+
+
+def opened_library(folder: Path, *roots: Path) -> Library:
+    return open_library(roots, cache_dir=folder / "cache", packs=Path("/nonexistent"))
+
+
+def new_stage(path: Path, up: str = "Y", metres: float = 0.01) -> Usd.Stage:
+    """A stage in centimetres, Y up, as most tools write it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdGeom.SetStageMetersPerUnit(stage, metres)
+    return stage
+
+
+def add_quad(stage: Usd.Stage, path: str) -> UsdGeom.Mesh:
+    """A rectangle of 1 m x 0.5 m in the plane Z = 0."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreatePointsAttr(QUAD)
+    mesh.CreateFaceVertexCountsAttr([4])
+    mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 3])
+    return mesh
+
+
+def surface(stage: Usd.Stage, path: str) -> tuple[UsdShade.Material, UsdShade.Shader]:
+    """A material with an empty UsdPreviewSurface."""
+    material = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/S")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    return material, shader
+
+
+def textured(stage: Usd.Stage, path: str, image: str) -> UsdShade.Material:
+    """A material whose colour is half of an image, looked up by the primvar ``map``."""
+    material, shader = surface(stage, path)
+    reader = UsdShade.Shader.Define(stage, f"{path}/R")
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("map")
+    node = UsdShade.Shader.Define(stage, f"{path}/T")
+    node.CreateIdAttr("UsdUVTexture")
+    node.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(image)
+    node.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(0.5, 0.5, 0.5, 1))
+    st = node.CreateInput("st", Sdf.ValueTypeNames.Float2)
+    st.ConnectToSource(reader.ConnectableAPI(), "result")
+    color = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    color.ConnectToSource(node.ConnectableAPI(), "rgb")
+    return material
+
+
+def test_an_exported_world_comes_back(tmp_path: Path) -> None:
+    """The same camera sees the same things: label images agree to more than 99 %."""
+    library = opened_library(tmp_path)
+    world = table_world(library)
+    root = exported(world, library, tmp_path / "out").parent
+    again = opened_library(tmp_path / "again", root)
+    element = UsdStage(name="copy", asset="user/000000000", annotate=True)
+
+    scene = element.add(Scene("empty", cameras=world.cameras), again)
+
+    (camera,) = world.cameras
+    wanted = frozenset({Channel.INSTANCE, Channel.Z_DEPTH})
+    first = WarpRenderer(library, "cpu").render(world, camera, wanted).channels
+    second = WarpRenderer(again, "cpu").render(scene, camera, wanted).channels
+    names = {i.instance_id: i.name for i in world.instances}
+    assert [i.category for i in scene.instances] == [i.category for i in world.instances]
+    for instance in scene.instances:
+        name = instance.name.removeprefix("copy/World_").replace("clutter_", "clutter/")
+        number = next(k for k, v in names.items() if v == name)
+        one, other = (
+            first[Channel.INSTANCE] == number,
+            second[Channel.INSTANCE] == instance.instance_id,
+        )
+        assert one.sum() > 100
+        assert (one & other).sum() / (one | other).sum() > 0.99
+    both = np.isfinite(first[Channel.Z_DEPTH]) & np.isfinite(second[Channel.Z_DEPTH])
+    depth = abs(first[Channel.Z_DEPTH][both] - second[Channel.Z_DEPTH][both])
+    assert both.mean() > 0.5 and np.quantile(depth, 0.99) < 1e-4
+
+
+def test_lights_and_cameras_come_back(tmp_path: Path) -> None:
+    """Intensities, colours, cones and poses, turned with the element; cameras become rigs."""
+    library = opened_library(tmp_path)
+    world = table_world(library)
+    root = exported(world, library, tmp_path / "out").parent
+    again = opened_library(tmp_path / "again", root)
+    element = UsdStage(name="copy", asset="user/000000000", cameras=True)
+
+    scene = element.add(Scene("empty"), again)
+
+    by_kind = {light.kind: light for light in scene.lights}
+    for light in world.lights:
+        copy = by_kind[light.kind]
+        luminance = 0.2126 * light.color[0] + 0.7152 * light.color[1] + 0.0722 * light.color[2]
+        assert copy.intensity_cd == pytest.approx(light.intensity_cd * luminance, rel=1e-5)
+        assert copy.illuminance_lux == pytest.approx(light.illuminance_lux, rel=1e-5)
+        assert copy.color == pytest.approx([c / luminance for c in light.color], rel=1e-5)
+        if light.kind != "sun":
+            assert copy.position_m == pytest.approx(light.position_m)
+            assert copy.radius_m == pytest.approx(light.radius_m)
+        if light.kind != "sphere":
+            assert copy.direction == pytest.approx(light.direction, abs=1e-6)
+    spot = by_kind["spot"]
+    assert (spot.cone_rad, spot.even) == pytest.approx((0.6, 0.8))
+    axes = scene.rig_pose("copy/World_Cameras_color").rotation()
+    camera = world.cameras[0].T_world_camera
+    # X along the camera's axis, Y to its left, Z up in its image.
+    expected = camera.rotation() @ np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    assert axes == pytest.approx(expected, abs=1e-6)
+    place = scene.rig_pose("copy/World_Cameras_color").translation_m
+    assert place == pytest.approx(camera.translation_m, abs=1e-6)
+
+
+def test_units_axes_subsets_and_materials_are_read(tmp_path: Path) -> None:
+    """Centimetres, Y up: a wall of 1 m x 0.5 m; each half has its own material."""
+    stage = new_stage(tmp_path / "props/wall.usda")
+    mesh = add_quad(stage, "/Wall/Mesh")
+    mesh.CreateFaceVertexCountsAttr([3, 3])
+    mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 0, 2, 3])
+    UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+        "map", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex
+    ).Set([(0, 0), (2, 0), (2, 1), (0, 1)])
+    Image.fromarray(np.full((4, 4, 3), (200, 10, 10), np.uint8)).save(tmp_path / "props/red.png")
+    metal, shader = surface(stage, "/Wall/Metal")
+    shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(1.0)
+    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.25)
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set((0.9, 0.8, 0.7))
+    binding = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
+    for k, material in enumerate((metal, textured(stage, "/Wall/Red", "./red.png"))):
+        part = binding.CreateMaterialBindSubset(f"part{k}", [k])
+        UsdShade.MaterialBindingAPI.Apply(part.GetPrim()).Bind(material)
+    stage.Save()
+    library = opened_library(tmp_path, tmp_path / "props")
+
+    read = library.mesh("user/wall")
+
+    low, high = read.bounds_m()
+    assert np.subtract(high, low) == pytest.approx([1.0, 0.0, 0.5], abs=1e-6)
+    slots = {m.metallic: (k, m) for k, m in enumerate(read.materials)}
+    assert slots[1.0][1].base_color == pytest.approx((0.9, 0.8, 0.7))
+    assert slots[1.0][1].roughness == 0.25
+    k, red = slots[0.0]
+    assert red.base_color == pytest.approx((0.5, 0.5, 0.5))
+    assert library.texture(red.texture).albedo[0, 0].tolist() == [200, 10, 10]
+    corners = read.faces[read.face_slots == k].ravel()
+    assert read.uvs[corners].max(axis=0) == pytest.approx([2.0, 1.0])
+
+
+def test_instances_transforms_and_references_are_followed(tmp_path: Path) -> None:
+    """Two instances of a layer in a subfolder, one turned and scaled, one hidden."""
+    part = new_stage(tmp_path / "props/parts/quad.usdc")
+    add_quad(part, "/Quad/Mesh")
+    part.SetDefaultPrim(part.GetPrimAtPath("/Quad"))
+    part.Save()
+    stage = new_stage(tmp_path / "props/pair.usdc")
+    for k, name in enumerate(("a", "b", "hidden")):
+        prim = UsdGeom.Xform.Define(stage, f"/World/{name}")
+        prim.GetPrim().GetReferences().AddReference("./parts/quad.usdc")
+        prim.GetPrim().SetInstanceable(True)
+        prim.AddTranslateOp().Set((0.0, 100.0 * k, 0.0))
+        prim.AddScaleOp().Set((1.0 + k, 1.0, 1.0))
+    UsdGeom.Imageable(stage.GetPrimAtPath("/World/hidden")).MakeInvisible()
+    stage.Save()
+    library = opened_library(tmp_path, tmp_path / "props")
+
+    model = library.stage("user/pair")
+
+    assert [p.name for p in model.pieces] == ["World_a_Mesh", "World_b_Mesh"]
+    # Centres: (50, 25) and (100, 125) cm; Y becomes Z.
+    assert model.pieces[0].T_stage_piece.translation_m == pytest.approx((0.5, 0.0, 0.25))
+    assert model.pieces[1].T_stage_piece.translation_m == pytest.approx((1.0, 0.0, 1.25))
+    _, high = library.bounds_m(model.pieces[1].asset)
+    assert high == pytest.approx((1.0, 0.0, 0.25), abs=1e-6)
+
+
+def test_an_archive_brings_its_images(tmp_path: Path) -> None:
+    """A usdz file is read without anything beside it."""
+    Image.fromarray(np.full((4, 4, 3), (10, 200, 10), np.uint8)).save(tmp_path / "green.png")
+    stage = new_stage(tmp_path / "leaf.usda")
+    mesh = add_quad(stage, "/Leaf")
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(textured(stage, "/M", "./green.png"))
+    stage.Save()
+    (tmp_path / "props").mkdir()
+    assert UsdUtils.CreateNewUsdzPackage(
+        str(tmp_path / "leaf.usda"), str(tmp_path / "props/leaf.usdz")
+    )
+    library = opened_library(tmp_path, tmp_path / "props")
+    for asset in ("user/leaf", library.stage("user/leaf").pieces[0].asset):
+        (material,) = library.materials(asset)
+        assert library.texture(material.texture).albedo[0, 0].tolist() == [10, 200, 10]
+
+
+def broken(folder: Path, kind: str) -> None:
+    """A file ``bad.*`` with one fault."""
+    stage = new_stage(folder / "bad.usda")
+    if kind == "no mesh":
+        UsdLux.SphereLight.Define(stage, "/Lamp")
+    elif kind == "not read":
+        UsdGeom.Cube.Define(stage, "/Cube")
+    else:
+        mesh = add_quad(stage, "/Quad")
+        if kind == "is missing":
+            material = textured(stage, "/M", "./nowhere.png")
+            UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+        elif kind == "UsdPreviewSurface":
+            material = UsdShade.Material.Define(stage, "/M")
+            UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+        elif kind == "fit together":
+            mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 9])
+        elif kind == "No such file":
+            stage.GetRootLayer().subLayerPaths.append("./lost.usda")
+        elif kind == "outside":
+            stage.GetRootLayer().subLayerPaths.append("../outside.usda")
+        elif kind == "in an archive outside":
+            stage.GetRootLayer().subLayerPaths.append("../outside.usdz[outside.usda]")
+    stage.Save()
+    if kind == "unreadable USD":
+        (folder / "bad.usda").write_text('#usda 1.0\ndef Mesh "M" {\n  point3f[] points = [(1,\n')
+    elif kind == "compressed":
+        (folder / "bad.usda").unlink()
+        with zipfile.ZipFile(folder / "bad.usdz", "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("bad.usda", "#usda 1.0\n" * 100)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "no mesh",
+        "not read",
+        "is missing",
+        "UsdPreviewSurface",
+        "fit together",
+        "No such file",
+        "outside",
+        "in an archive outside",
+        "unreadable USD",
+        "compressed",
+    ],
+)
+def test_a_bad_stage_is_one_clear_error(
+    fault: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The file is named, the fault and the remedy; the library behind prints nothing."""
+    (tmp_path / "outside.usda").write_text("#usda 1.0\n")
+    broken(tmp_path / "props", fault)
+    capfd.readouterr()
+    library = opened_library(tmp_path, tmp_path / "props")
+
+    with pytest.raises(AssetError, match=fault.removeprefix("in an archive ")) as raised:
+        library.mesh("user/bad")
+
+    assert "props/" in str(raised.value) and ";" in str(raised.value)
+    out, err = capfd.readouterr()
+    assert (out, err) == ("", "")
+
+
+def test_bytes_that_are_no_crate_file_are_refused(tmp_path: Path) -> None:
+    """Truncated and scrambled binary layers."""
+    stage = new_stage(tmp_path / "whole.usdc")
+    add_quad(stage, "/Quad")
+    stage.Save()
+    data = (tmp_path / "whole.usdc").read_bytes()
+    (tmp_path / "props").mkdir()
+    (tmp_path / "props/half.usdc").write_bytes(data[: len(data) // 2])
+    (tmp_path / "props/noise.usdc").write_bytes(data[:8] + bytes(range(256)) * 4)
+    library = opened_library(tmp_path, tmp_path / "props")
+    for name in ("half", "noise"):
+        with pytest.raises(AssetError, match="unreadable USD"):
+            library.mesh(f"user/{name}")
+
+
+def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
+    """A changed layer below is another asset."""
+    part = new_stage(tmp_path / "props/parts/quad.usda")
+    add_quad(part, "/Quad/Mesh")
+    part.SetDefaultPrim(part.GetPrimAtPath("/Quad"))
+    part.Save()
+    stage = new_stage(tmp_path / "props/one.usda")
+    UsdGeom.Xform.Define(stage, "/W").GetPrim().GetReferences().AddReference("./parts/quad.usda")
+    stage.Save()
+    before = opened_library(tmp_path, tmp_path / "props").get("user/one").sha256
+    text = (tmp_path / "props/parts/quad.usda").read_text()
+    (tmp_path / "props/parts/quad.usda").write_text(text.replace("100", "120"))
+    assert opened_library(tmp_path, tmp_path / "props").get("user/one").sha256 != before
+
+
+def test_a_scaled_stage_keeps_its_light(tmp_path: Path) -> None:
+    """Twice as large: lamps twice as far away light as brightly as before."""
+    stage = new_stage(tmp_path / "props/s.usda", "Z", 1.0)
+    add_quad(stage, "/Quad")
+    lamp = UsdLux.SphereLight.Define(stage, "/Lamp")
+    lamp.CreateRadiusAttr(0.1)
+    lamp.CreateIntensityAttr(1000.0)
+    lamp.AddTranslateOp().Set((0.0, 0.0, 3.0))
+    stage.Save()
+    index = "assets:\n  - {id: s, file: s.usda, category: room, scale: 0.02}\n"
+    (tmp_path / "props/assets.yaml").write_text(index)
+    (light,) = opened_library(tmp_path, tmp_path / "props").stage("user/s").lights
+    assert light.kind == "sphere"
+    assert light.position_m == pytest.approx((0.0, 0.0, 0.06))
+    # 1000 nits of a disc of 0.1 m, at 1 / 50 of the distance.
+    assert light.intensity_cd == pytest.approx(1000.0 * np.pi * 0.01 / 2500.0)
