@@ -1,0 +1,127 @@
+"""Two infrared cameras and a dot projector, as in RealSense D400: depth by matching blocks.
+
+Nothing is modelled but the images: what surrounding light shows, the projector's dots by the place
+of each point, shot and read noise, 8 bits. Fattened edges, holes and wrong matches come out of the
+matching itself: semi-global, Hirschmueller, "Stereo Processing by Semiglobal Matching and Mutual
+Information", TPAMI 2008, in OpenCV's form with a left-right check. What devices do: Keselman et
+al., "Intel RealSense Stereoscopic Depth Cameras", CVPR Workshops 2017.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from generator.config.strict import Strict
+from generator.core.geometry import Float32
+from generator.core.stereo import disparity_px, seen_by_both
+from generator.core.streams import Rng
+from generator.sensors.depth.dots import Dots
+from generator.sensors.depth.view import Measured, View
+
+UInt8 = NDArray[np.uint8]
+
+BITS = 4
+"""Binary places of OpenCV's disparities."""
+WHITE, WHITE_QUANTILE = 200.0, 0.98
+"""The exposure puts the brightest fiftieth of the image here."""
+
+
+class ActiveStereo(Strict):
+    """Block matching between two infrared cameras, helped by projected dots.
+
+    Attributes:
+        baseline_m: From the left camera, whose depth is reported, to the right one.
+        projector_m: From the left camera to the projector between them.
+        projector_cd: Its intensity, in the units in which surrounding light is given; 0 = none.
+        dots: Its pattern.
+        nearest_m: Larger disparities are not looked for.
+        block_px: Width of the blocks that are matched; odd.
+        smoothness: Factor on what changes of disparity cost.
+        uniqueness_pct: The best match has to be better by this than any other.
+        check_px: Largest difference between left-right and right-left disparities; -1 = unchecked.
+        speckle_px: Smaller patches are taken for wrong; 0 = none is.
+        full_well: Electrons of a white pixel.
+        read_noise: Of a pixel [electrons].
+    """
+
+    kind: Literal["active_stereo"]
+    baseline_m: float = Field(0.05, gt=0, le=2)
+    projector_m: float = Field(0.03, ge=-2, le=2)
+    projector_cd: float = Field(70.0, ge=0)
+    dots: Dots = Dots()
+    nearest_m: float = Field(0.2, gt=0)
+    block_px: int = Field(7, ge=3, le=21)
+    smoothness: float = Field(1.0, gt=0, le=100)
+    uniqueness_pct: int = Field(5, ge=0, le=100)
+    check_px: int = Field(1, ge=-1, le=16)
+    speckle_px: int = Field(60, ge=0)
+    full_well: float = Field(8000.0, gt=0)
+    read_noise: float = Field(6.0, ge=0)
+
+    def measure(self, view: View, rng: Rng) -> Measured:
+        """The depth image and the left infrared image of a view."""
+        lights = [self._light(view, right_m) for right_m in (0.0, self.baseline_m)]
+        white = max(float(np.quantile(lights[0], WHITE_QUANTILE)), 1e-6)
+        left, right = (self._photo(light / np.float32(white), rng) for light in lights)
+        focal_baseline = view.focal_px * self.baseline_m
+        most_px = math.ceil(focal_baseline / self.nearest_m / 16.0) * 16
+        disparity = self._matched(left, right, most_px)
+        z_m = np.where(disparity > 0.0, focal_baseline / np.maximum(disparity, 1e-3), np.inf)
+        return Measured(z_m.astype(np.float32), left.astype(np.uint16))
+
+    def _light(self, view: View, right_m: float) -> Float32:
+        """Luminance that one camera sees, dots included."""
+        light = view.luminance_cd_m2(right_m)
+        if self.projector_cd == 0.0:
+            return light
+        met = view.lit(right_m)
+        z_m, range_m = met.z_m[..., 0], met.range_m[..., 0]
+        away_m = self.projector_m - right_m
+        points = view.camera.intrinsics.unproject(z_m)
+        there = np.isfinite(z_m)
+        x, y = (
+            np.where(there, p / points[..., 2], 0.0).astype(np.float32)
+            for p in (points[..., 0] - away_m, points[..., 1])
+        )
+        lux = np.float32(self.projector_cd) * self.dots.at(x, y) / np.square(range_m)
+        if away_m != 0.0:
+            focal_baseline = view.focal_px * away_m
+            there_m = view.z_depth_m(self.projector_m)
+            lux *= seen_by_both(*(disparity_px(d, focal_baseline) for d in (z_m, there_m)))
+        return np.asarray(light + lux * met.reflectance[..., 0] / np.float32(np.pi), np.float32)
+
+    def _photo(self, exposed: Float32, rng: Rng) -> UInt8:
+        """Eight bits of an image in which 1 is ``WHITE``."""
+        electrons = np.minimum(exposed * np.float32(WHITE / 255.0), 1.0) * self.full_well
+        noise = rng.standard_normal(exposed.shape, dtype=np.float32)
+        electrons = electrons + np.sqrt(electrons + self.read_noise**2) * noise
+        return np.clip(np.rint(electrons * (255.0 / self.full_well)), 0, 255).astype(np.uint8)
+
+    def _matched(self, left: UInt8, right: UInt8, most_px: int) -> Float32:
+        """Disparities of the left image, float32 [h, w]; 0 = none."""
+        block = self.block_px | 1
+        cost = self.smoothness * block * block
+        matcher = cv2.StereoSGBM_create(
+            minDisparity=0,
+            numDisparities=most_px,
+            blockSize=block,
+            P1=round(8 * cost),
+            P2=round(32 * cost),
+            disp12MaxDiff=self.check_px,
+            preFilterCap=31,
+            uniquenessRatio=self.uniqueness_pct,
+            speckleWindowSize=self.speckle_px,
+            speckleRange=2,
+            mode=cv2.STEREO_SGBM_MODE_SGBM,
+        )
+        # OpenCV leaves out columns whose farthest match lies outside: give it some more to the left.
+        wide = [cv2.copyMakeBorder(i, 0, 0, most_px, 0, cv2.BORDER_REPLICATE) for i in (left, right)]
+        found = matcher.compute(*wide)[:, most_px:].astype(np.float32) / np.float32(1 << BITS)
+        columns = np.arange(left.shape[1], dtype=np.float32)
+        return np.asarray(np.where((found > 0) & (columns >= found), found, 0.0), np.float32)
