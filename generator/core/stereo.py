@@ -50,7 +50,9 @@ def disparity_px(z_depth_m: Float32, focal_baseline: float) -> Float32:
     return disparity
 
 
-def seen_by_both(here_px: Float32, there_px: Float32) -> NDArray[np.bool_]:
+def seen_by_both(
+    here_px: Float32, there_px: Float32, *, beyond: bool = False
+) -> NDArray[np.bool_]:
     """Whether the other camera sees what this one does, bool [h, w].
 
     It does if the point is in its image and nothing there is nearer by more than a pixel, in at
@@ -58,6 +60,7 @@ def seen_by_both(here_px: Float32, there_px: Float32) -> NDArray[np.bool_]:
 
     Args:
         here_px, there_px: Disparities of both images, with one sign; 0 = nothing.
+        beyond: Whether the other one, such as a projector, sees points beside its image.
     """
     height, width = here_px.shape
     at_px = np.arange(width, dtype=np.float32) - here_px
@@ -67,5 +70,6 @@ def seen_by_both(here_px: Float32, there_px: Float32) -> NDArray[np.bool_]:
     for column in (left, left + 1):
         inside = (column >= 0) & (column < width)
         other_px = there_px[rows, np.clip(column, 0, width - 1)]
-        seen |= inside & (np.abs(other_px) <= np.abs(here_px) + NEARER_PX)
+        open_ = np.abs(other_px) <= np.abs(here_px) + NEARER_PX
+        seen |= np.where(inside, open_, beyond)
     return np.asarray(seen & (here_px != 0.0))

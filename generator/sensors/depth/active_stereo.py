@@ -28,6 +28,8 @@ UInt8 = NDArray[np.uint8]
 
 BITS = 4
 """Binary places of OpenCV's disparities."""
+SMOOTHING_PX = 1.0
+"""Of images whose gradients are taken."""
 WHITE, WHITE_QUANTILE = 200.0, 0.98
 """The exposure puts the brightest fiftieth of the image here."""
 
@@ -46,6 +48,7 @@ class ActiveStereo(Strict):
         uniqueness_pct: The best match has to be better by this than any other.
         check_px: Largest difference between left-right and right-left disparities; -1 = unchecked.
         speckle_px: Smaller patches are taken for wrong; 0 = none is.
+        steps_per_px: Disparities are whole multiples of a pixel over this.
         full_well: Electrons of a white pixel.
         read_noise: Of a pixel [electrons].
     """
@@ -61,6 +64,7 @@ class ActiveStereo(Strict):
     uniqueness_pct: int = Field(5, ge=0, le=100)
     check_px: int = Field(1, ge=-1, le=16)
     speckle_px: int = Field(60, ge=0)
+    steps_per_px: int = Field(32, ge=1, le=256)
     full_well: float = Field(8000.0, gt=0)
     read_noise: float = Field(6.0, ge=0)
 
@@ -92,8 +96,9 @@ class ActiveStereo(Strict):
         lux = np.float32(self.projector_cd) * self.dots.at(x, y) / np.square(range_m)
         if away_m != 0.0:
             focal_baseline = view.focal_px * away_m
-            there_m = view.z_depth_m(self.projector_m)
-            lux *= seen_by_both(*(disparity_px(d, focal_baseline) for d in (z_m, there_m)))
+            depths_m = (z_m, view.z_depth_m(self.projector_m))
+            pair_px = (disparity_px(depth_m, focal_baseline) for depth_m in depths_m)
+            lux *= seen_by_both(*pair_px, beyond=True)
         return np.asarray(light + lux * met.reflectance[..., 0] / np.float32(np.pi), np.float32)
 
     def _photo(self, exposed: Float32, rng: Rng) -> UInt8:
@@ -124,4 +129,51 @@ class ActiveStereo(Strict):
         wide = [cv2.copyMakeBorder(i, 0, 0, most_px, 0, cv2.BORDER_REPLICATE) for i in (left, right)]
         found = matcher.compute(*wide)[:, most_px:].astype(np.float32) / np.float32(1 << BITS)
         columns = np.arange(left.shape[1], dtype=np.float32)
-        return np.asarray(np.where((found > 0) & (columns >= found), found, 0.0), np.float32)
+        found = np.where((found > 0) & (columns >= found), found, np.float32(0.0))
+        fine = refined(left, right, found, block)
+        return np.rint(fine * np.float32(self.steps_per_px)) / np.float32(self.steps_per_px)
+
+
+def refined(left: UInt8, right: UInt8, found: Float32, block_px: int) -> Float32:
+    """Disparities to a small part of a pixel, float32 [h, w]; 0 = none.
+
+    Lucas and Kanade, "An Iterative Image Registration Technique", IJCAI 1981: the shift under which
+    blocks differ least, with the gradients of both images, from where semi-global matching ended,
+    whose own parabolas lean towards whole pixels. Twice: from whole pixels, then from halves.
+    """
+    here = _smoothed(left)
+    there = _smoothed(right)
+    between = 0.5 * (there + np.pad(there, ((0, 0), (1, 0)), mode="edge")[:, :-1])
+    fine = found
+    for images in ((there,), (there, between)):
+        per_px = len(images)
+        start = np.where(found > 0.0, np.maximum(np.rint(fine * per_px), 1.0), 0.0).astype(np.int64)
+        shift = np.zeros_like(found)
+        for step in np.flatnonzero(np.bincount(start.ravel()))[1:]:
+            at = start == step
+            rows = np.flatnonzero(at.any(axis=1))
+            window = slice(max(rows[0] - block_px, 0), rows[-1] + block_px + 1)
+            image = images[step % per_px][window]
+            by = step // per_px
+            moved = np.pad(image, ((0, 0), (by, 0)), mode="edge")[:, : image.shape[1]]
+            shift[window] += at[window] * _shift(here[window], moved, block_px)
+        fine = np.where(found > 0.0, start / np.float32(per_px) + shift, np.float32(0.0))
+    return np.asarray(np.where(np.abs(fine - found) <= 1.0, fine, found), np.float32)
+
+
+def _shift(here: Float32, there: Float32, block_px: int) -> Float32:
+    """By how much blocks of the second image have to move to the right, at most a pixel."""
+    slope = 0.5 * (_slope(here) + _slope(there))
+    size = (block_px, block_px)
+    pull = cv2.boxFilter(slope * (there - here), -1, size, normalize=False)
+    stiff = cv2.boxFilter(slope * slope, -1, size, normalize=False)
+    return np.clip(pull / np.maximum(stiff, np.float32(1e-3)), -1.0, 1.0).astype(np.float32)
+
+
+def _slope(image: Float32) -> Float32:
+    wide = np.pad(image, ((0, 0), (1, 1)), mode="edge")
+    return np.asarray(0.5 * (wide[:, 2:] - wide[:, :-2]), np.float32)
+
+
+def _smoothed(image: UInt8) -> Float32:
+    return np.asarray(cv2.GaussianBlur(image.astype(np.float32), (0, 0), SMOOTHING_PX), np.float32)

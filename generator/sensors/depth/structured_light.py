@@ -78,7 +78,7 @@ class StructuredLight(Strict):
             focal_baseline = view.focal_px * self.baseline_m
             there_m = view.z_depth_m(self.baseline_m)
             here_px, there_px = (disparity_px(d, focal_baseline) for d in (z_m, there_m))
-            lit = seen_by_both(here_px, there_px) & self._recognised(here_px)
+            lit = seen_by_both(here_px, there_px, beyond=True) & self._recognised(here_px)
         signal = met.reflectance[..., 0] / np.square(met.range_m[..., 0])
         answered = self._answers(signal * (1.0 + SIGNAL_SPREAD * speckle))
         angle = np.arccos(np.clip(met.cosine[..., 0], 0.0, 1.0))
