@@ -50,16 +50,15 @@ def disparity_px(z_depth_m: Float32, focal_baseline: float) -> Float32:
     return disparity
 
 
-def seen_by_both(
-    here_px: Float32, there_px: Float32, *, beyond: bool = False
-) -> NDArray[np.bool_]:
+def seen_by_both(here_px: Float32, there_px: Float32, *, beyond: bool = False) -> NDArray[np.bool_]:
     """Whether the other camera sees what this one does, bool [h, w].
 
     It does if the point is in its image and nothing there is nearer by more than a pixel, in at
     least one of the two columns between which the point lies.
 
     Args:
-        here_px, there_px: Disparities of both images, with one sign; 0 = nothing.
+        here_px: Disparities of this image, float32 [h, w]; 0 = nothing.
+        there_px: Those of the other one, with the same sign.
         beyond: Whether the other one, such as a projector, sees points beside its image.
     """
     height, width = here_px.shape

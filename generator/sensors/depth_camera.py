@@ -69,9 +69,8 @@ class DepthCamera(Mounted):
     @property
     def device(self) -> DepthModel:
         """Its data sheet."""
-        if isinstance(self.model, str):
-            return preset(MODELS, self.model, DepthModel)
-        return self.model
+        model = self.model
+        return preset(MODELS, model, DepthModel) if isinstance(model, str) else model
 
     @property
     def media(self) -> tuple[Channel, ...]:

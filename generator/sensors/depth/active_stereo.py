@@ -106,13 +106,14 @@ class ActiveStereo(Strict):
         electrons = np.minimum(exposed * np.float32(WHITE / 255.0), 1.0) * self.full_well
         noise = rng.standard_normal(exposed.shape, dtype=np.float32)
         electrons = electrons + np.sqrt(electrons + self.read_noise**2) * noise
-        return np.clip(np.rint(electrons * (255.0 / self.full_well)), 0, 255).astype(np.uint8)
+        steps = np.rint(electrons * (255.0 / self.full_well))
+        return np.asarray(np.clip(steps, 0, 255), np.uint8)
 
     def _matched(self, left: UInt8, right: UInt8, most_px: int) -> Float32:
         """Disparities of the left image, float32 [h, w]; 0 = none."""
         block = self.block_px | 1
         cost = self.smoothness * block * block
-        matcher = cv2.StereoSGBM_create(
+        matcher = cv2.StereoSGBM.create(
             minDisparity=0,
             numDisparities=most_px,
             blockSize=block,
@@ -125,13 +126,16 @@ class ActiveStereo(Strict):
             speckleRange=2,
             mode=cv2.STEREO_SGBM_MODE_SGBM,
         )
-        # OpenCV leaves out columns whose farthest match lies outside: give it some more to the left.
-        wide = [cv2.copyMakeBorder(i, 0, 0, most_px, 0, cv2.BORDER_REPLICATE) for i in (left, right)]
+        # OpenCV leaves out columns whose farthest match lies outside: it is given more of them.
+        wide = [
+            cv2.copyMakeBorder(i, 0, 0, most_px, 0, cv2.BORDER_REPLICATE) for i in (left, right)
+        ]
         found = matcher.compute(*wide)[:, most_px:].astype(np.float32) / np.float32(1 << BITS)
         columns = np.arange(left.shape[1], dtype=np.float32)
         found = np.where((found > 0) & (columns >= found), found, np.float32(0.0))
         fine = refined(left, right, found, block)
-        return np.rint(fine * np.float32(self.steps_per_px)) / np.float32(self.steps_per_px)
+        per_px = np.float32(self.steps_per_px)
+        return np.asarray(np.rint(fine * per_px) / per_px, np.float32)
 
 
 def refined(left: UInt8, right: UInt8, found: Float32, block_px: int) -> Float32:
@@ -167,7 +171,8 @@ def _shift(here: Float32, there: Float32, block_px: int) -> Float32:
     size = (block_px, block_px)
     pull = cv2.boxFilter(slope * (there - here), -1, size, normalize=False)
     stiff = cv2.boxFilter(slope * slope, -1, size, normalize=False)
-    return np.clip(pull / np.maximum(stiff, np.float32(1e-3)), -1.0, 1.0).astype(np.float32)
+    shift = np.clip(pull / np.maximum(stiff, np.float32(1e-3)), -1.0, 1.0)
+    return np.asarray(shift, np.float32)
 
 
 def _slope(image: Float32) -> Float32:

@@ -29,7 +29,8 @@ class Dots(Strict):
         """Intensity relative to the mean over the field.
 
         Args:
-            x, y: Tangents of the directions from the projector, right and down.
+            x: Tangents of the directions from the projector, to its right.
+            y: The same, downwards.
         """
         pitch, sigma = 1e-3 * self.pitch_mrad, 1e-3 * self.dot_mrad
         u, v = x / np.float32(pitch), y / np.float32(pitch)
@@ -62,4 +63,4 @@ def _mixed(x: UInt32) -> UInt32:
 
 
 def _share(bits: NDArray[Any]) -> Float32:
-    return bits.astype(np.float32) / np.float32(65536.0)
+    return np.asarray(bits.astype(np.float32) / np.float32(65536.0), np.float32)

@@ -102,7 +102,7 @@ class TimeOfFlight(Strict):
         per_m = _phase_per_m(mhz)
         direct = (strength * np.exp(1j * per_m * range_m)).mean(axis=-1)
         if self.bounce == 0.0:
-            return direct.astype(np.complex64)
+            return np.asarray(direct, np.complex64)
         # On the way to where it is scattered the light has gone half of the phase of its echo.
         half = (strength * np.exp(0.5j * per_m * range_m)).mean(axis=-1)
         around = _blurred(half.real, sigma_px) + 1j * _blurred(half.imag, sigma_px)

@@ -87,16 +87,12 @@ class View:
 
     def z_depth_m(self, right_m: float) -> Float32:
         """Depth image from beside the camera, float32 [h, w]; inf."""
-        seen = self.renderer.render(
-            self.scene, self.beside(right_m), frozenset({Channel.Z_DEPTH})
-        )
+        seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.Z_DEPTH}))
         return np.asarray(seen.channels[Channel.Z_DEPTH], np.float32)
 
     def luminance_cd_m2(self, right_m: float) -> Float32:
         """What the surrounding light makes of the scene, float32 [h, w]."""
-        seen = self.renderer.render(
-            self.scene, self.beside(right_m), frozenset({Channel.RADIANCE})
-        )
+        seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.RADIANCE}))
         radiance = seen.channels[Channel.RADIANCE]
         luminance = np.einsum("hwc,c->hw", radiance, LUMINANCE, optimize=False)
         return np.asarray(luminance, np.float32)
