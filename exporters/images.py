@@ -10,6 +10,10 @@ instance, part,       16-bit grey            the id; 0
 category
 normals               8-bit RGB              ``round((n + 1) / 2 * 255)``; (128, 128, 128)
 object_coordinates    16-bit RGB             ``round(c * 65535)``; 0
+measured_depth        16-bit grey            as depth
+infrared              16-bit grey            as it is
+disparity,            16-bit grey            ``round(256 * pixels)``, as KITTI's stereo benchmark has
+disparity_visible                            it; 0 = nothing, or 256 px and more
 ====================  =====================  =====================================================
 
 Rows are filtered by what lies to the left, ids by what lies above, and compressed at the level
@@ -50,6 +54,10 @@ ENCODING = {
     Channel.CATEGORY: (RowFilter.UP, 2),
     Channel.NORMALS: (RowFilter.SUB, 1),
     Channel.OBJECT_COORDINATES: (RowFilter.SUB, 1),
+    Channel.MEASURED_DEPTH: (RowFilter.SUB, 1),
+    Channel.INFRARED: (RowFilter.SUB, 1),
+    Channel.DISPARITY: (RowFilter.SUB, 1),
+    Channel.DISPARITY_VISIBLE: (RowFilter.SUB, 1),
 }
 """Row filter and compression level of each channel, measured on rendered images."""
 
@@ -113,6 +121,16 @@ def depth_units(depth_m: NDArray[np.floating], depth_scale_m: float) -> UInt16:
     return units.astype(np.uint16)
 
 
+def disparity_units(disparity_px: NDArray[np.floating]) -> UInt16:
+    """Disparity in 1/256 px, half to even; 0 = nothing or out of range.
+
+    A disparity that would round to 0 becomes 1: it is there.
+    """
+    units = np.rint(disparity_px * 256.0)
+    units = np.where(disparity_px > 0.0, np.maximum(units, 1.0), 0.0)
+    return np.where(units > DEPTH_UNITS_MAX, 0.0, units).astype(np.uint16)
+
+
 def read_depth_units(path: Path) -> UInt16:
     """The values of a depth image as it was written, uint16 [height, width].
 
@@ -145,6 +163,9 @@ def _pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> NDAr
         Channel.RGB: lambda: image,
         Channel.Z_DEPTH: lambda: depth_units(image, depth_scale_m),
         Channel.RANGE: lambda: depth_units(image, depth_scale_m),
+        Channel.MEASURED_DEPTH: lambda: depth_units(image, depth_scale_m),
+        Channel.DISPARITY: lambda: disparity_units(image),
+        Channel.DISPARITY_VISIBLE: lambda: disparity_units(image),
         Channel.NORMALS: lambda: np.rint((image + 1.0) * 0.5 * 255.0).astype(np.uint8),
         # Boxes are rounded to a micrometre: a surface may lie that much outside [0, 1], and
         # 65536 would wrap to 0.

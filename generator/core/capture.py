@@ -30,6 +30,10 @@ class Channel(str, Enum):
     CATEGORY              uint16 [h, w]           category id; 0
     OBJECT_COORDINATES    float32 [h, w, 3]       position in the instance's box, [0, 1]; 0
     AMODAL                (silhouettes)           each instance alone, also outside the image
+    MEASURED_DEPTH        float32 [h, w]          depth as a device reports it [m]; inf
+    INFRARED              uint16 [h, w]           its image of its own light, in its own units; 0
+    DISPARITY             float32 [h, w]          to the camera on the right [px]; 0
+    DISPARITY_VISIBLE     float32 [h, w]          the same where that camera sees it too; 0
     ====================  ======================  ==========================================
     """
 
@@ -43,6 +47,10 @@ class Channel(str, Enum):
     CATEGORY = "category"
     OBJECT_COORDINATES = "object_coordinates"
     AMODAL = "amodal"
+    MEASURED_DEPTH = "measured_depth"
+    INFRARED = "infrared"
+    DISPARITY = "disparity"
+    DISPARITY_VISIBLE = "disparity_visible"
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -15,7 +15,7 @@ from generator.core.capture import Channel, Reading
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
 from generator.core.skeletons import skeleton_of
-from generator.preview.palette import Rgb, color_of, colored_depth, colored_ids
+from generator.preview.palette import Rgb, color_of, colored_depth, colored_ids, infrared_grey
 
 Image = NDArray[np.uint8]
 
@@ -56,8 +56,12 @@ def channel_image(reading: Reading, channel: Channel) -> Image:
     data = reading.channels[channel]
     if channel is Channel.RGB:
         return np.asarray(data, np.uint8)
-    if channel in (Channel.Z_DEPTH, Channel.RANGE):
+    if channel in (Channel.Z_DEPTH, Channel.RANGE, Channel.MEASURED_DEPTH):
         return colored_depth(data)
+    if channel in (Channel.DISPARITY, Channel.DISPARITY_VISIBLE):
+        return colored_depth(np.divide(1.0, data, out=np.full_like(data, np.inf), where=data > 0))
+    if channel is Channel.INFRARED:
+        return infrared_grey(data)
     if channel is Channel.NORMALS:
         return np.round((data + 1.0) * 127.5).astype(np.uint8)
     if channel is Channel.OBJECT_COORDINATES:

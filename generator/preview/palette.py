@@ -39,6 +39,13 @@ def colored_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
     return np.repeat(grey[..., None], 3, axis=2)
 
 
+def infrared_grey(infrared: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """An infrared image [h, w] in the gamma of screens, uint8 [h, w, 3]; a hundredth is white."""
+    white = max(float(np.quantile(infrared, 0.99)), 1.0)
+    grey = np.round(255.0 * np.clip(infrared / white, 0.0, 1.0) ** (1.0 / 2.2)).astype(np.uint8)
+    return np.repeat(grey[..., None], 3, axis=2)
+
+
 def colored_shares(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
     """Shares [n] as colours from blue (0) over green to red (1), uint8 [n, 3]; others are clipped.
 

@@ -22,13 +22,13 @@ BACKGROUND = 24
 def tiles(
     samples: Iterable[Sample], channels: Sequence[Channel], *, labels: bool, width_px: int
 ) -> list[Image]:
-    """One tile per sample, camera and channel, and two per scan, each ``width_px`` wide."""
+    """One tile per sample, camera and channel it has, and two per scan, ``width_px`` wide."""
     shown = []
     for sample in samples:
         aspect = 1.0
         for name, reading in sorted(sample.capture.readings.items()):
             aspect = reading.camera.intrinsics.width_px / reading.camera.intrinsics.height_px
-            for channel in channels:
+            for channel in (c for c in channels if c in reading.channels):
                 drawn = labels and channel is Channel.RGB
                 shown.append(
                     labelled_image(reading, sample.truth[name])

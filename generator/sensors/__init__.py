@@ -8,6 +8,7 @@ TABLE = PluginTable(
     "sensor",
     {
         "rgb_camera": "generator.sensors.rgb_camera:RgbCamera",
+        "depth_camera": "generator.sensors.depth_camera:DepthCamera",
         "lidar": "generator.sensors.lidar:LidarSensor",
         "imu": "generator.sensors.imu:Imu",
         "event_camera": "generator.sensors.event_camera:EventCamera",

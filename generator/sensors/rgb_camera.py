@@ -10,20 +10,34 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from generator.core.capture import Channel, Reading
+from generator.core.errors import ConfigError, SampleError, did_you_mean
 from generator.core.instants import RIG_AXES
 from generator.core.interfaces import Renderer
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Region, Scene
 from generator.core.se3 import SE3, look_at
+from generator.core.stereo import baseline_m, disparity_px, seen_by_both
 from generator.core.streams import Rng
 from generator.sensors.formation.chain import Formation, photograph
 from generator.sensors.lenses import LensConfig, Pinhole, Published
 from generator.sensors.mounting import Mounted, known_rig
 
 Image = Literal[
-    "rgb", "depth", "range", "normals", "instance", "part", "category", "object_coordinates"
+    "rgb",
+    "depth",
+    "range",
+    "normals",
+    "instance",
+    "part",
+    "category",
+    "object_coordinates",
+    "disparity",
+    "disparity_visible",
 ]
 """Channels that can be written as images; see ``generator.core.capture.Channel``."""
+
+PAIRED = frozenset({Channel.DISPARITY, Channel.DISPARITY_VISIBLE})
+"""Channels that take a second camera."""
 
 SidePx = Annotated[int, Field(ge=8, le=8192)]
 
@@ -48,6 +62,8 @@ class RgbCamera(Mounted):
         channels: What is written as images.
         ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
         formation: How its photographs come about; null = an ideal camera.
+        stereo_with: For its channels ``disparity`` and ``disparity_visible``: name of the camera
+            to its right that makes a rectified pair with it.
     """
 
     modality: ClassVar[Literal["camera", "lidar"]] = "camera"
@@ -59,6 +75,13 @@ class RgbCamera(Mounted):
     channels: tuple[Image, ...] = Field(("rgb", "depth", "instance", "category"), min_length=1)
     ev100: float | None = None
     formation: Formation | None = None
+    stereo_with: str = ""
+
+    @model_validator(mode="after")
+    def _has_a_partner(self) -> RgbCamera:
+        if not self.stereo_with and PAIRED & set(self.media):
+            raise ValueError("disparity needs a second camera: name it with stereo_with")
+        return self
 
     @model_validator(mode="after")
     def _has_a_lens(self) -> RgbCamera:
@@ -96,23 +119,25 @@ class RgbCamera(Mounted):
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this camera in it, looking at the scene's focus; as it is if it was."""
-        if any(camera.name == self.name for camera in scene.cameras):
-            return scene
-        intrinsics = self.intrinsics()
-        if self.rig:
-            rig = known_rig(scene, self.name, self.rig)
-            T_rig_camera = self.T_rig_sensor @ RIG_AXES.inverse()
-            camera = Camera(self.name, SE3(), intrinsics, self.ev100, rig, T_rig_camera)
-            return replace(scene, cameras=(*scene.cameras, camera))
-        pose = _nominal_pose(scene.focus, _narrower_half_rad(intrinsics))
-        camera = Camera(self.name, pose, intrinsics, self.ev100)
-        return replace(scene, cameras=(*scene.cameras, camera))
+        return with_camera(scene, self.name, self, self.intrinsics(), self.ev100)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Reading:
-        """Its own channels and those asked for; only colour is subject to its optics and noise."""
+        """Its own channels and those asked for; only colour is subject to its optics and noise.
+
+        Raises:
+            SampleError: it makes no rectified pair with the camera it should.
+        """
         asked = channels | set(self.media)
+        if self.stereo_with and PAIRED & asked:
+            below = (asked - PAIRED) | {Channel.Z_DEPTH}
+            return self._with_disparity(scene, renderer, self._seen(scene, renderer, below, rng))
+        return self._seen(scene, renderer, asked, rng)
+
+    def _seen(
+        self, scene: Scene, renderer: Renderer, asked: frozenset[Channel], rng: Rng
+    ) -> Reading:
         camera = scene.camera(self.name)
         if self.formation is None or Channel.RGB not in asked:
             return renderer.render(scene, camera, asked)
@@ -131,6 +156,52 @@ class RgbCamera(Mounted):
         )
         images = {k: v for k, v in seen.channels.items() if k in asked}
         return replace(seen, channels={**images, Channel.RGB: photo})
+
+    def _with_disparity(self, scene: Scene, renderer: Renderer, seen: Reading) -> Reading:
+        """The reading with disparities to the camera on its right."""
+        known = {camera.name: camera for camera in scene.cameras}
+        if self.stereo_with not in known:
+            raise ConfigError(
+                f"sensor '{self.name}': stereo_with: there is no camera '{self.stereo_with}'; there"
+                f" is {', '.join(known)}{did_you_mean(self.stereo_with, known)}"
+            )
+        left, right = known[self.name], known[self.stereo_with]
+        try:
+            scale = left.intrinsics.fx_px * baseline_m(left, right)
+        except ValueError as error:
+            raise SampleError(
+                f"sensors '{left.name}' and '{right.name}' are no rectified pair: {error}; put them"
+                " on one rig with the same size, field of view, lens and angles, the right one"
+                " beside the left, and let no randomizer vary only one of them"
+            ) from error
+        there = renderer.render(scene, right, frozenset({Channel.Z_DEPTH}))
+        here_px = disparity_px(seen.channels[Channel.Z_DEPTH], scale)
+        visible = seen_by_both(here_px, disparity_px(there.channels[Channel.Z_DEPTH], scale))
+        pair = {
+            Channel.DISPARITY: here_px,
+            Channel.DISPARITY_VISIBLE: np.where(visible, here_px, np.float32(0.0)),
+        }
+        return replace(seen, channels={**seen.channels, **pair})
+
+
+def with_camera(
+    scene: Scene, name: str, mounted: Mounted, intrinsics: Intrinsics, ev100: float | None = None
+) -> Scene:
+    """The scene with a camera on its rig, or looking at the scene's focus; as it is if it was.
+
+    Raises:
+        ConfigError: the scene has no such rig.
+    """
+    if any(camera.name == name for camera in scene.cameras):
+        return scene
+    if mounted.rig:
+        rig = known_rig(scene, name, mounted.rig)
+        T_rig_camera = mounted.T_rig_sensor @ RIG_AXES.inverse()
+        camera = Camera(name, SE3(), intrinsics, ev100, rig, T_rig_camera)
+    else:
+        pose = _nominal_pose(scene.focus, _narrower_half_rad(intrinsics))
+        camera = Camera(name, pose, intrinsics, ev100)
+    return replace(scene, cameras=(*scene.cameras, camera))
 
 
 def _narrower_half_rad(intrinsics: Intrinsics) -> float:

@@ -31,6 +31,7 @@ from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 GIVEN: dict[str, dict[str, Any]] = {
     "rgb_camera": {"size_px": [32, 24]},
+    "depth_camera": {"size_px": [32, 24]},
     "lidar": {"model": "VLP-16"},
     "event_camera": {"size_px": [32, 24], "frames_per_step": 2},
 }

@@ -1,0 +1,74 @@
+"""Two cameras side by side: disparities, and what only one of them sees.
+
+Both look the same way through the same pinhole, the second to the right of the first: the images
+are rectified. What the left one shows in column ``x`` the right one shows in ``x - disparity``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.geometry import Float32
+from generator.core.scene import Camera
+
+ALIGNED = 1e-6
+"""Largest deviation, in metres and as a sine, of cameras that look the same way."""
+NEARER_PX = 1.0
+"""What hides a point is nearer by more than this: as in left-right checks of stereo matching."""
+
+
+def baseline_m(left: Camera, right: Camera) -> float:
+    """How far the right camera is to the right of the left one.
+
+    Raises:
+        ValueError: they are no rectified pair.
+    """
+    if left.intrinsics != right.intrinsics or not left.intrinsics.straight:
+        raise ValueError("they are not the same pinhole")
+    T_left_right = left.T_world_camera.inverse() @ right.T_world_camera
+    if np.abs(T_left_right.rotation() - np.eye(3)).max() > ALIGNED:
+        raise ValueError("they do not look the same way")
+    x, y, z = T_left_right.translation_m
+    if max(abs(y), abs(z)) > ALIGNED or x <= 0.0:
+        raise ValueError(
+            f"one is {x:.6g} m to the right of, {y:.6g} m below and {z:.6g} m before the other, "
+            "not straight to its right"
+        )
+    return float(x)
+
+
+def disparity_px(z_depth_m: Float32, focal_baseline: float) -> Float32:
+    """``focal * baseline / z`` [px]; 0 where there is nothing.
+
+    Args:
+        z_depth_m: inf where there is nothing.
+        focal_baseline: Focal length [px] times baseline [m]; negative = the other camera is to
+            the left.
+    """
+    disparity: Float32 = np.divide(focal_baseline, z_depth_m, dtype=np.float32)
+    return disparity
+
+
+def seen_by_both(here_px: Float32, there_px: Float32, *, beyond: bool = False) -> NDArray[np.bool_]:
+    """Whether the other camera sees what this one does, bool [h, w].
+
+    It does if the point is in its image and nothing there is nearer by more than a pixel, in at
+    least one of the two columns between which the point lies.
+
+    Args:
+        here_px: Disparities of this image, float32 [h, w]; 0 = nothing.
+        there_px: Those of the other one, with the same sign.
+        beyond: Whether the other one, such as a projector, sees points beside its image.
+    """
+    height, width = here_px.shape
+    at_px = np.arange(width, dtype=np.float32) - here_px
+    left = np.floor(at_px).astype(np.int64)
+    seen = np.zeros((height, width), bool)
+    rows = np.arange(height)[:, None]
+    for column in (left, left + 1):
+        inside = (column >= 0) & (column < width)
+        other_px = there_px[rows, np.clip(column, 0, width - 1)]
+        open_ = np.abs(other_px) <= np.abs(here_px) + NEARER_PX
+        seen |= np.where(inside, open_, beyond)
+    return np.asarray(seen & (here_px != 0.0))

@@ -1,0 +1,1 @@
+"""Depth cameras: one file per principle, and devices as data, one YAML file each with sources."""

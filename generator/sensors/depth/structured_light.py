@@ -1,0 +1,158 @@
+"""A projector of known dots and one camera, as in the first Kinect: depth by triangulation.
+
+* **Shadow**: what the projector does not see has no dots.
+* **Noise**: Nguyen, Izadi and Lovell, "Modeling Kinect Sensor Noise for Improved 3D Reconstruction
+  and Tracking", 3DIMPVT 2012, axial and lateral, by distance and angle. They measured the device's
+  output, so what quantisation adds is taken off the axial noise.
+* **Quantisation**: disparities are whole multiples of 1/8 px (Khoshelham and Oude Elberink,
+  "Accuracy and Resolution of Kinect Depth Data for Indoor Mapping Applications", Sensors 2012).
+* **Lost edges and thin things**: dots are recognised by a window of 9 x 9 px (ibid.), which has to
+  show one surface by a good part.
+* **Holes** where too little light returns, where glints blind the camera, and at grazing angles.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from generator.config.strict import Strict
+from generator.core.geometry import Float32
+from generator.core.stereo import disparity_px, seen_by_both
+from generator.core.streams import Rng
+from generator.sensors.depth.dots import Dots
+from generator.sensors.depth.view import Lit, Measured, View, smooth_noise
+from generator.sensors.scanning import Seen
+
+Mask = NDArray[np.bool_]
+
+STEEP_RAD = math.radians(85.0)
+"""The formulas have a pole at a right angle."""
+WINDOW_RADIUS_PX, WINDOW_STEP_PX = 4, 2
+SAME_PX = 1.0
+"""Disparities in a window that differ by less belong to one surface."""
+NOISE_PX = 0.8
+"""How far the noise of a pixel reaches its neighbours: their windows overlap."""
+SIGNAL_SPREAD = 0.2
+"""Relative, of the light that a window receives: speckle."""
+INFRARED_BITS = 10
+
+
+class StructuredLight(Strict):
+    """Triangulation between a dot projector and one camera.
+
+    Attributes:
+        baseline_m: The projector is this far to the camera's right; negative = to its left.
+        step_px: Disparities are whole multiples of it; 0 = any.
+        noise: Factor on the published noise.
+        seen: The darkest matte surface, square on, that it recognises at a distance.
+        blinded: The nearest such surface that does not blind it.
+        grazing_deg: Surfaces that lean away farther have no depth.
+        window_share: Share of the window that has to show one surface, lit.
+        dots: The pattern in its infrared image.
+    """
+
+    kind: Literal["structured_light"]
+    baseline_m: float = Field(0.075, ge=-2, le=2)
+    step_px: float = Field(0.125, ge=0, le=4)
+    noise: float = Field(1.0, ge=0, le=100)
+    seen: Seen = Seen(reflectance=0.05, range_m=4.0)
+    blinded: Seen = Seen(reflectance=1.0, range_m=0.3)
+    grazing_deg: float = Field(82.0, gt=0, le=90)
+    window_share: float = Field(0.4, ge=0, le=1)
+    dots: Dots = Dots()
+
+    def measure(self, view: View, rng: Rng) -> Measured:
+        """The depth and infrared images of a view."""
+        met = view.lit()
+        z_m = met.z_m[..., 0]
+        lateral, axial, speckle = (smooth_noise(rng, z_m.shape, NOISE_PX) for _ in range(3))
+        infrared = self._infrared(view, met)
+        if self.baseline_m == 0.0:
+            lit = np.isfinite(z_m)
+        else:
+            focal_baseline = view.focal_px * self.baseline_m
+            there_m = view.z_depth_m(self.baseline_m)
+            here_px, there_px = (disparity_px(d, focal_baseline) for d in (z_m, there_m))
+            lit = seen_by_both(here_px, there_px, beyond=True) & self._recognised(here_px)
+        signal = met.reflectance[..., 0] / np.square(met.range_m[..., 0])
+        answered = self._answers(signal * (1.0 + SIGNAL_SPREAD * speckle))
+        angle = np.arccos(np.clip(met.cosine[..., 0], 0.0, 1.0))
+        kept = lit & answered & (angle < math.radians(self.grazing_deg))
+        place = _displaced(z_m.shape, self.noise * lateral_noise_px(angle) * lateral, rng)
+        measured_m = self._triangulated(z_m[place], angle[place], axial, view.focal_px)
+        return Measured(np.where(kept & kept[place], measured_m, np.float32(np.inf)), infrared)
+
+    def _answers(self, signal: Float32) -> Mask:
+        low = self.seen.reflectance / self.seen.range_m**2
+        high = self.blinded.reflectance / self.blinded.range_m**2
+        return np.asarray((signal >= low) & (signal <= high))
+
+    def _recognised(self, here_px: Float32) -> Mask:
+        """Whether enough of the window around each pixel shows the same surface."""
+        height, width = here_px.shape
+        reach, step = WINDOW_RADIUS_PX, WINDOW_STEP_PX
+        wide = np.pad(here_px, reach, mode="edge")
+        same = np.zeros(here_px.shape, np.float32)
+        shifts = range(0, 2 * reach + 1, step)
+        for down in shifts:
+            for right in shifts:
+                other = wide[down : down + height, right : right + width]
+                same += np.abs(other - here_px) < SAME_PX
+        return np.asarray(same >= self.window_share * len(shifts) ** 2)
+
+    def _triangulated(self, z_m: Float32, angle: Float32, noise: Float32, f_px: float) -> Float32:
+        """Depths with axial noise, on the device's steps."""
+        per_px = f_px * abs(self.baseline_m)
+        there = np.isfinite(z_m)
+        z = np.where(there, z_m, np.float32(1.0))
+        sigma_m = self.noise * axial_noise_m(z, angle)
+        if self.step_px == 0.0 or per_px == 0.0:
+            return np.asarray(np.where(there, z + sigma_m * noise, np.inf), np.float32)
+        step_m = z * z * np.float32(self.step_px / per_px)
+        sigma_m = np.sqrt(np.maximum(sigma_m**2 - step_m**2 / 12.0, 0.0))
+        noisy_m = np.maximum(z + sigma_m * noise, 1e-3)
+        steps = np.maximum(np.rint(per_px / noisy_m / self.step_px), 1.0)
+        return np.asarray(np.where(there, per_px / (steps * self.step_px), np.inf), np.float32)
+
+    def _infrared(self, view: View, met: Lit) -> NDArray[np.uint16]:
+        """What the camera sees of the dots; white is what blinds it, dots are brighter."""
+        points = view.camera.intrinsics.unproject(met.z_m[..., 0])
+        x = (points[..., 0] - self.baseline_m) / points[..., 2]
+        y = points[..., 1] / points[..., 2]
+        there = np.isfinite(x)
+        dots = self.dots.at(*(np.where(there, t, 0.0).astype(np.float32) for t in (x, y)))
+        signal = met.reflectance[..., 0] / np.square(met.range_m[..., 0])
+        white = self.blinded.reflectance / self.blinded.range_m**2
+        most = 2**INFRARED_BITS - 1
+        return np.asarray(np.rint(np.clip(dots * signal / white, 0, 1) * most), np.uint16)
+
+
+def axial_noise_m(z_m: Float32, angle_rad: Float32) -> Float32:
+    """Standard deviation along the axis, Nguyen et al. 2012, equation 5."""
+    angle = np.minimum(angle_rad, np.float32(STEEP_RAD))
+    flat = 0.0012 + 0.0019 * (z_m - 0.4) ** 2
+    lean = 0.0001 / np.sqrt(z_m) * angle**2 / (0.5 * np.pi - angle) ** 2
+    return np.asarray(flat + np.where(angle > np.pi / 3.0, lean, 0.0), np.float32)
+
+
+def lateral_noise_px(angle_rad: Float32) -> Float32:
+    """Standard deviation across the axis, Nguyen et al. 2012, equation 2."""
+    angle = np.minimum(angle_rad, np.float32(STEEP_RAD))
+    return np.asarray(0.8 + 0.035 * angle / (0.5 * np.pi - angle), np.float32)
+
+
+def _displaced(
+    shape: tuple[int, int], along_px: Float32, rng: Rng
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows and columns of the pixels whose dots each pixel takes for its own."""
+    down_px = smooth_noise(rng, shape, NOISE_PX) * np.abs(along_px).mean()
+    rows, columns = np.indices(shape)
+    return (
+        np.clip(np.rint(rows + down_px), 0, shape[0] - 1).astype(np.int64),
+        np.clip(np.rint(columns + along_px), 0, shape[1] - 1).astype(np.int64),
+    )

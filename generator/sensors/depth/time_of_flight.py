@@ -1,0 +1,164 @@
+"""Modulated light and four correlations per pixel, as in the second Kinect: depth by phase.
+
+* **Phase**: four samples a quarter period apart; their noise is that of the electrons they count
+  (Lange and Seitz, "Solid-state time-of-flight range camera", IEEE JQE 2001):
+  ``sigma = L / (2 pi) * sqrt(samples' variance / 2) / amplitude``, L the unambiguous range.
+* **Flying pixels**: what lies in a pixel's footprint is added up as phasors.
+* **Wrap-around**: distances are modulo ``c / (2 f)``; several frequencies reach as far as their
+  greatest common divisor, by the wrap count on which they agree best (as in Jaremo Lawin et al.,
+  "Efficient multi-frequency phase unwrapping using kernel density estimation", ECCV 2016, without
+  their spatial propagation). Where they do not agree there is a hole.
+* **Multi-path**: light that comes by way of what is nearby, added as one low-passed bounce, after
+  Fuchs, "Multipath Interference Compensation in Time-of-Flight Camera Images", ICPR 2010: it is
+  proportional to the surface's reflectance and has travelled farther.
+* **Holes** where too little light returns and where pixels overflow.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from generator.config.strict import Strict
+from generator.core.geometry import Float32
+from generator.core.streams import Rng
+from generator.sensors.depth.view import Lit, Measured, View
+
+LIGHT_M_S = 299_792_458.0
+SUBRAYS = 7
+"""Rays that stand for a pixel's footprint."""
+TURN = 2.0 * math.pi
+
+Complex = NDArray[np.complex64]
+Frequency = Annotated[int, Field(ge=1, le=1000)]
+
+
+class TimeOfFlight(Strict):
+    """Continuous-wave time of flight.
+
+    Attributes:
+        modulation_mhz: Frequencies, the highest last.
+        electrons: Amplitude that a white matte surface, square on, makes at 1 m.
+        contrast: Amplitude over offset of a correlation.
+        ambient: Electrons that other light adds to each sample.
+        read_noise: Standard deviation of reading a sample [electrons].
+        full_well: Samples beyond it are saturated [electrons].
+        least: Weaker amplitudes are holes [electrons].
+        disagreement_rad: Frequencies whose phases disagree by more, root mean square, leave a hole.
+        bounce: Share of the light around it that a white surface gets by way of its surroundings.
+        bounce_deg: How far surroundings reach, as a standard deviation.
+        flying: Whether a pixel has a footprint; costs seven rays instead of one.
+    """
+
+    kind: Literal["time_of_flight"]
+    modulation_mhz: tuple[Frequency, ...] = Field((16, 80, 120), min_length=1, max_length=8)
+    electrons: float = Field(30_000.0, gt=0)
+    contrast: float = Field(0.6, gt=0, le=1)
+    ambient: float = Field(200.0, ge=0)
+    read_noise: float = Field(20.0, ge=0)
+    full_well: float = Field(500_000.0, gt=0)
+    least: float = Field(60.0, ge=0)
+    disagreement_rad: float = Field(0.6, gt=0)
+    bounce: float = Field(0.04, ge=0, le=1)
+    bounce_deg: float = Field(2.5, gt=0, le=30)
+    flying: bool = True
+
+    @property
+    def ambiguity_m(self) -> float:
+        """Distances are known modulo this."""
+        return LIGHT_M_S / (2e6 * math.gcd(*self.modulation_mhz))
+
+    def measure(self, view: View, rng: Rng) -> Measured:
+        """The depth and infrared images of a view."""
+        met = view.lit(subrays=SUBRAYS if self.flying else 1)
+        sigma_px = view.focal_px * math.radians(self.bounce_deg)
+        phases, amplitude = [], np.zeros(met.range_m.shape[:2], np.float32)
+        ok = np.ones(amplitude.shape, bool)
+        for mhz in self.modulation_mhz:
+            phasor = self._phasor(met, mhz, sigma_px, view.focal_px)
+            samples = self._samples(phasor, rng)
+            ok &= samples.max(axis=0) < self.full_well
+            cosine, sine = samples[0] - samples[2], samples[3] - samples[1]
+            phases.append(np.arctan2(sine, cosine) % np.float32(TURN))
+            amplitude += 0.5 * np.hypot(cosine, sine) / len(self.modulation_mhz)
+        range_m, disagreement = unwrapped(np.stack(phases), self.modulation_mhz)
+        ok &= (amplitude >= self.least) & (disagreement <= self.disagreement_rad)
+        forward = view.camera.intrinsics.pixel_rays()[..., 2].astype(np.float32)
+        z_m = np.where(ok, range_m * forward, np.float32(np.inf))
+        infrared = np.rint(np.clip(amplitude, 0, 65_535)).astype(np.uint16)
+        return Measured(np.asarray(z_m, np.float32), infrared)
+
+    def _phasor(self, met: Lit, mhz: int, sigma_px: float, focal_px: float) -> Complex:
+        """Light that a pixel receives, amplitude [electrons] and phase, complex64 [h, w]."""
+        there = np.isfinite(met.range_m)
+        range_m = np.where(there, met.range_m, np.float32(1.0))
+        strength = np.float32(self.electrons) * met.reflectance / np.square(range_m)
+        strength = np.where(there, strength, np.float32(0.0))
+        per_m = _phase_per_m(mhz)
+        direct = (strength * np.exp(1j * per_m * range_m)).mean(axis=-1)
+        if self.bounce == 0.0:
+            return np.asarray(direct, np.complex64)
+        # On the way to where it is scattered the light has gone half of the phase of its echo.
+        half = (strength * np.exp(0.5j * per_m * range_m)).mean(axis=-1)
+        around = _blurred(half.real, sigma_px) + 1j * _blurred(half.imag, sigma_px)
+        near_m = range_m.min(axis=-1)
+        reflectance = met.reflectance.mean(axis=-1)
+        detour_m = near_m * np.float32(1.0 + sigma_px / focal_px)
+        bounced = self.bounce * reflectance * around * np.exp(0.5j * per_m * detour_m)
+        return np.asarray(direct + bounced, np.complex64)
+
+    def _samples(self, phasor: Complex, rng: Rng) -> Float32:
+        """Electrons of the four correlations, float32 [4, h, w]."""
+        offset = np.abs(phasor) / np.float32(self.contrast) + np.float32(self.ambient)
+        waves = np.stack([phasor.real, -phasor.imag, -phasor.real, phasor.imag])
+        electrons = np.maximum(offset + waves, 0.0)
+        sigma = np.sqrt(electrons + np.float32(self.read_noise**2))
+        noise = rng.standard_normal(electrons.shape, dtype=np.float32)
+        return np.asarray(electrons + sigma * noise, np.float32)
+
+
+def unwrapped(phases: Float32, modulation_mhz: tuple[int, ...]) -> tuple[Float32, Float32]:
+    """Distances on which phases agree best, and how much they disagree, root mean square [rad].
+
+    Args:
+        phases: In [0, 2 pi), one image per frequency, [n, h, w].
+        modulation_mhz: The frequencies, the highest last.
+    """
+    finest_m = LIGHT_M_S / (2e6 * modulation_mhz[-1])
+    wraps = modulation_mhz[-1] // math.gcd(*modulation_mhz)
+    best_m = np.zeros(phases.shape[1:], np.float32)
+    best = np.full(phases.shape[1:], np.inf, np.float32)
+    slopes = [_phase_per_m(mhz) for mhz in modulation_mhz]
+    weight = sum(slope * slope for slope in slopes)
+    for wrap in range(wraps):
+        range_m = (phases[-1] / np.float32(TURN) + np.float32(wrap)) * np.float32(finest_m)
+        square, correction = np.zeros_like(best), np.zeros_like(best)
+        for phase, slope in zip(phases, slopes, strict=True):
+            gap = (phase - np.float32(slope) * range_m + np.float32(math.pi)) % np.float32(TURN)
+            gap -= np.float32(math.pi)
+            square += gap * gap
+            correction += np.float32(slope) * gap
+        better = square < best
+        best = np.where(better, square, best)
+        best_m = np.where(better, range_m + correction / np.float32(weight), best_m)
+    ambiguity_m = np.float32(LIGHT_M_S / (2e6 * math.gcd(*modulation_mhz)))
+    return np.asarray(best_m % ambiguity_m), np.sqrt(best / np.float32(len(slopes)))
+
+
+def _phase_per_m(mhz: int) -> float:
+    return 2.0 * TURN * mhz * 1e6 / LIGHT_M_S
+
+
+def _blurred(image: NDArray[Any], sigma_px: float) -> Float32:
+    """Low-passed, by way of a smaller image where much is averaged."""
+    height, width = image.shape
+    factor = max(1, int(sigma_px / 3.0))
+    size = (max(width // factor, 1), max(height // factor, 1))
+    small = cv2.resize(image.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    small = cv2.GaussianBlur(small, (0, 0), sigma_px / factor, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR))

@@ -1,0 +1,110 @@
+"""What a depth camera has to work with: the scene from its own place and from beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.capture import Beams, Channel
+from generator.core.geometry import Float32
+from generator.core.interfaces import Renderer
+from generator.core.scene import Camera, Lidar, Scene
+from generator.core.se3 import SE3
+from generator.core.streams import Rng
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+"""Of linear sRGB."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Measured:
+    """What a device reports.
+
+    Attributes:
+        z_m: Depth along the optical axis, float32 [h, w]; inf = a hole.
+        infrared: The image of its own light, uint16 [h, w].
+    """
+
+    z_m: Float32
+    infrared: NDArray[np.uint16]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Lit:
+    """What the rays through pixels meet, under light from where they start.
+
+    Attributes:
+        range_m: Along the ray, [h, w, subrays]; inf.
+        z_m: Along the optical axis; inf.
+        reflectance: As of ``Echoes``: in the infrared, incidence included; 0.
+        cosine: Of the angle of incidence; 0.
+    """
+
+    range_m: Float32
+    z_m: Float32
+    reflectance: Float32
+    cosine: Float32
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class View:
+    """A scene, and the camera that the depth is reported for."""
+
+    scene: Scene
+    renderer: Renderer
+    camera: Camera
+
+    @property
+    def focal_px(self) -> float:
+        """Horizontal focal length."""
+        return self.camera.intrinsics.fx_px
+
+    def beside(self, right_m: float) -> Camera:
+        """The same camera, moved to its right."""
+        pose = self.camera.T_world_camera @ SE3((right_m, 0.0, 0.0))
+        return replace(self.camera, T_world_camera=pose)
+
+    def lit(self, right_m: float = 0.0, subrays: int = 1) -> Lit:
+        """What its pixels meet.
+
+        Args:
+            right_m: Place of eye and lamp, to the right of the camera.
+            subrays: 1, or 7 that are spread over a pixel's footprint.
+        """
+        lens = self.camera.intrinsics
+        shape = (lens.height_px, lens.width_px)
+        rays = np.nan_to_num(lens.pixel_rays()).reshape(-1, 3).astype(np.float32)
+        pose = self.beside(right_m).T_world_camera
+        beams = Beams(rays, 1.0 / lens.fx_px, subrays, np.inf)
+        seen = self.renderer.scan(self.scene, Lidar(self.camera.name, "", SE3(), pose), beams)
+        shape3 = (*shape, subrays)
+        z_m = seen.range_m * rays[:, 2:]
+        images = (seen.range_m, z_m, seen.reflectance, seen.incidence_cos)
+        return Lit(*(np.asarray(image, np.float32).reshape(shape3) for image in images))
+
+    def z_depth_m(self, right_m: float) -> Float32:
+        """Depth image from beside the camera, float32 [h, w]; inf."""
+        seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.Z_DEPTH}))
+        return np.asarray(seen.channels[Channel.Z_DEPTH], np.float32)
+
+    def luminance_cd_m2(self, right_m: float) -> Float32:
+        """What the surrounding light makes of the scene, float32 [h, w]."""
+        seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.RADIANCE}))
+        radiance = seen.channels[Channel.RADIANCE]
+        luminance = np.einsum("hwc,c->hw", radiance, LUMINANCE, optimize=False)
+        return np.asarray(luminance, np.float32)
+
+
+def smooth_noise(rng: Rng, shape: tuple[int, int], sigma_px: float) -> Float32:
+    """Gaussian noise of variance 1 whose neighbours resemble each other, float32 [h, w]."""
+    reach = int(np.ceil(3.0 * sigma_px))
+    height, width = shape
+    # Drawn beyond the image, so that its rim is like the rest of it.
+    white = rng.standard_normal((height + 2 * reach, width + 2 * reach), dtype=np.float32)
+    weights = cv2.getGaussianKernel(2 * reach + 1, sigma_px)
+    weights = weights / np.sqrt(np.sum(weights**2))
+    noise = cv2.sepFilter2D(white, cv2.CV_32F, weights, weights)
+    return np.asarray(noise[reach : reach + height, reach : reach + width], np.float32)
