@@ -12,8 +12,8 @@ normals               8-bit RGB              ``round((n + 1) / 2 * 255)``; (128,
 object_coordinates    16-bit RGB             ``round(c * 65535)``; 0
 measured_depth        16-bit grey            as depth
 infrared              16-bit grey            as it is
-disparity,            16-bit grey            ``round(256 * pixels)``, as KITTI's stereo benchmark has
-disparity_visible                            it; 0 = nothing, or 256 px and more
+disparity,            16-bit grey            ``round(256 * pixels)``, as KITTI's stereo benchmark
+disparity_visible                            has it; 0 = nothing, or 256 px and more
 ====================  =====================  =====================================================
 
 Rows are filtered by what lies to the left, ids by what lies above, and compressed at the level

@@ -143,7 +143,8 @@ def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_p
         "import sys; from pathlib import Path\n"
         "from generator.assets.library import open_library\n"
         "from tests.usd.worlds import exported, table_world\n"
-        "library = open_library(cache_dir=Path(sys.argv[1]) / 'cache', packs=Path('/nonexistent'))\n"
+        "cache = Path(sys.argv[1]) / 'cache'\n"
+        "library = open_library(cache_dir=cache, packs=Path('/nonexistent'))\n"
         "exported(table_world(library), library, Path(sys.argv[1]), format=sys.argv[2])\n"
     )
     root = Path(__file__).parents[2]
