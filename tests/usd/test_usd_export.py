@@ -104,6 +104,9 @@ def test_lights_are_photometric(sequence: Any) -> None:
     sky = UsdGeom.Xformable(sequence.GetPrimAtPath("/World/Lights/sky"))
     up = sky.ComputeLocalToWorldTransform(0).TransformDir((0, 1, 0))
     assert list(up) == pytest.approx([0.0, 0.0, 1.0])
+    # The image's centre: +Z of USD's sky, +X of ours, turned by 0.4 rad.
+    centre = sky.ComputeLocalToWorldTransform(0).TransformDir((0, 0, 1))
+    assert list(centre) == pytest.approx([np.cos(0.4), np.sin(0.4), 0.0])
 
 
 def test_materials_of_a_body_replace_those_of_its_mesh(sequence: Any) -> None:
@@ -143,7 +146,8 @@ def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_p
         "import sys; from pathlib import Path\n"
         "from generator.assets.library import open_library\n"
         "from tests.usd.worlds import exported, table_world\n"
-        "library = open_library(cache_dir=Path(sys.argv[1]) / 'cache', packs=Path('/nonexistent'))\n"
+        "cache, packs = Path(sys.argv[1]) / 'cache', Path('/nonexistent')\n"
+        "library = open_library(cache_dir=cache, packs=packs)\n"
         "exported(table_world(library), library, Path(sys.argv[1]), format=sys.argv[2])\n"
     )
     root = Path(__file__).parents[2]
