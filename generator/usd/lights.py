@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -64,51 +65,58 @@ def read_light(prim: Any, name: str, T_stage_light: Array) -> Light | None:
     """
     from pxr import UsdLux
 
-    if not (prim.IsA(UsdLux.SphereLight) or prim.IsA(UsdLux.DistantLight)):
-        return None
-    lux = UsdLux.LightAPI(prim)
-    color, strength = _color_and_strength(lux)
-    x, y, z = (float(v) for v in -T_stage_light[:3, 2] / _length(T_stage_light[:3, 2]))
     if prim.IsA(UsdLux.DistantLight):
-        half_rad = math.radians(0.5 * float(UsdLux.DistantLight(prim).GetAngleAttr().Get()))
-        if not lux.GetNormalizeAttr().Get() and half_rad > 0.0:
-            strength *= math.pi * math.sin(half_rad) ** 2
-        return Light(
-            name,
-            "sun",
-            direction=(x, y, z),
-            color=color,
-            illuminance_lux=strength,
-            angular_radius_rad=half_rad,
-        )
-    sphere, shaping = UsdLux.SphereLight(prim), UsdLux.ShapingAPI(prim)
-    radius_m = float(sphere.GetRadiusAttr().Get()) * _length(T_stage_light[:3, 0])
+        return _sun(UsdLux.DistantLight(prim), name, T_stage_light)
+    if prim.IsA(UsdLux.SphereLight):
+        return _lamp(UsdLux.SphereLight(prim), name, T_stage_light)
+    return None
+
+
+def _sun(sun: Any, name: str, T_stage_light: Array) -> Light:
+    color, strength = _color_and_strength(sun)
+    half_rad = math.radians(0.5 * float(sun.GetAngleAttr().Get()))
+    if not sun.GetNormalizeAttr().Get() and half_rad > 0.0:
+        strength *= math.pi * math.sin(half_rad) ** 2
+    return Light(
+        name,
+        "sun",
+        direction=_minus_z(T_stage_light),
+        color=color,
+        illuminance_lux=strength,
+        angular_radius_rad=half_rad,
+    )
+
+
+def _lamp(ball: Any, name: str, T_stage_light: Array) -> Light:
+    """A sphere; a spot where it is shaped to less than a half space."""
+    from pxr import UsdLux
+
+    color, strength = _color_and_strength(ball)
+    x, y, z = (float(v) for v in T_stage_light[:3, 3])
+    radius_m = float(ball.GetRadiusAttr().Get()) * _length(T_stage_light[:3, 0])
     # Normalised power is spread over the ball's surface, four times the disc that is seen.
-    candela = strength * (0.25 if lux.GetNormalizeAttr().Get() else _disc_m2(radius_m))
-    place_m = T_stage_light[:3, 3]
-    cone = shaping.GetShapingConeAngleAttr()
-    spot = prim.HasAPI(UsdLux.ShapingAPI) and cone.Get() is not None and cone.Get() < 90.0
+    disc_m2 = 0.25 if ball.GetNormalizeAttr().Get() else _disc_m2(radius_m)
     light = Light(
         name,
-        "spot" if spot else "sphere",
-        position_m=(float(place_m[0]), float(place_m[1]), float(place_m[2])),
-        direction=(x, y, z),
+        "sphere",
+        position_m=(x, y, z),
+        direction=_minus_z(T_stage_light),
         color=color,
-        intensity_cd=candela,
+        intensity_cd=strength * disc_m2,
         radius_m=radius_m,
     )
-    return light if not spot else _with_cone(light, shaping)
-
-
-def _with_cone(light: Light, shaping: Any) -> Light:
-    from dataclasses import replace
-
+    shaping = UsdLux.ShapingAPI(ball)
+    angle_deg = shaping.GetShapingConeAngleAttr().Get()
+    if not ball.GetPrim().HasAPI(UsdLux.ShapingAPI) or angle_deg is None or angle_deg >= 90.0:
+        return light
     softness = float(shaping.GetShapingConeSoftnessAttr().Get() or 0.0)
-    return replace(
-        light,
-        cone_rad=math.radians(float(shaping.GetShapingConeAngleAttr().Get())),
-        even=min(max(1.0 - softness, 0.0), 1.0),
-    )
+    even = min(max(1.0 - softness, 0.0), 1.0)
+    return replace(light, kind="spot", cone_rad=math.radians(float(angle_deg)), even=even)
+
+
+def _minus_z(T_stage_light: Array) -> Vec3:
+    x, y, z = (float(-v) for v in T_stage_light[:3, 2] / _length(T_stage_light[:3, 2]))
+    return (x, y, z)
 
 
 def _pose(light: Light) -> SE3:

@@ -40,7 +40,10 @@ def define_material(stage: Any, path: str, material: Material, textures: Texture
         shader.CreateInput("emissiveColor", color).Set(material.emission_cd_m2)
     diffuse = shader.CreateInput("diffuseColor", color)
     roughness = shader.CreateInput("roughness", Sdf.ValueTypeNames.Float)
-    if material.texture:
+    if not material.texture:
+        diffuse.Set(material.base_color)
+        roughness.Set(material.roughness)
+    else:
         images = _Images(stage, path, material)
         files = textures(material.texture)
         image = images.add("Albedo", files.albedo, "sRGB", (*material.base_color, 1.0))
@@ -53,10 +56,8 @@ def define_material(stage: Any, path: str, material: Material, textures: Texture
         if files.roughness:
             image = images.add("Roughness", files.roughness, "raw", (material.roughness,) * 4)
             roughness.ConnectToSource(image.CreateOutput("r", Sdf.ValueTypeNames.Float))
-    if not (material.texture and files.roughness):
-        roughness.Set(material.roughness)
-    if not material.texture:
-        diffuse.Set(material.base_color)
+        else:
+            roughness.Set(material.roughness)
     shade.CreateSurfaceOutput().ConnectToSource(
         shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
     )

@@ -79,6 +79,10 @@ class OpenStage:
         self._to_metres = np.eye(4)
         self._to_metres[:3, :3] = metres * turn
 
+    def layers(self) -> tuple[str, ...]:
+        """Paths of all files that it was composed of, those in archives behind the archive's."""
+        return tuple(str(x.realPath) for x in self._stage.GetUsedLayers() if x.realPath)
+
     def pieces(self) -> tuple[Piece, ...]:
         """Every visible mesh, in the stage's order.
 

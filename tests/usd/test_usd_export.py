@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,10 +13,13 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdLux, UsdSemantics, UsdShade, UsdUtils, UsdValidation
 
+from exporters.usd import Usd
 from generator.assets.library import Library, open_library
-from generator.core.capture import Channel
+from generator.core.capture import Capture, Channel
 from generator.core.instants import at
+from generator.core.interfaces import DatasetInfo
 from generator.core.motion import Change
+from generator.core.sample import Sample
 from generator.core.scene import Scene
 from generator.renderers.warp import WarpRenderer
 from tests.usd.worlds import STEP_S, STEPS, exported, off_centre_camera, table_world
@@ -104,6 +108,9 @@ def test_lights_are_photometric(sequence: Any) -> None:
     sky = UsdGeom.Xformable(sequence.GetPrimAtPath("/World/Lights/sky"))
     up = sky.ComputeLocalToWorldTransform(0).TransformDir((0, 1, 0))
     assert list(up) == pytest.approx([0.0, 0.0, 1.0])
+    # The image's centre: +Z of USD's sky, +X of ours, turned by 0.4 rad.
+    centre = sky.ComputeLocalToWorldTransform(0).TransformDir((0, 0, 1))
+    assert list(centre) == pytest.approx([np.cos(0.4), np.sin(0.4), 0.0])
 
 
 def test_materials_of_a_body_replace_those_of_its_mesh(sequence: Any) -> None:
@@ -143,8 +150,13 @@ def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_p
         "import sys; from pathlib import Path\n"
         "from generator.assets.library import open_library\n"
         "from tests.usd.worlds import exported, table_world\n"
+<<<<<<< HEAD
         "cache = Path(sys.argv[1]) / 'cache'\n"
         "library = open_library(cache_dir=cache, packs=Path('/nonexistent'))\n"
+=======
+        "cache, packs = Path(sys.argv[1]) / 'cache', Path('/nonexistent')\n"
+        "library = open_library(cache_dir=cache, packs=packs)\n"
+>>>>>>> 34fcf360f80564cce8e2ae6c880c024c08558e62
         "exported(table_world(library), library, Path(sys.argv[1]), format=sys.argv[2])\n"
     )
     root = Path(__file__).parents[2]
@@ -163,3 +175,26 @@ def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Pa
     assert not stage.HasAuthoredTimeCodeRange()
     attributes = [a for p in stage.Traverse() for a in p.GetAttributes()]
     assert attributes and not any(a.ValueMightBeTimeVarying() for a in attributes)
+
+
+def test_a_sequence_is_written_where_it_begins(library: Library, tmp_path: Path) -> None:
+    """Shards may end within a sequence: the one with its first step holds the whole stage."""
+    scene = table_world(library)
+    info = DatasetInfo("t", 7, 6, 1, (), (), {}, steps_per_scene=3, step_s=STEP_S)
+    samples = [
+        Sample(k, k // 3, 0, "train", at(scene, k % 3 * STEP_S), Capture({}), {}, step_index=k % 3)
+        for k in range(6)
+    ]
+    exporter = Usd().with_assets(library)
+    for number, part in enumerate((samples[:2], samples[2:4], samples[4:])):
+        exporter.write_shard(info, part, tmp_path / str(number))
+    shards = [tmp_path / str(number) for number in range(3)]
+    exporter.finalize(info, shards, tmp_path / "usd")
+
+    assert [p.name for p in sorted((tmp_path / "usd").glob("*.usdc"))] == [
+        "000000000.usdc",
+        "000000003.usdc",
+    ]
+    rows = [json.loads(line) for line in (tmp_path / "usd/stages.jsonl").read_text().splitlines()]
+    assert [(row["index"], row["steps"]) for row in rows] == [(0, 3), (3, 3)]
+    assert not list((shards[2] / "usd").glob("*.usdc"))

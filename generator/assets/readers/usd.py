@@ -108,13 +108,21 @@ def opened(folder: Folder, relative: str) -> Iterator[StageFile]:
     place = str(folder.root / relative)
     if PurePosixPath(relative).suffix.lower() != ARCHIVE:
         _check_layers(folder, relative)
-        yield StageFile(OpenStage(folder.path(relative), place), folder, packed=False)
+        yield StageFile(_composed(folder, relative, place), folder, packed=False)
         return
     with TemporaryDirectory(prefix="gen-data-usdz-") as name:
         inside = Folder(Path(name))
         first = _unpacked(folder.read(relative), inside, place)
         _check_layers(inside, first)
-        yield StageFile(OpenStage(inside.path(first), place), inside, packed=True)
+        yield StageFile(_composed(inside, first, place), inside, packed=True)
+
+
+def _composed(folder: Folder, relative: str, place: str) -> OpenStage:
+    stage = OpenStage(folder.path(relative), place)
+    root = folder.root.resolve()
+    if not all(Path(layer).resolve().is_relative_to(root) for layer in stage.layers()):
+        raise AssetError(f"{place}: uses layers outside its folder; put them beside it")
+    return stage
 
 
 def _check_layers(folder: Folder, relative: str) -> None:
