@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdLux, UsdSemantics, UsdShade, UsdUtils, UsdValidation
 
-from exporters.usd import Usd
+from exporters.usd import Usd as UsdExporter
 from generator.assets.library import Library, open_library
 from generator.core.capture import Capture, Channel
 from generator.core.instants import at
@@ -150,13 +150,8 @@ def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_p
         "import sys; from pathlib import Path\n"
         "from generator.assets.library import open_library\n"
         "from tests.usd.worlds import exported, table_world\n"
-<<<<<<< HEAD
-        "cache = Path(sys.argv[1]) / 'cache'\n"
-        "library = open_library(cache_dir=cache, packs=Path('/nonexistent'))\n"
-=======
         "cache, packs = Path(sys.argv[1]) / 'cache', Path('/nonexistent')\n"
         "library = open_library(cache_dir=cache, packs=packs)\n"
->>>>>>> 34fcf360f80564cce8e2ae6c880c024c08558e62
         "exported(table_world(library), library, Path(sys.argv[1]), format=sys.argv[2])\n"
     )
     root = Path(__file__).parents[2]
@@ -185,7 +180,7 @@ def test_a_sequence_is_written_where_it_begins(library: Library, tmp_path: Path)
         Sample(k, k // 3, 0, "train", at(scene, k % 3 * STEP_S), Capture({}), {}, step_index=k % 3)
         for k in range(6)
     ]
-    exporter = Usd().with_assets(library)
+    exporter = UsdExporter().with_assets(library)
     for number, part in enumerate((samples[:2], samples[2:4], samples[4:])):
         exporter.write_shard(info, part, tmp_path / str(number))
     shards = [tmp_path / str(number) for number in range(3)]
