@@ -173,7 +173,7 @@ class Kitti(Strict):
             elif self.velodyne_stride_px and not lidar:
                 thinned = self._points(info, sample, shard_dir)
                 _write_bytes(folder / f"velodyne/{frame}.bin", thinned.astype("<f4").tobytes())
-                unseen = missed(thinned, truth, self, T_camera_velo, self.velodyne_stride_px)
+                unseen = missed(thinned, truth, T_camera_velo, self.velodyne_stride_px)
             _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self, unseen))
             frames.append(f"{sample.index} {sample.split}\n")
         _write_text(folder / "frames.txt", "".join(frames))
@@ -334,14 +334,13 @@ def point_members(
 
 
 def missed(
-    thinned: Array, truth: ImageTruth, style: LabelStyle, T_camera_velo: Array, stride_px: int
+    thinned: Array, truth: ImageTruth, T_camera_velo: Array, stride_px: int
 ) -> frozenset[int]:
-    """Labelled instances that a thinned depth image has no point of.
+    """Instances in whose box a thinned depth image has no point.
 
     Args:
         thinned: Its points in the scanner frame [n, 4].
         truth: Of the image.
-        style: Of the labels.
         T_camera_velo: Points to the camera frame, [3, 4].
         stride_px: Distance of the pixels; what shows many times its square is not looked at.
     """
@@ -354,13 +353,10 @@ def missed(
         return frozenset()
     p_camera = np.einsum("ij,nj->ni", T_camera_velo[:, :3], thinned[:, :3], optimize=False)
     p_camera += T_camera_velo[:, 3]
-    labelled = {i for row, i in label_rows(truth, style) if not row.startswith(DONT_CARE)}
     return frozenset(
         number
         for number, box in small.items()
-        if number in labelled
-        and box is not None
-        and not (upright_box(box).depths_m(p_camera) >= -BORDER_M).any()
+        if box is not None and not (upright_box(box).depths_m(p_camera) >= -BORDER_M).any()
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import faulthandler
+import gc
 import os
 import pickle
 import resource
@@ -76,6 +77,9 @@ def _ancestor_of_message(kind: type[GenDataError]) -> type[GenDataError]:
 
 def _work(number: int, connection: Connection, job: Job) -> None:
     with job.make_pipeline() as pipeline:
+        # What is there now stays to the end: the collector need not look at it again.
+        gc.collect()
+        gc.freeze()
         connection.send(Ready(number))
         while (shard := connection.recv()) is not None:
             _make(number, connection, job, pipeline, shard)

@@ -399,7 +399,7 @@ def test_what_a_thinned_depth_image_misses_is_not_labelled(world: Any) -> None:
     T_camera_velo = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]])
     inside, away = np.array([[z, -x, -y, 0.0]]), np.array([[z + 50.0, -x, -y, 0.0]])
 
-    assert missed(away, small, Kitti(), T_camera_velo, 4) == {number}
-    assert missed(inside, small, Kitti(), T_camera_velo, 4) == frozenset()
+    assert missed(away, small, T_camera_velo, 4) == {number}
+    assert missed(inside, small, T_camera_velo, 4) == frozenset()
     large = replace(truth, objects=(replace(thing, visible_px=9000),))
-    assert missed(away, large, Kitti(), T_camera_velo, 4) == frozenset()
+    assert missed(away, large, T_camera_velo, 4) == frozenset()
