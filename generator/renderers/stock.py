@@ -18,8 +18,8 @@ from generator.renderers.meshes import DeviceMesh, upload_mesh
 from generator.renderers.optics import DeviceOptics, upload_optics
 from generator.renderers.textures import DeviceTexture, upload_texture
 
-_MESH_BYTES = 224 << 20
-_TEXTURE_BYTES = 208 << 20
+_MESH_BYTES = 176 << 20
+_TEXTURE_BYTES = 192 << 20
 _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
 _SCRATCH_BYTES = 96 << 20
