@@ -36,7 +36,7 @@ Arrays = dict[str, NDArray[Any]]
 FORMAT = 1
 """Raised whenever the same sources would be stored as other arrays."""
 # Little: renderers and physics engines keep what they made of it.
-_MEMORY_BYTES = 48 * 1024 * 1024
+_MEMORY_BYTES = 24 * 1024 * 1024
 _FRAME = struct.Struct("<II")
 _ALIGNMENT = 64
 
