@@ -27,6 +27,7 @@ class DeviceEnvironment:
     irradiance: wp.array
     glossy: wp.array
     image: wp.array
+    rest: wp.array
     nbytes: int
 
 
@@ -39,10 +40,12 @@ def upload_environment(image: Float32, device: wp.Device) -> DeviceEnvironment:
         ]
     )
     irradiance = irradiance_coefficients(_shrunk(image, _IRRADIANCE_HEIGHT))
+    shown = wp.array(image, dtype=wp.vec3, device=device)
     return DeviceEnvironment(
         wp.array(irradiance, dtype=wp.vec3, device=device),
         wp.array(maps, dtype=wp.vec3, device=device),
-        wp.array(image, dtype=wp.vec3, device=device),
+        shown,
+        shown,
         maps.nbytes + image.nbytes,
     )
 

@@ -25,7 +25,7 @@ _LENSES: dict[LensModel, int] = {
     "kannala_brandt": records.KANNALA_BRANDT,
     "equirectangular": records.EQUIRECTANGULAR,
 }
-_LAMP_KINDS = {"sphere": 0, "spot": 1, "sun": 2}
+_LAMP_KINDS = {"sphere": 0, "spot": 1, "sun": 2, "rectangle": 3, "disk": 4}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -85,7 +85,7 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     world.bodies = upload(placed, records.Body)
     world.surfaces = upload(surfaces, records.Surface)
     world.textures = upload(_stacked([*textures.values()], records.Texture), records.Texture)
-    world.lamps = upload(_lamps(scene.lights), records.Lamp)
+    world.lamps = upload(lamp_records(scene.lights), records.Lamp)
     world.lobes = stock.lobes
     world.sky = _sky(scene.environment, environment)
     return PackedWorld(
@@ -170,15 +170,16 @@ def _stacked(items: Sequence[Any], kind: Any) -> NDArray[np.void]:
 
 def _sky(environment: Environment, light: DeviceEnvironment) -> records.Sky:
     sky = records.Sky()
-    sky.irradiance, sky.glossy, sky.image = light.irradiance, light.glossy, light.image
+    sky.irradiance, sky.glossy = light.irradiance, light.glossy
+    sky.image, sky.rest = light.image, light.rest
     sky.luminance = environment.luminance_cd_m2
     sky.cos_yaw, sky.sin_yaw = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
     sky.visible = int(environment.visible)
     return sky
 
 
-def _lamps(lights: Sequence[Light]) -> NDArray[np.void]:
-    """Lamp records."""
+def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
+    """Lamp records, in the order of the lights."""
     values = np.zeros(len(lights), dtype=records.Lamp.numpy_dtype())
     for value, light in zip(values, lights, strict=True):
         strength = light.illuminance_lux if light.kind == "sun" else light.intensity_cd
@@ -190,4 +191,27 @@ def _lamps(lights: Sequence[Light]) -> NDArray[np.void]:
         value["radius"] = math.tan(light.angular_radius_rad) if sun else light.radius_m
         value["cos_outer"] = math.cos(light.cone_rad)
         value["cos_inner"] = math.cos(light.even * light.cone_rad)
+        if light.kind in ("rectangle", "disk"):
+            _fill_panel(value, light)
     return values
+
+
+def _fill_panel(value: NDArray[np.void], light: Light) -> None:
+    """The fields that only panels have."""
+    normal = np.asarray(light.direction, dtype=np.float64)
+    if light.kind == "rectangle":
+        half_m = 0.5 * np.asarray(light.size_m, dtype=np.float64)
+        # Kept at right angles to the normal, whatever rounding has left of it.
+        side = np.asarray(light.side) - normal * float((normal * light.side).sum())
+        side = side / math.sqrt(float((side * side).sum()))
+        area_m2 = 4.0 * half_m[0] * half_m[1]
+        value["radius"] = math.hypot(*half_m)
+    else:
+        half_m = np.full(2, light.radius_m)
+        least = np.eye(3)[int(np.abs(normal).argmin())]
+        side = np.cross(normal, least)
+        side = side / math.sqrt(float((side * side).sum()))
+        area_m2 = math.pi * light.radius_m**2
+    value["along"] = side * half_m[0]
+    value["across"] = np.cross(normal, side) * half_m[1]
+    value["radiance"] = np.asarray(light.color) * (light.intensity_cd / area_m2)

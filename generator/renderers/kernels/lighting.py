@@ -14,6 +14,8 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 SPHERE = wp.constant(0)
 SPOT = wp.constant(1)
 SUN = wp.constant(2)
+RECTANGLE = wp.constant(3)
+DISK = wp.constant(4)
 
 # Where a sun is taken to be; no scene is larger.
 SUN_DISTANCE_M = wp.constant(1.0e3)

@@ -168,11 +168,17 @@ class Texture:
 
 @wp.struct
 class Lamp:
-    """A light. ``kind``: 0 sphere, 1 spot, 2 sun.
+    """A light. ``kind``: 0 sphere, 1 spot, 2 sun, 3 rectangle, 4 disk; the last two are panels.
 
     Attributes:
-        power: Colour times intensity [cd] (sphere, spot) or illuminance [lx] (sun).
-        radius: Of the ball [m], or tangent of the sun's angular radius.
+        position_m: Centre (all but sun).
+        direction: In which the light travels; a panel's normal, on the side that shines.
+        power: Colour times intensity [cd] (all but sun) or illuminance [lx] (sun).
+        radiance: Of a panel's front, the same from everywhere [cd/m^2].
+        along, across: From a panel's centre to the middles of two of its sides, or to its rim [m];
+            they are at right angles to each other and to ``direction``.
+        radius: Of the ball or the disk, or of the circle around the rectangle [m], or tangent of
+            the sun's angular radius.
         cos_outer, cos_inner: Where a spot has faded to nothing, and where it begins to fade.
     """
 
@@ -180,6 +186,9 @@ class Lamp:
     position_m: wp.vec3
     direction: wp.vec3
     power: wp.vec3
+    radiance: wp.vec3
+    along: wp.vec3
+    across: wp.vec3
     radius: float
     cos_outer: float
     cos_inner: float
@@ -195,6 +204,7 @@ class Sky:
         glossy: Radiance convolved with GGX lobes on octahedral maps [level, row, column]; level
             ``k`` has perceptual roughness ``k / (levels - 1)``.
         image: Equirectangular radiance for pixels that see no body.
+        rest: The same without what lamps stand for, as is all that lights and is mirrored.
         cos_yaw, sin_yaw: Rotation of the image about world Z.
         visible: Whether such pixels show the image.
     """
@@ -202,6 +212,7 @@ class Sky:
     irradiance: wp.array(dtype=wp.vec3)
     glossy: wp.array(dtype=wp.vec3, ndim=3)
     image: wp.array(dtype=wp.vec3, ndim=2)
+    rest: wp.array(dtype=wp.vec3, ndim=2)
     luminance: float
     cos_yaw: float
     sin_yaw: float

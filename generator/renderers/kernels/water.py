@@ -29,7 +29,7 @@ from generator.renderers.kernels.records import (
     unit,
 )
 from generator.renderers.kernels.shade import Images
-from generator.renderers.kernels.sky import sky_image, sky_irradiance
+from generator.renderers.kernels.sky import sky_irradiance, sky_rest
 from generator.renderers.kernels.texturing import sampler_of, texel_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -107,7 +107,7 @@ def mean_color(world: World, surface: int):
 @wp.func
 def mirrored_sky(world: World, d: wp.vec3, width: float):
     """Sky in one direction, with the suns that are blurred over an angle."""
-    c = sky_image(world.sky, d)
+    c = sky_rest(world.sky, d)
     for j in range(world.lamps.shape[0]):
         if world.lamps[j].kind == SUN:
             away = wp.max(1.0 - wp.dot(d, -world.lamps[j].direction), 0.0)
