@@ -20,6 +20,7 @@ from generator.renderers.lamps import keep_main_lamps
 from generator.renderers.lens import add_glare, wet_lens
 from generator.renderers.occlusion import lamp_parts, openness, sampled_lattice, sunflower
 from generator.renderers.packing import PackedWorld
+from generator.renderers.pierced import has_holes, trace_over_samples
 from generator.renderers.precipitation import draw_precipitation
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
@@ -147,10 +148,14 @@ def _drawn_samples(
     offsets = wp.array((parts * 256.0 - 128.0).astype(np.int32), dtype=wp.vec2i, device=device)
     window = raster.Window()
     window.width, window.height = view.width, view.height
-    bodies = wp.array(projected.in_view, dtype=wp.int32, device=device)
+    pierced = has_holes(world.placed)[projected.in_view]
+    bodies = wp.array(projected.in_view[~pierced], dtype=wp.int32, device=device)
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
     inputs += [numbers, floors, offsets]
     wp.launch(mixing.draw_samples, len(bodies), inputs, [nearness, hits], device=device)
+    if pierced.any():
+        listed = projected.in_view[pierced]
+        trace_over_samples(world, view, listed, pixels, parts, nearness, hits)
     return hits
 
 
