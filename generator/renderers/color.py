@@ -53,11 +53,28 @@ def lit_image(
     settings: RenderSettings,
 ) -> LitImage:
     """Light, shade and weather, before the camera's response."""
-    images = _images(seen)
+    images = images_of(seen)
     keep_main_lamps(world, view, seen, stock, settings.max_lamps)
     lattice = sampled_lattice(world, view, seen, stock)
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
+    lit = expose(camera, world, view, seen, radiance, stock, settings)
+    if settings.antialias > 1:
+        exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
+        _mix_edges(world, view, seen, radiance, exposure, settings.antialias, stock)
+    return lit
+
+
+def expose(
+    camera: Camera,
+    world: PackedWorld,
+    view: records.View,
+    seen: Seen,
+    radiance: wp.array,
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> LitImage:
+    """Meter the light of a scene, and add what is between it and the sensor, in place."""
     _darken_outside(view, radiance)
     ev100 = camera.ev100
     if ev100 is None:
@@ -66,9 +83,6 @@ def lit_image(
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
     _darken_outside(view, radiance)
-    if settings.antialias > 1:
-        exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
-        _mix_edges(world, view, seen, radiance, exposure, settings.antialias, stock)
     return LitImage(radiance, ev100)
 
 
@@ -101,7 +115,7 @@ def _mix_edges(
     stock: AssetStock,
 ) -> None:
     """Anti-alias, in place."""
-    device, images = stock.device, _images(seen)
+    device, images = stock.device, images_of(seen)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", view.width * view.height, wp.int32)
     wp.launch(antialias.find_edges, view.height, [view, images], [count, pixels], device=device)
@@ -140,7 +154,7 @@ def _drawn_samples(
     numbers = stock.scratch("numbers", view.width * view.height, wp.int32)
     floors = stock.scratch("floors", view.width * view.height, float)
     floors.fill_(mixing.UNLISTED)
-    inputs = [view, _images(seen), pixels]
+    inputs = [view, images_of(seen), pixels]
     wp.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors], device=device)
     shape = (max(len(pixels), 1), len(parts))
     nearness = wp.zeros(shape, dtype=float, device=device)
@@ -165,7 +179,8 @@ def pixel_parts(n: int) -> Array:
     return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
 
 
-def _images(seen: Seen) -> shade.Images:
+def images_of(seen: Seen) -> shade.Images:
+    """What kernels read of the surfaces that are seen."""
     images = shade.Images()
     images.hits, images.z_m = seen.hits, seen.z_m
     images.weights, images.normals = seen.weights, seen.normals

@@ -15,6 +15,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.brdf import directional_albedo
+from generator.renderers.kernels.dielectrics import fresnel_dielectric, refracted
 from generator.renderers.kernels.records import unit
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -36,6 +37,7 @@ class Bsdf:
         ior: If not 0, the specular layer reflects by Fresnel's equations for this index instead.
         alpha: Width of the specular lobe.
         coat: Weight of the clear coat.
+        coat_f0: Its reflectance at normal incidence.
         coat_alpha: Width of its lobe.
         p_coat, p_shine: Probabilities of drawing from the coat and from the specular layer.
     """
@@ -48,6 +50,7 @@ class Bsdf:
     ior: float
     alpha: float
     coat: float
+    coat_f0: float
     coat_alpha: float
     p_coat: float
     p_shine: float
@@ -90,24 +93,6 @@ def fifth(c: float):
 
 
 @wp.func
-def fresnel(c: float, ior: float):
-    """Unpolarised reflectance of a dielectric.
-
-    Args:
-        c: Cosine of the angle to the normal, on the side that the light comes from.
-        ior: Refractive index of the other side over that of this one.
-    """
-    reflected = float(1.0)
-    squared = ior * ior - 1.0 + c * c
-    if squared > 0.0:
-        g = wp.sqrt(squared)
-        a = (g - c) / (g + c)
-        b = (c * (g + c) - 1.0) / (c * (g - c) + 1.0)
-        reflected = 0.5 * a * a * (1.0 + b * b)
-    return reflected
-
-
-@wp.func
 def make_bsdf(
     table: wp.array(dtype=wp.vec2, ndim=2),
     v: wp.vec3,
@@ -116,6 +101,7 @@ def make_bsdf(
     metallic: float,
     specular: float,
     coat: float,
+    coat_f0: float,
     coat_roughness: float,
 ):
     """An opaque surface.
@@ -124,7 +110,8 @@ def make_bsdf(
         table: Directional albedo of GGX lobes, see generator.renderers.lobes.smith_albedo.
         v: To the viewer.
         albedo, roughness, metallic, specular: As of generator.core.geometry.Material.
-        coat, coat_roughness: Of the coat above it.
+        coat, coat_f0, coat_roughness: Weight of the coat above it, its reflectance at normal
+            incidence, and its roughness.
     """
     one = wp.vec3(1.0, 1.0, 1.0)
     n_v = v[2]
@@ -142,9 +129,10 @@ def make_bsdf(
     shine = luminance(gloss)
     if coat > 0.0:
         s.coat = coat
+        s.coat_f0 = coat_f0
         s.coat_alpha = alpha_of(coat_roughness)
         above = directional_albedo(table, wp.sqrt(s.coat_alpha), n_v)
-        coated = coat * (COAT_F0 * above[0] + above[1])
+        coated = coat * (coat_f0 * above[0] + above[1])
         s.scale = s.scale * (1.0 - coated)
         s.diffuse = s.diffuse * (1.0 - coated)
         shine = shine * (1.0 - coated)
@@ -173,7 +161,7 @@ def reflectance(s: Bsdf, v_h: float):
     """Of the specular layer's facets."""
     f = s.f0
     if s.ior > 0.0:
-        r = fresnel(v_h, s.ior)
+        r = fresnel_dielectric(v_h, s.ior)
         f = wp.vec3(r, r, r)
     else:
         k = fifth(wp.min(v_h, 1.0))
@@ -216,7 +204,7 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
         lobe = 0.5 * facets(s.coat_alpha, h)
         root = slope(s.coat_alpha, n_v)
         k = fifth(wp.min(v_h, 1.0))
-        shine = s.coat * (COAT_F0 + (1.0 - COAT_F0) * k) * lobe * n_l
+        shine = s.coat * (s.coat_f0 + (1.0 - s.coat_f0) * k) * lobe * n_l
         shine = shine / (n_l * root + n_v * slope(s.coat_alpha, n_l))
         f += wp.vec3(shine, shine, shine)
         density += s.p_coat * lobe / (n_v + root)
@@ -277,13 +265,11 @@ def refract(v: wp.vec3, alpha: float, ior: float, u: wp.vec2):
     """
     out = Scattering()
     h = visible_facet(v, alpha, u)
-    v_h = wp.dot(v, h)
-    c2 = 1.0 - (1.0 - v_h * v_h) / (ior * ior)
-    if c2 > 0.0:
-        out.l = unit(h * (v_h / ior - wp.sqrt(c2)) - v * (1.0 / ior))
-        n_l = -out.l[2]
-        if n_l > 0.0:
-            masking = 2.0 * n_l / (n_l + slope(alpha, n_l))
-            w = (1.0 - fresnel(v_h, ior)) * masking
-            out.weight = wp.vec3(w, w, w)
+    v_h = wp.min(wp.dot(v, h), 1.0)
+    out.l = refracted(-v, h, ior)
+    n_l = -out.l[2]
+    if n_l > 0.0:
+        masking = 2.0 * n_l / (n_l + slope(alpha, n_l))
+        passed = (1.0 - fresnel_dielectric(v_h, ior)) * masking
+        out.weight = wp.vec3(passed, passed, passed)
     return out

@@ -139,7 +139,8 @@ def draw_ball(lamp: Lamp, p: wp.vec3, u: wp.vec2):
         axis = to_lamp * (1.0 / wp.sqrt(wp.max(squared, 1.0e-12)))
     sine = ball_sine(lamp, squared)
     if sine < 1.0:
-        g.direction, low = in_cone(axis, sine, u)
+        direction, low = in_cone(axis, sine, u)
+        g.direction = direction
         g.density = 1.0 / (2.0 * wp.pi * cone_width(sine))
         g.radiance = ball_radiance(lamp, axis)
         g.distance_m = AT_INFINITY

@@ -72,8 +72,8 @@ def random_pair(key: wp.uint32, dimension: int, sample: wp.uint32):
         dimension: Any number that tells this pair from the others of one path.
         sample: From 0. Each power of two of them is stratified as a (0, m, 2)-net.
     """
-    seed = mixed_bits(key ^ (wp.uint32(dimension) * wp.uint32(0x9E3779B9)))
+    seed = mixed_bits(key ^ (wp.uint32(dimension) * wp.uint32(0x5851F42D)))
     index = reversed_bits(scrambled(reversed_bits(sample), seed))
-    first = scrambled(index, mixed_bits(seed ^ wp.uint32(0xA511E9B3)))
+    first = scrambled(index, mixed_bits(seed ^ wp.uint32(0x2511E9B3)))
     second = scrambled(pascal(index), mixed_bits(seed ^ wp.uint32(0x63D83595)))
     return wp.vec2(unit_float(reversed_bits(first)), unit_float(reversed_bits(second)))
