@@ -29,9 +29,7 @@ def trace_over(
 
     bodies = _on_device(world, view, seen, hits.device)
     inputs = [view, world.record, bodies, Z_NEAR_M]
-    wp.launch(
-        pierced.trace_centres, view.height, inputs, [nearness, hits], device=hits.device
-    )
+    wp.launch(pierced.trace_centres, view.height, inputs, [nearness, hits], device=hits.device)
 
 
 def trace_over_samples(

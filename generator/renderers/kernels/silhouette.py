@@ -18,7 +18,14 @@ from generator.renderers.kernels.raster import (
     fan_edges,
 )
 from generator.renderers.kernels.rays import FARTHEST
-from generator.renderers.kernels.records import HOLES, View, World, to_mesh_point, to_mesh_vector, unit
+from generator.renderers.kernels.records import (
+    HOLES,
+    View,
+    World,
+    to_mesh_point,
+    to_mesh_vector,
+    unit,
+)
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
