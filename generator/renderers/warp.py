@@ -13,6 +13,7 @@ from generator.renderers.lidar import scanned
 from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
 from generator.renderers.silhouettes import silhouettes
+from generator.renderers.skylight import split_sky
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import see
 
@@ -54,6 +55,8 @@ class WarpRenderer:
         images = label_images(scene, world, view, seen, channels)
         ev100 = camera.ev100
         if channels & {Channel.RGB, Channel.RADIANCE}:
+            if self._settings.environment_shadow == "auto":
+                split_sky(world, scene, self._stock)
             lit = lit_image(camera, world, view, seen, self._stock, self._settings)
             ev100 = lit.ev100
             if Channel.RADIANCE in channels:
