@@ -87,7 +87,7 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     world.textures = upload(_stacked([*textures.values()], records.Texture), records.Texture)
     world.lamps = upload(lamp_records(scene.lights), records.Lamp)
     world.lobes = stock.lobes
-    world.sky = _sky(scene.environment, environment)
+    world.sky = sky_record(scene.environment, environment)
     return PackedWorld(
         world,
         (tree, meshes, textures, environment),
@@ -168,7 +168,8 @@ def _stacked(items: Sequence[Any], kind: Any) -> NDArray[np.void]:
     return values
 
 
-def _sky(environment: Environment, light: DeviceEnvironment) -> records.Sky:
+def sky_record(environment: Environment, light: DeviceEnvironment) -> records.Sky:
+    """The Sky record of an environment."""
     sky = records.Sky()
     sky.irradiance, sky.glossy = light.irradiance, light.glossy
     sky.image, sky.rest = light.image, light.rest

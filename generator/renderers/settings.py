@@ -25,6 +25,9 @@ class RenderSettings(Strict):
         tone: ``filmic`` has a soft shoulder and toe; ``srgb`` clips at white.
         glare: Share of the light that the lens scatters around bright sources; 0.02 suits a clean
             lens, 0.1 a dirty one.
+        environment_shadow: ``auto`` lets the brightest parts of a panorama throw shadows, where
+            the scene is open to it and has no sun of its own; ``off`` takes all of it for light
+            without shadows.
         max_lamps: Of a scene's lights, as many as give most of the light at what is seen.
         visibility: How the surface at a pixel centre is found: ``raster`` (CPU only), ``rays``,
             or the faster one on the device.
@@ -39,5 +42,6 @@ class RenderSettings(Strict):
     exposure_compensation_ev: float = Field(0.0, ge=-10.0, le=10.0)
     tone: Literal["filmic", "srgb"] = "filmic"
     glare: float = Field(0.0, ge=0.0, le=0.5)
+    environment_shadow: Literal["auto", "off"] = "auto"
     max_lamps: int = Field(16, ge=1)
     visibility: Literal["auto", "raster", "rays"] = "auto"

@@ -16,6 +16,7 @@ from generator.renderers.lidar import scanned
 from generator.renderers.packing import PackedWorld, pack_view, pack_world
 from generator.renderers.settings import RenderSettings
 from generator.renderers.silhouettes import silhouettes
+from generator.renderers.skylight import split_sky
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen, see
 
@@ -77,6 +78,8 @@ class WarpRenderer:
         self, scene: Scene, camera: Camera, world: PackedWorld, view: View, seen: Seen
     ) -> LitImage:
         if self._settings.tier == "realtime":
+            if self._settings.environment_shadow == "auto":
+                split_sky(world, scene, self._stock)
             return lit_image(camera, world, view, seen, self._stock, self._settings)
         if self._paths is None:
             # Its kernels take long to compile and are of no use to the other tier.

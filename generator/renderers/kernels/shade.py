@@ -7,7 +7,7 @@ import warp as wp
 from generator.renderers.kernels.brdf import Brdf, make_brdf, specular_lobe
 from generator.renderers.kernels.ground import coat_at, coated, footprint
 from generator.renderers.kernels.lattice import Lattice, cell_at, ray_origin
-from generator.renderers.kernels.lighting import beam_from, towards_mirror
+from generator.renderers.kernels.lighting import beam_from, facing, towards_mirror, widening
 from generator.renderers.kernels.look import Look, look_at_hit, plain_look
 from generator.renderers.kernels.occlusion import frame_of, surface_tolerance, way_to_lamp
 from generator.renderers.kernels.rays import blocked, free_path, path_along, unsheltered
@@ -99,11 +99,12 @@ def light_of_lamps(
         visible = lit[j, k]
         if visible > 0.0:
             beam = beam_from(world.lamps[j], p_world)
-            n_l = wp.dot(n, beam.direction)
+            n_l = facing(world.lamps[j], beam, p_world, n)
             if n_l > 0.0:
-                l = towards_mirror(beam, mirrored, alpha)  # noqa: E741
+                l = towards_mirror(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
-                lobe = specular_lobe(brdf, n, v, l, n_s, 0.5 * beam.spread)
+                wider = widening(world.lamps[j], beam, alpha)
+                lobe = specular_lobe(brdf, n, v, l, n_s, wider)
                 arriving = beam.normal_lux * (n_l * visible)
                 light.lux += arriving
                 light.shine += wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
@@ -379,7 +380,7 @@ def seen_part(
         for k in range(wp.where(beam.spread < SMALL_SPREAD, 1, parts.shape[0])):
             if k < 2 or (seen > 0.0 and seen < float(cast)):
                 cast += 1
-                if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, parts[k]))):
+                if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, n, parts[k]))):
                     seen += 1.0
     return seen / wp.max(float(cast), 1.0)
 
