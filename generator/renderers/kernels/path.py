@@ -20,6 +20,7 @@ from generator.renderers.kernels.dielectrics import (
 )
 from generator.renderers.kernels.ground import coat_at, coated
 from generator.renderers.kernels.holes import solid_hit
+from generator.renderers.kernels.layers import maps_at
 from generator.renderers.kernels.lighting import SUN
 from generator.renderers.kernels.look import Look, look_at_hit
 from generator.renderers.kernels.occlusion import frame_of
@@ -138,6 +139,9 @@ class Vertex:
         look: What it looks like; its normal is for shading.
         surface: Its material.
         outside: Whether that side is the face's front.
+        glow: What it sends out by itself [cd/m^2].
+        clear: Share of what is below the specular layer that lets light pass.
+        opacity: Share of what is behind that it hides.
         film, film_f0, film_roughness: Of a coat, or of water.
     """
 
@@ -146,6 +150,9 @@ class Vertex:
     look: Look
     surface: int
     outside: bool
+    glow: wp.vec3
+    clear: float
+    opacity: float
     film: float
     film_f0: float
     film_roughness: float
@@ -219,12 +226,31 @@ def vertex_of(world: World, hit: Hit, d: wp.vec3, width_m: float):
     v.surface = surface_index(world, hit.at)
     weight = wp.vec2(hit.weight[0] + 1.0 - side, hit.weight[1])
     v.look = look_at_hit(world, v.surface, hit.at, weight, smooth, width_m, -d)
-    v.film = world.surfaces[v.surface].coat
-    v.film_f0 = COAT_F0
-    v.film_roughness = world.surfaces[v.surface].coat_roughness
+    v.glow = world.surfaces[v.surface].emission_cd_m2
+    v.opacity = 1.0
+    if world.surfaces[v.surface].layered != 0:
+        v = layered(world, v, hit.at, weight, width_m)
     if world.ground.covered != 0:
         v = weathered(world, v, smooth, width_m)
     v.look.normal = facing(v.look.normal, d)
+    return v
+
+
+@wp.func
+def layered(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: float):
+    """A surface with all there is to it."""
+    maps = maps_at(world, v.surface, at, weight, width_m)
+    v.look.metallic *= maps.metallic
+    v.glow = wp.cw_mul(v.glow, maps.glow)
+    v.clear = world.surfaces[v.surface].transmission * (1.0 - v.look.metallic)
+    if v.clear > 0.0:
+        ior = world.surfaces[v.surface].ior
+        normal = (ior - 1.0) / (ior + 1.0)
+        v.look.specular = normal * normal / 0.08
+    v.opacity = world.surfaces[v.surface].opacity
+    v.film = world.surfaces[v.surface].coat
+    v.film_f0 = COAT_F0
+    v.film_roughness = world.surfaces[v.surface].coat_roughness
     return v
 
 
@@ -236,6 +262,10 @@ def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
         exposed = unsheltered(world, lifted(v.p, v.flat))
     coat = coat_at(world, v.surface, v.p, n, exposed, width_m)
     v.look = coated(world, v.surface, v.look, coat, n)
+    bare = 1.0 - wp.min(coat.snow, 1.0)
+    v.clear *= bare
+    v.film *= bare
+    v.opacity = 1.0 - (1.0 - v.opacity) * bare
     wet = water_at(world, v.surface, v.p, n, exposed, width_m)
     if wet[0] > v.film:
         v.film = wet[0]
@@ -247,13 +277,11 @@ def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
 @wp.func
 def pane_leaves(world: World, v: Vertex, d: wp.vec3):
     """Transmittance of what bends nothing: gaps in opacity, and clear panes."""
-    opacity = world.surfaces[v.surface].opacity
-    clear = world.surfaces[v.surface].transmission * (1.0 - v.look.metallic)
-    through = wp.vec3(1.0, 1.0, 1.0) * (1.0 - opacity)
-    if clear > 0.0 and is_clear_pane(world, v.surface):
+    through = wp.vec3(1.0, 1.0, 1.0) * (1.0 - v.opacity)
+    if v.clear > 0.0 and is_clear_pane(world, v.surface):
         cosine = wp.min(wp.abs(wp.dot(v.look.normal, d)), 1.0)
         f = fresnel_dielectric(cosine, world.surfaces[v.surface].ior)
-        through += pane_transmittance(f, v.look.albedo) * (opacity * clear)
+        through += pane_transmittance(f, v.look.albedo) * (v.opacity * v.clear)
     return through
 
 
@@ -420,7 +448,9 @@ def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
         p = lot_between(f, 1.0 - f)
         out.bsdf = make_interface(w, alpha, out.ior)
         out.bsdf.scale = wp.vec3(1.0, 1.0, 1.0) * (1.0 / p)
-        out.weight = tint * (1.0 / wp.max(1.0 - p, 1.0e-9))
+        # One half of the tint on the way in, the other on the way out.
+        half = wp.vec3(wp.sqrt(tint[0]), wp.sqrt(tint[1]), wp.sqrt(tint[2]))
+        out.weight = half * (1.0 / wp.max(1.0 - p, 1.0e-9))
         out.kind = REFRACT
     if lot < p:
         out.kind = OPAQUE
@@ -433,17 +463,15 @@ def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
 def deal(world: World, v: Vertex, w: wp.vec3, number: float):
     """What a vertex is; ``w`` points to where the path comes from, in the shading frame."""
     out = Dealt()
-    opacity = world.surfaces[v.surface].opacity
-    clear = world.surfaces[v.surface].transmission * (1.0 - v.look.metallic)
     lot = number
-    if opacity < 1.0:
-        if lot >= opacity:
+    if v.opacity < 1.0:
+        if lot >= v.opacity:
             out.kind = STRAIGHT
             out.weight = wp.vec3(1.0, 1.0, 1.0)
             return out
-        lot = lot / opacity
-    if lot < clear:
-        return deal_glass(world, v, w, lot / clear)
+        lot = lot / v.opacity
+    if lot < v.clear:
+        return deal_glass(world, v, w, lot / v.clear)
     out.bsdf = make_bsdf(
         world.lobes,
         w,
@@ -579,7 +607,7 @@ def path_light(
         else:
             width_m += cone * hit.t
             v = vertex_of(world, hit, d, width_m)
-            light += wp.cw_mul(through, world.surfaces[v.surface].emission_cd_m2)
+            light += wp.cw_mul(through, v.glow)
             if bounces < budget.bounces and passages < PASSAGES_MAX:
                 pair = 1 + PAIRS * (bounces + passages)
                 lots = random_pair(key, pair, sample)

@@ -6,7 +6,8 @@ dimensions are padded: each is a (0, 2)-sequence of its own, shuffled against th
 Sources: Sobol, "On the distribution of points in a cube", 1967 (the second dimension's matrix is
 Pascal's triangle modulo 2); Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", 1995;
 Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020; Vegdahl, "Building a better LK
-hash", 2021 (constants of ``scrambled``); Wellons, "Prospecting for hash functions", 2018.
+hash", 2021 (constants of ``scrambled``); Jarzynski and Olano, "Hash functions for GPU rendering",
+JCGT 9(3), 2020 (pcg).
 """
 
 from __future__ import annotations
@@ -19,10 +20,9 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 @wp.func
 def mixed_bits(key: wp.uint32):
     """A hash of 32 bits."""
-    x = key
-    x = (x ^ (x >> wp.uint32(16))) * wp.uint32(0x7FEB352D)
-    x = (x ^ (x >> wp.uint32(15))) * wp.uint32(0x846CA68B)
-    return x ^ (x >> wp.uint32(16))
+    x = key * wp.uint32(747796405) + wp.uint32(1442695041)
+    x = ((x >> ((x >> wp.uint32(28)) + wp.uint32(4))) ^ x) * wp.uint32(277803737)
+    return (x >> wp.uint32(22)) ^ x
 
 
 @wp.func
