@@ -27,7 +27,15 @@ class Material:
         texture: Texture id of the library; empty = none.
         texture_scale_m: Length of one texture repeat [m] under triplanar mapping; 0 = use the
             mesh's own UVs.
-        emission_cd_m2: Emitted luminance, linear RGB [cd/m^2].
+        emission_cd_m2: Emitted luminance, linear RGB [cd/m^2]; multiplies the texture's emission
+            where it has one.
+        coat: Weight in [0, 1] of a clear coat above it all, of refractive index 1.5.
+        coat_roughness: Perceptual roughness of the coat in [0, 1].
+        transmission: Share in [0, 1] of the light under the specular layer that goes through
+            instead of being scattered back; tinted by the base colour.
+        ior: Refractive index of what transmits.
+        thin: What transmits is a pane that bends nothing; else a solid body that refracts.
+        opacity: Share in [0, 1] of what is behind that it hides; labels take it for solid.
         printed: The texture is part of what the object *is* (a label, a book cover);
             randomizers leave colour and texture alone.
         role: What the slot is on its object, for randomizers that know more than "any surface":
@@ -42,6 +50,12 @@ class Material:
     texture: str = ""
     texture_scale_m: float = 0.0
     emission_cd_m2: Vec3 = (0.0, 0.0, 0.0)
+    coat: float = 0.0
+    coat_roughness: float = 0.03
+    transmission: float = 0.0
+    ior: float = 1.5
+    thin: bool = True
+    opacity: float = 1.0
     printed: bool = False
     role: str = ""
 
@@ -92,11 +106,20 @@ class TextureData:
         albedo: sRGB colour, uint8 [height, width, 3].
         roughness: Factor on the material's roughness, 255 = 1, uint8 [height, width]; None = 1.
         normal: Tangent-space normal (OpenGL convention, +Y up), uint8 [height, width, 3]; or None.
+        metallic: Factor on the material's metallic, 255 = 1, uint8 [height, width]; None = 1.
+        occlusion: Share of ambient light that arrives, 255 = 1, uint8 [height, width]; None = 1.
+        emission: sRGB factor on the material's emission, uint8 [height, width, 3]; None = 1.
+        alpha: Coverage, uint8 [height, width]: below 128 there is a hole, for labels and rays
+            too; None = no holes.
     """
 
     albedo: UInt8
     roughness: UInt8 | None = None
     normal: UInt8 | None = None
+    metallic: UInt8 | None = None
+    occlusion: UInt8 | None = None
+    emission: UInt8 | None = None
+    alpha: UInt8 | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -222,13 +222,17 @@ class Light:
 
     Attributes:
         kind: ``sphere`` radiates evenly from a ball; ``spot`` does so within a cone; ``sun`` is
-            at infinity.
-        position_m: Centre, world [m] (sphere, spot).
-        direction: Unit vector in which the light travels (spot, sun).
+            at infinity; ``rectangle`` and ``disk`` are panels with one side that is equally bright
+            from everywhere before it.
+        position_m: Centre, world [m] (all but sun).
+        direction: Unit vector in which the light travels (spot, sun); a panel's normal.
         color: Linear RGB with luminance 1.
-        intensity_cd: Luminous intensity [cd] (sphere, spot).
+        intensity_cd: Luminous intensity [cd] (all but sun); of panels, along their normal: their
+            luminance times their area.
         illuminance_lux: On a surface that faces it [lx] (sun).
-        radius_m: Of the ball: its softness (sphere, spot).
+        radius_m: Of the ball or the disk: its softness (sphere, spot, disk).
+        size_m: Of the rectangle, along ``side`` and across it.
+        side: Unit vector along the rectangle's first side, at right angles to ``direction``.
         angular_radius_rad: Of the disc in the sky (sun).
         cone_rad: Half angle at which a spot has faded to nothing.
         even: Share of the cone within which a spot is even; outside it fades.
@@ -236,13 +240,15 @@ class Light:
     """
 
     name: str
-    kind: Literal["sphere", "spot", "sun"]
+    kind: Literal["sphere", "spot", "sun", "rectangle", "disk"]
     position_m: Vec3 = (0.0, 0.0, 2.0)
     direction: Vec3 = (0.0, 0.0, -1.0)
     color: Vec3 = (1.0, 1.0, 1.0)
     intensity_cd: float = 0.0
     illuminance_lux: float = 0.0
     radius_m: float = 0.05
+    size_m: tuple[float, float] = (0.5, 0.5)
+    side: Vec3 = (1.0, 0.0, 0.0)
     angular_radius_rad: float = 0.00465
     cone_rad: float = 0.6
     even: float = 0.8

@@ -17,9 +17,11 @@ from generator.renderers.kernels import samples as mixing
 from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.lamps import keep_main_lamps
+from generator.renderers.layers import ListedPixels, shade_layers
 from generator.renderers.lens import add_glare, wet_lens
 from generator.renderers.occlusion import lamp_parts, openness, sampled_lattice, sunflower
 from generator.renderers.packing import PackedWorld
+from generator.renderers.pierced import has_holes, trace_over_samples
 from generator.renderers.precipitation import draw_precipitation
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
@@ -52,11 +54,28 @@ def lit_image(
     settings: RenderSettings,
 ) -> LitImage:
     """Light, shade and weather, before the camera's response."""
-    images = _images(seen)
+    images = images_of(seen)
     keep_main_lamps(world, view, seen, stock, settings.max_lamps)
     lattice = sampled_lattice(world, view, seen, stock)
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
+    lit = expose(camera, world, view, seen, radiance, stock, settings)
+    if settings.antialias > 1:
+        exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
+        _mix_edges(world, view, seen, radiance, exposure, settings.antialias, stock)
+    return lit
+
+
+def expose(
+    camera: Camera,
+    world: PackedWorld,
+    view: records.View,
+    seen: Seen,
+    radiance: wp.array,
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> LitImage:
+    """Meter the light of a scene, and add what is between it and the sensor, in place."""
     _darken_outside(view, radiance)
     ev100 = camera.ev100
     if ev100 is None:
@@ -65,9 +84,6 @@ def lit_image(
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
     _darken_outside(view, radiance)
-    if settings.antialias > 1:
-        exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
-        _mix_edges(world, view, seen, radiance, exposure, settings.antialias, stock)
     return LitImage(radiance, ev100)
 
 
@@ -100,7 +116,7 @@ def _mix_edges(
     stock: AssetStock,
 ) -> None:
     """Anti-alias, in place."""
-    device, images = stock.device, _images(seen)
+    device, images = stock.device, images_of(seen)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", view.width * view.height, wp.int32)
     wp.launch(antialias.find_edges, view.height, [view, images], [count, pixels], device=device)
@@ -139,7 +155,7 @@ def _drawn_samples(
     numbers = stock.scratch("numbers", view.width * view.height, wp.int32)
     floors = stock.scratch("floors", view.width * view.height, float)
     floors.fill_(mixing.UNLISTED)
-    inputs = [view, _images(seen), pixels]
+    inputs = [view, images_of(seen), pixels]
     wp.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors], device=device)
     shape = (max(len(pixels), 1), len(parts))
     nearness = wp.zeros(shape, dtype=float, device=device)
@@ -147,10 +163,14 @@ def _drawn_samples(
     offsets = wp.array((parts * 256.0 - 128.0).astype(np.int32), dtype=wp.vec2i, device=device)
     window = raster.Window()
     window.width, window.height = view.width, view.height
-    bodies = wp.array(projected.in_view, dtype=wp.int32, device=device)
+    pierced = has_holes(world.placed)[projected.in_view]
+    bodies = wp.array(projected.in_view[~pierced], dtype=wp.int32, device=device)
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
     inputs += [numbers, floors, offsets]
     wp.launch(mixing.draw_samples, len(bodies), inputs, [nearness, hits], device=device)
+    if pierced.any():
+        listed = projected.in_view[pierced]
+        trace_over_samples(world, view, listed, pixels, parts, nearness, hits)
     return hits
 
 
@@ -160,7 +180,8 @@ def pixel_parts(n: int) -> Array:
     return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
 
 
-def _images(seen: Seen) -> shade.Images:
+def images_of(seen: Seen) -> shade.Images:
+    """What kernels read of the surfaces that are seen."""
     images = shade.Images()
     images.hits, images.z_m = seen.hits, seen.z_m
     images.weights, images.normals = seen.weights, seen.normals
@@ -180,12 +201,12 @@ def _shaded(
     expose_ground(world, lattice, stock)
     radiance = stock.scratch("radiance", n, wp.vec3)
     around = openness(world, view, lattice, stock, settings)
-    points = lattice.width * lattice.height
-    lights = stock.scratch("lights", points, shade.Light)
-    coats = stock.scratch("coats", points, wp.vec4)
+    corners = lattice.width * lattice.height
+    lights = stock.scratch("lights", corners, shade.Light)
+    coats = stock.scratch("coats", corners, wp.vec4)
     frame = [view, world.record, images]
     inputs = [*frame, lattice, around.lit, around.open_sky]
-    wp.launch(shade.light_lattice, points, inputs, [lights, coats], device=device)
+    wp.launch(shade.light_lattice, corners, inputs, [lights, coats], device=device)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", n, wp.int32)
     # One thread per row on the CPU, where threads run one after the other anyway.
@@ -208,4 +229,7 @@ def _shaded(
     wp.launch(shade.look_around, listed, inputs, [lit, open_sky, exposed], device=device)
     inputs = [*frame, pixels, lit, open_sky, exposed]
     wp.launch(shade.shade_points, listed, inputs, [radiance], device=device)
+    if world.layered:
+        points = ListedPixels(listed, pixels, lit, open_sky, exposed)
+        shade_layers(world, view, images, points, radiance, stock, settings)
     return radiance

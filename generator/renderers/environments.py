@@ -11,7 +11,9 @@ import warp as wp
 
 from generator.core.geometry import Float32
 from generator.core.se3 import Array
+from generator.renderers.brightest import SkyLamp, without_brightest
 from generator.renderers.kernels.sky import prefilter, weigh_texels
+from generator.renderers.panoramas import texel_directions
 
 _GLOSSY_LEVELS = 4
 _GLOSSY_SIZE = 24
@@ -22,45 +24,54 @@ _IRRADIANCE_HEIGHT = 32
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DeviceEnvironment:
-    """One environment of mean luminance 1; the attributes are those of a Sky record."""
+    """One environment of mean luminance 1; the arrays are those of a Sky record.
+
+    Attributes:
+        lamps: What stands for the parts that ``rest`` lacks.
+    """
 
     irradiance: wp.array
     glossy: wp.array
     image: wp.array
+    rest: wp.array
+    lamps: tuple[SkyLamp, ...]
     nbytes: int
 
 
 def upload_environment(image: Float32, device: wp.Device) -> DeviceEnvironment:
-    """An equirectangular image, shape [h, 2h, 3], ready for kernels."""
+    """An equirectangular image, shape [h, 2h, 3], ready for kernels, as light without shadows."""
+    shown = wp.array(image, dtype=wp.vec3, device=device)
+    return _lit_by(image, (), shown, shown)
+
+
+def upload_split(image: Float32, whole: DeviceEnvironment) -> DeviceEnvironment:
+    """The same with its brightest parts as lamps; ``whole`` itself if it has none."""
+    rest, lamps = without_brightest(image)
+    if not lamps:
+        return whole
+    mirrored = wp.array(rest, dtype=wp.vec3, device=whole.image.device)
+    return _lit_by(rest, lamps, whole.image, mirrored)
+
+
+def _lit_by(
+    light: Float32, lamps: tuple[SkyLamp, ...], image: wp.array, rest: wp.array
+) -> DeviceEnvironment:
+    device = image.device
     maps = np.stack(
         [
-            bordered(_smoothed(image, level, device).numpy())
+            bordered(_smoothed(light, level, device).numpy())
             for level in range(1, _GLOSSY_LEVELS + 1)
         ]
     )
-    irradiance = irradiance_coefficients(_shrunk(image, _IRRADIANCE_HEIGHT))
+    irradiance = irradiance_coefficients(_shrunk(light, _IRRADIANCE_HEIGHT))
     return DeviceEnvironment(
         wp.array(irradiance, dtype=wp.vec3, device=device),
         wp.array(maps, dtype=wp.vec3, device=device),
-        wp.array(image, dtype=wp.vec3, device=device),
-        maps.nbytes + image.nbytes,
+        image,
+        rest,
+        lamps,
+        maps.nbytes + light.nbytes,
     )
-
-
-def texel_directions(height: int) -> tuple[Array, Array]:
-    """Unit directions [h, 2h, 3] and solid angles [h, 2h] of an equirectangular image.
-
-    Row 0 is the zenith; column 0 is -X, the centre is +X, columns grow clockwise from above.
-    """
-    width = 2 * height
-    edges = np.cos(np.pi * np.arange(height + 1) / height)
-    polar = np.pi * (np.arange(height) + 0.5) / height
-    azimuth = np.pi - 2.0 * np.pi * (np.arange(width) + 0.5) / width
-    x = np.sin(polar)[:, None] * np.cos(azimuth)[None]
-    y = np.sin(polar)[:, None] * np.sin(azimuth)[None]
-    z = np.broadcast_to(np.cos(polar)[:, None], x.shape)
-    solid = np.broadcast_to((edges[:-1] - edges[1:])[:, None] * 2.0 * np.pi / width, x.shape)
-    return np.stack([x, y, z], axis=-1), solid
 
 
 def irradiance_coefficients(image: Float32) -> Array:

@@ -15,7 +15,7 @@ from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
 
 _STRIDE_PX = 11
-_SPOT, _SUN = 1, 2
+_SPOT, _SUN, _RECTANGLE = 1, 2, 3
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Light that is taken for granted, so that lamps are not ranked by what they do in the dark [lx].
 _DIM_LUX = 0.05
@@ -69,6 +69,8 @@ def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Arr
         span = max(float(lamp["cos_inner"] - lamp["cos_outer"]), 1e-4)
         fade = np.clip((down - lamp["cos_outer"]) / span, 0.0, 1.0)
         lux = lux * fade * fade * (3.0 - 2.0 * fade)
+    elif lamp["kind"] >= _RECTANGLE:
+        lux = lux * np.maximum(-_dot(direction, [float(along) for along in lamp["direction"]]), 0.0)
     return lux
 
 

@@ -13,6 +13,10 @@ class RenderSettings(Strict):
     """How images are made. Labels do not depend on it.
 
     Attributes:
+        tier: ``realtime`` has no noise and takes a tenth of a second; ``pathtraced`` follows light
+            from surface to surface and converges to what physics says.
+        samples: Paths per pixel (path-traced tier); their mean over the pixel's square.
+        max_bounces: How often a path is scattered at most (path-traced tier).
         antialias: Samples per pixel on edges; 1 switches anti-aliasing off.
         shadows: ``soft`` follows the size of every light, ``hard`` takes lights for points.
         ambient_occlusion_radius_m: How far away a surface still darkens its neighbourhood; 0
@@ -21,16 +25,23 @@ class RenderSettings(Strict):
         tone: ``filmic`` has a soft shoulder and toe; ``srgb`` clips at white.
         glare: Share of the light that the lens scatters around bright sources; 0.02 suits a clean
             lens, 0.1 a dirty one.
+        environment_shadow: ``auto`` lets the brightest parts of a panorama throw shadows, where
+            the scene is open to it and has no sun of its own; ``off`` takes all of it for light
+            without shadows.
         max_lamps: Of a scene's lights, as many as give most of the light at what is seen.
         visibility: How the surface at a pixel centre is found: ``raster`` (CPU only), ``rays``,
             or the faster one on the device.
     """
 
+    tier: Literal["realtime", "pathtraced"] = "realtime"
+    samples: int = Field(64, ge=1, le=65536)
+    max_bounces: int = Field(16, ge=1, le=256)
     antialias: Literal[1, 2, 4, 8] = 4
     shadows: Literal["soft", "hard"] = "soft"
     ambient_occlusion_radius_m: float = Field(0.25, ge=0.0)
     exposure_compensation_ev: float = Field(0.0, ge=-10.0, le=10.0)
     tone: Literal["filmic", "srgb"] = "filmic"
     glare: float = Field(0.0, ge=0.0, le=0.5)
+    environment_shadow: Literal["auto", "off"] = "auto"
     max_lamps: int = Field(16, ge=1)
     visibility: Literal["auto", "raster", "rays"] = "auto"

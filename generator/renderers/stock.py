@@ -12,7 +12,7 @@ from generator.core.geometry import Material
 from generator.core.interfaces import AssetLibrary
 from generator.core.intrinsics import Intrinsics
 from generator.renderers.cache import ByteCache
-from generator.renderers.environments import DeviceEnvironment, upload_environment
+from generator.renderers.environments import DeviceEnvironment, upload_environment, upload_split
 from generator.renderers.lobes import lobe_albedo
 from generator.renderers.meshes import DeviceMesh, upload_mesh
 from generator.renderers.optics import DeviceOptics, upload_optics
@@ -65,6 +65,14 @@ class AssetStock:
         return self._environments.get(
             environment_id,
             lambda: upload_environment(self.assets.environment(environment_id), self.device),
+        )
+
+    def split_environment(self, environment_id: str) -> DeviceEnvironment:
+        """Light of an environment whose brightest parts are lamps."""
+        whole = self.environment(environment_id)
+        return self._environments.get(
+            f"split {environment_id}",
+            lambda: upload_split(self.assets.environment(environment_id), whole),
         )
 
     def optics(self, intrinsics: Intrinsics) -> DeviceOptics:

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from generator.core.capture import Beams, Channel, Echoes, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
-from generator.renderers.color import color_image, lit_image, radiance_image
+from generator.renderers.color import LitImage, color_image, lit_image, radiance_image
 from generator.renderers.compiling import compile_kernels
 from generator.renderers.device import open_device
+from generator.renderers.kernels.records import View
 from generator.renderers.labels import label_images
 from generator.renderers.lidar import scanned
-from generator.renderers.packing import pack_view, pack_world
+from generator.renderers.packing import PackedWorld, pack_view, pack_world
 from generator.renderers.settings import RenderSettings
 from generator.renderers.silhouettes import silhouettes
+from generator.renderers.skylight import split_sky
 from generator.renderers.stock import AssetStock
-from generator.renderers.visibility import see
+from generator.renderers.visibility import Seen, see
+
+if TYPE_CHECKING:
+    from generator.renderers.pathtracer import PathTracer
 
 
 class WarpRenderer:
@@ -45,6 +52,7 @@ class WarpRenderer:
             )
         compile_kernels(self._device.alias)
         self._stock = AssetStock(assets, self._device)
+        self._paths: PathTracer | None = None
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """Every asked channel of one camera."""
@@ -56,7 +64,7 @@ class WarpRenderer:
         images = label_images(scene, world, view, seen, channels)
         ev100 = camera.ev100
         if channels & {Channel.RGB, Channel.RADIANCE}:
-            lit = lit_image(camera, world, view, seen, self._stock, self._settings)
+            lit = self._lit(scene, camera, world, view, seen)
             ev100 = lit.ev100
             if Channel.RADIANCE in channels:
                 images[Channel.RADIANCE] = radiance_image(lit, view)
@@ -67,6 +75,20 @@ class WarpRenderer:
             ids = images[Channel.INSTANCE]
             outlines = silhouettes(scene, camera, world, view, self._stock, seen, ids)
         return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
+
+    def _lit(
+        self, scene: Scene, camera: Camera, world: PackedWorld, view: View, seen: Seen
+    ) -> LitImage:
+        if self._settings.tier == "realtime":
+            if self._settings.environment_shadow == "auto":
+                split_sky(world, scene, self._stock)
+            return lit_image(camera, world, view, seen, self._stock, self._settings)
+        if self._paths is None:
+            # Its kernels take long to compile and are of no use to the other tier.
+            from generator.renderers.pathtracer import PathTracer
+
+            self._paths = PathTracer(self._stock, self._settings)
+        return self._paths.lit_image(scene, camera, world, view, seen)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
         """What the rays of a laser scanner's beams hit first, and how well it reflects."""

@@ -64,13 +64,23 @@ def fill_air(
     stock: AssetStock,
 ) -> None:
     """Reflections in water, then fog; in place."""
-    weather, n = world.weather, view.width * view.height
-    if weather.wetness + weather.puddles > 0.0:
+    if world.weather.wetness + world.weather.puddles > 0.0:
         _mirror(world, view, images, lattice, radiance, stock)
-    if weather.fog_extinction_per_m > 0.0:
-        frame = [view, world.record, images, fog_of(weather)]
+    fill_fog(world, view, images, radiance, stock)
+
+
+def fill_fog(
+    world: PackedWorld,
+    view: records.View,
+    images: shade.Images,
+    radiance: wp.array,
+    stock: AssetStock,
+) -> None:
+    """Dim what is seen by the fog before it, and add the fog's own light, in place."""
+    if world.weather.fog_extinction_per_m > 0.0:
+        frame = [view, world.record, images, fog_of(world.weather)]
         columns, glow = _glow(world, view, frame, stock)
-        inputs = [*frame, columns, glow]
+        inputs, n = [*frame, columns, glow], view.width * view.height
         wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=stock.device)
 
 

@@ -15,7 +15,13 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.lattice import Lattice, agree
-from generator.renderers.kernels.lighting import SUN, SUN_DISTANCE_M, beam_from
+from generator.renderers.kernels.lighting import (
+    DISK,
+    RECTANGLE,
+    SUN,
+    SUN_DISTANCE_M,
+    beam_from,
+)
 from generator.renderers.kernels.rays import blocked_by_listed, free_of_listed, path_along
 from generator.renderers.kernels.records import Lamp, View, World, unit
 from generator.renderers.kernels.shafts import FAINT_SHARE, TILE
@@ -50,15 +56,46 @@ def frame_of(z: wp.vec3):
 
 
 @wp.func
-def way_to_lamp(lamp: Lamp, origin: wp.vec3, part: wp.vec2):
-    """From a point to a part of a lamp's disc."""
+def way_to_lamp(lamp: Lamp, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
+    """From a point to a part of a lamp, or to the opposite part if the first is below the horizon.
+
+    Args:
+        n: Normal of the horizon.
+        part: Of the unit disc, which stands for the lamp's outline.
+    """
     to_lamp = lamp.position_m - origin
-    radius = lamp.radius
-    if lamp.kind == SUN:
-        to_lamp = lamp.direction * -SUN_DISTANCE_M
-        radius = lamp.radius * SUN_DISTANCE_M
-    x, y = frame_of(unit(to_lamp))
-    return to_lamp + (x * part[0] + y * part[1]) * radius
+    off = wp.vec3(0.0)
+    if lamp.kind == RECTANGLE:
+        q = square_of_disc(part)
+        off = lamp.along * q[0] + lamp.across * q[1]
+    elif lamp.kind == DISK:
+        off = lamp.along * part[0] + lamp.across * part[1]
+    else:
+        radius = lamp.radius
+        if lamp.kind == SUN:
+            to_lamp = lamp.direction * -SUN_DISTANCE_M
+            radius = lamp.radius * SUN_DISTANCE_M
+        x, y = frame_of(unit(to_lamp))
+        off = (x * part[0] + y * part[1]) * radius
+    if wp.dot(to_lamp + off, n) < 0.0:
+        off = -off
+    return to_lamp + off
+
+
+@wp.func
+def square_of_disc(part: wp.vec2):
+    """From the unit disc to the square [-1, 1] x [-1, 1], areas in proportion.
+
+    Source: the inverse of Shirley and Chiu, "A low distortion map between disk and square", Journal
+    of Graphics Tools 2, 1997.
+    """
+    radius = wp.length(part)
+    long = radius
+    if wp.abs(part[0]) >= wp.abs(part[1]):
+        short = wp.atan2(part[1], wp.abs(part[0])) * (4.0 / wp.pi) * radius
+        return wp.vec2(wp.where(part[0] < 0.0, -long, long), short)
+    short = wp.atan2(part[0], wp.abs(part[1])) * (4.0 / wp.pi) * radius
+    return wp.vec2(short, wp.where(part[1] < 0.0, -long, long))
 
 
 @wp.func
@@ -177,7 +214,7 @@ def probed(
     value = float(1.0)
     if lists[tile, j, 0] != 0:
         origin = lattice.origin_m[i]
-        path = path_along(origin, way_to_lamp(world.lamps[j], origin, part))
+        path = path_along(origin, way_to_lamp(world.lamps[j], origin, lattice.normal[i], part))
         if blocked_by_listed(world, lists, tile, j, lattice.skip[i], path):
             value = 0.0
     return value
@@ -260,7 +297,8 @@ def refine_lamps(
                 origin = lattice.origin_m[i]
                 for k in range(2):
                     part = disc[3 * bayer(x, y) + 2 * k]
-                    path = path_along(origin, way_to_lamp(world.lamps[j], origin, part))
+                    way = way_to_lamp(world.lamps[j], origin, lattice.normal[i], part)
+                    path = path_along(origin, way)
                     if not blocked_by_listed(world, lists, tile, j, lattice.skip[i], path):
                         seen += 1.0
                 value = seen / 3.0

@@ -9,6 +9,8 @@ PINHOLE = wp.constant(0)
 BROWN_CONRADY = wp.constant(1)
 KANNALA_BRANDT = wp.constant(2)
 EQUIRECTANGULAR = wp.constant(3)
+HOLES = wp.constant(1)
+CLEAR = wp.constant(2)
 
 Coefficients = wp.types.vector(length=8, dtype=wp.float32)
 
@@ -81,11 +83,14 @@ class Body:
         R_world_mesh, t_world_mesh: Rotation without scale, and position.
         B_mesh_world, t_mesh_world: World to mesh, scale included.
         low_m, high_m: Box in the world.
+        pierced: HOLES, CLEAR or both, where rays may pass some of its faces; else 0, and no face
+            is looked at more closely.
     """
 
     geometry: int
     first_vertex: int
     first_material: int
+    pierced: int
     scale: float
     A_camera_mesh: wp.mat33
     t_camera_mesh: wp.vec3
@@ -101,7 +106,19 @@ class Body:
 
 @wp.struct
 class Surface:
-    """A metallic-roughness material; ``texture`` is -1 where there is none."""
+    """A metallic-roughness material, as generator.core.geometry.Material.
+
+    Attributes:
+        texture: Index into the textures; -1 where there is none.
+        layered: 1 where there is more to it than colour, roughness and bumps: a coat, light that
+            goes through, maps of emission, metal or occlusion, or a mirror; else nothing below
+            is read.
+        coat, coat_roughness: Weight and perceptual roughness of the clear coat.
+        transmission: Share of the light below the specular layer that goes through.
+        ior: Refractive index of what transmits.
+        thin: 1 for a pane that bends nothing, 0 for a solid that refracts.
+        opacity: Share of what is behind that it hides.
+    """
 
     base_color: wp.vec3
     roughness: float
@@ -110,6 +127,13 @@ class Surface:
     texture: int
     texture_scale_m: float
     emission_cd_m2: wp.vec3
+    layered: int
+    coat: float
+    coat_roughness: float
+    transmission: float
+    ior: float
+    thin: int
+    opacity: float
 
 
 @wp.struct
@@ -120,25 +144,41 @@ class Texture:
         texels: Albedo as square roots of linear values and roughness factor, 8 bits each
             (red lowest).
         bumps: Tangent-space normals, 8 bits each; empty where there are none.
+        shares: Factors on metallic (lowest byte) and occlusion of ambient light; empty where
+            there are none.
+        glow: Factor on emission as square roots of linear values; empty where there is none.
+        cover: Coverage of the finest level; empty where there are no holes.
         offsets: First texel of each level.
     """
 
     texels: wp.array(dtype=wp.uint32)
     bumps: wp.array(dtype=wp.uint32)
+    shares: wp.array(dtype=wp.uint32)
+    glow: wp.array(dtype=wp.uint32)
+    cover: wp.array(dtype=wp.uint8)
     offsets: wp.array(dtype=wp.int32)
     width: int
     height: int
     levels: int
     has_bumps: int
+    has_shares: int
+    has_glow: int
+    has_cover: int
 
 
 @wp.struct
 class Lamp:
-    """A light. ``kind``: 0 sphere, 1 spot, 2 sun.
+    """A light. ``kind``: 0 sphere, 1 spot, 2 sun, 3 rectangle, 4 disk; the last two are panels.
 
     Attributes:
-        power: Colour times intensity [cd] (sphere, spot) or illuminance [lx] (sun).
-        radius: Of the ball [m], or tangent of the sun's angular radius.
+        position_m: Centre (all but sun).
+        direction: In which the light travels; a panel's normal, on the side that shines.
+        power: Colour times intensity [cd] (all but sun) or illuminance [lx] (sun).
+        radiance: Of a panel's front, the same from everywhere [cd/m^2].
+        along, across: From a panel's centre to the middles of two of its sides, or to its rim [m];
+            they are at right angles to each other and to ``direction``.
+        radius: Of the ball or the disk, or of the circle around the rectangle [m], or tangent of
+            the sun's angular radius.
         cos_outer, cos_inner: Where a spot has faded to nothing, and where it begins to fade.
     """
 
@@ -146,6 +186,9 @@ class Lamp:
     position_m: wp.vec3
     direction: wp.vec3
     power: wp.vec3
+    radiance: wp.vec3
+    along: wp.vec3
+    across: wp.vec3
     radius: float
     cos_outer: float
     cos_inner: float
@@ -161,6 +204,7 @@ class Sky:
         glossy: Radiance convolved with GGX lobes on octahedral maps [level, row, column]; level
             ``k`` has perceptual roughness ``k / (levels - 1)``.
         image: Equirectangular radiance for pixels that see no body.
+        rest: The same without what lamps stand for, as is all that lights and is mirrored.
         cos_yaw, sin_yaw: Rotation of the image about world Z.
         visible: Whether such pixels show the image.
     """
@@ -168,6 +212,7 @@ class Sky:
     irradiance: wp.array(dtype=wp.vec3)
     glossy: wp.array(dtype=wp.vec3, ndim=3)
     image: wp.array(dtype=wp.vec3, ndim=2)
+    rest: wp.array(dtype=wp.vec3, ndim=2)
     luminance: float
     cos_yaw: float
     sin_yaw: float

@@ -35,10 +35,22 @@ def sky_irradiance(sky: Sky, n_world: wp.vec3):
 
 @wp.func
 def sky_image(sky: Sky, d_world: wp.vec3):
-    """The image in one direction, bilinear; any length."""
-    d = unit(to_sky(sky, d_world))
-    height = sky.image.shape[0]
-    width = sky.image.shape[1]
+    """What is seen of the sky in one direction; any length."""
+    return panorama(sky.image, to_sky(sky, d_world)) * sky.luminance
+
+
+@wp.func
+def sky_rest(sky: Sky, d_world: wp.vec3):
+    """The same without what lamps stand for."""
+    return panorama(sky.rest, to_sky(sky, d_world)) * sky.luminance
+
+
+@wp.func
+def panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
+    """An equirectangular image in one direction of its own frame, bilinear; any length."""
+    d = unit(direction)
+    height = image.shape[0]
+    width = image.shape[1]
     x = (0.5 - wp.atan2(d[1], d[0]) * (0.5 / wp.pi)) * float(width) - 0.5
     y = wp.acos(wp.clamp(d[2], -1.0, 1.0)) / wp.pi * float(height) - 0.5
     x0 = floor_int(x)
@@ -49,9 +61,9 @@ def sky_image(sky: Sky, d_world: wp.vec3):
     xb = (x0 + 1 + width) % width
     ya = wp.clamp(y0, 0, height - 1)
     yb = wp.clamp(y0 + 1, 0, height - 1)
-    top = sky.image[ya, xa] * (1.0 - fx) + sky.image[ya, xb] * fx
-    bottom = sky.image[yb, xa] * (1.0 - fx) + sky.image[yb, xb] * fx
-    return (top * (1.0 - fy) + bottom * fy) * sky.luminance
+    top = image[ya, xa] * (1.0 - fx) + image[ya, xb] * fx
+    bottom = image[yb, xa] * (1.0 - fx) + image[yb, xb] * fx
+    return top * (1.0 - fy) + bottom * fy
 
 
 @wp.func
@@ -97,7 +109,7 @@ def sky_reflection(sky: Sky, d_world: wp.vec3, roughness: float):
     rough = rough * sky.luminance
     if level < 0.0:
         # Below the first map, towards the image itself.
-        rough = sky_image(sky, d_world) * (-level) + rough * (1.0 + level)
+        rough = sky_rest(sky, d_world) * (-level) + rough * (1.0 + level)
     return rough
 
 

@@ -15,11 +15,13 @@ from generator.renderers.kernels.ground import (
     puddle_at,
     snow_at,
 )
+from generator.renderers.kernels.holes import solid_hit
 from generator.renderers.kernels.lattice import Lattice, cell_at, corner_of, ray_origin
 from generator.renderers.kernels.lighting import SUN, beam_from
 from generator.renderers.kernels.optics import pixel_of
 from generator.renderers.kernels.rays import unsheltered
 from generator.renderers.kernels.records import (
+    HOLES,
     View,
     World,
     pixel_direction,
@@ -29,7 +31,7 @@ from generator.renderers.kernels.records import (
     unit,
 )
 from generator.renderers.kernels.shade import Images
-from generator.renderers.kernels.sky import sky_image, sky_irradiance
+from generator.renderers.kernels.sky import sky_irradiance, sky_rest
 from generator.renderers.kernels.texturing import sampler_of, texel_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -107,7 +109,7 @@ def mean_color(world: World, surface: int):
 @wp.func
 def mirrored_sky(world: World, d: wp.vec3, width: float):
     """Sky in one direction, with the suns that are blurred over an angle."""
-    c = sky_image(world.sky, d)
+    c = sky_rest(world.sky, d)
     for j in range(world.lamps.shape[0]):
         if world.lamps[j].kind == SUN:
             away = wp.max(1.0 - wp.dot(d, -world.lamps[j].direction), 0.0)
@@ -166,9 +168,8 @@ def mirrored(
     candidates = wp.bvh_query_ray(world.tree, origin, d)
     b = int(0)
     while wp.bvh_query_next(candidates, b, nearest):
-        mesh = world.geometries[world.bodies[b].geometry].mesh
         o = to_mesh_point(world, b, origin)
-        answer = wp.mesh_query_ray(mesh, o, to_mesh_vector(world, b, d), nearest)
+        answer = solid_hit(world, b, o, to_mesh_vector(world, b, d), nearest, HOLES)
         if answer.result:
             nearest = answer.t
             hit = wp.vec2i(b, answer.face)

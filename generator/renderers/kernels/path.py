@@ -1,0 +1,664 @@
+"""Paths of light, from the camera: one thread per pixel, one path after the other.
+
+Source: Kajiya, "The rendering equation", SIGGRAPH 1986, with next-event estimation, multiple
+importance sampling and Russian roulette as in Pharr, Jakob and Humphreys, "Physically Based
+Rendering", 4th ed., chapters 13 and 14.
+
+Every vertex asks one source for light and goes on in one direction. What a surface is made of in
+shares, such as glass and paint, is decided by lot, so that a vertex is one thing at a time. Clear
+panes and opacity bend nothing: paths and shadows go straight through them.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from generator.renderers.kernels.dielectrics import (
+    fresnel_dielectric,
+    pane_reflectance,
+    pane_transmittance,
+)
+from generator.renderers.kernels.ground import coat_at, coated
+from generator.renderers.kernels.holes import solid_hit
+from generator.renderers.kernels.layers import maps_at
+from generator.renderers.kernels.lighting import SUN
+from generator.renderers.kernels.look import Look, look_at_hit
+from generator.renderers.kernels.occlusion import frame_of
+from generator.renderers.kernels.path_bsdf import (
+    COAT_F0,
+    Bsdf,
+    Scattering,
+    alpha_of,
+    evaluate,
+    luminance,
+    make_bsdf,
+    make_interface,
+    refract,
+    scatter,
+)
+from generator.renderers.kernels.path_lights import (
+    AT_INFINITY,
+    SKY,
+    Choice,
+    Glimpse,
+    SkyTable,
+    choose_source,
+    draw_ball,
+    draw_panel,
+    draw_sky,
+    lamp_weight,
+    meet_lamp,
+    preferred,
+    sky_density,
+    sky_weight,
+)
+from generator.renderers.kernels.path_random import mixed_bits, random_pair
+from generator.renderers.kernels.raster import Z_NEAR_M
+from generator.renderers.kernels.rays import path_along, cut, unsheltered
+from generator.renderers.kernels.records import (
+    HOLES,
+    View,
+    World,
+    corners_of,
+    normal_at,
+    pixel_direction,
+    pixel_width,
+    shows,
+    surface_index,
+    to_mesh_point,
+    to_mesh_vector,
+    unit,
+    vertex_at,
+)
+from generator.renderers.kernels.sky import sky_image
+from generator.renderers.kernels.surface import facing, mesh_point
+from generator.renderers.kernels.water import water_at
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Straight passages that are not counted as bounces.
+PASSAGES_MAX = wp.constant(64)
+# Vertices before paths of little weight are given up.
+SURE_BOUNCES = wp.constant(3)
+# Water on surfaces.
+WATER_F0 = wp.constant(0.02)
+# Rougher panes scatter what they let through.
+CLEAR_ROUGHNESS = wp.constant(0.1)
+# Probability at least of what an interface reflects, and of what it lets through.
+LOT_FLOOR = wp.constant(0.02)
+# Numbers that one segment of a path takes, in pairs.
+PAIRS = wp.constant(4)
+
+
+@wp.struct
+class Budget:
+    """How much is spent on a pixel.
+
+    Attributes:
+        first: Number of the first sample.
+        samples: How many are taken now.
+        whole: How many a pixel gets in all.
+        bounces: Number of times that light is scattered at most.
+        key: Of the image: tells its noise from that of others.
+        clear: 1 where some surface lets light through, so that shadows have to look closer.
+        lights: Bits of the techniques: 1 asks sources for light, 2 meets them by chance; 3 for an
+            image, the others to check one against the other.
+    """
+
+    first: int
+    samples: int
+    whole: int
+    bounces: int
+    key: wp.uint32
+    clear: int
+    lights: int
+
+
+@wp.struct
+class Hit:
+    """The first surface along a ray.
+
+    Attributes:
+        at: (body, face); (-1, -1) for nothing.
+        t: Along the ray.
+        weight: Barycentric, of the face's second and third corner.
+    """
+
+    at: wp.vec2i
+    t: float
+    weight: wp.vec2
+
+
+@wp.struct
+class Vertex:
+    """A surface where a path meets it.
+
+    Attributes:
+        p: World [m].
+        flat: Normal of the face, to the side that the path comes from.
+        look: What it looks like; its normal is for shading.
+        surface: Its material.
+        outside: Whether that side is the face's front.
+        glow: What it sends out by itself [cd/m^2].
+        clear: Share of what is below the specular layer that lets light pass.
+        opacity: Share of what is behind that it hides.
+        film, film_f0, film_roughness: Of a coat, or of water.
+    """
+
+    p: wp.vec3
+    flat: wp.vec3
+    look: Look
+    surface: int
+    outside: bool
+    glow: wp.vec3
+    clear: float
+    opacity: float
+    film: float
+    film_f0: float
+    film_roughness: float
+
+
+@wp.struct
+class Anchor:
+    """The last vertex that chose a direction, for what that direction meets.
+
+    Attributes:
+        p: Where the ray began.
+        n: Normal there.
+        density: Of the direction; below zero where sources could not have been asked.
+        total: Weights of all sources there [lx].
+        way_m: From there to where the path is now.
+    """
+
+    p: wp.vec3
+    n: wp.vec3
+    density: float
+    total: float
+    way_m: float
+
+
+@wp.func
+def first_hit(world: World, o: wp.vec3, d: wp.vec3, reach: float):
+    """The first surface along a ray of unit direction."""
+    hit = Hit()
+    hit.at = wp.vec2i(-1, -1)
+    hit.t = reach
+    candidates = wp.bvh_query_ray(world.tree, o, d)
+    b = int(0)
+    while wp.bvh_query_next(candidates, b, hit.t):
+        origin = to_mesh_point(world, b, o)
+        direction = to_mesh_vector(world, b, d)
+        answer = solid_hit(world, b, origin, direction, hit.t, HOLES)
+        if answer.result:
+            hit.t = answer.t
+            hit.at = wp.vec2i(b, answer.face)
+            hit.weight = wp.vec2(answer.v, 1.0 - answer.u - answer.v)
+    return hit
+
+
+@wp.func
+def lifted(p: wp.vec3, n: wp.vec3):
+    """A ray's origin off a surface, on the side of a normal."""
+    size = wp.abs(p[0]) + wp.abs(p[1]) + wp.abs(p[2])
+    return p + n * (2.0e-5 + 1.0e-6 * size)
+
+
+@wp.func
+def vertex_of(world: World, hit: Hit, d: wp.vec3, width_m: float):
+    """The surface at a hit, dry and bare."""
+    b = hit.at[0]
+    g = world.bodies[b].geometry
+    corner = corners_of(world, g, hit.at[1])
+    p0 = vertex_at(world, g, corner[0])
+    R = world.bodies[b].R_world_mesh
+    v = Vertex()
+    m = mesh_point(world, hit.at, hit.weight)
+    v.p = R @ (m * world.bodies[b].scale) + world.bodies[b].t_world_mesh
+    e1 = vertex_at(world, g, corner[1]) - p0
+    v.flat = R @ unit(wp.cross(e1, vertex_at(world, g, corner[2]) - p0))
+    v.outside = wp.dot(v.flat, d) < 0.0
+    side = wp.where(v.outside, 1.0, -1.0)
+    v.flat = v.flat * side
+    n = normal_at(world, g, corner[0]) * (1.0 - hit.weight[0] - hit.weight[1])
+    n += normal_at(world, g, corner[1]) * hit.weight[0]
+    n += normal_at(world, g, corner[2]) * hit.weight[1]
+    smooth = facing((R @ n) * side, d)
+    v.surface = surface_index(world, hit.at)
+    weight = wp.vec2(hit.weight[0] + 1.0 - side, hit.weight[1])
+    v.look = look_at_hit(world, v.surface, hit.at, weight, smooth, width_m, -d)
+    v.glow = world.surfaces[v.surface].emission_cd_m2
+    v.opacity = 1.0
+    if world.surfaces[v.surface].layered != 0:
+        v = layered(world, v, hit.at, weight, width_m)
+    if world.ground.covered != 0:
+        v = weathered(world, v, smooth, width_m)
+    v.look.normal = facing(v.look.normal, d)
+    return v
+
+
+@wp.func
+def layered(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: float):
+    """A surface with all there is to it."""
+    maps = maps_at(world, v.surface, at, weight, width_m)
+    v.look.metallic *= maps.metallic
+    v.glow = wp.cw_mul(v.glow, maps.glow)
+    v.clear = world.surfaces[v.surface].transmission * (1.0 - v.look.metallic)
+    if v.clear > 0.0:
+        ior = world.surfaces[v.surface].ior
+        normal = (ior - 1.0) / (ior + 1.0)
+        v.look.specular = normal * normal / 0.08
+    v.opacity = world.surfaces[v.surface].opacity
+    v.film = world.surfaces[v.surface].coat
+    v.film_f0 = COAT_F0
+    v.film_roughness = world.surfaces[v.surface].coat_roughness
+    return v
+
+
+@wp.func
+def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
+    """A surface as the weather leaves it; ``n`` is its normal without bumps."""
+    exposed = float(1.0)
+    if n[2] > 0.1:
+        exposed = unsheltered(world, lifted(v.p, v.flat))
+    coat = coat_at(world, v.surface, v.p, n, exposed, width_m)
+    v.look = coated(world, v.surface, v.look, coat, n)
+    bare = 1.0 - wp.min(coat.snow, 1.0)
+    v.clear *= bare
+    v.film *= bare
+    v.opacity = 1.0 - (1.0 - v.opacity) * bare
+    wet = water_at(world, v.surface, v.p, n, exposed, width_m)
+    if wet[0] > v.film:
+        v.film = wet[0]
+        v.film_f0 = WATER_F0
+        v.film_roughness = wp.sqrt(wet[1])
+    return v
+
+
+@wp.func
+def pane_leaves(world: World, v: Vertex, d: wp.vec3):
+    """Transmittance of what bends nothing: gaps in opacity, and clear panes."""
+    through = wp.vec3(1.0, 1.0, 1.0) * (1.0 - v.opacity)
+    if v.clear > 0.0 and is_clear_pane(world, v.surface):
+        cosine = wp.min(wp.abs(wp.dot(v.look.normal, d)), 1.0)
+        f = fresnel_dielectric(cosine, world.surfaces[v.surface].ior)
+        through += pane_transmittance(f, v.look.albedo) * (v.opacity * v.clear)
+    return through
+
+
+@wp.func
+def is_clear_pane(world: World, surface: int):
+    """Whether what a surface lets through goes straight on."""
+    smooth = world.surfaces[surface].roughness < CLEAR_ROUGHNESS
+    return world.surfaces[surface].thin != 0 and smooth
+
+
+@wp.func
+def light_through(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear: int):
+    """What is left of light from a distance."""
+    through = wp.vec3(1.0, 1.0, 1.0)
+    if clear == 0:
+        if cut(world, path_along(o, d * distance_m), HOLES):
+            through = wp.vec3(0.0)
+        return through
+    origin = o
+    rest_m = distance_m
+    passages = int(0)
+    going = bool(True)
+    while going:
+        hit = first_hit(world, origin, d, rest_m)
+        going = False
+        if hit.at[0] >= 0:
+            v = vertex_of(world, hit, d, 0.0)
+            through = wp.cw_mul(through, pane_leaves(world, v, d))
+            passages += 1
+            if wp.max(through) > 0.0 and passages < PASSAGES_MAX:
+                origin = lifted(v.p, -v.flat)
+                rest_m -= hit.t
+                going = rest_m > 0.0
+            else:
+                through = wp.vec3(0.0)
+    return through
+
+
+@wp.func
+def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float):
+    """Light of the lamps that a stretch of a ray meets, up to a distance from its anchor."""
+    light = wp.vec3(0.0)
+    for j in range(world.lamps.shape[0]):
+        g = meet_lamp(world.lamps[j], a.p, d)
+        if g.distance_m > a.way_m and g.distance_m < end_m:
+            part = float(1.0)
+            if a.density >= 0.0 and budget.lights != 2:
+                asked = g.density * lamp_weight(world.lamps[j], a.p, a.n) / wp.max(a.total, 1.0e-20)
+                part = preferred(a.density, asked) * float(budget.lights >> 1)
+            light += g.radiance * part
+    return light
+
+
+@wp.func
+def sky_met(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3):
+    """Light of the sky that a ray meets."""
+    light = wp.vec3(0.0)
+    if world.sky.luminance > 0.0:
+        part = float(1.0)
+        if a.density >= 0.0 and budget.lights != 2:
+            asked = sky_density(world.sky, table, d) * sky_weight(world.sky, a.n)
+            asked = asked / wp.max(a.total, 1.0e-20)
+            part = preferred(a.density, asked) * float(budget.lights >> 1)
+        light = sky_image(world.sky, d) * part
+    return light
+
+
+@wp.func
+def to_frame(v: wp.vec3, x: wp.vec3, y: wp.vec3, n: wp.vec3):
+    """World to the shading frame."""
+    return wp.vec3(wp.dot(x, v), wp.dot(y, v), wp.dot(n, v))
+
+
+@wp.func
+def light_asked(
+    world: World,
+    table: SkyTable,
+    budget: Budget,
+    s: Bsdf,
+    v: Vertex,
+    o: wp.vec3,
+    choice: Choice,
+    u: wp.vec2,
+):
+    """Light of one source that a vertex sends on."""
+    light = wp.vec3(0.0)
+    g = Glimpse()
+    if choice.source == SKY:
+        g = draw_sky(world.sky, table, u)
+        g.radiance = sky_image(world.sky, g.direction)
+    elif world.lamps[choice.source].kind <= SUN:
+        g = draw_ball(world.lamps[choice.source], o, u)
+    else:
+        g = draw_panel(world.lamps[choice.source], o, u)
+    n = v.look.normal
+    x, y = frame_of(n)
+    l = to_frame(g.direction, x, y, n)  # noqa: E741
+    if g.distance_m > 0.0 and l[2] > 0.0 and wp.dot(g.direction, v.flat) > 0.0:
+        f, density = evaluate(s, l)
+        asked = g.density * choice.part
+        f = wp.cw_mul(f, g.radiance)
+        if asked > 0.0 and wp.max(f) > 0.0:
+            part = float(1.0)
+            if budget.lights == 3:
+                part = preferred(asked, density)
+            through = light_through(world, o, g.direction, g.distance_m, budget.clear)
+            light = wp.cw_mul(f, through) * (part / asked)
+    return light
+
+
+@wp.struct
+class Dealt:
+    """What a vertex is, after the lot.
+
+    Attributes:
+        kind: One of OPAQUE, STRAIGHT, REFRACT and ROUGH_PANE.
+        bsdf: What reflects, if it is OPAQUE.
+        weight: What passes, over the probability of that.
+        ior: Behind the surface over before it, if it is REFRACT.
+    """
+
+    kind: int
+    bsdf: Bsdf
+    weight: wp.vec3
+    ior: float
+
+
+OPAQUE = wp.constant(0)
+STRAIGHT = wp.constant(1)
+REFRACT = wp.constant(2)
+ROUGH_PANE = wp.constant(3)
+
+
+@wp.func
+def lot_between(reflected: float, passed: float):
+    """Probability of reflection, not too far from what it brings."""
+    p = reflected / wp.max(reflected + passed, 1.0e-9)
+    if passed > 0.0:
+        p = wp.clamp(p, LOT_FLOOR, 1.0 - LOT_FLOOR)
+    return p
+
+
+@wp.func
+def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
+    """Whether glass reflects or lets pass; ``w`` points to where the path comes from."""
+    out = Dealt()
+    tint = v.look.albedo
+    alpha = alpha_of(v.look.roughness)
+    ior = world.surfaces[v.surface].ior
+    if world.surfaces[v.surface].thin != 0:
+        f = fresnel_dielectric(w[2], ior)
+        back = pane_reflectance(f, tint)
+        on = pane_transmittance(f, tint)
+        p = lot_between(luminance(back), luminance(on))
+        out.bsdf = make_interface(w, alpha, 0.0)
+        out.bsdf.f0 = wp.vec3(1.0, 1.0, 1.0)
+        out.bsdf.f90 = 1.0
+        out.weight = on * (1.0 / (1.0 - p))
+        out.bsdf.scale = back * (1.0 / p)
+        out.kind = wp.where(is_clear_pane(world, v.surface), STRAIGHT, ROUGH_PANE)
+    else:
+        out.ior = wp.where(v.outside, ior, 1.0 / ior)
+        f = fresnel_dielectric(w[2], out.ior)
+        p = lot_between(f, 1.0 - f)
+        out.bsdf = make_interface(w, alpha, out.ior)
+        out.bsdf.scale = wp.vec3(1.0, 1.0, 1.0) * (1.0 / p)
+        # One half of the tint on the way in, the other on the way out.
+        half = wp.vec3(wp.sqrt(tint[0]), wp.sqrt(tint[1]), wp.sqrt(tint[2]))
+        out.weight = half * (1.0 / wp.max(1.0 - p, 1.0e-9))
+        out.kind = REFRACT
+    if lot < p:
+        out.kind = OPAQUE
+    elif out.kind == ROUGH_PANE:
+        out.bsdf.scale = wp.vec3(1.0, 1.0, 1.0)
+    return out
+
+
+@wp.func
+def deal(world: World, v: Vertex, w: wp.vec3, number: float):
+    """What a vertex is; ``w`` points to where the path comes from, in the shading frame."""
+    out = Dealt()
+    lot = number
+    if v.opacity < 1.0:
+        if lot >= v.opacity:
+            out.kind = STRAIGHT
+            out.weight = wp.vec3(1.0, 1.0, 1.0)
+            return out
+        lot = lot / v.opacity
+    if lot < v.clear:
+        return deal_glass(world, v, w, lot / v.clear)
+    out.bsdf = make_bsdf(
+        world.lobes,
+        w,
+        v.look.albedo,
+        v.look.roughness,
+        v.look.metallic,
+        v.look.specular,
+        v.film,
+        v.film_f0,
+        v.film_roughness,
+    )
+    return out
+
+
+@wp.struct
+class Step:
+    """How a path goes on from a vertex.
+
+    Attributes:
+        light: That the vertex sends back from the source it has asked.
+        weight: Of what the new direction brings.
+        straight: Whether nothing has happened.
+        o, d: The next ray, if ``weight`` is not 0.
+        density, total: As of an Anchor.
+    """
+
+    light: wp.vec3
+    weight: wp.vec3
+    straight: bool
+    o: wp.vec3
+    d: wp.vec3
+    density: float
+    total: float
+
+
+@wp.func
+def step_from(
+    world: World,
+    table: SkyTable,
+    budget: Budget,
+    v: Vertex,
+    d: wp.vec3,
+    lot: float,
+    key: wp.uint32,
+    pair: int,
+    sample: wp.uint32,
+):
+    """Light that a vertex sends back at once, and where the path goes on.
+
+    Args:
+        d: Direction in which the path has come.
+        lot: In [0, 1), for what the vertex is.
+        key, pair, sample: Of the numbers for directions and sources.
+    """
+    n = v.look.normal
+    x, y = frame_of(n)
+    w = to_frame(-d, x, y, n)
+    w = wp.vec3(w[0], w[1], wp.max(w[2], 1.0e-3))
+    dealt = deal(world, v, w, lot)
+    step = Step()
+    step.density = -1.0
+    step.straight = dealt.kind == STRAIGHT
+    side = v.flat
+    if dealt.kind != OPAQUE:
+        side = -v.flat
+    step.o = lifted(v.p, side)
+    step.d = d
+    step.weight = dealt.weight
+    if step.straight:
+        return step
+    u = random_pair(key, pair, sample)
+    choices = random_pair(key, pair + 1, sample)
+    sent = Scattering()
+    if dealt.kind == REFRACT:
+        sent = refract(w, alpha_of(v.look.roughness), dealt.ior, u)
+    else:
+        sent = scatter(dealt.bsdf, choices[0], u)
+    if dealt.kind == ROUGH_PANE:
+        sent.l = wp.vec3(sent.l[0], sent.l[1], -sent.l[2])
+    step.weight = sent.weight
+    if dealt.kind != OPAQUE:
+        step.weight = wp.cw_mul(sent.weight, dealt.weight)
+    elif v.outside or dealt.bsdf.ior == 0.0:
+        choice = choose_source(world, step.o, n, choices[1])
+        step.density = sent.density
+        step.total = choice.total
+        if choice.part > 0.0 and budget.lights != 2:
+            u = random_pair(key, pair + 2, sample)
+            step.light = light_asked(world, table, budget, dealt.bsdf, v, step.o, choice, u)
+    step.d = x * sent.l[0] + y * sent.l[1] + n * sent.l[2]
+    if wp.dot(step.d, side) <= 0.0:
+        step.weight = wp.vec3(0.0)
+    return step
+
+
+@wp.func
+def path_light(
+    view: View,
+    world: World,
+    table: SkyTable,
+    budget: Budget,
+    i: int,
+    key: wp.uint32,
+    sample: wp.uint32,
+):
+    """Light that one path brings to pixel i [cd/m^2]."""
+    place = random_pair(key, 0, sample)
+    way = pixel_direction(view, float(i % view.width) + place[0], float(i / view.width) + place[1])
+    length = wp.length(way)
+    d = unit(view.R_world_camera @ way)
+    a = Anchor()
+    a.p = view.eye_m
+    a.density = -1.0
+    a.way_m = Z_NEAR_M * length
+    o = view.eye_m + d * a.way_m
+    # Samples share the pixel: each stands for a part of it.
+    cone = pixel_width(view, i, 1.0) / (length * wp.sqrt(float(budget.whole)))
+    width_m = float(0.0)
+    light = wp.vec3(0.0)
+    through = wp.vec3(1.0, 1.0, 1.0)
+    bounces = int(0)
+    passages = int(0)
+    going = bool(True)
+    while going:
+        going = False
+        hit = first_hit(world, o, d, AT_INFINITY)
+        end_m = a.way_m + wp.where(hit.at[0] < 0, 2.0 * AT_INFINITY, hit.t)
+        if bounces > 0:
+            light += wp.cw_mul(through, lamps_met(world, budget, a, d, end_m))
+        if hit.at[0] < 0:
+            if bounces > 0 or world.sky.visible != 0:
+                light += wp.cw_mul(through, sky_met(world, table, budget, a, d))
+        else:
+            width_m += cone * hit.t
+            v = vertex_of(world, hit, d, width_m)
+            light += wp.cw_mul(through, v.glow)
+            if bounces < budget.bounces and passages < PASSAGES_MAX:
+                pair = 1 + PAIRS * (bounces + passages)
+                lots = random_pair(key, pair, sample)
+                step = step_from(world, table, budget, v, d, lots[0], key, pair + 1, sample)
+                light += wp.cw_mul(through, step.light)
+                through = wp.cw_mul(through, step.weight)
+                going = wp.max(through) > 0.0
+                o = step.o
+                d = step.d
+                if step.straight:
+                    passages += 1
+                    a.way_m = end_m
+                else:
+                    bounces += 1
+                    a.p = step.o
+                    a.n = v.look.normal
+                    a.density = step.density
+                    a.total = step.total
+                    a.way_m = 0.0
+                    if a.density > 0.0:
+                        # A direction stands for those around it that are not drawn.
+                        spread = wp.sqrt(1.0 / (a.density * float(budget.whole)))
+                        cone = wp.max(cone, wp.min(spread, 0.5))
+                    if going and bounces >= SURE_BOUNCES:
+                        keep = wp.min(wp.max(through), 0.95)
+                        going = lots[1] < keep
+                        through = through * (1.0 / keep)
+    return light
+
+
+@wp.kernel
+def trace_paths(
+    view: View,
+    world: World,
+    table: SkyTable,
+    budget: Budget,
+    light: wp.array(dtype=wp.vec3),
+):
+    """Add the light of some samples to every pixel."""
+    i = wp.tid()
+    if not shows(view, i):
+        return
+    key = mixed_bits(wp.uint32(i) ^ budget.key)
+    total = wp.vec3(0.0)
+    for k in range(budget.samples):
+        total += path_light(view, world, table, budget, i, key, wp.uint32(budget.first + k))
+    light[i] = light[i] + total
+
+
+@wp.kernel
+def scale_light(factor: float, light: wp.array(dtype=wp.vec3)):
+    """Multiply all light by a factor."""
+    i = wp.tid()
+    light[i] = light[i] * factor

@@ -1,0 +1,340 @@
+"""Light sources, for paths: drawn from, and met by chance.
+
+Sources: Veach, "Robust Monte Carlo methods for light transport simulation", 1997 (multiple
+importance sampling, power heuristic); Shirley, Wang and Zimmerman, "Monte Carlo techniques for
+direct lighting calculations", ACM TOG 15(1), 1996 (spheres by their cone, panels by area).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from generator.renderers.kernels.lighting import DISK, RECTANGLE, SPOT, SUN
+from generator.renderers.kernels.occlusion import frame_of
+from generator.renderers.kernels.path_bsdf import luminance
+from generator.renderers.kernels.records import Lamp, Sky, World, floor_int, greater, unit
+from generator.renderers.kernels.sky import sky_irradiance
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+AT_INFINITY = wp.constant(1.0e6)
+# Share of the mean light that no surface is taken to see less of: coefficients are blurred.
+SKY_FLOOR = wp.constant(0.1)
+SKY = wp.constant(-1)
+
+
+@wp.struct
+class SkyTable:
+    """Where a sky's light comes from.
+
+    Attributes:
+        rows: Share of the light above each row's upper edge, [rows + 1].
+        columns: In each row, share of its light left of each column's edge, [rows, columns + 1].
+    """
+
+    rows: wp.array(dtype=float)
+    columns: wp.array(dtype=float, ndim=2)
+
+
+@wp.struct
+class Glimpse:
+    """A source in one direction from a point.
+
+    Attributes:
+        direction: Unit.
+        distance_m: To it; below zero where there is none.
+        radiance: That it sends to the point [cd/m^2].
+        density: Of drawing that direction from this source [1/sr].
+    """
+
+    direction: wp.vec3
+    distance_m: float
+    radiance: wp.vec3
+    density: float
+
+
+@wp.func
+def spot_fade(lamp: Lamp, away: wp.vec3):
+    """What is left of a spot's light in a unit direction away from it; 1 for a sphere."""
+    fade = float(1.0)
+    if lamp.kind == SPOT:
+        span = wp.max(lamp.cos_inner - lamp.cos_outer, 1.0e-4)
+        t = wp.clamp((wp.dot(away, lamp.direction) - lamp.cos_outer) / span, 0.0, 1.0)
+        fade = t * t * (3.0 - 2.0 * t)
+    return fade
+
+
+@wp.func
+def ball_radius(lamp: Lamp):
+    """Radius of a lamp [m]; points are taken for small balls."""
+    return greater(lamp.radius, 1.0e-3)
+
+
+@wp.func
+def cone_width(squared: float):
+    """One minus the cosine of a cone's half angle, from its sine squared."""
+    return squared / (1.0 + wp.sqrt(1.0 - squared))
+
+
+@wp.func
+def ball_sine(lamp: Lamp, distance_squared: float):
+    """Squared sine of the angle under which a lamp's radius is seen."""
+    squared = lamp.radius * lamp.radius / (1.0 + lamp.radius * lamp.radius)
+    if lamp.kind != SUN:
+        r = ball_radius(lamp)
+        squared = r * r / distance_squared
+    return squared
+
+
+@wp.func
+def lamp_weight(lamp: Lamp, p: wp.vec3, n: wp.vec3):
+    """About the illuminance [lx] that a lamp gives a surface; zero only where it is nothing."""
+    weight = float(0.0)
+    if lamp.kind == SUN:
+        weight = luminance(lamp.power) * wp.clamp(lamp.radius - wp.dot(n, lamp.direction), 0.0, 1.0)
+    else:
+        to_lamp = lamp.position_m - p
+        squared = greater(wp.dot(to_lamp, to_lamp), lamp.radius * lamp.radius)
+        squared = greater(squared, 1.0e-6)
+        inverse = 1.0 / wp.sqrt(squared)
+        above = (wp.dot(n, to_lamp) + lamp.radius) * inverse
+        if above > 0.0:
+            weight = luminance(lamp.power) * (wp.min(above, 1.0) + 0.02) * (inverse * inverse)
+            if lamp.kind == RECTANGLE or lamp.kind == DISK:
+                front = -wp.dot(to_lamp, lamp.direction) * inverse
+                weight = wp.where(front > 0.0, weight * (front + 0.05), 0.0)
+            else:
+                weight *= spot_fade(lamp, to_lamp * -inverse)
+    return weight
+
+
+@wp.func
+def sky_weight(sky: Sky, n: wp.vec3):
+    """About the illuminance [lx] that the sky gives a surface."""
+    mean = luminance(sky.irradiance[0]) * sky.luminance
+    return wp.pi * (luminance(sky_irradiance(sky, n)) + SKY_FLOOR * mean)
+
+
+@wp.func
+def in_cone(axis: wp.vec3, sine_squared: float, u: wp.vec2):
+    """A direction, drawn evenly from a cone; with one minus its cosine to the axis."""
+    low = u[0] * cone_width(sine_squared)
+    x, y = frame_of(axis)
+    r = wp.sqrt(wp.max(low * (2.0 - low), 0.0))
+    angle = 2.0 * wp.pi * u[1]
+    d = x * (r * wp.cos(angle)) + y * (r * wp.sin(angle)) + axis * (1.0 - low)
+    return d, low
+
+
+@wp.func
+def draw_ball(lamp: Lamp, p: wp.vec3, u: wp.vec2):
+    """A point of a sphere, of a spot or of the sun."""
+    g = Glimpse()
+    g.distance_m = -1.0
+    axis = -lamp.direction
+    squared = float(1.0)
+    if lamp.kind != SUN:
+        to_lamp = lamp.position_m - p
+        squared = wp.dot(to_lamp, to_lamp)
+        axis = to_lamp * (1.0 / wp.sqrt(wp.max(squared, 1.0e-12)))
+    sine = ball_sine(lamp, squared)
+    if sine < 1.0:
+        direction, low = in_cone(axis, sine, u)
+        g.direction = direction
+        g.density = 1.0 / (2.0 * wp.pi * cone_width(sine))
+        g.radiance = ball_radiance(lamp, axis)
+        g.distance_m = AT_INFINITY
+        if lamp.kind != SUN:
+            c = 1.0 - low
+            r = ball_radius(lamp)
+            beside = squared * low * (2.0 - low)
+            g.distance_m = wp.sqrt(squared) * c - wp.sqrt(wp.max(r * r - beside, 0.0))
+    return g
+
+
+@wp.func
+def ball_radiance(lamp: Lamp, axis: wp.vec3):
+    """Radiance of a ball seen along an axis; that of the sun over its disc."""
+    area = wp.pi * lamp.radius * lamp.radius / (1.0 + lamp.radius * lamp.radius)
+    if lamp.kind != SUN:
+        r = ball_radius(lamp)
+        area = wp.pi * r * r
+    return lamp.power * (spot_fade(lamp, -axis) / area)
+
+
+@wp.func
+def panel_area(lamp: Lamp):
+    """Area of a rectangle or disk [m^2]."""
+    per_square = wp.where(lamp.kind == DISK, wp.pi, 4.0)
+    return per_square * wp.length(lamp.along) * wp.length(lamp.across)
+
+
+@wp.func
+def draw_panel(lamp: Lamp, p: wp.vec3, u: wp.vec2):
+    """A point of a rectangle or disk, drawn evenly over its area."""
+    x = 2.0 * u[0] - 1.0
+    y = 2.0 * u[1] - 1.0
+    if lamp.kind == DISK:
+        r = wp.sqrt(u[0])
+        angle = 2.0 * wp.pi * u[1]
+        x = r * wp.cos(angle)
+        y = r * wp.sin(angle)
+    way = lamp.position_m + lamp.along * x + lamp.across * y - p
+    squared = wp.max(wp.dot(way, way), 1.0e-12)
+    g = Glimpse()
+    g.direction = way * (1.0 / wp.sqrt(squared))
+    front = -wp.dot(g.direction, lamp.direction)
+    g.distance_m = -1.0
+    if front > 1.0e-6:
+        g.distance_m = wp.sqrt(squared)
+        g.density = squared / (front * panel_area(lamp))
+        g.radiance = lamp.radiance
+    return g
+
+
+@wp.func
+def meet_lamp(lamp: Lamp, p: wp.vec3, d: wp.vec3):
+    """What a ray sees of a lamp."""
+    g = Glimpse()
+    g.direction = d
+    g.distance_m = -1.0
+    if lamp.kind == SUN:
+        sine = ball_sine(lamp, 1.0)
+        # By the chord: cosines of a twentieth of a degree have no digits left.
+        chord = d + lamp.direction
+        if wp.dot(chord, chord) < 2.0 * cone_width(sine):
+            g.distance_m = AT_INFINITY
+            g.density = 1.0 / (2.0 * wp.pi * cone_width(sine))
+            g.radiance = ball_radiance(lamp, -lamp.direction)
+    elif lamp.kind == RECTANGLE or lamp.kind == DISK:
+        front = -wp.dot(d, lamp.direction)
+        if front > 1.0e-6:
+            t = wp.dot(p - lamp.position_m, lamp.direction) / front
+            at = p + d * t - lamp.position_m
+            x = wp.dot(at, lamp.along) / wp.dot(lamp.along, lamp.along)
+            y = wp.dot(at, lamp.across) / wp.dot(lamp.across, lamp.across)
+            inside = wp.abs(x) < 1.0 and wp.abs(y) < 1.0
+            if lamp.kind == DISK:
+                inside = x * x + y * y < 1.0
+            if inside and t > 0.0:
+                g.distance_m = t
+                g.density = t * t / (front * panel_area(lamp))
+                g.radiance = lamp.radiance
+    else:
+        to_lamp = lamp.position_m - p
+        ahead = wp.dot(to_lamp, d)
+        off = to_lamp - d * ahead
+        r = ball_radius(lamp)
+        beside = wp.dot(off, off)
+        squared = wp.dot(to_lamp, to_lamp)
+        if ahead > 0.0 and beside < r * r and squared > r * r:
+            g.distance_m = ahead - wp.sqrt(r * r - beside)
+            g.density = 1.0 / (2.0 * wp.pi * cone_width(r * r / squared))
+            g.radiance = ball_radiance(lamp, to_lamp * (1.0 / wp.sqrt(squared)))
+    return g
+
+
+@wp.func
+def interval_of(shares: wp.array(dtype=float), last: int, u: float):
+    """The largest k < last with ``shares[k] <= u``."""
+    low = int(0)
+    high = last
+    while high - low > 1:
+        middle = (low + high) / 2
+        if shares[middle] <= u:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@wp.func
+def draw_sky(sky: Sky, table: SkyTable, u: wp.vec2):
+    """A direction of the sky, drawn by the brightness of the image; radiance is not told."""
+    height = table.rows.shape[0] - 1
+    width = table.columns.shape[1] - 1
+    row = interval_of(table.rows, height, u[1])
+    edges = table.columns[row]
+    column = interval_of(edges, width, u[0])
+    tall = table.rows[row + 1] - table.rows[row]
+    wide = edges[column + 1] - edges[column]
+    x = (float(column) + wp.min((u[0] - edges[column]) / wide, 1.0)) / float(width)
+    y = (float(row) + wp.min((u[1] - table.rows[row]) / tall, 1.0)) / float(height)
+    azimuth = wp.pi * (1.0 - 2.0 * x)
+    polar = wp.pi * y
+    sine = wp.sin(polar)
+    e = wp.vec3(sine * wp.cos(azimuth), sine * wp.sin(azimuth), wp.cos(polar))
+    g = Glimpse()
+    g.direction = wp.vec3(
+        sky.cos_yaw * e[0] - sky.sin_yaw * e[1], sky.cos_yaw * e[1] + sky.sin_yaw * e[0], e[2]
+    )
+    g.distance_m = AT_INFINITY
+    cells = float(width) * float(height)
+    g.density = tall * wide * cells / (2.0 * wp.pi * wp.pi * wp.max(sine, 1.0e-6))
+    return g
+
+
+@wp.func
+def sky_density(sky: Sky, table: SkyTable, d: wp.vec3):
+    """The density with which ``draw_sky`` draws a unit direction [1/sr]."""
+    height = table.rows.shape[0] - 1
+    width = table.columns.shape[1] - 1
+    x = sky.cos_yaw * d[0] + sky.sin_yaw * d[1]
+    y = sky.cos_yaw * d[1] - sky.sin_yaw * d[0]
+    z = wp.clamp(d[2], -1.0, 1.0)
+    column = floor_int((0.5 - wp.atan2(y, x) * (0.5 / wp.pi)) * float(width))
+    row = floor_int(wp.acos(z) * float(height) / wp.pi)
+    column = wp.clamp(column, 0, width - 1)
+    row = wp.clamp(row, 0, height - 1)
+    share = table.rows[row + 1] - table.rows[row]
+    share *= table.columns[row, column + 1] - table.columns[row, column]
+    sine = wp.max(wp.sqrt(1.0 - z * z), 1.0e-6)
+    return share * float(width) * float(height) / (2.0 * wp.pi * wp.pi * sine)
+
+
+@wp.struct
+class Choice:
+    """The source that a vertex asks for light.
+
+    Attributes:
+        source: Number of a lamp, or SKY.
+        part: Probability of that choice; 0 where no source gives light.
+        total: Sum of all weights [lx].
+    """
+
+    source: int
+    part: float
+    total: float
+
+
+@wp.func
+def choose_source(world: World, p: wp.vec3, n: wp.vec3, u: float):
+    """One source, nearly in proportion to the light that it gives a surface if nothing shades."""
+    c = Choice()
+    c.source = SKY
+    weight = float(0.0)
+    if world.sky.luminance > 0.0:
+        weight = sky_weight(world.sky, n)
+    c.total = weight
+    rest = u
+    for j in range(world.lamps.shape[0]):
+        w = lamp_weight(world.lamps[j], p, n)
+        if w > 0.0:
+            c.total += w
+            part = w / c.total
+            # What is left of the number decides between those after.
+            if rest < part:
+                c.source = j
+                weight = w
+                rest = rest / part
+            else:
+                rest = (rest - part) / (1.0 - part)
+    if c.total > 0.0:
+        c.part = weight / c.total
+    return c
+
+
+@wp.func
+def preferred(a: float, b: float):
+    """Weight of a technique with density a against one with density b: the power heuristic."""
+    return a * a / wp.max(a * a + b * b, 1.0e-30)

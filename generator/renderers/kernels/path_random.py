@@ -1,0 +1,79 @@
+"""Numbers that steer paths: scrambled Sobol points, each a function of pixel, sample and dimension.
+
+Nothing is kept between paths, so that images do not depend on the order of pixels. Pairs of
+dimensions are padded: each is a (0, 2)-sequence of its own, shuffled against the others.
+
+Sources: Sobol, "On the distribution of points in a cube", 1967 (the second dimension's matrix is
+Pascal's triangle modulo 2); Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", 1995;
+Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020; Vegdahl, "Building a better LK
+hash", 2021 (constants of ``scrambled``); Jarzynski and Olano, "Hash functions for GPU rendering",
+JCGT 9(3), 2020 (pcg).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.func
+def mixed_bits(key: wp.uint32):
+    """A hash of 32 bits."""
+    x = key * wp.uint32(747796405) + wp.uint32(1442695041)
+    x = ((x >> ((x >> wp.uint32(28)) + wp.uint32(4))) ^ x) * wp.uint32(277803737)
+    return (x >> wp.uint32(22)) ^ x
+
+
+@wp.func
+def reversed_bits(bits: wp.uint32):
+    """The same bits, the last first."""
+    x = bits
+    x = (x << wp.uint32(16)) | (x >> wp.uint32(16))
+    x = ((x & wp.uint32(0x00FF00FF)) << wp.uint32(8)) | ((x >> wp.uint32(8)) & wp.uint32(0x00FF00FF))
+    x = ((x & wp.uint32(0x0F0F0F0F)) << wp.uint32(4)) | ((x >> wp.uint32(4)) & wp.uint32(0x0F0F0F0F))
+    x = ((x & wp.uint32(0x33333333)) << wp.uint32(2)) | ((x >> wp.uint32(2)) & wp.uint32(0x33333333))
+    x = ((x & wp.uint32(0x55555555)) << wp.uint32(1)) | ((x >> wp.uint32(1)) & wp.uint32(0x55555555))
+    return x
+
+
+@wp.func
+def scrambled(bits: wp.uint32, seed: wp.uint32):
+    """Flip each bit by a hash of the bits below it."""
+    x = bits ^ (bits * wp.uint32(0x3D20ADEA))
+    x = (x + seed) * ((seed >> wp.uint32(16)) | wp.uint32(1))
+    x = x ^ (x * wp.uint32(0x05526C56))
+    return x ^ (x * wp.uint32(0x53A22864))
+
+
+@wp.func
+def pascal(index: wp.uint32):
+    """Bits of an index times Pascal's triangle modulo 2: the second Sobol dimension, reversed."""
+    x = index
+    x = x ^ ((x >> wp.uint32(1)) & wp.uint32(0x55555555))
+    x = x ^ ((x >> wp.uint32(2)) & wp.uint32(0x33333333))
+    x = x ^ ((x >> wp.uint32(4)) & wp.uint32(0x0F0F0F0F))
+    x = x ^ ((x >> wp.uint32(8)) & wp.uint32(0x00FF00FF))
+    return x ^ ((x >> wp.uint32(16)) & wp.uint32(0x0000FFFF))
+
+
+@wp.func
+def unit_float(bits: wp.uint32):
+    """Bits as a number in [0, 1)."""
+    return float(bits >> wp.uint32(8)) * (1.0 / 16777216.0)
+
+
+@wp.func
+def random_pair(key: wp.uint32, dimension: int, sample: wp.uint32):
+    """Two numbers in [0, 1).
+
+    Args:
+        key: A hash of the pixel.
+        dimension: Any number that tells this pair from the others of one path.
+        sample: From 0. Each power of two of them is stratified as a (0, m, 2)-net.
+    """
+    seed = mixed_bits(key ^ (wp.uint32(dimension) * wp.uint32(0x5851F42D)))
+    index = reversed_bits(scrambled(reversed_bits(sample), seed))
+    first = scrambled(index, mixed_bits(seed ^ wp.uint32(0x2511E9B3)))
+    second = scrambled(pascal(index), mixed_bits(seed ^ wp.uint32(0x63D83595)))
+    return wp.vec2(unit_float(reversed_bits(first)), unit_float(reversed_bits(second)))

@@ -1,0 +1,35 @@
+"""Directions and averages of equirectangular images."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.core.geometry import Float32
+from generator.core.se3 import Array
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Weights of linear sRGB in luminance (ITU-R BT.709)."""
+
+
+def texel_directions(height: int) -> tuple[Array, Array]:
+    """Unit directions [h, 2h, 3] and solid angles [h, 2h] of an equirectangular image.
+
+    Row 0 is the zenith; column 0 is -X, the centre is +X, columns grow clockwise from above.
+    """
+    width = 2 * height
+    edges = np.cos(np.pi * np.arange(height + 1) / height)
+    polar = np.pi * (np.arange(height) + 0.5) / height
+    azimuth = np.pi - 2.0 * np.pi * (np.arange(width) + 0.5) / width
+    x = np.sin(polar)[:, None] * np.cos(azimuth)[None]
+    y = np.sin(polar)[:, None] * np.sin(azimuth)[None]
+    z = np.broadcast_to(np.cos(polar)[:, None], x.shape)
+    solid = np.broadcast_to((edges[:-1] - edges[1:])[:, None] * 2.0 * np.pi / width, x.shape)
+    return np.stack([x, y, z], axis=-1), solid
+
+
+def luminance_of(image: Array | Float32) -> Array:
+    """Luminance (Rec. 709) of linear RGB, shape [h, w] of [h, w, 3], float64."""
+    # Channel by channel: reducing over a short last axis takes three times as long.
+    parts = [image[..., k].astype(np.float64) * LUMINANCE[k] for k in range(3)]
+    total: Array = parts[0] + parts[1] + parts[2]
+    return total

@@ -1,0 +1,135 @@
+"""Colour images by path tracing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import warp as wp
+
+from generator.core.scene import Camera, Scene
+from generator.core.streams import Streams
+from generator.renderers.cache import ByteCache
+from generator.renderers.color import LitImage, expose, images_of
+from generator.renderers.environments import irradiance_coefficients
+from generator.renderers.importance import sky_shares
+from generator.renderers.kernels import path, records
+from generator.renderers.kernels.path_lights import SkyTable
+from generator.renderers.lobes import smith_albedo
+from generator.renderers.packing import PackedWorld, lamp_records
+from generator.renderers.settings import RenderSettings
+from generator.renderers.stock import AssetStock
+from generator.renderers.visibility import Seen
+from generator.renderers.weather import fill_fog, ground_of
+
+# A launch is bounded, so that a device that also drives a screen is not held for long.
+_SAMPLES_AT_ONCE = 32
+_TABLE_BYTES = 16 << 20
+_IRRADIANCE_SIZE = (64, 32)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _SkyLight:
+    """An environment as paths need it: its table, and its irradiance as of a Sky record."""
+
+    table: SkyTable
+    irradiance: wp.array
+    nbytes: int
+
+
+class PathTracer:
+    """Traces paths; keeps tables of environments between images.
+
+    Args:
+        stock: Where assets are on the device.
+        settings: How colour images are made.
+    """
+
+    def __init__(self, stock: AssetStock, settings: RenderSettings) -> None:
+        self._stock = stock
+        self._settings = settings
+        self._lobes = wp.array(smith_albedo(), dtype=wp.vec2, device=stock.device)
+        self._skies: ByteCache[_SkyLight] = ByteCache(_TABLE_BYTES)
+
+    def lit_image(
+        self, scene: Scene, camera: Camera, world: PackedWorld, view: records.View, seen: Seen
+    ) -> LitImage:
+        """Light, shade and weather, before the camera's response.
+
+        What is in the air is added from the pixel centres' depths, as by the realtime tier.
+        """
+        radiance = self.radiance(scene, camera, world, view)
+        fill_fog(world, view, images_of(seen), radiance, self._stock)
+        return expose(camera, world, view, seen, radiance, self._stock, self._settings)
+
+    def radiance(
+        self,
+        scene: Scene,
+        camera: Camera,
+        world: PackedWorld,
+        view: records.View,
+        *,
+        seed: int = 0,
+        lights: int = 3,
+    ) -> wp.array:
+        """Mean light of each pixel's square [cd/m^2], linear RGB, flat; scratch memory.
+
+        Args:
+            scene: What ``world`` was packed from.
+            camera: Its name keys the noise.
+            world: Changed: gets every light, and the tables of paths.
+            view: Of the camera.
+            seed: Images of other seeds have other noise.
+            lights: How sources are found: 1 by asking them, 2 by meeting them, 3 by both.
+        """
+        sky = self._sky_light(scene.environment.image)
+        record = world.record
+        record.lobes = self._lobes
+        record.lamps = wp.array(
+            lamp_records(scene.lights), dtype=records.Lamp, device=self._stock.device
+        )
+        record.ground = ground_of(world.weather)
+        record.sky.irradiance = sky.irradiance
+        n = view.width * view.height
+        radiance = self._stock.scratch("radiance", n, wp.vec3)
+        radiance.zero_()
+        budget = self._budget(scene, camera, world, seed, lights)
+        for first in range(0, self._settings.samples, _SAMPLES_AT_ONCE):
+            budget.first = first
+            budget.samples = min(_SAMPLES_AT_ONCE, self._settings.samples - first)
+            inputs = [view, record, sky.table, budget]
+            wp.launch(path.trace_paths, n, inputs, [radiance], device=self._stock.device)
+        share = 1.0 / self._settings.samples
+        wp.launch(path.scale_light, n, [share], [radiance], device=self._stock.device)
+        return radiance
+
+    def _budget(
+        self, scene: Scene, camera: Camera, world: PackedWorld, seed: int, lights: int
+    ) -> path.Budget:
+        rng = Streams(seed=seed, scene=0).rng(f"paths {camera.name} {scene.time_s!r}")
+        surfaces = world.record.surfaces.numpy()
+        budget = path.Budget()
+        budget.whole = self._settings.samples
+        budget.bounces = self._settings.max_bounces
+        budget.key = int(rng.integers(1 << 32))
+        budget.clear = int(
+            ((surfaces["transmission"] > 0.0) | (surfaces["opacity"] < 1.0)).any()
+        )
+        budget.lights = lights
+        return budget
+
+    def _sky_light(self, environment_id: str) -> _SkyLight:
+        def make() -> _SkyLight:
+            device = self._stock.device
+            image = self._stock.assets.environment(environment_id)
+            rows, columns = sky_shares(image)
+            table = SkyTable()
+            table.rows = wp.array(rows, dtype=float, device=device)
+            table.columns = wp.array(columns, dtype=float, device=device)
+            small = cv2.resize(image, _IRRADIANCE_SIZE, interpolation=cv2.INTER_AREA)
+            irradiance = wp.array(
+                irradiance_coefficients(small), dtype=wp.vec3, device=device
+            )
+            return _SkyLight(table, irradiance, rows.nbytes + columns.nbytes)
+
+        return self._skies.get(environment_id, make)
