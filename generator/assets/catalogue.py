@@ -155,7 +155,7 @@ class RobotEntry(Origin):
 
 
 class ImageEntry(Origin):
-    """A texture (any image) or an environment (a Radiance .hdr panorama)."""
+    """A texture (any image) or an environment (a panorama, Radiance .hdr or OpenEXR)."""
 
     id: Id
     file: str

@@ -153,6 +153,13 @@ FAMILIES: Mapping[str, Family] = _table(
         _static(
             "backdrop", "furniture:backdrop", size_m=(3.0, 3.0, 2.2), radius_m=0.6, color="white"
         ),
+        _static(
+            "light_panel",
+            "furniture:light_panel",
+            size_m=(0.6, 0.6),
+            shape="rectangle",
+            depth_m=0.04,
+        ),
         _static("room", "room:room", size_m=(5.0, 4.0, 2.8), door=1, window=1),
     )
 )
