@@ -140,6 +140,7 @@ class Lamp:
         power: Colour times intensity [cd] (sphere, spot) or illuminance [lx] (sun).
         radius: Of the ball [m], or tangent of the sun's angular radius.
         cos_outer, cos_inner: Where a spot has faded to nothing, and where it begins to fade.
+        cutoff: Slope below which a dipped headlight lights the road; 0 = no such light.
     """
 
     kind: int
@@ -149,6 +150,7 @@ class Lamp:
     radius: float
     cos_outer: float
     cos_inner: float
+    cutoff: float
 
 
 @wp.struct
