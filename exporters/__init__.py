@@ -15,6 +15,7 @@ TABLE = PluginTable(
         "coco": "exporters.coco:Coco",
         "kitti": "exporters.kitti:Kitti",
         "kitti_raw": "exporters.kitti_raw:KittiRaw",
+        "kitti_stereo": "exporters.kitti_stereo:KittiStereo",
         "kitti_tracking": "exporters.kitti_tracking:KittiTracking",
         "motchallenge": "exporters.motchallenge:MotChallenge",
         "pointclouds": "exporters.pointclouds:PointClouds",

@@ -253,7 +253,7 @@ def calibration_texts(
     reference = camera_mount(scene, cameras.get("00", cameras["02"]))
     scanner = lidar_mount(scene, lidar)
     return {
-        "calib_cam_to_cam.txt": _cameras_text(scene, cameras, reference),
+        "calib_cam_to_cam.txt": cameras_text(scene, cameras, reference, "kitti_raw"),
         "calib_velo_to_cam.txt": _rigid_text(between(scene, reference, scanner))
         + "delta_f: 0.000000e+00 0.000000e+00\ndelta_c: 0.000000e+00 0.000000e+00\n",
         "calib_imu_to_velo.txt": _rigid_text(between(scene, scanner, unit)),
@@ -289,14 +289,25 @@ def projection(camera: Intrinsics, shift_m: Vec3) -> Array:
     return np.column_stack([K, np.einsum("ij,j->i", K, np.array(shift_m), optimize=False)])
 
 
-def _cameras_text(scene: Scene, cameras: Mapping[str, str], reference: Mount) -> str:
+def cameras_text(scene: Scene, cameras: Mapping[str, str], reference: Mount, exporter: str) -> str:
+    """The text of ``calib_cam_to_cam.txt``.
+
+    Args:
+        scene: At the instant of the images.
+        cameras: Sensors by KITTI's number; 02 is there.
+        reference: The camera whose frame poses refer to.
+        exporter: Who asks.
+
+    Raises:
+        ConfigError: the cameras are not parallel.
+    """
     text = CALIB_TIME + "corner_dist: 0.000000e+00\n"
     for number in ("00", "01", "02", "03"):
         name = cameras.get(number, cameras.get("00", cameras["02"]))
         pose = between(scene, camera_mount(scene, name), reference)
         if 2.0 * float(np.linalg.norm(pose.quaternion_wxyz[1:])) > PARALLEL_RAD:
             raise ConfigError(
-                f"exporter 'kitti_raw': camera '{name}' is not parallel to the reference camera, "
+                f"exporter '{exporter}': camera '{name}' is not parallel to the reference camera, "
                 "but KITTI's images are rectified; give both the same yaw, pitch and roll"
             )
         text += _camera_text(number, scene.camera(name).intrinsics, pose)

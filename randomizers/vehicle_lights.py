@@ -20,10 +20,10 @@ _WHITE: Vec3 = (1.02, 1.0, 0.94)
 RED: Vec3 = (4.2, 0.14, 0.06)
 AMBER: Vec3 = (2.35, 0.66, 0.02)
 """Linear RGB of luminance 1."""
-_DOWN = 0.035
-"""Slope of a beam's axis; its upper half stands for the stray light above the cut-off."""
-_CONE_RAD = 0.3
-_EVEN = 0.0
+_CUTOFF = 0.01
+"""UN R48: headlights of cars are aimed 1 to 1.5 % down."""
+_CONE_RAD = 0.9
+_EVEN = 0.5
 _OUTSIDE_M = 0.06
 
 
@@ -37,8 +37,8 @@ class VehicleLights(LookRandomizer):
         headlight_cd_m2: Luminance of headlight slots: what a lens shows on average off its beam.
         taillight_cd_m2, brakelight_cd_m2, indicator_cd_m2: Luminance of the other slots. UN R7
             and R6 ask for 4 to 17 cd, 60 to 260 cd and 175 to 1000 cd; lenses have 50 to 100 cm^2.
-        beam_cd: Luminous intensity of a dipped beam in its middle; UN R112 asks for 6 to 20 kcd
-            where it lights the road.
+        beam_cd: Luminous intensity of a dipped beam where it is brightest; with 9 to 14 kcd the
+            whole beam is as UN R112 asks for.
         beams: Whether headlights cast light on the street in the dark.
     """
 
@@ -50,7 +50,7 @@ class VehicleLights(LookRandomizer):
     taillight_cd_m2: Positive = Uniform(600.0, 1500.0)
     brakelight_cd_m2: Positive = Uniform(6000.0, 15_000.0)
     indicator_cd_m2: Positive = Uniform(15_000.0, 40_000.0)
-    beam_cd: Positive = Uniform(6000.0, 14_000.0)
+    beam_cd: Positive = Uniform(9000.0, 14_000.0)
     beams: bool = Field(True)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
@@ -108,12 +108,9 @@ def with_glow(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
 
 
 def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
-    """A spot at a lens, which faces +X, slightly downwards."""
-    ahead = T_world_lens.rotation()[:, 0]
-    direction = (float(ahead[0]), float(ahead[1]), float(ahead[2]) - _DOWN)
-    length = sum(part * part for part in direction) ** 0.5
+    """The dipped beam of a lens, which faces +X: dark above its cut-off."""
     x, y, z = (round(part, 6) for part in T_world_lens.translation_m)
-    dx, dy, dz = (round(part / length, 6) for part in direction)
+    dx, dy, dz = (round(float(part), 6) for part in T_world_lens.rotation()[:, 0])
     return Light(
         name,
         "spot",
@@ -124,6 +121,7 @@ def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
         radius_m=0.05,
         cone_rad=_CONE_RAD,
         even=_EVEN,
+        cutoff=_CUTOFF,
     )
 
 

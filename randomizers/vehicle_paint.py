@@ -1,4 +1,4 @@
-"""Paint and dirt of vehicles."""
+"""Paint, dirt and licence plates of vehicles."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from generator.assets.vehicles.plates import SEEDS, with_seed
 from generator.config.distributions import Flag, LogUniform, Probability, Uniform, UnitInterval
 from generator.core.geometry import Material
 from generator.core.interfaces import AssetIndex
@@ -51,7 +52,7 @@ ON_ROADS = {
 
 
 class VehiclePaint(LookRandomizer):
-    """Paints every slot of role ``paint`` of a vehicle in one colour, and soils the vehicle.
+    """Paints every slot of role ``paint`` of a vehicle in one colour; soils and registers it.
 
     Attributes:
         weights: How often a colour is drawn: white, black, grey, silver, blue, red, green, brown,
@@ -60,6 +61,7 @@ class VehiclePaint(LookRandomizer):
         roughness: Of the clear coat: 0.1 waxed, 0.3 weathered.
         metallic: Whether the paint has flakes of metal; white never has.
         dirt: Share of dust in every colour of the vehicle.
+        plates: Whether every vehicle gets a licence plate of its own, or keeps its model's.
     """
 
     type: Literal["vehicle_paint"] = "vehicle_paint"
@@ -68,6 +70,7 @@ class VehiclePaint(LookRandomizer):
     roughness: UnitInterval = LogUniform(0.1, 0.3)
     metallic: Flag = Probability(0.6)
     dirt: UnitInterval = Uniform(0.0, 0.25)
+    plates: bool = Field(True)
 
     def model_post_init(self, context: object) -> None:
         """Refuse colours that do not exist, and weights of which none counts."""
@@ -85,6 +88,8 @@ class VehiclePaint(LookRandomizer):
             paint = self._paint(rng)
             anew, dirt = self.probability.draw(rng), self.dirt.draw(rng)
             painted.append(_finished(body, assets, paint if anew else None, dirt))
+        if self.plates:
+            painted = [_registered(body, int(rng.integers(SEEDS))) for body in painted]
         return scene.with_bodies(*painted)
 
     def _paint(self, rng: Rng) -> Material:
@@ -124,6 +129,14 @@ def _finished(body: Body, assets: AssetIndex, paint: Material | None, dirt: floa
 
     slots = materials_of(body, assets)
     return replace(body, materials=tuple(finished(material) for material in slots))
+
+
+def _registered(body: Body, seed: int) -> Body:
+    """The body with another licence plate, where it has one."""
+    return replace(
+        body,
+        materials=tuple(replace(m, texture=with_seed(m.texture, seed)) for m in body.materials),
+    )
 
 
 def _dusty(material: Material, dirt: float) -> Material:

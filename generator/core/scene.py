@@ -237,6 +237,8 @@ class Light:
         angular_radius_rad: Of the disc in the sky (sun).
         cone_rad: Half angle at which a spot has faded to nothing.
         even: Share of the cone within which a spot is even; outside it fades.
+        cutoff: Of a spot that is a dipped headlight: slope below its level direction at which its
+            light ends; 0 = round about its direction.
         body: Name of the body it moves with; empty = none.
     """
 
@@ -253,6 +255,7 @@ class Light:
     angular_radius_rad: float = 0.00465
     cone_rad: float = 0.6
     even: float = 0.8
+    cutoff: float = 0.0
     body: str = ""
 
 

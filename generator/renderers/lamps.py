@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.se3 import Array
-from generator.renderers.kernels import records
+from generator.renderers.kernels import lighting, records
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
@@ -69,9 +70,29 @@ def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Arr
         span = max(float(lamp["cos_inner"] - lamp["cos_outer"]), 1e-4)
         fade = np.clip((down - lamp["cos_outer"]) / span, 0.0, 1.0)
         lux = lux * fade * fade * (3.0 - 2.0 * fade)
+        if lamp["cutoff"] > 0.0:
+            lux = lux * dipped_share(lamp, [-along for along in direction])
     elif lamp["kind"] >= _RECTANGLE:
         lux = lux * np.maximum(-_dot(direction, [float(along) for along in lamp["direction"]]), 0.0)
     return lux
+
+
+def dipped_share(lamp: NDArray[np.void], d: Sequence[Array]) -> Array:
+    """As kernels.lighting.dipped_share, in many directions, given axis by axis."""
+    axis = [float(along) for along in lamp["direction"]]
+    level = math.hypot(axis[0], axis[1])
+    right = [axis[1] / level, -axis[0] / level, 0.0]
+    up = np.cross(right, axis).tolist()
+    ahead = np.maximum(_dot(d, axis), 1e-3)
+    side, down = _dot(d, right) / ahead, -_dot(d, up) / ahead
+    rise = np.clip(lighting.CUTOFF_RISE * side, 0.0, lighting.CUTOFF_RISE_MAX)
+    below = down - float(lamp["cutoff"]) + rise
+    t = np.clip(0.5 + 0.5 * below / lighting.CUTOFF_HALF_WIDTH, 0.0, 1.0)
+    s = (side - lighting.HOT_SIDE) / lighting.SIDE_WIDTH
+    v = np.maximum(below, 0.0) / lighting.DOWN_WIDTH
+    lit = t * t * (3.0 - 2.0 * t) / ((1.0 + s * s) * (1.0 + v * v))
+    share: Array = np.maximum(lit, lighting.STRAY)
+    return share
 
 
 def _dot(a: Sequence[Array], b: Sequence[Array] | Sequence[float]) -> Array:

@@ -192,6 +192,7 @@ def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
         value["radius"] = math.tan(light.angular_radius_rad) if sun else light.radius_m
         value["cos_outer"] = math.cos(light.cone_rad)
         value["cos_inner"] = math.cos(light.even * light.cone_rad)
+        value["cutoff"] = light.cutoff
         if light.kind in ("rectangle", "disk"):
             _fill_panel(value, light)
     return values

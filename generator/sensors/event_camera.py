@@ -110,7 +110,7 @@ class EventCamera(Mounted):
         rows = table_rows(
             "event_camera",
             len(events.pixel),
-            time_s=np.round(events.time_s, 6),
+            time_s=events.time_s,
             x_px=events.pixel % width_px,
             y_px=events.pixel // width_px,
             polarity=events.polarity,
@@ -121,14 +121,31 @@ class EventCamera(Mounted):
     def _frames(
         self, scene: Scene, times_s: Array, renderer: Renderer
     ) -> tuple[list[Array], np.ndarray]:
-        """Luminance, and instance ids [frames, h, w], at each of several instants."""
+        """Luminance, and instance ids [frames, h, w], at each of several instants.
+
+        Nothing is rendered again while nothing moves.
+        """
         width_px, height_px = self.size_px
         lens = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
-        luminances, shown = [], []
+        luminances: list[Array] = []
+        shown: list[np.ndarray] = []
+        before: Scene | None = None
         for time_s in times_s:
             then = at(scene, float(time_s))
+            if before is not None and _looks_alike(before, then, self.name):
+                luminances.append(luminances[-1])
+                shown.append(shown[-1])
+                continue
             pose = then.device(self.name).T_world_device @ RIG_AXES.inverse()
             seen = renderer.render(then, Camera(self.name, pose, lens), CHANNELS)
             luminances.append(luminance_of(seen.channels[Channel.RADIANCE]))
             shown.append(seen.channels[Channel.INSTANCE])
+            before = then
         return luminances, np.stack(shown)
+
+
+def _looks_alike(one: Scene, other: Scene, device: str) -> bool:
+    """Whether a device sees the same at two instants of a scene."""
+    falling = one.weather.rain_mm_h > 0.0 or one.weather.snow_mm_h > 0.0
+    still = one.device(device) == other.device(device) and one.lights == other.lights
+    return still and not falling and one.bodies == other.bodies

@@ -149,7 +149,7 @@ class RgbCamera(Mounted):
         photo = photograph(
             seen.channels[Channel.RADIANCE],
             seen.channels[depth],
-            camera.intrinsics.fx_px,
+            camera.intrinsics,
             seen.ev100,
             self.formation,
             rng,

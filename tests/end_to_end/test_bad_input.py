@@ -107,6 +107,72 @@ def test_unfit_mesh_exits_with_3(tmp_path: Path, name: str, content: str, text: 
     assert_refused(tmp_path, arguments, 3, text)
 
 
+def user_assets(folder: Path) -> tuple[str, ...]:
+    """Arguments of a job that puts the asset ``bad`` of a folder on the table."""
+    return (
+        "--config", "tabletop.yaml", *JOB,
+        "--set", f"assets.folders=[{folder}]",
+        "--set", "elements.clutter.assets={ids: [user/bad]}",
+    )  # fmt: skip
+
+
+TETRAHEDRON = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+
+
+@pytest.mark.parametrize(
+    ("files", "texts"),
+    [
+        (
+            {
+                "bad.obj": ("mtllib bad.mtl\nusemtl m\n" + TETRAHEDRON).encode(),
+                "bad.mtl": b"newmtl m\nmap_Kd cracked.PNG\n",
+                "cracked.PNG": b"\x89PNG\r\n\x1a\n" + bytes(range(200)),
+            },
+            ("cracked.PNG", "unreadable image", "save it again"),
+        ),
+        ({"bad.glb": b"glTF\x02\0\0\0" + bytes(range(99))}, ("bad.glb", "malformed glTF")),
+        ({"bad.usdc": b"PXR-USDC" + bytes(range(256)) * 4}, ("bad.usdc", "unreadable USD")),
+        ({"bad.usda": b"#usda 1.0\ndef Mesh {{{"}, ("bad.usda", "unreadable USD")),
+    ],
+    ids=["png", "glb", "usdc", "usda"],
+)
+def test_corrupt_files_of_assets_exit_with_3(
+    tmp_path: Path, files: dict[str, bytes], texts: tuple[str, ...]
+) -> None:
+    """A picture, a mesh, a stage: the file is named, with what to do about it."""
+    (tmp_path / "mine").mkdir()
+    for name, content in files.items():
+        (tmp_path / "mine" / name).write_bytes(content)
+    assert_refused(tmp_path, user_assets(tmp_path / "mine"), 3, *texts)
+
+
+@pytest.mark.parametrize(
+    ("line", "texts"),
+    [
+        (
+            "  - {type: materials, name: finish, roughness: 1.4}\n",
+            ("wrong.yaml:3:48:", "randomizers[0].roughness", "1.4", "[0, 1]"),
+        ),
+        (
+            "  - {type: materials, name: finish, roughness: {uniform: [-0.2, 0.5]}}\n",
+            ("wrong.yaml:3:", "randomizers[0].roughness", "-0.2"),
+        ),
+        (
+            "sensors: [{type: rgb_camera, lens: {model: brown_conrady, k1: -0.9}}]\n",
+            ("wrong.yaml:3:", "sensors[0]", "folds over inside the image"),
+        ),
+    ],
+    ids=["roughness", "range of roughness", "lens"],
+)
+def test_values_that_do_not_exist_in_nature_exit_with_2(
+    tmp_path: Path, line: str, texts: tuple[str, ...]
+) -> None:
+    """With file, line, column and field."""
+    heads = "template: tabletop\n" + ("randomizers:\n" if line.startswith("  -") else "seed: 1\n")
+    (tmp_path / "wrong.yaml").write_text(heads + line)
+    assert_refused(tmp_path, ("--config", "wrong.yaml", "--n", "1"), 2, *texts)
+
+
 def test_template_that_cannot_be_satisfied_is_rejected_with_reasons(tmp_path: Path) -> None:
     """Sixty objects cannot lie on a small table: a bounded number of attempts, then why."""
     arguments = (

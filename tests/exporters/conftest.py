@@ -287,6 +287,28 @@ def make_drive(strides: Mapping[str, int] | None = None) -> list[Sample]:
     return samples
 
 
+def make_pairs() -> tuple[DatasetInfo, list[Sample]]:
+    """The drive with disparities of its left camera; those of even columns are not hidden."""
+    samples = []
+    for sample in make_drive():
+        left = sample.capture.readings["left"]
+        focal_px = left.camera.intrinsics.fx_px
+        disparity = (focal_px * 0.54 / left.channels[Channel.Z_DEPTH]).astype(np.float32)
+        channels = {
+            **left.channels,
+            Channel.DISPARITY: disparity,
+            Channel.DISPARITY_VISIBLE: np.where(np.arange(160) % 2, 0.0, disparity),
+        }
+        readings = {**sample.capture.readings, "left": replace(left, channels=channels)}
+        samples.append(replace(sample, capture=replace(sample.capture, readings=readings)))
+    media = {
+        "left": (Channel.RGB, Channel.DISPARITY, Channel.DISPARITY_VISIBLE),
+        "right": (Channel.RGB,),
+    }
+    names = ("left", "right")
+    return make_info(8, names, ("top",), media=media, steps_per_scene=4), samples
+
+
 def frame_of(scene: Scene) -> FrameTruth:
     """A map of 40 m in which half of the ground is drivable, and boxes."""
     drivable = np.zeros((80, 80), bool)
@@ -390,6 +412,7 @@ class World:
     export = staticmethod(export)
     ego_pose = staticmethod(ego_pose)
     drive = staticmethod(make_drive)
+    pairs = staticmethod(make_pairs)
 
     def __init__(self) -> None:
         splits = ("train", "train", "val", "train", "val", "train", "train")

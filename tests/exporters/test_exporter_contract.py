@@ -17,6 +17,13 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in found}
 
 
+def given(exporter: Any, world: Any) -> tuple[Any, Any]:
+    """The seven frames; a drive with two cameras for formats of pairs."""
+    if exporter.type == "kitti_stereo":
+        return world.pairs()
+    return world.info(7, lidars=("top",)), world.samples
+
+
 @pytest.fixture(scope="module", params=TABLE.names())
 def exporter(request: pytest.FixtureRequest) -> Any:
     """One exporter with its defaults."""
@@ -31,7 +38,7 @@ def test_its_type_is_its_name_in_the_table(exporter: Any) -> None:
 
 def test_shards_can_be_written_in_any_order(exporter: Any, world: Any, tmp_path: Path) -> None:
     """Ids are computed, not counted."""
-    info, samples = world.info(7, lidars=("top",)), world.samples
+    info, samples = given(exporter, world)
 
     forwards = world.export(exporter, info, samples, tmp_path / "a")
     backwards = world.export(exporter, info, samples, tmp_path / "b", backwards=True)
@@ -42,7 +49,7 @@ def test_shards_can_be_written_in_any_order(exporter: Any, world: Any, tmp_path:
 
 def test_the_size_of_shards_leaves_no_trace(exporter: Any, world: Any, tmp_path: Path) -> None:
     """One shard or seven: the merged data set has the same bytes."""
-    info, samples = world.info(7, lidars=("top",)), world.samples
+    info, samples = given(exporter, world)
 
     one = world.export(exporter, info, samples, tmp_path / "a", shard_size=7)
     seven = world.export(exporter, info, samples, tmp_path / "b", shard_size=1)
@@ -54,7 +61,7 @@ def test_file_names_of_a_shard_depend_on_indices_only(
     exporter: Any, world: Any, tmp_path: Path
 ) -> None:
     """A shard written alone equals the same shard of the whole data set."""
-    info, samples = world.info(7, lidars=("top",)), world.samples
+    info, samples = given(exporter, world)
     world.export(exporter, info, samples, tmp_path / "all")
 
     world.export(exporter, info, samples[3:6], tmp_path / "alone")
@@ -65,7 +72,7 @@ def test_file_names_of_a_shard_depend_on_indices_only(
 
 def test_text_files_are_utf8_with_unix_line_ends(exporter: Any, world: Any, tmp_path: Path) -> None:
     """On every system."""
-    folder = world.export(exporter, world.info(7, lidars=("top",)), world.samples, tmp_path)
+    folder = world.export(exporter, *given(exporter, world), tmp_path)
 
     for name, data in files(folder).items():
         if name.endswith((".json", ".txt")):

@@ -127,14 +127,15 @@ def test_lights_glow_by_role_and_are_labelled() -> None:
 
 
 def test_beams_light_the_street_in_the_dark_only() -> None:
-    """Two spots per vehicle, just before the lenses, ahead and slightly down."""
+    """Two spots per vehicle, just before the lenses, ahead and cut off below the horizon."""
     night = lit(road(3, dark=True), headlights=Constant(False))
     beams: list[Light] = [light for light in night.lights if light.kind == "spot"]
 
     assert len(beams) == 6
     for beam in beams:
         assert beam.direction[1] > 0.98
-        assert -0.2 < beam.direction[2] < 0.0
+        assert abs(beam.direction[2]) < 0.02
+        assert 0.01 <= beam.cutoff <= 0.015
         assert beam.position_m[1] == pytest.approx(2.26)
     assert dict(night.instances[0].attributes)["head_lights"] == "on"
     without = replace(night, lights=())

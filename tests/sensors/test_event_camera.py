@@ -15,7 +15,7 @@ from generator.core.errors import ConfigError
 from generator.core.instants import at, with_placed_sensors
 from generator.core.interfaces import Renderer
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera, Scene
+from generator.core.scene import Camera, Scene, Weather
 from generator.core.se3 import SE3
 from generator.sensors.event_camera import EventCamera
 from generator.sensors.event_pixels import (
@@ -25,8 +25,9 @@ from generator.sensors.event_pixels import (
     logarithm_of,
     luminance_of,
     noise_events,
+    order_of,
 )
-from tests.sensors.streetcar import BoxRays, rng, world
+from tests.sensors.streetcar import BoxRays, rng, straight, world
 
 SIZE_PX = (16, 8)
 QUIET = {"leak_hz": 0.0, "shot_noise_hz": 0.0, "refractory_s": 0.0, "size_px": SIZE_PX}
@@ -180,6 +181,24 @@ def test_every_reading_sees_its_first_and_last_instant() -> None:
     seen(EventCamera(rig="ego", size_px=SIZE_PX, frames_per_step=3), film, 1)
 
     assert film.frames == 4
+
+
+def test_nothing_is_rendered_again_while_nothing_moves() -> None:
+    """Before a parked car one image is enough, unless rain falls; noise goes on."""
+    parked = world(ego=straight((0.0, 0.0), (0.0, 0.0)))
+    sensor = EventCamera(rig="ego", size_px=SIZE_PX, shot_noise_hz=20.0)
+    dry, wet = Film(lambda t: 0.5), Film(lambda t: 0.5)
+
+    assert len(seen(sensor, dry, 2, parked).rows) > 10
+    seen(sensor, wet, 2, replace(parked, weather=Weather(rain_mm_h=5.0)))
+    assert (dry.frames, wet.frames) == (1, 6)
+
+
+def test_orders_are_stable_for_any_whole_numbers() -> None:
+    """As numpy's own stable sort, also of numbers of more than 16 bits and below 0."""
+    draws = rng().integers(-(2**40), 2**40, 500)
+    for numbers in (draws, draws >> 38, draws % 70_000, draws[:0], np.zeros(3, int)):
+        assert np.array_equal(order_of(numbers), np.argsort(numbers, kind="stable"))
 
 
 def test_darkness_hides_contrast() -> None:

@@ -6,11 +6,14 @@ import json
 import math
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from generator.config.distributions import Constant
+from generator.core.intrinsics import Intrinsics
+from generator.core.lens import Lens
 from generator.core.streams import Rng, Streams
 from generator.sensors.cameras import camera_names
 from generator.sensors.formation import development, optics
@@ -18,6 +21,7 @@ from generator.sensors.formation.chain import Formation, Shutter, exposure_for, 
 from generator.sensors.formation.photosites import Pattern, Photosites, exposed, mosaic
 
 FAR = np.full((48, 64), np.inf)
+EYE = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
 PATTERNS: tuple[Pattern, ...] = ("rggb", "bggr", "grbg", "gbrg")
 
 
@@ -111,18 +115,71 @@ def test_demosaicing_gives_flat_colours_back(pattern: Pattern, method: Any) -> N
     np.testing.assert_allclose(image[4:-4, 4:-4], flat(0.8, 0.4, 0.1)[4:-4, 4:-4], atol=2e-4)
 
 
+def eye(lens: Lens, focal_px: float, width_px: int = 401) -> Intrinsics:
+    """A camera whose axis meets the middle of pixel (50, 200)."""
+    return Intrinsics(width_px, 101, focal_px, focal_px, 200.5, 50.5, lens)
+
+
 def test_light_falls_off_with_the_fourth_power_of_the_cosine() -> None:
-    """At a pixel 30 degrees off the axis: cos(30 deg)^4 = 9/16."""
-    image = flat(1.0, 1.0, 1.0, shape=(101, 401))
+    """At a pixel 30 degrees off the axis: cos(30 deg)^4 = 9/16; the axis may be anywhere."""
     focal_px = 150.0 / math.tan(math.radians(30.0))
-    dark = optics.vignetted(image, focal_px, natural=True, corner_loss=0.0)
-    assert dark[50, 200, 0] == pytest.approx(1.0)
-    assert dark[50, 350, 0] == pytest.approx(9.0 / 16.0, rel=1e-4)
+    for width_px in (401, 380):
+        light = optics.natural_falloff(eye(Lens(), focal_px, width_px), 0.0)
+        assert light[50, 200] == pytest.approx(1.0)
+        assert light[50, 350] == pytest.approx(9.0 / 16.0, rel=1e-4)
+
+
+def test_bent_images_are_as_bright_as_their_own_rays_say() -> None:
+    """OpenCV's point for 30 degrees through a barrel: the same 9/16, farther in."""
+    k = (-0.2, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    K = np.array([[300.0, 0, 200.0], [0, 300.0, 50.0], [0, 0, 1]])
+    ahead = np.array([[[math.tan(math.radians(30.0)), 0.0, 1.0]]])
+    ((x, y),) = cv2.projectPoints(ahead, np.zeros(3), np.zeros(3), K, np.array(k))[0][0]
+    light = optics.natural_falloff(eye(Lens("brown_conrady", k), 300.0), 0.0)
+
+    assert x < 200.0 + 300.0 * math.tan(math.radians(30.0)) - 5.0
+    assert np.interp(x, np.arange(401), light[round(y)]) == pytest.approx(9.0 / 16.0, rel=1e-4)
+
+
+def test_fisheyes_fall_off_by_how_their_edge_is_squeezed() -> None:
+    """Solid angle per area, by differences of OpenCV's fisheye; 2 / pi at 90 degrees if even."""
+    even = optics.natural_falloff(eye(Lens("kannala_brandt", (0.0,) * 4), 360.0 / math.pi), 0.0)
+    assert even[50, 380] == pytest.approx(2.0 / math.pi, rel=1e-3)
+
+    k = (0.05, -0.01, 0.002, 0.0)
+    degrees = np.array([20.0, 45.0, 70.0, 85.0])
+
+    def radius(theta: np.ndarray) -> np.ndarray:
+        ahead = np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], -1)[None]
+        # OpenCV divides by z; a direction is enough.
+        return cv2.fisheye.projectPoints(
+            ahead, np.zeros(3), np.zeros(3), np.eye(3), np.array(k)
+        )[0][0, :, 0]  # fmt: skip
+
+    theta, small = np.radians(degrees), 1e-4
+    r = radius(theta)
+    area = (radius(theta + small) ** 2 - radius(theta - small) ** 2) / 2.0
+    solid = np.cos(theta - small) - np.cos(theta + small)
+    focal_px = 110.0
+    for power in (0.0, 1.0):
+        light = optics.natural_falloff(eye(Lens("kannala_brandt", k), focal_px), power)
+        seen = np.interp(200.0 + focal_px * r, np.arange(401), light[50])
+        np.testing.assert_allclose(seen, solid / area * np.cos(theta) ** power, rtol=2e-3)
+
+
+def test_what_a_lens_does_not_show_has_no_light_and_panoramas_are_even() -> None:
+    """A fisheye of 100 degrees in a wide image: dark beyond; nothing is NaN."""
+    lens = Lens("kannala_brandt", (0.0,) * 4, half_field_rad=math.radians(50.0))
+    light = optics.natural_falloff(eye(lens, 110.0), 0.0)
+    assert (light[50, [0, 400]] == 0.0).all()
+    assert light[50, 200] == pytest.approx(1.0)
+    panorama = Intrinsics(64, 32, 64 / math.tau, 64 / math.tau, 32.0, 16.0, Lens("equirectangular"))
+    assert (optics.natural_falloff(panorama, 0.0) == 1.0).all()
 
 
 def test_corners_lose_the_share_that_was_asked_for() -> None:
     """Half the light at the very corner."""
-    dark = optics.vignetted(flat(1.0, 1.0, 1.0), 50.0, natural=False, corner_loss=0.5)
+    dark = optics.vignetted(flat(1.0, 1.0, 1.0), 0.5)
     assert dark[0, 0, 1] == pytest.approx(0.5, abs=0.03)
     assert dark[24, 32, 1] == pytest.approx(1.0, abs=0.001)
 
@@ -208,7 +265,7 @@ def test_grey_stays_grey_through_matrix_and_mosaic() -> None:
         tone="linear",
     )
     luminance = flat(0.5, 0.5, 0.5) * 1.2 * 2.0**8
-    photo = photograph(luminance.astype(np.float32), FAR, 60.0, 8.0, formation, rng())
+    photo = photograph(luminance.astype(np.float32), FAR, EYE, 8.0, formation, rng())
     assert np.abs(photo.astype(int) - 128).max() <= 1
 
 
@@ -216,7 +273,7 @@ def test_an_ideal_camera_shows_luminance_by_its_curve() -> None:
     """IEC 61966-2-1: a quarter of white is byte 137."""
     luminance = (flat(0.25, 0.25, 0.25) * 1.2 * 2.0**8).astype(np.float32)
     formation = made(tone="srgb", shutter={"time_s": [1e-6, 10.0]})
-    photo = photograph(luminance, FAR, 60.0, 8.0, formation, rng())
+    photo = photograph(luminance, FAR, EYE, 8.0, formation, rng())
     assert (photo == 137).all()
 
 
@@ -225,10 +282,8 @@ def test_white_balance_takes_out_the_light_of_a_lamp() -> None:
     random = Streams(seed=1, scene=0).rng("patches").random((48, 64, 1))
     scene = (random * np.array([0.8, 0.5, 0.2]) * 1.2 * 2.0**8).astype(np.float32)
     wide = {"time_s": [1e-6, 10.0]}
-    grey = photograph(
-        scene, FAR, 60.0, 8.0, made(white_balance=1, tone="srgb", shutter=wide), rng()
-    )
-    plain = photograph(scene, FAR, 60.0, 8.0, made(tone="srgb", shutter=wide), rng())
+    grey = photograph(scene, FAR, EYE, 8.0, made(white_balance=1, tone="srgb", shutter=wide), rng())
+    plain = photograph(scene, FAR, EYE, 8.0, made(tone="srgb", shutter=wide), rng())
     balanced = grey.reshape(-1, 3).mean(axis=0)
     assert np.ptp(balanced) < 6.0
     assert np.ptp(plain.reshape(-1, 3).mean(axis=0)) > 60.0
@@ -250,9 +305,9 @@ def test_every_preset_takes_the_same_picture_twice(name: str) -> None:
     formation = made(preset=name)
     luminance = flat(40.0, 45.0, 50.0)
     depth = np.full((48, 64), 2.0)
-    one = photograph(luminance, depth, 60.0, 8.0, formation, rng())
-    two = photograph(luminance, depth, 60.0, 8.0, formation, rng())
-    other = photograph(luminance, depth, 60.0, 8.0, formation, rng("another"))
+    one = photograph(luminance, depth, EYE, 8.0, formation, rng())
+    two = photograph(luminance, depth, EYE, 8.0, formation, rng())
+    other = photograph(luminance, depth, EYE, 8.0, formation, rng("another"))
     assert one.shape == (48, 64, 3)
     assert (one == two).all()
     assert (one != other).any()

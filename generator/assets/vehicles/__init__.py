@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from generator.assets.procedural.family import Family, Lazy
+from generator.assets.procedural.family import Family, Lazy, TextureFamily
 
 
 def _vehicle(name: str, variants: int, mass_kg: float, module: str, **parameters: object) -> Family:
@@ -17,7 +17,7 @@ def _vehicle(name: str, variants: int, mass_kg: float, module: str, **parameters
         variants=variants,
         mass_kg=mass_kg,
         stackable=False,
-        version=3,
+        version=4,
         parameters=parameters,
         build=Lazy(path),
         facts=Lazy(f"{path}_facts"),
@@ -34,5 +34,16 @@ FAMILIES: Mapping[str, Family] = {
         _vehicle("motorcycle", 12, 200.0, "motorcycle"),
         _vehicle("bicycle", 12, 15.0, "bicycle"),
         _vehicle("cyclist", 16, 90.0, "bicycle"),
+    )
+}
+
+TEXTURES: Mapping[str, TextureFamily] = {
+    "licence_plate": TextureFamily(
+        "licence_plate",
+        ("printed",),
+        12,
+        1,
+        Lazy(f"{__name__}.plates:licence_plate"),
+        {"rows": 1},
     )
 }

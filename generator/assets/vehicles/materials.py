@@ -8,6 +8,7 @@ import numpy as np
 
 from generator.assets.procedural.draw import between
 from generator.assets.procedural.materials import linear
+from generator.assets.vehicles import plates
 from generator.core.geometry import Material
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
@@ -56,15 +57,20 @@ def drawn_paint(rng: Rng) -> Vec3:
 
 
 def materials(
-    rng: Rng, paint: Vec3, second: Vec3 = (0.8, 0.8, 0.78), clothes: tuple[Vec3, ...] = ()
+    rng: Rng,
+    paint: Vec3,
+    second: Vec3 = (0.8, 0.8, 0.78),
+    clothes: tuple[Vec3, ...] = (),
+    plate_rows: int = 1,
 ) -> tuple[Material, ...]:
     """One material per slot; colours are linear RGB.
 
     Args:
-        rng: Draws gloss and tint.
+        rng: Draws gloss, tint and licence plate.
         paint: Colour of the body.
         second: Colour of the load box, or a stripe.
         clothes: Skin, top, bottom, shoes and helmet of a rider.
+        plate_rows: Of the licence plate.
     """
     tint = between(0.015, 0.035, rng)
     rim = between(0.35, 0.75, rng) if rng.random() < 0.75 else 0.04
@@ -81,7 +87,7 @@ def materials(
         _lens((0.42, 0.012, 0.014), "brakelight"),
         _lens((0.72, 0.3, 0.05), "indicator_left"),
         _lens((0.72, 0.3, 0.05), "indicator_right"),
-        Material((0.75, 0.75, 0.7), 0.4, role="plate"),
+        _plate(rng, plate_rows),
         Material((0.75, 0.76, 0.77), 0.15, 1.0, role="chrome"),
         Material(second, 0.35, role="paint"),
         Material(skin, 0.5, role="skin"),
@@ -90,6 +96,12 @@ def materials(
         Material(shoes, 0.6, role="shoes"),
         Material(helmet, 0.3, role="trim"),
     )
+
+
+def _plate(rng: Rng, rows: int) -> Material:
+    seed = int(rng.random() * plates.SEEDS)
+    texture = plates.plate_id(seed, rows)
+    return Material((0.9, 0.9, 0.9), 0.4, texture=texture, printed=True, role="plate")
 
 
 def _lens(color: Vec3, role: str) -> Material:

@@ -62,7 +62,7 @@ def motorcycle(seed: int) -> Solid:
     if ridden:
         parts += people.rider(_seat(build), rng)
     paint = linear(pick(_PAINTS, rng))
-    finish = materials(rng, paint, clothes=people.drawn_clothes(rng))
+    finish = materials(rng, paint, clothes=people.drawn_clothes(rng), plate_rows=2)
     reach = build.axle + build.wheel_m
     hull = [
         hulls.box((-reach, -0.12, 0.0), (reach, 0.12, 0.75)),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from generator.assets.procedural.mesh import Array, Patch, joined
 from generator.assets.procedural.shapes import Point2, grid, spline
+from generator.assets.vehicles.materials import Slot
 
 Curve = Callable[[Array], Array]
 Mask = NDArray[np.bool_]
@@ -240,8 +241,9 @@ def whole(half: Patch, swaps: Sequence[tuple[int, int]] = ()) -> Patch:
 
 
 def unmapped(patch: Patch) -> Patch:
-    """The patch without texture coordinates."""
-    return replace(patch, uvs=np.zeros_like(patch.uvs))
+    """The patch without texture coordinates, but for those of licence plates."""
+    printed = (patch.slots == Slot.PLATE)[:, None, None]
+    return replace(patch, uvs=np.where(printed, patch.uvs, 0.0))
 
 
 def _along(across: Array, exponents: Point2) -> Array:

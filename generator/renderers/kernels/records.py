@@ -180,6 +180,7 @@ class Lamp:
         radius: Of the ball or the disk, or of the circle around the rectangle [m], or tangent of
             the sun's angular radius.
         cos_outer, cos_inner: Where a spot has faded to nothing, and where it begins to fade.
+        cutoff: Slope below which a dipped headlight lights the road; 0 = no such light.
     """
 
     kind: int
@@ -192,6 +193,7 @@ class Lamp:
     radius: float
     cos_outer: float
     cos_inner: float
+    cutoff: float
 
 
 @wp.struct

@@ -21,6 +21,7 @@ from generator.config.distributions import (
 )
 from generator.config.strict import Strict
 from generator.core.geometry import Float32
+from generator.core.intrinsics import Intrinsics
 from generator.core.streams import Rng
 from generator.sensors.cameras import camera_preset
 from generator.sensors.formation import development, optics
@@ -72,7 +73,10 @@ class Formation(Strict):
         flare: Share of what is far beyond white that returns as ghosts.
         bloom: Share of the light that is scattered around bright spots.
         chromatic_aberration_px: Between red and blue images and the green one, at the corners.
-        natural_vignetting: Whether light falls off with the fourth power of the cosine.
+        natural_vignetting: Whether light falls off with the angle to the axis: with the fourth
+            power of its cosine, and as ``fisheye_pupil`` says before a fisheye.
+        fisheye_pupil: Power of the cosine by which a fisheye's pupil is foreshortened: 0 turns to
+            the light, 1 is flat.
         vignetting: Share of the light that the barrel takes at the corners.
         shutter: Aperture, times and gains.
         exposure_error_ev: What metering gets wrong; positive is brighter.
@@ -94,6 +98,7 @@ class Formation(Strict):
     bloom: UnitInterval = NONE
     chromatic_aberration_px: Scalar = NONE
     natural_vignetting: bool = False
+    fisheye_pupil: float = Field(0.0, ge=0, le=1)
     vignetting: UnitInterval = NONE
     shutter: Shutter = Shutter()
     exposure_error_ev: Annotated[Scalar, Bounds(-8, 8)] = NONE
@@ -176,7 +181,7 @@ def exposure_for(ev100: float, shutter: Shutter) -> Exposed:
 def photograph(
     luminance: Float32,
     z_m: NDArray[np.floating],
-    focal_px: float,
+    camera: Intrinsics,
     metered_ev100: float,
     formation: Formation,
     rng: Rng,
@@ -187,7 +192,7 @@ def photograph(
         luminance: Linear Rec. 709 colours [cd/m^2], float32 [h, w, 3].
         z_m: Along the optical axis or, before a lens that is no pinhole, along the ray [m], [h, w];
             inf = nothing. Read only for depth of field.
-        focal_px: Focal length of the lens.
+        camera: What its lens does to angles.
         metered_ev100: What the camera's meter says.
         formation: The camera.
         rng: Draws what varies, and noise.
@@ -195,7 +200,7 @@ def photograph(
     metered = metered_ev100 - formation.exposure_error_ev.draw(rng)
     exposure = exposure_for(metered, formation.shutter)
     white = 1.2 * 2.0**exposure.ev100
-    image = _through_lens(luminance, z_m, focal_px, white, formation, rng)
+    image = _through_lens(luminance, z_m, camera, white, formation, rng)
     image = image * np.float32(1.0 / white)
     camera_from_srgb, srgb_from_camera = _color_matrices(formation)
     image = image @ camera_from_srgb.T
@@ -212,14 +217,14 @@ def photograph(
 def _through_lens(
     image: Float32,
     z_m: NDArray[np.floating],
-    focal_px: float,
+    camera: Intrinsics,
     white: float,
     formation: Formation,
     rng: Rng,
 ) -> Float32:
     if formation.focus is not None:
         focus = formation.focus
-        focal_m = focal_px * focus.pixel_um * 1e-6
+        focal_m = camera.fx_px * focus.pixel_um * 1e-6
         at_m = _centre_m(z_m) if focus.distance_m is None else focus.distance_m.draw(rng)
         radius = optics.blur_radius_px(
             z_m, max(at_m, 2.0 * focal_m), focal_m, formation.shutter.f_number,
@@ -235,8 +240,10 @@ def _through_lens(
         image = optics.bloomed(image, bloom)
     if aberration_px != 0.0:
         image = optics.with_chromatic_aberration(image, aberration_px)
-    if loss > 0.0 or formation.natural_vignetting:
-        image = optics.vignetted(image, focal_px, formation.natural_vignetting, loss)
+    if loss > 0.0:
+        image = optics.vignetted(image, loss)
+    if formation.natural_vignetting:
+        image = image * optics.natural_falloff(camera, formation.fisheye_pupil)[..., None]
     return image
 
 

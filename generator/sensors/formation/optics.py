@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from generator.core.geometry import Float32
+from generator.core.intrinsics import Intrinsics
+from generator.core.se3 import Array
 
 _BLUR_LEVELS = (0.0, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0)
 """Radii of the layers between which a defocused image is composed [px]."""
@@ -59,25 +62,64 @@ def defocused(image: Float32, radius_px: Float32) -> Float32:
     return np.asarray(out / np.maximum(weight, 1e-4)[..., None], np.float32)
 
 
-def vignetted(image: Float32, focal_px: float, natural: bool, corner_loss: float) -> Float32:
-    """Darker towards the corners.
+def vignetted(image: Float32, corner_loss: float) -> Float32:
+    """Darker towards the corners, where the barrel takes light away.
 
     Args:
         image: What to darken.
-        focal_px: Focal length.
-        natural: Whether light falls off with the fourth power of the cosine, as geometry asks.
-        corner_loss: Share that the barrel takes away at the corners, growing with the square of
-            the distance (Goldman, "Vignette and exposure calibration and compensation", 2010).
+        corner_loss: Share that is lost at the corners, growing with the square of the distance
+            (Goldman, "Vignette and exposure calibration and compensation", 2010).
     """
     height, width = image.shape[:2]
     x = np.arange(width, dtype=np.float32) + np.float32(0.5 - 0.5 * width)
     y = np.arange(height, dtype=np.float32) + np.float32(0.5 - 0.5 * height)
     r2 = x[None, :] ** 2 + y[:, None] ** 2
     gain = 1.0 - corner_loss * r2 / (0.25 * (width * width + height * height))
-    if natural:
-        cos2 = 1.0 / (1.0 + r2 / (focal_px * focal_px))
-        gain = gain * cos2 * cos2
     return np.asarray(image * gain[..., None].astype(np.float32), np.float32)
+
+
+def natural_falloff(camera: Intrinsics, pupil_power: float) -> Float32:
+    """Light at every pixel for the same luminance everywhere, float32 [h, w]; 1 on the axis.
+
+    A flat pupil is foreshortened by the cosine of the angle to the axis, and a plane image
+    stretched by its third power: together the fourth power, of the angle of the pixel's own ray.
+    A fisheye squeezes its edge, r(theta), and so makes it brighter: what remains is the pupil's
+    power of the cosine times ``sin(theta) / (r r')``, 2 / pi at 90 degrees if r is theta.
+    Panoramas are made of many images, and even. 0 where the lens shows nothing.
+
+    Args:
+        camera: Lens and all.
+        pupil_power: Of a fisheye's pupil: 1 is flat, 0 turns to the light, as most of them do
+            (Kumler and Bauer, "Fish-eye lens designs and their relative performance", 2000).
+    """
+    model = camera.lens.model
+    if model == "equirectangular":
+        return np.ones((camera.height_px, camera.width_px), np.float32)
+    if model == "pinhole":
+        x = (np.arange(camera.width_px) + 0.5 - camera.cx_px) / camera.fx_px
+        y = (np.arange(camera.height_px) + 0.5 - camera.cy_px) / camera.fy_px
+        cos2 = 1.0 / (1.0 + x[None, :] ** 2 + y[:, None] ** 2)
+        return (cos2 * cos2).astype(np.float32)
+    cosine = camera.pixel_rays()[..., 2]
+    if model == "brown_conrady":
+        falloff = np.maximum(cosine, 0.0) ** 4
+    else:
+        falloff = _squeezed(cosine, camera.lens.coefficients)
+        falloff = falloff * np.maximum(cosine, 0.0) ** pupil_power if pupil_power > 0 else falloff
+    return np.nan_to_num(falloff, nan=0.0).astype(np.float32)
+
+
+def _squeezed(cosine: Array, coefficients: Sequence[float]) -> Array:
+    """``sin(theta) / (r r')`` for Kannala and Brandt's ``r = theta + k1 theta^3 + ...``."""
+    theta = np.arccos(np.clip(cosine, -1.0, 1.0))
+    square = theta * theta
+    ratio, slope, power = np.ones_like(theta), np.ones_like(theta), square
+    for k, coefficient in enumerate(coefficients, start=1):
+        ratio = ratio + coefficient * power
+        slope = slope + (2 * k + 1) * coefficient * power
+        power = power * square
+    squeezed: Array = np.sinc(theta / np.pi) / (ratio * slope)
+    return squeezed
 
 
 def with_chromatic_aberration(image: Float32, corner_px: float) -> Float32:

@@ -1,0 +1,174 @@
+"""KITTI's stereo and flow benchmark of 2015: rectified pairs of images with disparities.
+
+::
+
+    training/image_2/000012_10.png      left colour image       000012_11.png  of the next step
+    training/image_3/000012_10.png      right colour image      000012_11.png  of the next step
+    training/disp_occ_0/000012_10.png   disparity of every pixel of image_2
+    training/disp_noc_0/000012_10.png   the same where image_3 shows the point too
+    training/calib_cam_to_cam/000012.txt
+    ImageSets/{train,val,test}.txt      frame names             README.txt
+
+* **Disparities** are 16-bit grey PNG: pixels times 256, 0 = none. They are exact, of the pixel's
+  centre; the point is in image_3 at x minus disparity.
+* **Frames** are named by sample; the next step is there where the sequence has one.
+* **Calibration** is as in KITTI's raw data: ``P_rect_03`` has minus focal length times baseline.
+
+Reference: Menze and Geiger, "Object Scene Flow for Autonomous Vehicles", CVPR 2015; its devkit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+from exporters.images import link_or_copy
+from exporters.kitti_raw import cameras_text
+from exporters.sensors import pinhole_camera, rgb_cameras
+from exporters.sequences import (
+    Frame,
+    camera_mount,
+    frame_facts,
+    read_sequences,
+    write_frames,
+    write_text,
+)
+from generator.config.strict import Strict
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.interfaces import DatasetInfo, media_path
+from generator.core.sample import Sample
+from generator.core.stereo import baseline_m
+
+FRAMES_MAX = 1_000_000
+"""Frame names have six digits."""
+SPLITS = ("train", "val", "test")
+LABELS = {Channel.DISPARITY: "disp_occ_0", Channel.DISPARITY_VISIBLE: "disp_noc_0"}
+"""Folders of the left camera's channels."""
+
+
+class KittiStereo(Strict):
+    """KITTI's stereo benchmark: pairs of colour images, and the left one's disparities."""
+
+    type: Literal["kitti_stereo"] = "kitti_stereo"
+    left: str = ""
+    """Sensor that is image_2; empty = the first one, by name, that writes disparities."""
+    right: str = ""
+    """Sensor that is image_3; empty = the only other one that writes the rgb channel."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators whose fields it reads: none."""
+        return frozenset()
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set that this format cannot hold.
+
+        Raises:
+            ConfigError: there is no pair of cameras, one is no pinhole, or there are too many
+                samples.
+        """
+        self._pair(info)
+        if info.n > FRAMES_MAX:
+            raise ConfigError(
+                f"exporter '{self.type}': frame names have six digits, {info.n} samples do not "
+                f"fit; make at most {FRAMES_MAX} samples"
+            )
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write the calibration of each pair, and a line about it.
+
+        Raises:
+            ConfigError: see ``check``, or the images are not rectified.
+        """
+        self.check(info)
+        pair = self._pair(info)
+        rows = []
+        for sample in samples:
+            if all(name in sample.truth for name in pair.values()):
+                text = self._calibration(sample, pair)
+                path = shard_dir / self.type / f"calib_cam_to_cam/{sample.index:06d}.txt"
+                write_text(path, text)
+                rows.append(frame_facts(info, sample))
+        write_frames(shard_dir / self.type, rows)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link all files of the shards into one tree and list the frames of each split."""
+        pair = self._pair(info)
+        frames_of: dict[str, list[str]] = {split: [] for split in SPLITS}
+        for frames in read_sequences(shard_dirs, self.type).values():
+            followers = {frame.index - 1: frame for frame in frames}
+            for frame in frames:
+                frames_of.setdefault(frame.row["split"], []).append(f"{frame.index:06d}\n")
+                links = self._links(info, pair, frame, followers.get(frame.index))
+                for source, target in links:
+                    link_or_copy(source, dataset_dir / "training" / target)
+        for split, names in frames_of.items():
+            write_text(dataset_dir / f"ImageSets/{split}.txt", "".join(names))
+        readme = _README.format(name=info.name, left=pair["02"], right=pair["03"])
+        write_text(dataset_dir / "README.txt", readme)
+
+    def _pair(self, info: DatasetInfo) -> dict[str, str]:
+        """Sensors by KITTI's numbers."""
+        known = rgb_cameras(info)
+        matched = [name for name in known if Channel.DISPARITY in info.media[name]]
+        left = self.left or (matched[0] if matched else "")
+        if left not in matched:
+            raise ConfigError(
+                f"exporter '{self.type}': camera '{left}' does not write the channels rgb and "
+                "disparity; add both to its channels and name its partner with stereo_with"
+            )
+        others = [name for name in known if name != left]
+        right = self.right or (others[0] if len(others) == 1 else "")
+        if right not in others:
+            raise ConfigError(
+                f"exporter '{self.type}': right: '{right}' is no other camera that writes the rgb "
+                f"channel; expected one of: {', '.join(others) or 'none'}"
+            )
+        return {
+            "02": pinhole_camera(info, left, self.type),
+            "03": pinhole_camera(info, right, self.type),
+        }
+
+    def _calibration(self, sample: Sample, pair: Mapping[str, str]) -> str:
+        left, right = (sample.scene.camera(pair[number]) for number in ("02", "03"))
+        try:
+            baseline_m(left, right)
+        except ValueError as error:
+            raise ConfigError(
+                f"exporter '{self.type}': cameras '{left.name}' and '{right.name}' are no "
+                f"rectified pair: {error}"
+            ) from error
+        reference = camera_mount(sample.scene, left.name)
+        return cameras_text(sample.scene, pair, reference, self.type)
+
+    def _links(
+        self, info: DatasetInfo, pair: Mapping[str, str], frame: Frame, follower: Frame | None
+    ) -> Iterator[tuple[Path, str]]:
+        """Files of one frame, each with its place under ``training``."""
+        name = f"{frame.index:06d}"
+        calibration = f"calib_cam_to_cam/{name}.txt"
+        yield frame.shard_dir / self.type / calibration, calibration
+        for number, camera in pair.items():
+            for suffix, shown in (("10", frame), ("11", follower)):
+                if shown is not None:
+                    source = media_path(shown.shard_dir, camera, Channel.RGB, shown.index)
+                    yield source, f"image_{int(number)}/{name}_{suffix}.png"
+        for channel, folder in LABELS.items():
+            if channel in info.media[pair["02"]]:
+                source = media_path(frame.shard_dir, pair["02"], channel, frame.index)
+                yield source, f"{folder}/{name}_10.png"
+
+
+_README = """\
+{name}: format of KITTI's stereo benchmark of 2015, sensors '{left}' and '{right}'
+
+training/   All frames; ImageSets/*.txt say which split each belongs to.
+image_2     RGB of '{left}'; _11 is the next step, where there is one.
+image_3     RGB of '{right}'.
+disp_occ_0  Disparity of image_2, 16-bit: pixels = value / 256; 0 = none, or 256 and more.
+disp_noc_0  The same where image_3 shows the point too. Present if the data set keeps it.
+calib_cam_to_cam  As in KITTI's raw data, pixel centres at whole numbers; the images are rectified:
+            P_rect_03 has minus focal length times baseline in its first row, last column.
+"""

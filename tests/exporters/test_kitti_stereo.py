@@ -1,0 +1,129 @@
+"""KITTI's stereo benchmark, read as its devkit reads it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from exporters.kitti_stereo import KittiStereo
+from generator.core.capture import Channel
+from generator.core.errors import ConfigError
+from generator.core.se3 import SE3
+
+BASELINE_M = 0.54
+
+
+def read_disparity(path: Path) -> np.ndarray:
+    """As ``io_disp.h`` of the devkit: value / 256, -1 where the value is 0."""
+    raw = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert raw.dtype == np.uint16
+    return np.where(raw == 0, -1.0, raw / 256.0)
+
+
+def read_calibration(path: Path) -> dict[str, np.ndarray]:
+    """``name: numbers`` lines; the first is a date."""
+    lines = path.read_text().splitlines()[1:]
+    return {k: np.array(v.split(), float) for k, v in (line.split(": ") for line in lines)}
+
+
+@pytest.fixture(scope="module")
+def tree(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The drive of two sequences with four steps each, exported."""
+    info, samples = world.pairs()
+    root: Path = world.export(KittiStereo(), info, samples, tmp_path_factory.mktemp("stereo"))
+    return root
+
+
+def test_disparities_are_those_of_depth(tree: Path, world: Any) -> None:
+    """Focal length times baseline over depth, to half of 1/256 px."""
+    _, samples = world.pairs()
+    for sample in samples:
+        left = sample.capture.readings["left"]
+        exact = left.camera.intrinsics.fx_px * BASELINE_M / left.channels[Channel.Z_DEPTH]
+        read = read_disparity(tree / f"training/disp_occ_0/{sample.index:06d}_10.png")
+        there = exact > 0.0
+        assert (read[~there] == -1.0).all()
+        assert np.abs(read[there] - exact[there]).max() <= 0.5 / 256.0 + 1e-6
+        visible = read_disparity(tree / f"training/disp_noc_0/{sample.index:06d}_10.png")
+        assert (visible[:, 1::2] == -1.0).all()
+        assert np.array_equal(visible[:, ::2], read[:, ::2])
+
+
+def test_points_are_in_the_right_image_at_x_minus_disparity(tree: Path, world: Any) -> None:
+    """Reprojected by the calibration files alone, as users of the format do."""
+    _, samples = world.pairs()
+    right = samples[0].scene.camera("right")
+    T_right_left = right.T_world_camera.inverse() @ samples[0].scene.camera("left").T_world_camera
+    calibration = read_calibration(tree / "training/calib_cam_to_cam/000000.txt")
+    P2, P3 = (calibration[f"P_rect_{k}"].reshape(3, 4) for k in ("02", "03"))
+    focal_baseline = P2[0, 3] - P3[0, 3]
+    disparity = read_disparity(tree / "training/disp_occ_0/000000_10.png")
+    rows, columns = np.nonzero(disparity > 2.0)
+    z = focal_baseline / disparity[rows, columns]
+    x = (columns - P2[0, 2]) / P2[0, 0] * z
+    y = (rows - P2[1, 2]) / P2[1, 1] * z
+    # Our own pixel coordinates have centres at i + 0.5.
+    seen = right.intrinsics.project(T_right_left.apply(np.stack([x, y, z], -1))) - 0.5
+
+    assert focal_baseline == pytest.approx(P2[0, 0] * BASELINE_M)
+    assert len(rows) > 1000
+    assert np.abs(seen[:, 0] - (columns - disparity[rows, columns])).max() < 1e-6
+    assert np.abs(seen[:, 1] - rows).max() < 1e-6
+
+
+def test_every_frame_has_both_images_and_those_of_the_next_step(tree: Path) -> None:
+    """The last step of a sequence has none; _11 of one frame is _10 of the next."""
+    for folder in ("image_2", "image_3"):
+        names = {p.name for p in (tree / "training" / folder).iterdir()}
+        following = {f"{k:06d}_11.png" for k in (0, 1, 2, 4, 5, 6)}
+        assert names == {f"{k:06d}_10.png" for k in range(8)} | following
+        first, second = (
+            (tree / "training" / folder / name).read_bytes()
+            for name in ("000000_11.png", "000001_10.png")
+        )
+        assert first == second
+
+
+def test_splits_list_frames_by_name(tree: Path) -> None:
+    """The first sequence is for training, the second for validation."""
+    listed = {k: (tree / f"ImageSets/{k}.txt").read_text().split() for k in ("train", "val")}
+
+    assert listed == {
+        "train": [f"{k:06d}" for k in range(4)],
+        "val": [f"{k:06d}" for k in range(4, 8)],
+    }
+
+
+def test_data_sets_without_a_pair_are_refused(world: Any) -> None:
+    """No disparity, no partner, two partners, a fisheye."""
+    info, _ = world.pairs()
+    with pytest.raises(ConfigError, match=r"camera '' does not write .*disparity"):
+        KittiStereo().check(world.info(4))
+    with pytest.raises(ConfigError, match=r"right: '' is no other camera .*one of: none"):
+        KittiStereo().check(replace(info, sensors=("left",)))
+    three = replace(
+        info, sensors=("left", "rear", "right"), media={**info.media, "rear": (Channel.RGB,)}
+    )
+    with pytest.raises(ConfigError, match="expected one of: rear, right"):
+        KittiStereo().check(three)
+    KittiStereo(right="right").check(three)
+    with pytest.raises(ConfigError, match="'right' has a lens of the model"):
+        KittiStereo().check(replace(info, lenses={"right": "brown_conrady"}))
+
+
+def test_cameras_that_are_not_beside_each_other_are_refused(world: Any, tmp_path: Path) -> None:
+    """One a hand higher than the other: rows do not match."""
+    info, samples = world.pairs()
+    scene = samples[0].scene
+    low = scene.camera("right")
+    high = replace(low, T_world_camera=low.T_world_camera @ SE3((0.0, -0.1, 0.0)))
+    cameras = tuple(high if c.name == "right" else c for c in scene.cameras)
+    wrong = replace(samples[0], scene=replace(scene, cameras=cameras))
+
+    with pytest.raises(ConfigError, match=r"'left' and 'right' are no rectified pair: .*below"):
+        world.export(KittiStereo(), info, [wrong], tmp_path)
