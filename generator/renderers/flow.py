@@ -5,7 +5,7 @@ Only whether it is hidden then takes an image of that instant.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from generator.core.capture import Channel
 from generator.core.geometry import Float32
 from generator.core.intrinsics import Intrinsics
-from generator.renderers.moments import Moment
+from generator.renderers.moments import Band, Moment, Sight, Studio, sight
 from generator.renderers.pace import bands_of
 from generator.renderers.points import Found, Points, carriers_of, deformed, find, points_of
-from generator.renderers.shown import Shown, Studio, drawn_bands
+from generator.renderers.shown import Shown, drawn_bands, whole_band
 
 FORWARD = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_OCCLUDED_FORWARD, Channel.SCENE_FLOW})
 BACKWARD = frozenset({Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_BACKWARD})
@@ -28,12 +28,12 @@ _NEARER = 2e-3
 
 
 def flow_images(
-    middle: Moment, shown: Shown, channels: frozenset[Channel], studio: Studio
+    near: Sight, shown: Shown, channels: frozenset[Channel], studio: Studio
 ) -> dict[Channel, NDArray[Any]]:
     """All channels of flow that are asked for, as listed at Channel.
 
     Args:
-        middle: The image's instant.
+        near: The world at the image's instant.
         shown: What its pixels show, each row at its own.
         channels: Of any kind.
         studio: Assets and settings.
@@ -41,25 +41,33 @@ def flow_images(
     images: dict[Channel, NDArray[Any]] = {}
     if not channels & FLOW:
         return images
+    middle = near.moment
     step_s = middle.scene.step_s
     carriers = carriers_of(middle.scene)
     points = points_of(shown, carriers)
     if channels & FORWARD:
-        images |= _carried(points, shown, middle.later(step_s), channels & FORWARD, studio)
+        images |= _carried(points, shown, middle.later(step_s), channels & FORWARD, near, studio)
     if channels & BACKWARD and middle.scene.time_s < step_s - 1e-9:
         images |= _nowhere(points.carriers.shape, channels)
     elif channels & BACKWARD:
-        images |= _carried(points, shown, middle.later(-step_s), channels & BACKWARD, studio)
+        images |= _carried(points, shown, middle.later(-step_s), channels & BACKWARD, near, studio)
     return images
 
 
 def _carried(
-    points: Points, shown: Shown, then: Moment, channels: frozenset[Channel], studio: Studio
+    points: Points,
+    shown: Shown,
+    then: Moment,
+    channels: frozenset[Channel],
+    near: Sight,
+    studio: Studio,
 ) -> dict[Channel, NDArray[Any]]:
     """Channels of one direction."""
     images: dict[Channel, NDArray[Any]] = {}
     carriers = carriers_of(then.scene)
-    bands = bands_of(then, studio)
+    bands: Sequence[Band] = (whole_band(then),)
+    if then.camera.shutter.rolls:
+        bands = bands_of(sight(then, studio, None, near))
     points = deformed(points, shown, then.scene, studio.stock.assets)
     found = find(points, bands, carriers)
     for channel in sorted(channels, key=lambda c: c.value):
@@ -69,7 +77,7 @@ def _carried(
             images[channel] = _scene_flow(points, found)
         else:
             seen = frozenset({Channel.RANGE, Channel.NORMALS})
-            _, other = drawn_bands(bands, seen, studio)
+            _, other = drawn_bands(bands, seen, studio, near)
             images[channel] = occluded(points, found, other, shown.intrinsics)
     return images
 

@@ -7,9 +7,18 @@ from dataclasses import dataclass, replace
 from generator.core.instants import at
 from generator.core.scene import Camera, Scene
 from generator.renderers.kernels import records
-from generator.renderers.packing import PackedWorld, pack_view, pack_world
+from generator.renderers.packing import PackedWorld, moved_world, pack_view, pack_world
+from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
-from generator.renderers.visibility import Method, Seen, see
+from generator.renderers.visibility import Seen, see
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Studio:
+    """What all renderings have in common: assets and settings."""
+
+    stock: AssetStock
+    settings: RenderSettings
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,8 +50,9 @@ class Band:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Sight:
-    """What a band of rows shows; valid until the next one is drawn."""
+    """What a camera, or a band of its rows, sees; ``seen`` is valid until the next one is drawn."""
 
+    moment: Moment
     world: PackedWorld
     view: records.View
     seen: Seen
@@ -57,21 +67,36 @@ def moves(moment: Moment, open_s: float) -> bool:
 
 
 def sight(
-    moment: Moment, stock: AssetStock, method: Method, rows: tuple[int, int] | None = None
+    moment: Moment,
+    studio: Studio,
+    rows: tuple[int, int] | None = None,
+    near: Sight | None = None,
 ) -> Sight:
-    """The surfaces at all pixel centres, or at those of the rows from the first to before the last.
+    """The surfaces at all pixel centres, or at those of some rows.
 
     Args:
         moment: What, and from where.
-        stock: Assets.
-        method: As in RenderSettings.
-        rows: First, and end.
+        studio: Assets and settings.
+        rows: The first, and the one after the last; None = all.
+        near: The same world at another instant: what is the same need not be packed again.
     """
-    world = pack_world(moment.scene, moment.camera, stock)
+    stock = studio.stock
+    if near is not None and _same_looks(near.moment.scene, moment.scene):
+        world = moved_world(near.world, moment.scene, moment.camera, stock)
+    else:
+        world = pack_world(moment.scene, moment.camera, stock)
     view = pack_view(moment.camera, stock)
     if rows is not None:
         view = rows_of(view, *rows)
-    return Sight(world, view, see(world, view, stock, method))
+    return Sight(moment, world, view, see(world, view, stock, studio.settings.visibility))
+
+
+def _same_looks(one: Scene, other: Scene) -> bool:
+    """Whether bodies have the same meshes and the very same materials."""
+    return all(
+        a is b or (a.asset == b.asset and a.materials is b.materials)
+        for a, b in zip(one.bodies, other.bodies, strict=True)
+    )
 
 
 def rows_of(view: records.View, first: int, end: int) -> records.View:

@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 
 from generator.core.boxes import tight_box
 from generator.core.capture import Silhouette
-from generator.renderers.moments import Band, Moment, sight
+from generator.renderers.moments import Band, Sight, Studio, sight
 from generator.renderers.pace import timed_bands
-from generator.renderers.shown import Studio
 from generator.renderers.silhouettes import silhouettes
 
 _BANDS = 12
 
 
 def rolled_silhouettes(
-    middle: Moment, bands: Sequence[Band], ids: NDArray[np.uint16], studio: Studio
+    bands: Sequence[Band], ids: NDArray[np.uint16], studio: Studio, near: Sight
 ) -> dict[int, Silhouette]:
     """Silhouettes, each row at its instant as far as a dozen bands can tell.
 
@@ -28,12 +27,12 @@ def rolled_silhouettes(
     """
     if len(bands) > _BANDS:
         starts = [band.first for band in bands][:: -(-len(bands) // _BANDS)]
-        bands = timed_bands(middle, starts)
+        bands = timed_bands(near.moment, starts)
     pieces: dict[int, list[Silhouette]] = {}
-    height = middle.camera.intrinsics.height_px
+    height = near.moment.camera.intrinsics.height_px
     for band in bands:
         scene, camera = band.moment.scene, band.moment.camera
-        see = sight(band.moment, studio.stock, studio.settings.visibility, None)
+        see = sight(band.moment, studio, None, near)
         none = np.zeros_like(ids)
         drawn = silhouettes(scene, camera, see.world, see.view, studio.stock, see.seen, none)
         top = band.first if band.first > 0 else -height

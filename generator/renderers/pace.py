@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from generator.core.se3 import Array
 from generator.core.shutter import INSTANT
-from generator.renderers.moments import Band, Moment, moves, sight
+from generator.renderers.moments import Band, Moment, Sight, moves
 from generator.renderers.points import carriers_of, find, points_of
-from generator.renderers.shown import Shown, Studio, shown_in, whole_band
+from generator.renderers.shown import shown_in, whole_band
 
 BAND_PX = 0.25
 """Nothing that is seen moves farther within a band of rows."""
@@ -36,13 +36,13 @@ class Pace:
     samples: int
 
 
-def pace_of(middle: Moment, shown: Shown) -> Pace:
+def pace_of(see: Sight) -> Pace:
     """How an image is taken while the camera's shutter is open.
 
     Args:
-        middle: Of that time.
-        shown: What the camera sees then.
+        see: What the camera sees in the middle of that time.
     """
+    middle, shown = see.moment, shown_in(see)
     shutter = middle.camera.shutter
     ends = [_at_once(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
     carriers = carriers_of(middle.scene)
@@ -56,20 +56,18 @@ def pace_of(middle: Moment, shown: Shown) -> Pace:
     return Pace(speeds, min(max(wanted, 1), shutter.samples))
 
 
-def bands_of(middle: Moment, studio: Studio, pace: Pace | None = None) -> tuple[Band, ...]:
+def bands_of(see: Sight, pace: Pace | None = None) -> tuple[Band, ...]:
     """Bands of rows within which nothing moves farther than ``BAND_PX``, each at its instant.
 
     Args:
-        middle: Of the exposure of the image.
-        studio: Assets and settings.
+        see: What the camera sees in the middle of the exposure of the image.
         pace: Of the image; None = it is to be found out.
     """
+    middle = see.moment
     shutter = middle.camera.shutter
     if not shutter.rolls or not moves(middle, shutter.open_s):
         return (whole_band(middle),)
-    if pace is None:
-        see = sight(middle, studio.stock, studio.settings.visibility)
-        pace = pace_of(middle, shown_in(middle, see))
+    pace = pace or pace_of(see)
     per_row_s = abs(shutter.readout_s) / len(pace.speeds_px_s)
     return timed_bands(middle, band_starts(pace.speeds_px_s * per_row_s))
 

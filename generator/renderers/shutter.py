@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,15 +33,14 @@ from generator.renderers.color import (
 )
 from generator.renderers.flow import FLOW, flow_images
 from generator.renderers.lamps import main_lamp_numbers
-from generator.renderers.moments import Band, Moment, moves, sight
+from generator.renderers.moments import Band, Moment, Sight, Studio, moves, sight
 from generator.renderers.outlines import rolled_silhouettes
 from generator.renderers.pace import bands_of, pace_of
-from generator.renderers.shown import Studio, drawn_bands, shown_in
+from generator.renderers.packing import moved_world
+from generator.renderers.shown import Light, drawn_bands, with_margin
 
 _LIT = frozenset({Channel.RGB, Channel.RADIANCE})
 _METERING = 4
-# Light on the lattice is smoothed over as many rows; its pattern repeats after as many.
-_MARGIN_PX = 12
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,31 +60,37 @@ def exposed(
     scene: Scene, camera: Camera, channels: frozenset[Channel], studio: Studio
 ) -> Reading | None:
     """The image of a camera whose shutter is open for a while; None if nothing moves meanwhile."""
-    middle = Moment.of(scene, camera)
+    moment = Moment.of(scene, camera)
     open_s = camera.shutter.open_s
-    if not open_s > 0.0 or not moves(middle, open_s):
+    if not open_s > 0.0 or not moves(moment, open_s):
         return None
-    see = sight(middle, studio.stock, studio.settings.visibility)
-    pace = pace_of(middle, shown_in(middle, see))
-    bands = bands_of(middle, studio, pace)
+    near = sight(moment, studio)
+    pace = pace_of(near)
+    bands = bands_of(near, pace)
     if len(bands) == 1 and pace.samples == 1:
         return None
-    lamps = main_lamp_numbers(see.world, see.view, see.seen, studio.settings.max_lamps)
+    near = _with_main_lamps(near, studio)
     drawn = channels - FLOW - _LIT - {Channel.AMODAL}
     if Channel.AMODAL in channels:
         drawn = drawn | {Channel.INSTANCE}
-    shown, images = drawn_bands(bands, drawn, studio)
     ev100 = camera.ev100
+    light: Light | None = None
     if channels & _LIT:
-        ev100 = _metered(middle, studio) if ev100 is None else ev100
-        slices = slices_of(middle, pace.samples) if pace.samples > 1 else _single(bands)
-        kept = None if lamps is None else tuple(int(k) for k in lamps)
-        radiance = _averaged(slices, ev100, kept, studio)
-        images |= _developed(radiance, shown.z_m, middle, ev100, channels, studio)
+        ev100 = _metered(near, studio) if ev100 is None else ev100
+        light = partial(_light, ev100=ev100, studio=studio)
+    blurred = light is not None and pace.samples > 1
+    shown, images = drawn_bands(bands, drawn, studio, near, None if blurred else light)
+    if light is not None:
+        assert ev100 is not None
+        mean = images.pop(Channel.RADIANCE, None)
+        if mean is None:
+            mean = _averaged(slices_of(near.moment, pace.samples), light, near, studio)
+        lit = LitImage(_on_device(mean, wp.vec3, studio), ev100)
+        images |= _developed(lit, _on_device(shown.z_m, float, studio), near, channels, studio)
     outlines: dict[int, Silhouette] = {}
     if Channel.AMODAL in channels:
-        outlines = rolled_silhouettes(middle, bands, images[Channel.INSTANCE], studio)
-    images |= flow_images(middle, shown, channels, studio)
+        outlines = rolled_silhouettes(bands, images[Channel.INSTANCE], studio, near)
+    images |= flow_images(near, shown, channels, studio)
     return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
 
 
@@ -110,79 +116,62 @@ def slices_of(middle: Moment, samples: int) -> list[Slice]:
     return slices
 
 
-def _single(bands: Sequence[Band]) -> list[Slice]:
-    """Every band as a slice of its own."""
-    return [Slice(band, np.ones(band.end - band.first, np.float32)) for band in bands]
-
-
-def _averaged(
-    slices: Sequence[Slice], ev100: float, lamps: tuple[int, ...] | None, studio: Studio
-) -> Float32:
-    """Means over slices of what comes from every pixel [cd/m^2], float32 [h, w, 3].
-
-    Args:
-        slices: Of the exposure.
-        ev100: At which edges are mixed.
-        lamps: Numbers of those that matter in the middle of the exposure, and light every slice;
-            None = all.
-        studio: Assets and settings.
-    """
-    lens = slices[0].band.moment.camera.intrinsics
+def _averaged(slices: Sequence[Slice], light: Light, near: Sight, studio: Studio) -> Float32:
+    """Means over slices of what comes from every pixel [cd/m^2], float32 [h, w, 3]."""
+    lens = near.moment.camera.intrinsics
     mean = np.zeros((lens.height_px, lens.width_px, 3), np.float32)
     for part in slices:
         band = part.band
-        first, end = _with_margin(band, lens.height_px)
-        moment = _lit_by(band.moment, lamps)
-        see = sight(moment, studio.stock, studio.settings.visibility, (first, end))
-        light = surface_light(see.world, see.view, see.seen, studio.stock, studio.settings)
-        lit = LitImage(light, ev100)
-        mix_edges(see.world, see.view, see.seen, lit, studio.stock, studio.settings)
-        rows = light.numpy().reshape(end - first, lens.width_px, 3)[band.first - first :]
-        rows = rows[: band.end - band.first]
-        mean[band.first : band.end] += part.weights[:, None, None] * rows
+        first, end = with_margin(band, lens.height_px)
+        rows = light(sight(band.moment, studio, (first, end), near))
+        own = rows[band.first - first : band.end - first]
+        mean[band.first : band.end] += part.weights[:, None, None] * own
     return mean
 
 
-def _with_margin(band: Band, height_px: int) -> tuple[int, int]:
-    """Rows to render so that light in the band is as it is in the whole image."""
-    first = max(band.first - _MARGIN_PX, 0) // _MARGIN_PX * _MARGIN_PX
-    end = -(-(band.end + _MARGIN_PX) // _MARGIN_PX) * _MARGIN_PX + 1
-    return first, min(end, height_px)
+def _light(see: Sight, ev100: float, studio: Studio) -> Float32:
+    """What comes from every pixel, anti-aliased; valid until the next call."""
+    stock, settings = studio.stock, studio.settings
+    lit = LitImage(surface_light(see.world, see.view, see.seen, stock, settings), ev100)
+    mix_edges(see.world, see.view, see.seen, lit, stock, settings)
+    image: Float32 = lit.radiance.numpy().reshape(see.view.height, see.view.width, 3)
+    return image
 
 
-def _lit_by(moment: Moment, lamps: tuple[int, ...] | None) -> Moment:
-    if lamps is None:
-        return moment
-    kept = tuple(moment.scene.lights[k] for k in lamps)
-    return replace(moment, scene=replace(moment.scene, lights=kept))
+def _with_main_lamps(near: Sight, studio: Studio) -> Sight:
+    """Only those lamps that matter in the middle of the exposure light the whole of it."""
+    chosen = main_lamp_numbers(near.world, near.view, near.seen, studio.settings.max_lamps)
+    if chosen is None:
+        return near
+    scene, camera = near.moment.scene, near.moment.camera
+    scene = replace(scene, lights=tuple(scene.lights[k] for k in chosen))
+    world = moved_world(near.world, scene, camera, studio.stock)
+    return replace(near, moment=Moment(scene, camera), world=world)
+
+
+def _on_device(image: Float32, dtype: Any, studio: Studio) -> wp.array:
+    """An image as kernels have it, flat."""
+    flat = image.reshape(-1, *image.shape[2:])
+    return wp.array(flat, dtype=dtype, device=studio.stock.device)
 
 
 def _developed(
-    radiance: Float32,
-    z_m: Float32,
-    middle: Moment,
-    ev100: float,
-    channels: frozenset[Channel],
-    studio: Studio,
+    lit: LitImage, z_m: wp.array, near: Sight, channels: frozenset[Channel], studio: Studio
 ) -> dict[Channel, NDArray[Any]]:
     """What the lens adds, and the response of the camera."""
-    stock, settings = studio.stock, studio.settings
-    see = sight(middle, stock, settings.visibility)
-    light = wp.array(radiance.reshape(-1, 3), dtype=wp.vec3, device=stock.device)
-    depth = wp.array(z_m.reshape(-1), dtype=float, device=stock.device)
-    lit = LitImage(light, ev100)
-    pass_lens(see.world, middle.camera, see.view, depth, lit, stock, settings)
+    stock, settings, view = studio.stock, studio.settings, near.view
+    pass_lens(near.world, near.moment.camera, view, z_m, lit, stock, settings)
     images: dict[Channel, NDArray[Any]] = {}
     if Channel.RADIANCE in channels:
-        images[Channel.RADIANCE] = radiance_image(lit, see.view)
+        images[Channel.RADIANCE] = radiance_image(lit, view)
     if Channel.RGB in channels:
-        images[Channel.RGB] = color_image(lit, see.view, stock, settings)
+        images[Channel.RGB] = color_image(lit, view, stock, settings)
     return images
 
 
-def _metered(middle: Moment, studio: Studio) -> float:
+def _metered(near: Sight, studio: Studio) -> float:
     """The exposure value for the middle, from an image of a quarter of the size."""
-    lens = middle.camera.intrinsics
+    lens = near.moment.camera.intrinsics
     small = replace(
         lens,
         width_px=max(lens.width_px // _METERING, 1),
@@ -192,6 +181,6 @@ def _metered(middle: Moment, studio: Studio) -> float:
         cx_px=lens.cx_px / _METERING,
         cy_px=lens.cy_px / _METERING,
     )
-    camera = replace(middle.camera, intrinsics=small, shutter=INSTANT)
-    see = sight(replace(middle, camera=camera), studio.stock, studio.settings.visibility)
+    camera = replace(near.moment.camera, intrinsics=small, shutter=INSTANT)
+    see = sight(Moment(near.moment.scene, camera), studio, None, near)
     return lit_image(camera, see.world, see.view, see.seen, studio.stock, studio.settings).ev100

@@ -11,10 +11,10 @@ from generator.renderers.device import open_device
 from generator.renderers.flow import FLOW, flow_images
 from generator.renderers.labels import label_images
 from generator.renderers.lidar import scanned
-from generator.renderers.moments import Moment, Sight
+from generator.renderers.moments import Moment, Sight, Studio
 from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
-from generator.renderers.shown import Studio, shown_in
+from generator.renderers.shown import shown_in
 from generator.renderers.shutter import exposed
 from generator.renderers.silhouettes import silhouettes
 from generator.renderers.stock import AssetStock
@@ -77,9 +77,8 @@ class WarpRenderer:
             ids = images[Channel.INSTANCE]
             outlines = silhouettes(scene, camera, world, view, self._stock, seen, ids)
         if channels & FLOW:
-            moment = Moment.of(scene, camera)
-            shown = shown_in(moment, Sight(world, view, seen))
-            images |= flow_images(moment, shown, channels, studio)
+            near = Sight(Moment.of(scene, camera), world, view, seen)
+            images |= flow_images(near, shown_in(near), channels, studio)
         return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
