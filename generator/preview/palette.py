@@ -50,14 +50,14 @@ def colored_flow(flow_px: NDArray[np.floating]) -> NDArray[np.uint8]:
     """A flow image [h, w, 2] on the colour wheel of flow, uint8 [h, w, 3]; black = none.
 
     The hue is the direction, red to the right and yellow downwards; the saturation is the length,
-    full at the 99th percentile and darker beyond.
+    full at the 99th percentile, at least at a pixel, and darker beyond.
     Source: Baker et al., "A database and evaluation methodology for optical flow", IJCV 92, 2011.
     """
     u, v = (flow_px[..., k].astype(np.float64) for k in (0, 1))
     known = np.isfinite(u) & np.isfinite(v)
     u, v = np.where(known, u, 0.0), np.where(known, v, 0.0)
     length = np.sqrt(u * u + v * v)
-    longest = max(float(np.quantile(length[known], 0.99)) if known.any() else 0.0, 1e-6)
+    longest = max(float(np.quantile(length[known], 0.99)) if known.any() else 0.0, 1.0)
     share = (length / longest)[..., None]
     wheel = _flow_wheel()
     place = (np.arctan2(-v, -u) / np.pi + 1.0) * 0.5 * (len(wheel) - 1)
