@@ -32,6 +32,14 @@ from generator.preview.shapes import boxes_2d, boxes_3d, mesh_3d, pinhole, trans
 TIMELINE = "sample"
 TIME = "time"
 APPLICATION = "gen-data"
+FLOWS = {
+    Channel.FLOW_FORWARD,
+    Channel.FLOW_BACKWARD,
+    Channel.FLOW_OCCLUDED_FORWARD,
+    Channel.FLOW_OCCLUDED_BACKWARD,
+    Channel.SCENE_FLOW,
+}
+"""Shown beside the image, on the colour wheel of flow."""
 AXES_M = 0.5
 """Length at which the axes of rigs and devices are drawn."""
 

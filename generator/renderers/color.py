@@ -45,46 +45,45 @@ class LitImage:
     ev100: float
 
 
-def lit_image(
-    camera: Camera,
+def surface_light(
     world: PackedWorld,
     view: records.View,
     seen: Seen,
     stock: AssetStock,
     settings: RenderSettings,
-) -> LitImage:
-    """Light, shade and weather, before the camera's response."""
+) -> wp.array:
+    """What comes from pixel centres through the air [cd/m^2], linear RGB, flat; scratch memory."""
     images = images_of(seen)
     keep_main_lamps(world, view, seen, stock, settings.max_lamps)
     lattice = sampled_lattice(world, view, seen, stock)
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
-    lit = expose(camera, world, view, seen, radiance, stock, settings)
-    if settings.antialias > 1:
-        exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
-        _mix_edges(world, view, seen, radiance, exposure, settings.antialias, stock)
-    return lit
+    darken_outside(view, radiance)
+    return radiance
 
 
-def expose(
-    camera: Camera,
+def metered_ev100(camera: Camera, view: records.View, radiance: wp.array) -> float:
+    """The exposure value that a camera is set to, or else that suits what it sees."""
+    if camera.ev100 is not None:
+        return camera.ev100
+    return automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
+
+
+def pass_lens(
     world: PackedWorld,
+    camera: Camera,
     view: records.View,
-    seen: Seen,
-    radiance: wp.array,
+    z_m: wp.array,
+    lit: LitImage,
     stock: AssetStock,
     settings: RenderSettings,
-) -> LitImage:
-    """Meter the light of a scene, and add what is between it and the sensor, in place."""
-    _darken_outside(view, radiance)
-    ev100 = camera.ev100
-    if ev100 is None:
-        ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
-    draw_precipitation(world, camera, view, seen.z_m, radiance, ev100=ev100, stock=stock)
+) -> None:
+    """Add what falls before the lens, drops on it and its glare, in place; depths as of Seen."""
+    radiance = lit.radiance
+    draw_precipitation(world, camera, view, z_m, radiance, ev100=lit.ev100, stock=stock)
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
-    _darken_outside(view, radiance)
-    return LitImage(radiance, ev100)
+    darken_outside(view, radiance)
 
 
 def radiance_image(lit: LitImage, view: records.View) -> Float32:
@@ -106,16 +105,19 @@ def color_image(
     return image
 
 
-def _mix_edges(
+def mix_edges(
     world: PackedWorld,
     view: records.View,
     seen: Seen,
-    radiance: wp.array,
-    exposure: float,
-    samples: int,
+    lit: LitImage,
     stock: AssetStock,
+    settings: RenderSettings,
 ) -> None:
     """Anti-alias, in place."""
+    if settings.antialias == 1:
+        return
+    radiance, samples = lit.radiance, settings.antialias
+    exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
     device, images = stock.device, images_of(seen)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", view.width * view.height, wp.int32)
@@ -134,7 +136,7 @@ def _mix_edges(
     wp.launch(tone.put_mixed, len(edges), [edges, mixed], [radiance], device=device)
 
 
-def _darken_outside(view: records.View, radiance: wp.array) -> None:
+def darken_outside(view: records.View, radiance: wp.array) -> None:
     """Leave no light where the lens shows nothing, in place."""
     if view.lens != records.PINHOLE:
         n = view.width * view.height

@@ -10,7 +10,7 @@ import warp as wp
 from generator.core.scene import Camera, Scene
 from generator.core.streams import Streams
 from generator.renderers.cache import ByteCache
-from generator.renderers.color import LitImage, expose, images_of
+from generator.renderers.color import darken_outside, images_of
 from generator.renderers.environments import irradiance_coefficients
 from generator.renderers.importance import sky_shares
 from generator.renderers.kernels import path, records
@@ -51,16 +51,14 @@ class PathTracer:
         self._lobes = wp.array(smith_albedo(), dtype=wp.vec2, device=stock.device)
         self._skies: ByteCache[_SkyLight] = ByteCache(_TABLE_BYTES)
 
-    def lit_image(
+    def light(
         self, scene: Scene, camera: Camera, world: PackedWorld, view: records.View, seen: Seen
-    ) -> LitImage:
-        """Light, shade and weather, before the camera's response.
-
-        What is in the air is added from the pixel centres' depths, as by the realtime tier.
-        """
+    ) -> wp.array:
+        """As of ``radiance``, through the air: that of the pixel centres' depths."""
         radiance = self.radiance(scene, camera, world, view)
         fill_fog(world, view, images_of(seen), radiance, self._stock)
-        return expose(camera, world, view, seen, radiance, self._stock, self._settings)
+        darken_outside(view, radiance)
+        return radiance
 
     def radiance(
         self,
@@ -112,9 +110,7 @@ class PathTracer:
         budget.whole = self._settings.samples
         budget.bounces = self._settings.max_bounces
         budget.key = int(rng.integers(1 << 32))
-        budget.clear = int(
-            ((surfaces["transmission"] > 0.0) | (surfaces["opacity"] < 1.0)).any()
-        )
+        budget.clear = int(((surfaces["transmission"] > 0.0) | (surfaces["opacity"] < 1.0)).any())
         budget.lights = lights
         return budget
 
@@ -127,9 +123,7 @@ class PathTracer:
             table.rows = wp.array(rows, dtype=float, device=device)
             table.columns = wp.array(columns, dtype=float, device=device)
             small = cv2.resize(image, _IRRADIANCE_SIZE, interpolation=cv2.INTER_AREA)
-            irradiance = wp.array(
-                irradiance_coefficients(small), dtype=wp.vec3, device=device
-            )
+            irradiance = wp.array(irradiance_coefficients(small), dtype=wp.vec3, device=device)
             return _SkyLight(table, irradiance, rows.nbytes + columns.nbytes)
 
         return self._skies.get(environment_id, make)

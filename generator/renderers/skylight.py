@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import warp as wp
@@ -21,28 +22,32 @@ _SHARE = 0.1
 _FAR_M = 1e3
 
 
-def split_sky(world: PackedWorld, scene: Scene, stock: AssetStock) -> None:
-    """Give the world lamps for what is brightest in its panorama, in place.
+def split_sky(world: PackedWorld, scene: Scene, stock: AssetStock) -> PackedWorld:
+    """The world with lamps for what is brightest in its panorama.
 
     Not where the scene has a sun, which its panorama then lacks; nor where walls shut the panorama
     out, whose light then is that of the room; nor where other lamps drown it.
     """
     environment = scene.environment
     if environment.luminance_cd_m2 <= 0.0 or any(light.kind == "sun" for light in scene.lights):
-        return
+        return world
     points = _viewpoints(scene)
     if not _is_open(world, points, _directions_around(), stock):
-        return
+        return world
     split = stock.split_environment(environment.image)
     if not split.lamps or not _matters(split.lamps[0], scene):
-        return
+        return world
     suns = [_sun(lamp, environment) for lamp in split.lamps]
     towards = np.array([np.negative(sun.direction) for sun in suns])
     if not _is_open(world, points, towards, stock):
-        return
-    world.record.sky = sky_record(environment, split)
+        return world
+    record = records.World()
+    for name in records.World.vars:
+        setattr(record, name, getattr(world.record, name))
+    record.sky = sky_record(environment, split)
     lamps = np.concatenate([world.record.lamps.numpy(), lamp_records(suns)])
-    world.record.lamps = wp.array(lamps, dtype=records.Lamp, device=stock.device)
+    record.lamps = wp.array(lamps, dtype=records.Lamp, device=stock.device)
+    return replace(world, record=record)
 
 
 def _sun(lamp: SkyLamp, environment: Environment) -> Light:

@@ -14,6 +14,9 @@ from generator.renderers.packing import PackedWorld
 from generator.renderers.pierced import has_holes, trace_over
 from generator.renderers.stock import AssetStock
 
+Method = Literal["auto", "raster", "rays"]
+"""How the surface at a pixel centre is found, as in RenderSettings."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Projected:
@@ -56,7 +59,7 @@ def see(
     world: PackedWorld,
     view: records.View,
     stock: AssetStock,
-    method: Literal["auto", "raster", "rays"],
+    method: Method,
 ) -> Seen:
     """The surfaces at all pixel centres of a view."""
     n = view.width * view.height

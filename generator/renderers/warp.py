@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from generator.core.capture import Beams, Channel, Echoes, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
-from generator.renderers.color import LitImage, color_image, lit_image, radiance_image
+from generator.renderers.color import color_image, radiance_image
 from generator.renderers.compiling import compile_kernels
 from generator.renderers.device import open_device
-from generator.renderers.kernels.records import View
+from generator.renderers.flow import FLOW, flow_images
 from generator.renderers.labels import label_images
 from generator.renderers.lidar import scanned
-from generator.renderers.packing import PackedWorld, pack_view, pack_world
+from generator.renderers.moments import Moment, Sight, Studio
+from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
+from generator.renderers.shown import shown_in
+from generator.renderers.shutter import exposed
 from generator.renderers.silhouettes import silhouettes
-from generator.renderers.skylight import split_sky
 from generator.renderers.stock import AssetStock
-from generator.renderers.visibility import Seen, see
-
-if TYPE_CHECKING:
-    from generator.renderers.pathtracer import PathTracer
+from generator.renderers.tiers import lit_image
+from generator.renderers.visibility import see
 
 
 class WarpRenderer:
@@ -52,10 +50,21 @@ class WarpRenderer:
             )
         compile_kernels(self._device.alias)
         self._stock = AssetStock(assets, self._device)
-        self._paths: PathTracer | None = None
+        self._studio = Studio(self._stock, self._settings)
+        if self._settings.tier == "pathtraced":
+            # Its kernels take long to compile and are of no use to the other tier.
+            from generator.renderers.pathtracer import PathTracer
+
+            tracer = PathTracer(self._stock, self._settings)
+            self._studio = replace(self._studio, paths=tracer)
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """Every asked channel of one camera."""
+        reading = exposed(scene, camera, channels, self._studio)
+        return reading or self._at_once(scene, camera, channels)
+
+    def _at_once(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+        """The image of one instant."""
         world = pack_world(scene, camera, self._stock)
         view = pack_view(camera, self._stock)
         seen = see(world, view, self._stock, self._settings.visibility)
@@ -64,7 +73,7 @@ class WarpRenderer:
         images = label_images(scene, world, view, seen, channels)
         ev100 = camera.ev100
         if channels & {Channel.RGB, Channel.RADIANCE}:
-            lit = self._lit(scene, camera, world, view, seen)
+            lit = lit_image(scene, camera, world, view, seen, self._studio)
             ev100 = lit.ev100
             if Channel.RADIANCE in channels:
                 images[Channel.RADIANCE] = radiance_image(lit, view)
@@ -74,21 +83,10 @@ class WarpRenderer:
         if Channel.AMODAL in channels:
             ids = images[Channel.INSTANCE]
             outlines = silhouettes(scene, camera, world, view, self._stock, seen, ids)
+        if channels & FLOW:
+            near = Sight(Moment.of(scene, camera), world, view, seen)
+            images |= flow_images(near, shown_in(near), channels, self._studio)
         return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
-
-    def _lit(
-        self, scene: Scene, camera: Camera, world: PackedWorld, view: View, seen: Seen
-    ) -> LitImage:
-        if self._settings.tier == "realtime":
-            if self._settings.environment_shadow == "auto":
-                split_sky(world, scene, self._stock)
-            return lit_image(camera, world, view, seen, self._stock, self._settings)
-        if self._paths is None:
-            # Its kernels take long to compile and are of no use to the other tier.
-            from generator.renderers.pathtracer import PathTracer
-
-            self._paths = PathTracer(self._stock, self._settings)
-        return self._paths.lit_image(scene, camera, world, view, seen)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
         """What the rays of a laser scanner's beams hit first, and how well it reflects."""
