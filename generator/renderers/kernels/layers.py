@@ -526,8 +526,8 @@ def ray_of(
                 bent = refracted(d, layers.n, eta)
                 if wp.dot(bent, bent) > 0.0:
                     ray.d = bent
-        elif world.surfaces[surface].thin != 0 and wp.max(layers.behind) > 0.0:
-            # Already part of the ray behind the pane.
+        elif world.surfaces[surface].thin != 0:
+            # Part of the ray behind the pane.
             ray.share = wp.vec3(0.0)
         ray.origin = beyond(p, ray.d, view.eye_m)
     return ray
