@@ -19,14 +19,16 @@ _EXR_MAGIC = b"\x76\x2f\x31\x01"
 # Of the brightest texel.
 _RINGING = 1e-4
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
+_WITH_ALPHA = ("RGBA", "LA", "PA")
 
 
-def decode(data: bytes, place: str) -> UInt8:
-    """Pixels in sRGB, uint8 [height, width, 3]; transparency is dropped.
+def decode(data: bytes, place: str, *, alpha: bool = False) -> UInt8:
+    """Pixels in sRGB, uint8 [height, width, 3].
 
     Args:
         data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA.
         place: What error messages call it.
+        alpha: Whether transparency is wanted: it makes a fourth channel where there is any.
 
     Raises:
         AssetError: if it is unreadable, or larger than 16,384 pixels a side or 64 megapixels.
@@ -38,6 +40,9 @@ def decode(data: bytes, place: str) -> UInt8:
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
                 _check_size(image.width, image.height, place)
+                if alpha and (image.mode in _WITH_ALPHA or "transparency" in image.info):
+                    pixels = np.array(image.convert("RGBA"), dtype=np.uint8)
+                    return pixels if pixels[..., 3].min() < 255 else pixels[..., :3].copy()
                 return np.array(image.convert("RGB"), dtype=np.uint8)
     except Image.DecompressionBombError:
         raise AssetError(

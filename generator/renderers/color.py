@@ -17,9 +17,11 @@ from generator.renderers.kernels import samples as mixing
 from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.lamps import keep_main_lamps
+from generator.renderers.layers import ListedPixels, shade_layers
 from generator.renderers.lens import add_glare, wet_lens
 from generator.renderers.occlusion import lamp_parts, openness, sampled_lattice, sunflower
 from generator.renderers.packing import PackedWorld
+from generator.renderers.pierced import has_holes, trace_over_samples
 from generator.renderers.precipitation import draw_precipitation
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
@@ -147,10 +149,14 @@ def _drawn_samples(
     offsets = wp.array((parts * 256.0 - 128.0).astype(np.int32), dtype=wp.vec2i, device=device)
     window = raster.Window()
     window.width, window.height = view.width, view.height
-    bodies = wp.array(projected.in_view, dtype=wp.int32, device=device)
+    pierced = has_holes(world.placed)[projected.in_view]
+    bodies = wp.array(projected.in_view[~pierced], dtype=wp.int32, device=device)
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
     inputs += [numbers, floors, offsets]
     wp.launch(mixing.draw_samples, len(bodies), inputs, [nearness, hits], device=device)
+    if pierced.any():
+        listed = projected.in_view[pierced]
+        trace_over_samples(world, view, listed, pixels, parts, nearness, hits)
     return hits
 
 
@@ -180,12 +186,12 @@ def _shaded(
     expose_ground(world, lattice, stock)
     radiance = stock.scratch("radiance", n, wp.vec3)
     around = openness(world, view, lattice, stock, settings)
-    points = lattice.width * lattice.height
-    lights = stock.scratch("lights", points, shade.Light)
-    coats = stock.scratch("coats", points, wp.vec4)
+    corners = lattice.width * lattice.height
+    lights = stock.scratch("lights", corners, shade.Light)
+    coats = stock.scratch("coats", corners, wp.vec4)
     frame = [view, world.record, images]
     inputs = [*frame, lattice, around.lit, around.open_sky]
-    wp.launch(shade.light_lattice, points, inputs, [lights, coats], device=device)
+    wp.launch(shade.light_lattice, corners, inputs, [lights, coats], device=device)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", n, wp.int32)
     # One thread per row on the CPU, where threads run one after the other anyway.
@@ -208,4 +214,7 @@ def _shaded(
     wp.launch(shade.look_around, listed, inputs, [lit, open_sky, exposed], device=device)
     inputs = [*frame, pixels, lit, open_sky, exposed]
     wp.launch(shade.shade_points, listed, inputs, [radiance], device=device)
+    if world.layered:
+        points = ListedPixels(listed, pixels, lit, open_sky, exposed)
+        shade_layers(world, view, images, points, radiance, stock, settings)
     return radiance

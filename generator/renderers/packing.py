@@ -11,13 +11,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from generator.core.geometry import Material
 from generator.core.lens import LensModel
 from generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
 from generator.renderers.environments import DeviceEnvironment
 from generator.renderers.kernels import records
 from generator.renderers.meshes import DeviceMesh
 from generator.renderers.stock import AssetStock
+from generator.renderers.surfaces import pierced_bodies, pierced_slots, surface_records
 
 _LENSES: dict[LensModel, int] = {
     "pinhole": records.PINHOLE,
@@ -38,6 +38,7 @@ class PackedWorld:
         placed: Body records on the host, structured array [n].
         vertex_count: Of all bodies together.
         weather: Of the scene.
+        layered: Whether any surface has more to it than colour, roughness and bumps.
     """
 
     record: records.World
@@ -45,6 +46,7 @@ class PackedWorld:
     placed: NDArray[np.void]
     vertex_count: int
     weather: Weather
+    layered: bool
 
 
 def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
@@ -55,12 +57,14 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
     materials = [material for group in own for material in group]
     texture_ids = sorted({m.texture for m in materials if m.texture})
-    textures = [stock.texture(texture_id) for texture_id in texture_ids]
+    textures = {texture_id: stock.texture(texture_id) for texture_id in texture_ids}
+    surfaces = surface_records(materials, textures)
     environment = stock.environment(scene.environment.image)
     placed = np.zeros(len(scene.bodies), dtype=records.Body.numpy_dtype())
     placed["geometry"] = [place[body.asset] for body in scene.bodies]
     counts = np.array([len(group) for group in own], dtype=np.int64)
     placed["first_material"] = np.cumsum(counts) - counts
+    placed["pierced"] = pierced_bodies(pierced_slots(surfaces, textures), counts)
     body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
     vertex_count = _place(placed, scene.bodies, body_meshes, camera)
     placed["low_m"], placed["high_m"] = _world_boxes(placed, body_meshes)
@@ -79,15 +83,18 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     world.tree = tree.id
     world.geometries = upload(_stacked(meshes, records.Geometry), records.Geometry)
     world.bodies = upload(placed, records.Body)
-    world.surfaces = upload(
-        _surfaces(materials, {t: k for k, t in enumerate(texture_ids)}), records.Surface
-    )
-    world.textures = upload(_stacked(textures, records.Texture), records.Texture)
+    world.surfaces = upload(surfaces, records.Surface)
+    world.textures = upload(_stacked([*textures.values()], records.Texture), records.Texture)
     world.lamps = upload(lamp_records(scene.lights), records.Lamp)
     world.lobes = stock.lobes
     world.sky = sky_record(scene.environment, environment)
     return PackedWorld(
-        world, (tree, meshes, textures, environment), placed, vertex_count, scene.weather
+        world,
+        (tree, meshes, textures, environment),
+        placed,
+        vertex_count,
+        scene.weather,
+        layered=bool(surfaces["layered"].any()),
     )
 
 
@@ -170,22 +177,6 @@ def sky_record(environment: Environment, light: DeviceEnvironment) -> records.Sk
     sky.cos_yaw, sky.sin_yaw = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
     sky.visible = int(environment.visible)
     return sky
-
-
-def _surfaces(materials: Sequence[Material], textures: dict[str, int]) -> NDArray[np.void]:
-    """Surface records; ``textures`` maps texture ids to their place among the textures."""
-    values = np.zeros(max(len(materials), 1), dtype=records.Surface.numpy_dtype())
-    if not materials:
-        return values
-    # Column by column: there are thousands in a street, and filling in one record takes long.
-    values["base_color"] = [m.base_color for m in materials]
-    values["roughness"] = [m.roughness for m in materials]
-    values["metallic"] = [m.metallic for m in materials]
-    values["specular"] = [m.specular for m in materials]
-    values["texture"] = [textures[m.texture] if m.texture else -1 for m in materials]
-    values["texture_scale_m"] = [m.texture_scale_m for m in materials]
-    values["emission_cd_m2"] = [m.emission_cd_m2 for m in materials]
-    return values
 
 
 def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:

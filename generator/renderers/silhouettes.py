@@ -13,6 +13,7 @@ from generator.renderers.kernels import raster, records
 from generator.renderers.kernels.silhouette import Canvas, draw_silhouettes
 from generator.renderers.outlooks import around, traced_masks
 from generator.renderers.packing import PackedWorld
+from generator.renderers.pierced import has_holes, trace_outlines
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Projected, Seen, project
 
@@ -59,10 +60,13 @@ def _drawn_masks(
     boxes = _boxes_px(scene, world, view, projected)
     canvases, size = _canvases(scene, boxes, projected.reached)
     mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
-    if len(canvases):
-        drawn_into = wp.array(canvases, dtype=Canvas, device=stock.device)
+    pierced = has_holes(world.placed)[canvases["body"]]
+    if not pierced.all():
+        drawn_into = wp.array(canvases[~pierced], dtype=Canvas, device=stock.device)
         inputs = [view, world.record, p_camera, xy, drawn_into]
-        wp.launch(draw_silhouettes, len(canvases), inputs, [mask], device=stock.device)
+        wp.launch(draw_silhouettes, len(drawn_into), inputs, [mask], device=stock.device)
+    if pierced.any():
+        trace_outlines(world, view, canvases[pierced], mask)
     drawn: NDArray[np.uint8] = mask.numpy()
     return boxes, drawn
 

@@ -17,6 +17,8 @@ from generator.renderers.kernels.records import Texture
 
 Pixels = NDArray[Any]
 
+_NO_TEXELS = np.zeros(1, np.uint32)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DeviceTexture:
@@ -26,32 +28,68 @@ class DeviceTexture:
         record: Value of a Texture record.
         keep: The device arrays that the record points to.
         texels: One of them: packed colours of all levels, the coarsest last.
+        layered: Whether it has maps that plain surfaces do not: emission, metal, occlusion.
+        pierced: Whether it has holes.
     """
 
     record: object
     keep: tuple[object, ...]
     texels: wp.array
     nbytes: int
+    layered: bool
+    pierced: bool
 
 
 def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     """A texture, ready for kernels."""
     height, width = data.albedo.shape[:2]
-    roughness = (
-        np.full((height, width), 255, np.uint8) if data.roughness is None else data.roughness
-    )
-    sizes, texels = _texels(data.albedo, roughness)
-    bumps = np.zeros(1, np.uint32) if data.normal is None else _bumps(data.normal)
+    white = np.full((height, width), 255, np.uint8)
+    albedo = data.albedo if data.alpha is None else without_fringe(data.albedo, data.alpha)
+    sizes, texels = _texels(albedo, white if data.roughness is None else data.roughness)
     record = Texture()
-    record.height, record.width = height, width
-    record.levels = len(sizes)
-    offsets = wp.array(np.cumsum([0, *sizes[:-1]]), dtype=wp.int32, device=device)
-    on_device = [wp.array(values, dtype=wp.uint32, device=device) for values in (texels, bumps)]
-    record.texels, record.bumps = on_device
-    record.offsets = offsets
-    record.has_bumps = int(data.normal is not None)
-    keep = (*on_device, offsets)
-    return DeviceTexture(record.numpy_value(), keep, on_device[0], texels.nbytes + bumps.nbytes)
+    record.height, record.width, record.levels = height, width, len(sizes)
+    images = [texels, _NO_TEXELS, _NO_TEXELS, _NO_TEXELS]
+    if data.normal is not None:
+        record.has_bumps, images[1] = 1, _means(_with_fourth(data.normal, white))
+    if data.metallic is not None or data.occlusion is not None:
+        shares = [white if share is None else share for share in (data.metallic, data.occlusion)]
+        record.has_shares, images[2] = 1, _means(cv2.merge([*shares, white, white]))
+    if data.emission is not None:
+        record.has_glow, images[3] = 1, _texels(data.emission, white)[1]
+    cover = white[:1, 0] if data.alpha is None else data.alpha.reshape(-1)
+    record.has_cover = int(data.alpha is not None)
+    on_device = [wp.array(values, dtype=wp.uint32, device=device) for values in images]
+    record.texels, record.bumps, record.shares, record.glow = on_device
+    record.cover = wp.array(cover, dtype=wp.uint8, device=device)
+    record.offsets = wp.array(np.cumsum([0, *sizes[:-1]]), dtype=wp.int32, device=device)
+    return DeviceTexture(
+        record.numpy_value(),
+        (*on_device, record.cover, record.offsets),
+        on_device[0],
+        sum(values.nbytes for values in images) + cover.nbytes,
+        layered=bool(record.has_shares or record.has_glow),
+        pierced=bool(record.has_cover),
+    )
+
+
+def without_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
+    """Colours with holes filled from around them, so that coarser levels do not mix theirs in.
+
+    Source: Gortler et al., "The lumigraph", SIGGRAPH 1996 (pull and push).
+
+    Args:
+        albedo: [height, width, 3].
+        alpha: Coverage; below 128 there is a hole, [height, width].
+    """
+    solid = (alpha >= 128).astype(np.float32)[..., None]
+    levels = _halvings(np.concatenate([albedo * solid, solid], axis=2))
+    filled = levels[-1][..., :3] / np.maximum(levels[-1][..., 3:], 1e-6)
+    for level in levels[-2::-1]:
+        height, width = level.shape[:2]
+        wider = cv2.resize(filled, (width, height)).reshape(height, width, 3)
+        weight = level[..., 3:]
+        filled = np.where(weight > 0.0, level[..., :3] / np.maximum(weight, 1e-6), wider)
+    return np.where(solid > 0.0, albedo, np.floor(filled + 0.5)).astype(np.uint8)
 
 
 def halved(image: Pixels) -> Pixels:
@@ -89,9 +127,8 @@ def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint
     return [level.shape[0] * level.shape[1] for level in levels], _packed(levels)
 
 
-def _bumps(normal: UInt8) -> NDArray[np.uint32]:
-    """Normal maps of all mip levels, packed one after the other."""
-    finest = _with_fourth(normal, np.full(normal.shape[:2], 255, np.uint8))
+def _means(finest: Pixels) -> NDArray[np.uint32]:
+    """Four channels of all mip levels, packed one after the other."""
     levels = [finest]
     if max(finest.shape[:2]) > 1:
         image = halved(finest).astype(np.float32) * np.float32(1.0 / 255.0)

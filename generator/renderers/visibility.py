@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from generator.renderers.kernels import raster, rays, records, surface
 from generator.renderers.packing import PackedWorld
+from generator.renderers.pierced import has_holes, trace_over
 from generator.renderers.stock import AssetStock
 
 
@@ -142,6 +143,9 @@ def _rasterise(
     hits.fill_(wp.vec2i(-1, -1))
     window = raster.Window()
     window.width, window.height = view.width, view.height
-    bodies = wp.array(projected.in_view, dtype=wp.int32, device=stock.device)
+    pierced = has_holes(world.placed)[projected.in_view]
+    bodies = wp.array(projected.in_view[~pierced], dtype=wp.int32, device=stock.device)
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
     wp.launch(raster.draw_bodies, len(bodies), inputs, [nearness, hits], device=stock.device)
+    if pierced.any():
+        trace_over(world, view, projected.in_view[pierced], nearness, hits)

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.holes import hole_at, solid_hit
 from generator.renderers.kernels.rays import FARTHEST
 from generator.renderers.kernels.records import (
+    HOLES,
     View,
     World,
     pixel_direction,
@@ -120,7 +122,9 @@ def cover(
     parts: Parts,
 ):
     """Give the parts of pixel (x, y) to the face that pixel ``source`` sees where it is nearest."""
-    facet = facet_of(world, images.hits[source])
+    hit = images.hits[source]
+    facet = facet_of(world, hit)
+    pierced = (world.bodies[hit[0]].pierced & HOLES) != 0
     for s in range(offsets.shape[0]):
         x_px = float(x) + offsets[s][0]
         y_px = float(y) + offsets[s][1]
@@ -133,7 +137,11 @@ def cover(
         w = det * side
         if u >= 0.0 and v >= 0.0 and u + v <= w and facet.depth * side > 0.0:
             nearness = det / facet.depth
-            if nearness > parts.nearness[s]:
+            seen = nearness > parts.nearness[s]
+            if seen and pierced:
+                weights = wp.vec3(w - u - v, u, v) * (1.0 / w)
+                seen = not hole_at(world, hit[0], hit[1], weights)
+            if seen:
                 parts.nearness[s] = nearness
                 parts.source[s] = source
     return parts
@@ -161,9 +169,8 @@ def traced_source(
                 source = j
         elif b != last:
             last = b
-            mesh = world.geometries[world.bodies[b].geometry].mesh
             o = to_mesh_point(world, b, origin)
-            answer = wp.mesh_query_ray(mesh, o, to_mesh_vector(world, b, d), nearest)
+            answer = solid_hit(world, b, o, to_mesh_vector(world, b, d), nearest, HOLES)
             if answer.result:
                 nearest = answer.t
                 source = j

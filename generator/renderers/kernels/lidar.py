@@ -5,8 +5,10 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.ground import Coat, coat_at, porosity_of
+from generator.renderers.kernels.holes import solid_hit
 from generator.renderers.kernels.rays import unsheltered
 from generator.renderers.kernels.records import (
+    HOLES,
     World,
     corners_of,
     normal_at,
@@ -184,8 +186,7 @@ def nearer(world: World, travel: Travel, b: int, ray: Ray, hit: Nearest, offset:
         d = B @ ray.direction
     elif offset:
         o += world.bodies[b].B_mesh_camera @ ray.origin_m
-    mesh = world.geometries[world.bodies[b].geometry].mesh
-    answer = wp.mesh_query_ray(mesh, o, d, hit.range_m)
+    answer = solid_hit(world, b, o, d, hit.range_m, HOLES)
     if answer.result:
         hit.range_m = answer.t
         hit.body = b

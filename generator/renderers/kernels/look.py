@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.holes import projected
 from generator.renderers.kernels.records import (
     World,
     corners_of,
@@ -62,18 +63,6 @@ def mesh_mapped(
         bitangent = unit(bitangent - n * wp.dot(n, bitangent))
         look.normal = unit(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
     return look
-
-
-@wp.func
-def projected(p: wp.vec3, axis: int):
-    """Texture coordinates along one axis; X and Y faces keep Z upright."""
-    u = p[0]
-    v = p[2]
-    if axis == 0:
-        u = p[1]
-    elif axis == 2:
-        v = p[1]
-    return wp.vec2(u, v)
 
 
 @wp.func

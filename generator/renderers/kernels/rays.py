@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.holes import OUT_OF_LINE, beyond_holes, solid_hit
 from generator.renderers.kernels.records import (
+    CLEAR,
+    HOLES,
     View,
     World,
     greater,
@@ -20,6 +23,8 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 FARTHEST = wp.constant(1.0e6)
 # What is lower than this over a surface keeps rain and snow off it.
 SHELTER_M = wp.constant(2.5)
+# What shadows pass.
+LIGHT = wp.constant(HOLES | CLEAR)
 
 
 @wp.func
@@ -36,8 +41,7 @@ def nearest_hit(world: World, origin: wp.vec3, direction: wp.vec3, t_min: float)
     while wp.bvh_query_next(candidates, b, nearest):
         o = to_mesh_point(world, b, start)
         d = to_mesh_vector(world, b, direction)
-        mesh = world.geometries[world.bodies[b].geometry].mesh
-        answer = wp.mesh_query_ray(mesh, o, d, nearest)
+        answer = solid_hit(world, b, o, d, nearest, HOLES)
         if answer.result:
             nearest = answer.t
             hit = wp.vec2i(b, answer.face)
@@ -91,25 +95,39 @@ def enters_box(world: World, b: int, path: Path):
 
 
 @wp.func
-def blocked_by(world: World, b: int, path: Path):
-    """Whether a body cuts a path."""
+def cut_by(world: World, b: int, path: Path, through: int):
+    """Whether a body cuts a path that passes what ``through`` says, HOLES or CLEAR or both."""
     hit = enters_box(world, b, path)
     if hit:
         o = to_mesh_point(world, b, path.origin)
         d = to_mesh_vector(world, b, path.way)
         mesh = world.geometries[world.bodies[b].geometry].mesh
         hit = wp.mesh_query_ray_anyhit(mesh, o, d, 1.0)
+        if hit and (world.bodies[b].pierced & through) != 0:
+            hit = beyond_holes(world, b, o, d, 1.0, through).result != 0
     return hit
 
 
 @wp.func
+def blocked_by(world: World, b: int, path: Path):
+    """Whether a body keeps light off a path."""
+    return cut_by(world, b, path, LIGHT)
+
+
+@wp.func
 def blocked(world: World, path: Path):
-    """Whether anything cuts a path."""
+    """Whether anything keeps light off a path."""
+    return cut(world, path, LIGHT)
+
+
+@wp.func(**OUT_OF_LINE)
+def cut(world: World, path: Path, through: int):
+    """Whether anything cuts a path that passes what ``through`` says."""
     hit = bool(False)
     candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
     b = int(0)
     while wp.bvh_query_next(candidates, b, 1.0):
-        hit = blocked_by(world, b, path)
+        hit = cut_by(world, b, path, through)
         if hit:
             break
     return hit
@@ -133,7 +151,7 @@ def blocked_by_listed(
     return hit
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def free_path(world: World, path: Path):
     """The part of a path that is free, from 0 to 1."""
     free = float(1.0)
@@ -167,8 +185,7 @@ def freed_by(world: World, b: int, path: Path, free: float):
     if enters_box(world, b, path):
         o = to_mesh_point(world, b, path.origin)
         d = to_mesh_vector(world, b, path.way)
-        mesh = world.geometries[world.bodies[b].geometry].mesh
-        answer = wp.mesh_query_ray(mesh, o, d, free)
+        answer = solid_hit(world, b, o, d, free, LIGHT)
         if answer.result:
             free = answer.t
     return free
@@ -182,7 +199,7 @@ def unsheltered(world: World, origin: wp.vec3):
     east = 0.15 * wp.sin(1.7 * x + 2.3 * wp.sin(1.3 * y))
     north = 0.15 * wp.sin(1.9 * y + 2.1 * wp.sin(1.1 * x))
     free = float(1.0)
-    if blocked(world, path_along(origin, wp.vec3(east, north, 1.0) * SHELTER_M)):
+    if cut(world, path_along(origin, wp.vec3(east, north, 1.0) * SHELTER_M), HOLES):
         free = 0.0
     return free
 

@@ -9,6 +9,8 @@ PINHOLE = wp.constant(0)
 BROWN_CONRADY = wp.constant(1)
 KANNALA_BRANDT = wp.constant(2)
 EQUIRECTANGULAR = wp.constant(3)
+HOLES = wp.constant(1)
+CLEAR = wp.constant(2)
 
 Coefficients = wp.types.vector(length=8, dtype=wp.float32)
 
@@ -81,11 +83,14 @@ class Body:
         R_world_mesh, t_world_mesh: Rotation without scale, and position.
         B_mesh_world, t_mesh_world: World to mesh, scale included.
         low_m, high_m: Box in the world.
+        pierced: HOLES, CLEAR or both, where rays may pass some of its faces; else 0, and no face
+            is looked at more closely.
     """
 
     geometry: int
     first_vertex: int
     first_material: int
+    pierced: int
     scale: float
     A_camera_mesh: wp.mat33
     t_camera_mesh: wp.vec3
@@ -101,7 +106,19 @@ class Body:
 
 @wp.struct
 class Surface:
-    """A metallic-roughness material; ``texture`` is -1 where there is none."""
+    """A metallic-roughness material, as generator.core.geometry.Material.
+
+    Attributes:
+        texture: Index into the textures; -1 where there is none.
+        layered: 1 where there is more to it than colour, roughness and bumps: a coat, light that
+            goes through, maps of emission, metal or occlusion, or a mirror; else nothing below
+            is read.
+        coat, coat_roughness: Weight and perceptual roughness of the clear coat.
+        transmission: Share of the light below the specular layer that goes through.
+        ior: Refractive index of what transmits.
+        thin: 1 for a pane that bends nothing, 0 for a solid that refracts.
+        opacity: Share of what is behind that it hides.
+    """
 
     base_color: wp.vec3
     roughness: float
@@ -110,6 +127,13 @@ class Surface:
     texture: int
     texture_scale_m: float
     emission_cd_m2: wp.vec3
+    layered: int
+    coat: float
+    coat_roughness: float
+    transmission: float
+    ior: float
+    thin: int
+    opacity: float
 
 
 @wp.struct
@@ -120,16 +144,26 @@ class Texture:
         texels: Albedo as square roots of linear values and roughness factor, 8 bits each
             (red lowest).
         bumps: Tangent-space normals, 8 bits each; empty where there are none.
+        shares: Factors on metallic (lowest byte) and occlusion of ambient light; empty where
+            there are none.
+        glow: Factor on emission as square roots of linear values; empty where there is none.
+        cover: Coverage of the finest level; empty where there are no holes.
         offsets: First texel of each level.
     """
 
     texels: wp.array(dtype=wp.uint32)
     bumps: wp.array(dtype=wp.uint32)
+    shares: wp.array(dtype=wp.uint32)
+    glow: wp.array(dtype=wp.uint32)
+    cover: wp.array(dtype=wp.uint8)
     offsets: wp.array(dtype=wp.int32)
     width: int
     height: int
     levels: int
     has_bumps: int
+    has_shares: int
+    has_glow: int
+    has_cover: int
 
 
 @wp.struct

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.brdf import make_brdf, specular_lobe
+from generator.renderers.kernels.brdf import Brdf, make_brdf, specular_lobe
 from generator.renderers.kernels.ground import coat_at, coated, footprint
 from generator.renderers.kernels.lattice import Lattice, cell_at, ray_origin
 from generator.renderers.kernels.lighting import beam_from, facing, towards_mirror, widening
@@ -66,6 +66,62 @@ def part_of(a: wp.vec3, b: wp.vec3):
     return (a[0] + a[1] + a[2]) / wp.max(b[0] + b[1] + b[2], 1.0e-20)
 
 
+@wp.struct
+class LampLight:
+    """Light of all lamps at a point.
+
+    Attributes:
+        lux: Illuminance of the surface [lx].
+        shine: Reflected by the specular layer towards the viewer [cd/m^2].
+        towards: Where it comes from, on average; any length.
+    """
+
+    lux: wp.vec3
+    shine: wp.vec3
+    towards: wp.vec3
+
+
+@wp.func
+def light_of_lamps(
+    world: World,
+    brdf: Brdf,
+    n: wp.vec3,
+    p_world: wp.vec3,
+    v: wp.vec3,
+    lit: wp.array(dtype=float, ndim=2),
+    k: int,
+):
+    """Light of all lamps at a point; arguments as for light_at."""
+    mirrored = n * (2.0 * wp.dot(n, v)) - v
+    alpha = brdf.roughness * brdf.roughness
+    light = LampLight()
+    for j in range(world.lamps.shape[0]):
+        visible = lit[j, k]
+        if visible > 0.0:
+            beam = beam_from(world.lamps[j], p_world)
+            n_l = facing(world.lamps[j], beam, p_world, n)
+            if n_l > 0.0:
+                l = towards_mirror(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
+                n_s = wp.max(wp.dot(n, l), 1.0e-3)
+                wider = widening(world.lamps[j], beam, alpha)
+                lobe = specular_lobe(brdf, n, v, l, n_s, wider)
+                arriving = beam.normal_lux * (n_l * visible)
+                light.lux += arriving
+                light.shine += wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
+                light.towards += beam.direction * (arriving[0] + arriving[1] + arriving[2])
+    return light
+
+
+@wp.func
+def open_lobe(brdf: Brdf, open_sky: float):
+    """Visible part of the sky in the specular lobe.
+
+    Source: Lagarde and de Rousiers 2014, with a fixed exponent.
+    """
+    lobe = brdf.n_v + open_sky
+    return wp.clamp(lobe * lobe - 1.0 + open_sky, 0.0, 1.0)
+
+
 @wp.func
 def light_at(
     world: World,
@@ -87,36 +143,17 @@ def light_at(
     n = look.normal
     n_v = wp.dot(n, v)
     brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, look.specular, n_v)
-    mirrored = n * (2.0 * n_v) - v
-    alpha = brdf.roughness * brdf.roughness
+    lamps = light_of_lamps(world, brdf, n, p_world, v, lit, k)
     light = Light()
-    lux = wp.vec3(0.0)
-    shine = wp.vec3(0.0)
-    for j in range(world.lamps.shape[0]):
-        visible = lit[j, k]
-        if visible > 0.0:
-            beam = beam_from(world.lamps[j], p_world)
-            n_l = facing(world.lamps[j], beam, p_world, n)
-            if n_l > 0.0:
-                l = towards_mirror(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
-                n_s = wp.max(wp.dot(n, l), 1.0e-3)
-                wider = widening(world.lamps[j], beam, alpha)
-                lobe = specular_lobe(brdf, n, v, l, n_s, wider)
-                arriving = beam.normal_lux * (n_l * visible)
-                lux += arriving
-                shine += wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
-                light.towards += beam.direction * (arriving[0] + arriving[1] + arriving[2])
+    light.towards = lamps.towards
     ambient = sky_irradiance(world.sky, n) * open_sky
-    # Specular occlusion after Lagarde and de Rousiers 2014, with a fixed exponent.
-    open_lobe = brdf.n_v + open_sky
-    open_lobe = wp.clamp(open_lobe * open_lobe - 1.0 + open_sky, 0.0, 1.0)
-    mirror = sky_reflection(world.sky, mirrored, brdf.roughness)
-    lux = lux * (1.0 / wp.pi)
+    mirror = sky_reflection(world.sky, n * (2.0 * n_v) - v, brdf.roughness)
+    lux = lamps.lux * (1.0 / wp.pi)
     light.diffuse = wp.cw_mul(brdf.matte, lux + ambient)
-    light.rest = wp.cw_mul(brdf.gloss, mirror) * open_lobe + shine
+    light.rest = wp.cw_mul(brdf.gloss, mirror) * open_lobe(brdf, open_sky) + lamps.shine
     light.rest += world.surfaces[surface].emission_cd_m2
     light.lamps = part_of(lux, lux + ambient)
-    light.shine = part_of(shine, light.rest)
+    light.shine = part_of(lamps.shine, light.rest)
     return light
 
 
@@ -171,16 +208,18 @@ def shade_points(
     exposed: wp.array(dtype=float),
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Shade a list of pixels, each by itself."""
+    """Shade a list of pixels, each by itself; layered surfaces are left out."""
     k = wp.tid()
     i = pixels[k]
     hit = images.hits[i]
+    surface = surface_index(world, hit)
+    if world.surfaces[surface].layered != 0:
+        return
     x = float(i % view.width) + 0.5
     y = float(i / view.width) + 0.5
     d = view.R_world_camera @ pixel_direction(view, x, y)
     v = unit(-d)
     z = images.z_m[i]
-    surface = surface_index(world, hit)
     width_m = pixel_width(view, i, z)
     look = look_at_hit(world, surface, hit, images.weights[i], images.normals[i], width_m, v)
     p = view.eye_m + d * z
@@ -196,6 +235,7 @@ def shade_points(
 def gatherable(world: World, surface: int):
     """Whether a material's light changes slowly enough to be taken from the lattice."""
     smooth = world.surfaces[surface].roughness >= GATHERED_ROUGHNESS
+    smooth = smooth and world.surfaces[surface].layered == 0
     texture = world.surfaces[surface].texture
     if smooth and texture >= 0:
         smooth = world.surfaces[surface].metallic < 0.05

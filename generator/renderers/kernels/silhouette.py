@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.holes import beyond_holes
 from generator.renderers.kernels.raster import (
     UNSNAPPED,
     Window,
@@ -17,7 +18,14 @@ from generator.renderers.kernels.raster import (
     fan_edges,
 )
 from generator.renderers.kernels.rays import FARTHEST
-from generator.renderers.kernels.records import View, World, to_mesh_point, to_mesh_vector, unit
+from generator.renderers.kernels.records import (
+    HOLES,
+    View,
+    World,
+    to_mesh_point,
+    to_mesh_vector,
+    unit,
+)
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -142,5 +150,9 @@ def trace_silhouettes(
             d = view.R_world_camera @ canvas_direction(view, nodes, stride, x, y)
             if wp.dot(d, d) > 0.5:
                 o = to_mesh_point(world, b, view.eye_m + d * t_min)
-                if wp.mesh_query_ray_anyhit(mesh, o, to_mesh_vector(world, b, d), FARTHEST):
+                way = to_mesh_vector(world, b, d)
+                met = wp.mesh_query_ray_anyhit(mesh, o, way, FARTHEST)
+                if met and (world.bodies[b].pierced & HOLES) != 0:
+                    met = beyond_holes(world, b, o, way, FARTHEST, HOLES).result != 0
+                if met:
                     mask[i] = wp.uint8(1)

@@ -15,11 +15,13 @@ from generator.renderers.kernels.ground import (
     puddle_at,
     snow_at,
 )
+from generator.renderers.kernels.holes import solid_hit
 from generator.renderers.kernels.lattice import Lattice, cell_at, corner_of, ray_origin
 from generator.renderers.kernels.lighting import SUN, beam_from
 from generator.renderers.kernels.optics import pixel_of
 from generator.renderers.kernels.rays import unsheltered
 from generator.renderers.kernels.records import (
+    HOLES,
     View,
     World,
     pixel_direction,
@@ -166,9 +168,8 @@ def mirrored(
     candidates = wp.bvh_query_ray(world.tree, origin, d)
     b = int(0)
     while wp.bvh_query_next(candidates, b, nearest):
-        mesh = world.geometries[world.bodies[b].geometry].mesh
         o = to_mesh_point(world, b, origin)
-        answer = wp.mesh_query_ray(mesh, o, to_mesh_vector(world, b, d), nearest)
+        answer = solid_hit(world, b, o, to_mesh_vector(world, b, d), nearest, HOLES)
         if answer.result:
             nearest = answer.t
             hit = wp.vec2i(b, answer.face)

@@ -1,0 +1,56 @@
+"""Coats, glass, mirrors and further maps, over what plain shading has left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from generator.renderers.kernels import records, shade
+from generator.renderers.occlusion import lamp_parts, sunflower
+from generator.renderers.packing import PackedWorld
+from generator.renderers.settings import RenderSettings
+from generator.renderers.stock import AssetStock
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ListedPixels:
+    """Pixels that are shaded by themselves.
+
+    Attributes:
+        count: Their number; the arrays are longer.
+        pixels: Which ones.
+        lit: Visible part of each lamp [lamp, place in the list].
+        open_sky: Visible part of the hemisphere, [1, place].
+        exposed: Share of what falls that reaches them.
+    """
+
+    count: int
+    pixels: wp.array
+    lit: wp.array
+    open_sky: wp.array
+    exposed: wp.array
+
+
+def shade_layers(
+    world: PackedWorld,
+    view: records.View,
+    images: shade.Images,
+    listed: ListedPixels,
+    radiance: wp.array,
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> None:
+    """Shade those of the listed pixels that see layered surfaces, in place."""
+    # A module of its own: scenes without such surfaces neither compile nor load it.
+    from generator.renderers.kernels import layers
+
+    device = stock.device
+    probe = layers.Probe()
+    probe.parts = wp.array(lamp_parts(4, settings), dtype=wp.vec2, device=device)
+    probe.disc = wp.array(sunflower(4), dtype=wp.vec2, device=device)
+    probe.radius_m = settings.ambient_occlusion_radius_m
+    probe.lit = stock.scratch("lit where rays end", listed.lit.shape, float)
+    frame = [view, world.record, images]
+    inputs = [*frame, listed.pixels, listed.lit, listed.open_sky, listed.exposed, probe]
+    wp.launch(layers.shade_layers, listed.count, inputs, [radiance], device=device)
