@@ -9,18 +9,21 @@ from pydantic import Field
 
 from generator.config.distributions import (
     Bounds,
+    Constant,
     Count,
     Flag,
+    Name,
     NonNegative,
     Probability,
     Scalar,
     Uniform,
     UniformInteger,
 )
-from generator.core.fixtures import fixture_asset, with_fixture, without_lights
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.fixtures import PANELS, fixture_asset, with_fixture, without_lights
 from generator.core.interfaces import AssetIndex
 from generator.core.photometry import with_flux
-from generator.core.scene import Light, Scene
+from generator.core.scene import Light, LightKind, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
@@ -33,7 +36,7 @@ class CeilingLights(RandomizerBase):
     They hang at the top of the space in which lights may be, and shine straight down.
 
     Attributes:
-        kind: rectangle or disk.
+        kind: rectangle or disk, all alike.
         rows, columns: Of the grid, along Y and X of the room.
         size_m: Sides of a rectangle along X and Y; a disk has the first for its diameter.
         luminous_flux_lm: Of one panel; an office panel of 0.6 m by 0.6 m gives 4000 lm.
@@ -44,7 +47,7 @@ class CeilingLights(RandomizerBase):
     """
 
     type: Literal["ceiling_lights"] = "ceiling_lights"
-    kind: Literal["rectangle", "disk"] = "rectangle"
+    kind: Name = Constant("rectangle")
     rows: Count = UniformInteger(1, 2)
     columns: Count = UniformInteger(2, 3)
     size_m: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (0.6, 0.6)
@@ -57,12 +60,13 @@ class CeilingLights(RandomizerBase):
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene under other lights."""
         scene = scene if self.keep else without_lights(scene)
+        kind = self._kind(rng)
         rows, columns = self.rows.draw(rng), self.columns.draw(rng)
         color = linear_of_temperature(self.temperature_k.draw(rng))
         flux_lm = self.luminous_flux_lm.draw(rng)
         for k in range(rows * columns):
             at_m = _grid_point(scene, k // columns, k % columns, rows, columns)
-            light = replace(self._panel(f"{self.name}/{k}", at_m), color=color)
+            light = replace(self._panel(f"{self.name}/{k}", kind, at_m), color=color)
             lit = 0.0 if self.broken.draw(rng) else flux_lm
             light = with_flux(light, lit)
             if self.visible:
@@ -72,10 +76,21 @@ class CeilingLights(RandomizerBase):
                 scene = replace(scene, lights=(*scene.lights, light))
         return scene
 
-    def _panel(self, name: str, at_m: Vec3) -> Light:
+    def _kind(self, rng: Rng) -> LightKind:
+        drawn = self.kind.draw(rng)
+        if drawn == "rectangle":
+            return "rectangle"
+        if drawn == "disk":
+            return "disk"
+        raise ConfigError(
+            f"randomizers.{self.name}.kind: unknown panel '{drawn}'; expected one of "
+            f"{', '.join(PANELS)}{did_you_mean(drawn, PANELS)}"
+        )
+
+    def _panel(self, name: str, kind: LightKind, at_m: Vec3) -> Light:
         return Light(
             name,
-            self.kind,
+            kind,
             position_m=at_m,
             direction=(0.0, 0.0, -1.0),
             size_m=self.size_m,

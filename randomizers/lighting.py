@@ -62,6 +62,7 @@ class Lighting(RandomizerBase):
         visible: Whether panels are seen, in housings with a bright front.
         cone_deg: Half angle of a spot.
         angular_radius_deg: Of the sun's disc.
+        keep: Whether the lights that are there stay.
     """
 
     type: Literal["lighting"] = "lighting"
@@ -80,6 +81,8 @@ class Lighting(RandomizerBase):
     cone_deg: Annotated[Scalar, Bounds(1, 90)] = Uniform(20.0, 40.0)
     angular_radius_deg: Annotated[Scalar, Bounds(0, 20)] = Constant(0.27)
 
+    keep: bool = False
+
     @model_validator(mode="after")
     def _has_one_strength(self) -> Lighting:
         if self.luminous_flux_lm is not None and "illuminance_lux" in self.model_fields_set:
@@ -95,7 +98,7 @@ class Lighting(RandomizerBase):
         shares = [0.3 + float(rng.uniform()) for _ in range(count)]
         strength = self.illuminance_lux if self.luminous_flux_lm is None else self.luminous_flux_lm
         total = strength.draw(rng)
-        scene = without_lights(scene)
+        scene = scene if self.keep else without_lights(scene)
         for k, share in enumerate(shares):
             light = self._light(scene, assets, rng, f"{self.name}/{k}", total * share / sum(shares))
             if self.visible and light.kind in PANELS:

@@ -95,6 +95,25 @@ def test_what_is_no_panorama_is_refused_and_nothing_is_kept(
     assert not [path for path in cache.rglob("*") if path.is_file()]
 
 
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"\x89PNG\r\n\x1a\n" + bytes(64), b"not an image at all", b"\xff\xd8\xff" + bytes(90)],
+)
+def test_a_corrupt_texture_is_refused_and_nothing_is_kept(tmp_path: Path, data: bytes) -> None:
+    """Empty, cut off or something else: one error that names the file."""
+    folder, cache = tmp_path / "mine", tmp_path / "cache"
+    folder.mkdir()
+    (folder / "wood.png").write_bytes(data)
+    (folder / "assets.yaml").write_text("textures:\n  - {id: wood, file: wood.png}\n")
+    library = open_library((folder,), cache, tmp_path / "no packs")
+
+    with pytest.raises(AssetError, match=r"wood\.png: unreadable image") as refused:
+        library.texture("user/wood")
+
+    assert "\n" not in str(refused.value)
+    assert not [path for path in cache.rglob("*") if path.is_file()]
+
+
 def test_a_panorama_of_the_user_lights_as_one_of_the_packs(tmp_path: Path) -> None:
     """An OpenEXR file in a folder of one's own is an environment by its id."""
     (tmp_path / "sky.exr").write_bytes(exr_file(pixels(16)))
