@@ -184,19 +184,28 @@ def coated() -> Picture:
 
 
 def lamps() -> Picture:
-    """Every kind of lamp at once."""
+    """Lamps that are bodies in Mitsuba, where they do not shade each other."""
     return still_life(
         matte(0.7)[0],
         {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": rgb(0.7)}},
-        PANEL, DISK, BALL, SUN, SPOT,
+        PANEL, DISK, BALL,
         sky=0.0,
     )  # fmt: skip
 
 
+def sun_and_spot() -> Picture:
+    """Lamps that are points there, and small here."""
+    picture = lamps()
+    return replace(picture, scene=replace(picture.scene, lights=(SUN, SPOT)))
+
+
 def textured() -> Picture:
-    """Square texels, each the same all over; the ground has UVs, whose V goes down in Mitsuba."""
+    """Four squares of colour, whose borders alone are mixed in another way.
+
+    V goes down in Mitsuba.
+    """
     colors = np.array([[[230, 40, 30], [40, 200, 60]], [[30, 60, 220], [240, 230, 200]]], np.uint8)
-    albedo = np.repeat(np.repeat(colors, 64, axis=0), 64, axis=1)
+    albedo = np.repeat(np.repeat(colors, 256, axis=0), 256, axis=1)
     picture = lamps()
     cloth = (replace(matte(1.0)[0], texture="cloth"),)
     meshes = {**picture.library.meshes, "ground": plane_mesh(4.0, cloth)}
@@ -206,7 +215,7 @@ def textured() -> Picture:
     }  # fmt: skip
     lambert = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": bitmap}}
     scene = replace(picture.scene, lights=(PANEL,))
-    return replace(picture, scene=scene, library=library, bsdfs={"ground": lambert})
+    return replace(picture, scene=scene, library=library, bsdfs={"ground": lambert}, exact=False)
 
 
 def sky_of(directions: np.ndarray) -> np.ndarray:
@@ -223,7 +232,7 @@ def environment_lit() -> Picture:
     # Mitsuba's image has its first and last rows at the poles, Y up, and goes around from -Z
     # by way of -X.
     polar = np.pi * np.arange(height) / (height - 1.0)
-    azimuth = 2.0 * np.pi * np.arange(2 * height) / (2.0 * height)
+    azimuth = 2.0 * np.pi * (np.arange(2 * height) + 0.5) / (2.0 * height)
     p, a = np.meshgrid(polar, azimuth, indexing="ij")
     theirs = np.stack([np.sin(p) * np.sin(a), np.cos(p), -np.sin(p) * np.cos(a)], axis=-1)
     to_world = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
@@ -247,7 +256,7 @@ PICTURES = {
     function.__name__: function
     for function in (
         cornell, metal, plastic, solid_glass, rough_glass, thin_glass, veil, coated, lamps,
-        textured, environment_lit,
+        sun_and_spot, textured, environment_lit,
     )
 }  # fmt: skip
 
