@@ -46,7 +46,9 @@ def smith_albedo() -> Float32:
     """
     nodes = np.clip(np.arange(64) / 63.0, 1e-3, 1.0)
     strata = (np.arange(32) + 0.5) / 32.0
-    u1, u2 = (axis.reshape(1, -1) for axis in np.meshgrid(strata, strata, indexing="ij"))
+    u1, rest = (axis.reshape(1, -1) for axis in np.meshgrid(strata, strata, indexing="ij"))
+    # Finer towards the few steep facets, whose light is lost.
+    u2, share = 1.0 - rest**3, rest**2 / (rest**2).mean()
     n_v = nodes[:, None]
     table = np.zeros((64, 64, 2), np.float32)
     for row, roughness in enumerate(np.clip(nodes, 0.045, 1.0)):
@@ -63,7 +65,7 @@ def smith_albedo() -> Float32:
         n_l = 2.0 * v_h * hz / size - n_v
         roots = [np.sqrt(alpha**2 + (1.0 - alpha**2) * c**2) for c in (n_v, n_l)]
         weight = n_l * (n_v + roots[0]) / (n_l * roots[0] + n_v * roots[1])
-        weight = np.where(n_l > 0.0, weight, 0.0)
+        weight = np.where(n_l > 0.0, weight * share, 0.0)
         fresnel = np.clip(1.0 - v_h, 0.0, 1.0) ** 5
         factors = np.stack([weight * (1.0 - fresnel), weight * fresnel], axis=-1)
         table[row] = factors.mean(axis=1)

@@ -33,8 +33,8 @@ from generator.renderers.kernels.path_bsdf import (
     luminance,
     make_bsdf,
     make_interface,
-    refract,
     scatter,
+    scatter_glass,
 )
 from generator.renderers.kernels.path_lights import (
     AT_INFINITY,
@@ -397,21 +397,19 @@ class Dealt:
     """What a vertex is, after the lot.
 
     Attributes:
-        kind: One of OPAQUE, STRAIGHT, REFRACT and ROUGH_PANE.
-        bsdf: What reflects, if it is OPAQUE.
-        weight: What passes, over the probability of that.
-        ior: Behind the surface over before it, if it is REFRACT.
+        kind: One of OPAQUE, STRAIGHT, SOLID and ROUGH_PANE.
+        bsdf: What reflects.
+        weight: What is left of light that passes, over the probability of that.
     """
 
     kind: int
     bsdf: Bsdf
     weight: wp.vec3
-    ior: float
 
 
 OPAQUE = wp.constant(0)
 STRAIGHT = wp.constant(1)
-REFRACT = wp.constant(2)
+SOLID = wp.constant(2)
 ROUGH_PANE = wp.constant(3)
 
 
@@ -426,7 +424,7 @@ def lot_between(reflected: float, passed: float):
 
 @wp.func
 def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
-    """Whether glass reflects or lets pass; ``w`` points to where the path comes from."""
+    """Glass; of panes, whether they reflect or let pass. ``w`` is to where the path comes from."""
     out = Dealt()
     tint = v.look.albedo
     alpha = alpha_of(v.look.roughness)
@@ -441,21 +439,18 @@ def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
         out.bsdf.f90 = 1.0
         out.weight = on * (1.0 / (1.0 - p))
         out.bsdf.scale = back * (1.0 / p)
-        out.kind = wp.where(is_clear_pane(world, v.surface), STRAIGHT, ROUGH_PANE)
+        if lot < p:
+            out.kind = OPAQUE
+        elif is_clear_pane(world, v.surface):
+            out.kind = STRAIGHT
+        else:
+            out.kind = ROUGH_PANE
+            out.bsdf.scale = wp.vec3(1.0, 1.0, 1.0)
     else:
-        out.ior = wp.where(v.outside, ior, 1.0 / ior)
-        f = fresnel_dielectric(w[2], out.ior)
-        p = lot_between(f, 1.0 - f)
-        out.bsdf = make_interface(w, alpha, out.ior)
-        out.bsdf.scale = wp.vec3(1.0, 1.0, 1.0) * (1.0 / p)
+        out.bsdf = make_interface(w, alpha, wp.where(v.outside, ior, 1.0 / ior))
         # One half of the tint on the way in, the other on the way out.
-        half = wp.vec3(wp.sqrt(tint[0]), wp.sqrt(tint[1]), wp.sqrt(tint[2]))
-        out.weight = half * (1.0 / wp.max(1.0 - p, 1.0e-9))
-        out.kind = REFRACT
-    if lot < p:
-        out.kind = OPAQUE
-    elif out.kind == ROUGH_PANE:
-        out.bsdf.scale = wp.vec3(1.0, 1.0, 1.0)
+        out.weight = wp.vec3(wp.sqrt(tint[0]), wp.sqrt(tint[1]), wp.sqrt(tint[2]))
+        out.kind = SOLID
     return out
 
 
@@ -534,10 +529,7 @@ def step_from(
     step = Step()
     step.density = -1.0
     step.straight = dealt.kind == STRAIGHT
-    side = v.flat
-    if dealt.kind != OPAQUE:
-        side = -v.flat
-    step.o = lifted(v.p, side)
+    step.o = lifted(v.p, -v.flat)
     step.d = d
     step.weight = dealt.weight
     if step.straight:
@@ -545,22 +537,28 @@ def step_from(
     u = random_pair(key, pair, sample)
     choices = random_pair(key, pair + 1, sample)
     sent = Scattering()
-    if dealt.kind == REFRACT:
-        sent = refract(w, alpha_of(v.look.roughness), dealt.ior, u)
+    if dealt.kind == SOLID:
+        sent = scatter_glass(dealt.bsdf, choices[0], u)
     else:
         sent = scatter(dealt.bsdf, choices[0], u)
     if dealt.kind == ROUGH_PANE:
         sent.l = wp.vec3(sent.l[0], sent.l[1], -sent.l[2])
+        sent.density = -1.0
     step.weight = sent.weight
-    if dealt.kind != OPAQUE:
+    side = v.flat
+    if sent.l[2] <= 0.0:
+        side = -v.flat
         step.weight = wp.cw_mul(sent.weight, dealt.weight)
-    elif v.outside or dealt.bsdf.ior == 0.0:
-        choice = choose_source(world, step.o, n, choices[1])
+    o = lifted(v.p, v.flat)
+    # Inside glass nothing is asked: what is outside is seen by going there.
+    if dealt.kind == OPAQUE or (dealt.kind == SOLID and v.outside):
+        choice = choose_source(world, o, n, choices[1])
         step.density = sent.density
         step.total = choice.total
         if choice.part > 0.0 and budget.lights != 2:
             u = random_pair(key, pair + 2, sample)
-            step.light = light_asked(world, table, budget, dealt.bsdf, v, step.o, choice, u)
+            step.light = light_asked(world, table, budget, dealt.bsdf, v, o, choice, u)
+    step.o = lifted(v.p, side)
     step.d = x * sent.l[0] + y * sent.l[1] + n * sent.l[2]
     if wp.dot(step.d, side) <= 0.0:
         step.weight = wp.vec3(0.0)

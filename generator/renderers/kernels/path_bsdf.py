@@ -34,7 +34,8 @@ class Bsdf:
         diffuse: Albedo of the matte layer, seen through those above it.
         f0, f90: Reflectance of the specular layer (Schlick); its share below the coat and its
             multiple scattering are in ``scale``.
-        ior: If not 0, the specular layer reflects by Fresnel's equations for this index instead.
+        ior: If not 0, the specular layer is all there is, reflects by Fresnel's equations for this
+            index instead, and lets the rest through.
         alpha: Width of the specular lobe.
         coat: Weight of the clear coat.
         coat_f0: Its reflectance at normal incidence.
@@ -61,9 +62,9 @@ class Scattering:
     """A direction that was drawn.
 
     Attributes:
-        l: Unit; Z <= 0 where the draw has failed and the path ends.
-        weight: BSDF times cosine over density.
-        density: Per solid angle [1/sr].
+        l: Unit.
+        weight: BSDF times cosine over density; 0 where the draw has failed and the path ends.
+        density: Per solid angle [1/sr]; below zero for what only this draw can find.
     """
 
     l: wp.vec3  # noqa: E741
@@ -198,8 +199,12 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
     if s.p_shine > 0.0:
         lobe = 0.5 * facets(s.alpha, h)
         root = slope(s.alpha, n_v)
-        f += reflectance(s, v_h) * (lobe * n_l / (n_l * root + n_v * slope(s.alpha, n_l)))
-        density += s.p_shine * lobe / (n_v + root)
+        reflected = reflectance(s, v_h)
+        p = s.p_shine
+        if s.ior > 0.0:
+            p = reflected[0]
+        f += reflected * (lobe * n_l / (n_l * root + n_v * slope(s.alpha, n_l)))
+        density += p * lobe / (n_v + root)
     if s.coat > 0.0:
         lobe = 0.5 * facets(s.coat_alpha, h)
         root = slope(s.coat_alpha, n_v)
@@ -257,19 +262,31 @@ def scatter(s: Bsdf, choice: float, u: wp.vec2):
 
 
 @wp.func
-def refract(v: wp.vec3, alpha: float, ior: float, u: wp.vec2):
-    """A direction through a dielectric, towards negative Z; the weight lacks any tint.
+def scatter_glass(s: Bsdf, lot: float, u: wp.vec2):
+    """A direction that is reflected, or goes through towards negative Z.
 
-    The density is not told: nothing else draws such directions. Radiance is that of the outside on
-    both sides: what is seen through a body leaves it again. Masking is separable, as by Walter.
+    The weight lacks any tint. No density is told for what goes through: nothing else draws such
+    directions. Radiance is that of the outside on both sides: what is seen through a body leaves
+    it again. Masking of what goes through is separable, as by Walter.
+
+    Args:
+        lot: In [0, 1), decides between the two.
+        u: In [0, 1), for the direction.
     """
     out = Scattering()
-    h = visible_facet(v, alpha, u)
-    v_h = wp.min(wp.dot(v, h), 1.0)
-    out.l = refracted(-v, h, ior)
-    n_l = -out.l[2]
-    if n_l > 0.0:
-        masking = 2.0 * n_l / (n_l + slope(alpha, n_l))
-        passed = (1.0 - fresnel_dielectric(v_h, ior)) * masking
-        out.weight = wp.vec3(passed, passed, passed)
+    h = visible_facet(s.v, s.alpha, u)
+    v_h = wp.min(wp.dot(s.v, h), 1.0)
+    if lot < fresnel_dielectric(v_h, s.ior):
+        out.l = h * (2.0 * v_h) - s.v
+        if out.l[2] > 0.0:
+            f, density = evaluate(s, out.l)
+            out.density = density
+            out.weight = f * (1.0 / wp.max(density, 1.0e-20))
+    else:
+        out.l = refracted(-s.v, h, s.ior)
+        out.density = -1.0
+        n_l = -out.l[2]
+        if n_l > 0.0:
+            passed = 2.0 * n_l / (n_l + slope(s.alpha, n_l))
+            out.weight = wp.vec3(passed, passed, passed)
     return out

@@ -1,0 +1,53 @@
+"""Path-traced radiance for tests: by the renderer, or by one technique and seed at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.core.capture import Channel
+from generator.core.scene import Camera, Scene
+from generator.renderers.device import open_device
+from generator.renderers.packing import pack_view, pack_world
+from generator.renderers.pathtracer import PathTracer
+from generator.renderers.settings import RenderSettings
+from generator.renderers.stock import AssetStock
+from generator.renderers.warp import WarpRenderer
+from tests.renderers.fake_library import FakeLibrary
+
+BOTH, ASKED, MET = 3, 1, 2
+"""Techniques: next-event estimation and BSDF sampling, either alone."""
+
+
+def settings_of(samples: int, max_bounces: int = 16) -> RenderSettings:
+    return RenderSettings(tier="pathtraced", samples=samples, max_bounces=max_bounces)
+
+
+def radiance_of(
+    scene: Scene, camera: Camera, library: FakeLibrary, samples: int, max_bounces: int = 16
+) -> np.ndarray:
+    """cd/m^2, float64 [h, w, 3], as the renderer gives it."""
+    renderer = WarpRenderer(library, "cpu", settings_of(samples, max_bounces))
+    reading = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
+    return reading.channels[Channel.RADIANCE].astype(np.float64)
+
+
+def replicates_of(
+    scene: Scene,
+    camera: Camera,
+    library: FakeLibrary,
+    samples: int,
+    count: int,
+    lights: int = BOTH,
+    max_bounces: int = 16,
+) -> np.ndarray:
+    """Independent images of as many seeds, [count, h, w, 3]: their spread is the true error."""
+    stock = AssetStock(library, open_device("cpu"))
+    tracer = PathTracer(stock, settings_of(samples, max_bounces))
+    view = pack_view(camera, stock)
+    shape = (view.height, view.width, 3)
+    images = []
+    for seed in range(count):
+        world = pack_world(scene, camera, stock)
+        traced = tracer.radiance(scene, camera, world, view, seed=seed, lights=lights)
+        images.append(traced.numpy().reshape(shape).astype(np.float64))
+    return np.stack(images)
