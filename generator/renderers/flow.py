@@ -67,7 +67,8 @@ def _carried(
     carriers = carriers_of(then.scene)
     bands: Sequence[Band] = (whole_band(then),)
     if then.camera.shutter.rolls:
-        bands = bands_of(sight(then, studio, None, near))
+        near = sight(then, studio, None, near)
+        bands = bands_of(near)
     points = deformed(points, shown, then.scene, studio.stock.assets)
     found = find(points, bands, carriers)
     for channel in sorted(channels, key=lambda c: c.value):

@@ -32,7 +32,7 @@ def rolled_silhouettes(
     height = near.moment.camera.intrinsics.height_px
     for band in bands:
         scene, camera = band.moment.scene, band.moment.camera
-        see = sight(band.moment, studio, None, near)
+        see = near = sight(band.moment, studio, None, near)
         none = np.zeros_like(ids)
         drawn = silhouettes(scene, camera, see.world, see.view, studio.stock, see.seen, none)
         top = band.first if band.first > 0 else -height

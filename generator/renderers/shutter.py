@@ -139,8 +139,8 @@ def _averaged(slices: Sequence[Slice], light: Light, near: Sight, studio: Studio
     for part in slices:
         band = part.band
         first, end = with_margin(band, lens.height_px)
-        rows = light(sight(band.moment, studio, (first, end), near))
-        own = rows[band.first - first : band.end - first]
+        see = near = sight(band.moment, studio, (first, end), near)
+        own = light(see)[band.first - first : band.end - first]
         mean[band.first : band.end] += part.weights[:, None, None] * own
     return mean
 

@@ -33,8 +33,8 @@ def test_what_stands_still_is_white_and_none_is_black() -> None:
 
 @pytest.mark.parametrize(
     ("direction", "hue_deg"),
-    # Of the 55 colours from red clockwise, 15 to yellow, 6, 4, 11 to blue, 13 to magenta, 6: numbers
-    # 0, 13.5, 27 and 40.5.
+    # Of the 55 colours from red clockwise, 15 to yellow, 6, 4, 11 to blue, 13 to magenta, 6, these
+    # have the numbers 0, 13.5, 27 and 40.5.
     [((10.0, 0.0), 0.0), ((0.0, 10.0), 54.0), ((-10.0, 0.0), 190.9), ((0.0, -10.0), 260.8)],
 )
 def test_the_hue_is_the_direction(direction: tuple[float, float], hue_deg: float) -> None:
