@@ -62,9 +62,11 @@ def exposed(
     scene: Scene, camera: Camera, channels: frozenset[Channel], studio: Studio
 ) -> Reading | None:
     """The image of a camera whose shutter is open for a while; None if nothing moves meanwhile."""
-    moment = Moment.of(scene, camera)
     open_s = camera.shutter.open_s
-    if not open_s > 0.0 or not moves(moment, open_s):
+    if not open_s > 0.0:
+        return None
+    moment = Moment.of(scene, camera)
+    if not moves(moment, open_s):
         return None
     near = sight(moment, studio)
     pace = pace_of(near)

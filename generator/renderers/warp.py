@@ -47,16 +47,14 @@ class WarpRenderer:
                 " choose 'auto' or 'rays'."
             )
         self._stock = AssetStock(assets, self._device)
+        self._studio = Studio(self._stock, self._settings)
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """Every asked channel of one camera."""
-        studio = Studio(self._stock, self._settings)
-        reading = exposed(scene, camera, channels, studio)
-        return reading or self._at_once(scene, camera, channels, studio)
+        reading = exposed(scene, camera, channels, self._studio)
+        return reading or self._at_once(scene, camera, channels)
 
-    def _at_once(
-        self, scene: Scene, camera: Camera, channels: frozenset[Channel], studio: Studio
-    ) -> Reading:
+    def _at_once(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """The image of one instant."""
         world = pack_world(scene, camera, self._stock)
         view = pack_view(camera, self._stock)
@@ -78,7 +76,7 @@ class WarpRenderer:
             outlines = silhouettes(scene, camera, world, view, self._stock, seen, ids)
         if channels & FLOW:
             near = Sight(Moment.of(scene, camera), world, view, seen)
-            images |= flow_images(near, shown_in(near), channels, studio)
+            images |= flow_images(near, shown_in(near), channels, self._studio)
         return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
