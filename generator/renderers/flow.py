@@ -15,7 +15,7 @@ from generator.core.capture import Channel
 from generator.core.geometry import Float32
 from generator.core.intrinsics import Intrinsics
 from generator.renderers.moments import Band, Moment, Sight, Studio, sight
-from generator.renderers.pace import bands_of
+from generator.renderers.pace import bands_of, timed_bands
 from generator.renderers.points import Found, Points, carriers_of, deformed, find, points_of
 from generator.renderers.shown import Shown, drawn_bands, whole_band
 
@@ -67,7 +67,8 @@ def _carried(
     carriers = carriers_of(then.scene)
     bands: Sequence[Band] = (whole_band(then),)
     if then.camera.shutter.rolls:
-        bands = bands_of(sight(then, studio, None, near))
+        near = sight(then, studio, None, near)
+        bands = bands_of(near)
     points = deformed(points, shown, then.scene, studio.stock.assets)
     found = find(points, bands, carriers)
     for channel in sorted(channels, key=lambda c: c.value):
@@ -77,7 +78,9 @@ def _carried(
             images[channel] = _scene_flow(points, found)
         else:
             seen = frozenset({Channel.RANGE, Channel.NORMALS})
-            _, other = drawn_bands(bands, seen, studio, near)
+            # Four times as far as bands allow is a pixel: as sharp as occlusion is told.
+            starts = [band.first for band in bands[::4]]
+            _, other = drawn_bands(timed_bands(then, starts), seen, studio, near)
             images[channel] = occluded(points, found, other, shown.intrinsics)
     return images
 

@@ -89,15 +89,18 @@ def sight(
         rows: The first, and the one after the last; None = all.
         near: The same world at another instant: what is the same need not be packed again.
     """
-    stock = studio.stock
-    if near is not None and _same_looks(near.moment.scene, moment.scene):
-        world = moved_world(near.world, moment.scene, moment.camera, stock)
-    else:
-        world = pack_world(moment.scene, moment.camera, stock)
-    view = pack_view(moment.camera, stock)
+    world = packed(moment, studio, near)
+    view = pack_view(moment.camera, studio.stock)
     if rows is not None:
         view = rows_of(view, *rows)
-    return Sight(moment, world, view, see(world, view, stock, studio.settings.visibility))
+    return Sight(moment, world, view, see(world, view, studio.stock, studio.settings.visibility))
+
+
+def packed(moment: Moment, studio: Studio, near: Sight | None = None) -> PackedWorld:
+    """The world on the device; arguments as of ``sight``."""
+    if near is not None and _same_looks(near.moment.scene, moment.scene):
+        return moved_world(near.world, moment.scene, moment.camera, studio.stock)
+    return pack_world(moment.scene, moment.camera, studio.stock)
 
 
 def _same_looks(one: Scene, other: Scene) -> bool:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from generator.core.boxes import tight_box
 from generator.core.capture import Silhouette
-from generator.renderers.moments import Band, Sight, Studio, sight
+from generator.renderers.moments import Band, Sight, Studio, packed
 from generator.renderers.pace import timed_bands
+from generator.renderers.packing import pack_view
 from generator.renderers.silhouettes import silhouettes
 
 _BANDS = 12
@@ -30,11 +31,12 @@ def rolled_silhouettes(
         bands = timed_bands(near.moment, starts)
     pieces: dict[int, list[Silhouette]] = {}
     height = near.moment.camera.intrinsics.height_px
+    none, unseen = np.zeros_like(ids), replace(near.seen, projected=None)
     for band in bands:
         scene, camera = band.moment.scene, band.moment.camera
-        see = sight(band.moment, studio, None, near)
-        none = np.zeros_like(ids)
-        drawn = silhouettes(scene, camera, see.world, see.view, studio.stock, see.seen, none)
+        world, view = packed(band.moment, studio, near), pack_view(camera, studio.stock)
+        near = Sight(band.moment, world, view, unseen)
+        drawn = silhouettes(scene, camera, world, view, studio.stock, unseen, none)
         top = band.first if band.first > 0 else -height
         end = band.end if band.end < height else 2 * height
         for instance_id, outline in drawn.items():

@@ -88,8 +88,9 @@ def draw_precipitation(
 ) -> None:
     """Draw what falls over the image, in place; nothing where nothing falls."""
     weather = world.weather
+    exposure_s = camera.shutter.exposure_s or exposure_time_s(ev100)
     found = [
-        traces(kind, camera, weather, exposure_time_s(ev100), name)
+        traces(kind, camera, weather, exposure_s, name)
         for name, rate, kind in (
             ("rain", weather.rain_mm_h, rain(max(weather.rain_mm_h, 1e-3))),
             ("snow", weather.snow_mm_h, snow(max(weather.snow_mm_h, 1e-3))),

@@ -73,7 +73,7 @@ def drawn_bands(
         bands: In order of rows; together all of them.
         channels: Labels.
         studio: Assets and settings.
-        near: The world at any of their instants, or about then.
+        near: The world at about that time.
         light: Makes the channel RADIANCE; None = it is not asked for.
     """
     lens = near.moment.camera.intrinsics
@@ -84,7 +84,8 @@ def drawn_bands(
     for band in bands:
         rows = slice(band.first, band.end)
         first, end = (band.first, band.end) if light is None else with_margin(band, lens.height_px)
-        see = sight(band.moment, studio, (first, end), near)
+        # Neighbours in time have most in common.
+        see = near = sight(band.moment, studio, (first, end), near)
         own = slice(band.first - first, band.end - first)
         seen, rows_px = see.seen, (end - first, lens.width_px)
         hits[rows] = seen.hits.numpy().reshape(*rows_px, 2)[own]

@@ -33,13 +33,15 @@ from generator.renderers.flow import FLOW, flow_images
 from generator.renderers.lamps import main_lamp_numbers
 from generator.renderers.moments import Band, Moment, Sight, Studio, moves, sight
 from generator.renderers.outlines import rolled_silhouettes
-from generator.renderers.pace import bands_of, pace_of
+from generator.renderers.pace import Pace, bands_of, pace_of
 from generator.renderers.packing import moved_world
-from generator.renderers.shown import Light, drawn_bands, with_margin
+from generator.renderers.shown import Light, Shown, drawn_bands, with_margin
 from generator.renderers.tiers import smooth_edges, tier_light
 
 _LIT = frozenset({Channel.RGB, Channel.RADIANCE})
 _METERING = 4
+_LINEAR_EV100 = 40.0
+"""So short an exposure that edges are mixed linearly: a mean over time adds up light."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,9 +61,11 @@ def exposed(
     scene: Scene, camera: Camera, channels: frozenset[Channel], studio: Studio
 ) -> Reading | None:
     """The image of a camera whose shutter is open for a while; None if nothing moves meanwhile."""
-    moment = Moment.of(scene, camera)
     open_s = camera.shutter.open_s
-    if not open_s > 0.0 or not moves(moment, open_s):
+    if not open_s > 0.0:
+        return None
+    moment = Moment.of(scene, camera)
+    if not moves(moment, open_s):
         return None
     near = sight(moment, studio)
     pace = pace_of(near)
@@ -72,25 +76,39 @@ def exposed(
     drawn = channels - FLOW - _LIT - {Channel.AMODAL}
     if Channel.AMODAL in channels:
         drawn = drawn | {Channel.INSTANCE}
-    ev100 = camera.ev100
-    light: Light | None = None
-    if channels & _LIT:
-        ev100 = _metered(near, studio) if ev100 is None else ev100
-        light = partial(_light, ev100=ev100, studio=studio)
-    blurred = light is not None and pace.samples > 1
-    shown, images = drawn_bands(bands, drawn, studio, near, None if blurred else light)
-    if light is not None:
-        assert ev100 is not None
-        mean = images.pop(Channel.RADIANCE, None)
-        if mean is None:
-            mean = _averaged(slices_of(near.moment, pace.samples), light, near, studio)
-        lit = LitImage(_on_device(mean, wp.vec3, studio), ev100)
-        images |= _developed(lit, _on_device(shown.z_m, float, studio), near, channels, studio)
+    lit = camera.ev100 is None and channels & _LIT
+    ev100 = _metered(near, studio) if lit else camera.ev100
+    shown, images = _images(near, bands, drawn | channels & _LIT, pace, ev100, studio)
     outlines: dict[int, Silhouette] = {}
     if Channel.AMODAL in channels:
         outlines = rolled_silhouettes(bands, images[Channel.INSTANCE], studio, near)
     images |= flow_images(near, shown, channels, studio)
     return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
+
+
+def _images(
+    near: Sight,
+    bands: Sequence[Band],
+    channels: frozenset[Channel],
+    pace: Pace,
+    ev100: float | None,
+    studio: Studio,
+) -> tuple[Shown, dict[Channel, NDArray[Any]]]:
+    """What pixels show, labels of it and, if asked for, the photograph."""
+    labels = channels - _LIT
+    if ev100 is None or not channels & _LIT:
+        return drawn_bands(bands, labels, studio, near)
+    if pace.samples > 1:
+        light = partial(light_of, ev100=_LINEAR_EV100, studio=studio)
+        shown, images = drawn_bands(bands, labels, studio, near)
+        mean = _averaged(slices_of(near.moment, pace.samples), light, near, studio)
+    else:
+        light = partial(light_of, ev100=ev100, studio=studio)
+        shown, images = drawn_bands(bands, labels, studio, near, light)
+        mean = images.pop(Channel.RADIANCE)
+    lit = LitImage(_on_device(mean, wp.vec3, studio), ev100)
+    depths = _on_device(shown.z_m, float, studio)
+    return shown, images | _developed(lit, depths, near, channels, studio)
 
 
 def slices_of(middle: Moment, samples: int) -> list[Slice]:
@@ -122,13 +140,13 @@ def _averaged(slices: Sequence[Slice], light: Light, near: Sight, studio: Studio
     for part in slices:
         band = part.band
         first, end = with_margin(band, lens.height_px)
-        rows = light(sight(band.moment, studio, (first, end), near))
-        own = rows[band.first - first : band.end - first]
+        see = near = sight(band.moment, studio, (first, end), near)
+        own = light(see)[band.first - first : band.end - first]
         mean[band.first : band.end] += part.weights[:, None, None] * own
     return mean
 
 
-def _light(see: Sight, ev100: float, studio: Studio) -> Float32:
+def light_of(see: Sight, ev100: float, studio: Studio) -> Float32:
     """What comes from every pixel, anti-aliased; valid until the next call."""
     lit = LitImage(_radiance(see, studio), ev100)
     smooth_edges(see.world, see.view, see.seen, lit, studio)

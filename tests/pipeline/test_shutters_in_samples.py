@@ -1,0 +1,107 @@
+"""The shipped dash camera: rolling rows, blur, flow and labels in the samples of a sequence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from generator.assemble.recipe import open_pipeline
+from generator.assemble.spec import load_spec
+from generator.core.capture import Channel, Reading
+from generator.core.sample import Sample
+from generator.core.shutter import INSTANT
+from generator.pipeline import Pipeline
+
+SIZE_PX = (240, 136)
+
+
+@pytest.fixture(scope="module")
+def pipeline() -> Iterator[Pipeline]:
+    """With small images of a clear day."""
+    overrides = [
+        "sensors.dash.size_px=[240, 136]",
+        "shared.weather=CloudyNoon",
+        "randomizers.people.count=4",
+    ]
+    with open_pipeline(load_spec("street_motion", overrides=overrides)) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def sample(pipeline: Pipeline) -> Sample:
+    """In the middle of a drive."""
+    return pipeline.sample(6)
+
+
+def reading(sample: Sample) -> Reading:
+    return sample.capture.readings["dash"]
+
+
+def test_a_step_made_alone_is_the_step_of_the_sequence(pipeline: Pipeline, sample: Sample) -> None:
+    """Whatever was rendered before: the same bytes in every channel."""
+    pipeline.sample(7)
+    again = reading(pipeline.sample(6))
+
+    for channel, image in reading(sample).channels.items():
+        assert np.array_equal(image, again.channels[channel], equal_nan=True), channel
+
+
+def test_every_label_of_a_rolling_image_agrees_with_it(sample: Sample) -> None:
+    """Boxes and masks are those of the id image, and every share is one."""
+    truth, ids = sample.truth["dash"], reading(sample).channels[Channel.INSTANCE]
+
+    assert truth.objects
+    for thing in truth.objects:
+        assert thing.visible_px == np.count_nonzero(ids == thing.instance.instance_id)
+        assert thing.visible_fraction is not None
+        assert 0.0 < thing.visible_fraction <= 1.0
+
+
+def test_the_camera_of_the_truth_tells_when_its_rows_were_exposed(sample: Sample) -> None:
+    """The same shutter in the scene, in the reading and in what annotators saw."""
+    shutter = sample.scene.camera("dash").shutter
+
+    assert (shutter.exposure_s, shutter.readout_s) == (0.008, 0.025)
+    assert sample.truth["dash"].camera.shutter == reading(sample).camera.shutter == shutter
+
+
+def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample) -> None:
+    """Against a camera at the same place that sees one instant: other pixels, softer ones."""
+    camera = replace(sample.scene.camera("dash"), shutter=INSTANT)
+    wanted = frozenset({Channel.RGB, Channel.INSTANCE, Channel.Z_DEPTH})
+    instant = pipeline.renderer.render(sample.scene, camera, wanted)
+    rolled = reading(sample)
+
+    def detail(image: np.ndarray) -> float:
+        road = image[100:, :, 1].astype(float)
+        return float(np.abs(np.diff(road, axis=0)).mean())
+
+    others = rolled.channels[Channel.INSTANCE] != instant.channels[Channel.INSTANCE]
+    middle = SIZE_PX[1] // 2
+    assert others.sum() > 100
+    assert others[middle - 1 : middle + 1].sum() <= 4
+    assert detail(rolled.channels[Channel.RGB]) < 0.95 * detail(instant.channels[Channel.RGB])
+
+
+def test_flow_of_the_street_is_that_of_the_next_image(pipeline: Pipeline, sample: Sample) -> None:
+    """Where the point is not hidden, the next image shows the same thing at its end."""
+    now, then = reading(sample), reading(pipeline.sample(7))
+    v, u = np.mgrid[: SIZE_PX[1], : SIZE_PX[0]] + 0.5
+    flow = now.channels[Channel.FLOW_FORWARD]
+    image = now.channels[Channel.INSTANCE]
+    # Points at edges may fall into the pixel beside, which shows what is behind.
+    edge = np.zeros(image.shape, bool)
+    for axis in (0, 1):
+        for step in (-1, 1):
+            edge |= np.roll(image, step, axis) != image
+    seen = (now.channels[Channel.FLOW_OCCLUDED_FORWARD] == 0) & ~edge
+    column = np.where(seen, u + flow[..., 0], 0).astype(int)
+    row = np.where(seen, v + flow[..., 1], 0).astype(int)
+    ids = image[seen]
+    found = then.channels[Channel.INSTANCE][row, column][seen]
+
+    assert seen.mean() > 0.5
+    assert (ids == found).mean() > 0.99
