@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from generator.preview.clouds import PointColors
 
 
+WRITTEN = "written"
+
+
 @click.command()
 @click.argument("source")
 @click.option("--n", "-n", type=int, default=8, show_default=True, help="Number of samples.")
@@ -79,8 +82,14 @@ def preview(
 )
 @click.option("--columns", type=int, default=0, help="Tiles in a row; 0 = a sheet of 4 to 3.")
 @click.option("--tile-px", type=int, default=320, show_default=True, help="Width of a tile.")
-@click.option("--channels", default="rgb", show_default=True, help="Comma-separated channels.")
+@click.option(
+    "--channels",
+    default="rgb",
+    show_default=True,
+    help="Comma-separated channels of all cameras; 'written' = what each sensor itself writes.",
+)
 @click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")
+@click.option("--captions", is_flag=True, help="Write under every tile what it is.")
 @configuration_options
 def contact_sheet(
     source: str,
@@ -92,6 +101,7 @@ def contact_sheet(
     tile_px: int,
     channels: str,
     labels: bool,
+    captions: bool,
     seed: int | None,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
@@ -101,13 +111,17 @@ def contact_sheet(
     SOURCE is a configuration (a path or a shipped name), or the folder of a data set.
     """
     from generator.assemble.recipe import open_pipeline
-    from generator.preview.sheet import arranged, tiles, write_sheet
+    from generator.preview.sheet import arranged, pictures, tiles, write_sheet
 
-    wanted = [_channel(name.strip()) for name in channels.split(",")]
+    own = channels == WRITTEN
+    wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))
     spec = Choice(source, seed, overrides, without).spec()
     with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
         samples = _samples(pipeline.sample, first, n, step)
-        images = tiles(samples, wanted, labels=labels, width_px=tile_px)
+        info = pipeline.info
+        shown = info.media if own else dict.fromkeys(info.sensors, wanted)
+        drawn = tiles(samples, shown, labels=labels, devices=own)
+        images = pictures(drawn, tile_px, captions=captions)
     write_sheet(arranged(images, columns), out)
     click.echo(f"{out}: {len(images)} tiles")
 
@@ -125,6 +139,7 @@ def _channel(name: str) -> Channel:
     shown = [c.value for c in Channel if c is not Channel.AMODAL]
     if name not in shown:
         raise ConfigError(
-            f"--channels: unknown channel '{name}'; expected one of {', '.join(shown)}"
+            f"--channels: unknown channel '{name}'; expected {WRITTEN}, or some of"
+            f" {', '.join(shown)}"
         )
     return Channel(name)
