@@ -15,6 +15,7 @@ from generator.core.sample import Sample
 
 if TYPE_CHECKING:
     from generator.preview.clouds import PointColors
+    from generator.preview.overlay import Image
 
 
 WRITTEN = "written"
@@ -68,7 +69,7 @@ def preview(
 
 
 @click.command("contact-sheet")
-@click.argument("source")
+@click.argument("sources", nargs=-1, required=True)
 @click.option("--n", "-n", type=int, default=48, show_default=True, help="Number of samples.")
 @click.option("--first", type=int, default=0, show_default=True, help="Index of the first sample.")
 @click.option("--step", type=int, default=1, show_default=True, help="Distance between samples.")
@@ -92,7 +93,7 @@ def preview(
 @click.option("--captions", is_flag=True, help="Write under every tile what it is.")
 @configuration_options
 def contact_sheet(
-    source: str,
+    sources: tuple[str, ...],
     n: int,
     first: int,
     step: int,
@@ -108,20 +109,23 @@ def contact_sheet(
 ) -> None:
     """Draw samples with their labels on one PNG.
 
-    SOURCE is a configuration (a path or a shipped name), or the folder of a data set.
+    SOURCES are configurations (paths or shipped names), or folders of data sets; the samples of
+    each follow those of the one before.
     """
     from generator.assemble.recipe import open_pipeline
     from generator.preview.sheet import arranged, pictures, tiles, write_sheet
 
     own = channels == WRITTEN
     wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))
-    spec = Choice(source, seed, overrides, without).spec()
-    with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
-        samples = _samples(pipeline.sample, first, n, step)
-        info = pipeline.info
-        shown = info.media if own else dict.fromkeys(info.sensors, wanted)
-        drawn = tiles(samples, shown, labels=labels, devices=own)
-        images = pictures(drawn, tile_px, captions=captions)
+    images: list[Image] = []
+    for source in sources:
+        spec = Choice(source, seed, overrides, without).spec()
+        with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
+            samples = _samples(pipeline.sample, first, n, step)
+            info = pipeline.info
+            shown = info.media if own else dict.fromkeys(info.sensors, wanted)
+            drawn = tiles(samples, shown, labels=labels, devices=own)
+            images += pictures(drawn, tile_px, captions=captions)
     write_sheet(arranged(images, columns), out)
     click.echo(f"{out}: {len(images)} tiles")
 

@@ -36,6 +36,7 @@ SLOTS: Mapping[str, tuple[str, ...]] = {
     "backdrop": ("paper",),
     "box": ("body",),
     "pedestal": ("body", "plates"),
+    "sphere": ("surface",),
     "room": ("floor", "ceiling", "walls", "skirting", "door", "frames", "window", "handle"),
 }
 TABLE_STYLES = ("legs", "trestle", "bench")
