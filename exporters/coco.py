@@ -42,6 +42,11 @@ Images have ``K`` and, where their camera is no pinhole, ``lens``: its ``model``
 ``generator.core.lens``), the ``distortion`` that ``K`` maps on, which is OpenCV's vector, with the
 names of its ``coefficients``, and ``half_field_rad``, the angle to the axis where the image ends.
 
+Images whose camera has a shutter have ``exposure_s``, how long a row is exposed, and ``readout_s``,
+from the exposure of the upper edge to that of the lower one (negative = upwards, 0 = at once): row
+``v`` is exposed around ``readout_s * ((v + 0.5) / height - 0.5)`` after the image's instant. Masks,
+boxes and keypoints are those of rows' instants, everything in three dimensions that of the image's.
+
 Images have ``lane_borders``, lists of image points in the direction of travel and whether each is
 visible (0 = hidden), and ``free_space``, run-length encoded, as far as these are made.
 
@@ -84,6 +89,7 @@ from generator.core.sample import (
 from generator.core.scene import Instance, Weather
 from generator.core.se3 import Array
 from generator.core.serial import canonical_json
+from generator.core.shutter import Shutter
 from generator.core.skeletons import Skeleton, skeleton_of
 
 DECIMALS = 9
@@ -262,6 +268,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "sensor": sensor,
         "K": _rows(camera.intrinsics.matrix()),
         **_lens(camera.intrinsics.lens),
+        **_shutter(camera.shutter),
         "T_world_camera": _rows(camera.T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
@@ -283,6 +290,13 @@ def _lens(lens: Lens) -> dict[str, Any]:
         known["distortion"] = list(lens.coefficients)
         known["half_field_rad"] = lens.half_field_rad
     return {"lens": known}
+
+
+def _shutter(shutter: Shutter) -> dict[str, Any]:
+    """Nothing for one that opens for an instant only."""
+    if not shutter.open_s > 0.0:
+        return {}
+    return {"exposure_s": shutter.exposure_s, "readout_s": shutter.readout_s}
 
 
 def _weather(weather: Weather) -> dict[str, float]:

@@ -14,6 +14,12 @@ measured_depth        16-bit grey            as depth
 infrared              16-bit grey            as it is
 disparity,            16-bit grey            ``round(256 * pixels)``, as KITTI's stereo benchmark
 disparity_visible                            has it; 0 = nothing, or 256 px and more
+flow_forward,         16-bit RGB             ``round(64 * pixels) + 32768`` to the right and
+flow_backward                                down, then 1, as KITTI's flow benchmark has it;
+                                             (0, 0, 0) = none, or 512 px and more
+flow_occluded_...     8-bit grey             255 = hidden, or not in the image; 0 = seen
+scene_flow            16-bit RGB             ``round(metres / depth_scale_m) + 32768`` per axis;
+                                             (0, 0, 0) = nothing, or beyond 32767 units
 ====================  =====================  =====================================================
 
 Rows are filtered by what lies to the left, ids by what lies above, and compressed at the level
@@ -45,6 +51,10 @@ UInt16 = NDArray[np.uint16]
 DEPTH_UNITS_MAX = 65_535
 """Largest value of a 16-bit depth image."""
 
+FLOW_UNITS_PER_PX = 64
+SIGNED_ZERO = 32_768
+"""Value of 0 in 16-bit images of what may be negative."""
+
 ENCODING = {
     Channel.RGB: (RowFilter.SUB, 1),
     Channel.Z_DEPTH: (RowFilter.SUB, 1),
@@ -58,6 +68,11 @@ ENCODING = {
     Channel.INFRARED: (RowFilter.SUB, 1),
     Channel.DISPARITY: (RowFilter.SUB, 1),
     Channel.DISPARITY_VISIBLE: (RowFilter.SUB, 1),
+    Channel.FLOW_FORWARD: (RowFilter.SUB, 1),
+    Channel.FLOW_BACKWARD: (RowFilter.SUB, 1),
+    Channel.FLOW_OCCLUDED_FORWARD: (RowFilter.UP, 2),
+    Channel.FLOW_OCCLUDED_BACKWARD: (RowFilter.UP, 2),
+    Channel.SCENE_FLOW: (RowFilter.SUB, 1),
 }
 """Row filter and compression level of each channel, measured on rendered images."""
 
@@ -131,6 +146,21 @@ def disparity_units(disparity_px: NDArray[np.floating]) -> UInt16:
     return np.where(units > DEPTH_UNITS_MAX, 0.0, units).astype(np.uint16)
 
 
+def flow_units(flow_px: NDArray[np.floating]) -> UInt16:
+    """Flow in 1/64 px from 32768, and 1 where there is any, uint16 [h, w, 3]; else 0."""
+    units = _signed_units(flow_px, 1.0 / FLOW_UNITS_PER_PX)
+    valid = (units > 0).any(axis=-1, keepdims=True)
+    return np.concatenate([units, valid.astype(np.uint16)], axis=-1)
+
+
+def _signed_units(values: NDArray[np.floating], unit: float) -> UInt16:
+    """Vectors [..., n] in units from 32768, half to even; all 0 for NaN or out of range."""
+    units = np.rint(np.divide(values, unit, dtype=np.float64))
+    # NaN compares false.
+    known = (np.abs(units) < SIGNED_ZERO).all(axis=-1, keepdims=True)
+    return np.where(known, units + SIGNED_ZERO, 0.0).astype(np.uint16)
+
+
 def read_depth_units(path: Path) -> UInt16:
     """The values of a depth image as it was written, uint16 [height, width].
 
@@ -166,6 +196,11 @@ def _pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> NDAr
         Channel.MEASURED_DEPTH: lambda: depth_units(image, depth_scale_m),
         Channel.DISPARITY: lambda: disparity_units(image),
         Channel.DISPARITY_VISIBLE: lambda: disparity_units(image),
+        Channel.FLOW_FORWARD: lambda: flow_units(image),
+        Channel.FLOW_BACKWARD: lambda: flow_units(image),
+        Channel.FLOW_OCCLUDED_FORWARD: lambda: image * np.uint8(255),
+        Channel.FLOW_OCCLUDED_BACKWARD: lambda: image * np.uint8(255),
+        Channel.SCENE_FLOW: lambda: _signed_units(image, depth_scale_m),
         Channel.NORMALS: lambda: np.rint((image + 1.0) * 0.5 * 255.0).astype(np.uint8),
         # Boxes are rounded to a micrometre: a surface may lie that much outside [0, 1], and
         # 65536 would wrap to 0.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from generator.core.capture import Channel, Reading
 from generator.core.geometry import Keypoint
+from generator.core.rows import seen_points
 from generator.core.sample import KeypointTruth, ObjectTruth
 from generator.core.scene import Scene
 from generator.core.se3 import Array, Vec3
@@ -26,6 +28,9 @@ class Keypoints:
     by the object itself, 2 = visible. A point is seen through the surface of its own object as
     long as it lies no deeper below it than its radius. Depth is measured across the surface, as
     for a hub below the face of its wheel, which is seen from the side and obliquely alike.
+
+    Behind a rolling shutter image coordinates are those of the instant of the row that shows the
+    point, camera coordinates those of the image's instant.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset(
@@ -35,24 +40,44 @@ class Keypoints:
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``keypoints``, in the instance's order; empty for one that has none."""
         instance = truth.instance
+        if not instance.keypoints:
+            return replace(truth, keypoints=())
         T_camera_world = reading.camera.T_world_camera.inverse()
         T_camera_instance = T_camera_world @ instance.T_world_instance
+        places_m = np.array([point.position_m for point in instance.keypoints])
+        p_camera = np.stack([T_camera_instance.apply(place_m) for place_m in places_m])
+        p_seen, image_px = p_camera, reading.camera.intrinsics.project(p_camera)
+        if reading.camera.shutter.rolls:
+            p_seen, image_px = seen_points(scene, reading.camera, places_m, instance)
         found = tuple(
-            _found(reading, instance.instance_id, point, T_camera_instance.apply(place_m))
-            for point in instance.keypoints
-            for place_m in (np.array(point.position_m),)
+            _found(reading, instance.instance_id, point, position_m, seen)
+            for point, position_m, *seen in zip(
+                instance.keypoints, p_camera, p_seen, image_px, strict=True
+            )
         )
         return replace(truth, keypoints=found)
 
 
-def _found(reading: Reading, instance_id: int, point: Keypoint, p_camera: Array) -> KeypointTruth:
+def _found(
+    reading: Reading, instance_id: int, point: Keypoint, p_camera: Array, seen: Sequence[Array]
+) -> KeypointTruth:
+    """One keypoint.
+
+    Args:
+        reading: The image.
+        instance_id: What the point belongs to.
+        point: Which.
+        p_camera: Where it is at the image's instant.
+        seen: Where it is when its row is exposed: camera frame, and image.
+    """
     camera = reading.camera.intrinsics
     x, y, z = (float(v) for v in p_camera)
     position_m: Vec3 = (x, y, z)
-    u, v = (float(w) for w in camera.project(p_camera))
+    p_seen, image_px = seen
+    u, v = (float(w) for w in image_px)
     if not (0 <= u < camera.width_px and 0 <= v < camera.height_px):
         return KeypointTruth(point.name, position_m)
-    visible = is_visible(reading, instance_id, p_camera, (int(u), int(v)), point.radius_m)
+    visible = is_visible(reading, instance_id, p_seen, (int(u), int(v)), point.radius_m)
     return KeypointTruth(point.name, position_m, (u, v), 2 if visible else 1)
 
 

@@ -14,6 +14,7 @@ from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.interfaces import AssetLibrary
 from generator.core.lanes import LaneBorder, lane_borders
+from generator.core.rows import seen_points
 from generator.core.sample import BorderTruth, FrameTruth, ImageTruth
 from generator.core.scene import Scene
 from generator.core.se3 import Array
@@ -47,7 +48,7 @@ class Lanes(Strict):
         found = tuple(
             line
             for border in lane_borders(scene.lanes)
-            for line in self._projected(border, reading)
+            for line in self._projected(border, scene, reading)
         )
         return replace(truth, borders=found)
 
@@ -58,7 +59,9 @@ class Lanes(Strict):
         del assets
         return replace(truth, borders=lane_borders(scenes[""].lanes))
 
-    def _projected(self, border: LaneBorder, reading: Reading) -> Iterator[BorderTruth]:
+    def _projected(
+        self, border: LaneBorder, scene: Scene, reading: Reading
+    ) -> Iterator[BorderTruth]:
         """The stretches of a border that lie in the image."""
         camera = reading.camera
         lens = camera.intrinsics
@@ -66,6 +69,8 @@ class Lanes(Strict):
         p_camera = camera.T_world_camera.inverse().apply(p_world)
         near = (p_camera * p_camera).sum(axis=1) < self.far_m**2
         uv = lens.project(p_camera)
+        if camera.shutter.rolls:
+            p_camera, uv = seen_points(scene, camera, p_world)
         # What the lens does not show is NaN, and less than nothing.
         inside = near & (uv >= 0.0).all(axis=1)
         inside &= (uv[:, 0] < lens.width_px) & (uv[:, 1] < lens.height_px)

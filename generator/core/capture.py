@@ -34,7 +34,20 @@ class Channel(str, Enum):
     INFRARED              uint16 [h, w]           its image of its own light, in its own units; 0
     DISPARITY             float32 [h, w]          to the camera on the right [px]; 0
     DISPARITY_VISIBLE     float32 [h, w]          the same where that camera sees it too; 0
+    FLOW_FORWARD          float32 [h, w, 2]       to where the seen point is in this camera's
+                                                  image a step later [px]; NaN
+    FLOW_BACKWARD         float32 [h, w, 2]       the same a step earlier; NaN
+    FLOW_OCCLUDED_...     uint8 [h, w]            1 where that point cannot be seen then: it is
+                                                  hidden, or not in the image; 1
+    SCENE_FLOW            float32 [h, w, 3]       where the seen point is a step later, in the
+                                                  camera frame of then, minus where it is now, in
+                                                  that of now [m]; NaN
     ====================  ======================  ==========================================
+
+    A sky is at infinity and has the flow that the camera's rotation gives it; ``u + FLOW`` is the
+    image of ``p + SCENE_FLOW``. Flow is NaN where the lens has no image of the point then, and
+    FLOW_BACKWARD everywhere before a whole step has passed. Behind a rolling shutter "now" and
+    "then" are the instants of the rows that the point is on.
     """
 
     RGB = "rgb"
@@ -51,6 +64,11 @@ class Channel(str, Enum):
     INFRARED = "infrared"
     DISPARITY = "disparity"
     DISPARITY_VISIBLE = "disparity_visible"
+    FLOW_FORWARD = "flow_forward"
+    FLOW_BACKWARD = "flow_backward"
+    FLOW_OCCLUDED_FORWARD = "flow_occluded_forward"
+    FLOW_OCCLUDED_BACKWARD = "flow_occluded_backward"
+    SCENE_FLOW = "scene_flow"
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from generator.core.motion import STILL, Change, Twist
@@ -91,12 +92,12 @@ def with_twists(scene: Scene) -> Scene:
         if body.name in tracks and body.instance_id not in rooted
     }
     twists = {k: track.twist(scene.time_s) for k, track in carriers.items()}
-    return replace(
-        scene,
-        instances=tuple(
-            replace(i, twist=twists.get(i.instance_id, STILL)) for i in scene.instances
-        ),
-    )
+    return replace(scene, instances=tuple(_moving(i, twists) for i in scene.instances))
+
+
+def _moving(instance: Instance, twists: Mapping[int, Twist]) -> Instance:
+    twist = twists.get(instance.instance_id, STILL)
+    return instance if twist == instance.twist else replace(instance, twist=twist)
 
 
 def ego_rig(scene: Scene, name: str = "") -> Rig | None:
@@ -136,12 +137,15 @@ def _in_force(changes: tuple[Change, ...], time_s: float) -> dict[str, Change]:
         if change.time_s > time_s + 1e-9:
             continue
         before = sums.get(change.body, change)
+        facts = change.attributes
+        if before.attributes != facts:
+            facts = tuple(sorted({**dict(before.attributes), **dict(facts)}.items()))
         sums[change.body] = Change(
             change.time_s,
             change.body,
             change.asset or before.asset,
             change.materials or before.materials,
-            tuple(sorted({**dict(before.attributes), **dict(change.attributes)}.items())),
+            facts,
         )
     return sums
 
@@ -172,6 +176,10 @@ def _moved_instances(
             instances.append(instance)
             continue
         change = changes.get(body_.name)
+        still = body_.T_world_body == instance.T_world_instance
+        if still and change is None and instance.instance_id not in facts:
+            instances.append(instance)
+            continue
         known = {**dict(instance.attributes), **facts.get(instance.instance_id, {})}
         instances.append(
             replace(

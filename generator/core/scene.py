@@ -14,6 +14,7 @@ from generator.core.geometry import Keypoint, Material
 from generator.core.intrinsics import Intrinsics
 from generator.core.motion import STILL, Change, JointTrack, Track, Twist
 from generator.core.se3 import IDENTITY, SE3, Vec3
+from generator.core.shutter import INSTANT, Shutter
 
 SharedValue = str | float | int | bool
 Motion = Literal["static", "dynamic", "kinematic"]
@@ -326,6 +327,7 @@ class Camera:
         ev100: Fixed exposure value at ISO 100; None = exposed automatically.
         rig: Name of the rig it is mounted on; empty = it stands in the world by itself.
         T_rig_camera: Where it is on its rig.
+        shutter: When its rows are exposed, around the scene's instant.
     """
 
     name: str
@@ -334,6 +336,7 @@ class Camera:
     ev100: float | None = None
     rig: str = ""
     T_rig_camera: SE3 = IDENTITY
+    shutter: Shutter = INSTANT
 
 
 @dataclass(frozen=True, slots=True)

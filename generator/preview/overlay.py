@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +15,14 @@ from generator.core.capture import Channel, Reading
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
 from generator.core.skeletons import skeleton_of
-from generator.preview.palette import Rgb, color_of, colored_depth, colored_ids, infrared_grey
+from generator.preview.palette import (
+    Rgb,
+    color_of,
+    colored_depth,
+    colored_flow,
+    colored_ids,
+    infrared_grey,
+)
 
 Image = NDArray[np.uint8]
 
@@ -53,20 +60,41 @@ def channel_image(reading: Reading, channel: Channel) -> Image:
     Raises:
         KeyError: if the reading does not have the channel.
     """
-    data = reading.channels[channel]
-    if channel is Channel.RGB:
-        return np.asarray(data, np.uint8)
-    if channel in (Channel.Z_DEPTH, Channel.RANGE, Channel.MEASURED_DEPTH):
-        return colored_depth(data)
-    if channel in (Channel.DISPARITY, Channel.DISPARITY_VISIBLE):
-        return colored_depth(np.divide(1.0, data, out=np.full_like(data, np.inf), where=data > 0))
-    if channel is Channel.INFRARED:
-        return infrared_grey(data)
-    if channel is Channel.NORMALS:
-        return np.round((data + 1.0) * 127.5).astype(np.uint8)
-    if channel is Channel.OBJECT_COORDINATES:
-        return np.round(data * 255.0).astype(np.uint8)
-    return colored_ids(data)
+    image = reading.channels[channel]
+    return _SHOWN[channel](image) if channel in _SHOWN else colored_ids(image)
+
+
+def _disparity(disparity_px: NDArray[Any]) -> Image:
+    nothing = np.full_like(disparity_px, np.inf)
+    return colored_depth(np.divide(1.0, disparity_px, out=nothing, where=disparity_px > 0))
+
+
+def _flow_from_above(scene_flow_m: NDArray[Any]) -> Image:
+    """To the right, and away from the camera."""
+    return colored_flow(np.stack([scene_flow_m[..., 0], -scene_flow_m[..., 2]], axis=-1))
+
+
+def _white_where_set(flags: NDArray[Any]) -> Image:
+    return np.repeat(flags[..., None] * np.uint8(255), 3, axis=2)
+
+
+_SHOWN: Mapping[Channel, Callable[[NDArray[Any]], Image]] = {
+    Channel.RGB: lambda image: np.asarray(image, np.uint8),
+    Channel.Z_DEPTH: colored_depth,
+    Channel.RANGE: colored_depth,
+    Channel.MEASURED_DEPTH: colored_depth,
+    Channel.DISPARITY: _disparity,
+    Channel.DISPARITY_VISIBLE: _disparity,
+    Channel.INFRARED: infrared_grey,
+    Channel.NORMALS: lambda normals: np.round((normals + 1.0) * 127.5).astype(np.uint8),
+    Channel.OBJECT_COORDINATES: lambda places: np.round(places * 255.0).astype(np.uint8),
+    Channel.FLOW_FORWARD: colored_flow,
+    Channel.FLOW_BACKWARD: colored_flow,
+    Channel.SCENE_FLOW: _flow_from_above,
+    Channel.FLOW_OCCLUDED_FORWARD: _white_where_set,
+    Channel.FLOW_OCCLUDED_BACKWARD: _white_where_set,
+}
+"""How channels are made visible; all others are ids."""
 
 
 def draw_box3d(image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rgb) -> None:

@@ -46,6 +46,39 @@ def infrared_grey(infrared: NDArray[np.uint16]) -> NDArray[np.uint8]:
     return np.repeat(grey[..., None], 3, axis=2)
 
 
+def colored_flow(flow_px: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """A flow image [h, w, 2] on the colour wheel of flow, uint8 [h, w, 3]; black = none.
+
+    The hue is the direction, red to the right and yellow downwards; the saturation is the length,
+    full at the 99th percentile, at least at a pixel, and darker beyond.
+    Source: Baker et al., "A database and evaluation methodology for optical flow", IJCV 92, 2011.
+    """
+    u, v = (flow_px[..., k].astype(np.float64) for k in (0, 1))
+    known = np.isfinite(u) & np.isfinite(v)
+    u, v = np.where(known, u, 0.0), np.where(known, v, 0.0)
+    length = np.sqrt(u * u + v * v)
+    longest = max(float(np.quantile(length[known], 0.99)) if known.any() else 0.0, 1.0)
+    share = (length / longest)[..., None]
+    wheel = _flow_wheel()
+    place = (np.arctan2(-v, -u) / np.pi + 1.0) * 0.5 * (len(wheel) - 1)
+    first = np.floor(place).astype(np.int64)
+    part = (place - first)[..., None]
+    hue = (1.0 - part) * wheel[first] + part * wheel[(first + 1) % len(wheel)]
+    color = np.where(share <= 1.0, 1.0 - share * (1.0 - hue), 0.75 * hue)
+    return np.asarray(np.where(known[..., None], np.floor(255.0 * color), 0.0), np.uint8)
+
+
+def _flow_wheel() -> NDArray[np.float64]:
+    """Hues from red over yellow, green, cyan, blue and magenta, more where eyes tell more apart."""
+    ends = np.array([[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]], float)
+    counts = (15, 6, 4, 11, 13, 6)
+    ramps = [
+        one + (other - one) * (np.arange(n) / n)[:, None]
+        for one, other, n in zip(ends, np.roll(ends, -1, axis=0), counts, strict=True)
+    ]
+    return np.concatenate(ramps)
+
+
 def colored_shares(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
     """Shares [n] as colours from blue (0) over green to red (1), uint8 [n, 3]; others are clipped.
 

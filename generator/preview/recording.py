@@ -25,12 +25,21 @@ from generator.core.scene import Body, Instance, Scene
 from generator.core.se3 import SE3
 from generator.core.skeletons import Skeleton, skeleton_of
 from generator.preview.clouds import PointColors, point_colors
+from generator.preview.overlay import channel_image
 from generator.preview.palette import color_of
 from generator.preview.shapes import boxes_2d, boxes_3d, mesh_3d, pinhole, transform, ways
 
 TIMELINE = "sample"
 TIME = "time"
 APPLICATION = "gen-data"
+FLOWS = {
+    Channel.FLOW_FORWARD,
+    Channel.FLOW_BACKWARD,
+    Channel.FLOW_OCCLUDED_FORWARD,
+    Channel.FLOW_OCCLUDED_BACKWARD,
+    Channel.SCENE_FLOW,
+}
+"""Shown beside the image, on the colour wheel of flow."""
 AXES_M = 0.5
 """Length at which the axes of rigs and devices are drawn."""
 
@@ -177,6 +186,9 @@ class Recorder:
         if Channel.CATEGORY in channels:
             categories = rr.SegmentationImage(channels[Channel.CATEGORY], opacity=0.4)
             self.stream.log(f"{path}/image/category", categories)
+        for channel in sorted(channels.keys() & FLOWS, key=lambda c: c.value):
+            shown_flow = rr.Image(channel_image(reading, channel)).compress(90)
+            self.stream.log(f"{path}/{channel.value}", shown_flow)
         self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
         self._record_keypoints(f"{path}/image/keypoints", truth)
 

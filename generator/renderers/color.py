@@ -52,23 +52,48 @@ def lit_image(
     settings: RenderSettings,
 ) -> LitImage:
     """Light, shade and weather, before the camera's response."""
+    radiance = surface_light(world, view, seen, stock, settings)
+    ev100 = camera.ev100
+    if ev100 is None:
+        ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
+    lit = LitImage(radiance, ev100)
+    pass_lens(world, camera, view, seen.z_m, lit, stock, settings)
+    mix_edges(world, view, seen, lit, stock, settings)
+    return lit
+
+
+def surface_light(
+    world: PackedWorld,
+    view: records.View,
+    seen: Seen,
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> wp.array:
+    """What comes from pixel centres through the air [cd/m^2], linear RGB, flat; scratch memory."""
     images = _images(seen)
     keep_main_lamps(world, view, seen, stock, settings.max_lamps)
     lattice = sampled_lattice(world, view, seen, stock)
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
     _darken_outside(view, radiance)
-    ev100 = camera.ev100
-    if ev100 is None:
-        ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
-    draw_precipitation(world, camera, view, seen.z_m, radiance, ev100=ev100, stock=stock)
+    return radiance
+
+
+def pass_lens(
+    world: PackedWorld,
+    camera: Camera,
+    view: records.View,
+    z_m: wp.array,
+    lit: LitImage,
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> None:
+    """Add what falls before the lens, drops on it and its glare, in place; depths as of Seen."""
+    radiance = lit.radiance
+    draw_precipitation(world, camera, view, z_m, radiance, ev100=lit.ev100, stock=stock)
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
     _darken_outside(view, radiance)
-    if settings.antialias > 1:
-        exposure = exposure_of(ev100 - settings.exposure_compensation_ev)
-        _mix_edges(world, view, seen, radiance, exposure, settings.antialias, stock)
-    return LitImage(radiance, ev100)
 
 
 def radiance_image(lit: LitImage, view: records.View) -> Float32:
@@ -90,16 +115,19 @@ def color_image(
     return image
 
 
-def _mix_edges(
+def mix_edges(
     world: PackedWorld,
     view: records.View,
     seen: Seen,
-    radiance: wp.array,
-    exposure: float,
-    samples: int,
+    lit: LitImage,
     stock: AssetStock,
+    settings: RenderSettings,
 ) -> None:
     """Anti-alias, in place."""
+    if settings.antialias == 1:
+        return
+    radiance, samples = lit.radiance, settings.antialias
+    exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
     device, images = stock.device, _images(seen)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", view.width * view.height, wp.int32)

@@ -28,12 +28,21 @@ def keep_main_lamps(
     world: PackedWorld, view: records.View, seen: Seen, stock: AssetStock, lamps_max: int
 ) -> None:
     """Leave the world the lamps that give most of the light at what is seen."""
+    chosen = main_lamp_numbers(world, view, seen, lamps_max)
+    if chosen is not None:
+        lamps = world.record.lamps.numpy()[chosen]
+        world.record.lamps = wp.array(lamps, dtype=records.Lamp, device=stock.device)
+
+
+def main_lamp_numbers(
+    world: PackedWorld, view: records.View, seen: Seen, lamps_max: int
+) -> NDArray[np.int64] | None:
+    """Numbers of the lamps that ``keep_main_lamps`` keeps, ascending; None = all."""
     lamps = world.record.lamps.numpy()
     if len(lamps) <= lamps_max:
-        return
+        return None
     points, normals = _sparse_points(view, seen)
-    chosen = main_lamps(lamps, points, normals, lamps_max)
-    world.record.lamps = wp.array(lamps[chosen], dtype=records.Lamp, device=stock.device)
+    return main_lamps(lamps, points, normals, lamps_max)
 
 
 def main_lamps(

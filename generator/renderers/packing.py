@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -68,13 +68,7 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     def upload(values: NDArray[np.void] | list[object], dtype: Any) -> wp.array:
         return wp.array(values, dtype=dtype, device=stock.device)
 
-    # A hierarchy needs a box; rays never meet this one.
-    nowhere = np.full((1, 3), 1e9, np.float32)
-    low = placed["low_m"] if len(placed) else nowhere
-    high = placed["high_m"] if len(placed) else nowhere
-    tree = wp.Bvh(
-        upload(np.ascontiguousarray(low), wp.vec3), upload(np.ascontiguousarray(high), wp.vec3)
-    )
+    tree = _tree_over(placed, stock)
     world = records.World()
     world.tree = tree.id
     world.geometries = upload(_stacked(meshes, records.Geometry), records.Geometry)
@@ -88,6 +82,45 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     world.sky = _sky(scene.environment, environment)
     return PackedWorld(
         world, (tree, meshes, textures, environment), placed, vertex_count, scene.weather
+    )
+
+
+def moved_world(world: PackedWorld, scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
+    """Another instant of a packed scene: the same assets and materials at other places.
+
+    Args:
+        world: As ``pack_world`` made it.
+        scene: Poses of bodies and lights may differ from those that were packed.
+        camera: Its pose may differ.
+        stock: Assets.
+    """
+    _, meshes, *_ = world.keep
+    assert isinstance(meshes, list)
+    placed = world.placed.copy()
+    body_meshes = [meshes[k] for k in placed["geometry"]]
+    _place(placed, scene.bodies, body_meshes, camera)
+    placed["low_m"], placed["high_m"] = _world_boxes(placed, body_meshes)
+    tree = _tree_over(placed, stock)
+    record = records.World()
+    for name in records.World.vars:
+        setattr(record, name, getattr(world.record, name))
+    record.tree = tree.id
+    record.bodies = wp.array(placed, dtype=records.Body, device=stock.device)
+    record.lamps = wp.array(_lamps(scene.lights), dtype=records.Lamp, device=stock.device)
+    return replace(world, record=record, keep=(tree, *world.keep[1:]), placed=placed)
+
+
+def _tree_over(placed: NDArray[np.void], stock: AssetStock) -> wp.Bvh:
+    """The hierarchy over the boxes of bodies."""
+    # A hierarchy needs a box; rays never meet this one.
+    nowhere = np.full((1, 3), 1e9, np.float32)
+    low = placed["low_m"] if len(placed) else nowhere
+    high = placed["high_m"] if len(placed) else nowhere
+    return wp.Bvh(
+        *(
+            wp.array(np.ascontiguousarray(side), dtype=wp.vec3, device=stock.device)
+            for side in (low, high)
+        )
     )
 
 

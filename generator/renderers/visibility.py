@@ -13,6 +13,9 @@ from generator.renderers.kernels import raster, rays, records, surface
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
 
+Method = Literal["auto", "raster", "rays"]
+"""How the surface at a pixel centre is found, as in RenderSettings."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Projected:
@@ -55,7 +58,7 @@ def see(
     world: PackedWorld,
     view: records.View,
     stock: AssetStock,
-    method: Literal["auto", "raster", "rays"],
+    method: Method,
 ) -> Seen:
     """The surfaces at all pixel centres of a view."""
     n = view.width * view.height

@@ -8,10 +8,14 @@ from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
 from generator.renderers.color import color_image, lit_image, radiance_image
 from generator.renderers.device import open_device
+from generator.renderers.flow import FLOW, flow_images
 from generator.renderers.labels import label_images
 from generator.renderers.lidar import scanned
+from generator.renderers.moments import Moment, Sight, Studio
 from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
+from generator.renderers.shown import shown_in
+from generator.renderers.shutter import exposed
 from generator.renderers.silhouettes import silhouettes
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import see
@@ -46,6 +50,14 @@ class WarpRenderer:
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """Every asked channel of one camera."""
+        studio = Studio(self._stock, self._settings)
+        reading = exposed(scene, camera, channels, studio)
+        return reading or self._at_once(scene, camera, channels, studio)
+
+    def _at_once(
+        self, scene: Scene, camera: Camera, channels: frozenset[Channel], studio: Studio
+    ) -> Reading:
+        """The image of one instant."""
         world = pack_world(scene, camera, self._stock)
         view = pack_view(camera, self._stock)
         seen = see(world, view, self._stock, self._settings.visibility)
@@ -64,6 +76,9 @@ class WarpRenderer:
         if Channel.AMODAL in channels:
             ids = images[Channel.INSTANCE]
             outlines = silhouettes(scene, camera, world, view, self._stock, seen, ids)
+        if channels & FLOW:
+            near = Sight(Moment.of(scene, camera), world, view, seen)
+            images |= flow_images(near, shown_in(near), channels, studio)
         return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:

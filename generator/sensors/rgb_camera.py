@@ -16,11 +16,13 @@ from generator.core.interfaces import Renderer
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Region, Scene
 from generator.core.se3 import SE3, look_at
+from generator.core.shutter import INSTANT, Shutter
 from generator.core.stereo import baseline_m, disparity_px, seen_by_both
 from generator.core.streams import Rng
 from generator.sensors.formation.chain import Formation, photograph
 from generator.sensors.lenses import LensConfig, Pinhole, Published
 from generator.sensors.mounting import Mounted, known_rig
+from generator.sensors.shutters import ExposureTime, RollingShutter, shutter_of
 
 Image = Literal[
     "rgb",
@@ -33,6 +35,11 @@ Image = Literal[
     "object_coordinates",
     "disparity",
     "disparity_visible",
+    "flow_forward",
+    "flow_backward",
+    "flow_occluded_forward",
+    "flow_occluded_backward",
+    "scene_flow",
 ]
 """Channels that can be written as images; see ``generator.core.capture.Channel``."""
 
@@ -61,6 +68,11 @@ class RgbCamera(Mounted):
             or tum_vi_cam0.
         channels: What is written as images.
         ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
+        exposure: How long its images are exposed; null = an instant. Their labels are those of the
+            middle of the exposure, which is the instant of the step.
+        rolling_shutter: How its rows are read one after the other; null = all at once. Labels in
+            the image, keypoints included, are those of each row's instant; labels in space those of
+            the middle row's, which is the instant of the step.
         formation: How its photographs come about; null = an ideal camera.
         stereo_with: For its channels ``disparity`` and ``disparity_visible``: name of the camera
             to its right that makes a rectified pair with it.
@@ -74,6 +86,8 @@ class RgbCamera(Mounted):
     lens: LensConfig = Pinhole()
     channels: tuple[Image, ...] = Field(("rgb", "depth", "instance", "category"), min_length=1)
     ev100: float | None = None
+    exposure: ExposureTime | None = None
+    rolling_shutter: RollingShutter | None = None
     formation: Formation | None = None
     stereo_with: str = ""
 
@@ -119,7 +133,10 @@ class RgbCamera(Mounted):
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this camera in it, looking at the scene's focus; as it is if it was."""
-        return with_camera(scene, self.name, self, self.intrinsics(), self.ev100)
+        shutter = shutter_of(self.exposure, self.rolling_shutter)
+        return with_camera(
+            scene, self.name, self, self.intrinsics(), ev100=self.ev100, shutter=shutter
+        )
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
@@ -185,7 +202,13 @@ class RgbCamera(Mounted):
 
 
 def with_camera(
-    scene: Scene, name: str, mounted: Mounted, intrinsics: Intrinsics, ev100: float | None = None
+    scene: Scene,
+    name: str,
+    mounted: Mounted,
+    intrinsics: Intrinsics,
+    *,
+    ev100: float | None = None,
+    shutter: Shutter = INSTANT,
 ) -> Scene:
     """The scene with a camera on its rig, or looking at the scene's focus; as it is if it was.
 
@@ -197,10 +220,10 @@ def with_camera(
     if mounted.rig:
         rig = known_rig(scene, name, mounted.rig)
         T_rig_camera = mounted.T_rig_sensor @ RIG_AXES.inverse()
-        camera = Camera(name, SE3(), intrinsics, ev100, rig, T_rig_camera)
+        camera = Camera(name, SE3(), intrinsics, ev100, rig, T_rig_camera, shutter)
     else:
         pose = _nominal_pose(scene.focus, _narrower_half_rad(intrinsics))
-        camera = Camera(name, pose, intrinsics, ev100)
+        camera = Camera(name, pose, intrinsics, ev100, shutter=shutter)
     return replace(scene, cameras=(*scene.cameras, camera))
 
 

@@ -1,0 +1,82 @@
+"""Points before a rolling shutter: each is where it is when the row that shows it is exposed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.core.scene import Camera, Instance, Scene
+from generator.core.se3 import IDENTITY, SE3, Array
+
+_LOOKS = 5
+"""Where a point is decides when it is seen, and that where it is: errors shrink by the speed of
+its image over that of the rows, a factor of ten or more, with every look."""
+
+
+def seen_points(
+    scene: Scene, camera: Camera, points_m: Array, instance: Instance | None = None
+) -> tuple[Array, Array]:
+    """Where points are when the camera sees them, camera frame [m] [n, 3], and in the image [n, 2].
+
+    Args:
+        scene: At the image's instant.
+        camera: Of the scene, or its equal.
+        points_m: In the instance's frame, or fixed in the world, shape [n, 3].
+        instance: What carries the points; None = the world.
+
+    Returns:
+        NaN in the image for points that the lens does not show.
+    """
+    shutter, lens = camera.shutter, camera.intrinsics
+    p_frame = np.asarray(points_m, np.float64)
+    delays_s = np.zeros(len(p_frame))
+    for _ in range(_LOOKS if shutter.rolls else 1):
+        p_world = p_frame
+        if instance is not None:
+            carrier = _carrier_of(scene, instance)
+            R, t = _poses(scene, carrier, instance.T_world_instance, IDENTITY, delays_s)
+            p_world = np.einsum("nij,nj->ni", R, p_frame, optimize=False) + t
+        R, t = _camera_poses(scene, camera, delays_s)
+        p_camera = np.einsum("nji,nj->ni", R, p_world - t, optimize=False)
+        image_px = lens.project(p_camera)
+        v = np.nan_to_num(image_px[:, 1], nan=0.5 * lens.height_px)
+        delays_s = shutter.delay_s(np.clip(v, 0.0, lens.height_px), lens.height_px)
+    return p_camera, image_px
+
+
+def _carrier_of(scene: Scene, instance: Instance) -> str:
+    """The body whose frame the instance's is; empty for robots, which stand on their bases."""
+    if any(a.instance_id == instance.instance_id for a in scene.articulations):
+        return ""
+    own = (body.name for body in scene.bodies if body.instance_id == instance.instance_id)
+    return next(own, "")
+
+
+def _camera_poses(scene: Scene, camera: Camera, delays_s: Array) -> tuple[Array, Array]:
+    if not camera.rig:
+        return _poses(scene, "", camera.T_world_camera, IDENTITY, delays_s)
+    rig = scene.rig(camera.rig)
+    T_body_camera = rig.T_body_rig @ camera.T_rig_camera
+    return _poses(scene, rig.body, camera.T_world_camera, T_body_camera, delays_s)
+
+
+def _poses(
+    scene: Scene, body: str, at_rest: SE3, T_body_frame: SE3, delays_s: Array
+) -> tuple[Array, Array]:
+    """Rotations [n, 3, 3] and origins [n, 3] in the world of a frame on a body, at instants.
+
+    Args:
+        scene: The instant that delays count from.
+        body: What carries the frame.
+        at_rest: The frame's pose if that does not move.
+        T_body_frame: Where the frame is on it.
+        delays_s: Shape [n].
+    """
+    track = scene.track(body) if body else None
+    n = len(delays_s)
+    if track is None:
+        R_world_frame = np.broadcast_to(at_rest.rotation(), (n, 3, 3))
+        return R_world_frame, np.broadcast_to(np.asarray(at_rest.translation_m), (n, 3))
+    R, t = track.poses(scene.time_s + delays_s)
+    shift = np.asarray(T_body_frame.translation_m)
+    origin = np.einsum("nij,j->ni", R, shift, optimize=False) + t
+    return np.einsum("nij,jk->nik", R, T_body_frame.rotation(), optimize=False), origin

@@ -1,0 +1,102 @@
+"""How fast things move in an image, and how many instants of time it therefore takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.se3 import Array
+from generator.core.shutter import INSTANT
+from generator.renderers.moments import Band, Moment, Sight, moves
+from generator.renderers.points import carriers_of, find, points_of
+from generator.renderers.shown import shown_in, whole_band
+
+BAND_PX = 0.25
+"""Nothing that is seen moves farther within a band of rows."""
+BLUR_PX = 0.3
+"""Nor within a slice of an exposure, if the camera's number of samples allows."""
+_SPREAD_ROWS = 8
+_STRIDE_PX = 4
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pace:
+    """How an image has to be taken.
+
+    Attributes:
+        speeds_px_s: Of the fastest thing in each row, shape [height].
+        samples: Slices of an exposure.
+    """
+
+    speeds_px_s: Array
+    samples: int
+
+
+def pace_of(see: Sight) -> Pace:
+    """How an image is taken while the camera's shutter is open.
+
+    Args:
+        see: What the camera sees in the middle of that time.
+    """
+    middle, shown = see.moment, shown_in(see)
+    shutter = middle.camera.shutter
+    ends = [_at_once(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
+    carriers = carriers_of(middle.scene)
+    points = points_of(shown, carriers, _STRIDE_PX)
+    before, after = (find(points, [end], carriers, _STRIDE_PX).image_px for end in ends)
+    way = after - before
+    length = np.sqrt((way * way).sum(axis=-1))
+    fastest = np.max(length, axis=1, initial=0.0, where=np.isfinite(length)) / shutter.open_s
+    speeds = np.repeat(fastest, _STRIDE_PX)[: len(shown.z_m)]
+    wanted = math.ceil(float(speeds.max()) * shutter.exposure_s / BLUR_PX)
+    return Pace(speeds, min(max(wanted, 1), shutter.samples))
+
+
+def bands_of(see: Sight, pace: Pace | None = None) -> tuple[Band, ...]:
+    """Bands of rows within which nothing moves farther than ``BAND_PX``, each at its instant.
+
+    Args:
+        see: What the camera sees in the middle of the exposure of the image.
+        pace: Of the image; None = it is to be found out.
+    """
+    middle = see.moment
+    shutter = middle.camera.shutter
+    if not shutter.rolls or not moves(middle, shutter.open_s):
+        return (whole_band(middle),)
+    pace = pace or pace_of(see)
+    per_row_s = abs(shutter.readout_s) / len(pace.speeds_px_s)
+    return timed_bands(middle, band_starts(pace.speeds_px_s * per_row_s))
+
+
+def timed_bands(middle: Moment, starts: Sequence[int]) -> tuple[Band, ...]:
+    """Bands that begin at those rows, each at the instant of its middle."""
+    height = middle.camera.intrinsics.height_px
+    delay_s = middle.camera.shutter.delay_s
+    return tuple(
+        Band(first, end, middle.later(delay_s(0.5 * (first + end), height)))
+        for first, end in zip(starts, [*starts[1:], height], strict=True)
+    )
+
+
+def band_starts(motion_px: Array) -> list[int]:
+    """First rows of bands, each as high as the motion in it allows.
+
+    Args:
+        motion_px: How far things move from one row to the next, shape [height].
+    """
+    padded = np.pad(motion_px, _SPREAD_ROWS, mode="edge")
+    # What moves in one row may be in those near it by the time that they are exposed.
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _SPREAD_ROWS + 1)
+    travelled = np.concatenate([[0.0], np.cumsum(windows.max(axis=1))])[:-1]
+    begins: NDArray[np.bool_] = np.diff(np.floor(travelled / BAND_PX), prepend=-1.0) > 0.0
+    return [int(row) for row in np.flatnonzero(begins)]
+
+
+def _at_once(moment: Moment) -> Band:
+    """The whole image of a camera whose rows are all exposed then."""
+    camera = replace(moment.camera, shutter=INSTANT)
+    return whole_band(replace(moment, camera=camera))

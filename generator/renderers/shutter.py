@@ -1,0 +1,202 @@
+"""Images whose rows are exposed at several instants, or for a while.
+
+Labels are those of each row's own instant, the middle of its exposure. Light is averaged over the
+exposure: time is cut into slices, every slice is rendered at its middle as far as rows are exposed
+then, and every row is the mean of its slices. Both take no more instants than motion in the image
+makes necessary.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from generator.core.capture import Channel, Reading, Silhouette
+from generator.core.geometry import Float32
+from generator.core.scene import Camera, Scene
+from generator.core.shutter import INSTANT
+from generator.renderers.color import (
+    LitImage,
+    color_image,
+    lit_image,
+    mix_edges,
+    pass_lens,
+    radiance_image,
+    surface_light,
+)
+from generator.renderers.flow import FLOW, flow_images
+from generator.renderers.lamps import main_lamp_numbers
+from generator.renderers.moments import Band, Moment, Sight, Studio, moves, sight
+from generator.renderers.outlines import rolled_silhouettes
+from generator.renderers.pace import Pace, bands_of, pace_of
+from generator.renderers.packing import moved_world
+from generator.renderers.shown import Light, Shown, drawn_bands, with_margin
+
+_LIT = frozenset({Channel.RGB, Channel.RADIANCE})
+_METERING = 4
+_LINEAR_EV100 = 40.0
+"""So short an exposure that edges are mixed linearly: a mean over time adds up light."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Slice:
+    """A slice of time, and the rows that are exposed in it.
+
+    Attributes:
+        band: The rows, and the slice's middle.
+        weights: Share of each row's exposure that falls into the slice, shape [rows].
+    """
+
+    band: Band
+    weights: Float32
+
+
+def exposed(
+    scene: Scene, camera: Camera, channels: frozenset[Channel], studio: Studio
+) -> Reading | None:
+    """The image of a camera whose shutter is open for a while; None if nothing moves meanwhile."""
+    moment = Moment.of(scene, camera)
+    open_s = camera.shutter.open_s
+    if not open_s > 0.0 or not moves(moment, open_s):
+        return None
+    near = sight(moment, studio)
+    pace = pace_of(near)
+    bands = bands_of(near, pace)
+    if len(bands) == 1 and pace.samples == 1:
+        return None
+    near = _with_main_lamps(near, studio)
+    drawn = channels - FLOW - _LIT - {Channel.AMODAL}
+    if Channel.AMODAL in channels:
+        drawn = drawn | {Channel.INSTANCE}
+    lit = camera.ev100 is None and channels & _LIT
+    ev100 = _metered(near, studio) if lit else camera.ev100
+    shown, images = _images(near, bands, drawn | channels & _LIT, pace, ev100, studio)
+    outlines: dict[int, Silhouette] = {}
+    if Channel.AMODAL in channels:
+        outlines = rolled_silhouettes(bands, images[Channel.INSTANCE], studio, near)
+    images |= flow_images(near, shown, channels, studio)
+    return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
+
+
+def _images(
+    near: Sight,
+    bands: Sequence[Band],
+    channels: frozenset[Channel],
+    pace: Pace,
+    ev100: float | None,
+    studio: Studio,
+) -> tuple[Shown, dict[Channel, NDArray[Any]]]:
+    """What pixels show, labels of it and, if asked for, the photograph."""
+    labels = channels - _LIT
+    if ev100 is None or not channels & _LIT:
+        return drawn_bands(bands, labels, studio, near)
+    if pace.samples > 1:
+        light = partial(light_of, ev100=_LINEAR_EV100, studio=studio)
+        shown, images = drawn_bands(bands, labels, studio, near)
+        mean = _averaged(slices_of(near.moment, pace.samples), light, near, studio)
+    else:
+        light = partial(light_of, ev100=ev100, studio=studio)
+        shown, images = drawn_bands(bands, labels, studio, near, light)
+        mean = images.pop(Channel.RADIANCE)
+    lit = LitImage(_on_device(mean, wp.vec3, studio), ev100)
+    depths = _on_device(shown.z_m, float, studio)
+    return shown, images | _developed(lit, depths, near, channels, studio)
+
+
+def slices_of(middle: Moment, samples: int) -> list[Slice]:
+    """Slices of time, ``samples`` to an exposure, that together hold every row's exposure once."""
+    shutter, height = middle.camera.shutter, middle.camera.intrinsics.height_px
+    step_s = shutter.exposure_s / samples
+    count = max(math.ceil(round(shutter.open_s / step_s, 6)), 1)
+    offsets = (np.arange(count) - 0.5 * (count - 1)) * step_s
+    delays, half_s = shutter.row_delays_s(height), 0.5 * shutter.exposure_s
+    starts, ends = offsets[:, None] - 0.5 * step_s, offsets[:, None] + 0.5 * step_s
+    shares = np.minimum(ends, delays + half_s) - np.maximum(starts, delays - half_s)
+    # What rounding leaves of a slice is not worth rendering.
+    shares = np.where(shares > 1e-6 * step_s, shares, 0.0)
+    shares /= shares.sum(axis=0)
+    slices = []
+    for offset_s, share in zip(offsets, shares, strict=True):
+        rows = np.flatnonzero(share)
+        if len(rows):
+            first, end = int(rows[0]), int(rows[-1]) + 1
+            band = Band(first, end, middle.later(float(offset_s)))
+            slices.append(Slice(band, share[first:end].astype(np.float32)))
+    return slices
+
+
+def _averaged(slices: Sequence[Slice], light: Light, near: Sight, studio: Studio) -> Float32:
+    """Means over slices of what comes from every pixel [cd/m^2], float32 [h, w, 3]."""
+    lens = near.moment.camera.intrinsics
+    mean = np.zeros((lens.height_px, lens.width_px, 3), np.float32)
+    for part in slices:
+        band = part.band
+        first, end = with_margin(band, lens.height_px)
+        see = near = sight(band.moment, studio, (first, end), near)
+        own = light(see)[band.first - first : band.end - first]
+        mean[band.first : band.end] += part.weights[:, None, None] * own
+    return mean
+
+
+def light_of(see: Sight, ev100: float, studio: Studio) -> Float32:
+    """What comes from every pixel, anti-aliased; valid until the next call."""
+    stock, settings = studio.stock, studio.settings
+    lit = LitImage(surface_light(see.world, see.view, see.seen, stock, settings), ev100)
+    mix_edges(see.world, see.view, see.seen, lit, stock, settings)
+    image: Float32 = lit.radiance.numpy().reshape(see.view.height, see.view.width, 3)
+    return image
+
+
+def _with_main_lamps(near: Sight, studio: Studio) -> Sight:
+    """Only those lamps that matter in the middle of the exposure light the whole of it."""
+    chosen = main_lamp_numbers(near.world, near.view, near.seen, studio.settings.max_lamps)
+    if chosen is None:
+        return near
+    scene, camera = near.moment.scene, near.moment.camera
+    scene = replace(scene, lights=tuple(scene.lights[k] for k in chosen))
+    world = moved_world(near.world, scene, camera, studio.stock)
+    return replace(near, moment=Moment(scene, camera), world=world)
+
+
+def _on_device(image: Float32, dtype: Any, studio: Studio) -> wp.array:
+    """An image as kernels have it, flat."""
+    flat = image.reshape(-1, *image.shape[2:])
+    return wp.array(flat, dtype=dtype, device=studio.stock.device)
+
+
+def _developed(
+    lit: LitImage, z_m: wp.array, near: Sight, channels: frozenset[Channel], studio: Studio
+) -> dict[Channel, NDArray[Any]]:
+    """What the lens adds, and the response of the camera."""
+    stock, settings, view = studio.stock, studio.settings, near.view
+    pass_lens(near.world, near.moment.camera, view, z_m, lit, stock, settings)
+    images: dict[Channel, NDArray[Any]] = {}
+    if Channel.RADIANCE in channels:
+        images[Channel.RADIANCE] = radiance_image(lit, view)
+    if Channel.RGB in channels:
+        images[Channel.RGB] = color_image(lit, view, stock, settings)
+    return images
+
+
+def _metered(near: Sight, studio: Studio) -> float:
+    """The exposure value for the middle, from an image of a quarter of the size."""
+    lens = near.moment.camera.intrinsics
+    small = replace(
+        lens,
+        width_px=max(lens.width_px // _METERING, 1),
+        height_px=max(lens.height_px // _METERING, 1),
+        fx_px=lens.fx_px / _METERING,
+        fy_px=lens.fy_px / _METERING,
+        cx_px=lens.cx_px / _METERING,
+        cy_px=lens.cy_px / _METERING,
+    )
+    camera = replace(near.moment.camera, intrinsics=small, shutter=INSTANT)
+    see = sight(Moment(near.moment.scene, camera), studio, None, near)
+    return lit_image(camera, see.world, see.view, see.seen, studio.stock, studio.settings).ev100

@@ -1,0 +1,74 @@
+"""Flow in files, read back as the KITTI development kit reads it: by OpenCV, 16 bits a colour."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from exporters.images import png
+from generator.core.capture import Channel
+
+H, W = 7, 9
+
+
+def read(data: bytes) -> NDArray[np.uint16]:
+    """Pixels in the order of the file: red, green, blue."""
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    return image[..., ::-1] if image.ndim == 3 else image
+
+
+@pytest.mark.parametrize("channel", [Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD])
+def test_flow_is_kittis(channel: Channel) -> None:
+    """U and v are (value - 2^15) / 64, the third says whether there is any."""
+    flow = np.random.default_rng(1).uniform(-500.0, 500.0, (H, W, 2)).astype(np.float32)
+    flow[2, 3] = np.nan
+    flow[4, 5] = (3.0, np.nan)
+    values = read(png(channel, flow, 0.001)).astype(np.float64)
+
+    known = values[..., 2] == 1
+    assert np.array_equal(~known, np.isnan(flow).any(axis=-1))
+    back = (values[..., :2] - 32768.0) / 64.0
+    assert np.abs(back - flow)[known].max() <= 0.5 / 64.0
+    assert (values[~known] == 0).all()
+
+
+def test_no_flow_is_not_flow_of_nothing() -> None:
+    """What stands still is valid, and 2^15 in both coordinates."""
+    values = read(png(Channel.FLOW_FORWARD, np.zeros((H, W, 2), np.float32), 0.001))
+
+    assert np.array_equal(values, np.broadcast_to([32768, 32768, 1], (H, W, 3)))
+
+
+@pytest.mark.parametrize("beyond_px", [512.0, -512.0, 1e6, np.inf])
+def test_flow_beyond_what_the_file_can_hold_is_none(beyond_px: float) -> None:
+    """It does not wrap around."""
+    flow = np.zeros((H, W, 2), np.float32)
+    flow[1, 1, 0] = beyond_px
+    values = read(png(Channel.FLOW_FORWARD, flow, 0.001))
+
+    assert (values[1, 1] == 0).all()
+    assert (values[1, 2] == [32768, 32768, 1]).all()
+
+
+def test_scene_flow_is_in_units_of_depth() -> None:
+    """Signed, from 2^15; nothing is 0 in all three."""
+    flow = np.random.default_rng(2).uniform(-30.0, 30.0, (H, W, 3)).astype(np.float32)
+    flow[0, 0] = np.nan
+    flow[0, 1, 2] = 33.0
+    values = read(png(Channel.SCENE_FLOW, flow, 0.001)).astype(np.float64)
+
+    assert (values[0, 0] == 0).all()
+    assert (values[0, 1] == 0).all()
+    assert np.abs((values[1:] - 32768.0) * 0.001 - flow[1:]).max() <= 0.0005 + 1e-6
+
+
+def test_occlusion_is_white() -> None:
+    """255 where a point cannot be seen, 0 where it can."""
+    hidden = (np.arange(H * W).reshape(H, W) % 2).astype(np.uint8)
+
+    values = read(png(Channel.FLOW_OCCLUDED_BACKWARD, hidden, 0.001))
+
+    assert values.dtype == np.uint8
+    assert np.array_equal(values, 255 * hidden)

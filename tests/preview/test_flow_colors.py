@@ -1,0 +1,70 @@
+"""The colour wheel of flow, against the published one's corners."""
+
+from __future__ import annotations
+
+import colorsys
+import math
+
+import numpy as np
+import pytest
+
+from generator.core.capture import Channel, Reading
+from generator.core.intrinsics import Intrinsics
+from generator.core.scene import Camera
+from generator.core.se3 import IDENTITY
+from generator.preview.overlay import channel_image
+from generator.preview.palette import colored_flow
+
+
+def color_of_flow(u: float, v: float) -> tuple[int, int, int]:
+    """The colour of one direction in an image whose longest flow is 10 px."""
+    flow = np.zeros((1, 1000, 2), np.float32)
+    flow[0, 20:] = (10.0, 0.0)
+    flow[0, 0] = (u, v)
+    red, green, blue = colored_flow(flow)[0, 0].tolist()
+    return red, green, blue
+
+
+def test_what_stands_still_is_white_and_none_is_black() -> None:
+    """The middle of the wheel; and what is not on it."""
+    assert color_of_flow(0.0, 0.0) == (255, 255, 255)
+    assert color_of_flow(math.nan, math.nan) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("direction", "hue_deg"),
+    # Of the 55 colours from red clockwise, 15 to yellow, 6, 4, 11 to blue, 13 to magenta, 6, these
+    # have the numbers 0, 13.5, 27 and 40.5.
+    [((10.0, 0.0), 0.0), ((0.0, 10.0), 54.0), ((-10.0, 0.0), 190.9), ((0.0, -10.0), 260.8)],
+)
+def test_the_hue_is_the_direction(direction: tuple[float, float], hue_deg: float) -> None:
+    """Red to the right, yellow downwards, blue to the left, violet upwards."""
+    red, green, blue = color_of_flow(*direction)
+    hue, saturation, value = colorsys.rgb_to_hsv(red / 255, green / 255, blue / 255)
+
+    assert 360.0 * hue == pytest.approx(hue_deg, abs=1.0)
+    assert saturation > 0.99
+    assert value > 0.99
+
+
+def test_the_saturation_is_the_length() -> None:
+    """Half as far is half as colourful; beyond the scale it is darker."""
+    assert color_of_flow(5.0, 0.0) == (255, 127, 127)
+    assert color_of_flow(20.0, 0.0) == (191, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("channel", "depth"),
+    [(Channel.FLOW_BACKWARD, 2), (Channel.SCENE_FLOW, 3), (Channel.FLOW_OCCLUDED_FORWARD, 0)],
+)
+def test_every_channel_of_flow_can_be_looked_at(channel: Channel, depth: int) -> None:
+    """As an image of bytes in colour."""
+    shape = (4, 6, depth) if depth else (4, 6)
+    data = np.ones(shape, np.float32 if depth else np.uint8)
+    camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
+
+    image = channel_image(Reading("c", camera, {channel: data}), channel)
+
+    assert image.shape == (4, 6, 3)
+    assert image.dtype == np.uint8
+    assert image.max() == 255

@@ -1,0 +1,63 @@
+"""From ``exposure`` and ``rolling_shutter`` in YAML to a camera's shutter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from generator.core.scene import Scene
+from generator.core.shutter import INSTANT, Shutter
+from generator.sensors.rgb_camera import RgbCamera
+
+
+def shutter(**fields: Any) -> Shutter:
+    """Of the camera that is mounted."""
+    return RgbCamera.model_validate(fields).mount(Scene("t")).cameras[0].shutter
+
+
+def test_a_camera_sees_an_instant_unless_told_otherwise() -> None:
+    """Without either there is no shutter."""
+    assert shutter() == INSTANT
+    assert INSTANT.open_s == 0.0
+
+
+def test_an_exposure_has_a_time_and_a_number_of_samples() -> None:
+    """Eight by default."""
+    assert shutter(exposure={"time_s": 0.01}) == Shutter(0.01, 0.0, 8)
+    assert shutter(exposure={"time_s": 0.01, "samples": 32}) == Shutter(0.01, 0.0, 32)
+
+
+@pytest.mark.parametrize(("direction", "sign"), [("down", 1.0), ("up", -1.0)])
+def test_rows_are_read_in_a_direction(direction: str, sign: float) -> None:
+    """Upwards, the lower rows come first: their delay is negative."""
+    rolling = shutter(rolling_shutter={"readout_s": 0.02, "direction": direction})
+
+    assert rolling.delay_s(100.0, 100) == pytest.approx(0.01 * sign)
+    assert rolling.delay_s(50.0, 100) == 0.0
+    assert rolling.row_delays_s(2).tolist() == pytest.approx([-0.005 * sign, 0.005 * sign])
+
+
+def test_both_add_up_to_the_time_that_a_shutter_is_open() -> None:
+    """From the first light on any row to the last."""
+    both = shutter(exposure={"time_s": 0.01}, rolling_shutter={"readout_s": 0.03})
+
+    assert both.open_s == pytest.approx(0.04)
+    assert both.rolls
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"exposure": {"time_s": 0.0}},
+        {"exposure": {"time_s": 0.01, "samples": 0}},
+        {"exposure": {"samples": 4}},
+        {"rolling_shutter": {"readout_s": -0.01}},
+        {"rolling_shutter": {"readout_s": 0.01, "direction": "left"}},
+    ],
+)
+def test_what_no_shutter_does_is_refused(wrong: dict[str, Any]) -> None:
+    """No time, no samples, a time that runs backwards, columns."""
+    with pytest.raises(ValidationError, match=next(iter(wrong))):
+        RgbCamera.model_validate(wrong)
