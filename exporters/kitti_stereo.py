@@ -1,4 +1,4 @@
-"""KITTI's stereo and flow benchmark of 2015: rectified pairs of images with disparities.
+"""KITTI's stereo and flow benchmark of 2015: rectified pairs of images, disparities and flow.
 
 ::
 
@@ -6,11 +6,15 @@
     training/image_3/000012_10.png      right colour image      000012_11.png  of the next step
     training/disp_occ_0/000012_10.png   disparity of every pixel of image_2
     training/disp_noc_0/000012_10.png   the same where image_3 shows the point too
+    training/flow_occ/000012_10.png     optical flow of every pixel of image_2 to 000012_11.png
+    training/flow_noc/000012_10.png     the same where the point is still seen then
     training/calib_cam_to_cam/000012.txt
     ImageSets/{train,val,test}.txt      frame names             README.txt
 
 * **Disparities** are 16-bit grey PNG: pixels times 256, 0 = none. They are exact, of the pixel's
   centre; the point is in image_3 at x minus disparity.
+* **Flow** is 16-bit RGB PNG: 64 times the pixels to the right and down, plus 32768, then whether
+  there is any. Folders are there for the channels that the left camera writes.
 * **Frames** are named by sample; the next step is there where the sequence has one.
 * **Calibration** is as in KITTI's raw data: ``P_rect_03`` has minus focal length times baseline.
 
@@ -23,14 +27,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
+import cv2
+import numpy as np
+
 from exporters.images import link_or_copy
 from exporters.kitti_raw import cameras_text
+from exporters.png import RowFilter, encode_png
 from exporters.sensors import pinhole_camera, rgb_cameras
 from exporters.sequences import (
     Frame,
     camera_mount,
     frame_facts,
     read_sequences,
+    write_bytes,
     write_frames,
     write_text,
 )
@@ -46,6 +55,7 @@ FRAMES_MAX = 1_000_000
 SPLITS = ("train", "val", "test")
 LABELS = {Channel.DISPARITY: "disp_occ_0", Channel.DISPARITY_VISIBLE: "disp_noc_0"}
 """Folders of the left camera's channels."""
+FLOWS = (Channel.FLOW_FORWARD, Channel.FLOW_OCCLUDED_FORWARD)
 
 
 class KittiStereo(Strict):
@@ -90,6 +100,9 @@ class KittiStereo(Strict):
                 text = self._calibration(sample, pair)
                 path = shard_dir / self.type / f"calib_cam_to_cam/{sample.index:06d}.txt"
                 write_text(path, text)
+                if set(FLOWS) <= set(info.media[pair["02"]]):
+                    data = seen_flow(shard_dir, pair["02"], sample.index)
+                    write_bytes(self._flow_noc(shard_dir, sample.index), data)
                 rows.append(frame_facts(info, sample))
         write_frames(shard_dir / self.type, rows)
 
@@ -159,6 +172,34 @@ class KittiStereo(Strict):
             if channel in info.media[pair["02"]]:
                 source = media_path(frame.shard_dir, pair["02"], channel, frame.index)
                 yield source, f"{folder}/{name}_10.png"
+        if follower is None:
+            return
+        if Channel.FLOW_FORWARD in info.media[pair["02"]]:
+            source = media_path(frame.shard_dir, pair["02"], Channel.FLOW_FORWARD, frame.index)
+            yield source, f"flow_occ/{name}_10.png"
+        if set(FLOWS) <= set(info.media[pair["02"]]):
+            yield self._flow_noc(frame.shard_dir, frame.index), f"flow_noc/{name}_10.png"
+
+    def _flow_noc(self, shard_dir: Path, index: int) -> Path:
+        return shard_dir / self.type / f"flow_noc/{index:06d}.png"
+
+
+def seen_flow(shard_dir: Path, camera: str, index: int) -> bytes:
+    """The PNG of a camera's flow without that of points which are hidden a step later.
+
+    Args:
+        shard_dir: Where its images are.
+        camera: Which writes ``FLOWS``.
+        index: Of the sample.
+    """
+    flow, hidden = (
+        cv2.imread(str(media_path(shard_dir, camera, channel, index)), cv2.IMREAD_UNCHANGED)
+        for channel in FLOWS
+    )
+    assert flow is not None, "images are written before labels"
+    assert hidden is not None, "images are written before labels"
+    kept = np.where(hidden[..., None] > 0, 0, flow[..., ::-1]).astype(np.uint16)
+    return encode_png(kept, RowFilter.SUB, 1)
 
 
 _README = """\
@@ -169,6 +210,9 @@ image_2     RGB of '{left}'; _11 is the next step, where there is one.
 image_3     RGB of '{right}'.
 disp_occ_0  Disparity of image_2, 16-bit: pixels = value / 256; 0 = none, or 256 and more.
 disp_noc_0  The same where image_3 shows the point too. Present if the data set keeps it.
+flow_occ    Flow from _10 to _11, 16-bit RGB: pixels = (value - 32768) / 64 to the right and down;
+            the third value is 1 where there is any. Present if the data set keeps it.
+flow_noc    The same where the point is still seen in _11.
 calib_cam_to_cam  As in KITTI's raw data, pixel centres at whole numbers; the images are rectified:
             P_rect_03 has minus focal length times baseline in its first row, last column.
 """

@@ -15,6 +15,10 @@ from generator.core.sample import Sample
 
 if TYPE_CHECKING:
     from generator.preview.clouds import PointColors
+    from generator.preview.overlay import Image
+
+
+WRITTEN = "written"
 
 
 @click.command()
@@ -65,7 +69,7 @@ def preview(
 
 
 @click.command("contact-sheet")
-@click.argument("source")
+@click.argument("sources", nargs=-1, required=True)
 @click.option("--n", "-n", type=int, default=48, show_default=True, help="Number of samples.")
 @click.option("--first", type=int, default=0, show_default=True, help="Index of the first sample.")
 @click.option("--step", type=int, default=1, show_default=True, help="Distance between samples.")
@@ -79,11 +83,17 @@ def preview(
 )
 @click.option("--columns", type=int, default=0, help="Tiles in a row; 0 = a sheet of 4 to 3.")
 @click.option("--tile-px", type=int, default=320, show_default=True, help="Width of a tile.")
-@click.option("--channels", default="rgb", show_default=True, help="Comma-separated channels.")
+@click.option(
+    "--channels",
+    default="rgb",
+    show_default=True,
+    help="Comma-separated channels of all cameras; 'written' = what each sensor itself writes.",
+)
 @click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")
+@click.option("--captions", is_flag=True, help="Write under every tile what it is.")
 @configuration_options
 def contact_sheet(
-    source: str,
+    sources: tuple[str, ...],
     n: int,
     first: int,
     step: int,
@@ -92,22 +102,30 @@ def contact_sheet(
     tile_px: int,
     channels: str,
     labels: bool,
+    captions: bool,
     seed: int | None,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
     """Draw samples with their labels on one PNG.
 
-    SOURCE is a configuration (a path or a shipped name), or the folder of a data set.
+    SOURCES are configurations (paths or shipped names), or folders of data sets; the samples of
+    each follow those of the one before.
     """
     from generator.assemble.recipe import open_pipeline
-    from generator.preview.sheet import arranged, tiles, write_sheet
+    from generator.preview.sheet import arranged, pictures, tiles, write_sheet
 
-    wanted = [_channel(name.strip()) for name in channels.split(",")]
-    spec = Choice(source, seed, overrides, without).spec()
-    with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
-        samples = _samples(pipeline.sample, first, n, step)
-        images = tiles(samples, wanted, labels=labels, width_px=tile_px)
+    own = channels == WRITTEN
+    wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))
+    images: list[Image] = []
+    for source in sources:
+        spec = Choice(source, seed, overrides, without).spec()
+        with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
+            samples = _samples(pipeline.sample, first, n, step)
+            info = pipeline.info
+            shown = info.media if own else dict.fromkeys(info.sensors, wanted)
+            drawn = tiles(samples, shown, labels=labels, devices=own)
+            images += pictures(drawn, tile_px, captions=captions)
     write_sheet(arranged(images, columns), out)
     click.echo(f"{out}: {len(images)} tiles")
 
@@ -125,6 +143,7 @@ def _channel(name: str) -> Channel:
     shown = [c.value for c in Channel if c is not Channel.AMODAL]
     if name not in shown:
         raise ConfigError(
-            f"--channels: unknown channel '{name}'; expected one of {', '.join(shown)}"
+            f"--channels: unknown channel '{name}'; expected {WRITTEN}, or some of"
+            f" {', '.join(shown)}"
         )
     return Channel(name)

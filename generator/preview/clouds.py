@@ -73,27 +73,37 @@ def top_view(cloud: PointCloud, scene: Scene, aspect: float) -> Image:
         scene: Whose annotated things are outlined.
         aspect: Width over height.
     """
-    shape = (max(8, round(PANEL_PX / aspect)), PANEL_PX)
-    image: Image = np.zeros((*shape, 3), np.uint8)
+    image = empty_view(aspect)
+    shape = image.shape
     position_m = cloud.points["position_m"]
     colors = point_colors(cloud)
-    column, row = _pixels(position_m, shape)
+    column, row = pixels_from_above(position_m, image)
     inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
     # Higher points last: they are what is seen from above.
     order = np.argsort(position_m[:, 2], kind="stable")
     order = order[inside[order]]
     image[row[order], column[order]] = colors[order]
-    T_lidar_world = cloud.lidar.T_world_lidar.inverse()
+    outline_things(image, scene, cloud.lidar.T_world_lidar)
+    return image
+
+
+def empty_view(aspect: float) -> Image:
+    """What views from above are drawn on, uint8 [h, w, 3]."""
+    return np.zeros((max(8, round(PANEL_PX / aspect)), PANEL_PX, 3), np.uint8)
+
+
+def outline_things(image: Image, scene: Scene, T_world_sensor: SE3) -> None:
+    """Draw the boxes of annotated things from above, in place, around a sensor."""
+    T_sensor_world = T_world_sensor.inverse()
     for thing in scene.instances:
         if thing.annotated:
             low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
             x, y, z = (float(v) for v in 0.5 * (low + high))
             length, width, height = (float(v) for v in high - low)
             box = OrientedBox(
-                T_lidar_world @ thing.T_world_instance @ SE3((x, y, z)), (length, width, height)
+                T_sensor_world @ thing.T_world_instance @ SE3((x, y, z)), (length, width, height)
             )
             _outline(image, box, color_of(thing.category_id))
-    return image
 
 
 def range_view(cloud: PointCloud) -> Image:
@@ -124,18 +134,19 @@ def range_view(cloud: PointCloud) -> Image:
     return np.concatenate(panels)
 
 
-def _pixels(
-    position_m: NDArray[np.floating], shape: tuple[int, int]
+def pixels_from_above(
+    position_m: NDArray[np.floating], image: Image
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Column and row of points; X to the right, Y up."""
-    scale = 0.5 * shape[1] / AHEAD_M
-    column = np.floor(0.5 * shape[1] + position_m[:, 0] * scale).astype(np.intp)
-    row = np.floor(0.5 * shape[0] - position_m[:, 1] * scale).astype(np.intp)
+    """Column and row of points; X to the right, Y up, the sensor in the middle of the image."""
+    height, width = image.shape[:2]
+    scale = 0.5 * width / AHEAD_M
+    column = np.floor(0.5 * width + position_m[:, 0] * scale).astype(np.intp)
+    row = np.floor(0.5 * height - position_m[:, 1] * scale).astype(np.intp)
     return column, row
 
 
 def _outline(image: Image, box: OrientedBox, color: tuple[int, int, int]) -> None:
-    column, row = _pixels(box.corners(), (image.shape[0], image.shape[1]))
+    column, row = pixels_from_above(box.corners(), image)
     far = max(image.shape) * 4
     if max(np.abs(column).max(), np.abs(row).max()) > far:
         return

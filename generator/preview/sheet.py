@@ -1,9 +1,10 @@
-"""Contact sheet: many samples on one PNG."""
+"""Contact sheet: many samples, or many sensors, on one PNG."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -13,31 +14,70 @@ from generator.core.capture import Channel
 from generator.core.errors import ConfigError, StorageError
 from generator.core.sample import Sample
 from generator.preview.clouds import range_view, top_view
+from generator.preview.devices import event_view, radar_view
 from generator.preview.overlay import Image, channel_image, labelled_image
 
 GAP_PX = 4
 BACKGROUND = 24
 
 
+CAPTION_PX = 18
+"""Height of the strip under a tile that its caption stands on."""
+INK = (225, 225, 225)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Tile:
+    """One picture of a sheet, uint8 [h, w, 3], and what it is."""
+
+    caption: str
+    image: Image
+
+
 def tiles(
-    samples: Iterable[Sample], channels: Sequence[Channel], *, labels: bool, width_px: int
-) -> list[Image]:
-    """One tile per sample, camera and channel it has, and two per scan, ``width_px`` wide."""
-    shown = []
+    samples: Iterable[Sample],
+    channels: Mapping[str, Sequence[Channel]],
+    *,
+    labels: bool,
+    devices: bool = False,
+) -> Iterator[Tile]:
+    """One tile per sample, camera and channel it has, and two per scan.
+
+    Args:
+        samples: What is shown.
+        channels: Of every camera.
+        labels: Whether they are drawn on colour images.
+        devices: Whether radars and event cameras have tiles too.
+    """
     for sample in samples:
         aspect = 1.0
         for name, reading in sorted(sample.capture.readings.items()):
             aspect = reading.camera.intrinsics.width_px / reading.camera.intrinsics.height_px
-            for channel in (c for c in channels if c in reading.channels):
-                drawn = labels and channel is Channel.RGB
-                shown.append(
-                    labelled_image(reading, sample.truth[name])
-                    if drawn
-                    else channel_image(reading, channel)
-                )
-        for _, cloud in sorted(sample.capture.clouds.items()):
-            shown += [top_view(cloud, sample.scene, aspect), range_view(cloud)]
-    return [_scaled(image, width_px) for image in shown]
+            shown = [c for c in channels[name] if c in reading.channels]
+            for channel in shown:
+                caption = name if len(shown) == 1 else f"{name} {channel.value}"
+                if labels and channel is Channel.RGB:
+                    yield Tile(caption, labelled_image(reading, sample.truth[name]))
+                else:
+                    yield Tile(caption, channel_image(reading, channel))
+        for name, cloud in sorted(sample.capture.clouds.items()):
+            yield Tile(name, top_view(cloud, sample.scene, aspect))
+            yield Tile(f"{name} range, intensity, class", range_view(cloud))
+        for name, table in sorted(sample.capture.tables.items()) if devices else ():
+            if table.device.kind == "radar":
+                yield Tile(name, radar_view(table, sample.scene, aspect))
+            elif table.device.kind == "event_camera":
+                yield Tile(name, event_view(table))
+
+
+def pictures(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:
+    """The images of tiles, ``width_px`` wide, with their captions below if asked for."""
+    return [
+        _captioned(_scaled(tile.image, width_px), tile.caption)
+        if captions
+        else _scaled(tile.image, width_px)
+        for tile in shown
+    ]
 
 
 def arranged(images: Sequence[Image], columns: int) -> Image:
@@ -79,6 +119,13 @@ def write_sheet(sheet: Image, path: Path) -> None:
         path.write_bytes(encoded.tobytes())
     except OSError as error:
         raise StorageError(f"{path}: {error.strerror}") from error
+
+
+def _captioned(image: Image, caption: str) -> Image:
+    strip: Image = np.full((CAPTION_PX, image.shape[1], 3), BACKGROUND, np.uint8)
+    face = cv2.FONT_HERSHEY_SIMPLEX
+    cv2.putText(strip, caption, (4, CAPTION_PX - 5), face, 0.42, INK, 1, cv2.LINE_AA)
+    return np.concatenate([image, strip])
 
 
 def _scaled(image: Image, width_px: int) -> Image:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from generator.core.capture import Beams, Channel, Echoes, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary

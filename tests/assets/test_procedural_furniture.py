@@ -205,3 +205,13 @@ def _highest_at(solid: Solid, x: float, y: float) -> float:
     """Top of the collision above a place, on a grid of 1 mm."""
     heights = np.arange(2.0, -0.001, -0.001)
     return next(float(z) for z in heights if _inside_any(solid, (x, y, float(z) - 5e-4)))
+
+
+def test_a_sphere_is_as_wide_as_asked_and_stands_on_the_floor() -> None:
+    """All of it lies half a diameter from its centre; a sphere of no size is refused."""
+    mesh = FAMILIES["sphere"].build(diameter_m=0.3).mesh
+    radius = np.linalg.norm(mesh.vertices_m - np.array([0.0, 0.0, 0.15]), axis=1)
+
+    assert np.allclose(radius, 0.15, atol=2e-6)
+    with pytest.raises(ValueError, match=r"a sphere of 0 m; expected 0\.001 m to 10 m"):
+        FAMILIES["sphere"].build(diameter_m=0.0)

@@ -288,21 +288,36 @@ def make_drive(strides: Mapping[str, int] | None = None) -> list[Sample]:
 
 
 def make_pairs() -> tuple[DatasetInfo, list[Sample]]:
-    """The drive with disparities of its left camera; those of even columns are not hidden."""
+    """The drive with disparities and flow of its left camera.
+
+    Disparities of even columns are not hidden; flow of every third row is.
+    """
     samples = []
     for sample in make_drive():
         left = sample.capture.readings["left"]
         focal_px = left.camera.intrinsics.fx_px
         disparity = (focal_px * 0.54 / left.channels[Channel.Z_DEPTH]).astype(np.float32)
+        # Every point moves by its own row and column; rows above the tenth have no flow.
+        v, u = np.mgrid[:120, :160].astype(np.float32)
+        flow = np.stack([0.25 * u - 10.0, 0.125 * v], axis=-1)
+        flow[:10] = np.nan
         channels = {
             **left.channels,
+            Channel.FLOW_FORWARD: flow,
+            Channel.FLOW_OCCLUDED_FORWARD: (v % 3 == 0).astype(np.uint8),
             Channel.DISPARITY: disparity,
             Channel.DISPARITY_VISIBLE: np.where(np.arange(160) % 2, 0.0, disparity),
         }
         readings = {**sample.capture.readings, "left": replace(left, channels=channels)}
         samples.append(replace(sample, capture=replace(sample.capture, readings=readings)))
     media = {
-        "left": (Channel.RGB, Channel.DISPARITY, Channel.DISPARITY_VISIBLE),
+        "left": (
+            Channel.RGB,
+            Channel.DISPARITY,
+            Channel.DISPARITY_VISIBLE,
+            Channel.FLOW_FORWARD,
+            Channel.FLOW_OCCLUDED_FORWARD,
+        ),
         "right": (Channel.RGB,),
     }
     names = ("left", "right")

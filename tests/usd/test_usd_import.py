@@ -240,7 +240,7 @@ def broken(folder: Path, kind: str) -> None:
             material = UsdShade.Material.Define(stage, "/M")
             UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
         elif kind.startswith("roughness"):
-            material = shiny(stage, "/M", float(kind.split()[1]))
+            material = shiny(stage, "/M", float(kind.rstrip(",").split()[-1]))
             UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
         elif kind == "fit together":
             mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 9])

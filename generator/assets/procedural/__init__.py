@@ -149,6 +149,7 @@ FAMILIES: Mapping[str, Family] = _table(
         _static("bin", "furniture:bin_", size_m=(0.6, 0.4, 0.22), color="blue"),
         _static("box", "furniture:box_", size_m=(0.2, 0.2, 0.2), color="grey"),
         _static("pedestal", "furniture:pedestal", size_m=(0.3, 0.3, 0.7)),
+        _static("sphere", "toys:plain_sphere", diameter_m=0.2),
         _static("gantry", "furniture:gantry", size_m=(1.6, 1.0, 1.8)),
         _static("plane", "furniture:plane", size_m=(4.0, 4.0)),
         _static(

@@ -38,6 +38,7 @@ SLOTS: Mapping[str, tuple[str, ...]] = {
     "box": ("body",),
     "pedestal": ("body", "plates"),
     "light_panel": ("housing", "lamp"),
+    "sphere": ("surface",),
     "room": ("floor", "ceiling", "walls", "skirting", "door", "frames", "window", "handle"),
 }
 PANEL_SHAPES = ("rectangle", "disk")

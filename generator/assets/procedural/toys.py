@@ -15,7 +15,7 @@ from generator.assets.procedural.materials import (
     plastic,
     printed,
 )
-from generator.assets.procedural.mesh import centred
+from generator.assets.procedural.mesh import centred, in_place
 from generator.assets.procedural.shapes import ball as sphere
 from generator.assets.procedural.shapes import fillet, lathe, rounded_box, spline
 from generator.core.geometry import Material
@@ -57,6 +57,20 @@ def ball(seed: int) -> Solid:
     # One small hull has flat sides that a ball would rest on; four that are turned have not.
     parts = [hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)]
     return centred([body], (cover,), parts)
+
+
+def plain_sphere(diameter_m: float = 0.2) -> Solid:
+    """A smooth matte sphere to show surfaces and lights on. Slot: surface.
+
+    Raises:
+        ValueError: if it is not between 1 mm and 10 m wide.
+    """
+    if not 0.001 <= diameter_m <= 10.0:
+        raise ValueError(f"a sphere of {diameter_m:g} m; expected 0.001 m to 10 m")
+    radius = 0.5 * diameter_m
+    body = sphere(lambda d: radius * d, 48, 96).moved(0.0, 0.0, radius)
+    surface = Material((0.5, 0.5, 0.5), 0.5)
+    return in_place([body], (surface,), [hulls.extreme(body.corners_m)])
 
 
 def ball_kind(seed: int) -> str:

@@ -99,14 +99,14 @@ def natural_falloff(camera: Intrinsics, pupil_power: float) -> Float32:
         x = (np.arange(camera.width_px) + 0.5 - camera.cx_px) / camera.fx_px
         y = (np.arange(camera.height_px) + 0.5 - camera.cy_px) / camera.fy_px
         cos2 = 1.0 / (1.0 + x[None, :] ** 2 + y[:, None] ** 2)
-        return (cos2 * cos2).astype(np.float32)
+        return np.asarray(cos2 * cos2, np.float32)
     cosine = camera.pixel_rays()[..., 2]
     if model == "brown_conrady":
         falloff = np.maximum(cosine, 0.0) ** 4
     else:
         falloff = _squeezed(cosine, camera.lens.coefficients)
         falloff = falloff * np.maximum(cosine, 0.0) ** pupil_power if pupil_power > 0 else falloff
-    return np.nan_to_num(falloff, nan=0.0).astype(np.float32)
+    return np.asarray(np.nan_to_num(falloff, nan=0.0), np.float32)
 
 
 def _squeezed(cosine: Array, coefficients: Sequence[float]) -> Array:
