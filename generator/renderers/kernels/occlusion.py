@@ -400,7 +400,7 @@ def smooth_lattice(
             else:
                 tolerance_m = surface_tolerance(view, lattice.p_m[i])
                 total = column_sum(lattice, sums, j, i, 2, tolerance_m)
-                if total[1] < 12.0:
+                if total[1] < 8.0:
                     # Where its surface ends, part of a window has seen part of the lamp only.
                     total = column_sum(lattice, sums, j, i, 4, tolerance_m)
                 if total[1] > 0.0:
