@@ -43,8 +43,8 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
     """
     pbr = description.get("pbrMetallicRoughness", {})
     further = description.get("extensions", {})
-    factors = pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
-    red, green, blue, alpha = (fraction(c, "baseColorFactor") for c in factors)
+    *color, alpha = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
+    red, green, blue = (fraction(c, "baseColorFactor") for c in color)
     surface = _surface(pbr, images)
     cover, cutoff, opacity = _alpha(description, pbr, alpha, images)
     emission, glow = _emission(description, further, images)
