@@ -335,3 +335,24 @@ def _fixture_mesh(size_m: Vec3, front: Material):  # noqa: ANN202
     vertices = mesh.vertices_m + np.array([0.0, 0.0, 0.5 * size_m[2]], np.float32)
     low = (vertices[mesh.faces][..., 2] < 1e-6).all(axis=1)
     return replace(mesh, vertices_m=vertices, face_slots=low.astype(np.int32))
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_a_mirror_shows_a_panel_once(visible: bool) -> None:
+    """As bright as the panel times the metal's 0.9, whether a ray finds it or only its lobe."""
+    light = replace(RECTANGLE, position_m=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
+    asset = fixture_asset(light)
+    glass = Material((0.8, 0.8, 0.8), role="lamp")
+    silver = Material((0.9, 0.9, 0.9), 0.08, 1.0)
+    meshes = {asset: _fixture_mesh((1.2, 0.6, 0.04), glass), "plane": plane_mesh(20.0, (silver,))}
+    library = FakeLibrary(meshes)
+    scene = Scene("t", (Body("p", "plane"),), environment=DARK)
+    if visible:
+        scene, light = with_fixture(scene, light, library.materials(asset))
+    scene = replace(scene, lights=(light,))
+    camera = camera_at((-0.3, 0.0, 0.8), (0.0, 0.0, 0.0), (48, 36), hfov_deg=8.0)
+
+    luminance = radiance_of(scene, camera, library)[18, 24, 1]
+
+    tolerance = 0.02 if visible else 0.2
+    assert luminance == pytest.approx(0.9 * 100.0 / 0.72, rel=tolerance)

@@ -13,6 +13,8 @@ from generator.core.geometry import Float32
 from generator.core.scene import Body, Environment, Light, Region, Scene
 from generator.core.se3 import SE3, Vec3
 from generator.renderers.brightest import SkyLamp, without_brightest
+from generator.renderers.device import open_device
+from generator.renderers.environments import upload_environment, upload_split
 from generator.renderers.settings import RenderSettings
 from generator.renderers.warp import WarpRenderer
 from tests.renderers.embree import open3d_or_skip
@@ -124,6 +126,22 @@ def test_a_disc_in_the_sky_is_found_where_and_as_large_as_it_is(
     assert lamps[0].angular_radius_rad == pytest.approx(radius_rad, rel=0.08, abs=0.003)
     red, green, blue = lamps[0].power
     assert (red / green, blue / green) == pytest.approx((1.2, 0.7), rel=0.03)
+
+
+def test_a_fine_panorama_is_lit_and_mirrored_like_a_coarse_one() -> None:
+    """1200 rows: the light of the mirrored image and of the lamps is still that of the panorama."""
+    image = panorama(((0.6, 0.3, 0.7), 0.05, 900.0), height=1200)
+    device = open_device("cpu")
+
+    split = upload_split(image, upload_environment(image, device))
+
+    (lamp,) = split.lamps
+    normals = every_normal()[::5]
+    whole = irradiance(image, normals)
+    parts = irradiance(split.rest.numpy(), normals) + disc_irradiance(lamp, normals)
+    assert split.rest.shape == (1200, 2400)
+    assert np.abs(parts - whole).max() < 0.01 * whole.max()
+    np.testing.assert_array_equal(split.image.numpy(), image)
 
 
 def test_even_and_cloudy_skies_stay_as_they_are() -> None:
