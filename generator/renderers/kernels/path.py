@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.brdf import directional_albedo
 from generator.renderers.kernels.dielectrics import (
     fresnel_dielectric,
     pane_reflectance,
@@ -438,14 +439,17 @@ def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
         out.bsdf.f0 = wp.vec3(1.0, 1.0, 1.0)
         out.bsdf.f90 = 1.0
         out.weight = on * (1.0 / (1.0 - p))
-        out.bsdf.scale = back * (1.0 / p)
+        # All that rough facets hide is scattered on.
+        part = directional_albedo(world.lobes, wp.sqrt(alpha), w[2])
+        boost = 1.0 / (part[0] + part[1])
+        out.bsdf.scale = back * (boost / p)
         if lot < p:
             out.kind = OPAQUE
         elif is_clear_pane(world, v.surface):
             out.kind = STRAIGHT
         else:
             out.kind = ROUGH_PANE
-            out.bsdf.scale = wp.vec3(1.0, 1.0, 1.0)
+            out.bsdf.scale = wp.vec3(boost, boost, boost)
     else:
         out.bsdf = make_interface(w, alpha, wp.where(v.outside, ior, 1.0 / ior))
         # One half of the tint on the way in, the other on the way out.

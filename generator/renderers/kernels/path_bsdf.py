@@ -37,7 +37,7 @@ class Bsdf:
         ior: If not 0, the specular layer is all there is, reflects by Fresnel's equations for this
             index instead, and lets the rest through.
         alpha: Width of the specular lobe.
-        coat: Weight of the clear coat.
+        coat: Weight of the clear coat, multiple scattering included.
         coat_f0: Its reflectance at normal incidence.
         coat_alpha: Width of its lobe.
         p_coat, p_shine: Probabilities of drawing from the coat and from the specular layer.
@@ -129,11 +129,11 @@ def make_bsdf(
     s.diffuse = wp.cw_mul(one - gloss, albedo) * (1.0 - metallic)
     shine = luminance(gloss)
     if coat > 0.0:
-        s.coat = coat
         s.coat_f0 = coat_f0
         s.coat_alpha = alpha_of(coat_roughness)
         above = directional_albedo(table, wp.sqrt(s.coat_alpha), n_v)
-        coated = coat * (coat_f0 * above[0] + above[1])
+        s.coat = coat * (1.0 + coat_f0 * (1.0 / (above[0] + above[1]) - 1.0))
+        coated = s.coat * (coat_f0 * above[0] + above[1])
         s.scale = s.scale * (1.0 - coated)
         s.diffuse = s.diffuse * (1.0 - coated)
         shine = shine * (1.0 - coated)

@@ -1,0 +1,366 @@
+"""The path-traced tier against closed forms, furnaces, and itself by other techniques."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import integrate
+
+from generator.core.capture import Channel
+from generator.core.geometry import Material, TextureData
+from generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
+from generator.core.se3 import SE3
+from generator.renderers.warp import WarpRenderer
+from tests.renderers.fake_library import (
+    DARK,
+    MATTE,
+    FakeLibrary,
+    box_mesh,
+    camera_at,
+    plane_mesh,
+    room_mesh,
+    sphere_mesh,
+)
+from tests.renderers.paths import ASKED, BOTH, MET, radiance_of, replicates_of, settings_of
+
+FURNACE = Environment(luminance_cd_m2=100.0)
+WHITE = (1.0, 1.0, 1.0)
+
+
+def ball_in_furnace(**fields: object) -> np.ndarray:
+    """Radiance of eight replicates over the face of a fine ball, every direction 100 cd/m^2."""
+    material = Material(**{"base_color": WHITE, **fields})
+    library = FakeLibrary({"ball": sphere_mesh(0.5, 192, (material,))})
+    scene = Scene("furnace", (Body("ball", "ball"),), environment=FURNACE)
+    camera = camera_at((0.0, -4.0, 0.0), (0.0, 0.0, 0.0), (16, 16), hfov_deg=9.0)
+    return replicates_of(scene, camera, library, 64, 8, max_bounces=128)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"metallic": 1.0, "roughness": 0.0},
+        {"metallic": 1.0, "roughness": 0.3},
+        {"metallic": 1.0, "roughness": 0.7},
+        {"metallic": 1.0, "roughness": 1.0},
+        {"roughness": 0.1},
+        {"roughness": 0.6, "specular": 1.0},
+        {"roughness": 1.0, "specular": 0.0},
+        {"roughness": 0.5, "coat": 1.0, "coat_roughness": 0.0},
+        {"metallic": 1.0, "roughness": 0.4, "coat": 1.0, "coat_roughness": 0.5},
+        {"transmission": 1.0, "thin": True, "roughness": 0.5},
+        {"transmission": 1.0, "thin": False, "roughness": 0.0},
+        {"transmission": 1.0, "thin": True, "roughness": 0.0},
+        {"transmission": 0.6, "thin": True, "roughness": 0.05, "opacity": 0.5},
+    ],
+    ids=str,
+)
+def test_what_takes_no_light_is_invisible_in_a_uniform_environment(fields: dict) -> None:
+    """White furnace: radiance 100 in, 100 out, to 0.1 %, the error of the table of lobes."""
+    images = ball_in_furnace(**fields)
+
+    means = images.mean(axis=(1, 2, 3))
+    error = means.std(ddof=1) / math.sqrt(len(means))
+    assert abs(means.mean() - 100.0) < 4.0 * error + 0.1
+
+
+def test_rough_glass_loses_what_its_facets_hide_and_no_more() -> None:
+    """Walter's model has no second scattering: never above one, and not far below."""
+    image = ball_in_furnace(transmission=1.0, thin=False, roughness=0.4).mean(axis=0)
+
+    assert image.mean() < 100.1
+    assert image.mean() > 85.0
+
+
+def test_a_grey_ball_under_an_even_sky_has_its_albedo() -> None:
+    """A convex matte body sees nothing of itself: radiance is albedo times 100."""
+    images = ball_in_furnace(base_color=(0.5, 0.25, 0.1), roughness=1.0, specular=0.0)
+
+    np.testing.assert_allclose(images.mean(axis=(0, 1, 2)), (50.0, 25.0, 10.0), rtol=2e-3)
+
+
+def ground(material: Material = MATTE) -> FakeLibrary:
+    return FakeLibrary({"plane": plane_mesh(20.0, (material,)), "box": box_mesh()})
+
+
+def from_above(size_px: tuple[int, int] = (16, 12)) -> Camera:
+    return camera_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), size_px, hfov_deg=2.0)
+
+
+def lit_ground(light: Light, samples: int = 256) -> np.ndarray:
+    """Radiance of the middle of a matte floor, albedo 0.5."""
+    scene = Scene("t", (Body("p", "plane"),), lights=(light,), environment=DARK)
+    return radiance_of(scene, from_above(), ground(), samples)
+
+
+def test_the_sun_on_the_ground_is_lux_over_pi() -> None:
+    """2000 lx at 60 degrees on an albedo of 0.5: 1000 * 0.5 / pi."""
+    s, c = math.sin(math.radians(60.0)), math.cos(math.radians(60.0))
+    sun = Light("sun", "sun", direction=(s, 0.0, -c), illuminance_lux=2000.0)
+
+    np.testing.assert_allclose(lit_ground(sun), 1000.0 * 0.5 / math.pi, rtol=1e-3)
+
+
+def test_a_ball_above_the_ground_gives_its_intensity_over_the_squared_distance() -> None:
+    """A sphere of any radius lights what faces it as a point does: 800 cd at 2 m, 200 lx."""
+    ball = Light("lamp", "sphere", (0.0, 0.0, 2.0), intensity_cd=800.0, radius_m=0.5)
+
+    np.testing.assert_allclose(lit_ground(ball).mean(), 200.0 * 0.5 / math.pi, rtol=2e-3)
+
+
+def test_a_rectangle_gives_what_quadrature_says() -> None:
+    """Luminance 1000 over 1 m x 0.6 m, tilted, to one side: sum of cos cos / d^2."""
+    normal, side = np.array((-0.6, 0.0, -0.8)), np.array((0.0, 1.0, 0.0))
+    centre = np.array((0.9, 0.2, 1.1))
+    panel = Light(
+        "panel", "rectangle", tuple(centre), tuple(normal), side=tuple(side), size_m=(1.0, 0.6),
+        intensity_cd=600.0,
+    )  # fmt: skip
+    across = np.cross(normal, side)
+
+    def flow(v_m: float, u_m: float) -> float:
+        way = centre + u_m * side + v_m * across
+        squared = float(way @ way)
+        front = max(-float(way @ normal), 0.0)
+        return 1000.0 * max(way[2], 0.0) * front / squared**2
+
+    lux = integrate.dblquad(flow, -0.5, 0.5, -0.3, 0.3, epsabs=1e-3)[0]
+
+    np.testing.assert_allclose(lit_ground(panel, 512).mean(), lux * 0.5 / math.pi, rtol=3e-3)
+
+
+def test_a_disk_overhead_has_the_form_factor_of_the_books() -> None:
+    """Parallel coaxial disk over an element: F = r^2 / (r^2 + h^2) (Howell's catalogue, B-13)."""
+    r, h = 0.7, 1.2
+    disk = Light("disk", "disk", (0.0, 0.0, h), radius_m=r, intensity_cd=1000.0 * math.pi * r * r)
+    lux = math.pi * 1000.0 * r * r / (r * r + h * h)
+
+    np.testing.assert_allclose(lit_ground(disk, 512).mean(), lux * 0.5 / math.pi, rtol=3e-3)
+
+
+def test_a_spot_is_dark_outside_its_cone_and_fades_within() -> None:
+    """On its axis a spot is a ball; beyond its half angle nothing arrives."""
+    spot = Light(
+        "spot", "spot", (0.0, 0.0, 2.0), intensity_cd=400.0, radius_m=0.01, cone_rad=0.3, even=0.5
+    )
+    scene = Scene("t", (Body("p", "plane"),), lights=(spot,), environment=DARK)
+    camera = camera_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (41, 41), hfov_deg=30.0)
+
+    image = radiance_of(scene, camera, ground(), 64)[..., 0]
+
+    x_m = (np.arange(41) + 0.5 - 20.5) / 20.5 * 4.0 * math.tan(math.radians(15.0))
+    off_m = np.hypot(*np.meshgrid(x_m, x_m))
+    assert image[20, 20] == pytest.approx(100.0 * 0.5 / math.pi, rel=2e-3)
+    assert not image[off_m > 2.0 * math.tan(0.3) + 0.1].any()
+    fading = (off_m > 2.0 * math.tan(0.2)) & (off_m < 2.0 * math.tan(0.26))
+    assert (image[fading] < image[20, 20] * 0.9).all() and (image[fading] > 0.0).all()
+
+
+def test_opaque_things_throw_shadows_and_veils_thin_ones() -> None:
+    """Below a sheet of opacity 0.25 three quarters of a sun's light arrive."""
+    sun = Light("sun", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=1000.0)
+    veil = replace(MATTE, base_color=(0.0, 0.0, 0.0), opacity=0.25)
+    library = FakeLibrary({"plane": plane_mesh(4.0), "veil": plane_mesh(4.0, (veil,))})
+    bodies = (
+        Body("p", "plane", materials=(MATTE,)),
+        Body("veil", "veil", SE3((0.0, 0.0, 2.5))),
+    )
+    camera = camera_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), (8, 8), hfov_deg=2.0)
+
+    image = radiance_of(Scene("t", bodies, lights=(sun,), environment=DARK), camera, library, 64)
+
+    np.testing.assert_allclose(image, 750.0 * 0.5 / math.pi, rtol=1e-3)
+
+
+def test_a_clear_pane_lets_through_what_fresnel_leaves() -> None:
+    """Light straight through a pane: (1 - F)^2 / (1 - F^2), F = 0.04, times its tint."""
+    sun = Light("sun", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=1000.0)
+    pane = Material(base_color=(0.9, 0.9, 0.9), transmission=1.0, thin=True, roughness=0.0)
+    library = FakeLibrary({"plane": plane_mesh(4.0, (MATTE,)), "pane": plane_mesh(4.0, (pane,))})
+    bodies = (Body("p", "plane"), Body("pane", "pane", SE3((0.0, 0.0, 2.5))))
+    camera = camera_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), (8, 8), hfov_deg=2.0)
+    scene = Scene("t", bodies, lights=(sun,), environment=DARK)
+
+    image = radiance_of(scene, camera, library, 16, max_bounces=1)
+
+    through = 0.96**2 * 0.9 / (1.0 - 0.04**2 * 0.81)
+    np.testing.assert_allclose(image, 1000.0 * through * 0.5 / math.pi, rtol=1e-3)
+
+
+def test_a_panel_seen_in_a_mirror_has_its_luminance() -> None:
+    """A perfect mirror shows a panel as bright as it is: 500 cd/m^2."""
+    mirror = Material(base_color=WHITE, metallic=1.0, roughness=0.0)
+    panel = Light("panel", "rectangle", (0.0, 1.5, 1.5), (0.0, -0.7071068, -0.7071068),
+                  side=(1.0, 0.0, 0.0), size_m=(1.0, 1.0), intensity_cd=500.0)  # fmt: skip
+    scene = Scene("t", (Body("p", "plane"),), lights=(panel,), environment=DARK)
+    camera = camera_at((0.0, -1.5, 1.5), (0.0, 0.0, 0.0), (8, 8), hfov_deg=2.0)
+
+    image = radiance_of(scene, camera, ground(mirror), 256)
+
+    np.testing.assert_allclose(image.mean(), 500.0, rtol=2e-3)
+
+
+def test_emission_shines_in_the_picture_and_on_what_is_near() -> None:
+    """A closed room that emits 10 cd/m^2 and reflects a half: 10 + 5 + 2.5 ... = 20."""
+    glowing = replace(MATTE, emission_cd_m2=(10.0, 10.0, 10.0))
+    library = FakeLibrary({"room": room_mesh(materials=(glowing,))})
+    camera = camera_at((0.0, 0.0, 1.5), (1.0, 0.3, 1.2), (12, 12))
+    scene = Scene("t", (Body("room", "room"),), environment=DARK)
+
+    image = radiance_of(scene, camera, library, 256, max_bounces=64)
+
+    np.testing.assert_allclose(image.mean(), 20.0, rtol=3e-3)
+
+
+def test_holes_let_paths_and_shadows_through() -> None:
+    """A sheet whose texture is all hole changes nothing, neither seen nor as a shadow."""
+    nothing = TextureData(np.full((4, 4, 3), 200, np.uint8), alpha=np.zeros((4, 4), np.uint8))
+    sheet = replace(MATTE, texture="nothing")
+    library = FakeLibrary(
+        {"plane": plane_mesh(4.0, (MATTE,)), "sheet": plane_mesh(4.0, (sheet,))},
+        {"nothing": nothing},
+    )
+    sun = Light("sun", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=1000.0)
+    bodies = (Body("p", "plane"), Body("sheet", "sheet", SE3((0.0, 0.0, 1.0))))
+    scene = Scene("t", bodies, lights=(sun,), environment=DARK)
+
+    image = radiance_of(scene, from_above(), library, 16)
+
+    np.testing.assert_allclose(image, 1000.0 * 0.5 / math.pi, rtol=1e-3)
+
+
+def mixed_scene() -> tuple[Scene, Camera, FakeLibrary]:
+    """Two soft lamps and a sky with a bright patch over glossy and matte things."""
+    sky = np.ones((32, 64, 3), np.float32)
+    sky[6:10, 10:18] = 12.0
+    sky /= sky.mean()
+    glossy = Material(base_color=(0.6, 0.3, 0.2), roughness=0.35, specular=0.8)
+    library = FakeLibrary(
+        {
+            "plane": plane_mesh(4.0, (replace(MATTE, base_color=(0.4, 0.4, 0.4)),)),
+            "ball": sphere_mesh(0.4, 24, (glossy,)),
+            "steel": sphere_mesh(0.3, 24, (Material((0.7, 0.7, 0.7), 0.45, 1.0),)),
+        },
+        None,
+        {"patch": sky},
+    )
+    lights = (
+        Light("ball", "sphere", (0.8, -0.6, 1.2), intensity_cd=120.0, radius_m=0.35),
+        Light("panel", "rectangle", (-0.9, 0.0, 1.3), (0.6, 0.0, -0.8), side=(0.0, 1.0, 0.0),
+              size_m=(0.8, 0.8), intensity_cd=150.0),
+    )  # fmt: skip
+    bodies = (
+        Body("p", "plane"),
+        Body("ball", "ball", SE3((0.3, 0.2, 0.4))),
+        Body("steel", "steel", SE3((-0.5, -0.1, 0.3))),
+    )
+    environment = Environment("patch", luminance_cd_m2=40.0)
+    camera = camera_at((0.0, -2.2, 1.2), (0.0, 0.0, 0.2), (24, 18), hfov_deg=45.0)
+    return Scene("mixed", bodies, lights=lights, environment=environment), camera, library
+
+
+@pytest.mark.parametrize("lights", [ASKED, MET], ids=["asked", "met"])
+def test_either_technique_alone_agrees_with_both_together(lights: int) -> None:
+    """Three estimators of one integral: z-test of the mean over the image, sixteen replicates."""
+    scene, camera, library = mixed_scene()
+
+    both = replicates_of(scene, camera, library, 64, 16, BOTH).mean(axis=(1, 2, 3))
+    alone = replicates_of(scene, camera, library, 64, 16, lights).mean(axis=(1, 2, 3))
+
+    error = math.sqrt((both.var(ddof=1) + alone.var(ddof=1)) / 16)
+    assert error < 0.02 * both.mean()
+    assert abs(both.mean() - alone.mean()) < 3.5 * error
+
+
+def test_both_techniques_together_are_less_noisy_than_either() -> None:
+    """Multiple importance sampling: the variance, averaged over the image."""
+    scene, camera, library = mixed_scene()
+
+    noise = {
+        lights: replicates_of(scene, camera, library, 16, 8, lights).var(axis=0).mean()
+        for lights in (BOTH, ASKED, MET)
+    }
+
+    assert noise[BOTH] < 0.8 * noise[MET]
+    assert noise[BOTH] < 1.05 * noise[ASKED]
+
+
+def test_error_falls_faster_than_that_of_independent_samples() -> None:
+    """Sixteen times the samples: four times less error by chance, at least six by scrambled nets."""
+    sun = Light("lamp", "sphere", (0.3, 0.0, 1.0), intensity_cd=100.0, radius_m=0.3)
+    scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK)
+
+    few, many = (
+        replicates_of(scene, from_above(), ground(), n, 8).std(axis=0).mean() for n in (4, 64)
+    )
+
+    assert few / many > 6.0
+
+
+def test_the_same_scene_gives_the_same_bytes() -> None:
+    """Two renderers, one of which has rendered something else before."""
+    scene, camera, library = mixed_scene()
+    channels = frozenset({Channel.RGB, Channel.RADIANCE, Channel.INSTANCE})
+    first, second = (WarpRenderer(library, "cpu", settings_of(4)) for _ in range(2))
+    second.render(replace(scene, lights=()), camera, channels)
+
+    a, b = (renderer.render(scene, camera, channels) for renderer in (first, second))
+
+    for channel in channels:
+        assert a.channels[channel].tobytes() == b.channels[channel].tobytes()
+
+
+def test_labels_do_not_depend_on_the_tier() -> None:
+    """They come from the pixel-centre ray."""
+    scene, camera, library = mixed_scene()
+    channels = frozenset({Channel.RGB, Channel.INSTANCE, Channel.Z_DEPTH, Channel.NORMALS})
+    traced = WarpRenderer(library, "cpu", settings_of(1)).render(scene, camera, channels)
+    drawn = WarpRenderer(library, "cpu").render(scene, camera, channels)
+
+    for channel in channels - {Channel.RGB}:
+        assert traced.channels[channel].tobytes() == drawn.channels[channel].tobytes()
+    assert (traced.channels[Channel.RGB] != drawn.channels[Channel.RGB]).any()
+
+
+def test_both_tiers_agree_where_light_comes_straight_from_lamps() -> None:
+    """A matte floor under one lamp: no bounce to miss, the same radiance to 1 %."""
+    lamp = Light("lamp", "sphere", (0.5, 0.0, 2.0), intensity_cd=300.0, radius_m=0.1)
+    scene = Scene("t", (Body("p", "plane"),), lights=(lamp,), environment=DARK)
+    channels = frozenset({Channel.RADIANCE})
+    drawn = WarpRenderer(ground(), "cpu").render(scene, from_above(), channels)
+
+    traced = radiance_of(scene, from_above(), ground(), 64)
+
+    np.testing.assert_allclose(traced, drawn.channels[Channel.RADIANCE], rtol=0.01)
+
+
+def test_fog_dims_what_is_far() -> None:
+    """Koschmieder: exp(-0.2 * 3) of a lit floor is left, plus the fog's own light."""
+    sun = Light("sun", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=1000.0)
+    weather = Weather(fog_extinction_per_m=0.2)
+    scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK, weather=weather)
+    clear = radiance_of(replace(scene, weather=Weather()), from_above(), ground(), 4)
+
+    foggy = radiance_of(scene, from_above(), ground(), 4)
+
+    left = math.exp(-0.2 * 3.0)
+    assert (foggy > left * clear * 0.99).all()
+    assert (foggy < left * clear + (1.0 - left) * 1000.0 / math.pi).all()
+
+
+def test_snow_whitens_and_puddles_mirror() -> None:
+    """Weather on the ground is part of paths."""
+    dark = replace(MATTE, base_color=(0.1, 0.1, 0.1), roughness=0.9)
+    scene = Scene("t", (Body("p", "plane"),), environment=FURNACE)
+    dry = radiance_of(scene, from_above(), ground(dark), 32).mean()
+
+    snowed = replace(scene, weather=Weather(snow_cover=1.0))
+    soaked = replace(scene, weather=Weather(puddles=1.0, wetness=1.0))
+
+    assert dry == pytest.approx(10.0, rel=0.02)
+    assert radiance_of(snowed, from_above(), ground(dark), 32).mean() > 60.0
+    # Darker below, and 2 % that water mirrors.
+    assert 3.0 < radiance_of(soaked, from_above(), ground(dark), 32).mean() < 10.0
