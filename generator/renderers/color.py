@@ -53,11 +53,7 @@ def lit_image(
 ) -> LitImage:
     """Light, shade and weather, before the camera's response."""
     radiance = surface_light(world, view, seen, stock, settings)
-    ev100 = camera.ev100
-    if ev100 is None:
-        ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
-    lit = LitImage(radiance, ev100)
-    pass_lens(world, camera, view, seen.z_m, lit, stock, settings)
+    lit = expose(camera, world, view, seen, radiance, stock, settings)
     mix_edges(world, view, seen, lit, stock, settings)
     return lit
 
@@ -70,13 +66,31 @@ def surface_light(
     settings: RenderSettings,
 ) -> wp.array:
     """What comes from pixel centres through the air [cd/m^2], linear RGB, flat; scratch memory."""
-    images = _images(seen)
+    images = images_of(seen)
     keep_main_lamps(world, view, seen, stock, settings.max_lamps)
     lattice = sampled_lattice(world, view, seen, stock)
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
-    _darken_outside(view, radiance)
     return radiance
+
+
+def expose(
+    camera: Camera,
+    world: PackedWorld,
+    view: records.View,
+    seen: Seen,
+    radiance: wp.array,
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> LitImage:
+    """Meter the light of a scene, and add what is between it and the sensor, in place."""
+    darken_outside(view, radiance)
+    ev100 = camera.ev100
+    if ev100 is None:
+        ev100 = automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
+    lit = LitImage(radiance, ev100)
+    pass_lens(world, camera, view, seen.z_m, lit, stock, settings)
+    return lit
 
 
 def pass_lens(
@@ -93,7 +107,7 @@ def pass_lens(
     draw_precipitation(world, camera, view, z_m, radiance, ev100=lit.ev100, stock=stock)
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
-    _darken_outside(view, radiance)
+    darken_outside(view, radiance)
 
 
 def radiance_image(lit: LitImage, view: records.View) -> Float32:
@@ -128,7 +142,7 @@ def mix_edges(
         return
     radiance, samples = lit.radiance, settings.antialias
     exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
-    device, images = stock.device, _images(seen)
+    device, images = stock.device, images_of(seen)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", view.width * view.height, wp.int32)
     wp.launch(antialias.find_edges, view.height, [view, images], [count, pixels], device=device)
@@ -146,7 +160,7 @@ def mix_edges(
     wp.launch(tone.put_mixed, len(edges), [edges, mixed], [radiance], device=device)
 
 
-def _darken_outside(view: records.View, radiance: wp.array) -> None:
+def darken_outside(view: records.View, radiance: wp.array) -> None:
     """Leave no light where the lens shows nothing, in place."""
     if view.lens != records.PINHOLE:
         n = view.width * view.height
@@ -167,7 +181,7 @@ def _drawn_samples(
     numbers = stock.scratch("numbers", view.width * view.height, wp.int32)
     floors = stock.scratch("floors", view.width * view.height, float)
     floors.fill_(mixing.UNLISTED)
-    inputs = [view, _images(seen), pixels]
+    inputs = [view, images_of(seen), pixels]
     wp.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors], device=device)
     shape = (max(len(pixels), 1), len(parts))
     nearness = wp.zeros(shape, dtype=float, device=device)
@@ -188,7 +202,8 @@ def pixel_parts(n: int) -> Array:
     return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
 
 
-def _images(seen: Seen) -> shade.Images:
+def images_of(seen: Seen) -> shade.Images:
+    """What kernels read of the surfaces that are seen."""
     images = shade.Images()
     images.hits, images.z_m = seen.hits, seen.z_m
     images.weights, images.normals = seen.weights, seen.normals

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from generator.core.capture import Channel, Reading
 from generator.core.intrinsics import Intrinsics
+from generator.core.lens import PINHOLE, Lens
 from generator.core.rows import seen_points
 from generator.core.scene import Body, Scene
 from generator.core.se3 import SE3
@@ -177,10 +178,16 @@ def test_silhouettes_roll_with_their_rows(renderer: WarpRenderer) -> None:
     assert beside.silhouettes[1].mask.sum() > (beside.channels[Channel.INSTANCE] == 1).sum() + 200
 
 
-def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer) -> None:
+@pytest.mark.parametrize(
+    "lens", [PINHOLE, Lens("kannala_brandt", (-0.02, 0.01, -0.004, 0.0005), 1.4)]
+)
+def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, lens: Lens) -> None:
     """Bit for bit for labels; light differs by no more than the last bit of its sums."""
     wall = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
-    scene = world(wall, replace(LAMP, scale=0.7), shutter=Shutter(0.0, 0.05), time_s=0.0)
+    scene = world(
+        wall, replace(LAMP, scale=0.7), shutter=Shutter(0.0, 0.05), time_s=0.0,
+        lens=replace(LENS, lens=lens),
+    )  # fmt: skip
     studio = Studio(renderer._stock, RenderSettings())
     near = sight(Moment.of(scene, scene.cameras[0]), studio)
     whole_bands = timed_bands(near.moment, [0])
