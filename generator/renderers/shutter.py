@@ -103,7 +103,7 @@ def _images(
     if pace.samples > 1:
         light = partial(light_of, ev100=_LINEAR_EV100, studio=studio)
         shown, images = drawn_bands(bands, labels, studio, near)
-        mean = _averaged(slices_of(near.moment, pace.samples), light, near, studio)
+        mean = _averaged(slices_of(near.moment, pace.samples, pace.blurred), light, near, studio)
     else:
         light = partial(light_of, ev100=ev100, studio=studio)
         shown, images = drawn_bands(bands, labels, studio, near, light)
@@ -113,8 +113,17 @@ def _images(
     return shown, images | _developed(lit, depths, near, channels, studio)
 
 
-def slices_of(middle: Moment, samples: int) -> list[Slice]:
-    """Slices of time, ``samples`` to an exposure, that together hold every row's exposure once."""
+def slices_of(
+    middle: Moment, samples: int, blurred: NDArray[np.bool_] | None = None
+) -> list[Slice]:
+    """Slices of time that together hold every row's exposure once.
+
+    Args:
+        middle: Of the exposure of the image.
+        samples: Slices to an exposure.
+        blurred: Rows that are worth it; the others are rendered in the slice nearest to their own
+            instant. None = all.
+    """
     shutter, height = middle.camera.shutter, middle.camera.intrinsics.height_px
     step_s = shutter.exposure_s / samples
     count = max(math.ceil(round(shutter.open_s / step_s, 6)), 1)
@@ -125,6 +134,10 @@ def slices_of(middle: Moment, samples: int) -> list[Slice]:
     # What rounding leaves of a slice is not worth rendering.
     shares = np.where(shares > 1e-6 * step_s, shares, 0.0)
     shares /= shares.sum(axis=0)
+    if blurred is not None:
+        nearest = np.abs(offsets[:, None] - delays).argmin(axis=0)
+        alone = np.arange(count)[:, None] == nearest
+        shares = np.where(blurred, shares, alone)
     slices = []
     for offset_s, share in zip(offsets, shares, strict=True):
         rows = np.flatnonzero(share)

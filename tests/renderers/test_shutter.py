@@ -125,6 +125,29 @@ def test_slices_of_time_hold_every_row_once_around_its_instant(
     assert np.abs(instants - delays).max() <= 0.5 * exposure_s / samples + 1e-6
 
 
+@pytest.mark.parametrize("readout_s", [0.0, 0.03])
+def test_rows_in_which_nothing_moves_are_rendered_once(readout_s: float) -> None:
+    """In the slice nearest to their instant; others in every slice of their exposure."""
+    scene = world(shutter=Shutter(0.01, readout_s, samples=4))
+    moment = Moment.of(scene, scene.cameras[0])
+    blurred = np.arange(LENS.height_px) >= 40
+    slices = slices_of(moment, 4, blurred)
+    shares, times = np.zeros(LENS.height_px), np.zeros(LENS.height_px, int)
+    delays = scene.cameras[0].shutter.row_delays_s(LENS.height_px)
+    for part in slices:
+        rows = slice(part.band.first, part.band.end)
+        shares[rows] += part.weights
+        times[rows] += part.weights > 0.0
+        offset_s = part.band.moment.scene.time_s - scene.time_s
+        once = np.flatnonzero(part.weights == 1.0) + part.band.first
+        assert (np.abs(offset_s - delays[once]) <= 0.5 * 0.0025 + 1e-9).all()
+
+    np.testing.assert_allclose(shares, 1.0, atol=1e-6)
+    assert (times[:40] == 1).all()
+    assert (times[40:] >= 4).all()
+    assert sum(part.band.first < 40 for part in slices) < len(slices)
+
+
 @pytest.mark.parametrize("readout_s", [0.06, -0.06])
 @pytest.mark.parametrize("exposure_s", [0.0, 0.004])
 def test_an_edge_that_passes_leans_by_its_speed_times_the_time_between_rows(
