@@ -96,7 +96,8 @@ class Reading:
     Attributes:
         channels: Arrays by channel, as listed at Channel.
         silhouettes: By instance id; empty unless AMODAL was asked for.
-        time_s: The instant that depth, ids and boxes refer to.
+        time_s: The instant that depth, ids and boxes refer to; behind a rolling shutter, that of
+            the image's middle, while each row has its own (``camera.shutter``).
         ev100: Exposure value that was set or metered; None where there is no colour.
     """
 

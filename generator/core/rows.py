@@ -38,8 +38,8 @@ def seen_points(
         R, t = _camera_poses(scene, camera, delays_s)
         p_camera = np.einsum("nji,nj->ni", R, p_world - t, optimize=False)
         image_px = lens.project(p_camera)
-        v = np.nan_to_num(image_px[:, 1], nan=0.5 * lens.height_px)
-        delays_s = shutter.delay_s(np.clip(v, 0.0, lens.height_px), lens.height_px)
+        v = np.clip(image_px[:, 1], 0.0, lens.height_px)
+        delays_s = np.where(np.isfinite(v), shutter.delay_s(v, lens.height_px), delays_s)
     return p_camera, image_px
 
 

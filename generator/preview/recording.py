@@ -6,7 +6,7 @@ sequences follow each other. What has not changed since the last sample is not s
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,7 @@ class Recorder:
         """Log what holds for every sample: axes, category names, the layout of the views."""
         self._name_classes()
         self.stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self.stream.send_blueprint(_layout(self.info.sensors))
+        self.stream.send_blueprint(_layout(self.info))
 
     def _name_classes(self) -> None:
         """Log names and colours of categories and, as far as they are known, their skeletons."""
@@ -273,9 +273,18 @@ def _record_all(recorder: Recorder, samples: Iterable[Sample]) -> None:
         recorder.record(sample)
 
 
-def _layout(sensors: Sequence[str]) -> rrb.Blueprint:
-    cameras = [
-        rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name) for name in sensors
-    ]
+def _layout(info: DatasetInfo) -> rrb.Blueprint:
     world = rrb.Spatial3DView(origin="world", name="scene")
-    return rrb.Blueprint(rrb.Horizontal(world, rrb.Vertical(*cameras)), collapse_panels=True)
+    cameras = rrb.Vertical(*(_camera_view(info, name) for name in info.sensors))
+    return rrb.Blueprint(rrb.Horizontal(world, cameras), collapse_panels=True)
+
+
+def _camera_view(info: DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
+    """The image of a camera, and tabs beside it for its flow."""
+    image = rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name)
+    flows = [
+        rrb.Spatial2DView(origin=f"world/cameras/{name}/{c.value}", name=f"{name} {c.value}")
+        for c in info.media.get(name, ())
+        if c in FLOWS
+    ]
+    return rrb.Tabs(image, *flows) if flows else image

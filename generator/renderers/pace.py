@@ -19,7 +19,7 @@ BAND_PX = 0.25
 """Nothing that is seen moves farther within a band of rows."""
 BLUR_PX = 0.3
 """Nor within a slice of an exposure, if the camera's number of samples allows."""
-_SPREAD_ROWS = 8
+_SPREAD_ROWS = 12
 _STRIDE_PX = 4
 
 
@@ -28,12 +28,14 @@ class Pace:
     """How an image has to be taken.
 
     Attributes:
-        speeds_px_s: Of the fastest thing in each row, shape [height].
+        speeds_px_s: Of the fastest thing in or near each row, shape [height].
         samples: Slices of an exposure.
+        blurred: Rows in which something moves while they are exposed, shape [height].
     """
 
     speeds_px_s: Array
     samples: int
+    blurred: NDArray[np.bool_]
 
 
 def pace_of(see: Sight) -> Pace:
@@ -51,9 +53,10 @@ def pace_of(see: Sight) -> Pace:
     way = after - before
     length = np.sqrt((way * way).sum(axis=-1))
     fastest = np.max(length, axis=1, initial=0.0, where=np.isfinite(length)) / shutter.open_s
-    speeds = np.repeat(fastest, _STRIDE_PX)[: len(shown.z_m)]
+    speeds = _spread(np.repeat(fastest, _STRIDE_PX)[: len(shown.z_m)])
     wanted = math.ceil(float(speeds.max()) * shutter.exposure_s / BLUR_PX)
-    return Pace(speeds, min(max(wanted, 1), shutter.samples))
+    blurred = speeds * shutter.exposure_s > BLUR_PX
+    return Pace(speeds, min(max(wanted, 1), shutter.samples), blurred)
 
 
 def bands_of(see: Sight, pace: Pace | None = None) -> tuple[Band, ...]:
@@ -88,12 +91,17 @@ def band_starts(motion_px: Array) -> list[int]:
     Args:
         motion_px: How far things move from one row to the next, shape [height].
     """
-    padded = np.pad(motion_px, _SPREAD_ROWS, mode="edge")
-    # What moves in one row may be in those near it by the time that they are exposed.
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _SPREAD_ROWS + 1)
-    travelled = np.concatenate([[0.0], np.cumsum(windows.max(axis=1))])[:-1]
+    travelled = np.concatenate([[0.0], np.cumsum(motion_px)])[:-1]
     begins: NDArray[np.bool_] = np.diff(np.floor(travelled / BAND_PX), prepend=-1.0) > 0.0
     return [int(row) for row in np.flatnonzero(begins)]
+
+
+def _spread(speeds: Array) -> Array:
+    """The highest speed near each row: what moves may be there by the time it is exposed."""
+    padded = np.pad(speeds, _SPREAD_ROWS, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _SPREAD_ROWS + 1)
+    highest: Array = windows.max(axis=1)
+    return highest
 
 
 def _at_once(moment: Moment) -> Band:

@@ -108,13 +108,23 @@ def moved_world(world: PackedWorld, scene: Scene, camera: Camera, stock: AssetSt
     _place(placed, scene.bodies, body_meshes, camera)
     placed["low_m"], placed["high_m"] = _world_boxes(placed, body_meshes)
     tree = _tree_over(placed, stock)
-    record = records.World()
-    for name in records.World.vars:
-        setattr(record, name, getattr(world.record, name))
+    record = _copy_of(world.record)
     record.tree = tree.id
     record.bodies = wp.array(placed, dtype=records.Body, device=stock.device)
     record.lamps = wp.array(lamp_records(scene.lights), dtype=records.Lamp, device=stock.device)
     return replace(world, record=record, keep=(tree, *world.keep[1:]), placed=placed)
+
+
+def with_own_record(world: PackedWorld) -> PackedWorld:
+    """The same world, whose lamps, ground and sky can be changed without changing the other's."""
+    return replace(world, record=_copy_of(world.record))
+
+
+def _copy_of(record: records.World) -> records.World:
+    copy = records.World()
+    for name in records.World.vars:
+        setattr(copy, name, getattr(record, name))
+    return copy
 
 
 def _tree_over(placed: NDArray[np.void], stock: AssetStock) -> wp.Bvh:

@@ -94,7 +94,8 @@ def find(
         for _ in range(_LOOKS if len(bands) > 1 else 1):
             moved = np.einsum("hwij,hwj->hwi", ways[carrier, band_of_row[row]], place)
             image = camera.intrinsics.project(moved)
-            v = np.nan_to_num(image[..., 1], nan=-1.0)
+            # What a lens does not show at one instant is looked for where it was.
+            v = np.where(np.isfinite(image[..., 1]), image[..., 1], row)
             row = np.clip(np.floor(v), 0, len(band_of_row) - 1).astype(np.intp)
         p_camera[rows], image_px[rows] = moved, image
     return Found(p_camera, image_px)

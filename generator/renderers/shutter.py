@@ -34,7 +34,7 @@ from generator.renderers.lamps import main_lamp_numbers
 from generator.renderers.moments import Band, Moment, Sight, Studio, moves, sight
 from generator.renderers.outlines import rolled_silhouettes
 from generator.renderers.pace import Pace, bands_of, pace_of
-from generator.renderers.packing import moved_world
+from generator.renderers.packing import moved_world, with_own_record
 from generator.renderers.shown import Light, Shown, drawn_bands, with_margin
 from generator.renderers.tiers import smooth_edges, tier_light
 
@@ -101,7 +101,7 @@ def _images(
     if pace.samples > 1:
         light = partial(light_of, ev100=_LINEAR_EV100, studio=studio)
         shown, images = drawn_bands(bands, labels, studio, near)
-        mean = _averaged(slices_of(near.moment, pace.samples), light, near, studio)
+        mean = _averaged(slices_of(near.moment, pace.samples, pace.blurred), light, near, studio)
     else:
         light = partial(light_of, ev100=ev100, studio=studio)
         shown, images = drawn_bands(bands, labels, studio, near, light)
@@ -111,8 +111,17 @@ def _images(
     return shown, images | _developed(lit, depths, near, channels, studio)
 
 
-def slices_of(middle: Moment, samples: int) -> list[Slice]:
-    """Slices of time, ``samples`` to an exposure, that together hold every row's exposure once."""
+def slices_of(
+    middle: Moment, samples: int, blurred: NDArray[np.bool_] | None = None
+) -> list[Slice]:
+    """Slices of time that together hold every row's exposure once.
+
+    Args:
+        middle: Of the exposure of the image.
+        samples: Slices to an exposure.
+        blurred: Rows that are worth it; the others are rendered in the slice nearest to their own
+            instant. None = all.
+    """
     shutter, height = middle.camera.shutter, middle.camera.intrinsics.height_px
     step_s = shutter.exposure_s / samples
     count = max(math.ceil(round(shutter.open_s / step_s, 6)), 1)
@@ -123,6 +132,10 @@ def slices_of(middle: Moment, samples: int) -> list[Slice]:
     # What rounding leaves of a slice is not worth rendering.
     shares = np.where(shares > 1e-6 * step_s, shares, 0.0)
     shares /= shares.sum(axis=0)
+    if blurred is not None:
+        nearest = np.abs(offsets[:, None] - delays).argmin(axis=0)
+        alone = np.arange(count)[:, None] == nearest
+        shares = np.where(blurred, shares, alone)
     slices = []
     for offset_s, share in zip(offsets, shares, strict=True):
         rows = np.flatnonzero(share)
@@ -148,6 +161,8 @@ def _averaged(slices: Sequence[Slice], light: Light, near: Sight, studio: Studio
 
 def light_of(see: Sight, ev100: float, studio: Studio) -> Float32:
     """What comes from every pixel, anti-aliased; valid until the next call."""
+    # What light does to the world's record is of no concern to those who start from it.
+    see = replace(see, world=with_own_record(see.world))
     lit = LitImage(_radiance(see, studio), ev100)
     smooth_edges(see.world, see.view, see.seen, lit, studio)
     image: Float32 = lit.radiance.numpy().reshape(see.view.height, see.view.width, 3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import warp as wp
@@ -13,7 +12,7 @@ from generator.core.se3 import Array
 from generator.renderers.brightest import SkyLamp
 from generator.renderers.kernels import records
 from generator.renderers.kernels.rays import see_out
-from generator.renderers.packing import PackedWorld, lamp_records, sky_record
+from generator.renderers.packing import PackedWorld, lamp_records, sky_record, with_own_record
 from generator.renderers.panoramas import LUMINANCE
 from generator.renderers.stock import AssetStock
 
@@ -41,13 +40,11 @@ def split_sky(world: PackedWorld, scene: Scene, stock: AssetStock) -> PackedWorl
     towards = np.array([np.negative(sun.direction) for sun in suns])
     if not _is_open(world, points, towards, stock):
         return world
-    record = records.World()
-    for name in records.World.vars:
-        setattr(record, name, getattr(world.record, name))
-    record.sky = sky_record(environment, split)
+    lit = with_own_record(world)
+    lit.record.sky = sky_record(environment, split)
     lamps = np.concatenate([world.record.lamps.numpy(), lamp_records(suns)])
-    record.lamps = wp.array(lamps, dtype=records.Lamp, device=stock.device)
-    return replace(world, record=record)
+    lit.record.lamps = wp.array(lamps, dtype=records.Lamp, device=stock.device)
+    return lit
 
 
 def _sun(lamp: SkyLamp, environment: Environment) -> Light:

@@ -8,12 +8,15 @@ import math
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel, Reading
+from generator.core.capture import Capture, Channel, Reading
+from generator.core.interfaces import DatasetInfo
 from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera
+from generator.core.sample import ImageTruth, Sample
+from generator.core.scene import Camera, Scene
 from generator.core.se3 import IDENTITY
 from generator.preview.overlay import channel_image
 from generator.preview.palette import colored_flow
+from generator.preview.recording import Recorder
 
 
 def color_of_flow(u: float, v: float) -> tuple[int, int, int]:
@@ -68,3 +71,42 @@ def test_every_channel_of_flow_can_be_looked_at(channel: Channel, depth: int) ->
     assert image.shape == (4, 6, 3)
     assert image.dtype == np.uint8
     assert image.max() == 255
+
+
+class _Stream:
+    """What a recorder logs."""
+
+    def __init__(self) -> None:
+        self.logged: dict[str, object] = {}
+
+    def log(self, path: str, *what: object, static: bool = False) -> None:
+        """Remember it."""
+        self.logged[path] = what
+
+    def set_time(self, *what: object, **when: object) -> None:
+        """Times do not matter here."""
+
+    def send_blueprint(self, blueprint: object) -> None:
+        """Remember it."""
+        self.blueprint = blueprint
+
+
+def test_a_recording_has_flow_beside_the_image_of_its_camera() -> None:
+    """As a picture in a tab of its own; a camera without flow has no tabs."""
+    camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
+    reading = Reading("c", camera, {Channel.FLOW_FORWARD: np.ones((4, 6, 2), np.float32)})
+    info = DatasetInfo("t", 1, 1, 1, (), ("c",), {"c": (Channel.RGB, Channel.FLOW_FORWARD)})
+    stream = _Stream()
+    recorder = Recorder(stream, None, info)  # type: ignore[arg-type]
+    truth = {"c": ImageTruth(camera, ())}
+
+    recorder.start()
+    recorder.record(Sample(0, 0, 0, "train", Scene("t"), Capture({"c": reading}), truth))
+
+    assert "world/cameras/c/flow_forward" in stream.logged
+    (root,) = [stream.blueprint.root_container]
+    (tabs,) = root.contents[1].contents
+    assert [view.origin for view in tabs.contents] == [
+        "world/cameras/c/image",
+        "world/cameras/c/flow_forward",
+    ]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from generator.core.capture import Channel, Reading
 from generator.core.intrinsics import Intrinsics
+from generator.core.lens import PINHOLE, Lens
 from generator.core.rows import seen_points
 from generator.core.scene import Body, Scene
 from generator.core.se3 import SE3
@@ -124,6 +125,29 @@ def test_slices_of_time_hold_every_row_once_around_its_instant(
     assert np.abs(instants - delays).max() <= 0.5 * exposure_s / samples + 1e-6
 
 
+@pytest.mark.parametrize("readout_s", [0.0, 0.03])
+def test_rows_in_which_nothing_moves_are_rendered_once(readout_s: float) -> None:
+    """In the slice nearest to their instant; others in every slice of their exposure."""
+    scene = world(shutter=Shutter(0.01, readout_s, samples=4))
+    moment = Moment.of(scene, scene.cameras[0])
+    blurred = np.arange(LENS.height_px) >= 40
+    slices = slices_of(moment, 4, blurred)
+    shares, times = np.zeros(LENS.height_px), np.zeros(LENS.height_px, int)
+    delays = scene.cameras[0].shutter.row_delays_s(LENS.height_px)
+    for part in slices:
+        rows = slice(part.band.first, part.band.end)
+        shares[rows] += part.weights
+        times[rows] += part.weights > 0.0
+        offset_s = part.band.moment.scene.time_s - scene.time_s
+        once = np.flatnonzero(part.weights == 1.0) + part.band.first
+        assert (np.abs(offset_s - delays[once]) <= 0.5 * 0.0025 + 1e-9).all()
+
+    np.testing.assert_allclose(shares, 1.0, atol=1e-6)
+    assert (times[:40] == 1).all()
+    assert (times[40:] >= 4).all()
+    assert sum(part.band.first < 40 for part in slices) < len(slices)
+
+
 @pytest.mark.parametrize("readout_s", [0.06, -0.06])
 @pytest.mark.parametrize("exposure_s", [0.0, 0.004])
 def test_an_edge_that_passes_leans_by_its_speed_times_the_time_between_rows(
@@ -177,10 +201,16 @@ def test_silhouettes_roll_with_their_rows(renderer: WarpRenderer) -> None:
     assert beside.silhouettes[1].mask.sum() > (beside.channels[Channel.INSTANCE] == 1).sum() + 200
 
 
-def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer) -> None:
+@pytest.mark.parametrize(
+    "lens", [PINHOLE, Lens("kannala_brandt", (-0.02, 0.01, -0.004, 0.0005), 1.4)]
+)
+def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, lens: Lens) -> None:
     """Bit for bit for labels; light differs by no more than the last bit of its sums."""
     wall = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
-    scene = world(wall, replace(LAMP, scale=0.7), shutter=Shutter(0.0, 0.05), time_s=0.0)
+    scene = world(
+        wall, replace(LAMP, scale=0.7), shutter=Shutter(0.0, 0.05), time_s=0.0,
+        lens=replace(LENS, lens=lens),
+    )  # fmt: skip
     studio = Studio(renderer._stock, RenderSettings())
     near = sight(Moment.of(scene, scene.cameras[0]), studio)
     whole_bands = timed_bands(near.moment, [0])
