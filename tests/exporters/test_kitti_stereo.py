@@ -70,9 +70,8 @@ def test_flow_is_there_for_every_frame_that_has_a_next_one(tree: Path) -> None:
         assert {p.name for p in paths} == names
         flow, valid = read_flow(paths[0])
         assert np.array_equal(valid, told)
-        assert (
-            np.abs(flow[told] - np.stack([0.25 * u - 10.0, 0.125 * v], -1)[told]).max() <= 1 / 128
-        )
+        exact = np.stack([0.25 * u - 10.0, 0.125 * v], axis=-1)
+        assert np.abs(flow[told] - exact[told]).max() <= 1.0 / 128.0
 
 
 def test_points_are_in_the_right_image_at_x_minus_disparity(tree: Path, world: Any) -> None:
