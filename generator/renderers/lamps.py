@@ -75,12 +75,12 @@ def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Arr
     cosine = np.maximum(_dot(direction, list(normals.T)), _TURNED_AWAY)
     lux: Array = float((lamp["power"] * _LUMINANCE).sum()) * cosine / squared
     if lamp["kind"] == _SPOT:
+        if lamp["cutoff"] > 0.0:
+            lux = lux * dipped_share(lamp, [-along for along in direction])
         down = -_dot(direction, [float(along) for along in lamp["direction"]])
         span = max(float(lamp["cos_inner"] - lamp["cos_outer"]), 1e-4)
         fade = np.clip((down - lamp["cos_outer"]) / span, 0.0, 1.0)
         lux = lux * fade * fade * (3.0 - 2.0 * fade)
-        if lamp["cutoff"] > 0.0:
-            lux = lux * dipped_share(lamp, [-along for along in direction])
     return lux
 
 

@@ -228,9 +228,9 @@ def _lamps(lights: Sequence[Light]) -> NDArray[np.void]:
         value["position_m"] = light.position_m
         value["direction"] = light.direction
         value["power"] = np.asarray(light.color) * strength
+        value["cutoff"] = light.cutoff
         sun = light.kind == "sun"
         value["radius"] = math.tan(light.angular_radius_rad) if sun else light.radius_m
         value["cos_outer"] = math.cos(light.cone_rad)
         value["cos_inner"] = math.cos(light.even * light.cone_rad)
-        value["cutoff"] = light.cutoff
     return values

@@ -45,8 +45,7 @@ def read_look(prim: Any, mesh: Any, place: str) -> SurfaceLook:
     """The look of a mesh or subset by its bound material; else by the mesh's display colour.
 
     Raises:
-        AssetError: if the material is no UsdPreviewSurface, an image is missing, or roughness or
-            metalness is no share.
+        AssetError: if the material is no UsdPreviewSurface, or an image is missing.
     """
     from pxr import UsdShade
 
@@ -74,8 +73,8 @@ def _preview_surface(name: str, surface: Any, where: str) -> SurfaceLook:
         name,
         Material(
             base_color=(_unit(color[0]), _unit(color[1]), _unit(color[2])),
-            roughness=round(_share(rough, "roughness", where), 4),
-            metallic=round(_share(metallic, "metallic", where), 4),
+            roughness=round(_unit(rough), 4),
+            metallic=round(_unit(metallic), 4),
             specular=round(_unit(((ior - 1.0) / (ior + 1.0)) ** 2 / 0.08), 4),
             emission_cd_m2=glow,
         ),
@@ -175,12 +174,6 @@ def _displayed(mesh: Any) -> Material:
         return Material()
     red, green, blue = (_unit(float(c)) for c in colors[0])
     return Material(base_color=(red, green, blue))
-
-
-def _share(value: float, name: str, where: str) -> float:
-    if not 0.0 <= value <= 1.0:
-        raise AssetError(f"{where}: {name} {value:g} is not in [0, 1]; export it again")
-    return value
 
 
 def _unit(value: float) -> float:

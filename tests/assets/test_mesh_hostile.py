@@ -47,18 +47,6 @@ def _base64(data: bytes) -> str:
     return base64.b64encode(data).decode()
 
 
-def shiny(**factors: Any) -> bytes:
-    """The triangle with these factors in its material."""
-    primitive = {"attributes": {"POSITION": 0}, "material": 0}
-    return gltf(materials=[{"pbrMetallicRoughness": factors}], meshes=[{"primitives": [primitive]}])
-
-
-def glb(text: bytes) -> bytes:
-    """A glTF text as a binary file."""
-    text += b" " * (-len(text) % 4)
-    return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
-
-
 def accessor(**changes: Any) -> list[dict[str, Any]]:
     return [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", **changes}]
 
@@ -155,11 +143,6 @@ MESHES: dict[str, tuple[str, bytes | str]] = {
     "escaped traversal uri gltf": (
         "a.gltf", gltf(buffers=[{"byteLength": 36, "uri": "%2e%2e/secret.mtl"}])),
     "bad base64 gltf": ("a.gltf", gltf(buffers=[{"byteLength": 36, "uri": "data:;base64,@@@"}])),
-    "roughness 1.5 gltf": ("a.gltf", shiny(roughnessFactor=1.5)),
-    "negative roughness glb": ("a.glb", glb(shiny(roughnessFactor=-0.1))),
-    "nan roughness gltf": ("a.gltf", shiny(roughnessFactor=float("nan"))),
-    "metal of 2 gltf": ("a.gltf", shiny(metallicFactor=2)),
-    "colour beyond white gltf": ("a.gltf", shiny(baseColorFactor=[1, 1, 3, 1])),
     "draco gltf": ("a.gltf", gltf(extensionsRequired=["KHR_draco_mesh_compression"])),
     "strings for numbers gltf": ("a.gltf", gltf(accessors=accessor(count="three"))),
     "null everywhere gltf": ("a.gltf", gltf(meshes=None, nodes=None)),
@@ -308,19 +291,6 @@ def test_hostile_images_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(AssetError, match=reason):
         library.texture(texture)
     assert time.monotonic() - started_s < SECONDS_MAX
-
-
-def test_a_roughness_that_does_not_exist_is_told_by_name(tmp_path: Path) -> None:
-    """The file, the factor, its value and what it may be; at the ends of the range it is read."""
-    folder = tmp_path / "assets"
-    folder.mkdir()
-    for name, value in (("bad", 1.5), ("mirror", 0.0), ("chalk", 1.0)):
-        (folder / f"{name}.glb").write_bytes(glb(shiny(roughnessFactor=value)))
-    library = open_library([folder], cache_dir=tmp_path / "cache")
-    with pytest.raises(AssetError, match=r"bad\.glb: .*roughnessFactor 1\.5 .* \[0, 1\]"):
-        library.mesh("user/bad")
-    for name, value in (("mirror", 0.0), ("chalk", 1.0)):
-        assert library.materials(f"user/{name}")[0].roughness == value
 
 
 def test_a_missing_texture_is_told(tmp_path: Path) -> None:

@@ -30,13 +30,13 @@ Box = tuple[Vec3, Vec3]
 SLOTS: Mapping[str, tuple[str, ...]] = {
     "table": ("top", "frame"),
     "shelf": ("boards", "frame"),
+    "sphere": ("surface",),
     "bin": ("body",),
     "gantry": ("profiles", "joints"),
     "plane": ("ground",),
     "backdrop": ("paper",),
     "box": ("body",),
     "pedestal": ("body", "plates"),
-    "sphere": ("surface",),
     "room": ("floor", "ceiling", "walls", "skirting", "door", "frames", "window", "handle"),
 }
 TABLE_STYLES = ("legs", "trestle", "bench")

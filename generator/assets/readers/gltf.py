@@ -266,10 +266,8 @@ def _from_uri(document: _Document, uri: str) -> bytes:
 
 def _slot(document: _Document, description: Mapping[str, Any]) -> Slot:
     pbr = description.get("pbrMetallicRoughness", {})
-    color = pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
-    red, green, blue, _ = (_unit(c, "baseColorFactor") for c in color)
-    roughness = _unit(pbr.get("roughnessFactor", 1), "roughnessFactor")
-    metallic = _unit(pbr.get("metallicFactor", 1), "metallicFactor")
+    red, green, blue, _ = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
+    roughness, metallic = float(pbr.get("roughnessFactor", 1)), float(pbr.get("metallicFactor", 1))
     if "metallicRoughnessTexture" in pbr:
         # The surface has one roughness and one metalness: the means of what the image says.
         name = _image(document, pbr["metallicRoughnessTexture"])
@@ -277,19 +275,16 @@ def _slot(document: _Document, description: Mapping[str, Any]) -> Slot:
         means = decode(encoded, f"{document.folder.root / document.relative}").mean(axis=(0, 1))
         roughness, metallic = roughness * means[1] / 255.0, metallic * means[2] / 255.0
     material = Material(
-        base_color=(red, green, blue),
-        roughness=round(roughness, 4),
-        metallic=round(metallic, 4),
+        base_color=(_unit(red), _unit(green), _unit(blue)),
+        roughness=round(_unit(roughness), 4),
+        metallic=round(_unit(metallic), 4),
         texture=_image(document, pbr["baseColorTexture"]) if "baseColorTexture" in pbr else "",
     )
     return Slot(str(description.get("name", "")), material, from_file=True)
 
 
-def _unit(value: Any, name: str) -> float:
-    number = float(value)
-    if not 0.0 <= number <= 1.0:
-        raise ValueError(f"{name} {number:g} of a material is not in [0, 1]")
-    return number
+def _unit(value: float) -> float:
+    return min(max(float(value), 0.0), 1.0)
 
 
 def _image(document: _Document, reference: Mapping[str, Any]) -> str:
