@@ -18,6 +18,9 @@ from generator.usd.placing import along_minus_z, place
 RADIUS_M_MIN = 1e-3
 """A point is written as a ball of this size: it has a radiance, which USD asks for."""
 
+DIPPED_RAD = 0.2
+"""Half angle of the spot that stands for a dipped headlight."""
+
 T_WORLD_DOME = SE3((0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5))
 """USD's sky has its pole along +Y and the image's centre along +Z; ours along +Z and +X."""
 
@@ -26,6 +29,7 @@ def define_light(stage: Any, path: str, steps: Sequence[Light]) -> None:
     """A light, and where it is at every time code."""
     from pxr import UsdLux
 
+    steps = [_without_cutoff(step) for step in steps]
     light = steps[0]
     if light.kind == "sun":
         prim = UsdLux.DistantLight.Define(stage, path)
@@ -182,6 +186,16 @@ def _lamp(ball: Any, name: str, T_stage_light: Array) -> Light:
     softness = float(shaping.GetShapingConeSoftnessAttr().Get() or 0.0)
     even = min(max(1.0 - softness, 0.0), 1.0)
     return replace(light, kind="spot", cone_rad=math.radians(float(angle_deg)), even=even)
+
+
+def _without_cutoff(light: Light) -> Light:
+    """A dipped headlight as the round spot below its cut-off, which is all that USD can say."""
+    if light.cutoff <= 0.0:
+        return light
+    down = math.tan(DIPPED_RAD) + light.cutoff
+    direction = np.array(light.direction) - (0.0, 0.0, down)
+    x, y, z = (float(v) for v in direction / _length(direction))
+    return replace(light, direction=(x, y, z), cone_rad=DIPPED_RAD, cutoff=0.0)
 
 
 def _minus_z(T_stage_light: Array) -> Vec3:
