@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import astuple
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
@@ -31,6 +32,7 @@ from exporters.images import link_or_copy
 from exporters.png import RowFilter, encode_png
 from exporters.sequences import write_bytes, write_text
 from generator.config.strict import Strict
+from generator.core.geometry import TextureData
 from generator.core.instants import at
 from generator.core.interfaces import AssetLibrary, DatasetInfo
 from generator.core.sample import Sample
@@ -109,12 +111,21 @@ def _row(sample: Sample, name: str, steps: int) -> dict[str, Any]:
     }
 
 
+def _shares(images: TextureData) -> NDArray[np.uint8] | None:
+    """Occlusion in red and metallic in blue, as glTF has them; None where there is neither."""
+    if images.occlusion is None and images.metallic is None:
+        return None
+    full = np.full(images.albedo.shape[:2], 255, np.uint8)
+    red, blue = (full if m is None else m for m in (images.occlusion, images.metallic))
+    return np.stack([red, full, blue], axis=2)
+
+
 class _SharedFiles:
     """The files of one shard that stages share; each is written when it is first asked for."""
 
     def __init__(self, folder: Path, suffix: str, assets: AssetLibrary) -> None:
         self._folder, self._suffix, self._assets = folder, suffix, assets
-        self._written: dict[str, tuple[str, str, str]] = {}
+        self._written: dict[str, TextureFiles] = {}
 
     def files(self) -> Files:
         """They, as stages beside the folders of shared files refer to them."""
@@ -136,12 +147,16 @@ class _SharedFiles:
         if texture not in self._written:
             stem = f"textures/{_file_name(texture)}"
             images = self._assets.texture(texture)
-            self._written[texture] = (
+            self._written[texture] = TextureFiles(
                 self._image(f"{stem}.png", images.albedo),
                 self._image(f"{stem}.roughness.png", images.roughness),
                 self._image(f"{stem}.normal.png", images.normal),
+                self._image(f"{stem}.shares.png", _shares(images)),
+                self._image(f"{stem}.emission.png", images.emission),
+                self._image(f"{stem}.alpha.png", images.alpha),
             )
-        return TextureFiles(*(up + name if name else "" for name in self._written[texture]))
+        names = astuple(self._written[texture])
+        return TextureFiles(*(up + name if name else "" for name in names))
 
     def _image(self, name: str, pixels: NDArray[Any] | None) -> str:
         """Name of an image, once it is written; empty if there is none."""

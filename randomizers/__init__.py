@@ -14,6 +14,7 @@ TABLE = PluginTable(
         "camera_intrinsics": "randomizers.camera_intrinsics:CameraIntrinsics",
         "camera_on_lane": "randomizers.camera_on_lane:CameraOnLane",
         "camera_pose": "randomizers.camera_pose:CameraPose",
+        "ceiling_lights": "randomizers.ceiling_lights:CeilingLights",
         "colors": "randomizers.colors:Colors",
         "distractors": "randomizers.distractors:Distractors",
         "ego_on_lane": "randomizers.ego_on_lane:EgoOnLane",

@@ -20,10 +20,12 @@ def is_in_the_open(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: fl
 def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -> bool:
     """Whether a point is no nearer than ``margin_m`` to a body.
 
-    Bodies count with their bounding boxes; the background (the room itself) does not.
+    Bodies count with their bounding boxes; the background (the room itself) does not, but for the
+    fixtures of lights.
     """
+    fixtures = {light.body for light in scene.lights}
     for body in scene.bodies:
-        if body.instance_id == 0:
+        if body.instance_id == 0 and body.name not in fixtures:
             continue
         local = (body.T_world_body.inverse() @ SE3(point_m)).translation_m
         low, high = assets.bounds_m(body.asset)

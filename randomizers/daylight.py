@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from generator.assets.skies.daylight import sun_color, sun_illuminance_lux, sun_radius_rad
-from generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2
+from generator.assets.skies.daylight import sun_color, sun_radius_rad
+from generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2, sun_lux
 from generator.core.scene import Environment, Light, Scene
 from generator.core.streams import Rng
 
@@ -29,6 +29,7 @@ class Daylight:
         turbidity: Of clear air: 2 very clear, 6 hazy.
         seed: Of the clouds.
         snow: Whether the land lies under snow.
+        model: Of the sky, as in ``generator.assets.skies.sky.SkyModel``.
     """
 
     sun_altitude_deg: float
@@ -37,6 +38,7 @@ class Daylight:
     turbidity: float
     seed: int
     snow: bool = False
+    model: str = "measured"
 
 
 def cloud_seed(rng: Rng) -> int:
@@ -49,11 +51,12 @@ def with_daylight(scene: Scene, light: Daylight) -> Scene:
     altitude_deg, cloudiness = round(light.sun_altitude_deg, 2), round(light.cloudiness, 3)
     turbidity = round(light.turbidity, 2)
     albedo = _SNOW_ALBEDO if light.snow else _LAND_ALBEDO
-    model = SkyModel(light.seed, altitude_deg, turbidity, cloudiness, albedo)
+    model = SkyModel(light.seed, altitude_deg, turbidity, cloudiness, albedo, light.model)
     yaw = round(math.radians(light.sun_azimuth_deg % 360.0), 6)
+    named = "" if light.model == "measured" else f"&model={light.model}"
     image = (
-        f"environment/sky?cloudiness={cloudiness:g}&ground_albedo={albedo:g}&seed={light.seed}"
-        f"&sun_altitude_deg={altitude_deg:g}&turbidity={turbidity:g}"
+        f"environment/sky?cloudiness={cloudiness:g}&ground_albedo={albedo:g}{named}"
+        f"&seed={light.seed}&sun_altitude_deg={altitude_deg:g}&turbidity={turbidity:g}"
     )
     environment = Environment(image, _significant(mean_luminance_cd_m2(model)), yaw)
     lamps = tuple(lamp for lamp in scene.lights if lamp.kind != "sun")
@@ -84,7 +87,7 @@ def is_dark(scene: Scene) -> bool:
 
 def _sun(model: SkyModel, yaw_rad: float) -> tuple[Light, ...]:
     altitude = model.sun_altitude_rad
-    lux = sun_illuminance_lux(altitude, model.turbidity, model.cloudiness)
+    lux = sun_lux(model)
     if lux < _FAINTEST_LUX:
         return ()
     level = math.cos(altitude)

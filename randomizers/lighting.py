@@ -6,6 +6,8 @@ import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
+from pydantic import Field, model_validator
+
 from generator.config.distributions import (
     Bounds,
     Constant,
@@ -17,10 +19,19 @@ from generator.config.distributions import (
     Scalar,
     Uniform,
     UniformInteger,
+    UnitInterval,
 )
 from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from generator.core.fixtures import (
+    PANELS,
+    fixture_asset,
+    level_side,
+    with_fixture,
+    without_lights,
+)
 from generator.core.interfaces import AssetIndex
-from generator.core.scene import Light, Scene
+from generator.core.photometry import intensity_of_flux, intensity_of_illuminance
+from generator.core.scene import Light, LightKind, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
@@ -28,9 +39,9 @@ from randomizers.clearance import is_in_the_open, is_inside
 from randomizers.color_space import linear_of_temperature
 
 TRIES = 24
-KINDS = ("sphere", "spot", "sun")
+KINDS: tuple[LightKind, ...] = ("sphere", "spot", "sun", "rectangle", "disk")
 MARGIN_M = 0.05
-"""The ball of a lamp keeps this far from bodies."""
+"""A lamp keeps this far from bodies."""
 
 
 class Lighting(RandomizerBase):
@@ -38,77 +49,115 @@ class Lighting(RandomizerBase):
 
     Attributes:
         count: How many lights.
-        kind: sphere, spot or sun.
+        kind: sphere, spot, sun; rectangle or disk: panels turned to the focus, such as softboxes.
         illuminance_lux: Of all lights together, on a surface at the focus that faces them.
+        luminous_flux_lm: Of all lights together, instead of their illuminance; not for suns.
         distance_m: From the focus; shortened where the room ends.
         elevation_deg: Height over the horizon, seen from the focus.
         azimuth_deg: Direction around the vertical, seen from the focus.
         temperature_k: Colour temperature: 2700 is warm white, 6500 daylight.
-        radius_m: Of the luminous ball: the larger, the softer its shadows.
+        radius_m: Of the luminous ball or disk: the larger, the softer its shadows.
+        panel_m: Longer side of a rectangle.
+        panel_aspect: Its shorter side, over the longer one.
+        visible: Whether panels are seen, in housings with a bright front.
         cone_deg: Half angle of a spot.
         angular_radius_deg: Of the sun's disc.
+        keep: Whether the lights that are there stay.
     """
 
     type: Literal["lighting"] = "lighting"
     count: Count = UniformInteger(1, 3)
     kind: Name = Constant("sphere")
     illuminance_lux: NonNegative = LogUniform(250.0, 1200.0)
+    luminous_flux_lm: NonNegative | None = Field(None)
     distance_m: Positive = Uniform(1.0, 1.9)
     elevation_deg: Annotated[Scalar, Bounds(-90, 90)] = Uniform(35.0, 80.0)
     azimuth_deg: Scalar = Uniform(0.0, 360.0)
     temperature_k: Annotated[Scalar, Bounds(1667, 25000)] = Uniform(2700.0, 6500.0)
     radius_m: NonNegative = Uniform(0.02, 0.12)
+    panel_m: Positive = Uniform(0.4, 1.0)
+    panel_aspect: UnitInterval = Uniform(0.5, 1.0)
+    visible: bool = False
     cone_deg: Annotated[Scalar, Bounds(1, 90)] = Uniform(20.0, 40.0)
     angular_radius_deg: Annotated[Scalar, Bounds(0, 20)] = Constant(0.27)
 
+    keep: bool = False
+
+    @model_validator(mode="after")
+    def _has_one_strength(self) -> Lighting:
+        if self.luminous_flux_lm is not None and "illuminance_lux" in self.model_fields_set:
+            raise ValueError("illuminance_lux and luminous_flux_lm exclude each other")
+        low = self.panel_aspect.support()[0]
+        if low <= 0.0:
+            raise ValueError("panel_aspect must be above 0")
+        return self
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene under other lights; they share the illuminance unevenly."""
+        """The scene under other lights; they share the light unevenly."""
         count = self.count.draw(rng)
         shares = [0.3 + float(rng.uniform()) for _ in range(count)]
-        total_lux = self.illuminance_lux.draw(rng)
-        lights = tuple(
-            self._light(scene, assets, rng, f"{self.name}/{k}", total_lux * share / sum(shares))
-            for k, share in enumerate(shares)
-        )
-        return replace(scene, lights=lights)
+        strength = self.illuminance_lux if self.luminous_flux_lm is None else self.luminous_flux_lm
+        total = strength.draw(rng)
+        scene = scene if self.keep else without_lights(scene)
+        for k, share in enumerate(shares):
+            light = self._light(scene, assets, rng, f"{self.name}/{k}", total * share / sum(shares))
+            if self.visible and light.kind in PANELS:
+                materials = assets.materials(fixture_asset(light))
+                scene, light = with_fixture(scene, light, materials)
+            scene = replace(scene, lights=(*scene.lights, light))
+        return scene
 
-    def _light(self, scene: Scene, assets: AssetIndex, rng: Rng, name: str, lux: float) -> Light:
-        kind = self.kind.draw(rng)
-        if kind not in KINDS:
-            raise ConfigError(
-                f"randomizers.{self.name}.kind: unknown light '{kind}'; expected one of "
-                f"{', '.join(KINDS)}{did_you_mean(kind, KINDS)}"
-            )
-        color = linear_of_temperature(self.temperature_k.draw(rng))
-        target = scene.focus.center_m
-        if kind == "sun":
+    def _light(
+        self, scene: Scene, assets: AssetIndex, rng: Rng, name: str, strength: float
+    ) -> Light:
+        light = Light(name, self._kind(rng))
+        light = replace(light, color=linear_of_temperature(self.temperature_k.draw(rng)))
+        if light.kind == "sun":
             up = self._direction(rng)
-            return Light(
-                name,
-                "sun",
+            return replace(
+                light,
                 direction=_rounded((-up[0], -up[1], -up[2])),
-                color=color,
-                illuminance_lux=round(lux, 4),
+                illuminance_lux=round(strength, 4),
                 angular_radius_rad=round(math.radians(self.angular_radius_deg.draw(rng)), 6),
             )
-        radius_m = round(self.radius_m.draw(rng), 4)
-        position = self._position(scene, assets, rng, radius_m + MARGIN_M)
-        away = (position[0] - target[0], position[1] - target[1], position[2] - target[2])
-        squared_m2 = away[0] ** 2 + away[1] ** 2 + away[2] ** 2
-        distance_m = math.sqrt(squared_m2)
-        return Light(
-            name,
-            "spot" if kind == "spot" else "sphere",
-            position_m=position,
-            direction=_rounded(
-                (-away[0] / distance_m, -away[1] / distance_m, -away[2] / distance_m)
-            ),
-            color=color,
-            # Photometric inverse square law: E = I / d^2 on a surface that faces the lamp.
-            intensity_cd=round(lux * squared_m2, 4),
-            radius_m=radius_m,
-            cone_rad=round(math.radians(self.cone_deg.draw(rng)), 6),
-        )
+        light, reach_m = self._sized(light, rng)
+        position = self._position(scene, assets, rng, reach_m + MARGIN_M)
+        light = _aimed(light, position, scene.focus.center_m)
+        if light.kind not in PANELS:
+            light = replace(light, cone_rad=round(math.radians(self.cone_deg.draw(rng)), 6))
+        return self._bright(light, strength, math.dist(position, scene.focus.center_m))
+
+    def _sized(self, light: Light, rng: Rng) -> tuple[Light, float]:
+        """The light with its size, and how far it reaches from its centre."""
+        if light.kind != "rectangle":
+            radius_m = round(self.radius_m.draw(rng), 4)
+            return replace(light, radius_m=radius_m), radius_m
+        longer_m = self.panel_m.draw(rng)
+        sides_m = round(longer_m, 4), round(longer_m * self.panel_aspect.draw(rng), 4)
+        return replace(light, size_m=sides_m), 0.5 * math.hypot(*sides_m)
+
+    def _kind(self, rng: Rng) -> LightKind:
+        drawn = self.kind.draw(rng)
+        kind = next((known for known in KINDS if known == drawn), None)
+        if kind is None:
+            raise ConfigError(
+                f"randomizers.{self.name}.kind: unknown light '{drawn}'; expected one of "
+                f"{', '.join(KINDS)}{did_you_mean(drawn, KINDS)}"
+            )
+        if kind == "sun" and self.luminous_flux_lm is not None:
+            raise ConfigError(
+                f"randomizers.{self.name}.luminous_flux_lm: a sun has no flux; give its "
+                "illuminance_lux, or another kind"
+            )
+        return kind
+
+    def _bright(self, light: Light, strength: float, distance_m: float) -> Light:
+        """The light with its share of what all give at the focus, or send out."""
+        if self.luminous_flux_lm is None:
+            intensity_cd = intensity_of_illuminance(light, strength, distance_m)
+        else:
+            intensity_cd = intensity_of_flux(light, strength)
+        return replace(light, intensity_cd=round(intensity_cd, 4))
 
     def _direction(self, rng: Rng) -> Vec3:
         elevation = math.radians(self.elevation_deg.draw(rng))
@@ -134,6 +183,15 @@ class Lighting(RandomizerBase):
                 f"other distance_m, elevation_deg or azimuth_deg (randomizers.{self.name})",
             )
         )
+
+
+def _aimed(light: Light, position_m: Vec3, target_m: Vec3) -> Light:
+    """The light at a place, turned to another; rectangles stand level."""
+    away = [p - t for p, t in zip(position_m, target_m, strict=True)]
+    distance_m = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+    direction = _rounded((-away[0] / distance_m, -away[1] / distance_m, -away[2] / distance_m))
+    side = level_side(direction) if light.kind == "rectangle" else light.side
+    return replace(light, position_m=position_m, direction=direction, side=side)
 
 
 def _rounded(vector: Vec3) -> Vec3:

@@ -20,6 +20,7 @@ from generator.config.distributions import (
 )
 from generator.core.geometry import Keypoint, Material
 from generator.core.interfaces import AssetIndex
+from generator.core.photometry import intensity_of_flux
 from generator.core.scene import Body, Light, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
@@ -105,13 +106,8 @@ def balanced_color(temperature_k: float) -> Vec3:
 
 
 def spot_intensity_cd(flux_lm: float, cone_rad: float) -> float:
-    """Luminous intensity of a spot that sends a flux into a cone.
-
-    A spot is even up to 0.8 of its cone and fades to nothing at it; half of what lies between
-    counts.
-    """
-    inner, outer = (1.0 - math.cos(share * cone_rad) for share in (0.8, 1.0))
-    return flux_lm / (math.pi * (inner + outer))
+    """Luminous intensity of a spot that sends a flux into a cone."""
+    return intensity_of_flux(Light("", "spot", cone_rad=cone_rad), flux_lm)
 
 
 def _lamp(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from generator.config.distributions import Bounds, Scalar, Uniform, UnitInterval
 from generator.core.interfaces import AssetIndex
@@ -27,6 +27,8 @@ class TimeOfDay(RandomizerBase):
         cloudiness: 0 clear, 0.5 broken clouds, 1 overcast; without it what the weather said,
             else anything up to broken clouds.
         turbidity: Haze of clear air: 2 very clear, 6 hazy.
+        sky: measured: as much light as tables of daylight say, under any clouds, day and night.
+            preetham: the luminances of the analytic clear sky by day of Preetham 1999, and its sun.
     """
 
     type: Literal["time_of_day"] = "time_of_day"
@@ -34,6 +36,16 @@ class TimeOfDay(RandomizerBase):
     sun_azimuth_deg: Scalar = Uniform(0.0, 360.0)
     cloudiness: UnitInterval | None = Field(None)
     turbidity: Turbidity = Uniform(2.0, 4.0)
+    sky: Literal["measured", "preetham"] = "measured"
+
+    @model_validator(mode="after")
+    def _is_day_and_clear(self) -> TimeOfDay:
+        if self.sky == "preetham":
+            if self.cloudiness is not None and self.cloudiness.support() != (0.0, 0.0):
+                raise ValueError("sky 'preetham' has no clouds; leave cloudiness out")
+            if self.sun_altitude_deg.support()[0] < 1.0:
+                raise ValueError("sky 'preetham' has no night; let sun_altitude_deg begin at 1")
+        return self
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene at another time."""
@@ -41,7 +53,7 @@ class TimeOfDay(RandomizerBase):
         altitude_deg = self.sun_altitude_deg.draw(rng)
         azimuth_deg = self.sun_azimuth_deg.draw(rng)
         turbidity, seed = self.turbidity.draw(rng), cloud_seed(rng)
-        given = shared_number(scene, "cloudiness")
+        given = 0.0 if self.sky == "preetham" else shared_number(scene, "cloudiness")
         if self.cloudiness is not None:
             cloudiness = self.cloudiness.draw(rng)
         elif given is not None:
@@ -49,6 +61,7 @@ class TimeOfDay(RandomizerBase):
         else:
             cloudiness = Uniform(0.0, 0.6).draw(rng)
         snow = scene.weather.snow_cover > 0.0
-        return with_daylight(
-            scene, Daylight(altitude_deg, azimuth_deg, cloudiness, turbidity, seed, snow)
+        light = Daylight(
+            altitude_deg, azimuth_deg, cloudiness, turbidity, seed, snow=snow, model=self.sky
         )
+        return with_daylight(scene, light)

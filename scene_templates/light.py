@@ -2,38 +2,87 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from generator.core.fixtures import (
+    PANELS,
+    fixture_asset,
+    level_side,
+    with_fixture,
+)
 from generator.core.interfaces import AssetIndex
+from generator.core.photometry import with_flux
 from generator.core.scene import Light, Scene
+from generator.core.se3 import Vec3
 from scene_templates.element import Element
 
 
 class LightElement(Element):
-    """A ball of light at a fixed place; the ``lighting`` randomizer replaces all lights.
+    """A light at a fixed place; the ``lighting`` randomizer replaces all lights.
 
     Attributes:
+        kind: sphere, spot, or a panel that shines to one side: rectangle, disk.
         position_m: Its centre in the world.
-        intensity_cd: Luminous intensity; 1 cd lights a surface at 1 m with 1 lx.
-        radius_m: Its radius: the larger, the softer its shadows.
+        direction: Where a spot or a panel shines; any length.
+        intensity_cd: Luminous intensity; 1 cd lights a surface at 1 m with 1 lx. Of panels,
+            straight before them.
+        luminous_flux_lm: Of all its light, instead of ``intensity_cd``.
+        radius_m: Of the ball or disk: the larger, the softer its shadows.
+        size_m: Of the rectangle; the first side is level.
+        cone_deg: Half angle of a spot.
+        visible: Whether a panel is seen, in a housing with a bright front.
     """
 
     type: Literal["light"] = "light"
+    kind: Literal["sphere", "spot", "rectangle", "disk"] = "sphere"
     position_m: tuple[float, float, float] = (0.5, -0.8, 2.2)
+    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
     intensity_cd: float = Field(800.0, ge=0)
+    luminous_flux_lm: float | None = Field(None, ge=0)
     radius_m: float = Field(0.08, ge=0)
+    size_m: tuple[float, float] = (0.6, 0.6)
+    cone_deg: float = Field(30.0, ge=1.0, le=90.0)
+    visible: bool = True
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> LightElement:
+        if self.luminous_flux_lm is not None and "intensity_cd" in self.model_fields_set:
+            raise ValueError("intensity_cd and luminous_flux_lm exclude each other")
+        if self.kind == "disk" and self.radius_m <= 0.0:
+            raise ValueError("radius_m of a disk must be above 0")
+        if min(self.size_m) <= 0.0:
+            raise ValueError("size_m must be above 0")
+        if not any(self.direction):
+            raise ValueError("direction must not be 0")
+        return self
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """One more light."""
-        del assets
+        """One more light, and what it is seen in."""
         light = Light(
             self.name,
-            "sphere",
+            self.kind,
             position_m=self.position_m,
+            direction=_unit(self.direction),
             intensity_cd=self.intensity_cd,
             radius_m=self.radius_m,
         )
+        if self.kind == "spot":
+            light = replace(light, cone_rad=round(math.radians(self.cone_deg), 6))
+        if self.kind == "rectangle":
+            light = replace(light, size_m=self.size_m, side=level_side(light.direction))
+        if self.luminous_flux_lm is not None:
+            light = with_flux(light, self.luminous_flux_lm)
+        if self.visible and self.kind in PANELS:
+            materials = assets.materials(fixture_asset(light))
+            scene, light = with_fixture(scene, light, materials)
         return replace(scene, lights=(*scene.lights, light))
+
+
+def _unit(direction: Vec3) -> Vec3:
+    length = math.sqrt(sum(v * v for v in direction))
+    x, y, z = (round(v / length, 6) for v in direction)
+    return (x, y, z)

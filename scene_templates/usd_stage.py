@@ -77,6 +77,7 @@ class UsdStage(PlacedElement):
             name=f"{self.name}/{light.name}",
             position_m=(pose @ SE3(light.position_m)).translation_m,
             direction=rotate_by_quaternion(pose.quaternion_wxyz, light.direction),
+            side=rotate_by_quaternion(pose.quaternion_wxyz, light.side),
         )
 
     def _rig(self, name: str, T_world_camera: SE3, carrier: Body) -> Rig:

@@ -27,6 +27,7 @@ ROAD_SUFFIX = ".xodr"
 _MAX_FILES = 20_000
 
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+Luminance = Annotated[float, Field(ge=0.0)]
 Id = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*(/[A-Za-z0-9_][A-Za-z0-9_.\-]*)*$",
                           max_length=120)]  # fmt: skip
 Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_\-]*$", max_length=60)]
@@ -40,6 +41,16 @@ class Finish(Strict):
     roughness: Fraction | None = None
     metallic: Fraction | None = None
     specular: Fraction | None = None
+    coat: Fraction | None = None
+    """Weight of a clear coat."""
+    coat_roughness: Fraction | None = None
+    transmission: Fraction | None = None
+    """Share of the light under the surface that goes through."""
+    ior: Annotated[float, Field(ge=1.0, le=4.0)] | None = None
+    thin: bool | None = None
+    """What transmits is a pane; false: a solid body that refracts."""
+    opacity: Fraction | None = None
+    emission_cd_m2: tuple[Luminance, Luminance, Luminance] | None = None
     printed: bool | None = None
     """The image is part of what the object is: randomizers leave it alone."""
     textured: Literal[False] | None = None
@@ -155,7 +166,7 @@ class RobotEntry(Origin):
 
 
 class ImageEntry(Origin):
-    """A texture (any image) or an environment (a Radiance .hdr panorama)."""
+    """A texture (any image) or an environment (a panorama, Radiance .hdr or OpenEXR)."""
 
     id: Id
     file: str

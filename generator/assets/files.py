@@ -8,6 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from generator.assets.cache import FORMAT, Arrays, DiskCache, Store, content_key
 from generator.assets.catalogue import (
     ROAD_SUFFIX,
@@ -24,6 +27,7 @@ from generator.assets.digests import Digests
 from generator.assets.folder import Folder
 from generator.assets.images import decode, decode_radiance
 from generator.assets.importer import VERSION, Imported, import_link, import_object
+from generator.assets.maps import composed, maps_named
 from generator.assets.packing import pack, unpack
 from generator.assets.packs import pack_assets
 from generator.assets.road_files import import_road_network, road_network_lanes
@@ -31,12 +35,12 @@ from generator.assets.robots import robot_model
 from generator.assets.stages import is_stage, stage_model
 from generator.assets.urdf import Urdf, read_urdf
 from generator.core.errors import AssetError
-from generator.core.geometry import Asset, Float32, RobotModel, TextureData
+from generator.core.geometry import Asset, Float32, RobotModel, TextureData, UInt8
 from generator.core.scene import Lane, StageModel
 
 _BUILT_IN = Path(__file__).with_name("pybullet.yaml")
 
-T = TypeVar("T")
+T = TypeVar("T", bound=np.generic)
 
 
 class Files:
@@ -147,13 +151,20 @@ class Files:
             if one.kind != "texture":
                 raise AssetError(f"asset '{owner}': is no texture but one of kind {one.kind}")
             name = one.entry.file
-        elif one.kind == "object" and name in (images := self.imported(owner).images):
-            return TextureData(images[name])
+        maps = maps_named(name)
+        if maps is not None:
+            return composed(maps, lambda image: self._image(owner, one, folder, image, alpha=True))
+        pixels = self._image(owner, one, folder, name, alpha=False)
+        return TextureData(np.ascontiguousarray(pixels[..., :3]))
+
+    def _image(self, owner: str, one: Listed, folder: Folder, name: str, *, alpha: bool) -> UInt8:
+        """Pixels of an image inside a mesh file or beside it."""
+        if one.kind == "object" and name in (images := self.imported(owner).images):
+            return images[name]
         place = str(folder.root / name)
         return self._of_file(
-            folder, name, place,
-            lambda: {"albedo": decode(folder.read(name), place)},
-            lambda arrays: TextureData(arrays["albedo"]),
+            folder, name, place, "rgba" if alpha else "albedo",
+            lambda: decode(folder.read(name), place, alpha=alpha),
         )  # fmt: skip
 
     def environment(self, asset_id: str) -> Float32:
@@ -164,24 +175,21 @@ class Files:
         folder, name = Folder(one.root), one.entry.file
         place = str(folder.root / name)
         return self._of_file(
-            folder, name, place,
-            lambda: {"radiance": decode_radiance(folder.read(name), place)},
-            lambda arrays: arrays["radiance"],
+            folder, name, place, "radiance", lambda: decode_radiance(folder.read(name), place)
         )  # fmt: skip
 
     def _of_file(
-        self,
-        folder: Folder,
-        name: str,
-        place: str,
-        compute: Callable[[], Arrays],
-        view: Callable[[Arrays], T],
-    ) -> T:
+        self, folder: Folder, name: str, place: str, what: str, compute: Callable[[], NDArray[T]]
+    ) -> NDArray[T]:
+        """What an image file says, in the store under the hash of its bytes."""
         if not folder.exists(name):
             raise AssetError(f"{place}: no such image; put it there or correct what refers to it")
         digests = self._digests.of(folder, name)
+        key: dict[str, object] = {"format": FORMAT, "image": digests[name]}
+        if what == "rgba":
+            key["channels"] = what
         return self._store.get(
-            content_key({"format": FORMAT, "image": digests[name]}), compute, view
+            content_key(key), lambda: {what: compute()}, lambda arrays: arrays[what]
         )
 
     def _all(self) -> dict[str, Listed]:

@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import io
 import math
+import tempfile
 import warnings
 
 import numpy as np
+from numpy.typing import NDArray
 
 from generator.core.errors import AssetError
 from generator.core.geometry import Float32, UInt8
 
 MAX_SIDE_PX = 16_384
 MAX_PIXELS = 64_000_000
+_EXR_MAGIC = b"\x76\x2f\x31\x01"
+# Of the brightest texel.
+_RINGING = 1e-4
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
+_WITH_ALPHA = ("RGBA", "LA", "PA")
 
 
-def decode(data: bytes, place: str) -> UInt8:
-    """Pixels in sRGB, uint8 [height, width, 3]; transparency is dropped.
+def decode(data: bytes, place: str, *, alpha: bool = False) -> UInt8:
+    """Pixels in sRGB, uint8 [height, width, 3].
 
     Args:
         data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA.
         place: What error messages call it.
+        alpha: Whether transparency is wanted: it makes a fourth channel where there is any.
 
     Raises:
         AssetError: if it is unreadable, or larger than 16,384 pixels a side or 64 megapixels.
@@ -33,6 +40,9 @@ def decode(data: bytes, place: str) -> UInt8:
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
                 _check_size(image.width, image.height, place)
+                if alpha and (image.mode in _WITH_ALPHA or "transparency" in image.info):
+                    pixels = np.array(image.convert("RGBA"), dtype=np.uint8)
+                    return pixels if pixels[..., 3].min() < 255 else pixels[..., :3].copy()
                 return np.array(image.convert("RGB"), dtype=np.uint8)
     except Image.DecompressionBombError:
         raise AssetError(
@@ -50,18 +60,59 @@ def decode_radiance(data: bytes, place: str) -> Float32:
     """Equirectangular panorama as ``AssetLibrary.environment`` promises it: mean luminance 1.
 
     Args:
-        data: A Radiance .hdr file, twice as wide as high.
+        data: A Radiance .hdr or an OpenEXR file, twice as wide as high.
         place: What error messages call it.
 
     Raises:
-        AssetError: if it is unreadable, too large, of another shape, dark or not finite.
+        AssetError: if it is unreadable, too large, of another shape, dark, negative or not finite.
     """
+    read = read_exr if data[:4] == _EXR_MAGIC else _read_radiance
+    rgb = read(data, place).astype(np.float64)
+    height, width = rgb.shape[:2]
+    if width != 2 * height:
+        raise AssetError(f"{place}: {width} x {height} px; a panorama is twice as wide as high")
+    _check_texels(rgb, place)
+    # Filters ring a little below zero; what goes further is no light.
+    rgb = np.maximum(rgb, 0.0)
+    radiance: Float32 = (rgb / _mean_luminance(rgb)).astype(np.float32)
+    if not np.isfinite(radiance).all():
+        raise AssetError(f"{place}: one texel outshines all others; save it again from its source")
+    return radiance
+
+
+def read_exr(data: bytes, place: str) -> Float32:
+    """RGB pixels of an OpenEXR image, float32 [height, width, 3].
+
+    Raises:
+        AssetError: if it is unreadable, too large, or lacks a colour.
+    """
+    import OpenEXR
+
+    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
+        file.write(data)
+        file.flush()
+        try:
+            window = OpenEXR.File(file.name, header_only=True).header()["dataWindow"]
+            (x0, y0), (x1, y1) = (corner.tolist() for corner in window)
+            _check_size(x1 - x0 + 1, y1 - y0 + 1, place)
+            channels = OpenEXR.File(file.name).channels()
+        except (RuntimeError, ValueError, OSError, KeyError) as error:
+            reason = str(error).replace(file.name, "it").strip() or type(error).__name__
+            raise AssetError(f"{place}: unreadable OpenEXR image ({reason})") from None
+    for name in ("RGB", "RGBA"):
+        if name in channels:
+            return np.ascontiguousarray(channels[name].pixels[..., :3], dtype=np.float32)
+    if not {"R", "G", "B"} <= set(channels):
+        raise AssetError(f"{place}: has no channels R, G, B")
+    return np.stack([channels[name].pixels for name in "RGB"], axis=-1).astype(np.float32)
+
+
+def _read_radiance(data: bytes, place: str) -> Float32:
+    """RGB pixels of a Radiance image, float32 [height, width, 3]."""
     import cv2
 
     width, height = _radiance_size(data, place)
     _check_size(width, height, place)
-    if width != 2 * height:
-        raise AssetError(f"{place}: {width} x {height} px; a panorama is twice as wide as high")
     try:
         bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
@@ -69,12 +120,21 @@ def decode_radiance(data: bytes, place: str) -> Float32:
     if bgr is None or bgr.ndim != 3 or bgr.shape[2] != 3 or bgr.dtype != np.float32:
         raise AssetError(f"{place}: unreadable panorama; save it again as Radiance .hdr")
     # A panorama's centre column is its front; ours is +X, with the left half to the left of it.
-    rgb = np.maximum(bgr[..., ::-1].astype(np.float64), 0.0)
-    mean = _mean_luminance(rgb)
-    if not np.isfinite(rgb).all() or mean <= 0.0:
-        raise AssetError(f"{place}: black or not finite; save it again from its source")
-    radiance: Float32 = (rgb / mean).astype(np.float32)
-    return radiance
+    return np.ascontiguousarray(bgr[..., ::-1])
+
+
+def _check_texels(rgb: NDArray[np.float64], place: str) -> None:
+    finite = np.isfinite(rgb)
+    brightest = float(np.where(finite, rgb, 0.0).max())
+    impossible = ~finite | (rgb < -_RINGING * brightest)
+    if impossible.any():
+        row, column, channel = (int(v) for v in np.argwhere(impossible)[0])
+        raise AssetError(
+            f"{place}: row {row}, column {column} is {rgb[row, column, channel]:g}; light is "
+            "finite and not negative, save it again from its source"
+        )
+    if brightest <= 0.0:
+        raise AssetError(f"{place}: black; save it again from its source")
 
 
 def _radiance_size(data: bytes, place: str) -> tuple[int, int]:
@@ -86,7 +146,7 @@ def _radiance_size(data: bytes, place: str) -> tuple[int, int]:
             if words[1].isdigit() and words[3].isdigit():
                 return int(words[3]), int(words[1])
             break
-    raise AssetError(f"{place}: not a Radiance panorama; save it as .hdr")
+    raise AssetError(f"{place}: neither Radiance nor OpenEXR; save the panorama as .hdr or .exr")
 
 
 def _mean_luminance(rgb: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:

@@ -30,7 +30,7 @@ from generator.core.errors import AssetError
 from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, UInt8
 from generator.core.se3 import SE3
 
-VERSION = 3
+VERSION = 4
 """Raised whenever the same files would come out as other geometry."""
 _WHITEST = 0.85
 """Files say 1 for white; no matt surface reflects more than fresh snow does (about 0.85)."""
@@ -43,8 +43,9 @@ class Imported:
     Attributes:
         mesh: None for a robot link that only collides.
         collision: None for a robot link that is only seen.
-        images: ``{name: uint8 [h, w, 3]}`` of the images inside the file; a material's texture
-            ``<asset id>#<name>`` refers to one of these, or to a file of the folder.
+        images: ``{name: uint8 [h, w, 3]}`` of the images inside the file, with a fourth channel
+            where they are transparent; a material's texture ``<asset id>#<name>`` refers to one of
+            these or to a file of the folder, or to several (``generator.assets.maps``).
         keypoints: Named points in the asset's frame.
     """
 
@@ -83,7 +84,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         collision = convex_parts(solid, place, entry.parts)
     else:
         collision = convex_parts(_solid_of(mesh, entry.max_faces), place, entry.parts)
-    decoded = {name: decode(data, f"{place}#{name}") for name, data in images.items()}
+    decoded = {name: decode(data, f"{place}#{name}", alpha=True) for name, data in images.items()}
     keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
     return Imported(mesh, collision, decoded, keypoints)
 
@@ -253,7 +254,7 @@ def _with_finish(material: Material, finish: Finish) -> Material:
 
 
 def _possible(material: Material) -> tuple[float, float, float]:
-    if material.metallic > 0.5:
+    if material.metallic > 0.5 or material.transmission > 0.5:
         return material.base_color
     red, green, blue = (min(c, _WHITEST) for c in material.base_color)
     return (red, green, blue)

@@ -52,19 +52,18 @@ def unpack(arrays: Arrays) -> Imported:
     return Imported(mesh, collision, images, keypoints)
 
 
+_FURTHER = ("roughness", "normal", "metallic", "occlusion", "emission", "alpha")
+
+
 def pack_texture(texture: TextureData) -> Arrays:
     """Plain arrays that hold a texture."""
-    arrays: Arrays = {"albedo": texture.albedo}
-    if texture.roughness is not None:
-        arrays["roughness"] = texture.roughness
-    if texture.normal is not None:
-        arrays["normal"] = texture.normal
-    return arrays
+    further = {name: getattr(texture, name) for name in _FURTHER}
+    return {"albedo": texture.albedo, **{k: v for k, v in further.items() if v is not None}}
 
 
 def unpack_texture(arrays: Arrays) -> TextureData:
     """The texture that plain arrays hold. Raises KeyError if they do not."""
-    return TextureData(arrays["albedo"], arrays.get("roughness"), arrays.get("normal"))
+    return TextureData(arrays["albedo"], **{name: arrays.get(name) for name in _FURTHER})
 
 
 def _text(text: str) -> UInt8:

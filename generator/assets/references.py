@@ -15,7 +15,7 @@ from generator.core.errors import AssetError
 from generator.usd.reading import SUFFIXES, layer_references
 
 _MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", re.MULTILINE)
-_MAP = re.compile(rb"^[ \t]*map_Kd[ \t]+(?:.*[ \t])?(\S+?)[ \t\r]*$", re.MULTILINE)
+_MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]+(?:.*[ \t])?(\S+?)[ \t\r]*$", re.MULTILINE)
 _MAX_FILES = 2000
 
 

@@ -64,6 +64,8 @@ def _placed(light: Light, T_model_stage: SE3, scale: float) -> Light:
         light,
         position_m=place.translation_m,
         direction=rotate_by_quaternion(T_model_stage.quaternion_wxyz, light.direction),
+        side=rotate_by_quaternion(T_model_stage.quaternion_wxyz, light.side),
+        size_m=(light.size_m[0] * scale, light.size_m[1] * scale),
         intensity_cd=light.intensity_cd * scale * scale,
         radius_m=light.radius_m * scale,
     )

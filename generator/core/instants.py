@@ -193,11 +193,15 @@ def _moved_joints(arm: Articulation, time_s: float) -> Articulation:
 def _moved_light(light: Light, T_new_old: SE3) -> Light:
     x, y, z = (T_new_old @ SE3(light.position_m)).translation_m
     dx, dy, dz = (float(v) for v in T_new_old.rotate(light.direction))  # type: ignore[arg-type]
-    return replace(
+    moved = replace(
         light,
         position_m=(round(x, 6), round(y, 6), round(z, 6)),
         direction=(round(dx, 8), round(dy, 8), round(dz, 8)),
     )
+    if light.kind != "rectangle":
+        return moved
+    sx, sy, sz = (float(v) for v in T_new_old.rotate(light.side))  # type: ignore[arg-type]
+    return replace(moved, side=(round(sx, 8), round(sy, 8), round(sz, 8)))
 
 
 def _placed_camera(scene: Scene, camera: Camera) -> Camera:

@@ -18,6 +18,7 @@ from generator.core.se3 import IDENTITY, SE3, Vec3
 SharedValue = str | float | int | bool
 Motion = Literal["static", "dynamic", "kinematic"]
 Placement = Literal["drop", "scatter", "grid", "stack", "along"]
+LightKind = Literal["sphere", "spot", "sun", "rectangle", "disk"]
 LaneKind = Literal[
     "driving", "parking", "bicycle", "sidewalk", "crosswalk", "verge", "furniture", "frontage"
 ]
@@ -240,7 +241,7 @@ class Light:
     """
 
     name: str
-    kind: Literal["sphere", "spot", "sun", "rectangle", "disk"]
+    kind: LightKind
     position_m: Vec3 = (0.0, 0.0, 2.0)
     direction: Vec3 = (0.0, 0.0, -1.0)
     color: Vec3 = (1.0, 1.0, 1.0)

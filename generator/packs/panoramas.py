@@ -9,12 +9,12 @@ from __future__ import annotations
 import base64
 import binascii
 import re
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from generator.assets.catalogue import ImageEntry, Index
+from generator.assets.images import read_exr
 from generator.assets.packs import INDEX_NAME, TAG
 from generator.core.errors import AssetError
 from generator.core.geometry import Float32
@@ -77,29 +77,6 @@ def exr_bytes(script: bytes, place: str) -> bytes:
         return base64.b64decode(match[1] if match else b"=", validate=True)
     except binascii.Error:
         raise AssetError(f"{place}: holds no base64 data URL") from None
-
-
-def read_exr(data: bytes, place: str) -> Float32:
-    """RGB pixels of an OpenEXR image, float32 [height, width, 3].
-
-    Raises:
-        AssetError: if it is unreadable or lacks a colour.
-    """
-    import OpenEXR
-
-    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
-        file.write(data)
-        file.flush()
-        try:
-            channels = OpenEXR.File(file.name).channels()
-        except (RuntimeError, ValueError, OSError) as error:
-            raise AssetError(f"{place}: unreadable OpenEXR image ({error})") from None
-    for name in ("RGB", "RGBA"):
-        if name in channels:
-            return np.ascontiguousarray(channels[name].pixels[..., :3], dtype=np.float32)
-    if not {"R", "G", "B"} <= set(channels):
-        raise AssetError(f"{place}: has no channels R, G, B")
-    return np.stack([channels[name].pixels for name in "RGB"], axis=-1).astype(np.float32)
 
 
 def radiance_file(rgb: Float32) -> bytes:

@@ -128,7 +128,9 @@ def _parts(
     for label in np.flatnonzero(totals > _FAINT).tolist():
         mask = labels == label
         whole = cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
-        yield whole.astype(bool), float(np.quantile(small[mask & ~bright], _RIM))
+        rim = small[mask & ~bright]
+        floor = float(np.quantile(rim, _RIM)) if rim.size else float(small[mask].min())
+        yield whole.astype(bool), floor
 
 
 def _joined(labels: NDArray[np.int32], count: int) -> list[int]:

@@ -13,13 +13,15 @@ from generator.core.geometry import Float32
 from generator.core.se3 import Array
 from generator.renderers.brightest import SkyLamp, without_brightest
 from generator.renderers.kernels.sky import prefilter, weigh_texels
-from generator.renderers.panoramas import texel_directions
+from generator.renderers.panoramas import luminance_of, texel_directions
 
 _GLOSSY_LEVELS = 4
 _GLOSSY_SIZE = 24
 # Lobes of each level are wider than the texels of an image of that height.
 _SOURCE_HEIGHTS = (48, 24, 24, 24)
 _IRRADIANCE_HEIGHT = 32
+# Finer images are split as coarsely: the time it takes, and the memory, grow with the texels.
+_SPLIT_HEIGHT = 512
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,11 +48,24 @@ def upload_environment(image: Float32, device: wp.Device) -> DeviceEnvironment:
 
 def upload_split(image: Float32, whole: DeviceEnvironment) -> DeviceEnvironment:
     """The same with its brightest parts as lamps; ``whole`` itself if it has none."""
-    rest, lamps = without_brightest(image)
+    light = _shrunk(image, _SPLIT_HEIGHT)
+    rest, lamps = without_brightest(light)
     if not lamps:
         return whole
-    mirrored = wp.array(rest, dtype=wp.vec3, device=whole.image.device)
+    mirrored = wp.array(_dimmed(image, light, rest), dtype=wp.vec3, device=whole.image.device)
     return _lit_by(rest, lamps, whole.image, mirrored)
+
+
+def _dimmed(image: Float32, light: Float32, rest: Float32) -> Float32:
+    """The image as much darker as its shrunk copy ``light`` is in ``rest``."""
+    if image.shape == rest.shape:
+        return rest
+    before = luminance_of(light)
+    left = luminance_of(rest) / np.where(before > 0.0, before, 1.0)
+    size = (image.shape[1], image.shape[0])
+    part = cv2.resize(left.astype(np.float32), size, interpolation=cv2.INTER_NEAREST)
+    dimmed: Float32 = image * part[..., None]
+    return dimmed
 
 
 def _lit_by(
@@ -70,7 +85,7 @@ def _lit_by(
         image,
         rest,
         lamps,
-        maps.nbytes + light.nbytes,
+        maps.nbytes + 12 * int(rest.size),
     )
 
 

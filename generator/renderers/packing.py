@@ -213,6 +213,7 @@ def _fill_panel(value: NDArray[np.void], light: Light) -> None:
         side = np.cross(normal, least)
         side = side / math.sqrt(float((side * side).sum()))
         area_m2 = math.pi * light.radius_m**2
+    value["shown"] = int(light.body != "")
     value["along"] = side * half_m[0]
     value["across"] = np.cross(normal, side) * half_m[1]
     value["radiance"] = np.asarray(light.color) * (light.intensity_cd / area_m2)

@@ -54,11 +54,7 @@ def trace_over_samples(
 def trace_outlines(
     world: PackedWorld, view: records.View, canvases: NDArray[np.void], mask: wp.array
 ) -> None:
-    """Draw the silhouettes of bodies with holes into the canvases of their instances, in place.
-
-    Args:
-        canvases: Canvas records of those bodies.
-    """
+    """Draw silhouettes of bodies with holes into their Canvas records' pixels of a mask."""
     from generator.renderers.kernels import pierced
 
     outlines = np.zeros(len(canvases), dtype=pierced.Outline.numpy_dtype())

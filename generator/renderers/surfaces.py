@@ -52,9 +52,9 @@ def pierced_slots(
     """By surface, HOLES where its texture has any, and CLEAR where it casts no shadow."""
     holes = np.array([*(texture.pierced for texture in textures.values()), False])
     clear = (surfaces["transmission"] > 0.5) | (surfaces["opacity"] < 0.5)
-    return (holes[surfaces["texture"]] * int(records.HOLES) + clear * int(records.CLEAR)).astype(
-        np.int32
-    )
+    flags = holes[surfaces["texture"]] * int(records.HOLES) + clear * int(records.CLEAR)
+    slots: NDArray[np.int32] = flags.astype(np.int32)
+    return slots
 
 
 def pierced_bodies(slots: NDArray[np.int32], counts: NDArray[np.int64]) -> NDArray[np.int32]:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from generator.core.errors import AssetError
+from generator.core.photometry import luminance_cd_m2
 from generator.core.scene import Environment, Light
 from generator.core.se3 import SE3, Array, Vec3
 from generator.usd.placing import along_minus_z, place
@@ -31,6 +33,15 @@ def define_light(stage: Any, path: str, steps: Sequence[Light]) -> None:
         # Normalised, a distant light's intensity is the illuminance of what faces it.
         prim.CreateNormalizeAttr(True)
         prim.CreateIntensityAttr(light.illuminance_lux)
+    elif light.kind == "rectangle":
+        prim = UsdLux.RectLight.Define(stage, path)
+        prim.CreateWidthAttr(light.size_m[0])
+        prim.CreateHeightAttr(light.size_m[1])
+        prim.CreateIntensityAttr(luminance_cd_m2(light))
+    elif light.kind == "disk":
+        prim = UsdLux.DiskLight.Define(stage, path)
+        prim.CreateRadiusAttr(light.radius_m)
+        prim.CreateIntensityAttr(luminance_cd_m2(light))
     else:
         radius_m = max(light.radius_m, RADIUS_M_MIN)
         prim = UsdLux.SphereLight.Define(stage, path)
@@ -69,7 +80,38 @@ def read_light(prim: Any, name: str, T_stage_light: Array) -> Light | None:
         return _sun(UsdLux.DistantLight(prim), name, T_stage_light)
     if prim.IsA(UsdLux.SphereLight):
         return _lamp(UsdLux.SphereLight(prim), name, T_stage_light)
+    if prim.IsA(UsdLux.RectLight):
+        return _rectangle(UsdLux.RectLight(prim), name, T_stage_light)
+    if prim.IsA(UsdLux.DiskLight):
+        return _disk(UsdLux.DiskLight(prim), name, T_stage_light)
     return None
+
+
+def checked(light: Light, place: str) -> Light:
+    """The light, if it can be.
+
+    Raises:
+        AssetError: a number of it is not finite, or what must not be negative is.
+    """
+    strengths = {
+        "intensity": light.intensity_cd,
+        "irradiance": light.illuminance_lux,
+        "radius": light.radius_m,
+        "width": light.size_m[0],
+        "height": light.size_m[1],
+        "color": min(light.color),
+        "angle": light.angular_radius_rad,
+    }
+    for name, value in strengths.items():
+        if not (math.isfinite(value) and value >= 0.0):
+            raise AssetError(
+                f"{place}: light '{light.name}' has {name} {value:g}; expected a number from 0 on"
+            )
+    if (light.kind == "disk" and light.radius_m == 0.0) or min(light.size_m) == 0.0:
+        raise AssetError(f"{place}: light '{light.name}' has no area; give it one, or take it out")
+    if not all(math.isfinite(v) for v in (*light.color, *light.position_m, *light.direction)):
+        raise AssetError(f"{place}: light '{light.name}' is not finite; check its place and color")
+    return light
 
 
 def _sun(sun: Any, name: str, T_stage_light: Array) -> Light:
@@ -84,6 +126,34 @@ def _sun(sun: Any, name: str, T_stage_light: Array) -> Light:
         color=color,
         illuminance_lux=strength,
         angular_radius_rad=half_rad,
+    )
+
+
+def _rectangle(panel: Any, name: str, T_stage_light: Array) -> Light:
+    across = (_length(T_stage_light[:3, 0]), _length(T_stage_light[:3, 1]))
+    width_m = float(panel.GetWidthAttr().Get()) * across[0]
+    height_m = float(panel.GetHeightAttr().Get()) * across[1]
+    x, y, z = (float(v) for v in T_stage_light[:3, 0] / across[0])
+    light = _panel(panel, Light(name, "rectangle"), T_stage_light, width_m * height_m)
+    return replace(light, size_m=(width_m, height_m), side=(x, y, z))
+
+
+def _disk(panel: Any, name: str, T_stage_light: Array) -> Light:
+    radius_m = float(panel.GetRadiusAttr().Get()) * _length(T_stage_light[:3, 0])
+    light = _panel(panel, Light(name, "disk"), T_stage_light, _disc_m2(radius_m))
+    return replace(light, radius_m=radius_m)
+
+
+def _panel(panel: Any, light: Light, T_stage_light: Array, area_m2: float) -> Light:
+    """A panel without its size; normalised ones send out the same whatever their area."""
+    color, strength = _color_and_strength(panel)
+    x, y, z = (float(v) for v in T_stage_light[:3, 3])
+    return replace(
+        light,
+        position_m=(x, y, z),
+        direction=_minus_z(T_stage_light),
+        color=color,
+        intensity_cd=strength if panel.GetNormalizeAttr().Get() else strength * area_m2,
     )
 
 
@@ -120,6 +190,12 @@ def _minus_z(T_stage_light: Array) -> Vec3:
 
 
 def _pose(light: Light) -> SE3:
+    if light.kind == "rectangle":
+        z = -np.asarray(light.direction, dtype=np.float64)
+        x = np.asarray(light.side, dtype=np.float64)
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+        return SE3(light.position_m, SE3.from_matrix(matrix).quaternion_wxyz)
     turn = along_minus_z(light.direction) if light.kind != "sphere" else SE3()
     at = (0.0, 0.0, 0.0) if light.kind == "sun" else light.position_m
     return SE3(at, turn.quaternion_wxyz)
@@ -130,7 +206,7 @@ def _color_and_strength(lux: Any) -> tuple[Vec3, float]:
     red, green, blue = (float(c) for c in lux.GetColorAttr().Get())
     luminance = 0.2126 * red + 0.7152 * green + 0.0722 * blue
     strength = float(lux.GetIntensityAttr().Get()) * 2.0 ** float(lux.GetExposureAttr().Get())
-    if luminance <= 0.0:
+    if luminance == 0.0:
         return (1.0, 1.0, 1.0), 0.0
     return (red / luminance, green / luminance, blue / luminance), strength * luminance
 

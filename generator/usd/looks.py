@@ -23,8 +23,12 @@ class SurfaceLook:
         name: Of its material; empty = it has none.
         material: Without its texture.
         texture: Resolved path of its colour image; empty = none.
-        roughness_image, metallic_image: Resolved path and channel (0 red) of the images that
-            multiply roughness and metalness; empty = none.
+        roughness_image, metallic_image, occlusion_image, cover_image: Resolved path and channel
+            (0 red) of the images that multiply roughness, metalness, ambient light and coverage;
+            empty = none.
+        normal_image, emission_image: Resolved paths; empty = none.
+        veil_image: As these; multiplies what hides the background, without holes.
+        cutoff: Coverage from which on there is no hole.
         uv_name: Primvar that holds its texture coordinates.
         uv_matrix: Affine map [2, 3] on them.
     """
@@ -34,8 +38,27 @@ class SurfaceLook:
     texture: str = ""
     roughness_image: tuple[str, int] = ("", 0)
     metallic_image: tuple[str, int] = ("", 0)
+    occlusion_image: tuple[str, int] = ("", 0)
+    cover_image: tuple[str, int] = ("", 0)
+    veil_image: tuple[str, int] = ("", 0)
+    normal_image: str = ""
+    emission_image: str = ""
+    cutoff: float = 0.5
     uv_name: str = "st"
     uv_matrix: Array = field(default_factory=lambda: _IDENTITY)
+
+    @property
+    def mapped(self) -> bool:
+        """Whether any image says how it looks."""
+        channels = (
+            self.roughness_image,
+            self.metallic_image,
+            self.occlusion_image,
+            self.cover_image,
+            self.veil_image,
+        )
+        whole = (self.texture, self.normal_image, self.emission_image)
+        return any(whole) or any(name for name, _ in channels)
 
 
 PLAIN = SurfaceLook()
@@ -64,27 +87,72 @@ def read_look(prim: Any, mesh: Any, place: str) -> SurfaceLook:
 
 
 def _preview_surface(name: str, surface: Any, where: str) -> SurfaceLook:
-    rough, rough_image = _number(surface, "roughness", 0.5, where)
-    metallic, metallic_image = _number(surface, "metallic", 0.0, where)
-    ior, _ = _number(surface, "ior", 1.5, where)
+    numbers = {}
+    images = {}
+    for key, default in _NUMBERS.items():
+        numbers[key], images[key] = _number(surface, key, default, where)
+    ior = numbers["ior"]
+    if not 1.0 <= ior < math.inf:
+        raise AssetError(f"{where}: ior is {ior:g}, not a number of at least 1; correct it")
     color, image = _color(surface, "diffuseColor", (0.18, 0.18, 0.18), where)
-    glow, _ = _color(surface, "emissiveColor", (0.0, 0.0, 0.0), where)
+    glow, glow_image = _color(surface, "emissiveColor", (0.0, 0.0, 0.0), where)
+    if not all(0.0 <= c < math.inf for c in glow):
+        raise AssetError(f"{where}: emissiveColor is {glow}, negative or no number; correct it")
+    bump = _source(surface, "normal")[1]
+    cut_out = numbers["opacityThreshold"] > 0.0
+    # What the threshold does not cut out lets light through, or (mode "presence") is not there.
+    opacity = 1.0 if cut_out else numbers["opacity"]
+    present = _source(surface, "opacityMode")[0] == "presence"
+    material = Material(
+        base_color=(_unit(color[0]), _unit(color[1]), _unit(color[2])),
+        roughness=round(numbers["roughness"], 4),
+        metallic=round(numbers["metallic"], 4),
+        specular=round(_unit(((ior - 1.0) / (ior + 1.0)) ** 2 / 0.08), 4),
+        emission_cd_m2=glow,
+        coat=round(numbers["clearcoat"], 4),
+        coat_roughness=round(numbers["clearcoatRoughness"], 4),
+        transmission=0.0 if present else round(1.0 - opacity, 4),
+        ior=round(ior, 4),
+        opacity=round(opacity, 4) if present else 1.0,
+    )
     look = SurfaceLook(
         name,
-        Material(
-            base_color=(_unit(color[0]), _unit(color[1]), _unit(color[2])),
-            roughness=round(_unit(rough), 4),
-            metallic=round(_unit(metallic), 4),
-            specular=round(_unit(((ior - 1.0) / (ior + 1.0)) ** 2 / 0.08), 4),
-            emission_cd_m2=glow,
-        ),
-        roughness_image=rough_image,
-        metallic_image=metallic_image,
+        material,
+        texture=_file(image, where) if image is not None else "",
+        roughness_image=images["roughness"],
+        metallic_image=images["metallic"],
+        occlusion_image=images["occlusion"],
+        cover_image=images["opacity"] if cut_out else ("", 0),
+        veil_image=("", 0) if cut_out else images["opacity"],
+        normal_image=_file(bump, where) if _is_image(bump) else "",
+        emission_image=_file(glow_image, where) if glow_image is not None else "",
+        cutoff=numbers["opacityThreshold"] if cut_out else 0.5,
     )
-    if image is None:
+    first = image if image is not None else _any_image(surface)
+    if first is None:
         return look
-    uv_name, uv_matrix = _coordinates(image)
-    return replace(look, texture=_file(image, where), uv_name=uv_name, uv_matrix=uv_matrix)
+    uv_name, uv_matrix = _coordinates(first)
+    return replace(look, uv_name=uv_name, uv_matrix=uv_matrix)
+
+
+_NUMBERS = {
+    "roughness": 0.5,
+    "metallic": 0.0,
+    "ior": 1.5,
+    "clearcoat": 0.0,
+    "clearcoatRoughness": 0.01,
+    "opacity": 1.0,
+    "opacityThreshold": 0.0,
+    "occlusion": 1.0,
+}
+"""Inputs that are numbers, and what they are where nothing is said."""
+_IMAGED = ("roughness", "metallic", "occlusion", "opacity", "normal", "emissiveColor")
+
+
+def _any_image(surface: Any) -> Any:
+    """The node of the first image that is no colour; None if there is none."""
+    nodes = (_source(surface, name)[1] for name in _IMAGED)
+    return next((node for node in nodes if _is_image(node)), None)
 
 
 def _source(surface: Any, name: str) -> tuple[Any, Any]:
@@ -106,10 +174,13 @@ def _number(surface: Any, name: str, default: float, where: str) -> tuple[float,
 
     value, node = _source(surface, name)
     if not _is_image(node):
-        return float(default if value is None else value), ("", 0)
+        number = float(default if value is None else value)
+        if name != "ior" and not -1e-4 <= number <= 1.0 + 1e-4:
+            raise AssetError(f"{where}: {name} is {number:g}, not in [0, 1]; correct it")
+        return number if name == "ior" else _unit(number), ("", 0)
     output = str(surface.GetInput(name).GetValueProducingAttributes()[0].GetName())
     channel = "rgba".find(UsdShade.Utils.GetBaseNameAndType(output)[0][:1])
-    channel = max(channel, 0) % 3
+    channel = max(channel, 0)
     return _factors(node)[channel], (_file(node, where), channel)
 
 

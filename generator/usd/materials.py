@@ -15,11 +15,19 @@ UV, BOX_UV = "st", "stBox"
 
 @dataclass(frozen=True, slots=True)
 class TextureFiles:
-    """Images of a texture, as the layer at hand refers to them; empty = there is none."""
+    """Images of a texture, as the layer at hand refers to them; empty = there is none.
+
+    Attributes:
+        shares: Occlusion in red, metallic in blue.
+        alpha: Coverage; below a half there is a hole.
+    """
 
     albedo: str
     roughness: str = ""
     normal: str = ""
+    shares: str = ""
+    emission: str = ""
+    alpha: str = ""
 
 
 TextureFinder = Callable[[str], TextureFiles]
@@ -32,36 +40,76 @@ def define_material(stage: Any, path: str, material: Material, textures: Texture
     shade = UsdShade.Material.Define(stage, path)
     shader = UsdShade.Shader.Define(stage, f"{path}/Surface")
     shader.CreateIdAttr("UsdPreviewSurface")
-    color = Sdf.ValueTypeNames.Color3f
     shader.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(0)
-    shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(material.metallic)
-    shader.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(_index_of(material.specular))
+    number = Sdf.ValueTypeNames.Float
+    ior = material.ior if material.transmission else _index_of(material.specular)
+    shader.CreateInput("metallic", number).Set(material.metallic)
+    shader.CreateInput("ior", number).Set(ior)
     if any(material.emission_cd_m2):
-        shader.CreateInput("emissiveColor", color).Set(material.emission_cd_m2)
-    diffuse = shader.CreateInput("diffuseColor", color)
-    roughness = shader.CreateInput("roughness", Sdf.ValueTypeNames.Float)
-    if not material.texture:
-        diffuse.Set(material.base_color)
-        roughness.Set(material.roughness)
-    else:
-        images = _Images(stage, path, material)
-        files = textures(material.texture)
-        image = images.add("Albedo", files.albedo, "sRGB", (*material.base_color, 1.0))
-        diffuse.ConnectToSource(image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3))
-        if files.normal:
-            image = images.add("Normal", files.normal, "raw", (2.0, 2.0, 2.0, 1.0))
-            image.CreateInput("bias", Sdf.ValueTypeNames.Float4).Set((-1.0, -1.0, -1.0, 0.0))
-            bump = shader.CreateInput("normal", Sdf.ValueTypeNames.Normal3f)
-            bump.ConnectToSource(image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3))
-        if files.roughness:
-            image = images.add("Roughness", files.roughness, "raw", (material.roughness,) * 4)
-            roughness.ConnectToSource(image.CreateOutput("r", Sdf.ValueTypeNames.Float))
-        else:
-            roughness.Set(material.roughness)
+        glow = shader.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f)
+        glow.Set(material.emission_cd_m2)
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(material.base_color)
+    shader.CreateInput("roughness", number).Set(material.roughness)
+    _define_layers(shader, material)
+    if material.texture:
+        _connect_images(shader, _Images(stage, path, material), textures(material.texture))
     shade.CreateSurfaceOutput().ConnectToSource(
         shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
     )
     return shade
+
+
+def _define_layers(shader: Any, material: Material) -> None:
+    """Coat, transmission and opacity, where there are any."""
+    from pxr import Sdf
+
+    number = Sdf.ValueTypeNames.Float
+    if material.coat:
+        shader.CreateInput("clearcoat", number).Set(material.coat)
+        shader.CreateInput("clearcoatRoughness", number).Set(material.coat_roughness)
+    if material.opacity < 1.0:
+        shader.CreateInput("opacityMode", Sdf.ValueTypeNames.Token).Set("presence")
+        shader.CreateInput("opacity", number).Set(material.opacity)
+    elif material.transmission:
+        shader.CreateInput("opacity", number).Set(1.0 - material.transmission)
+
+
+def _connect_images(shader: Any, images: _Images, files: TextureFiles) -> None:
+    """Let images, times the numbers that inputs hold, decide instead of these."""
+    from pxr import Gf, Sdf
+
+    def connect(name: str, node: Any, output: str) -> None:
+        kind = Sdf.ValueTypeNames.Float if len(output) == 1 else Sdf.ValueTypeNames.Float3
+        given = shader.GetInput(name)
+        given.GetAttr().Clear()
+        given.ConnectToSource(node.CreateOutput(output, kind))
+
+    def factor(name: str) -> Any:
+        return shader.GetInput(name).Get()
+
+    albedo = images.add("Albedo", files.albedo, "sRGB", (*factor("diffuseColor"), 1.0))
+    connect("diffuseColor", albedo, "rgb")
+    if files.roughness:
+        node = images.add("Roughness", files.roughness, "raw", (factor("roughness"),) * 4)
+        connect("roughness", node, "r")
+    if files.shares:
+        node = images.add("Shares", files.shares, "raw", (1.0, 1.0, factor("metallic"), 1.0))
+        connect("metallic", node, "b")
+        shader.CreateInput("occlusion", Sdf.ValueTypeNames.Float)
+        connect("occlusion", node, "r")
+    if files.emission and shader.GetInput("emissiveColor"):
+        node = images.add("Emission", files.emission, "sRGB", (*factor("emissiveColor"), 1.0))
+        connect("emissiveColor", node, "rgb")
+    if files.normal:
+        node = images.add("Normal", files.normal, "raw", (2.0, 2.0, 2.0, 1.0))
+        node.CreateInput("bias", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
+        shader.CreateInput("normal", Sdf.ValueTypeNames.Normal3f)
+        connect("normal", node, "rgb")
+    if files.alpha:
+        node = images.add("Alpha", files.alpha, "raw", (1.0,) * 4)
+        shader.CreateInput("opacity", Sdf.ValueTypeNames.Float)
+        connect("opacity", node, "r")
+        shader.CreateInput("opacityThreshold", Sdf.ValueTypeNames.Float).Set(0.5)
 
 
 class _Images:

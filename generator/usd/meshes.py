@@ -115,7 +115,7 @@ def _uvs(
     uvs = np.zeros((len(topology.fans), 3, 2))
     found = False
     for slot, look in enumerate(looks):
-        values = _per_corner(prim, look.uv_name, topology) if look.texture else None
+        values = _per_corner(prim, look.uv_name, topology) if look.mapped else None
         if values is not None:
             chosen = face_slots == slot
             turned = np.einsum("ij,...j->...i", look.uv_matrix[:, :2], values, optimize=False)

@@ -18,7 +18,7 @@ from generator.core.errors import AssetError
 from generator.core.scene import Light
 from generator.core.se3 import SE3, Array
 from generator.usd.cameras import read_camera_pose
-from generator.usd.lights import read_light
+from generator.usd.lights import checked, read_light
 from generator.usd.meshes import MeshPrim, read_mesh_prim
 from generator.usd.names import unique_name
 
@@ -116,9 +116,13 @@ class OpenStage:
             return read_mesh_prim(piece.prim, self.place)
 
     def lights(self) -> tuple[Light, ...]:
-        """Lamps and suns; skies and other kinds are left out."""
+        """Lamps, panels and suns; skies and other kinds are left out.
+
+        Raises:
+            AssetError: a light is negative or not finite.
+        """
         read = [read_light(prim, _flat(prim), self._pose(prim)) for prim in self._visible()]
-        return tuple(light for light in read if light is not None)
+        return tuple(checked(light, self.place) for light in read if light is not None)
 
     def cameras(self) -> tuple[tuple[str, SE3], ...]:
         """Names and ``T_stage_camera`` of all cameras."""

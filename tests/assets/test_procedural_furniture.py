@@ -46,6 +46,28 @@ def test_the_bounding_box_is_the_size_asked_for(
     assert np.abs(points.max(axis=0) - high).max() < 0.003
 
 
+@pytest.mark.parametrize("shape", ["rectangle", "disk"])
+def test_a_light_panel_shines_down_with_all_of_its_lower_side(shape: str) -> None:
+    """The lamp's slot covers z = 0, faces down, and has the area of the shape; dark at first."""
+    mesh = FAMILIES["light_panel"].build(size_m=(0.8, 0.5), shape=shape).mesh
+    corners = mesh.vertices_m.astype(np.float64)[mesh.faces[mesh.face_slots == 1]]
+    normals = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    assert np.abs(corners[..., 2]).max() == 0.0
+    assert (normals[:, 2] < 0.0).all()
+    expected = 0.4 if shape == "rectangle" else np.pi * 0.16
+    assert -normals[:, 2].sum() == pytest.approx(expected, rel=0.002)
+    assert mesh.materials[1].role == "lamp"
+    assert mesh.materials[1].emission_cd_m2 == (0.0, 0.0, 0.0)
+    assert mesh.bounds_m()[1][2] == pytest.approx(0.04)
+
+
+def test_a_light_panel_of_another_shape_is_refused() -> None:
+    """With what was probably meant."""
+    with pytest.raises(AssetError, match="disk"):
+        FAMILIES["light_panel"].build(shape="disc")
+
+
 @pytest.mark.parametrize("style", ["legs", "trestle", "bench"])
 def test_every_table_style_has_a_flat_top_and_legs_to_the_floor(style: str) -> None:
     """A ball dropped above the top meets it at its height; the legs reach z = 0."""

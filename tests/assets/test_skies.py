@@ -16,6 +16,7 @@ from generator.assets.skies.sky import (
     mean_luminance_cd_m2,
     overcast_sky,
     sky,
+    sun_lux,
 )
 from generator.core.errors import AssetError
 
@@ -100,6 +101,95 @@ def test_clear_sky_follows_perez_with_preethams_coefficients(
     got = clear_sky(place[None, None], sun, 2.0)[0, 0] @ LUMINANCE
 
     assert got == pytest.approx(expected, rel=1e-6)
+
+
+def cie_clear_sky(d: np.ndarray, sun: float) -> np.ndarray:
+    """Luminance over the zenith's: CIE S 011/E:2003, type 12, the standard clear sky."""
+    a, b, c, slope, e = -1.0, -0.32, 10.0, -3.0, 0.45
+    angle = np.arccos(np.clip(d @ (math.cos(sun), 0.0, math.sin(sun)), -1.0, 1.0))
+    at_zenith = 0.5 * math.pi - sun
+
+    def scattering(chi: np.ndarray | float) -> np.ndarray:
+        far = math.exp(slope * 0.5 * math.pi)
+        return 1.0 + c * (np.exp(slope * chi) - far) + e * np.cos(chi) ** 2
+
+    gradation = (1.0 + a * np.exp(b / d[..., 2])) / (1.0 + a * math.exp(b))
+    return gradation * scattering(angle) / scattering(at_zenith)
+
+
+@pytest.mark.parametrize("altitude_deg", [20.0, 40.0, 60.0])
+def test_preethams_sky_is_shaped_as_the_standard_clear_sky(altitude_deg: float) -> None:
+    """At turbidity 2.5: nine tenths of it, 10 degrees over the horizon and up, within 1.7 times.
+
+    Preetham fitted another atmosphere; the median is within 20 %.
+    """
+    polar = np.radians(np.arange(1.0, 80.0, 3.0))[:, None]
+    turn = np.radians(np.arange(0.0, 360.0, 5.0))[None]
+    up = np.broadcast_to(np.cos(polar), (len(polar), turn.size))
+    d = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), up], axis=-1)
+    sun = math.radians(altitude_deg)
+
+    ratio = (clear_sky(d, sun, 2.5, pale=0.0) @ LUMINANCE) / cie_clear_sky(d, sun)
+
+    weights = np.broadcast_to(np.sin(polar), up.shape).ravel()
+    order = np.argsort(ratio.ravel())
+    grown = np.cumsum(weights[order]) / weights.sum()
+    low, middle, high = (ratio.ravel()[order][np.searchsorted(grown, q)] for q in (0.05, 0.5, 0.95))
+    assert middle == pytest.approx(1.0, abs=0.2)
+    assert 1.0 / 1.7 < low < high < 1.7
+
+
+@pytest.mark.parametrize(("altitude_deg", "turbidity"), [(30.0, 2.5), (45.0, 3.0), (60.0, 2.5)])
+def test_preethams_sun_and_sky_give_the_light_of_a_clear_day(
+    altitude_deg: float, turbidity: float
+) -> None:
+    """On level ground within 15 % of IES RP-21: 127.5 klx exp(-0.21 m) sin h, and the clear sky.
+
+    Preetham's sky alone is up to twice as bright as that of IES, his sun the dimmer for it.
+    """
+    altitude = math.radians(altitude_deg)
+    model = SkyModel(0, altitude_deg, turbidity, model="preetham")
+
+    sky_lux = level_illuminance_lux(luminance_cd_m2(model, 128))
+    total = sun_lux(model) * math.sin(altitude) + sky_lux
+
+    mass = daylight.air_mass(altitude)
+    sun = 127_500.0 * math.exp(-0.21 * mass) * math.sin(altitude)
+    expected = sun + 800.0 + 15_500.0 * math.sqrt(math.sin(altitude))
+    assert total == pytest.approx(expected, rel=0.15)
+
+
+def test_preethams_zenith_is_as_bright_as_published() -> None:
+    """A.2: (4.0453 T - 4.9710) tan((4/9 - T/120) (pi - 2 theta)) - 0.2155 T + 2.4192, kcd/m^2.
+
+    By hand for T = 3 and the sun at 40 degrees: 7.1649 tan(0.5856) + 1.7727 = 6.521.
+    """
+    assert daylight.preetham_zenith_cd_m2(math.radians(40.0), 3.0) == pytest.approx(
+        6521.0, rel=1e-3
+    )
+    model = SkyModel(0, 40.0, 3.0, model="preetham")
+    top = luminance_cd_m2(model, 256)[0] @ LUMINANCE
+    assert top.mean() == pytest.approx(6521.0, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"cloudiness": 0.3}, "no clouds"),
+        ({"sun_altitude_deg": -5.0}, "no night"),
+        ({"turbidity": 9.0}, "turbidity"),
+    ],
+)
+def test_preethams_sky_is_clear_and_by_day(given: dict[str, float], said: str) -> None:
+    """What it does not know is refused."""
+    with pytest.raises(ValueError, match=said):
+        luminance_cd_m2(SkyModel(model="preetham", **given), 64)
+
+
+def test_an_unknown_model_of_the_sky_is_refused() -> None:
+    """With those that there are."""
+    with pytest.raises(ValueError, match="expected one of measured, preetham"):
+        luminance_cd_m2(SkyModel(model="hosek"), 64)
 
 
 def test_overcast_zenith_is_three_times_the_horizon() -> None:

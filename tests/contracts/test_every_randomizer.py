@@ -26,6 +26,7 @@ from scene_templates.surface import SurfaceElement
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 GIVEN: dict[str, dict[str, Any]] = {
+    "ceiling_lights": {"visible": True},
     "distractors": {"count": {"uniform_integer": [1, 4]}},
     "colors": {"probability": True},
     "materials": {"probability": True},

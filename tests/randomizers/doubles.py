@@ -15,7 +15,7 @@ from generator.core.scene import Body, ObjectGroup, Scene, Surface
 from generator.core.se3 import SE3, Array, Vec3
 from generator.core.streams import Rng, Streams
 
-FURNITURE_M: dict[str, Vec3] = {
+FURNITURE_M: dict[str, tuple[float, ...]] = {
     "table": (1.2, 0.8, 0.74),
     "shelf": (0.9, 0.32, 1.6),
     "bin": (0.6, 0.4, 0.22),
@@ -23,6 +23,7 @@ FURNITURE_M: dict[str, Vec3] = {
     "gantry": (1.6, 1.0, 1.8),
     "pedestal": (0.3, 0.3, 0.7),
     "plane": (4.0, 4.0, 0.0),
+    "light_panel": (0.6, 0.6),
     "backdrop": (3.0, 3.0, 2.2),
     "street_lamp": (0.4, 0.4, 6.0),
 }

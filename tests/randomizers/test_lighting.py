@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from generator.config.distributions import Choice, Constant, Sequence, Uniform
 from generator.core.errors import ConfigError, LayoutRejected
 from generator.core.scene import Body, Light, Region, Scene
 from generator.core.se3 import SE3
+from randomizers.ceiling_lights import CeilingLights
+from randomizers.clearance import is_clear
 from randomizers.environment import EnvironmentLight
 from randomizers.lighting import Lighting
 from tests.randomizers.doubles import FakeAssets, rng_of
@@ -126,6 +129,143 @@ def test_illuminance_can_follow_a_sequence() -> None:
             for k in (1, 0, 3)]  # fmt: skip
 
     assert sums == pytest.approx([400.0, 100.0, 400.0], rel=1e-4)
+
+
+PANELS = {
+    "panel_m": Uniform(0.4, 0.9),
+    "panel_aspect": Uniform(0.5, 0.8),
+    "radius_m": Uniform(0.2, 0.3),
+}
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "disk"])
+def test_soft_boxes_are_turned_to_the_focus_and_stand_level(kind: str) -> None:
+    """As large as drawn; together they give the illuminance, by the formula for the axis."""
+    for scene_index in range(10):
+        lights = lit(
+            scene_index=scene_index, count=Constant(2), kind=Constant(kind),
+            illuminance_lux=Constant(500.0), **PANELS,
+        )  # fmt: skip
+        total_lux = 0.0
+        for light in lights:
+            away = np.subtract(light.position_m, FOCUS.center_m)
+            d = float(np.linalg.norm(away))
+            assert np.allclose(-away / d, light.direction, atol=2e-6)
+            if kind == "disk":
+                assert 0.2 <= light.radius_m <= 0.3
+                total_lux += light.intensity_cd / (d * d + light.radius_m**2)
+            else:
+                assert 0.4 <= light.size_m[0] <= 0.9
+                assert 0.5 - 1e-3 <= light.size_m[1] / light.size_m[0] <= 0.8 + 1e-3
+                assert light.side[2] == 0.0
+                assert np.dot(light.side, light.direction) == pytest.approx(0.0, abs=2e-6)
+                assert np.linalg.norm(light.side) == pytest.approx(1.0, abs=2e-6)
+                # Sixteen by sixteen parts of the panel.
+                s = (np.arange(16) + 0.5) / 16 - 0.5
+                u, v = np.meshgrid(s * light.size_m[0], s * light.size_m[1])
+                total_lux += light.intensity_cd * (d**2 / (u**2 + v**2 + d**2) ** 2).mean()
+        assert total_lux == pytest.approx(500.0, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "per_flux"), [("sphere", 4 * math.pi), ("rectangle", math.pi), ("disk", math.pi)]
+)
+def test_flux_is_an_alternative_to_illuminance(kind: str, per_flux: float) -> None:
+    """I = flux / (4 pi) of a ball, flux / pi of a panel, wherever it is."""
+    lights = lit(
+        count=Constant(2), kind=Constant(kind), luminous_flux_lm=Constant(3000.0), **PANELS
+    )
+
+    assert sum(light.intensity_cd for light in lights) * per_flux == pytest.approx(3000.0)
+
+
+def test_a_visible_panel_hangs_in_a_housing_and_the_next_draw_takes_it_away() -> None:
+    """One body per panel, which the light goes with; lights drawn over them leave none behind."""
+    lighting = Lighting(name="soft", kind=Constant("rectangle"), visible=True, count=Constant(2))
+    scene = lighting(SCENE, FakeAssets(), rng_of("soft", 3))
+    again = Lighting(name="lamps")(scene, FakeAssets(), rng_of("lamps", 3))
+    kept = Lighting(name="lamps", keep=True)(scene, FakeAssets(), rng_of("lamps", 3))
+
+    assert [body.name for body in scene.bodies] == ["soft/0", "soft/1"]
+    assert [light.body for light in scene.lights] == ["soft/0", "soft/1"]
+    assert again.bodies == ()
+    assert kept.bodies == scene.bodies
+    assert kept.lights[:2] == scene.lights
+
+
+def test_cameras_and_lamps_keep_clear_of_housings() -> None:
+    """They are background, and in the way all the same."""
+    lighting = Lighting(name="soft", kind=Constant("rectangle"), visible=True, count=Constant(1))
+    scene = lighting(SCENE, FakeAssets(), rng_of("soft", 3))
+    light = scene.lights[0]
+
+    assert not is_clear(light.position_m, scene, FakeAssets(), 0.02)
+    assert is_clear(light.position_m, replace(scene, lights=()), FakeAssets(), 0.02)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"illuminance_lux": -1.0}, "0"),
+        ({"illuminance_lux": float("nan")}, "finite"),
+        ({"panel_m": 0.0}, "0"),
+        ({"panel_aspect": 0.0}, "panel_aspect must be above 0"),
+        ({"panel_aspect": 1.5}, "1"),
+        ({"radius_m": -0.1}, "0"),
+        ({"temperature_k": 100.0}, "1667"),
+        ({"luminous_flux_lm": -5.0}, "0"),
+        ({"luminous_flux_lm": 5.0, "illuminance_lux": 5.0}, "exclude each other"),
+    ],
+)
+def test_impossible_lights_are_refused_when_they_are_read(
+    given: dict[str, float], said: str
+) -> None:
+    """Before anything is drawn or written."""
+    with pytest.raises(ValidationError, match=said):
+        Lighting.model_validate({"name": "lamps", **given})
+
+
+def test_a_sun_with_a_flux_is_refused() -> None:
+    """There is no such thing."""
+    with pytest.raises(ConfigError, match=r"randomizers\.lamps\.luminous_flux_lm: a sun has no"):
+        lit(kind=Constant("sun"), luminous_flux_lm=Constant(1000.0))
+
+
+def ceiling(**given: object) -> Scene:
+    lights = CeilingLights.model_validate({"name": "panels", "broken": False, **given})
+    return lights(SCENE, FakeAssets(), rng_of("panels", 1))
+
+
+def test_ceiling_panels_hang_in_a_grid_and_shine_down() -> None:
+    """Two rows of three, in the middles of equal fields at the top of the room, 1000 lm each."""
+    scene = ceiling(rows=2, columns=3, luminous_flux_lm=1000)
+
+    at = sorted(light.position_m for light in scene.lights)
+    x = [-2.3 + 4.6 * k / 6 for k in (1, 3, 5)]
+    expected = [(a, b, 2.6) for a in x for b in (-0.9, 0.9)]
+    np.testing.assert_allclose(at, expected, atol=1e-6)
+    assert {light.direction for light in scene.lights} == {(0.0, 0.0, -1.0)}
+    assert all(
+        light.intensity_cd == pytest.approx(1000 / math.pi, rel=1e-5) for light in scene.lights
+    )
+    assert len(scene.bodies) == 6
+
+
+def test_broken_ceiling_panels_are_dark_and_there() -> None:
+    """Housings without a light; none at all if they are not to be seen."""
+    dark = ceiling(rows=1, columns=2, broken=True)
+    unseen = ceiling(rows=1, columns=2, visible=False)
+
+    assert dark.lights == ()
+    assert len(dark.bodies) == 2
+    assert len(unseen.lights) == 2
+    assert unseen.bodies == ()
+
+
+def test_unknown_kind_of_panel_is_named() -> None:
+    """With what was probably meant."""
+    with pytest.raises(ConfigError, match=r"unknown panel 'dsik'.*did you mean 'disk'"):
+        ceiling(kind="dsik")
 
 
 def test_unknown_kind_of_light_is_named() -> None:

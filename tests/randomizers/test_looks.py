@@ -129,6 +129,28 @@ def test_finishes_stay_in_their_ranges() -> None:
     assert {m.metallic for m in materials} == {0.0, 1.0}
 
 
+def test_coats_and_glass_come_only_where_they_are_asked_for() -> None:
+    """Shares within four sigma; clear objects are no metal; the other draws stay as they were."""
+    scene = scene_with(*["brick"] * 400)
+    plain = Materials(name="m", probability=ALWAYS)
+    made = Materials(name="m", probability=ALWAYS, coated=Probability(0.3), clear=HALF,
+                     coat=Constant(0.8), coat_roughness=Uniform(0.1, 0.2),
+                     transmission=Uniform(0.7, 0.9), ior=Uniform(1.3, 1.6), solid=HALF)  # fmt: skip
+
+    materials = [body.materials[0] for body in after(made, scene).bodies if body.group]
+    coated = [m for m in materials if m.coat]
+    clear = [m for m in materials if m.transmission]
+
+    assert abs(len(coated) - 120) < 37 and abs(len(clear) - 200) < 40
+    assert all(m.coat == 0.8 and 0.1 <= m.coat_roughness <= 0.2 for m in coated)
+    assert all(0.7 <= m.transmission <= 0.9 and 1.3 <= m.ior <= 1.6 for m in clear)
+    assert {m.metallic for m in clear} == {0.0} and {m.thin for m in clear} == {True, False}
+    first = after(made, scene).body("clutter/0").materials[0]
+    default = after(plain, scene).body("clutter/0").materials[0]
+    assert (first.roughness, first.specular) == (default.roughness, default.specular)
+    assert (default.coat, default.transmission, default.opacity) == (0.0, 0.0, 1.0)
+
+
 def test_textures_cover_the_slots_that_were_named() -> None:
     """A table's top and not its legs; the repeat is as drawn."""
     cover = Textures(name="t", targets=("table",), textures=("plaster",), probability=ALWAYS,

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from generator.assets.skies import daylight
+from generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2
 from generator.core.geometry import Material
 from generator.core.scene import Body, Light, Scene
 from generator.core.scene import Weather as SceneWeather
 from generator.core.se3 import SE3
 from randomizers import TABLE
 from randomizers.street_lights import StreetLights, balanced_color, spot_intensity_cd
+from randomizers.time_of_day import TimeOfDay
 from randomizers.weather_presets import ALTITUDES_DEG, CONDITIONS, PRESETS
 from tests.randomizers.doubles import FakeAssets, rng_of
 
@@ -99,6 +102,39 @@ def test_time_of_day_takes_other_suns_away_and_leaves_lamps() -> None:
 
     assert [light.name for light in noon.lights] == ["sun", "lamp"]
     assert drawn("time_of_day", noon, sun_altitude_deg=-20).lights == (lamp,)
+
+
+def test_time_of_day_can_be_preethams() -> None:
+    """Sun and sky of one model: clear, whatever the weather said; the sun as the model has it."""
+    rainy = Scene("t", shared=(("cloudiness", 1.0),))
+
+    scene = drawn("time_of_day", rainy, sky="preetham", sun_altitude_deg=40, turbidity=3)
+
+    model = SkyModel(0, 40.0, 3.0, model="preetham")
+    assert "model=preetham" in scene.environment.image
+    assert dict(scene.shared)["cloudiness"] == 0.0
+    assert scene.environment.luminance_cd_m2 == pytest.approx(mean_luminance_cd_m2(model), rel=1e-3)
+    (sun,) = suns(scene)
+    assert sun.illuminance_lux == pytest.approx(
+        daylight.preetham_sun_lux(math.radians(40.0), 3.0), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"cloudiness": 0.2}, "has no clouds"),
+        ({"sun_altitude_deg": {"uniform": [-5, 30]}}, "has no night"),
+        ({"turbidity": 1.0}, "1.8"),
+        ({"turbidity": float("nan")}, "finite"),
+    ],
+)
+def test_a_time_that_preethams_sky_does_not_know_is_refused(
+    given: dict[str, object], said: str
+) -> None:
+    """When it is read, before anything is drawn."""
+    with pytest.raises(ValidationError, match=said):
+        TimeOfDay.model_validate({"name": "time", "sky": "preetham", **given})
 
 
 def test_time_of_day_keeps_the_clouds_of_the_weather() -> None:

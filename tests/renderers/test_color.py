@@ -93,6 +93,50 @@ def test_the_filmic_curve_keeps_middle_grey_and_never_reaches_beyond_white() -> 
     assert float(filmic(np.array(1.0))) < 0.9 < float(filmic(np.array(4.0))) <= 1.0
 
 
+@pytest.mark.parametrize("value", [0.002, 0.01, 0.18, 0.5, 1.0])
+def test_the_srgb_curve_is_that_of_the_standard(value: float) -> None:
+    """IEC 61966-2-1: 12.92 v below 0.0031308, else 1.055 v^(1/2.4) - 0.055; white beyond 1."""
+    curve = tone_curve("srgb")
+    byte = int(curve[round(value / (1.0 + value) * (len(curve) - 1))])
+
+    display = 12.92 * value if value <= 0.0031308 else 1.055 * value ** (1 / 2.4) - 0.055
+    assert abs(byte - 255.0 * display) <= 1.0
+    assert int(curve[len(curve) * 2 // 3]) == 255
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        # In the straight part, 0.22 to 0.532, the curve is the identity.
+        (0.22, 0.22),
+        (0.4, 0.4),
+        (0.532, 0.532),
+        # The shoulder: 1 - 0.468 exp(-(x - 0.532) / 0.468).
+        (1.0, 1.0 - 0.468 * math.exp(-1.0)),
+        (2.0, 1.0 - 0.468 * math.exp(-1.468 / 0.468)),
+        # The toe half-way up, where it weighs half: (0.22 * 0.5^1.33 + 0.11) / 2.
+        (0.11, 0.5 * (0.22 * 0.5**1.33 + 0.11)),
+    ],
+)
+def test_the_filmic_curve_is_that_of_its_source(value: float, expected: float) -> None:
+    """Uchimura 2017, worked by hand for his parameters."""
+    assert float(filmic(np.array(value))) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(("lux", "ev100"), [(2.5, 0.0), (2500.0, 9.966), (80_000.0, 14.966)])
+def test_exposure_values_are_those_of_a_light_meter(lux: float, ev100: float) -> None:
+    """An incident-light meter, E = 2.5 lx 2^EV (ISO 2720, C = 250): grey is between grey and white.
+
+    A card of 18 % under that light, exposed by the meter, is 0.12 of saturation: 0.18 * 2.5 / pi /
+    1.2, which is where cameras put it, three stops below white.
+    """
+    grey_cd_m2 = 0.18 * lux / math.pi
+
+    exposed = grey_cd_m2 * exposure_of(ev100)
+
+    assert exposed == pytest.approx(0.18 * 2.5 / math.pi / 1.2, rel=1e-3)
+
+
 def test_the_tone_curve_ends_at_black_and_white() -> None:
     """Indexed by v / (1 + v): the last entry stands for infinity."""
     for tone in ("filmic", "srgb"):

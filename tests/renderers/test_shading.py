@@ -212,6 +212,34 @@ def test_the_penumbra_of_a_ball_has_the_width_of_similar_triangles() -> None:
     assert visible[x > 0.49].min() > 0.97
 
 
+def test_the_penumbra_of_a_sun_has_the_width_of_its_disc() -> None:
+    """Edge 0.52 m up, sun of radius 3 degrees overhead: 2 * 0.52 * tan(3 degrees) = 5.45 cm.
+
+    The share of a disc beyond a line gives the profile; smoothing over 3.7 cm rounds its ends off.
+    """
+    slab = box_mesh((0.6, 4.0, 0.02))
+    library = FakeLibrary({"plane": plane_mesh(20.0, (MATTE,)), "slab": slab})
+    sun = Light(
+        "s", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=400.0,
+        angular_radius_rad=math.radians(3.0),
+    )  # fmt: skip
+    bodies = (Body("p", "plane"), Body("slab", "slab", SE3((0.0, 0.0, 0.51))))
+    scene = Scene("t", bodies, lights=(sun,), environment=DARK)
+    camera = camera_at((0.4, 0.0, 8.0), (0.4, 0.0, 0.0), (320, 60), hfov_deg=7.0, ev100=6.0)
+    renderer = WarpRenderer(library, "cpu", LINEAR)
+
+    lit = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
+
+    visible = lit.channels[Channel.RADIANCE][30, :, 1] / (400.0 * 0.5 / math.pi)
+    x = 0.4 + ((np.arange(320) + 0.5) / 320.0 - 0.5) * 16.0 * math.tan(math.radians(3.5))
+    s = np.clip((x - 0.3) / (0.51 * math.tan(math.radians(3.0))), -1.0, 1.0)
+    expected = 1.0 - (np.arccos(s) - s * np.sqrt(1.0 - s * s)) / math.pi
+    on_ground = x > 0.325
+    assert np.abs(visible - expected)[on_ground].max() < 0.13
+    assert abs((visible - expected)[on_ground].mean()) < 0.01
+    assert visible[x > 0.36].min() > 0.98
+
+
 def test_hard_shadows_have_no_penumbra() -> None:
     """The same lamp, taken for a point: from dark to light within the smoothing window."""
     x, visible = shadow_profile(0.2, LINEAR.model_copy(update={"shadows": "hard"}))

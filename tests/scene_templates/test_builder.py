@@ -221,6 +221,53 @@ def test_scene_without_a_lamp_gets_one_and_others_keep_theirs() -> None:
     assert [light.intensity_cd for light in built(DESK, lamp).lights] == [500.0]
 
 
+def test_a_ceiling_panel_is_a_light_and_its_housing() -> None:
+    """4000 lm of 0.6 m x 1.2 m are 4000 / pi cd; the housing is background right above it."""
+    panel = {
+        "type": "light", "name": "panel", "kind": "rectangle", "position_m": (0, 0, 2.6),
+        "size_m": (1.2, 0.6), "luminous_flux_lm": 4000,
+    }  # fmt: skip
+    scene = built(DESK, panel)
+
+    (light,) = scene.lights
+    assert light.intensity_cd == pytest.approx(4000.0 / math.pi, abs=1e-4)
+    assert (light.size_m, light.direction, light.body) == ((1.2, 0.6), (0.0, 0.0, -1.0), "panel")
+    body = scene.body("panel")
+    assert body.T_world_body.translation_m == pytest.approx((0.0, 0.0, 2.601))
+    assert body.instance_id == 0
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "disk"])
+def test_a_panel_need_not_be_seen(kind: str) -> None:
+    """Without a housing there is but the light; its direction is made a unit vector."""
+    lamp = {
+        "type": "light", "name": "soft", "kind": kind, "direction": (0, 3, -4), "visible": False,
+    }  # fmt: skip
+    scene = built(DESK, lamp)
+
+    assert [body.name for body in scene.bodies] == [body.name for body in built(DESK).bodies]
+    assert scene.lights[0].direction == (0.0, 0.6, -0.8)
+    assert scene.lights[0].body == ""
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"intensity_cd": -1}, "greater than or equal to 0"),
+        ({"intensity_cd": float("nan")}, "finite"),
+        ({"luminous_flux_lm": float("inf")}, "finite"),
+        ({"luminous_flux_lm": 100, "intensity_cd": 5}, "exclude each other"),
+        ({"kind": "rectangle", "size_m": (0.0, 1.0)}, "size_m must be above 0"),
+        ({"kind": "disk", "radius_m": 0}, "radius_m of a disk"),
+        ({"kind": "spot", "direction": (0, 0, 0)}, "direction must not be 0"),
+    ],
+)
+def test_an_impossible_lamp_is_refused_when_it_is_read(given: dict[str, object], said: str) -> None:
+    """Before anything is built."""
+    with pytest.raises(ValidationError, match=said):
+        built(DESK, {"type": "light", "name": "lamp", **given})
+
+
 def test_backdrop_is_background() -> None:
     """A plane under everything has no instance."""
     scene = built({"type": "backdrop", "name": "ground", "asset": "plane?size_m=6,6"}, DESK)

@@ -121,6 +121,9 @@ def test_lights_and_cameras_come_back(tmp_path: Path) -> None:
             assert copy.radius_m == pytest.approx(light.radius_m)
         if light.kind != "sphere":
             assert copy.direction == pytest.approx(light.direction, abs=1e-6)
+    panel = by_kind["rectangle"]
+    assert panel.size_m == pytest.approx((0.8, 0.4))
+    assert panel.side == pytest.approx((0.8, 0.48, -0.36), abs=1e-6)
     spot = by_kind["spot"]
     assert (spot.cone_rad, spot.even) == pytest.approx((0.6, 0.8))
     axes = scene.rig_pose("copy/World_Cameras_color").rotation()
@@ -303,6 +306,50 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
     text = (tmp_path / "props/parts/quad.usda").read_text()
     (tmp_path / "props/parts/quad.usda").write_text(text.replace("100", "120"))
     assert opened_library(tmp_path, tmp_path / "props").get("user/one").sha256 != before
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "said"),
+    [
+        ("inputs:intensity", float("nan"), "has intensity nan"),
+        ("inputs:intensity", -3.0, "has intensity -"),
+        ("inputs:color", (-0.5, 1.0, 1.0), "has color -"),
+        ("inputs:color", (float("inf"), 1.0, 1.0), "light 'Panel'"),
+        ("inputs:width", -1.0, "light 'Panel' has"),
+        ("inputs:width", 0.0, "has no area"),
+        ("inputs:height", float("nan"), "light 'Panel' has"),
+    ],
+)
+def test_an_impossible_light_of_a_stage_is_refused(
+    tmp_path: Path, attribute: str, value: object, said: str
+) -> None:
+    """One error that names the file and the light; nothing is made of it."""
+    (tmp_path / "props").mkdir()
+    stage = new_stage(tmp_path / "props/s.usda")
+    add_quad(stage, "/Quad")
+    panel = UsdLux.RectLight.Define(stage, "/Panel")
+    panel.GetPrim().GetAttribute(attribute).Set(value)
+    stage.GetRootLayer().Save()
+
+    with pytest.raises(AssetError, match=r"s\.usda: .*") as refused:
+        opened_library(tmp_path, tmp_path / "props").stage("user/s")
+    assert said in str(refused.value)
+
+
+def test_a_normalised_panel_sends_out_the_same_whatever_its_size(tmp_path: Path) -> None:
+    """UsdLux: intensity 500, normalised, is 500 cd from 0.1 m^2 or 4 m^2 alike."""
+    (tmp_path / "props").mkdir()
+    stage = new_stage(tmp_path / "props/s.usda")
+    add_quad(stage, "/Quad")
+    for name, width in (("A", 0.5), ("B", 20.0)):
+        panel = UsdLux.RectLight.Define(stage, f"/{name}")
+        panel.CreateWidthAttr(width)
+        panel.CreateNormalizeAttr(True)
+        panel.CreateIntensityAttr(500.0)
+    stage.GetRootLayer().Save()
+
+    lights = opened_library(tmp_path, tmp_path / "props").stage("user/s").lights
+    assert [light.intensity_cd for light in lights] == pytest.approx([500.0, 500.0])
 
 
 def test_a_scaled_stage_keeps_its_light(tmp_path: Path) -> None:

@@ -42,6 +42,17 @@ def table_world(library: Library) -> Scene:
     lights = (
         Light("lamp", "sphere", (0.4, -0.9, 2.2), intensity_cd=900.0, radius_m=0.08),
         Light("spot", "spot", (0.0, 0.5, 1.5), (0.0, -0.6, -0.8), (1.2, 0.97, 0.7), 250.0),
+        Light(
+            "panel",
+            "rectangle",
+            (0.3, 0.4, 1.6),
+            (0.0, -0.6, -0.8),
+            (1.1, 0.98, 0.9),
+            120.0,
+            size_m=(0.8, 0.4),
+            side=(0.8, 0.48, -0.36),
+        ),
+        Light("disk", "disk", (-0.5, 0.4, 1.2), (0.6, 0.0, -0.8), intensity_cd=60.0, radius_m=0.2),
         Light("sun", "sun", direction=(0.6, 0.0, -0.8), illuminance_lux=4000.0),
     )
     return Scene(

@@ -6,6 +6,7 @@ Three tables. A new generator is one function and one line; it is imported when 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TypeVar
 
 from generator.assets.procedural.family import (
@@ -152,6 +153,17 @@ FAMILIES: Mapping[str, Family] = _table(
         _static("plane", "furniture:plane", size_m=(4.0, 4.0)),
         _static(
             "backdrop", "furniture:backdrop", size_m=(3.0, 3.0, 2.2), radius_m=0.6, color="white"
+        ),
+        # Lamps of all sizes are drawn, and quickly made.
+        replace(
+            _static(
+                "light_panel",
+                "furniture:light_panel",
+                size_m=(0.6, 0.6),
+                shape="rectangle",
+                depth_m=0.04,
+            ),
+            stored=False,
         ),
         _static("room", "room:room", size_m=(5.0, 4.0, 2.8), door=1, window=1),
     )

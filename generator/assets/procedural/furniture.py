@@ -21,8 +21,9 @@ from generator.assets.procedural.materials import (
     patterned,
 )
 from generator.assets.procedural.mesh import Array, Patch, in_place, joined
-from generator.assets.procedural.shapes import along_grain, block, fan, grid, lathe
+from generator.assets.procedural.shapes import along_grain, block, circle, fan, grid, lathe
 from generator.core.errors import AssetError, did_you_mean
+from generator.core.geometry import Material
 from generator.core.se3 import Vec3
 
 Box = tuple[Vec3, Vec3]
@@ -36,8 +37,10 @@ SLOTS: Mapping[str, tuple[str, ...]] = {
     "backdrop": ("paper",),
     "box": ("body",),
     "pedestal": ("body", "plates"),
+    "light_panel": ("housing", "lamp"),
     "room": ("floor", "ceiling", "walls", "skirting", "door", "frames", "window", "handle"),
 }
+PANEL_SHAPES = ("rectangle", "disk")
 TABLE_STYLES = ("legs", "trestle", "bench")
 SHELF_STYLES = ("bookcase", "rack")
 
@@ -262,6 +265,36 @@ def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
     return in_place([ground], (patterned("texture/concrete?seed=0", 2.0, 0.8),), [slab])
 
 
+def light_panel(
+    size_m: Sequence[float] = (0.6, 0.6), shape: str = "rectangle", depth_m: float = 0.04
+) -> Solid:
+    """A panel that shines down from z = 0, and its housing above. Slots: housing, lamp.
+
+    The lamp is dark until it is given an emission.
+
+    Args:
+        size_m: Of the bright part; a disk has the first for its diameter.
+        shape: rectangle or disk.
+        depth_m: Of the housing, which is as wide as the panel.
+
+    Raises:
+        AssetError: if a size or the shape is not usable.
+    """
+    x, y, z = checked_size("light_panel", (*size_m[:2], depth_m), 0.005)
+    _known("light_panel", "shape", shape, PANEL_SHAPES)
+    if shape == "disk":
+        y = x
+        rim = circle(0.5 * x, 64)
+        front = fan(np.concatenate([rim[::-1], np.zeros((64, 1))], axis=1), 1)
+        back = lathe([(0.5 * x, 0.0), (0.5 * x, z), (0.0, z)], 64)
+    else:
+        front = rectangle((-x / 2, -y / 2, 0.0), (0.0, y, 0.0), (x, 0.0, 0.0)).painted(1)
+        back = joined(_plain_shell(x, y, z))
+    lamp = Material((0.8, 0.8, 0.8), 0.9, specular=0.2, role="lamp")
+    hull = hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
+    return in_place([back, front], (painted("#d9dadb", 0.5), lamp), [hull])
+
+
 def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str = "white") -> Solid:
     """A studio sweep: floor that curves up into a wall at +Y, open elsewhere. Slot: paper.
 
@@ -409,6 +442,16 @@ def _profile_bar(low: Vec3, high: Vec3) -> list[Patch]:
         inset = 0.25 * (high[side] - low[side])
         a[side], b[side] = low[side] + inset, high[side] - inset
     return [*made, block((a[0], a[1], a[2]), (b[0], b[1], b[2]))]
+
+
+def _plain_shell(x: float, y: float, z: float) -> list[Patch]:
+    """Four sides and the top of a box on z = 0."""
+    corners = [(-x / 2, -y / 2), (x / 2, -y / 2), (x / 2, y / 2), (-x / 2, y / 2)]
+    sides = [
+        rectangle((*a, 0.0), (b[0] - a[0], b[1] - a[1], 0.0), (0.0, 0.0, z))
+        for a, b in pairwise([*corners, corners[0]])
+    ]
+    return [*sides, rectangle((-x / 2, -y / 2, z), (x, 0.0, 0.0), (0.0, y, 0.0))]
 
 
 def _cove(x: float, y: float, r: float) -> list[Array]:

@@ -1,6 +1,6 @@
 """glTF 2.0, text and binary (Khronos, "glTF 2.0 specification", 2021).
 
-Read are triangles, the first UV set, base colour, metallic and roughness. Morph targets, skins,
+Read are triangles, the first UV set, and materials as gltf_materials says. Morph targets, skins,
 animations, cameras and lights are ignored; compressed geometry is refused.
 """
 
@@ -12,6 +12,7 @@ import json
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 from urllib.parse import unquote
 
@@ -20,10 +21,11 @@ from numpy.typing import NDArray
 
 from generator.assets.folder import Folder
 from generator.assets.images import decode
+from generator.assets.readers.gltf_materials import Images, gltf_material
 from generator.assets.readers.source import MAX_FACES, Source
 from generator.assets.soup import Float64, Int64, Slot, Soup, joined
 from generator.core.errors import AssetError
-from generator.core.geometry import Material
+from generator.core.geometry import UInt8
 
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -265,26 +267,18 @@ def _from_uri(document: _Document, uri: str) -> bytes:
 
 
 def _slot(document: _Document, description: Mapping[str, Any]) -> Slot:
-    pbr = description.get("pbrMetallicRoughness", {})
-    red, green, blue, _ = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
-    roughness, metallic = float(pbr.get("roughnessFactor", 1)), float(pbr.get("metallicFactor", 1))
-    if "metallicRoughnessTexture" in pbr:
-        # The surface has one roughness and one metalness: the means of what the image says.
-        name = _image(document, pbr["metallicRoughnessTexture"])
+    place = f"{document.folder.root / document.relative}"
+
+    def pixels(name: str) -> UInt8:
         encoded = document.images.get(name) or document.folder.read(name)
-        means = decode(encoded, f"{document.folder.root / document.relative}").mean(axis=(0, 1))
-        roughness, metallic = roughness * means[1] / 255.0, metallic * means[2] / 255.0
-    material = Material(
-        base_color=(_unit(red), _unit(green), _unit(blue)),
-        roughness=round(_unit(roughness), 4),
-        metallic=round(_unit(metallic), 4),
-        texture=_image(document, pbr["baseColorTexture"]) if "baseColorTexture" in pbr else "",
-    )
-    return Slot(str(description.get("name", "")), material, from_file=True)
+        return decode(encoded, f"{place}#{name}", alpha=True)
 
-
-def _unit(value: float) -> float:
-    return min(max(float(value), 0.0), 1.0)
+    name = str(description.get("name", ""))
+    images = Images(lambda reference: _image(document, reference), cache(pixels))
+    try:
+        return Slot(name, gltf_material(description, images), from_file=True)
+    except ValueError as error:
+        raise ValueError(f"material '{name[:40]}': {error}") from None
 
 
 def _image(document: _Document, reference: Mapping[str, Any]) -> str:

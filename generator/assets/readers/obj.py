@@ -1,20 +1,26 @@
 """Wavefront OBJ and MTL.
 
 Source: Wavefront Advanced Visualizer manual, appendix B1 (polygonal elements) and MTL 5.0; the
-keys ``Pr`` and ``Pm`` (roughness, metallic) are the widespread PBR extension.
+keys ``Pr``, ``Pm``, ``Pc``, ``Pcr`` (roughness, metallic, clear coat and its roughness), ``norm``
+and their images are the widespread PBR extension.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
+from typing import Any
 
 import numpy as np
 
 from generator.assets.folder import Folder
+from generator.assets.maps import Maps
 from generator.assets.readers.source import (
     MAX_FACES,
     Source,
+    at_least,
+    fraction,
     linear_of_srgb,
     roughness_of_shininess,
 )
@@ -192,41 +198,92 @@ def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[Slot, ...]:
     )
 
 
+@dataclass
+class _Definition:
+    """What an MTL file says of one material."""
+
+    material: Material = field(default_factory=Material)
+    maps: Maps = field(default_factory=Maps)
+    dissolved: bool = False
+
+    def finished(self) -> Material:
+        maps = self.maps
+        if maps.alpha:
+            # The transparency of an image is in its fourth channel, if it is that of its colour.
+            own = maps.alpha == maps.albedo
+            maps = replace(maps, alpha=f"{maps.alpha}!{3 if own else 0}")
+        return replace(self.material, texture=maps.name())
+
+
 def _read_mtl(folder: Folder, relative: str) -> dict[str, Material]:
-    materials: dict[str, Material] = {}
+    definitions: dict[str, _Definition] = {}
     name = ""
     for line in folder.read(relative).decode("utf-8", errors="replace").split("\n"):
         key, _, rest = line.strip().partition(" ")
         if key == "newmtl":
             name = rest.strip()
-            materials[name] = Material()
-        elif name in materials:
+            definitions[name] = _Definition()
+        elif name in definitions and (key in _NUMBERS or key in _IMAGES):
             try:
-                materials[name] = _with_key(folder, relative, materials[name], (key, rest))
-            except (ValueError, IndexError):
+                _add(definitions[name], key, rest, lambda file: folder.refer(relative, file))
+            except (ValueError, IndexError) as error:
+                reason = f" ({error})" if str(error).startswith(f"{key} is") else ""
                 raise AssetError(
-                    f"{folder.root / relative}: material '{name}': malformed '{key}'; "
+                    f"{folder.root / relative}: material '{name}': malformed '{key}'{reason}; "
                     "export it again"
                 ) from None
-    return materials
+    return {name: definition.finished() for name, definition in definitions.items()}
 
 
-def _with_key(
-    folder: Folder, relative: str, material: Material, statement: tuple[str, str]
-) -> Material:
-    key, rest = statement
+_NUMBERS = frozenset({"Kd", "Ke", "Ns", "Ni", "Pr", "Pm", "Pc", "Pcr", "d", "Tr"})
+_IMAGES = {
+    "map_Kd": "albedo",
+    "map_Ke": "emission",
+    "map_d": "alpha",
+    "map_Pr": "roughness",
+    "map_Pm": "metallic",
+    "norm": "normal",
+}
+
+
+def _add(known: _Definition, key: str, rest: str, refer: Callable[[str], str]) -> None:
+    """Take one statement in. Raises ValueError or IndexError if it is malformed."""
+    if key in _IMAGES:
+        image: dict[str, Any] = {_IMAGES[key]: refer(_image_name(rest))}
+        known.maps = replace(known.maps, **image)
+        return
+    numbers = [float(x) for x in rest.split()]
     if key == "Kd":
-        red, green, blue = (float(x) for x in (rest.split() * 3)[:3])
-        return replace(material, base_color=linear_of_srgb((red, green, blue)))
-    if key == "Ns" and float(rest) > 0.0:
-        return replace(material, roughness=roughness_of_shininess(float(rest)))
-    if key == "Pr":
-        return replace(material, roughness=min(max(float(rest.split()[0]), 0.0), 1.0))
-    if key == "Pm":
-        return replace(material, metallic=min(max(float(rest.split()[0]), 0.0), 1.0))
-    if key == "map_Kd":
-        return replace(material, texture=folder.refer(relative, _image_name(rest)))
-    return material
+        red, green, blue = (numbers * 3)[:3]
+        color = linear_of_srgb((red, green, blue))
+        known.material = replace(known.material, base_color=color)
+    elif key == "Ke":
+        red, green, blue = (at_least(0.0, c, key) for c in (numbers * 3)[:3])
+        known.material = replace(known.material, emission_cd_m2=(red, green, blue))
+    elif key == "Ns":
+        if numbers[0] > 0.0:
+            roughness = roughness_of_shininess(numbers[0])
+            known.material = replace(known.material, roughness=roughness)
+    elif key == "Ni":
+        # Less than 1 is how exporters say that they do not know.
+        known.material = replace(known.material, ior=numbers[0] if numbers[0] > 1.0 else 1.5)
+    elif key in ("d", "Tr"):
+        _dissolve(known, key, numbers[-1])
+    else:
+        names = {"Pr": "roughness", "Pm": "metallic", "Pc": "coat", "Pcr": "coat_roughness"}
+        share: dict[str, Any] = {names[key]: fraction(numbers[0], key)}
+        known.material = replace(known.material, **share)
+
+
+def _dissolve(known: _Definition, key: str, number: float) -> None:
+    """Opacity by ``d``, or by ``Tr``, which is the contrary, where ``d`` is not given.
+
+    Nothing that is drawn is fully transparent: some exporters swap the two.
+    """
+    opacity = fraction(number, key) if key == "d" else 1.0 - fraction(number, key)
+    if key == "d" or not known.dissolved:
+        known.material = replace(known.material, opacity=opacity if opacity > 0.0 else 1.0)
+    known.dissolved = known.dissolved or key == "d"
 
 
 def _image_name(rest: str) -> str:

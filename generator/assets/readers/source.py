@@ -10,6 +10,8 @@ from generator.assets.soup import Soup
 from generator.core.se3 import Vec3
 
 MAX_FACES = 5_000_000
+EVEN = 3.0
+"""Channels of images that spread less than this [1/255] say one thing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +26,29 @@ class Source:
 
     soup: Soup
     images: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def fraction(value: object, name: str) -> float:
+    """A number in [0, 1]. Raises ValueError, naming it, if it is none."""
+    number = _number(value, name)
+    # Exporters round: a hair beyond an end means the end.
+    if not -1e-4 <= number <= 1.0 + 1e-4:
+        raise ValueError(f"{name} is {number:g}, not in [0, 1]")
+    return min(max(number, 0.0), 1.0)
+
+
+def at_least(low: float, value: object, name: str) -> float:
+    """A finite number that is not below ``low``. Raises ValueError, naming it, if it is none."""
+    number = _number(value, name)
+    if not low - 1e-6 <= number < math.inf:
+        raise ValueError(f"{name} is {number:g}, not a number of at least {low:g}")
+    return max(number, low)
+
+
+def _number(value: object, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"{name} is no number")
+    return float(value)
 
 
 def linear_of_srgb(color: Vec3) -> Vec3:

@@ -18,9 +18,11 @@ import numpy as np
 
 from generator.assets.folder import Folder
 from generator.assets.images import decode
-from generator.assets.readers.source import Source
+from generator.assets.maps import Maps
+from generator.assets.readers.source import EVEN, Source
 from generator.assets.soup import Slot, Soup, joined
 from generator.core.errors import AssetError
+from generator.core.geometry import Material, UInt8
 from generator.usd.looks import SurfaceLook
 from generator.usd.reading import SUFFIXES, OpenStage, Piece, layer_references
 
@@ -68,26 +70,63 @@ class StageFile:
         return Source(joined(soups), images)
 
     def _slot(self, look: SurfaceLook, images: dict[str, bytes]) -> Slot:
-        material = replace(
-            look.material,
-            roughness=self._dimmed(look.material.roughness, look.roughness_image),
-            metallic=self._dimmed(look.material.metallic, look.metallic_image),
-            texture=self._name(look.texture) if look.texture else "",
+        roughness, rough_map = self._mapped(look.material.roughness, look.roughness_image)
+        metallic, metal_map = self._mapped(look.material.metallic, look.metallic_image)
+        material = self._veiled(look)
+        maps = Maps(
+            albedo=self._name(look.texture),
+            alpha=self._channel(look.cover_image),
+            normal=self._name(look.normal_image),
+            roughness=rough_map,
+            metallic=metal_map,
+            occlusion=self._channel(look.occlusion_image),
+            emission=self._name(look.emission_image),
+            cutoff=look.cutoff,
         )
-        if material.texture and self.packed:
-            images[material.texture] = self.folder.read(material.texture)
+        material = replace(material, roughness=roughness, metallic=metallic, texture=maps.name())
+        if self.packed:
+            images |= {name: self.folder.read(name) for name in maps.images()}
         return Slot(look.name, material, from_file=True)
 
-    def _dimmed(self, value: float, image: tuple[str, int]) -> float:
-        """The mean of what an image makes of a number: a surface has one."""
+    def _mapped(self, value: float, image: tuple[str, int]) -> tuple[float, str]:
+        """A number and the channel that multiplies it, or what an even channel makes of it."""
+        if not image[0]:
+            return value, ""
+        channel = self._pixels(image)
+        if float(channel.std()) < EVEN:
+            return round(value * float(channel.mean()) / 255.0, 4), ""
+        return value, self._channel(image)
+
+    def _veiled(self, look: SurfaceLook) -> Material:
+        """The material under the mean of an image of its opacity."""
+        if not look.veil_image[0]:
+            return look.material
+        kept = float(self._pixels(look.veil_image).mean()) / 255.0
+        return replace(
+            look.material,
+            opacity=round(look.material.opacity * kept, 4),
+            transmission=0.0,
+        )
+
+    def _pixels(self, image: tuple[str, int]) -> UInt8:
+        """One channel of an image; white where a fourth is asked for and there is none."""
         path, channel = image
-        if not path:
-            return value
-        pixels = decode(self.folder.read(self._name(path)), f"{self.stage.place}: {path}")
-        return round(value * float(pixels[..., channel].mean()) / 255.0, 4)
+        data = self.folder.read(self._name(path))
+        pixels = decode(data, f"{self.stage.place}: {path}", alpha=True)
+        whole = channel < pixels.shape[2]
+        return pixels[..., channel] if whole else np.full(pixels.shape[:2], 255, np.uint8)
+
+    def _channel(self, image: tuple[str, int]) -> str:
+        return f"{self._name(image[0])}!{image[1]}" if image[0] else ""
 
     def _name(self, path: str) -> str:
-        """An image's path relative to the folder. Raises AssetError if it is outside."""
+        """An image's path relative to the folder; empty for none.
+
+        Raises:
+            AssetError: if it is outside.
+        """
+        if not path:
+            return ""
         root = self.folder.root.resolve()
         resolved = Path(path).resolve()
         if not resolved.is_relative_to(root):

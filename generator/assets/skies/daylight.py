@@ -38,6 +38,8 @@ _NIGHT_LUX, _NIGHT_OVERCAST_LUX = 0.03, 0.3
 # What the sun's colour is computed at [um], and its colour outside the atmosphere.
 _WAVELENGTHS_UM = (0.610, 0.550, 0.465)
 _SOLAR_COLOR = (1.07, 0.985, 0.90)
+# 0.35 cm of ozone, which takes 0.1 per cm at 555 nm (Preetham 1999, A.1).
+_OZONE_DEPTH = 0.035
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
@@ -64,7 +66,7 @@ def sun_illuminance_lux(
 def sun_color(altitude_rad: float, turbidity: float = CLEAR_TURBIDITY) -> Vec3:
     """Linear RGB of the sun's light at the ground, luminance 1."""
     mass = air_mass(max(altitude_rad, 0.0))
-    aerosol = max(0.04608 * turbidity - 0.04586, 0.0)
+    aerosol = _aerosol(turbidity)
     rgb = []
     for wavelength_um, outside in zip(_WAVELENGTHS_UM, _SOLAR_COLOR, strict=True):
         rayleigh = math.exp(-0.008735 * wavelength_um**-4.08 * mass)
@@ -72,6 +74,26 @@ def sun_color(altitude_rad: float, turbidity: float = CLEAR_TURBIDITY) -> Vec3:
     luminance = sum(weight * part for weight, part in zip(_LUMINANCE, rgb, strict=True))
     red, green, blue = (round(part / luminance, 6) for part in rgb)
     return (red, green, blue)
+
+
+def preetham_sun_lux(altitude_rad: float, turbidity: float) -> float:
+    """Of the sun alone in clear air, on a surface that faces it [lx]; 0 below the horizon.
+
+    Preetham 1999, A.1: extinction by air, aerosol and ozone, at the wavelength to which the eye is
+    most sensitive.
+    """
+    if altitude_rad <= 0.0:
+        return 0.0
+    mass, wavelength_um = air_mass(altitude_rad), 0.555
+    depth = 0.008735 * wavelength_um**-4.08 + _aerosol(turbidity) * wavelength_um**-1.3
+    return float(SOLAR_ILLUMINANCE_LUX * math.exp(-(depth + _OZONE_DEPTH) * mass))
+
+
+def preetham_zenith_cd_m2(altitude_rad: float, turbidity: float) -> float:
+    """Luminance of the clear sky's zenith; Preetham 1999, A.2, after Karayel et al. 1984."""
+    chi = (4.0 / 9.0 - turbidity / 120.0) * (2.0 * altitude_rad)
+    slope = 4.0453 * turbidity - 4.9710
+    return 1e3 * (slope * math.tan(chi) - 0.2155 * turbidity + 2.4192)
 
 
 def sun_radius_rad(cloudiness: float = 0.0) -> float:
@@ -92,6 +114,11 @@ def sky_illuminance_lux(altitude_rad: float, cloudiness: float = 0.0) -> float:
 def night_illuminance_lux(cloudiness: float = 0.0) -> float:
     """Of a city's sky long after sunset, on level ground [lx]."""
     return float(_NIGHT_LUX * (_NIGHT_OVERCAST_LUX / _NIGHT_LUX) ** cloudiness)
+
+
+def _aerosol(turbidity: float) -> float:
+    """Angstrom's coefficient (Preetham 1999, A.1)."""
+    return max(0.04608 * turbidity - 0.04586, 0.0)
 
 
 def _day_lux(kind: tuple[float, float, float], altitude_rad: float) -> float:

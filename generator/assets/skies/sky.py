@@ -23,6 +23,8 @@ from generator.core.geometry import Float32
 
 Array = NDArray[np.float64]
 
+MODELS = ("measured", "preetham")
+"""Where a sky's luminances come from."""
 _ROWS = 512
 _MEAN_ROWS = 64
 # Less light than this share of the rest is not computed.
@@ -78,6 +80,8 @@ class SkyModel:
         turbidity: 2 very clear, 3 usual, 6 hazy.
         cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
         ground_albedo: Of the land below the horizon.
+        model: ``measured``: as much light as IES RP-21 says, under any clouds, day and night.
+            ``preetham``: the luminances of Preetham's clear sky by day as published.
     """
 
     seed: int = 0
@@ -85,6 +89,7 @@ class SkyModel:
     turbidity: float = 2.5
     cloudiness: float = 0.0
     ground_albedo: float = 0.18
+    model: str = "measured"
 
     @property
     def sun_altitude_rad(self) -> float:
@@ -98,14 +103,22 @@ def sky(
     turbidity: float,
     cloudiness: float,
     ground_albedo: float,
+    model: str = "measured",
 ) -> Float32:
     """Relative luminance, mean 1; float32 [512, 1024, 3].
 
     Raises:
         ValueError: a parameter is outside its range.
     """
-    model = SkyModel(seed, sun_altitude_deg, turbidity, cloudiness, ground_albedo)
-    return normalised(luminance_cd_m2(model, _ROWS))
+    known = SkyModel(seed, sun_altitude_deg, turbidity, cloudiness, ground_albedo, model)
+    return normalised(luminance_cd_m2(known, _ROWS))
+
+
+def sun_lux(model: SkyModel) -> float:
+    """Illuminance of the sun alone, on a surface that faces it [lx]."""
+    if model.model == "preetham":
+        return daylight.preetham_sun_lux(model.sun_altitude_rad, model.turbidity)
+    return daylight.sun_illuminance_lux(model.sun_altitude_rad, model.turbidity, model.cloudiness)
 
 
 def mean_luminance_cd_m2(model: SkyModel) -> float:
@@ -125,6 +138,10 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Array:
     _check(model)
     d = directions(rows)
     above, below = d[: rows // 2], d[rows // 2 :]
+    if model.model == "preetham":
+        zenith = daylight.preetham_zenith_cd_m2(model.sun_altitude_rad, model.turbidity)
+        image = zenith * clear_sky(above, model.sun_altitude_rad, model.turbidity, pale=0.0)
+        return np.concatenate([image, _land(image, below, model)])
     night_lux = daylight.night_illuminance_lux(model.cloudiness)
     day_lux = daylight.sky_illuminance_lux(model.sun_altitude_rad, model.cloudiness) - night_lux
     image = np.zeros_like(above)
@@ -135,8 +152,15 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Array:
     return np.concatenate([image, _land(image, below, model)])
 
 
-def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
-    """Relative luminance of the clear sky by day, linear RGB, zenith about 1; Preetham 1999."""
+def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float = 1.0) -> Array:
+    """Relative luminance of the clear sky by day, linear RGB, zenith 1; Preetham 1999.
+
+    Args:
+        d: Unit directions, shape [h, w, 3], each row level.
+        sun_altitude_rad: Over the horizon.
+        turbidity: Of the air.
+        pale: How far the horizon's colour is taken from the fit's to that of photographs.
+    """
     zenith_distance = 0.5 * math.pi - sun_altitude_rad
     up = np.maximum(d[..., 2], 0.012)
     towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
@@ -160,8 +184,8 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     xyz = np.stack([x / y, np.ones_like(x), (1.0 - x - y) / y], axis=-1)
     rgb = np.maximum(np.einsum("hwc,kc->hwk", xyz, _RGB_OF_XYZ, optimize=False), 0.02)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
-    pale = np.exp(-rows_up / 0.22)[..., None] * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
-    rgb += pale * (_HORIZON - rgb)
+    high = pale * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
+    rgb += np.exp(-rows_up / 0.22)[..., None] * high * (_HORIZON - rgb)
     rgb /= np.einsum("hwc,c->hw", rgb, _LUMINANCE, optimize=False)[..., None]
     sky_rgb: Array = rgb * luminance[..., None]
     return sky_rgb
@@ -241,8 +265,7 @@ def _night(d: Array, model: SkyModel) -> Array:
 def _land(image: Array, d: Array, model: SkyModel) -> Array:
     """What lies below the horizon: land that sun and sky light, hazy where it is far."""
     altitude = model.sun_altitude_rad
-    sun_lux = daylight.sun_illuminance_lux(altitude, model.turbidity, model.cloudiness)
-    sun = sun_lux * max(math.sin(altitude), 0.0) * np.array(daylight.sun_color(altitude))
+    sun = sun_lux(model) * max(math.sin(altitude), 0.0) * np.array(daylight.sun_color(altitude))
     light = np.einsum("hwc,h->c", image, _cosine_weights(len(image)), optimize=False) + sun
     soil = _SOIL if model.ground_albedo < 0.5 else np.ones(3)
     land = model.ground_albedo / math.pi * light * soil
@@ -286,3 +309,10 @@ def _check(model: SkyModel) -> None:
     for name, value, low, high in limits:
         if not low <= value <= high:
             raise ValueError(f"{name} is {value:g}; expected a number in [{low:g}, {high:g}]")
+    if model.model not in MODELS:
+        raise ValueError(f"model is '{model.model}'; expected one of {', '.join(MODELS)}")
+    if model.model == "preetham" and (model.cloudiness > 0.0 or model.sun_altitude_deg < 1.0):
+        raise ValueError(
+            "preetham's sky has no clouds and no night; expected cloudiness 0 and sun_altitude_deg "
+            "from 1 on"
+        )

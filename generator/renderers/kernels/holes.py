@@ -6,6 +6,8 @@ shadows and laser beams agree on where, at every distance.
 
 from __future__ import annotations
 
+import inspect
+
 import warp as wp
 
 from generator.renderers.kernels.records import (
@@ -18,6 +20,8 @@ from generator.renderers.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Few bodies have holes: what they take is compiled once per module, not wherever it is called.
+OUT_OF_LINE = {"inline": False} if "inline" in inspect.signature(wp.func).parameters else {}
 # Rays that have passed a face go on this far behind it.
 STEP_M = wp.constant(2.0e-5)
 # Faces of one body that a ray passes at most.
@@ -87,7 +91,7 @@ def uv_at(world: World, surface: int, b: int, face: int, weights: wp.vec3):
     return uv
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def hole_at(world: World, b: int, face: int, weights: wp.vec3):
     """Whether there is a hole at a point of a face."""
     g = world.bodies[b].geometry
@@ -118,6 +122,45 @@ def passable(world: World, b: int, face: int, weights: wp.vec3, through: int):
     return clear
 
 
+@wp.struct
+class Strike:
+    """Where a ray meets a mesh, as ``wp.mesh_query_ray`` tells it; ``result`` is 0 where not."""
+
+    result: int
+    face: int
+    t: float
+    u: float
+    v: float
+    normal: wp.vec3
+
+
+@wp.func(**OUT_OF_LINE)
+def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+    """The first point of a body with holes that a ray does not pass; arguments as for solid_hit."""
+    mesh = world.geometries[world.bodies[b].geometry].mesh
+    strike = Strike()
+    begin = float(0.0)
+    faces = int(0)
+    going = bool(True)
+    while going:
+        going = False
+        answer = wp.mesh_query_ray(mesh, o + d * begin, d, reach - begin)
+        if answer.result:
+            weights = wp.vec3(answer.u, answer.v, 1.0 - answer.u - answer.v)
+            if passable(world, b, answer.face, weights, through):
+                begin += answer.t * 1.000001 + STEP_M / wp.length(d)
+                faces += 1
+                going = faces < FACES_MAX
+            else:
+                strike.result = 1
+                strike.t = begin + answer.t
+                strike.face = answer.face
+                strike.u = answer.u
+                strike.v = answer.v
+                strike.normal = answer.normal
+    return strike
+
+
 @wp.func
 def solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
     """The first point of a body that a ray does not pass, as ``wp.mesh_query_ray`` tells it.
@@ -130,18 +173,11 @@ def solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, throug
     mesh = world.geometries[world.bodies[b].geometry].mesh
     answer = wp.mesh_query_ray(mesh, o, d, reach)
     if (world.bodies[b].pierced & through) != 0:
-        begin = float(0.0)
-        step = STEP_M / wp.length(d)
-        faces = int(0)
-        going = bool(True)
-        while going:
-            going = False
-            if answer.result:
-                weights = wp.vec3(answer.u, answer.v, 1.0 - answer.u - answer.v)
-                if passable(world, b, answer.face, weights, through):
-                    begin += answer.t * 1.000001 + step
-                    faces += 1
-                    going = faces < FACES_MAX
-                    answer = wp.mesh_query_ray(mesh, o + d * begin, d, reach - begin)
-        answer.t = answer.t + begin
+        strike = beyond_holes(world, b, o, d, reach, through)
+        answer.result = strike.result != 0
+        answer.face = strike.face
+        answer.t = strike.t
+        answer.u = strike.u
+        answer.v = strike.v
+        answer.normal = strike.normal
     return answer

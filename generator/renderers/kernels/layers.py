@@ -451,6 +451,7 @@ def layers_at(
     mirrors = look.metallic >= 0.5 or clear > 0.0
     if mirrors and brdf.roughness < MIRROR_ROUGHNESS:
         layers.mirror = gloss
+        own -= lamps.shown
     else:
         mirrored = look.normal * (2.0 * n_v) - v
         sky = sky_reflection(world.sky, mirrored, brdf.roughness)
@@ -460,12 +461,13 @@ def layers_at(
         rough = world.surfaces[surface].coat_roughness
         lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
         share = coat * lacquer.gloss[0]
-        shine = light_of_lamps(world, lacquer, n, p, v, lit, k).shine
-        own = own * (1.0 - share) + shine * coat
+        above = light_of_lamps(world, lacquer, n, p, v, lit, k)
+        own = own * (1.0 - share) + above.shine * coat
         layers.mirror = layers.mirror * (1.0 - share)
         layers.behind = layers.behind * (1.0 - share)
         if lacquer.roughness < MIRROR_ROUGHNESS:
             layers.coat = share
+            own -= above.shown * coat
         else:
             sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
             own += sky * (share * open_lobe(lacquer, open_sky))
@@ -526,8 +528,8 @@ def ray_of(
                 bent = refracted(d, layers.n, eta)
                 if wp.dot(bent, bent) > 0.0:
                     ray.d = bent
-        elif world.surfaces[surface].thin != 0 and wp.max(layers.behind) > 0.0:
-            # Already part of the ray behind the pane.
+        elif world.surfaces[surface].thin != 0:
+            # Part of the ray behind the pane.
             ray.share = wp.vec3(0.0)
         ray.origin = beyond(p, ray.d, view.eye_m)
     return ray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.holes import solid_hit
+from generator.renderers.kernels.holes import OUT_OF_LINE, beyond_holes, solid_hit
 from generator.renderers.kernels.records import (
     CLEAR,
     HOLES,
@@ -104,7 +104,7 @@ def cut_by(world: World, b: int, path: Path, through: int):
         mesh = world.geometries[world.bodies[b].geometry].mesh
         hit = wp.mesh_query_ray_anyhit(mesh, o, d, 1.0)
         if hit and (world.bodies[b].pierced & through) != 0:
-            hit = solid_hit(world, b, o, d, 1.0, through).result
+            hit = beyond_holes(world, b, o, d, 1.0, through).result != 0
     return hit
 
 
@@ -120,7 +120,7 @@ def blocked(world: World, path: Path):
     return cut(world, path, LIGHT)
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def cut(world: World, path: Path, through: int):
     """Whether anything cuts a path that passes what ``through`` says."""
     hit = bool(False)
@@ -151,7 +151,7 @@ def blocked_by_listed(
     return hit
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def free_path(world: World, path: Path):
     """The part of a path that is free, from 0 to 1."""
     free = float(1.0)

@@ -179,6 +179,7 @@ class Lamp:
             they are at right angles to each other and to ``direction``.
         radius: Of the ball or the disk, or of the circle around the rectangle [m], or tangent of
             the sun's angular radius.
+        shown: 1 where a body before which a panel hangs shows it, so that rays find it.
         cos_outer, cos_inner: Where a spot has faded to nothing, and where it begins to fade.
     """
 
@@ -190,6 +191,7 @@ class Lamp:
     along: wp.vec3
     across: wp.vec3
     radius: float
+    shown: int
     cos_outer: float
     cos_inner: float
 

@@ -73,11 +73,13 @@ class LampLight:
     Attributes:
         lux: Illuminance of the surface [lx].
         shine: Reflected by the specular layer towards the viewer [cd/m^2].
+        shown: Part of ``shine`` from lamps that a mirrored ray finds.
         towards: Where it comes from, on average; any length.
     """
 
     lux: wp.vec3
     shine: wp.vec3
+    shown: wp.vec3
     towards: wp.vec3
 
 
@@ -107,7 +109,10 @@ def light_of_lamps(
                 lobe = specular_lobe(brdf, n, v, l, n_s, wider)
                 arriving = beam.normal_lux * (n_l * visible)
                 light.lux += arriving
-                light.shine += wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
+                shine = wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
+                light.shine += shine
+                if world.lamps[j].shown != 0:
+                    light.shown += shine
                 light.towards += beam.direction * (arriving[0] + arriving[1] + arriving[2])
     return light
 

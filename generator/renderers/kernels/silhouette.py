@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.holes import solid_hit
+from generator.renderers.kernels.holes import beyond_holes
 from generator.renderers.kernels.raster import (
     UNSNAPPED,
     Window,
@@ -153,6 +153,6 @@ def trace_silhouettes(
                 way = to_mesh_vector(world, b, d)
                 met = wp.mesh_query_ray_anyhit(mesh, o, way, FARTHEST)
                 if met and (world.bodies[b].pierced & HOLES) != 0:
-                    met = solid_hit(world, b, o, way, FARTHEST, HOLES).result
+                    met = beyond_holes(world, b, o, way, FARTHEST, HOLES).result != 0
                 if met:
                     mask[i] = wp.uint8(1)

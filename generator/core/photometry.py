@@ -1,0 +1,72 @@
+"""From what lamps are sold by to what they do: lumens, candelas, lux."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from generator.core.scene import Light
+
+
+def intensity_of_flux(light: Light, flux_lm: float) -> float:
+    """Luminous intensity [cd] of a light that sends out a luminous flux.
+
+    A ball sends it everywhere, a panel into the half space before it by Lambert's law, a spot into
+    its cone: evenly up to ``even`` of its half angle, and then fading to nothing, by a step that is
+    symmetric in the cosine, so that half of what lies between counts.
+
+    Args:
+        light: Of any kind but sun.
+        flux_lm: Of all its light.
+
+    Raises:
+        ValueError: a sun has no flux.
+    """
+    if light.kind == "sun":
+        raise ValueError("a sun has an illuminance, not a flux")
+    if light.kind == "sphere":
+        return flux_lm / (4.0 * math.pi)
+    if light.kind == "spot":
+        inner, outer = (1.0 - math.cos(share * light.cone_rad) for share in (light.even, 1.0))
+        return flux_lm / (math.pi * (inner + outer))
+    return flux_lm / math.pi
+
+
+def intensity_of_illuminance(light: Light, lux: float, distance_m: float) -> float:
+    """Luminous intensity [cd] with which a light gives an illuminance straight before it.
+
+    Args:
+        light: Of any kind but sun.
+        lux: On a surface that faces the light's centre.
+        distance_m: From the centre; panels are turned to the surface.
+
+    Sources: the inverse square law; for panels, Howell, "A catalog of radiation heat transfer
+    configuration factors", 1982 (a disk and a rectangle before a parallel element).
+    """
+    squared_m2 = distance_m * distance_m
+    if light.kind == "disk":
+        return lux * (squared_m2 + light.radius_m * light.radius_m)
+    if light.kind == "rectangle":
+        a, b = (0.5 * side_m for side_m in light.size_m)
+        long, across = math.sqrt(squared_m2 + a * a), math.sqrt(squared_m2 + b * b)
+        per_luminance = 2.0 * (a / long * math.atan(b / long) + b / across * math.atan(a / across))
+        return lux * 4.0 * a * b / per_luminance
+    return lux * squared_m2
+
+
+def luminance_cd_m2(light: Light) -> float:
+    """Of a panel's front.
+
+    Raises:
+        ValueError: the light is no panel.
+    """
+    if light.kind == "rectangle":
+        return light.intensity_cd / (light.size_m[0] * light.size_m[1])
+    if light.kind == "disk":
+        return light.intensity_cd / (math.pi * light.radius_m * light.radius_m)
+    raise ValueError(f"a light of kind {light.kind} is no panel")
+
+
+def with_flux(light: Light, flux_lm: float) -> Light:
+    """The light with the intensity that belongs to a luminous flux."""
+    return replace(light, intensity_cd=round(intensity_of_flux(light, flux_lm), 4))

@@ -1,0 +1,106 @@
+"""Panels under the ceiling of a room."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from generator.config.distributions import (
+    Bounds,
+    Constant,
+    Count,
+    Flag,
+    Name,
+    NonNegative,
+    Probability,
+    Scalar,
+    Uniform,
+    UniformInteger,
+)
+from generator.core.errors import ConfigError, did_you_mean
+from generator.core.fixtures import PANELS, fixture_asset, with_fixture, without_lights
+from generator.core.interfaces import AssetIndex
+from generator.core.photometry import with_flux
+from generator.core.scene import Light, LightKind, Scene
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+from randomizers.base import RandomizerBase
+from randomizers.color_space import linear_of_temperature
+
+
+class CeilingLights(RandomizerBase):
+    """Hangs bright panels in a grid under the ceiling, in place of all lights.
+
+    They hang at the top of the space in which lights may be, and shine straight down.
+
+    Attributes:
+        kind: rectangle or disk, all alike.
+        rows, columns: Of the grid, along Y and X of the room.
+        size_m: Sides of a rectangle along X and Y; a disk has the first for its diameter.
+        luminous_flux_lm: Of one panel; an office panel of 0.6 m by 0.6 m gives 4000 lm.
+        temperature_k: Of all panels.
+        broken: Whether a panel stays dark.
+        visible: Whether they are seen, in housings with a bright front.
+        keep: Whether the lights that are there stay.
+    """
+
+    type: Literal["ceiling_lights"] = "ceiling_lights"
+    kind: Name = Constant("rectangle")
+    rows: Count = UniformInteger(1, 2)
+    columns: Count = UniformInteger(2, 3)
+    size_m: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (0.6, 0.6)
+    luminous_flux_lm: NonNegative = Uniform(2500.0, 4500.0)
+    temperature_k: Annotated[Scalar, Bounds(1667, 25000)] = Uniform(2700.0, 6500.0)
+    broken: Flag = Probability(0.05)
+    visible: bool = True
+    keep: bool = False
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene under other lights."""
+        scene = scene if self.keep else without_lights(scene)
+        kind = self._kind(rng)
+        rows, columns = self.rows.draw(rng), self.columns.draw(rng)
+        color = linear_of_temperature(self.temperature_k.draw(rng))
+        flux_lm = self.luminous_flux_lm.draw(rng)
+        for k in range(rows * columns):
+            at_m = _grid_point(scene, k // columns, k % columns, rows, columns)
+            light = replace(self._panel(f"{self.name}/{k}", kind, at_m), color=color)
+            lit = 0.0 if self.broken.draw(rng) else flux_lm
+            light = with_flux(light, lit)
+            if self.visible:
+                materials = assets.materials(fixture_asset(light))
+                scene, light = with_fixture(scene, light, materials)
+            if lit > 0.0:
+                scene = replace(scene, lights=(*scene.lights, light))
+        return scene
+
+    def _kind(self, rng: Rng) -> LightKind:
+        drawn = self.kind.draw(rng)
+        if drawn == "rectangle":
+            return "rectangle"
+        if drawn == "disk":
+            return "disk"
+        raise ConfigError(
+            f"randomizers.{self.name}.kind: unknown panel '{drawn}'; expected one of "
+            f"{', '.join(PANELS)}{did_you_mean(drawn, PANELS)}"
+        )
+
+    def _panel(self, name: str, kind: LightKind, at_m: Vec3) -> Light:
+        return Light(
+            name,
+            kind,
+            position_m=at_m,
+            direction=(0.0, 0.0, -1.0),
+            size_m=self.size_m,
+            radius_m=0.5 * self.size_m[0],
+        )
+
+
+def _grid_point(scene: Scene, row: int, column: int, rows: int, columns: int) -> Vec3:
+    """Middle of one of the equal fields into which the ceiling is cut."""
+    (x0, y0, _), (x1, y1, z1) = scene.interior_m
+    x = x0 + (x1 - x0) * (column + 0.5) / columns
+    y = y0 + (y1 - y0) * (row + 0.5) / rows
+    return (round(x, 6), round(y, 6), z1)

@@ -1,0 +1,273 @@
+"""What files say of coats, glass, opacity, holes and light: it arrives, or is refused by name."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from generator.assets.folder import Folder
+from generator.assets.library import open_library
+from generator.assets.maps import Maps, composed, maps_named
+from generator.assets.readers import read_mesh
+from generator.core.errors import AssetError, ConfigError
+from generator.core.geometry import Material, TextureData
+
+TRIANGLE_OBJ = (
+    "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+)
+
+
+def png(pixels: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def gltf(folder: Path, material: dict[str, Any], **images: np.ndarray) -> None:
+    """A triangle with a material, beside its images, which have the numbers of their order."""
+    positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
+    uvs = np.array([[0, 0], [1, 0], [0, 1]], "<f4").tobytes()
+    (folder / "t.bin").write_bytes(positions + uvs)
+    for name, pixels in images.items():
+        (folder / f"{name}.png").write_bytes(png(pixels))
+    tree = {
+        "asset": {"version": "2.0"},
+        "nodes": [{"mesh": 0}],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}
+        ],
+        "materials": [{"name": "skin of it", **material}],
+        "textures": [{"source": k} for k in range(len(images))],
+        "images": [{"uri": f"{name}.png"} for name in images],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 36, "byteLength": 24},
+        ],
+        "buffers": [{"byteLength": 60, "uri": "t.bin"}],
+    }
+    (folder / "t.gltf").write_text(json.dumps(tree))
+
+
+def loaded(folder: Path) -> tuple[Material, TextureData | None]:
+    """The material as the library serves it, and its texture."""
+    library = open_library([folder], cache_dir=folder.parent / "cache")
+    (material,) = library.mesh("user/t").materials
+    return material, library.texture(material.texture) if material.texture else None
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    path = tmp_path / "assets"
+    path.mkdir()
+    return path
+
+
+def checker(low: int, high: int) -> np.ndarray:
+    y, x = np.mgrid[:4, :4]
+    return np.where((x + y) % 2, high, low).astype(np.uint8)
+
+
+def test_gltf_extensions_become_coat_glass_and_light(folder: Path) -> None:
+    """Numbers as written; a volume makes glass a solid; nits stay nits; F0 follows the index."""
+    gltf(folder, {
+        "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 1], "metallicFactor": 0,
+                                 "roughnessFactor": 0.1},
+        "emissiveFactor": [1.0, 0.5, 0.0],
+        "extensions": {
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.8, "clearcoatRoughnessFactor": 0.2},
+            "KHR_materials_transmission": {"transmissionFactor": 0.9},
+            "KHR_materials_volume": {"thicknessFactor": 0.01},
+            "KHR_materials_ior": {"ior": 1.33},
+            "KHR_materials_emissive_strength": {"emissiveStrength": 400.0},
+        },
+    })  # fmt: skip
+
+    material, texture = loaded(folder)
+
+    assert texture is None
+    assert (material.coat, material.coat_roughness) == (0.8, 0.2)
+    assert (material.transmission, material.ior, material.thin) == (0.9, 1.33, False)
+    assert material.emission_cd_m2 == (400.0, 200.0, 0.0)
+    assert material.specular == pytest.approx((0.33 / 2.33) ** 2 / 0.08, abs=1e-4)
+    assert material.base_color == (1.0, 1.0, 1.0)
+
+
+def test_gltf_images_become_maps(folder: Path) -> None:
+    """Roughness from green, metal from blue, occlusion from red, coverage from alpha."""
+    orm = np.dstack([checker(100, 200), checker(0, 255), checker(255, 0)])
+    leaf = np.dstack([np.full((4, 4, 3), 90, np.uint8), checker(0, 200)])
+    glow = np.dstack([checker(0, 255)] * 3)
+    gltf(
+        folder,
+        {
+            "alphaMode": "MASK",
+            "alphaCutoff": 0.25,
+            "pbrMetallicRoughness": {
+                "baseColorTexture": {"index": 0},
+                "metallicRoughnessTexture": {"index": 1},
+            },
+            "occlusionTexture": {"index": 1},
+            "emissiveFactor": [3, 3, 3],
+            "emissiveTexture": {"index": 2},
+            "normalTexture": {"index": 2},
+        },
+        leaf=leaf,
+        orm=orm,
+        glow=glow,
+    )
+
+    material, texture = loaded(folder)
+
+    assert texture is not None
+    assert (material.roughness, material.metallic, material.opacity) == (1.0, 1.0, 1.0)
+    np.testing.assert_array_equal(texture.albedo, leaf[..., :3])
+    np.testing.assert_array_equal(texture.roughness, orm[..., 1])
+    np.testing.assert_array_equal(texture.metallic, orm[..., 2])
+    np.testing.assert_array_equal(texture.occlusion, orm[..., 0])
+    np.testing.assert_array_equal(texture.emission, glow)
+    np.testing.assert_array_equal(texture.normal, glow)
+    assert texture.alpha is not None
+    np.testing.assert_array_equal(texture.alpha >= 128, leaf[..., 3] >= 0.25 * 255)
+
+
+def test_even_images_become_numbers(folder: Path) -> None:
+    """A roughness image of 128 and a metal image of 255 are factors, not maps."""
+    even = np.zeros((4, 4, 3), np.uint8)
+    even[..., 1], even[..., 2] = 128, 255
+    gltf(folder, {"pbrMetallicRoughness": {
+        "metallicRoughnessTexture": {"index": 0}, "roughnessFactor": 0.5}}, even=even)  # fmt: skip
+
+    material, texture = loaded(folder)
+
+    assert texture is None
+    assert material.roughness == pytest.approx(0.5 * 128 / 255, abs=1e-4)
+    assert material.metallic == 1.0
+
+
+def test_a_blended_image_is_opacity_and_holes(folder: Path) -> None:
+    """Half of 4 x 4 texels at 0.4, half at nothing: opacity 0.4, and holes where nothing is."""
+    veil = np.dstack([np.full((4, 4, 3), 255, np.uint8), checker(0, 102)])
+    gltf(folder, {"alphaMode": "BLEND", "pbrMetallicRoughness": {
+        "baseColorTexture": {"index": 0}}}, veil=veil)  # fmt: skip
+
+    material, texture = loaded(folder)
+
+    assert material.opacity == pytest.approx(0.4, abs=1e-4)
+    assert texture is not None and texture.alpha is not None
+    np.testing.assert_array_equal(texture.alpha >= 128, veil[..., 3] > 0)
+
+
+def test_mtl_says_opacity_light_coat_and_holes(folder: Path) -> None:
+    """``d`` goes before ``Tr``; a coverage image of its own is grey."""
+    (folder / "t.obj").write_text(TRIANGLE_OBJ)
+    (folder / "m.mtl").write_text(
+        "newmtl m\nKd 1 1 1\nTr 0.9\nd 0.6\nKe 10 20 30\nPc 0.7\nPcr 0.1\nNi 1.4\n"
+        "map_d hole.png\nmap_Kd wood.png\nmap_Ke lamp.png\n"
+    )
+    hole, wood = checker(0, 255), np.dstack([checker(10, 240)] * 3)
+    for name, pixels in (("hole", hole), ("wood", wood), ("lamp", wood)):
+        (folder / f"{name}.png").write_bytes(png(pixels))
+
+    material, texture = loaded(folder)
+
+    assert material.opacity == 0.6
+    assert material.emission_cd_m2 == (10.0, 20.0, 30.0)
+    assert (material.coat, material.coat_roughness, material.ior) == (0.7, 0.1, 1.4)
+    assert texture is not None
+    np.testing.assert_array_equal(texture.alpha >= 128, hole >= 128)
+    np.testing.assert_array_equal(texture.emission, wood)
+
+
+def test_a_changed_map_is_another_asset(folder: Path) -> None:
+    """Content hashes cover every image that an MTL file names."""
+    (folder / "t.obj").write_text(TRIANGLE_OBJ)
+    (folder / "m.mtl").write_text("newmtl m\nmap_Kd wood.png\nmap_Ke lamp.png\n")
+    (folder / "wood.png").write_bytes(png(np.dstack([checker(10, 240)] * 3)))
+    digests = []
+    for value in (50, 60):
+        (folder / "lamp.png").write_bytes(png(np.full((2, 2, 3), value, np.uint8)))
+        library = open_library([folder], cache_dir=folder.parent / f"cache{value}")
+        digests.append(library.get("user/t").sha256)
+    assert digests[0] != digests[1]
+
+
+BAD = {
+    "roughnessFactor": {"pbrMetallicRoughness": {"roughnessFactor": 1.5}},
+    "metallicFactor": {"pbrMetallicRoughness": {"metallicFactor": -0.2}},
+    "clearcoatFactor": {"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 2}}},
+    "transmissionFactor": {
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.2}}
+    },
+    "alpha": {"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, -1]}},
+    "emissiveFactor": {"emissiveFactor": [0, -1, 0]},
+    "emissiveStrength": {
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": float("nan")}}
+    },
+    "ior": {"extensions": {"KHR_materials_ior": {"ior": 0.9}}},
+}
+
+
+@pytest.mark.parametrize("field", sorted(BAD))
+def test_gltf_values_out_of_range_are_one_clear_error(folder: Path, field: str) -> None:
+    """It names the file, the material and the field."""
+    gltf(folder, BAD[field])
+    with pytest.raises(AssetError, match=rf"t\.gltf: .*material 'skin of it': .*{field}.* is"):
+        read_mesh(Folder(folder), "t.gltf")
+
+
+@pytest.mark.parametrize("line", ["d 1.5", "Tr -0.5", "Pr nan", "Pm 2", "Pc -1", "Ke -1 0 0"])
+def test_mtl_values_out_of_range_are_one_clear_error(folder: Path, line: str) -> None:
+    """It names the file, the material and the statement."""
+    (folder / "t.obj").write_text(TRIANGLE_OBJ)
+    (folder / "m.mtl").write_text(f"newmtl m\n{line}\n")
+    with pytest.raises(AssetError, match=rf"m\.mtl: material 'm': .*{line.partition(' ')[0]} is"):
+        read_mesh(Folder(folder), "t.obj")
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("coat", "1.5"),
+        ("transmission", "-0.1"),
+        ("opacity", ".nan"),
+        ("ior", "0.5"),
+        ("emission_cd_m2", "[-1, 0, 0]"),
+    ],
+)
+def test_index_values_out_of_range_are_one_clear_error(
+    folder: Path, field: str, value: str
+) -> None:
+    """It names the index and the field."""
+    (folder / "t.obj").write_text(TRIANGLE_OBJ)
+    (folder / "m.mtl").write_text("newmtl m\n")
+    (folder / "assets.yaml").write_text(
+        "assets:\n  - id: thing\n    file: t.obj\n    category: thing\n    licence: CC0-1.0\n"
+        f"    materials: {{m: {{{field}: {value}}}}}\n"
+    )
+    with pytest.raises(ConfigError, match=rf"assets\.yaml.*materials\.m\.{field}"):
+        open_library([folder], cache_dir=folder.parent / "cache").get("user/thing")
+
+
+def test_names_of_maps_survive_any_file_name() -> None:
+    """Spaces, semicolons and equal signs in names of images come back."""
+    maps = Maps(albedo="a b;c=d.png", metallic="x%20/y.png!2", alpha="a b;c=d.png!3", cutoff=0.2)
+    assert maps_named(maps.name()) == maps
+    assert maps_named("plain.png") is None
+    assert Maps(albedo="plain.png").name() == "plain.png"
+
+
+def test_maps_of_several_sizes_take_the_largest() -> None:
+    """A grey of 2 x 2 beside a colour of 8 x 4."""
+    small, large = np.full((2, 2, 3), 70, np.uint8), np.full((4, 8, 3), 9, np.uint8)
+    texture = composed(Maps(albedo="s", emission="l"), {"s": small, "l": large}.__getitem__)
+    assert texture.albedo.shape == (4, 8, 3) and (texture.albedo == 70).all()

@@ -1,0 +1,126 @@
+"""Panoramas of users: Radiance and OpenEXR; what is no light is refused with one clear error."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from generator.assets.images import decode_radiance
+from generator.assets.library import open_library
+from generator.core.errors import AssetError
+from generator.packs.panoramas import radiance_file
+
+
+def pixels(height: int = 8) -> np.ndarray:
+    """Some light, brighter from above, in three colours; exact in Radiance's eight bits."""
+    rows = np.repeat(np.linspace(4.0, 1.0, height)[:, None], 2 * height, axis=1)
+    return (np.round(rows[..., None] * (1.0, 0.5, 0.25) * 32.0) / 32.0).astype(np.float32)
+
+
+def exr_file(rgb: np.ndarray, names: str = "RGB") -> bytes:
+    """An OpenEXR file of 32-bit floats."""
+    channels = {name: np.ascontiguousarray(rgb[..., k]) for k, name in enumerate(names)}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
+        OpenEXR.File(header, channels).write(file.name)
+        return Path(file.name).read_bytes()
+
+
+def with_texel(value: float) -> np.ndarray:
+    rgb = pixels()
+    rgb[5, 3, 1] = value
+    return rgb
+
+
+def test_openexr_and_radiance_hold_the_same_light() -> None:
+    """The same panorama of mean luminance 1 from both, to the precision of Radiance (1 %)."""
+    exr, hdr = (
+        decode_radiance(exr_file(pixels()), "a"),
+        decode_radiance(radiance_file(pixels()), "b"),
+    )
+
+    np.testing.assert_allclose(exr, hdr, rtol=0.01)
+    np.testing.assert_allclose(exr[0, 0] / exr[0, 0, 0], (1.0, 0.5, 0.25), rtol=1e-6)
+    rows = np.cos(np.pi * np.arange(9) / 8)
+    mean = ((exr @ (0.2126, 0.7152, 0.0722)).mean(axis=1) * 0.5 * (rows[:-1] - rows[1:])).sum()
+    assert mean == pytest.approx(1.0, rel=1e-6)
+
+
+def test_a_little_ringing_below_zero_is_dark() -> None:
+    """Filters leave values a little below zero beside a sun; they are taken for none."""
+    rgb = with_texel(-1e-5)
+
+    assert decode_radiance(exr_file(rgb), "sky")[5, 3, 1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: exr_file(with_texel(float("nan"))), "row 5, column 3 is nan"),
+        (lambda: exr_file(with_texel(float("inf"))), "row 5, column 3 is inf"),
+        (lambda: exr_file(with_texel(-2.0)), "row 5, column 3 is -2"),
+        (lambda: exr_file(0.0 * pixels()), "black"),
+        (lambda: exr_file(pixels()[:, :8]), "8 x 8 px; a panorama is twice as wide as high"),
+        (lambda: exr_file(pixels()[..., :2], "RG"), "has no channels R, G, B"),
+        (lambda: exr_file(pixels(64))[:600], "unreadable OpenEXR image"),
+        (lambda: exr_file(pixels())[:4] + bytes(200), "unreadable OpenEXR image"),
+        (lambda: exr_file(np.ones((1, 17000, 3), np.float32)), "at most 16384 a side"),
+        (lambda: radiance_file(pixels())[:-100], "unreadable panorama"),
+        (lambda: radiance_file(0.0 * pixels()), "black"),
+        (lambda: b"#?RADIANCE\n\nnonsense", "neither Radiance nor OpenEXR"),
+        (lambda: b"", "neither Radiance nor OpenEXR"),
+        (lambda: b"\x89PNG\r\n\x1a\n" + bytes(64), "neither Radiance nor OpenEXR"),
+    ],
+)
+def test_what_is_no_panorama_is_refused_and_nothing_is_kept(
+    tmp_path: Path, make: Callable[[], bytes], said: str
+) -> None:
+    """One error that names the file and what is wrong; the cache stays empty."""
+    folder, cache = tmp_path / "mine", tmp_path / "cache"
+    folder.mkdir()
+    (folder / "sky.exr").write_bytes(make())
+    (folder / "assets.yaml").write_text("environments:\n  - {id: sky, file: sky.exr}\n")
+    library = open_library((folder,), cache, tmp_path / "no packs")
+
+    with pytest.raises(AssetError, match=r"sky\.exr: ") as refused:
+        library.environment("user/sky")
+
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert not [path for path in cache.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"\x89PNG\r\n\x1a\n" + bytes(64), b"not an image at all", b"\xff\xd8\xff" + bytes(90)],
+)
+def test_a_corrupt_texture_is_refused_and_nothing_is_kept(tmp_path: Path, data: bytes) -> None:
+    """Empty, cut off or something else: one error that names the file."""
+    folder, cache = tmp_path / "mine", tmp_path / "cache"
+    folder.mkdir()
+    (folder / "wood.png").write_bytes(data)
+    (folder / "assets.yaml").write_text("textures:\n  - {id: wood, file: wood.png}\n")
+    library = open_library((folder,), cache, tmp_path / "no packs")
+
+    with pytest.raises(AssetError, match=r"wood\.png: unreadable image") as refused:
+        library.texture("user/wood")
+
+    assert "\n" not in str(refused.value)
+    assert not [path for path in cache.rglob("*") if path.is_file()]
+
+
+def test_a_panorama_of_the_user_lights_as_one_of_the_packs(tmp_path: Path) -> None:
+    """An OpenEXR file in a folder of one's own is an environment by its id."""
+    (tmp_path / "sky.exr").write_bytes(exr_file(pixels(16)))
+    (tmp_path / "assets.yaml").write_text(
+        "environments:\n  - {id: sky, file: sky.exr, tags: [outdoor]}\n"
+    )
+    library = open_library((tmp_path,), tmp_path / "cache", tmp_path / "no packs")
+
+    assert [a.asset_id for a in library.find(("outdoor",), "environment")].count("user/sky") == 1
+    assert library.environment("user/sky").shape == (16, 32, 3)
