@@ -9,6 +9,7 @@ from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
 from generator.renderers.color import LitImage, color_image, lit_image, radiance_image
+from generator.renderers.denoising import require_denoiser
 from generator.renderers.device import open_device
 from generator.renderers.kernels.records import View
 from generator.renderers.labels import label_images
@@ -36,7 +37,7 @@ class WarpRenderer:
         settings: How colour images are made.
 
     Raises:
-        ConfigError: if the device does not exist.
+        ConfigError: if the device does not exist, or a denoiser is asked for and not there.
     """
 
     def __init__(
@@ -49,6 +50,8 @@ class WarpRenderer:
                 f"renderer.visibility: 'raster' works on the CPU only, not on '{self._device}';"
                 " choose 'auto' or 'rays'."
             )
+        if self._settings.tier == "pathtraced" and self._settings.denoise:
+            require_denoiser()
         self._stock = AssetStock(assets, self._device)
         self._paths: PathTracer | None = None
 
