@@ -11,6 +11,7 @@ from generator.core.scene import Camera, Scene
 from generator.core.streams import Streams
 from generator.renderers.cache import ByteCache
 from generator.renderers.color import darken_outside, images_of
+from generator.renderers.denoising import denoised, require_denoiser
 from generator.renderers.environments import irradiance_coefficients
 from generator.renderers.importance import sky_shares
 from generator.renderers.kernels import path, records
@@ -24,6 +25,7 @@ from generator.renderers.weather import fill_fog, ground_of
 
 # A launch is bounded, so that a device that also drives a screen is not held for long.
 _SAMPLES_AT_ONCE = 32
+_GUIDE_SAMPLES = 16
 _TABLE_BYTES = 16 << 20
 _IRRADIANCE_SIZE = (64, 32)
 
@@ -48,6 +50,8 @@ class PathTracer:
     def __init__(self, stock: AssetStock, settings: RenderSettings) -> None:
         self._stock = stock
         self._settings = settings
+        if settings.denoise:
+            require_denoiser()
         self._lobes = wp.array(smith_albedo(), dtype=wp.vec2, device=stock.device)
         self._skies: ByteCache[_SkyLight] = ByteCache(_TABLE_BYTES)
 
@@ -56,6 +60,8 @@ class PathTracer:
     ) -> wp.array:
         """As of ``radiance``, through the air: that of the pixel centres' depths."""
         radiance = self.radiance(scene, camera, world, view)
+        if self._settings.denoise:
+            self._denoise(world, view, radiance)
         fill_fog(world, view, images_of(seen), radiance, self._stock)
         darken_outside(view, radiance)
         return radiance
@@ -100,6 +106,18 @@ class PathTracer:
         share = 1.0 / self._settings.samples
         wp.launch(path.scale_light, n, [share], [radiance], device=self._stock.device)
         return radiance
+
+    def _denoise(self, world: PackedWorld, view: records.View, radiance: wp.array) -> None:
+        """Take out the noise, in place."""
+        from generator.renderers.kernels.path_guides import trace_guides
+
+        device, n = self._stock.device, view.width * view.height
+        shape = (view.height, view.width, 3)
+        albedo, normal = (wp.zeros(n, dtype=wp.vec3, device=device) for _ in range(2))
+        inputs = [view, world.record, _GUIDE_SAMPLES, 0]
+        wp.launch(trace_guides, n, inputs, [albedo, normal], device=device)
+        clean = denoised(*(image.numpy().reshape(shape) for image in (radiance, albedo, normal)))
+        radiance.assign(clean.reshape(-1, 3))
 
     def _budget(
         self, scene: Scene, camera: Camera, world: PackedWorld, seed: int, lights: int

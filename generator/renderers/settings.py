@@ -17,6 +17,8 @@ class RenderSettings(Strict):
             from surface to surface and converges to what physics says.
         samples: Paths per pixel (path-traced tier); their mean over the pixel's square.
         max_bounces: How often a path is scattered at most (path-traced tier).
+        denoise: Whether the noise of few samples is taken out by Open Image Denoise (path-traced
+            tier; package extra ``denoise``). Bytes are then those of one kind of processor.
         antialias: Samples per pixel on edges; 1 switches anti-aliasing off.
         shadows: ``soft`` follows the size of every light, ``hard`` takes lights for points.
         ambient_occlusion_radius_m: How far away a surface still darkens its neighbourhood; 0
@@ -36,6 +38,7 @@ class RenderSettings(Strict):
     tier: Literal["realtime", "pathtraced"] = "realtime"
     samples: int = Field(64, ge=1, le=65536)
     max_bounces: int = Field(16, ge=1, le=256)
+    denoise: bool = False
     antialias: Literal[1, 2, 4, 8] = 4
     shadows: Literal["soft", "hard"] = "soft"
     ambient_occlusion_radius_m: float = Field(0.25, ge=0.0)

@@ -37,7 +37,7 @@ class WarpRenderer:
         settings: How colour images are made.
 
     Raises:
-        ConfigError: if the device does not exist.
+        ConfigError: if the device does not exist, or a denoiser is asked for and not there.
     """
 
     def __init__(

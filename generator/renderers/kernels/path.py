@@ -323,8 +323,12 @@ def light_through(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear
 
 @wp.func
 def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float):
-    """Light of the lamps that a stretch of a ray meets, up to a distance from its anchor."""
+    """Light of the lamps that a stretch of a ray meets, up to a distance from its anchor.
+
+    Also 1 where the body at its end shows one of them: that body's own light is the lamp's.
+    """
     light = wp.vec3(0.0)
+    shown = int(0)
     for j in range(world.lamps.shape[0]):
         g = meet_lamp(world.lamps[j], a.p, d)
         if g.distance_m > a.way_m and g.distance_m < end_m:
@@ -333,7 +337,8 @@ def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float)
                 asked = g.density * lamp_weight(world.lamps[j], a.p, a.n) / wp.max(a.total, 1.0e-20)
                 part = preferred(a.density, asked) * float(budget.lights >> 1)
             light += g.radiance * part
-    return light
+            shown = wp.max(shown, world.lamps[j].shown)
+    return light, shown
 
 
 @wp.func
@@ -601,15 +606,18 @@ def path_light(
         going = False
         hit = first_hit(world, o, d, AT_INFINITY)
         end_m = a.way_m + wp.where(hit.at[0] < 0, 2.0 * AT_INFINITY, hit.t)
+        shown = int(0)
         if bounces > 0:
-            light += wp.cw_mul(through, lamps_met(world, budget, a, d, end_m))
+            met, shown = lamps_met(world, budget, a, d, end_m)
+            light += wp.cw_mul(through, met)
         if hit.at[0] < 0:
             if bounces > 0 or world.sky.visible != 0:
                 light += wp.cw_mul(through, sky_met(world, table, budget, a, d))
         else:
             width_m += cone * hit.t
             v = vertex_of(world, hit, d, width_m)
-            light += wp.cw_mul(through, v.glow)
+            if shown == 0:
+                light += wp.cw_mul(through, v.glow)
             if bounces < budget.bounces and passages < PASSAGES_MAX:
                 pair = 1 + PAIRS * (bounces + passages)
                 lots = random_pair(key, pair, sample)
