@@ -32,14 +32,8 @@ from generator.preview.shapes import boxes_2d, boxes_3d, mesh_3d, pinhole, trans
 TIMELINE = "sample"
 TIME = "time"
 APPLICATION = "gen-data"
-FLOWS = {
-    Channel.FLOW_FORWARD,
-    Channel.FLOW_BACKWARD,
-    Channel.FLOW_OCCLUDED_FORWARD,
-    Channel.FLOW_OCCLUDED_BACKWARD,
-    Channel.SCENE_FLOW,
-}
-"""Shown beside the image, on the colour wheel of flow."""
+IN_IMAGE = {Channel.RGB, Channel.Z_DEPTH, Channel.MEASURED_DEPTH, Channel.CATEGORY}
+"""Channels that are laid over each other; all others have pictures of their own."""
 AXES_M = 0.5
 """Length at which the axes of rigs and devices are drawn."""
 
@@ -176,19 +170,18 @@ class Recorder:
         # Rerun knows no other camera: images of other lenses are shown by themselves.
         if reading.camera.intrinsics.straight:
             self.stream.log(f"{path}/image", pinhole(reading.camera.intrinsics))
-        channels = reading.channels
-        if Channel.RGB in channels:
-            self.stream.log(f"{path}/image/rgb", rr.Image(channels[Channel.RGB]).compress(90))
-        if Channel.Z_DEPTH in channels:
-            depth_m = channels[Channel.Z_DEPTH]
-            shown = np.where(np.isfinite(depth_m), depth_m, 0).astype(np.float32)
-            self.stream.log(f"{path}/image/depth", rr.DepthImage(shown, meter=1.0))
-        if Channel.CATEGORY in channels:
-            categories = rr.SegmentationImage(channels[Channel.CATEGORY], opacity=0.4)
-            self.stream.log(f"{path}/image/category", categories)
-        for channel in sorted(channels.keys() & FLOWS, key=lambda c: c.value):
-            shown_flow = rr.Image(channel_image(reading, channel)).compress(90)
-            self.stream.log(f"{path}/{channel.value}", shown_flow)
+        for channel, data in reading.channels.items():
+            if channel is Channel.RGB:
+                self.stream.log(f"{path}/image/rgb", rr.Image(data).compress(90))
+            elif channel in (Channel.Z_DEPTH, Channel.MEASURED_DEPTH):
+                shown = np.where(np.isfinite(data), data, 0).astype(np.float32)
+                self.stream.log(f"{path}/image/{channel.value}", rr.DepthImage(shown, meter=1.0))
+            elif channel is Channel.CATEGORY:
+                categories = rr.SegmentationImage(data, opacity=0.4)
+                self.stream.log(f"{path}/image/category", categories)
+            else:
+                colored = rr.Image(channel_image(reading, channel)).compress(90)
+                self.stream.log(f"channels/{name}/{channel.value}", colored)
         self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
         self._record_keypoints(f"{path}/image/keypoints", truth)
 
@@ -281,11 +274,11 @@ def _layout(info: DatasetInfo) -> rrb.Blueprint:
 
 
 def _camera_view(info: DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
-    """The image of a camera, and tabs beside it for its flow."""
+    """The image of a camera, and tabs for the pictures of its other channels."""
     image = rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name)
-    flows = [
-        rrb.Spatial2DView(origin=f"world/cameras/{name}/{c.value}", name=f"{name} {c.value}")
+    others = [
+        rrb.Spatial2DView(origin=f"channels/{name}/{c.value}", name=f"{name} {c.value}")
         for c in info.media.get(name, ())
-        if c in FLOWS
+        if c not in IN_IMAGE
     ]
-    return rrb.Tabs(image, *flows) if flows else image
+    return rrb.Tabs(image, *others) if others else image
