@@ -19,7 +19,7 @@ from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.lamps import keep_main_lamps
 from generator.renderers.lens import add_glare, wet_lens
 from generator.renderers.occlusion import lamp_parts, openness, sampled_lattice, sunflower
-from generator.renderers.packing import PackedWorld
+from generator.renderers.packing import PackedWorld, with_own_record
 from generator.renderers.precipitation import draw_precipitation
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
@@ -72,6 +72,26 @@ def surface_light(
     radiance = _shaded(world, view, images, lattice, stock, settings)
     fill_air(world, view, images, lattice, radiance, stock)
     return radiance
+
+
+def antialiased_light(
+    world: PackedWorld,
+    view: records.View,
+    seen: Seen,
+    ev100: float,
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> wp.array:
+    """What comes from every pixel's square through the air, as ``surface_light``.
+
+    Edges are mixed so that they look even at an exposure.
+    """
+    # What light does to the world's record is of no concern to those who start from it.
+    world = with_own_record(world)
+    lit = LitImage(surface_light(world, view, seen, stock, settings), ev100)
+    darken_outside(view, lit.radiance)
+    mix_edges(world, view, seen, lit, stock, settings)
+    return lit.radiance
 
 
 def expose(

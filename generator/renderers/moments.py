@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+
+import warp as wp
 
 from generator.core.instants import at
 from generator.core.scene import Camera, Scene
@@ -15,10 +18,18 @@ from generator.renderers.visibility import Seen, see
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Studio:
-    """What all renderings have in common: assets and settings."""
+    """What all renderings have in common.
+
+    Attributes:
+        stock: Assets.
+        settings: How images are made.
+        light: What comes from every pixel of a sight through the air [cd/m^2], anti-aliased for
+            an exposure value; flat, linear RGB.
+    """
 
     stock: AssetStock
     settings: RenderSettings
+    light: Callable[[Sight, float], wp.array]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -25,19 +25,16 @@ from generator.core.shutter import INSTANT
 from generator.renderers.color import (
     LitImage,
     color_image,
-    darken_outside,
     lit_image,
-    mix_edges,
     pass_lens,
     radiance_image,
-    surface_light,
 )
 from generator.renderers.flow import FLOW, flow_images
 from generator.renderers.lamps import main_lamp_numbers
 from generator.renderers.moments import Band, Moment, Sight, Studio, moves, sight
 from generator.renderers.outlines import rolled_silhouettes
 from generator.renderers.pace import Pace, bands_of, pace_of
-from generator.renderers.packing import moved_world, with_own_record
+from generator.renderers.packing import moved_world
 from generator.renderers.shown import Light, Shown, drawn_bands, with_margin
 
 _LIT = frozenset({Channel.RGB, Channel.RADIANCE})
@@ -163,13 +160,7 @@ def _averaged(slices: Sequence[Slice], light: Light, near: Sight, studio: Studio
 
 def light_of(see: Sight, ev100: float, studio: Studio) -> Float32:
     """What comes from every pixel, anti-aliased; valid until the next call."""
-    stock, settings = studio.stock, studio.settings
-    # What light does to the world's record is of no concern to those who start from it.
-    world = with_own_record(see.world)
-    lit = LitImage(surface_light(world, see.view, see.seen, stock, settings), ev100)
-    darken_outside(see.view, lit.radiance)
-    mix_edges(world, see.view, see.seen, lit, stock, settings)
-    image: Float32 = lit.radiance.numpy().reshape(see.view.height, see.view.width, 3)
+    image: Float32 = studio.light(see, ev100).numpy().reshape(see.view.height, see.view.width, 3)
     return image
 
 

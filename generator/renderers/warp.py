@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warp as wp
+
 from generator.core.capture import Beams, Channel, Echoes, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
-from generator.renderers.color import color_image, lit_image, radiance_image
+from generator.renderers.color import antialiased_light, color_image, lit_image, radiance_image
 from generator.renderers.compiling import compile_kernels
 from generator.renderers.device import open_device
 from generator.renderers.flow import FLOW, flow_images
@@ -49,7 +51,7 @@ class WarpRenderer:
             )
         compile_kernels(self._device.alias)
         self._stock = AssetStock(assets, self._device)
-        self._studio = Studio(self._stock, self._settings)
+        self._studio = Studio(self._stock, self._settings, self._light)
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         """Every asked channel of one camera."""
@@ -80,6 +82,11 @@ class WarpRenderer:
             near = Sight(Moment.of(scene, camera), world, view, seen)
             images |= flow_images(near, shown_in(near), channels, self._studio)
         return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
+
+    def _light(self, see: Sight, ev100: float) -> wp.array:
+        """What comes from every pixel of a sight, as Studio has it."""
+        stock, settings = self._stock, self._settings
+        return antialiased_light(see.world, see.view, see.seen, ev100, stock, settings)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
         """What the rays of a laser scanner's beams hit first, and how well it reflects."""
