@@ -32,14 +32,8 @@ from generator.preview.shapes import boxes_2d, boxes_3d, mesh_3d, pinhole, trans
 TIMELINE = "sample"
 TIME = "time"
 APPLICATION = "gen-data"
-FLOWS = {
-    Channel.FLOW_FORWARD,
-    Channel.FLOW_BACKWARD,
-    Channel.FLOW_OCCLUDED_FORWARD,
-    Channel.FLOW_OCCLUDED_BACKWARD,
-    Channel.SCENE_FLOW,
-}
-"""Shown beside the image, on the colour wheel of flow."""
+IN_IMAGE = {Channel.RGB, Channel.Z_DEPTH, Channel.MEASURED_DEPTH, Channel.CATEGORY}
+"""Channels that are laid over each other; all others have pictures of their own."""
 AXES_M = 0.5
 """Length at which the axes of rigs and devices are drawn."""
 
@@ -280,11 +274,11 @@ def _layout(info: DatasetInfo) -> rrb.Blueprint:
 
 
 def _camera_view(info: DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
-    """The image of a camera, and tabs beside it for its flow."""
+    """The image of a camera, and tabs for the pictures of its other channels."""
     image = rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name)
-    flows = [
-        rrb.Spatial2DView(origin=f"world/cameras/{name}/{c.value}", name=f"{name} {c.value}")
+    others = [
+        rrb.Spatial2DView(origin=f"channels/{name}/{c.value}", name=f"{name} {c.value}")
         for c in info.media.get(name, ())
-        if c in FLOWS
+        if c not in IN_IMAGE
     ]
-    return rrb.Tabs(image, *flows) if flows else image
+    return rrb.Tabs(image, *others) if others else image

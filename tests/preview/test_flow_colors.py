@@ -103,10 +103,10 @@ def test_a_recording_has_flow_beside_the_image_of_its_camera() -> None:
     recorder.start()
     recorder.record(Sample(0, 0, 0, "train", Scene("t"), Capture({"c": reading}), truth))
 
-    assert "world/cameras/c/flow_forward" in stream.logged
+    assert "channels/c/flow_forward" in stream.logged
     (root,) = [stream.blueprint.root_container]
     (tabs,) = root.contents[1].contents
     assert [view.origin for view in tabs.contents] == [
         "world/cameras/c/image",
-        "world/cameras/c/flow_forward",
+        "channels/c/flow_forward",
     ]

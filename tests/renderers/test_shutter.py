@@ -16,9 +16,8 @@ from generator.core.rows import seen_points
 from generator.core.scene import Body, Scene
 from generator.core.se3 import SE3
 from generator.core.shutter import INSTANT, Shutter
-from generator.renderers.moments import Moment, Studio, sight
+from generator.renderers.moments import Moment, sight
 from generator.renderers.pace import timed_bands
-from generator.renderers.settings import RenderSettings
 from generator.renderers.shown import drawn_bands
 from generator.renderers.shutter import light_of, slices_of
 from generator.renderers.warp import WarpRenderer
@@ -211,7 +210,7 @@ def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, len
         wall, replace(LAMP, scale=0.7), shutter=Shutter(0.0, 0.05), time_s=0.0,
         lens=replace(LENS, lens=lens),
     )  # fmt: skip
-    studio = Studio(renderer._stock, RenderSettings())
+    studio = renderer._studio
     near = sight(Moment.of(scene, scene.cameras[0]), studio)
     whole_bands = timed_bands(near.moment, [0])
     rows = timed_bands(near.moment, list(range(0, LENS.height_px, 5)))
