@@ -14,6 +14,7 @@ from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
 from generator.renderers.kernels import antialias, gather, optics, raster, records, shade, tone
 from generator.renderers.kernels import samples as mixing
+from generator.renderers.kernels.edges import find_edges
 from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.lamps import keep_main_lamps
@@ -121,7 +122,7 @@ def mix_edges(
     device, images = stock.device, images_of(seen)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", view.width * view.height, wp.int32)
-    wp.launch(antialias.find_edges, view.height, [view, images], [count, pixels], device=device)
+    wp.launch(find_edges, view.height, [view, images], [count, pixels], device=device)
     edges = pixels[: int(count.numpy()[0])]
     mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=device)
     parts = pixel_parts(samples)

@@ -23,8 +23,8 @@ import warp as wp
 from generator.renderers import kernels
 
 EVERY_FRAME = (
-    "shade", "occlusion", "antialias", "gather", "raster", "silhouette", "surface", "samples",
-    "lattice", "shafts", "tone", "sky",
+    "shade", "occlusion", "raster", "gather", "silhouette", "samples", "shafts", "surface",
+    "edges", "lattice", "tone", "sky",
 )  # fmt: skip
 """Modules of kernels that every photograph takes, in an order that deals them out evenly."""
 

@@ -17,8 +17,8 @@ from generator.core.geometry import Float32
 from generator.core.scene import Camera, Scene
 from generator.core.se3 import Array
 from generator.renderers.kernels import records
+from generator.renderers.kernels.outlook import Outlook, trace_silhouettes
 from generator.renderers.kernels.raster import Z_NEAR_M
-from generator.renderers.kernels.silhouette import Outlook, trace_silhouettes
 from generator.renderers.optics import NODE_STRIDE_PX
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock

@@ -11,7 +11,7 @@ from generator.core.scene import Environment, Light, Scene
 from generator.core.se3 import Array
 from generator.renderers.brightest import SkyLamp
 from generator.renderers.kernels import records
-from generator.renderers.kernels.rays import see_out
+from generator.renderers.kernels.occlusion import see_out
 from generator.renderers.packing import PackedWorld, lamp_records, sky_record, with_own_record
 from generator.renderers.panoramas import LUMINANCE
 from generator.renderers.stock import AssetStock

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.edges import most_alike, nearby, tone_weight
 from generator.renderers.kernels.holes import hole_at, solid_hit
 from generator.renderers.kernels.rays import FARTHEST
 from generator.renderers.kernels.records import (
@@ -26,56 +27,8 @@ from generator.renderers.kernels.surface import facet_of
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Faces that meet at less than 25 degrees look like one surface.
-CREASE_COSINE = wp.constant(0.9)
-# Places in a 3 x 3 block, row by row, as hexadecimal digits from the last: centre, sides, corners.
-ORDER = wp.constant(wp.int64(0x862075314))
-
 Vector8 = wp.types.vector(length=8, dtype=wp.float32)
 Vector8i = wp.types.vector(length=8, dtype=wp.int32)
-
-
-@wp.func
-def clamped_pixel(view: View, x: int, y: int):
-    """Index of the pixel of the image nearest to (x, y)."""
-    return wp.clamp(y, 0, view.height - 1) * view.width + wp.clamp(x, 0, view.width - 1)
-
-
-@wp.func
-def differ(images: Images, i: int, j: int):
-    """Whether an edge runs between two neighbouring pixels."""
-    a = images.hits[i]
-    b = images.hits[j]
-    edge = bool(False)
-    if a[0] != b[0]:
-        edge = True
-    elif a[1] != b[1]:
-        edge = wp.dot(images.normals[i], images.normals[j]) < CREASE_COSINE
-        # One body before itself: depths that are far from each other's tangent planes.
-        nearer = wp.min(images.z_m[i], images.z_m[j])
-        if wp.abs(images.z_m[i] - images.z_m[j]) > 0.05 * nearer:
-            edge = True
-    return edge
-
-
-@wp.kernel
-def find_edges(view: View, images: Images, count: wp.array(dtype=int), pixels: wp.array(dtype=int)):
-    """List the pixels that an edge may cross.
-
-    Args:
-        count: Length of the list; 0 at first.
-        pixels: The list, in any order.
-    """
-    y = wp.tid()
-    for x in range(view.width):
-        i = y * view.width + x
-        if (
-            differ(images, i, clamped_pixel(view, x + 1, y))
-            or differ(images, i, clamped_pixel(view, x - 1, y))
-            or differ(images, i, clamped_pixel(view, x, y + 1))
-            or differ(images, i, clamped_pixel(view, x, y - 1))
-        ):
-            pixels[wp.atomic_add(count, 0, 1)] = i
 
 
 @wp.struct
@@ -89,13 +42,6 @@ class Parts:
 
     nearness: Vector8
     source: Vector8i
-
-
-@wp.func
-def nearby(view: View, x: int, y: int, k: int):
-    """The k-th pixel of the nine around (x, y): itself, then sides, then corners."""
-    m = int((ORDER >> wp.int64(4 * k)) & wp.int64(15))
-    return clamped_pixel(view, x + m % 3 - 1, y + m / 3 - 1)
 
 
 @wp.func
@@ -178,27 +124,6 @@ def traced_source(
     if nearest < FARTHEST:
         source = most_alike(view, images, x, y, source, normal)
     return source
-
-
-@wp.func
-def most_alike(view: View, images: Images, x: int, y: int, source: int, normal: wp.vec3):
-    """Of the pixels around (x, y) that see the body of ``source``, the one turned most alike."""
-    best = float(-1.0)
-    found = source
-    for k in range(9):
-        j = nearby(view, x, y, k)
-        if images.hits[j][0] == images.hits[source][0]:
-            cosine = wp.abs(wp.dot(images.normals[j], normal))
-            if cosine > best + 0.05:
-                best = cosine
-                found = j
-    return found
-
-
-@wp.func
-def tone_weight(exposed: wp.vec3):
-    """Weight of a sample: bright ones count less, as they would after the tone curve."""
-    return 1.0 / (1.0 + 0.2126 * exposed[0] + 0.7152 * exposed[1] + 0.0722 * exposed[2])
 
 
 @wp.kernel

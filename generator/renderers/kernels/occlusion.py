@@ -22,7 +22,12 @@ from generator.renderers.kernels.lighting import (
     SUN_DISTANCE_M,
     beam_from,
 )
-from generator.renderers.kernels.rays import blocked_by_listed, free_of_listed, path_along
+from generator.renderers.kernels.rays import (
+    blocked,
+    blocked_by_listed,
+    free_of_listed,
+    path_along,
+)
 from generator.renderers.kernels.records import Lamp, View, World, unit
 from generator.renderers.kernels.shafts import FAINT_SHARE, TILE
 from generator.renderers.kernels.sky import sky_irradiance
@@ -438,3 +443,17 @@ def probe_ambient(
             t = free_of_listed(world, lists, tile, lattice.skip[i], path)
             value = t * (2.0 - t)
     open_sky[0, i] = value
+
+
+@wp.kernel
+def see_out(
+    world: World,
+    points: wp.array(dtype=wp.vec3),
+    ways: wp.array(dtype=wp.vec3),
+    free: wp.array(dtype=int),
+):
+    """Count the ways that are free, over all points."""
+    i = wp.tid()
+    for k in range(ways.shape[0]):
+        if not blocked(world, path_along(points[i], ways[k])):
+            wp.atomic_add(free, 0, 1)

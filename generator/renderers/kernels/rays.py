@@ -202,17 +202,3 @@ def unsheltered(world: World, origin: wp.vec3):
     if cut(world, path_along(origin, wp.vec3(east, north, 1.0) * SHELTER_M), HOLES):
         free = 0.0
     return free
-
-
-@wp.kernel
-def see_out(
-    world: World,
-    points: wp.array(dtype=wp.vec3),
-    ways: wp.array(dtype=wp.vec3),
-    free: wp.array(dtype=int),
-):
-    """Count the ways that are free, over all points."""
-    i = wp.tid()
-    for k in range(ways.shape[0]):
-        if not blocked(world, path_along(points[i], ways[k])):
-            wp.atomic_add(free, 0, 1)

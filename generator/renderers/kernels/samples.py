@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.antialias import most_alike, nearby, tone_weight
+from generator.renderers.kernels.edges import most_alike, nearby, tone_weight
 from generator.renderers.kernels.raster import (
     UNSNAPPED,
     Z_NEAR_M,
