@@ -58,11 +58,13 @@ class FirstHits:
     """First hits of all rays: ranges and (body, material) on the device, the latter also here.
 
     Attributes:
+        normals: Where there are mirrors, on the device, lidar frame.
         puddles: Share of each ray's end that is standing water; None where everything is dry.
     """
 
     ranges_m: wp.array
     on_device: wp.array
+    normals: wp.array
     hits: NDArray[np.int32]
     puddles: NDArray[np.float32] | None
 
@@ -101,6 +103,7 @@ def detours(
             wp.array(mirrors, dtype=int, device=stock.device),
             first.ranges_m,
             first.on_device,
+            first.normals,
             wp.array(water, dtype=float, device=stock.device),
         ]
         seen = _launched(kernels.look_in_mirrors, [*inputs, *given], mirrors, labels, stock)
@@ -123,7 +126,7 @@ def _launched(
     ranges_m, reflectances = (wp.zeros(count, dtype=float, device=stock.device) for _ in range(2))
     hits_ = wp.zeros(count, dtype=wp.vec2i, device=stock.device)
     outputs = [ranges_m, reflectances, hits_]
-    wp.launch(kernel, count, list(inputs), outputs, device=stock.device)
+    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=stock.device)
     hits = hits_.numpy()
     there = hits[:, 0] >= 0
     seen = (ranges_m.numpy()[there], reflectances.numpy()[there])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import warp as wp
 
 from generator.core.capture import Beams, Echoes
@@ -12,7 +13,8 @@ from generator.core.scene import Camera, Lidar, Scene
 from generator.renderers.detours import FirstHits, HitLabels, detours
 from generator.renderers.infrared import infrared_surfaces
 from generator.renderers.kernels import lidar as kernels
-from generator.renderers.packing import pack_world
+from generator.renderers.kernels.bundles import LISTED_MAX, Boxes
+from generator.renderers.packing import PackedWorld, pack_world
 from generator.renderers.stock import AssetStock
 from generator.renderers.travel import travelling
 from generator.renderers.weather import ground_of
@@ -22,7 +24,10 @@ RING_SHARE = math.sqrt(1.0 / 2.0)
 
 
 RUN = 64
-"""Rays per thread: neighbours mostly hit the same body."""
+"""Rays that are looked at together: neighbours meet the same few bodies."""
+
+THREADS = {True: 16, False: 16384}
+"""By whether the device is a processor, which runs them one after the other."""
 
 
 def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echoes:
@@ -38,21 +43,24 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     infrared = infrared_surfaces(materials, stock)
     lights = wp.array(infrared, dtype=kernels.Infrared, device=device)
     axes = wp.array(beams.directions, dtype=wp.vec3, device=device)
-    inputs = [_scan(lidar, beams), world.record, travel, lights, axes]
+    record = _scan(lidar, beams, stock)
+    inputs = [record, world.record, travel, _boxes(world, record.threads, stock), lights, axes]
+    order = wp.array(np.zeros(0, np.int32), dtype=int, device=device)
     images = [stock.scratch(f"scan {k}", count, float) for k in range(3)]
     hits_ = stock.scratch("scan hits", count, wp.vec2i)
+    normals = stock.scratch("scan normals", count, wp.vec3)
     covered = bool(world.record.ground.covered)
     puddles = stock.scratch("scan puddles", count if covered else 1, float)
     wp.launch(
         kernels.scan_beams,
-        dim=(count + RUN - 1) // RUN,
-        inputs=inputs,
-        outputs=[*images, hits_, puddles],
+        dim=record.threads,
+        inputs=[*inputs, order],
+        outputs=[*images, hits_, normals, puddles],
         device=device,
     )
     hits = hits_.numpy()
     labels = HitLabels.of(scene, materials)
-    first = FirstHits(images[0], hits_, hits, puddles.numpy() if covered else None)
+    first = FirstHits(images[0], hits_, normals, hits, puddles.numpy() if covered else None)
     ranges_m, reflectances, cosines = (image.numpy().reshape(shape).copy() for image in images)
     instances, categories, surfaces = labels.at(hits)
     return Echoes(
@@ -66,7 +74,16 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     )
 
 
-def _scan(lidar: Lidar, beams: Beams) -> kernels.Scan:
+def _boxes(world: PackedWorld, threads: int, stock: AssetStock) -> Boxes:
+    boxes = Boxes()
+    boxes.lows_m, boxes.highs_m = world.lows_m, world.highs_m
+    shape = (threads, int(LISTED_MAX))
+    boxes.listed = stock.scratch("listed bodies", shape, int)
+    boxes.enters_m = stock.scratch("listed distances", shape, float)
+    return boxes
+
+
+def _scan(lidar: Lidar, beams: Beams, stock: AssetStock) -> kernels.Scan:
     scan = kernels.Scan()
     scan.R_world_lidar = wp.mat33(lidar.T_world_lidar.rotation())
     scan.eye_m = wp.vec3(*lidar.T_world_lidar.translation_m)
@@ -74,5 +91,6 @@ def _scan(lidar: Lidar, beams: Beams) -> kernels.Scan:
     scan.spread = RING_SHARE * math.tan(0.5 * beams.divergence_rad)
     scan.subrays = beams.subrays
     scan.run = RUN
+    scan.threads = THREADS[stock.device.is_cpu]
     scan.divergence_rad = beams.divergence_rad
     return scan

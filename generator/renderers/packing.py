@@ -38,6 +38,7 @@ class PackedWorld:
         placed: Body records on the host, structured array [n].
         vertex_count: Of all bodies together.
         weather: Of the scene.
+        lows_m, highs_m: Corners of boxes in the world around the bodies, one at least.
     """
 
     record: records.World
@@ -45,6 +46,8 @@ class PackedWorld:
     placed: NDArray[np.void]
     vertex_count: int
     weather: Weather
+    lows_m: wp.array
+    highs_m: wp.array
 
 
 def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
@@ -72,9 +75,8 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     nowhere = np.full((1, 3), 1e9, np.float32)
     low = placed["low_m"] if len(placed) else nowhere
     high = placed["high_m"] if len(placed) else nowhere
-    tree = wp.Bvh(
-        upload(np.ascontiguousarray(low), wp.vec3), upload(np.ascontiguousarray(high), wp.vec3)
-    )
+    lows_m, highs_m = (upload(np.ascontiguousarray(corner), wp.vec3) for corner in (low, high))
+    tree = wp.Bvh(lows_m, highs_m)
     world = records.World()
     world.tree = tree.id
     world.geometries = upload(_stacked(meshes, records.Geometry), records.Geometry)
@@ -87,7 +89,13 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     world.lobes = stock.lobes
     world.sky = _sky(scene.environment, environment)
     return PackedWorld(
-        world, (tree, meshes, textures, environment), placed, vertex_count, scene.weather
+        world,
+        (tree, meshes, textures, environment),
+        placed,
+        vertex_count,
+        scene.weather,
+        lows_m,
+        highs_m,
     )
 
 

@@ -93,7 +93,7 @@ def _seen_from(
 
 
 def _enclosing(world: PackedWorld, movers: list[Mover], stock: AssetStock) -> PackedWorld:
-    """The world with a hierarchy that finds movers wherever they are."""
+    """The world with boxes that hold movers wherever they are."""
     if not movers:
         return world
     low_m, high_m = world.placed["low_m"].copy(), world.placed["high_m"].copy()
@@ -106,9 +106,7 @@ def _enclosing(world: PackedWorld, movers: list[Mover], stock: AssetStock) -> Pa
         reach = np.einsum("kij,j->ki", np.abs(R), half, optimize=False) + SLACK_M
         low_m[mover.number] = (centre - reach).min(axis=0)
         high_m[mover.number] = (centre + reach).max(axis=0)
-    tree = wp.Bvh(
-        wp.array(low_m, dtype=wp.vec3, device=stock.device),
-        wp.array(high_m, dtype=wp.vec3, device=stock.device),
+    lows_m, highs_m = (
+        wp.array(corner, dtype=wp.vec3, device=stock.device) for corner in (low_m, high_m)
     )
-    world.record.tree = tree.id
-    return replace(world, keep=(*world.keep, tree))
+    return replace(world, lows_m=lows_m, highs_m=highs_m)
