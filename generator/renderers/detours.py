@@ -72,6 +72,7 @@ class FirstHits:
 def detours(
     inputs: Sequence[Any],
     first: FirstHits,
+    order: NDArray[np.int32] | None,
     infrared: NDArray[np.void],
     labels: HitLabels,
     stock: AssetStock,
@@ -81,6 +82,7 @@ def detours(
     Args:
         inputs: Of the kernel that found the first hits.
         first: What it found.
+        order: Of the beams.
         infrared: Records of the materials.
         labels: Of the scene.
         stock: Of the renderer.
@@ -91,7 +93,7 @@ def detours(
     if first.puddles is not None:
         mirror = mirror | (first.puddles > PUDDLE_MIN)
     found = []
-    panes, mirrors = (np.flatnonzero(which).astype(np.int32) for which in (clear, mirror))
+    panes, mirrors = (_picked(which, order) for which in (clear, mirror))
     if len(panes):
         given = [wp.array(panes, dtype=int, device=stock.device), first.ranges_m]
         found.append(_launched(kernels.look_through, [*inputs, *given], panes, labels, stock))
@@ -112,6 +114,15 @@ def detours(
     if not found:
         return None
     return Detours(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _picked(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Numbers of the rays that are marked, those of neighbouring beams after each other."""
+    if order is None or not which.any():
+        return np.flatnonzero(which).astype(np.int32)
+    subrays = len(which) // len(order)
+    rays = order if subrays == 1 else (subrays * order[:, None] + np.arange(subrays)).ravel()
+    return rays[which[rays]].astype(np.int32, copy=False)
 
 
 def _launched(

@@ -23,7 +23,7 @@ RING_SHARE = math.sqrt(1.0 / 2.0)
 """Radius of the ring of rays, in units of the beam's: half the light is outside it."""
 
 
-RUN = 64
+RUN = 128
 """Rays that are looked at together: neighbours meet the same few bodies."""
 
 THREADS = {True: 16, False: 16384}
@@ -45,7 +45,7 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     axes = wp.array(beams.directions, dtype=wp.vec3, device=device)
     record = _scan(lidar, beams, stock)
     inputs = [record, world.record, travel, _boxes(world, record.threads, stock), lights, axes]
-    order = wp.array(np.zeros(0, np.int32), dtype=int, device=device)
+    order = np.zeros(0, np.int32) if beams.order is None else beams.order
     images = [stock.scratch(f"scan {k}", count, float) for k in range(3)]
     hits_ = stock.scratch("scan hits", count, wp.vec2i)
     normals = stock.scratch("scan normals", count, wp.vec3)
@@ -54,7 +54,7 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     wp.launch(
         kernels.scan_beams,
         dim=record.threads,
-        inputs=[*inputs, order],
+        inputs=[*inputs, wp.array(order, dtype=int, device=device)],
         outputs=[*images, hits_, normals, puddles],
         device=device,
     )
@@ -70,7 +70,7 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
         instances.reshape(shape),
         categories.reshape(shape),
         surfaces.reshape(shape),
-        detours(inputs, first, infrared, labels, stock),
+        detours(inputs, first, beams.order, infrared, labels, stock),
     )
 
 

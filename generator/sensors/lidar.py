@@ -143,6 +143,7 @@ class LidarSensor(Mounted):
             model.range_m[1],
             shots.origins_m,
             shots.time_s,
+            sweep.order,
         )
         pulses = pulses_of(renderer.scan(scene, lidar, beams), model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
