@@ -157,7 +157,10 @@ def _put_detours(
 ) -> None:
     """Merge what rays met besides into the peaks of their beams, in place; the strongest stay."""
     rays = fields["range_m"].shape[1]
-    order = np.argsort(detours.ray, kind="stable")
+    rivals = np.arange(len(detours.ray))
+    if pulses.light.shape[1] == 1:
+        rivals = _rivals(pulses, detours, model)
+    order = rivals[np.argsort(detours.ray[rivals], kind="stable")]
     ray = detours.ray[order]
     # A ray's second detour, if it has two, goes into a slot of its own.
     again = (np.diff(ray, prepend=-1) == 0).astype(np.int64)
@@ -173,6 +176,18 @@ def _put_detours(
     best = np.argsort(-peaks.light, axis=1, kind="stable")[:, : pulses.light.shape[1]]
     for name in Pulses.__slots__:
         getattr(pulses, name)[rows] = np.take_along_axis(getattr(peaks, name), best, axis=1)
+
+
+def _rivals(pulses: Pulses, detours: Detours, model: LidarModel) -> NDArray[np.intp]:
+    """Detours of the single rays whose strongest peak may change: most are far fainter than it."""
+    ray = detours.ray
+    light = light_of(detours.reflectance, detours.range_m, model)
+    # Two that run into one have at most twice the light of one; a hair for what is rounded.
+    strong = (DETOURS_MAX * 1.001) * light >= pulses.light[ray, 0]
+    near = detours.range_m - pulses.range_m[ray, 0] <= 1.001 * model.pulse_m
+    changed: NDArray[np.bool_] = np.zeros(len(pulses.light), np.bool_)
+    changed[ray[strong | near]] = True
+    return np.flatnonzero(changed[ray])
 
 
 def _merged(fields: Mapping[str, NDArray[Any]], rays: int, model: LidarModel) -> Pulses:
