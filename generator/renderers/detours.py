@@ -14,13 +14,12 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.capture import Detours
-from generator.core.geometry import SURFACES, Material
+from generator.core.geometry import SURFACES
 from generator.core.scene import Scene
 from generator.renderers.kernels import lidar as kernels
 from generator.renderers.labels import category_ids
+from generator.renderers.looks import Looks
 from generator.renderers.stock import AssetStock
-
-_SURFACE = {role: number for number, role in enumerate(SURFACES)}
 
 PUDDLE_MIN = 0.05
 """Less of standing water than this mirrors nothing."""
@@ -37,14 +36,14 @@ class HitLabels:
     surfaces: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, scene: Scene, materials: Sequence[Material]) -> HitLabels:
-        """Of a scene, whose bodies' materials these are."""
+    def of(cls, scene: Scene, looks: Sequence[Looks]) -> HitLabels:
+        """Of a scene, whose bodies look like this."""
         instances = [0, *(body.instance_id for body in scene.bodies)]
-        surfaces = [0, *(_SURFACE.get(material.role, 0) for material in materials)]
+        nothing = np.zeros(1, np.uint8)
         return cls(
             np.array(instances, np.uint16),
             np.array([0, *category_ids(scene)], np.uint16),
-            np.array(surfaces, np.uint8),
+            np.concatenate([nothing, *(look.roles for look in looks)]),
         )
 
     def at(self, hits: NDArray[np.int32]) -> Labels:

@@ -14,6 +14,7 @@ from generator.renderers.detours import FirstHits, HitLabels, detours
 from generator.renderers.infrared import infrared_surfaces
 from generator.renderers.kernels import lidar as kernels
 from generator.renderers.kernels.bundles import LISTED_MAX, Boxes
+from generator.renderers.looks import looks_of
 from generator.renderers.packing import PackedWorld, pack_world
 from generator.renderers.stock import AssetStock
 from generator.renderers.travel import travelling
@@ -35,12 +36,11 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     eye = Camera(lidar.name, lidar.T_world_lidar, Intrinsics(1, 1, 1.0, 1.0, 0.5, 0.5))
     world, travel = travelling(scene, lidar, beams, pack_world(scene, eye, stock), stock)
     world.record.ground = ground_of(scene.weather)
-    own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
-    materials = [material for group in own for material in group]
+    looks = looks_of(scene, stock)
     device = stock.device
     shape = (len(beams.directions), beams.subrays)
     count = shape[0] * shape[1]
-    infrared = infrared_surfaces(materials, stock)
+    infrared = infrared_surfaces(looks, stock)
     lights = wp.array(infrared, dtype=kernels.Infrared, device=device)
     axes = wp.array(beams.directions, dtype=wp.vec3, device=device)
     record = _scan(lidar, beams, stock)
@@ -59,7 +59,7 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
         device=device,
     )
     hits = hits_.numpy()
-    labels = HitLabels.of(scene, materials)
+    labels = HitLabels.of(scene, looks)
     first = FirstHits(images[0], hits_, normals, hits, puddles.numpy() if covered else None)
     ranges_m, reflectances, cosines = (image.numpy().reshape(shape).copy() for image in images)
     instances, categories, surfaces = labels.at(hits)

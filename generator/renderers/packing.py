@@ -11,13 +11,15 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from generator.core.geometry import Material
 from generator.core.lens import LensModel
 from generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
+from generator.core.se3 import Array, rotations_of_unit
 from generator.renderers.environments import DeviceEnvironment
 from generator.renderers.kernels import records
+from generator.renderers.looks import Looks, looks_of
 from generator.renderers.meshes import DeviceMesh
 from generator.renderers.stock import AssetStock
+from generator.renderers.structs import dtype_of, stacked
 
 _LENSES: dict[LensModel, int] = {
     "pinhole": records.PINHOLE,
@@ -50,25 +52,68 @@ class PackedWorld:
     highs_m: wp.array
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Packed:
+    """What every camera and scanner shares of one scene.
+
+    Attributes:
+        record: The World record.
+        keep: As of PackedWorld.
+        placed: Body records without what depends on the camera.
+        R_world_mesh, t_world_mesh, scale: Of the bodies, float64 [n, 3, 3], [n, 3] and [n].
+        vertex_count, lows_m, highs_m: As of PackedWorld.
+    """
+
+    record: records.World
+    keep: tuple[object, ...]
+    placed: NDArray[np.void]
+    R_world_mesh: Array
+    t_world_mesh: Array
+    scale: Array
+    vertex_count: int
+    lows_m: wp.array
+    highs_m: wp.array
+
+
 def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     """The scene as one camera sees it. Cheap enough to be done for every frame."""
+    packed: _Packed = stock.scenes.get(scene, lambda: _packed(scene, stock))
+    placed = packed.placed.copy()
+    if len(placed):
+        _see(placed, packed, camera)
+    # A record of its own: weather and lamps are put into it for one view.
+    world = records.World()
+    for name in ("tree", "geometries", "surfaces", "textures", "lamps", "lobes", "sky"):
+        setattr(world, name, getattr(packed.record, name))
+    world.bodies = wp.array(placed, dtype=records.Body, device=stock.device)
+    return PackedWorld(
+        world,
+        packed.keep,
+        placed,
+        packed.vertex_count,
+        scene.weather,
+        packed.lows_m,
+        packed.highs_m,
+    )
+
+
+def _packed(scene: Scene, stock: AssetStock) -> _Packed:
     asset_ids = sorted({body.asset for body in scene.bodies})
     place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
     meshes = [stock.mesh(asset_id) for asset_id in asset_ids]
-    own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
-    materials = [material for group in own for material in group]
-    texture_ids = sorted({m.texture for m in materials if m.texture})
+    looks = looks_of(scene, stock)
+    texture_ids = sorted({texture_id for look in looks for texture_id in look.textures})
     textures = [stock.texture(texture_id) for texture_id in texture_ids]
     environment = stock.environment(scene.environment.image)
-    placed = np.zeros(len(scene.bodies), dtype=records.Body.numpy_dtype())
+    placed = np.zeros(len(scene.bodies), dtype=dtype_of(records.Body))
     placed["geometry"] = [place[body.asset] for body in scene.bodies]
-    counts = np.array([len(group) for group in own], dtype=np.int64)
+    counts = np.array([len(look.materials) for look in looks], dtype=np.int64)
     placed["first_material"] = np.cumsum(counts) - counts
     body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
-    vertex_count = _place(placed, scene.bodies, body_meshes, camera)
+    R, t, scale, vertex_count = _place(placed, scene.bodies, body_meshes)
     placed["low_m"], placed["high_m"] = _world_boxes(placed, body_meshes)
 
-    def upload(values: NDArray[np.void] | list[object], dtype: Any) -> wp.array:
+    def upload(values: NDArray[Any], dtype: Any) -> wp.array:
         return wp.array(values, dtype=dtype, device=stock.device)
 
     # A hierarchy needs a box; rays never meet this one.
@@ -79,24 +124,14 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     tree = wp.Bvh(lows_m, highs_m)
     world = records.World()
     world.tree = tree.id
-    world.geometries = upload(_stacked(meshes, records.Geometry), records.Geometry)
-    world.bodies = upload(placed, records.Body)
-    world.surfaces = upload(
-        _surfaces(materials, {t: k for k, t in enumerate(texture_ids)}), records.Surface
-    )
-    world.textures = upload(_stacked(textures, records.Texture), records.Texture)
+    world.geometries = upload(stacked([m.record for m in meshes], records.Geometry), records.Geometry)
+    world.surfaces = upload(_surfaces(looks, texture_ids), records.Surface)
+    world.textures = upload(stacked([t.record for t in textures], records.Texture), records.Texture)
     world.lamps = upload(_lamps(scene.lights), records.Lamp)
     world.lobes = stock.lobes
     world.sky = _sky(scene.environment, environment)
-    return PackedWorld(
-        world,
-        (tree, meshes, textures, environment),
-        placed,
-        vertex_count,
-        scene.weather,
-        lows_m,
-        highs_m,
-    )
+    keep = (tree, meshes, textures, environment)
+    return _Packed(world, keep, placed, R, t, scale, vertex_count, lows_m, highs_m)
 
 
 def pack_view(camera: Camera, stock: AssetStock) -> records.View:
@@ -118,32 +153,37 @@ def pack_view(camera: Camera, stock: AssetStock) -> records.View:
 
 
 def _place(
-    values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh], camera: Camera
-) -> int:
-    """Fill in poses and vertex ranges; returns the number of vertices.
-
-    Products are taken in float64, so that a camera far from the world's origin loses nothing.
-    """
+    values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh]
+) -> tuple[Array, Array, Array, int]:
+    """Fill in poses and vertex ranges; returns rotations, positions, scales, number of vertices."""
     if not bodies:
-        return 0
-    R_camera_world = camera.T_world_camera.rotation().T
-    eye = np.asarray(camera.T_world_camera.translation_m)
-    R = np.stack([body.T_world_body.rotation() for body in bodies])
+        return np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), 0
+    R = rotations_of_unit(np.array([body.T_world_body.quaternion_wxyz for body in bodies]))
     t = np.array([body.T_world_body.translation_m for body in bodies])
     scale = np.array([body.scale for body in bodies])
     counts = np.array([mesh.vertex_count for mesh in meshes])
-    A = np.einsum("ij,njk->nik", R_camera_world, R, optimize=False)
     values["first_vertex"] = np.cumsum(counts) - counts
     values["scale"] = scale
-    values["A_camera_mesh"] = A * scale[:, None, None]
-    values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_camera_world, t - eye, optimize=False)
-    values["B_mesh_camera"] = A.transpose(0, 2, 1) / scale[:, None, None]
-    values["eye_mesh"] = np.einsum("nji,nj->ni", R, eye - t, optimize=False) / scale[:, None]
     values["R_world_mesh"] = R
     values["t_world_mesh"] = t
     values["B_mesh_world"] = R.transpose(0, 2, 1) / scale[:, None, None]
     values["t_mesh_world"] = -np.einsum("nji,nj->ni", R, t, optimize=False) / scale[:, None]
-    return int(counts.sum())
+    return R, t, scale, int(counts.sum())
+
+
+def _see(values: NDArray[np.void], packed: _Packed, camera: Camera) -> None:
+    """Fill in where bodies are before a camera.
+
+    Products are taken in float64, so that a camera far from the world's origin loses nothing.
+    """
+    R_camera_world = camera.T_world_camera.rotation().T
+    away = packed.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)
+    R, scale = packed.R_world_mesh, packed.scale
+    A = np.einsum("ij,njk->nik", R_camera_world, R, optimize=False)
+    values["A_camera_mesh"] = A * scale[:, None, None]
+    values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_camera_world, away, optimize=False)
+    values["B_mesh_camera"] = A.transpose(0, 2, 1) / scale[:, None, None]
+    values["eye_mesh"] = np.einsum("nji,nj->ni", R, -away, optimize=False) / scale[:, None]
 
 
 def _world_boxes(
@@ -162,13 +202,6 @@ def _world_boxes(
     return (centre - half).astype(np.float32), (centre + half).astype(np.float32)
 
 
-def _stacked(items: Sequence[Any], kind: Any) -> NDArray[np.void]:
-    values = np.zeros(max(len(items), 1), dtype=kind.numpy_dtype())
-    for k, item in enumerate(items):
-        values[k] = item.record
-    return values
-
-
 def _sky(environment: Environment, light: DeviceEnvironment) -> records.Sky:
     sky = records.Sky()
     sky.irradiance, sky.glossy, sky.image = light.irradiance, light.glossy, light.image
@@ -178,25 +211,23 @@ def _sky(environment: Environment, light: DeviceEnvironment) -> records.Sky:
     return sky
 
 
-def _surfaces(materials: Sequence[Material], textures: dict[str, int]) -> NDArray[np.void]:
-    """Surface records; ``textures`` maps texture ids to their place among the textures."""
-    values = np.zeros(max(len(materials), 1), dtype=records.Surface.numpy_dtype())
-    if not materials:
-        return values
-    # Column by column: there are thousands in a street, and filling in one record takes long.
-    values["base_color"] = [m.base_color for m in materials]
-    values["roughness"] = [m.roughness for m in materials]
-    values["metallic"] = [m.metallic for m in materials]
-    values["specular"] = [m.specular for m in materials]
-    values["texture"] = [textures[m.texture] if m.texture else -1 for m in materials]
-    values["texture_scale_m"] = [m.texture_scale_m for m in materials]
-    values["emission_cd_m2"] = [m.emission_cd_m2 for m in materials]
+def _surfaces(looks: Sequence[Looks], texture_ids: Sequence[str]) -> NDArray[np.void]:
+    """Surface records of all bodies; at least one."""
+    values = stacked([look.surfaces for look in looks], records.Surface)
+    place = {texture_id: k for k, texture_id in enumerate(texture_ids)}
+    listed = np.array([*(place[t] for look in looks for t in look.textures), -1], np.int32)
+    counts = np.array([len(look.textures) for look in looks], np.int64)
+    slots = [len(look.materials) for look in looks]
+    first = np.repeat(np.cumsum(counts) - counts, slots)
+    if len(first):
+        local = values["texture"]
+        values["texture"] = np.where(local < 0, -1, listed[first + np.maximum(local, 0)])
     return values
 
 
 def _lamps(lights: Sequence[Light]) -> NDArray[np.void]:
     """Lamp records."""
-    values = np.zeros(len(lights), dtype=records.Lamp.numpy_dtype())
+    values = np.zeros(len(lights), dtype=dtype_of(records.Lamp))
     for value, light in zip(values, lights, strict=True):
         strength = light.illuminance_lux if light.kind == "sun" else light.intensity_cd
         value["kind"] = _LAMP_KINDS[light.kind]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from generator.core.geometry import TextureData, UInt8
 from generator.core.se3 import Array
 from generator.renderers.kernels.records import Texture
+from generator.renderers.structs import record_of
 
 Pixels = NDArray[Any]
 
@@ -23,12 +24,12 @@ class DeviceTexture:
     """One texture on the device.
 
     Attributes:
-        record: Value of a Texture record.
+        record: A Texture record [1].
         keep: The device arrays that the record points to.
         texels: One of them: packed colours of all levels, the coarsest last.
     """
 
-    record: object
+    record: NDArray[np.void]
     keep: tuple[object, ...]
     texels: wp.array
     nbytes: int
@@ -51,7 +52,8 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     record.offsets = offsets
     record.has_bumps = int(data.normal is not None)
     keep = (*on_device, offsets)
-    return DeviceTexture(record.numpy_value(), keep, on_device[0], texels.nbytes + bumps.nbytes)
+    nbytes = texels.nbytes + bumps.nbytes
+    return DeviceTexture(record_of(record, Texture), keep, on_device[0], nbytes)
 
 
 def halved(image: Pixels) -> Pixels:
