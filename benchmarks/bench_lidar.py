@@ -46,16 +46,18 @@ def under_way(scene: Scene) -> Scene:
     speeds_m_s = {i.instance_id: 1.5 if i.category in people else 10.0
                   for i in scene.instances if i.annotated}  # fmt: skip
     bodies = [b for b in scene.bodies if b.instance_id in speeds_m_s]
-    tracks = [_straight(cart, 12.0)] + [_straight(b, speeds_m_s[b.instance_id]) for b in bodies]
+    start_s = scene.time_s - 1.0
+    tracks = [_straight(cart, 12.0, start_s)]
+    tracks += [_straight(b, speeds_m_s[b.instance_id], start_s) for b in bodies]
     print(f"    {len(bodies)} bodies move")
     return replace(scene, bodies=(*scene.bodies, cart), rigs=(Rig("rig", "cart"),),
                    lidars=(lidar,), tracks=tuple(tracks))  # fmt: skip
 
 
-def _straight(body: Body, speed_m_s: float) -> Track:
+def _straight(body: Body, speed_m_s: float, start_s: float) -> Track:
     pose = body.T_world_body
     steps = [SE3.about_z(0.02 * k, (0.1 * speed_m_s * k, 0.0, 0.0)) for k in range(-10, 11)]
-    return Track(body.name, 0.1, tuple(pose @ step for step in steps), -1.0)
+    return Track(body.name, 0.1, tuple(pose @ step for step in steps), start_s)
 
 
 def main() -> None:

@@ -157,9 +157,7 @@ class Track:
         return (w / norm, x / norm, y / norm, z / norm)
 
 
-def poses_of(
-    tracks: Sequence[Track], times_s: NDArray[np.floating]
-) -> tuple[Array, Array]:
+def poses_of(tracks: Sequence[Track], times_s: NDArray[np.floating]) -> tuple[Array, Array]:
     """Where bodies are at several instants, as ``Track.pose``.
 
     Returns:

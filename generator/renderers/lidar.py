@@ -17,6 +17,7 @@ from generator.renderers.kernels.bundles import LISTED_MAX, Boxes
 from generator.renderers.looks import looks_of
 from generator.renderers.packing import PackedWorld, pack_world
 from generator.renderers.stock import AssetStock
+from generator.renderers.structs import on_device
 from generator.renderers.travel import travelling
 from generator.renderers.weather import ground_of
 
@@ -41,8 +42,8 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     shape = (len(beams.directions), beams.subrays)
     count = shape[0] * shape[1]
     infrared = infrared_surfaces(looks, stock)
-    lights = wp.array(infrared, dtype=kernels.Infrared, device=device)
-    axes = wp.array(beams.directions, dtype=wp.vec3, device=device)
+    lights = on_device(infrared, kernels.Infrared, device)
+    axes = wp.array(beams.directions, dtype=wp.vec3, device=device, copy=False)
     record = _scan(lidar, beams, stock)
     inputs = [record, world.record, travel, _boxes(world, record.threads, stock), lights, axes]
     order = np.zeros(0, np.int32) if beams.order is None else beams.order
@@ -54,7 +55,7 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     wp.launch(
         kernels.scan_beams,
         dim=record.threads,
-        inputs=[*inputs, wp.array(order, dtype=int, device=device)],
+        inputs=[*inputs, wp.array(order, dtype=int, device=device, copy=False)],
         outputs=[*images, hits_, normals, puddles],
         device=device,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class Looks:
 def looks_of(scene: Scene, stock: AssetStock) -> list[Looks]:
     """The materials of every body."""
     own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
-    return [stock.looks.get(materials, lambda m=materials: _looks(m)) for materials in own]
+    return [stock.looks.get(materials, partial(_looks, materials)) for materials in own]
 
 
 def _looks(materials: tuple[Material, ...]) -> Looks:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -19,7 +18,7 @@ from generator.renderers.kernels import records
 from generator.renderers.looks import Looks, looks_of
 from generator.renderers.meshes import DeviceMesh
 from generator.renderers.stock import AssetStock
-from generator.renderers.structs import dtype_of, stacked
+from generator.renderers.structs import dtype_of, on_device, stacked
 
 _LENSES: dict[LensModel, int] = {
     "pinhole": records.PINHOLE,
@@ -85,7 +84,7 @@ def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     world = records.World()
     for name in ("tree", "geometries", "surfaces", "textures", "lamps", "lobes", "sky"):
         setattr(world, name, getattr(packed.record, name))
-    world.bodies = wp.array(placed, dtype=records.Body, device=stock.device)
+    world.bodies = on_device(placed, records.Body, stock.device)
     return PackedWorld(
         world,
         packed.keep,
@@ -113,21 +112,24 @@ def _packed(scene: Scene, stock: AssetStock) -> _Packed:
     R, t, scale, vertex_count = _place(placed, scene.bodies, body_meshes)
     placed["low_m"], placed["high_m"] = _world_boxes(placed, body_meshes)
 
-    def upload(values: NDArray[Any], dtype: Any) -> wp.array:
-        return wp.array(values, dtype=dtype, device=stock.device)
-
+    device = stock.device
     # A hierarchy needs a box; rays never meet this one.
     nowhere = np.full((1, 3), 1e9, np.float32)
     low = placed["low_m"] if len(placed) else nowhere
     high = placed["high_m"] if len(placed) else nowhere
-    lows_m, highs_m = (upload(np.ascontiguousarray(corner), wp.vec3) for corner in (low, high))
+    lows_m, highs_m = (
+        wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=device)
+        for corner in (low, high)
+    )
     tree = wp.Bvh(lows_m, highs_m)
     world = records.World()
     world.tree = tree.id
-    world.geometries = upload(stacked([m.record for m in meshes], records.Geometry), records.Geometry)
-    world.surfaces = upload(_surfaces(looks, texture_ids), records.Surface)
-    world.textures = upload(stacked([t.record for t in textures], records.Texture), records.Texture)
-    world.lamps = upload(_lamps(scene.lights), records.Lamp)
+    geometries = stacked([mesh.record for mesh in meshes], records.Geometry)
+    images = stacked([texture.record for texture in textures], records.Texture)
+    world.geometries = on_device(geometries, records.Geometry, device)
+    world.surfaces = on_device(_surfaces(looks, texture_ids), records.Surface, device)
+    world.textures = on_device(images, records.Texture, device)
+    world.lamps = on_device(_lamps(scene.lights), records.Lamp, device)
     world.lobes = stock.lobes
     world.sky = _sky(scene.environment, environment)
     keep = (tree, meshes, textures, environment)

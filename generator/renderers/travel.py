@@ -55,8 +55,8 @@ def travelling(
     travel.rows = wp.array(rows, dtype=int, device=device)
     travel.B_mesh_lidar = wp.array(B_mesh_lidar, dtype=wp.mat33, device=device)
     travel.eye_mesh = wp.array(eye_mesh, dtype=wp.vec3, device=device)
-    travel.phases = wp.array(phases, dtype=float, device=device)
-    travel.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device)
+    travel.phases = wp.array(phases, dtype=float, device=device, copy=False)
+    travel.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device, copy=False)
     return _enclosing(world, movers, stock), travel
 
 
@@ -72,7 +72,7 @@ def _movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
         if track.end_s > keys_s[0] and track.start_s < keys_s[-1] and track.body in numbers
     ]
     R, t = poses_of(tracks, keys_s)
-    moves = (t != t[:, :1]).any(axis=(1, 2)) | (R != R[:, :1]).any(axis=(1, 2, 3))
+    moves = (t != t[:, :1]).any(axis=(1, 2)) | (R[:, :1] != R).any(axis=(1, 2, 3))
     moving = sorted((numbers[tracks[k].body], int(k)) for k in np.flatnonzero(moves))
     return [Mover(number, scene.bodies[number], R[k], t[k]) for number, k in moving]
 
@@ -101,7 +101,9 @@ def _enclosing(world: PackedWorld, movers: list[Mover], stock: AssetStock) -> Pa
     numbers = [mover.number for mover in movers]
     meshes = [stock.mesh(mover.body.asset) for mover in movers]
     scale = np.array([mover.body.scale for mover in movers])[:, None]
-    low, high = (np.stack(corner) for corner in zip(*((m.low_m, m.high_m) for m in meshes), strict=True))
+    low, high = (
+        np.stack(corner) for corner in zip(*((m.low_m, m.high_m) for m in meshes), strict=True)
+    )
     R = np.stack([mover.R_world_mesh for mover in movers])
     t = np.stack([mover.t_world_mesh for mover in movers])
     centre = t + np.einsum("nkij,nj->nki", R, 0.5 * (low + high) * scale, optimize=False)

@@ -70,7 +70,7 @@ def pulses_of(echoes: Echoes, model: LidarModel, keep: Kept = "dual") -> Pulses:
         return pulses
     pulses = Pulses(*(getattr(pulses, name).copy() for name in Pulses.__slots__))
     if rays == 1 and keep != "strongest":
-        none = {name: np.repeat(_nothing(fields[name]), DETOURS_MAX, axis=1) for name in FIELDS}
+        none = {name: _nothing(name, fields[name], DETOURS_MAX) for name in FIELDS}
         dark: Float32 = np.zeros(none["range_m"].shape, np.float32)
         more = Pulses(none["range_m"], dark, *(none[name] for name in FIELDS[1:]))
         pulses = joined(pulses, more)
@@ -147,9 +147,9 @@ def reported_intensity(reflectance: Float32, model: LidarModel) -> Float32:
     return np.asarray(told, dtype=np.float32)
 
 
-def _nothing(field: NDArray[Any]) -> NDArray[Any]:
-    """What a field of echoes [n, 1] says of nothing."""
-    return np.full((len(field), 1), np.inf if field.dtype == np.float32 else 0, field.dtype)
+def _nothing(name: str, like: NDArray[Any], candidates: int) -> NDArray[Any]:
+    """What a field of echoes says of nothing, for as many pulses."""
+    return np.full((len(like), candidates), np.inf if name == "range_m" else 0, like.dtype)
 
 
 def _put_detours(
