@@ -28,8 +28,10 @@ RING_SHARE = math.sqrt(1.0 / 2.0)
 RUN = 128
 """Rays that are looked at together: neighbours meet the same few bodies."""
 
-THREADS = {True: 16, False: 16384}
-"""By whether the device is a processor, which runs them one after the other."""
+THREADS = 16
+"""A processor runs them one after the other, each with lists of its own."""
+
+RUN_CUDA, THREADS_CUDA = 32, 16384
 
 
 def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echoes:
@@ -49,8 +51,9 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     order = np.zeros(0, np.int32) if beams.order is None else beams.order
     images = [stock.scratch(f"scan {k}", count, float) for k in range(3)]
     hits_ = stock.scratch("scan hits", count, wp.vec2i)
-    normals = stock.scratch("scan normals", count, wp.vec3)
     covered = bool(world.record.ground.covered)
+    mirrors = covered or bool((infrared["mirror"] > 0.0).any())
+    normals = stock.scratch("scan normals", count if mirrors else 1, wp.vec3)
     puddles = stock.scratch("scan puddles", count if covered else 1, float)
     wp.launch(
         kernels.scan_beams,
@@ -91,7 +94,7 @@ def _scan(lidar: Lidar, beams: Beams, stock: AssetStock) -> kernels.Scan:
     scan.reach_m = beams.range_max_m
     scan.spread = RING_SHARE * math.tan(0.5 * beams.divergence_rad)
     scan.subrays = beams.subrays
-    scan.run = RUN
-    scan.threads = THREADS[stock.device.is_cpu]
+    is_cpu = stock.device.is_cpu
+    scan.run, scan.threads = (RUN, THREADS) if is_cpu else (RUN_CUDA, THREADS_CUDA)
     scan.divergence_rad = beams.divergence_rad
     return scan
