@@ -25,6 +25,7 @@ from generator.core.scene import Body, Instance, Scene
 from generator.core.se3 import SE3
 from generator.core.skeletons import Skeleton, skeleton_of
 from generator.preview.clouds import PointColors, point_colors
+from generator.preview.overlay import channel_image
 from generator.preview.palette import color_of
 from generator.preview.shapes import boxes_2d, boxes_3d, mesh_3d, pinhole, transform, ways
 
@@ -167,16 +168,18 @@ class Recorder:
         # Rerun knows no other camera: images of other lenses are shown by themselves.
         if reading.camera.intrinsics.straight:
             self.stream.log(f"{path}/image", pinhole(reading.camera.intrinsics))
-        channels = reading.channels
-        if Channel.RGB in channels:
-            self.stream.log(f"{path}/image/rgb", rr.Image(channels[Channel.RGB]).compress(90))
-        if Channel.Z_DEPTH in channels:
-            depth_m = channels[Channel.Z_DEPTH]
-            shown = np.where(np.isfinite(depth_m), depth_m, 0).astype(np.float32)
-            self.stream.log(f"{path}/image/depth", rr.DepthImage(shown, meter=1.0))
-        if Channel.CATEGORY in channels:
-            categories = rr.SegmentationImage(channels[Channel.CATEGORY], opacity=0.4)
-            self.stream.log(f"{path}/image/category", categories)
+        for channel, data in reading.channels.items():
+            if channel is Channel.RGB:
+                self.stream.log(f"{path}/image/rgb", rr.Image(data).compress(90))
+            elif channel in (Channel.Z_DEPTH, Channel.MEASURED_DEPTH):
+                shown = np.where(np.isfinite(data), data, 0).astype(np.float32)
+                self.stream.log(f"{path}/image/{channel.value}", rr.DepthImage(shown, meter=1.0))
+            elif channel is Channel.CATEGORY:
+                categories = rr.SegmentationImage(data, opacity=0.4)
+                self.stream.log(f"{path}/image/category", categories)
+            else:
+                colored = rr.Image(channel_image(reading, channel)).compress(90)
+                self.stream.log(f"channels/{name}/{channel.value}", colored)
         self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
         self._record_keypoints(f"{path}/image/keypoints", truth)
 

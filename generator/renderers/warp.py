@@ -7,6 +7,7 @@ from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
 from generator.renderers.color import color_image, lit_image, radiance_image
+from generator.renderers.compiling import compile_kernels
 from generator.renderers.device import open_device
 from generator.renderers.labels import label_images
 from generator.renderers.lidar import scanned
@@ -42,6 +43,7 @@ class WarpRenderer:
                 f"renderer.visibility: 'raster' works on the CPU only, not on '{self._device}';"
                 " choose 'auto' or 'rays'."
             )
+        compile_kernels(self._device.alias)
         self._stock = AssetStock(assets, self._device)
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.core.boxes import BoxPx, OrientedBox
-from generator.core.capture import POINT, Capture, PointCloud, Reading
+from generator.core.capture import POINT, Capture, Channel, PointCloud, Reading
 from generator.core.errors import ConfigError
 from generator.core.geometry import Keypoint, Material, MeshData
 from generator.core.instants import at
@@ -179,6 +179,34 @@ def test_images_that_rerun_cannot_place_in_space_are_shown_by_themselves() -> No
 
         logged = [what for path, what in stream.logged if path == "world/cameras/color/image"]
         assert len(logged) == pinholes
+
+
+def test_every_channel_of_a_camera_is_in_the_recording() -> None:
+    """Colour, depth and categories lie over the image; what else there is has its own picture."""
+    camera = Camera("color", IDENTITY, Intrinsics(8, 4, 8.0, 8.0, 4.0, 2.0))
+    depth_m = np.full((4, 8), 2.0, np.float32)
+    ids = np.ones((4, 8), np.uint16)
+    channels = {
+        Channel.RGB: np.zeros((4, 8, 3), np.uint8),
+        Channel.Z_DEPTH: depth_m,
+        Channel.MEASURED_DEPTH: depth_m,
+        Channel.CATEGORY: ids,
+        Channel.INSTANCE: ids,
+        Channel.NORMALS: np.zeros((4, 8, 3), np.float32),
+        Channel.DISPARITY: depth_m,
+    }
+    stream = _Stream()
+    recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
+    capture = Capture({"color": Reading("color", camera, channels)})
+    truth = {"color": ImageTruth(camera, ())}
+
+    recorder.record(Sample(0, 0, 0, "train", Scene("s"), capture, truth))
+
+    logged = {path for path, _ in stream.logged}
+    for name in ("rgb", "depth", "measured_depth", "category"):
+        assert f"world/cameras/color/image/{name}" in logged
+    for name in ("instance", "normals", "disparity"):
+        assert f"channels/color/{name}" in logged
 
 
 def test_neighbouring_ids_look_different_and_nothing_is_black() -> None:

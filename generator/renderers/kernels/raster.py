@@ -135,44 +135,44 @@ def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
     """The edge from p to q, seen from a snapped point; positive to its right (y is down)."""
     dx = wp.int64(p[1] - q[1])
     dy = wp.int64(q[0] - p[0])
-    e = Edge()
-    e.value = wp.int64(x - p[0]) * dx + wp.int64(y - p[1]) * dy
+    edge = Edge()
+    edge.value = wp.int64(x - p[0]) * dx + wp.int64(y - p[1]) * dy
     # Left and top edges own the centres that lie on them.
     if not (dx > wp.int64(0) or (dx == wp.int64(0) and dy > wp.int64(0))):
-        e.value -= wp.int64(1)
-    e.dx = dx * wp.int64(256)
-    e.dy = dy * wp.int64(256)
-    return e
+        edge.value -= wp.int64(1)
+    edge.dx = dx * wp.int64(256)
+    edge.dy = dy * wp.int64(256)
+    return edge
 
 
 @wp.func
 def edges_of(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window):
     """Edge functions of a triangle of either orientation, and the pixels it may cover."""
-    e = Edges()
+    edges = Edges()
     x_low, x_high = wp.min(p[0], wp.min(q[0], r[0])), wp.max(p[0], wp.max(q[0], r[0]))
     y_low, y_high = wp.min(p[1], wp.min(q[1], r[1])), wp.max(p[1], wp.max(q[1], r[1]))
-    e.x_first = wp.max(first_centre(x_low) - window.x0, 0)
-    e.x_last = wp.min(last_centre(x_high) - window.x0, window.width - 1)
-    e.y_first = wp.max(first_centre(y_low) - window.y0, 0)
-    e.y_last = wp.min(last_centre(y_high) - window.y0, window.height - 1)
-    if e.x_first > e.x_last or e.y_first > e.y_last:
-        return e
+    edges.x_first = wp.max(first_centre(x_low) - window.x0, 0)
+    edges.x_last = wp.min(last_centre(x_high) - window.x0, window.width - 1)
+    edges.y_first = wp.max(first_centre(y_low) - window.y0, 0)
+    edges.y_last = wp.min(last_centre(y_high) - window.y0, window.height - 1)
+    if edges.x_first > edges.x_last or edges.y_first > edges.y_last:
+        return edges
     area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
     area -= wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
     if area == wp.int64(0):
-        return e
-    x = ((e.x_first + window.x0) << 8) + 128
-    y = ((e.y_first + window.y0) << 8) + 128
+        return edges
+    x = ((edges.x_first + window.x0) << 8) + 128
+    y = ((edges.y_first + window.y0) << 8) + 128
     if area > wp.int64(0):
-        e.a = edge_between(p, q, x, y)
-        e.b = edge_between(q, r, x, y)
-        e.c = edge_between(r, p, x, y)
+        edges.a = edge_between(p, q, x, y)
+        edges.b = edge_between(q, r, x, y)
+        edges.c = edge_between(r, p, x, y)
     else:
-        e.a = edge_between(q, p, x, y)
-        e.b = edge_between(r, q, x, y)
-        e.c = edge_between(p, r, x, y)
-    e.covers = 1
-    return e
+        edges.a = edge_between(q, p, x, y)
+        edges.b = edge_between(r, q, x, y)
+        edges.c = edge_between(p, r, x, y)
+    edges.covers = 1
+    return edges
 
 
 @wp.func

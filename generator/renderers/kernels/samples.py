@@ -71,16 +71,16 @@ class Side:
 @wp.func
 def side_of(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
     """The edge from p to q of a triangle with that signed area, seen from a snapped point."""
-    e = Side()
+    side = Side()
     turn = wp.where(area > wp.int64(0), wp.int64(1), wp.int64(-1))
-    e.dx = wp.int64(p[1] - q[1]) * turn
-    e.dy = wp.int64(q[0] - p[0]) * turn
-    e.value = wp.int64(x - p[0]) * e.dx + wp.int64(y - p[1]) * e.dy
+    side.dx = wp.int64(p[1] - q[1]) * turn
+    side.dy = wp.int64(q[0] - p[0]) * turn
+    side.value = wp.int64(x - p[0]) * side.dx + wp.int64(y - p[1]) * side.dy
     # Left and top edges own what lies on them.
-    if not (e.dx > wp.int64(0) or (e.dx == wp.int64(0) and e.dy > wp.int64(0))):
-        e.value -= wp.int64(1)
-    e.reach = wp.int64(128) * (wp.abs(e.dx) + wp.abs(e.dy))
-    return e
+    if not (side.dx > wp.int64(0) or (side.dx == wp.int64(0) and side.dy > wp.int64(0))):
+        side.value -= wp.int64(1)
+    side.reach = wp.int64(128) * (wp.abs(side.dx) + wp.abs(side.dy))
+    return side
 
 
 @wp.func

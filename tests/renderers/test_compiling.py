@@ -1,0 +1,38 @@
+"""Kernels are compiled once, side by side, and found again."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+_FIRST_SAMPLE = """
+from generator.assemble.recipe import open_pipeline
+from generator.assemble.spec import load_spec
+
+spec = load_spec("tabletop.yaml", overrides=["sensors=[{type: rgb_camera, size_px: [64, 48]}]"])
+with open_pipeline(spec) as pipeline:
+    pipeline.sample(0)
+"""
+
+
+@pytest.mark.slow
+def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes(tmp_path: Path) -> None:
+    """After it the first sample of a process adds nothing to the cache, nor does the next."""
+    compiler = [sys.executable, "-c", "from generator.renderers.device import open_device\n"
+                "from generator.renderers.compiling import compile_kernels\n"
+                "compile_kernels(open_device('cpu').alias)"]  # fmt: skip
+    environment = {**os.environ, "WARP_CACHE_PATH": str(tmp_path)}
+    subprocess.run(compiler, env=environment, check=True)
+    compiled = _modules(tmp_path)
+    assert compiled
+    for _process in range(2):
+        subprocess.run([sys.executable, "-c", _FIRST_SAMPLE], env=environment, check=True)
+        assert _modules(tmp_path) == compiled
+
+
+def _modules(cache: Path) -> list[str]:
+    return sorted(path.name for path in cache.rglob("wp_*") if path.is_dir())
