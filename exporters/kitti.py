@@ -325,9 +325,9 @@ def point_members(
         for thing in truth.objects
         if thing.instance.instance_id in labelled and thing.box3d_camera is not None
     }
-    R_camera_velo, t_camera_velo = T_camera_velo[:, :3], T_camera_velo[:, 3]
-    p_camera = np.einsum("ij,nj->ni", R_camera_velo, points["position_m"], optimize=False)
-    p_camera += t_camera_velo
+    # Coordinate by coordinate: a sum over the short last axis takes three times as long.
+    x, y, z = points["position_m"].T.astype(np.float64)
+    p_camera = np.stack([a * x + b * y + c * z + d for a, b, c, d in T_camera_velo], axis=1)
     ids = points["instance_id"].astype(np.int64)
     members = boxed_members(ids, p_camera, boxes)
     return members, frozenset(labelled) - frozenset(np.unique(ids[members == ids]).tolist())

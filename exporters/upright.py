@@ -100,9 +100,15 @@ def boxed_members(
     for instance_id, box in boxes.items():
         (mine,) = np.nonzero(ids == instance_id)
         members[mine[box.depths_m(p_camera[mine]) < -BORDER_M]] = 0
-    free = np.flatnonzero(~np.isin(members, list(boxes)))
+    boxed = np.zeros(1 + max([0, *boxes, int(ids.max(initial=0))]), np.bool_)
+    boxed[list(boxes)] = True
+    free = np.flatnonzero(~boxed[members])
+    # Coordinate by coordinate, most of all points are settled by the first.
+    x, y, z = (p_camera[:, k].take(free) for k in range(3))
     for instance_id, box in boxes.items():
-        reach_m = math.hypot(*box.size_hwl_m)
-        near = free[np.abs(p_camera[free] - box.bottom_m).max(axis=1) < reach_m]
-        members[near[box.depths_m(p_camera[near]) > BORDER_M]] = instance_id
+        reach_m, (x0, y0, z0) = math.hypot(*box.size_hwl_m), box.bottom_m
+        near = np.flatnonzero(np.abs(x - x0) < reach_m)
+        near = near[(np.abs(y[near] - y0) < reach_m) & (np.abs(z[near] - z0) < reach_m)]
+        at = free[near]
+        members[at[box.depths_m(p_camera[at]) > BORDER_M]] = instance_id
     return members

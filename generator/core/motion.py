@@ -7,6 +7,7 @@ every processor.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,24 +102,8 @@ class Track:
 
     def poses(self, times_s: NDArray[np.floating]) -> tuple[Array, Array]:
         """Rotation matrices [n, 3, 3] and translations [n, 3] at several instants, as ``pose``."""
-        steps = (np.asarray(times_s, np.float64) - self.start_s) / self.step_s
-        steps = np.array([round(s, 9) for s in steps.tolist()])
-        k = np.clip(np.floor(steps), 0, len(self.knots) - 2).astype(np.intp)
-        f = np.clip(steps - k, 0.0, 1.0)[:, None]
-        places = np.array([knot.translation_m for knot in self.knots])
-        slopes = np.array([self._slope(i) for i in range(len(self.knots))])
-        g = 1.0 - f
-        translations = (
-            (1.0 + 2.0 * f) * g * g * places[k]
-            + f * g * g * slopes[k]
-            + f * f * (3.0 - 2.0 * f) * places[k + 1]
-            + f * f * (f - 1.0) * slopes[k + 1]
-        )
-        turns = np.array([knot.quaternion_wxyz for knot in self.knots])
-        a, b = turns[k], turns[k + 1]
-        same = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2] + a[:, 3] * b[:, 3]
-        sign = np.where(same >= 0.0, 1.0, -1.0)[:, None]
-        return rotations_of(g * a + f * sign * b), translations
+        rotations, translations = poses_of((self,), times_s)
+        return rotations[0], translations[0]
 
     def twist(self, time_s: float) -> Twist:
         """How the body moves at one instant; nothing moves outside the knots."""
@@ -170,6 +155,53 @@ class Track:
         w, x, y, z = ((1.0 - f) * p + f * sign * q for p, q in zip(a, b, strict=True))
         norm = math.sqrt(w * w + x * x + y * y + z * z)
         return (w / norm, x / norm, y / norm, z / norm)
+
+
+def poses_of(tracks: Sequence[Track], times_s: NDArray[np.floating]) -> tuple[Array, Array]:
+    """Where bodies are at several instants, as ``Track.pose``.
+
+    Returns:
+        Rotation matrices [tracks, n, 3, 3] and translations [tracks, n, 3].
+    """
+    times = np.asarray(times_s, np.float64)
+    rotations = np.zeros((len(tracks), len(times), 3, 3))
+    translations = np.zeros((len(tracks), len(times), 3))
+    grids: dict[tuple[float, float, int], list[int]] = {}
+    for i, track in enumerate(tracks):
+        grids.setdefault((track.start_s, track.step_s, len(track.knots)), []).append(i)
+    for (start_s, step_s, _), members in grids.items():
+        # The grid of ``Track._place``: as good as round(), which takes one number at a time.
+        steps = np.rint((times - start_s) / step_s * 1e9) / 1e9
+        knots = [tracks[i].knots for i in members]
+        rotations[members], translations[members] = _between(knots, steps)
+    return rotations, translations
+
+
+def _between(ways: Sequence[tuple[SE3, ...]], steps: Array) -> tuple[Array, Array]:
+    """Rotation matrices and translations between the knots of ways with equally many."""
+    last = len(ways[0]) - 1
+    k = np.clip(np.floor(steps), 0, last - 1).astype(np.intp)
+    f = np.clip(steps - k, 0.0, 1.0)[:, None]
+    first, end = max(int(k.min()) - 1, 0), min(int(k.max()) + 2, last)
+    near = [way[first : end + 1] for way in ways]
+    places = np.array([[knot.translation_m for knot in way] for way in near])
+    turns = np.array([[knot.quaternion_wxyz for knot in way] for way in near])
+    i = np.arange(end + 1 - first)
+    before, after = np.maximum(i - 1, 0), np.minimum(i + 1, end - first)
+    slopes = (places[:, after] - places[:, before]) / (after - before)[:, None]
+    k -= first
+    g = 1.0 - f
+    translations = (
+        (1.0 + 2.0 * f) * g * g * places[:, k]
+        + f * g * g * slopes[:, k]
+        + f * f * (3.0 - 2.0 * f) * places[:, k + 1]
+        + f * f * (f - 1.0) * slopes[:, k + 1]
+    )
+    a, b = turns[:, k], turns[:, k + 1]
+    same = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+    sign = np.where(same + a[..., 3] * b[..., 3] >= 0.0, 1.0, -1.0)[..., None]
+    rotations = rotations_of((g * a + f * sign * b).reshape(-1, 4))
+    return rotations.reshape(*a.shape[:2], 3, 3), translations
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,13 +125,18 @@ def rotations_of(quaternions_wxyz: Array) -> Array:
     """Rotation matrices [n, 3, 3] of quaternions [n, 4] of any length above 0, scalar first."""
     w, x, y, z = quaternions_wxyz.T
     norm = np.sqrt(w * w + x * x + y * y + z * z)
-    w, x, y, z = w / norm, x / norm, y / norm, z / norm
+    return rotations_of_unit(quaternions_wxyz / norm[:, None])
+
+
+def rotations_of_unit(quaternions_wxyz: Array) -> Array:
+    """Rotation matrices [n, 3, 3] of unit quaternions [n, 4], as ``SE3.rotation``."""
+    w, x, y, z = quaternions_wxyz.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    rotations: Array = np.array(rows).transpose(2, 0, 1)
+    rotations: Array = np.ascontiguousarray(np.array(rows).transpose(2, 0, 1))
     return rotations
 
 

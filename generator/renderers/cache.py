@@ -1,4 +1,4 @@
-"""A cache bounded by bytes."""
+"""Caches: one bounded by bytes, one by number."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ class Sized(Protocol):
         ...
 
 
-V = TypeVar("V", bound=Sized)
+S = TypeVar("S", bound=Sized)
+V = TypeVar("V")
 
 
-class ByteCache(Generic[V]):
+class ByteCache(Generic[S]):
     """Values by name; the least recently used go first when the bound is exceeded."""
 
     def __init__(self, limit_bytes: int) -> None:
         self._limit_bytes = limit_bytes
         self._held_bytes = 0
-        self._values: OrderedDict[str, V] = OrderedDict()
+        self._values: OrderedDict[str, S] = OrderedDict()
 
-    def get(self, name: str, make: Callable[[], V]) -> V:
+    def get(self, name: str, make: Callable[[], S]) -> S:
         """The value of that name, made if it is not there."""
         if name in self._values:
             self._values.move_to_end(name)
@@ -38,4 +39,28 @@ class ByteCache(Generic[V]):
         while self._held_bytes > self._limit_bytes and len(self._values) > 1:
             _, dropped = self._values.popitem(last=False)
             self._held_bytes -= dropped.nbytes
+        return value
+
+
+class ObjectCache(Generic[V]):
+    """Values made of objects that never change, for the latest of these objects.
+
+    Objects are told apart by identity: asking a scene's thousands of materials for their hashes
+    takes longer than what is kept here. Whatever is kept, the values are the same.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._values: OrderedDict[int, tuple[object, V]] = OrderedDict()
+
+    def get(self, source: object, make: Callable[[], V]) -> V:
+        """The value of that object, made if it is not there."""
+        known = self._values.get(id(source))
+        if known is not None and known[0] is source:
+            self._values.move_to_end(id(source))
+            return known[1]
+        value = make()
+        self._values[id(source)] = source, value
+        if len(self._values) > self._limit:
+            self._values.popitem(last=False)
         return value

@@ -14,13 +14,12 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.capture import Detours
-from generator.core.geometry import SURFACES, Material
+from generator.core.geometry import SURFACES
 from generator.core.scene import Scene
 from generator.renderers.kernels import lidar as kernels
 from generator.renderers.labels import category_ids
+from generator.renderers.looks import Looks
 from generator.renderers.stock import AssetStock
-
-_SURFACE = {role: number for number, role in enumerate(SURFACES)}
 
 PUDDLE_MIN = 0.05
 """Less of standing water than this mirrors nothing."""
@@ -37,14 +36,14 @@ class HitLabels:
     surfaces: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, scene: Scene, materials: Sequence[Material]) -> HitLabels:
-        """Of a scene, whose bodies' materials these are."""
+    def of(cls, scene: Scene, looks: Sequence[Looks]) -> HitLabels:
+        """Of a scene, whose bodies look like this."""
         instances = [0, *(body.instance_id for body in scene.bodies)]
-        surfaces = [0, *(_SURFACE.get(material.role, 0) for material in materials)]
+        nothing = np.zeros(1, np.uint8)
         return cls(
             np.array(instances, np.uint16),
             np.array([0, *category_ids(scene)], np.uint16),
-            np.array(surfaces, np.uint8),
+            np.concatenate([nothing, *(look.roles for look in looks)]),
         )
 
     def at(self, hits: NDArray[np.int32]) -> Labels:
@@ -58,11 +57,13 @@ class FirstHits:
     """First hits of all rays: ranges and (body, material) on the device, the latter also here.
 
     Attributes:
+        normals: Where there are mirrors, on the device, lidar frame.
         puddles: Share of each ray's end that is standing water; None where everything is dry.
     """
 
     ranges_m: wp.array
     on_device: wp.array
+    normals: wp.array
     hits: NDArray[np.int32]
     puddles: NDArray[np.float32] | None
 
@@ -70,6 +71,7 @@ class FirstHits:
 def detours(
     inputs: Sequence[Any],
     first: FirstHits,
+    order: NDArray[np.int32] | None,
     infrared: NDArray[np.void],
     labels: HitLabels,
     stock: AssetStock,
@@ -79,6 +81,7 @@ def detours(
     Args:
         inputs: Of the kernel that found the first hits.
         first: What it found.
+        order: Of the beams.
         infrared: Records of the materials.
         labels: Of the scene.
         stock: Of the renderer.
@@ -89,7 +92,7 @@ def detours(
     if first.puddles is not None:
         mirror = mirror | (first.puddles > PUDDLE_MIN)
     found = []
-    panes, mirrors = (np.flatnonzero(which).astype(np.int32) for which in (clear, mirror))
+    panes, mirrors = (_picked(which, order) for which in (clear, mirror))
     if len(panes):
         given = [wp.array(panes, dtype=int, device=stock.device), first.ranges_m]
         found.append(_launched(kernels.look_through, [*inputs, *given], panes, labels, stock))
@@ -101,6 +104,7 @@ def detours(
             wp.array(mirrors, dtype=int, device=stock.device),
             first.ranges_m,
             first.on_device,
+            first.normals,
             wp.array(water, dtype=float, device=stock.device),
         ]
         seen = _launched(kernels.look_in_mirrors, [*inputs, *given], mirrors, labels, stock)
@@ -109,6 +113,15 @@ def detours(
     if not found:
         return None
     return Detours(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _picked(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Numbers of the rays that are marked, those of neighbouring beams after each other."""
+    if order is None or not which.any():
+        return np.flatnonzero(which).astype(np.int32)
+    subrays = len(which) // len(order)
+    rays = order if subrays == 1 else (subrays * order[:, None] + np.arange(subrays)).ravel()
+    return rays[which[rays]].astype(np.int32, copy=False)
 
 
 def _launched(
@@ -123,7 +136,7 @@ def _launched(
     ranges_m, reflectances = (wp.zeros(count, dtype=float, device=stock.device) for _ in range(2))
     hits_ = wp.zeros(count, dtype=wp.vec2i, device=stock.device)
     outputs = [ranges_m, reflectances, hits_]
-    wp.launch(kernel, count, list(inputs), outputs, device=stock.device)
+    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=stock.device)
     hits = hits_.numpy()
     there = hits[:, 0] >= 0
     seen = (ranges_m.numpy()[there], reflectances.numpy()[there])

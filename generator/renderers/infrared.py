@@ -31,7 +31,9 @@ from numpy.typing import NDArray
 from generator.core.geometry import Material
 from generator.core.se3 import Array
 from generator.renderers.kernels.lidar import Infrared
+from generator.renderers.looks import Looks
 from generator.renderers.stock import AssetStock
+from generator.renderers.structs import dtype_of, stacked
 
 DIFFUSE = {
     "leaf": 0.50,
@@ -75,17 +77,22 @@ ALPHA_MIN = 0.03
 """Narrower lobes than this are wider than the material says: no glass is flat to a milliradian."""
 
 
-def infrared_surfaces(materials: Sequence[Material], stock: AssetStock) -> NDArray[np.void]:
-    """Infrared records of materials, in their order; at least one."""
-    values: NDArray[Any] = np.zeros(max(len(materials), 1), dtype=Infrared.numpy_dtype())
-    known: dict[Material, tuple[float, ...]] = {}
+def infrared_surfaces(looks: Sequence[Looks], stock: AssetStock) -> NDArray[np.void]:
+    """Infrared records of the materials of all bodies, in their order; at least one."""
+
+    def records(look: Looks) -> NDArray[np.void]:
+        return stock.infrared.get(look.materials, lambda: _infrared(look.materials, stock))
+
+    return stacked([records(look) for look in looks], Infrared)
+
+
+def _infrared(materials: Sequence[Material], stock: AssetStock) -> NDArray[np.void]:
+    values: NDArray[Any] = np.zeros(len(materials), dtype=dtype_of(Infrared))
     for k, material in enumerate(materials):
-        if material not in known:
-            color = np.asarray(material.base_color, dtype=np.float64)
-            if material.texture:
-                color = color * mean_albedo(stock, material.texture)
-            known[material] = infrared_of(material, color)
-        values[k] = known[material]
+        color = np.asarray(material.base_color, dtype=np.float64)
+        if material.texture:
+            color = color * mean_albedo(stock, material.texture)
+        values[k] = infrared_of(material, color)
     return values
 
 

@@ -21,6 +21,7 @@ _DROPS_MAX = 400
 # Shares of glare by halving of the image: a narrow core and a wide veil, after the
 # eye's and camera's point spread that falls with the square of the angle.
 _GLARE_LEVELS = (2, 4, 6)
+GLARE_FACTOR = 2 ** _GLARE_LEVELS[0]
 
 
 def wet_lens(
@@ -64,26 +65,27 @@ def add_glare(view: records.View, share: float, radiance: wp.array, stock: Asset
     if share <= 0.0:
         return
     image = radiance.numpy().reshape(view.height, view.width, 3)
-    veil = wp.array(glare(image).reshape(-1, 3), dtype=wp.vec3, device=stock.device)
+    veil = wp.array(glare(image), dtype=wp.vec3, device=stock.device)
+    inputs = [veil, GLARE_FACTOR, view.width, 1.0 / len(_GLARE_LEVELS), share]
     n = view.width * view.height
-    wp.launch(particles.mix_images, n, [veil, share], [radiance], device=stock.device)
+    wp.launch(particles.mix_coarse, n, inputs, [radiance], device=stock.device)
 
 
 def glare(image: Float32) -> Float32:
-    """The image as scattered light: the mean of several blurs, each as bright as the image."""
-    height, width = image.shape[:2]
+    """The image as scattered light: the sum of several blurs, each as bright as the image.
+
+    It is coarser than the image by ``GLARE_FACTOR`` in both directions.
+    """
     levels, blurs = _GLARE_LEVELS, []
     for level, before in zip(levels, (0, *levels), strict=False):
         image = _halved(image, level - before)
         blurs.append(_spread(_spread(image)))
-    # From coarse to fine, so that only the sum is enlarged to full size.
+    # From coarse to fine, so that only the sum is enlarged further.
     total = blurs[-1]
     for k in range(len(levels) - 2, -1, -1):
         rows, columns = blurs[k].shape[:2]
         total = blurs[k] + _enlarged(total, rows, columns, 2 ** (levels[k + 1] - levels[k]))
-    veil = _enlarged(total, height, width, 2 ** levels[0])
-    mean: Float32 = veil * np.float32(1.0 / len(_GLARE_LEVELS))
-    return mean
+    return total
 
 
 def _halved(image: Float32, times: int) -> Float32:

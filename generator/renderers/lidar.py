@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import warp as wp
 
 from generator.core.capture import Beams, Echoes
@@ -12,8 +13,11 @@ from generator.core.scene import Camera, Lidar, Scene
 from generator.renderers.detours import FirstHits, HitLabels, detours
 from generator.renderers.infrared import infrared_surfaces
 from generator.renderers.kernels import lidar as kernels
-from generator.renderers.packing import pack_world
+from generator.renderers.kernels.bundles import LISTED_MAX, Boxes
+from generator.renderers.looks import looks_of
+from generator.renderers.packing import PackedWorld, pack_world
 from generator.renderers.stock import AssetStock
+from generator.renderers.structs import on_device
 from generator.renderers.travel import travelling
 from generator.renderers.weather import ground_of
 
@@ -21,8 +25,13 @@ RING_SHARE = math.sqrt(1.0 / 2.0)
 """Radius of the ring of rays, in units of the beam's: half the light is outside it."""
 
 
-RUN = 64
-"""Rays per thread: neighbours mostly hit the same body."""
+RUN = 128
+"""Rays that are looked at together: neighbours meet the same few bodies."""
+
+THREADS = 16
+"""A processor runs them one after the other, each with lists of its own."""
+
+RUN_CUDA, THREADS_CUDA = 32, 16384
 
 
 def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echoes:
@@ -30,29 +39,32 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
     eye = Camera(lidar.name, lidar.T_world_lidar, Intrinsics(1, 1, 1.0, 1.0, 0.5, 0.5))
     world, travel = travelling(scene, lidar, beams, pack_world(scene, eye, stock), stock)
     world.record.ground = ground_of(scene.weather)
-    own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
-    materials = [material for group in own for material in group]
+    looks = looks_of(scene, stock)
     device = stock.device
     shape = (len(beams.directions), beams.subrays)
     count = shape[0] * shape[1]
-    infrared = infrared_surfaces(materials, stock)
-    lights = wp.array(infrared, dtype=kernels.Infrared, device=device)
-    axes = wp.array(beams.directions, dtype=wp.vec3, device=device)
-    inputs = [_scan(lidar, beams), world.record, travel, lights, axes]
+    infrared = infrared_surfaces(looks, stock)
+    lights = on_device(infrared, kernels.Infrared, device)
+    axes = wp.array(beams.directions, dtype=wp.vec3, device=device, copy=False)
+    record = _scan(lidar, beams, stock)
+    inputs = [record, world.record, travel, _boxes(world, record.threads, stock), lights, axes]
+    order = np.zeros(0, np.int32) if beams.order is None else beams.order
     images = [stock.scratch(f"scan {k}", count, float) for k in range(3)]
     hits_ = stock.scratch("scan hits", count, wp.vec2i)
     covered = bool(world.record.ground.covered)
+    mirrors = covered or bool((infrared["mirror"] > 0.0).any())
+    normals = stock.scratch("scan normals", count if mirrors else 1, wp.vec3)
     puddles = stock.scratch("scan puddles", count if covered else 1, float)
     wp.launch(
         kernels.scan_beams,
-        dim=(count + RUN - 1) // RUN,
-        inputs=inputs,
-        outputs=[*images, hits_, puddles],
+        dim=record.threads,
+        inputs=[*inputs, wp.array(order, dtype=int, device=device, copy=False)],
+        outputs=[*images, hits_, normals, puddles],
         device=device,
     )
     hits = hits_.numpy()
-    labels = HitLabels.of(scene, materials)
-    first = FirstHits(images[0], hits_, hits, puddles.numpy() if covered else None)
+    labels = HitLabels.of(scene, looks)
+    first = FirstHits(images[0], hits_, normals, hits, puddles.numpy() if covered else None)
     ranges_m, reflectances, cosines = (image.numpy().reshape(shape).copy() for image in images)
     instances, categories, surfaces = labels.at(hits)
     return Echoes(
@@ -62,17 +74,27 @@ def scanned(scene: Scene, lidar: Lidar, beams: Beams, stock: AssetStock) -> Echo
         instances.reshape(shape),
         categories.reshape(shape),
         surfaces.reshape(shape),
-        detours(inputs, first, infrared, labels, stock),
+        detours(inputs, first, beams.order, infrared, labels, stock),
     )
 
 
-def _scan(lidar: Lidar, beams: Beams) -> kernels.Scan:
+def _boxes(world: PackedWorld, threads: int, stock: AssetStock) -> Boxes:
+    boxes = Boxes()
+    boxes.lows_m, boxes.highs_m = world.lows_m, world.highs_m
+    shape = (threads, int(LISTED_MAX))
+    boxes.listed = stock.scratch("listed bodies", shape, int)
+    boxes.enters_m = stock.scratch("listed distances", shape, float)
+    return boxes
+
+
+def _scan(lidar: Lidar, beams: Beams, stock: AssetStock) -> kernels.Scan:
     scan = kernels.Scan()
     scan.R_world_lidar = wp.mat33(lidar.T_world_lidar.rotation())
     scan.eye_m = wp.vec3(*lidar.T_world_lidar.translation_m)
     scan.reach_m = beams.range_max_m
     scan.spread = RING_SHARE * math.tan(0.5 * beams.divergence_rad)
     scan.subrays = beams.subrays
-    scan.run = RUN
+    is_cpu = stock.device.is_cpu
+    scan.run, scan.threads = (RUN, THREADS) if is_cpu else (RUN_CUDA, THREADS_CUDA)
     scan.divergence_rad = beams.divergence_rad
     return scan

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from generator.core.geometry import Material, MeshData
 from generator.core.se3 import Array
 from generator.renderers.kernels.records import Geometry
+from generator.renderers.structs import record_of
 
 # Boxes around faces are those of the cells of a grid of this many along the longest side.
 _CELLS = 6
@@ -26,12 +27,12 @@ class DeviceMesh:
     """One asset's geometry on the device.
 
     Attributes:
-        record: Value of a Geometry record.
+        record: A Geometry record [1].
         keep: The device arrays and the hierarchy that the record points to.
         low_m, high_m: Bounds in the mesh frame.
     """
 
-    record: object
+    record: NDArray[np.void]
     keep: tuple[object, ...]
     low_m: Array
     high_m: Array
@@ -65,7 +66,13 @@ def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
     nbytes = 32 * len(data.vertices_m) + (16 + 64 + 24) * len(data.faces)
     keep = (vertices, normals, uvs, faces, slots, lows, highs, mesh)
     return DeviceMesh(
-        record.numpy_value(), keep, low, high, len(data.vertices_m), data.materials, nbytes
+        record_of(record, Geometry),
+        keep,
+        low,
+        high,
+        len(data.vertices_m),
+        data.materials,
+        nbytes,
     )
 
 

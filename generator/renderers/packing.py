@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -13,10 +12,13 @@ from numpy.typing import NDArray
 
 from generator.core.lens import LensModel
 from generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
+from generator.core.se3 import Array, rotations_of_unit
 from generator.renderers.environments import DeviceEnvironment
 from generator.renderers.kernels import records
+from generator.renderers.looks import looks_of
 from generator.renderers.meshes import DeviceMesh
 from generator.renderers.stock import AssetStock
+from generator.renderers.structs import dtype_of, on_device, stacked
 from generator.renderers.surfaces import pierced_bodies, pierced_slots, surface_records
 
 _LENSES: dict[LensModel, int] = {
@@ -39,6 +41,7 @@ class PackedWorld:
         vertex_count: Of all bodies together.
         weather: Of the scene.
         layered: Whether any surface has more to it than colour, roughness and bumps.
+        lows_m, highs_m: Corners of boxes in the world around the bodies, one at least.
     """
 
     record: records.World
@@ -47,49 +50,52 @@ class PackedWorld:
     vertex_count: int
     weather: Weather
     layered: bool
+    lows_m: wp.array
+    highs_m: wp.array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Places:
+    """Where the bodies of a scene are, whoever looks at them.
+
+    Attributes:
+        placed: Body records without what depends on the camera.
+        R_world_mesh, t_world_mesh, scale: Of the bodies, float64 [n, 3, 3], [n, 3] and [n].
+        vertex_count, lows_m, highs_m: As of PackedWorld.
+        tree: The hierarchy over their boxes.
+    """
+
+    placed: NDArray[np.void]
+    R_world_mesh: Array
+    t_world_mesh: Array
+    scale: Array
+    vertex_count: int
+    lows_m: wp.array
+    highs_m: wp.array
+    tree: wp.Bvh
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Packed:
+    """What every camera and scanner shares of one scene.
+
+    Attributes:
+        record: The World record, without bodies.
+        assets: Meshes, textures and environment that the record points to.
+        places: Where the bodies are.
+        layered: As of PackedWorld.
+    """
+
+    record: records.World
+    assets: tuple[object, ...]
+    places: _Places
+    layered: bool
 
 
 def pack_world(scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
     """The scene as one camera sees it. Cheap enough to be done for every frame."""
-    asset_ids = sorted({body.asset for body in scene.bodies})
-    place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
-    meshes = [stock.mesh(asset_id) for asset_id in asset_ids]
-    own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
-    materials = [material for group in own for material in group]
-    texture_ids = sorted({m.texture for m in materials if m.texture})
-    textures = {texture_id: stock.texture(texture_id) for texture_id in texture_ids}
-    surfaces = surface_records(materials, textures)
-    environment = stock.environment(scene.environment.image)
-    placed = np.zeros(len(scene.bodies), dtype=records.Body.numpy_dtype())
-    placed["geometry"] = [place[body.asset] for body in scene.bodies]
-    counts = np.array([len(group) for group in own], dtype=np.int64)
-    placed["first_material"] = np.cumsum(counts) - counts
-    placed["pierced"] = pierced_bodies(pierced_slots(surfaces, textures), counts)
-    body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
-    vertex_count = _place(placed, scene.bodies, body_meshes, camera)
-    placed["low_m"], placed["high_m"] = _world_boxes(placed, body_meshes)
-
-    def upload(values: NDArray[np.void] | list[object], dtype: Any) -> wp.array:
-        return wp.array(values, dtype=dtype, device=stock.device)
-
-    tree = _tree_over(placed, stock)
-    world = records.World()
-    world.tree = tree.id
-    world.geometries = upload(_stacked(meshes, records.Geometry), records.Geometry)
-    world.bodies = upload(placed, records.Body)
-    world.surfaces = upload(surfaces, records.Surface)
-    world.textures = upload(_stacked([*textures.values()], records.Texture), records.Texture)
-    world.lamps = upload(lamp_records(scene.lights), records.Lamp)
-    world.lobes = stock.lobes
-    world.sky = sky_record(scene.environment, environment)
-    return PackedWorld(
-        world,
-        (tree, meshes, textures, environment),
-        placed,
-        vertex_count,
-        scene.weather,
-        layered=bool(surfaces["layered"].any()),
-    )
+    packed: _Packed = stock.scenes.get(scene, lambda: _packed(scene, stock))
+    return _before(camera, packed, scene.weather, stock)
 
 
 def moved_world(world: PackedWorld, scene: Scene, camera: Camera, stock: AssetStock) -> PackedWorld:
@@ -101,18 +107,15 @@ def moved_world(world: PackedWorld, scene: Scene, camera: Camera, stock: AssetSt
         camera: Its pose may differ.
         stock: Assets.
     """
-    _, meshes, *_ = world.keep
+    _, *assets = world.keep
+    meshes = assets[0]
     assert isinstance(meshes, list)
-    placed = world.placed.copy()
-    body_meshes = [meshes[k] for k in placed["geometry"]]
-    _place(placed, scene.bodies, body_meshes, camera)
-    placed["low_m"], placed["high_m"] = _world_boxes(placed, body_meshes)
-    tree = _tree_over(placed, stock)
+    body_meshes = [meshes[k] for k in world.placed["geometry"]]
+    places = _places(world.placed.copy(), scene.bodies, body_meshes, stock)
     record = _copy_of(world.record)
-    record.tree = tree.id
-    record.bodies = wp.array(placed, dtype=records.Body, device=stock.device)
-    record.lamps = wp.array(lamp_records(scene.lights), dtype=records.Lamp, device=stock.device)
-    return replace(world, record=record, keep=(tree, *world.keep[1:]), placed=placed)
+    record.lamps = on_device(lamp_records(scene.lights), records.Lamp, stock.device)
+    packed = _Packed(record, tuple(assets), places, world.layered)
+    return _before(camera, packed, world.weather, stock)
 
 
 def with_own_record(world: PackedWorld) -> PackedWorld:
@@ -127,18 +130,77 @@ def _copy_of(record: records.World) -> records.World:
     return copy
 
 
-def _tree_over(placed: NDArray[np.void], stock: AssetStock) -> wp.Bvh:
-    """The hierarchy over the boxes of bodies."""
+def _before(camera: Camera, packed: _Packed, weather: Weather, stock: AssetStock) -> PackedWorld:
+    """A packed scene with what depends on the camera."""
+    places = packed.places
+    placed = places.placed.copy()
+    if len(placed):
+        _see(placed, places, camera)
+    # A record of its own: weather and lamps are put into it for one view.
+    record = _copy_of(packed.record)
+    record.tree = places.tree.id
+    record.bodies = on_device(placed, records.Body, stock.device)
+    return PackedWorld(
+        record,
+        (places.tree, *packed.assets),
+        placed,
+        places.vertex_count,
+        weather,
+        packed.layered,
+        places.lows_m,
+        places.highs_m,
+    )
+
+
+def _packed(scene: Scene, stock: AssetStock) -> _Packed:
+    asset_ids = sorted({body.asset for body in scene.bodies})
+    place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
+    meshes = [stock.mesh(asset_id) for asset_id in asset_ids]
+    looks = looks_of(scene, stock)
+    texture_ids = sorted({texture_id for look in looks for texture_id in look.textures})
+    textures = {texture_id: stock.texture(texture_id) for texture_id in texture_ids}
+    surfaces = surface_records(looks, textures)
+    environment = stock.environment(scene.environment.image)
+    placed = np.zeros(len(scene.bodies), dtype=dtype_of(records.Body))
+    placed["geometry"] = [place[body.asset] for body in scene.bodies]
+    counts = np.array([len(look.materials) for look in looks], dtype=np.int64)
+    placed["first_material"] = np.cumsum(counts) - counts
+    placed["pierced"] = pierced_bodies(pierced_slots(surfaces, textures), counts)
+    body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
+    places = _places(placed, scene.bodies, body_meshes, stock)
+    device = stock.device
+    world = records.World()
+    geometries = stacked([mesh.record for mesh in meshes], records.Geometry)
+    images = stacked([texture.record for texture in textures.values()], records.Texture)
+    world.geometries = on_device(geometries, records.Geometry, device)
+    world.surfaces = on_device(surfaces, records.Surface, device)
+    world.textures = on_device(images, records.Texture, device)
+    world.lamps = on_device(lamp_records(scene.lights), records.Lamp, device)
+    world.lobes = stock.lobes
+    world.sky = sky_record(scene.environment, environment)
+    layered = bool(surfaces["layered"].any())
+    return _Packed(world, (meshes, textures, environment), places, layered)
+
+
+def _places(
+    placed: NDArray[np.void],
+    bodies: Sequence[Body],
+    meshes: Sequence[DeviceMesh],
+    stock: AssetStock,
+) -> _Places:
+    """Fill in where bodies are, and put a hierarchy over them."""
+    R, t, scale, vertex_count = _place(placed, bodies, meshes)
+    placed["low_m"], placed["high_m"] = _world_boxes(placed, meshes)
     # A hierarchy needs a box; rays never meet this one.
     nowhere = np.full((1, 3), 1e9, np.float32)
     low = placed["low_m"] if len(placed) else nowhere
     high = placed["high_m"] if len(placed) else nowhere
-    return wp.Bvh(
-        *(
-            wp.array(np.ascontiguousarray(side), dtype=wp.vec3, device=stock.device)
-            for side in (low, high)
-        )
+    lows_m, highs_m = (
+        wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=stock.device)
+        for corner in (low, high)
     )
+    tree = wp.Bvh(lows_m, highs_m)
+    return _Places(placed, R, t, scale, vertex_count, lows_m, highs_m, tree)
 
 
 def pack_view(camera: Camera, stock: AssetStock) -> records.View:
@@ -160,32 +222,37 @@ def pack_view(camera: Camera, stock: AssetStock) -> records.View:
 
 
 def _place(
-    values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh], camera: Camera
-) -> int:
-    """Fill in poses and vertex ranges; returns the number of vertices.
-
-    Products are taken in float64, so that a camera far from the world's origin loses nothing.
-    """
+    values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh]
+) -> tuple[Array, Array, Array, int]:
+    """Fill in poses and vertex ranges; returns rotations, positions, scales, number of vertices."""
     if not bodies:
-        return 0
-    R_camera_world = camera.T_world_camera.rotation().T
-    eye = np.asarray(camera.T_world_camera.translation_m)
-    R = np.stack([body.T_world_body.rotation() for body in bodies])
+        return np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), 0
+    R = rotations_of_unit(np.array([body.T_world_body.quaternion_wxyz for body in bodies]))
     t = np.array([body.T_world_body.translation_m for body in bodies])
     scale = np.array([body.scale for body in bodies])
     counts = np.array([mesh.vertex_count for mesh in meshes])
-    A = np.einsum("ij,njk->nik", R_camera_world, R, optimize=False)
     values["first_vertex"] = np.cumsum(counts) - counts
     values["scale"] = scale
-    values["A_camera_mesh"] = A * scale[:, None, None]
-    values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_camera_world, t - eye, optimize=False)
-    values["B_mesh_camera"] = A.transpose(0, 2, 1) / scale[:, None, None]
-    values["eye_mesh"] = np.einsum("nji,nj->ni", R, eye - t, optimize=False) / scale[:, None]
     values["R_world_mesh"] = R
     values["t_world_mesh"] = t
     values["B_mesh_world"] = R.transpose(0, 2, 1) / scale[:, None, None]
     values["t_mesh_world"] = -np.einsum("nji,nj->ni", R, t, optimize=False) / scale[:, None]
-    return int(counts.sum())
+    return R, t, scale, int(counts.sum())
+
+
+def _see(values: NDArray[np.void], places: _Places, camera: Camera) -> None:
+    """Fill in where bodies are before a camera.
+
+    Products are taken in float64, so that a camera far from the world's origin loses nothing.
+    """
+    R_camera_world = camera.T_world_camera.rotation().T
+    away = places.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)
+    R, scale = places.R_world_mesh, places.scale
+    A = np.einsum("ij,njk->nik", R_camera_world, R, optimize=False)
+    values["A_camera_mesh"] = A * scale[:, None, None]
+    values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_camera_world, away, optimize=False)
+    values["B_mesh_camera"] = A.transpose(0, 2, 1) / scale[:, None, None]
+    values["eye_mesh"] = np.einsum("nji,nj->ni", R, -away, optimize=False) / scale[:, None]
 
 
 def _world_boxes(
@@ -204,13 +271,6 @@ def _world_boxes(
     return (centre - half).astype(np.float32), (centre + half).astype(np.float32)
 
 
-def _stacked(items: Sequence[Any], kind: Any) -> NDArray[np.void]:
-    values = np.zeros(max(len(items), 1), dtype=kind.numpy_dtype())
-    for k, item in enumerate(items):
-        values[k] = item.record
-    return values
-
-
 def sky_record(environment: Environment, light: DeviceEnvironment) -> records.Sky:
     """The Sky record of an environment."""
     sky = records.Sky()
@@ -224,7 +284,7 @@ def sky_record(environment: Environment, light: DeviceEnvironment) -> records.Sk
 
 def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
     """Lamp records, in the order of the lights."""
-    values = np.zeros(len(lights), dtype=records.Lamp.numpy_dtype())
+    values = np.zeros(len(lights), dtype=dtype_of(records.Lamp))
     for value, light in zip(values, lights, strict=True):
         strength = light.illuminance_lux if light.kind == "sun" else light.intensity_cd
         value["kind"] = _LAMP_KINDS[light.kind]

@@ -1,4 +1,4 @@
-"""What a renderer keeps between frames: assets, lenses and scratch memory, never scenes."""
+"""What a renderer keeps between frames: assets, lenses, scratch memory and the latest scene."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from generator.core.geometry import Material
 from generator.core.interfaces import AssetLibrary
 from generator.core.intrinsics import Intrinsics
-from generator.renderers.cache import ByteCache
+from generator.renderers.cache import ByteCache, ObjectCache
 from generator.renderers.environments import DeviceEnvironment, upload_environment, upload_split
 from generator.renderers.lobes import lobe_albedo
 from generator.renderers.meshes import DeviceMesh, upload_mesh
@@ -23,6 +24,8 @@ _TEXTURE_BYTES = 192 << 20
 _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
 _SCRATCH_BYTES = 96 << 20
+_BODIES = 2048
+"""Bodies whose materials are remembered."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,12 +35,20 @@ class _Scratch:
 
 
 class AssetStock:
-    """Meshes, textures and environments on one device, each bounded in bytes."""
+    """Meshes, textures and environments on one device, each bounded in bytes.
+
+    Attributes:
+        scenes: Packed scenes: cameras and scanners look at the same one after each other.
+        looks, infrared: Records of the materials of a body, by their tuple.
+    """
 
     def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
         self.assets = assets
         self.device = device
         self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
+        self.scenes: ObjectCache[Any] = ObjectCache(1)
+        self.looks: ObjectCache[Any] = ObjectCache(_BODIES)
+        self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
         self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
         self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)
         self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.geometry import Material
 from generator.renderers.kernels import records
+from generator.renderers.looks import Looks
+from generator.renderers.structs import stacked
 from generator.renderers.textures import DeviceTexture
 
 MIRROR_ROUGHNESS = 0.15
@@ -16,25 +17,23 @@ MIRROR_ROUGHNESS = 0.15
 
 
 def surface_records(
-    materials: Sequence[Material], textures: Mapping[str, DeviceTexture]
+    looks: Sequence[Looks], textures: Mapping[str, DeviceTexture]
 ) -> NDArray[np.void]:
-    """Surface records of materials, in their order; at least one.
+    """Surface records of all bodies, body after body; at least one.
 
     Args:
-        materials: Any.
-        textures: All that the materials name, in the order of the device's textures.
+        looks: Of the bodies.
+        textures: All that the bodies name, in the order of the device's textures.
     """
-    values = np.zeros(max(len(materials), 1), dtype=records.Surface.numpy_dtype())
-    if not materials:
+    values = stacked([look.surfaces for look in looks], records.Surface)
+    place = {texture_id: k for k, texture_id in enumerate(textures)}
+    listed = np.array([*(place[t] for look in looks for t in look.textures), -1], np.int32)
+    counts = np.array([len(look.textures) for look in looks], np.int64)
+    first = np.repeat(np.cumsum(counts) - counts, [len(look.materials) for look in looks])
+    if not len(first):
         return values
-    places = {"": -1, **{texture_id: k for k, texture_id in enumerate(textures)}}
-    # Column by column: there are thousands in a street, and filling in one record takes long.
-    values["texture"] = [places[m.texture] for m in materials]
-    for name in ("base_color", "roughness", "metallic", "specular", "texture_scale_m"):
-        values[name] = [getattr(m, name) for m in materials]
-    for name in ("emission_cd_m2", "coat", "coat_roughness", "transmission", "ior", "thin"):
-        values[name] = [getattr(m, name) for m in materials]
-    values["opacity"] = [m.opacity for m in materials]
+    local = values["texture"]
+    values["texture"] = np.where(local < 0, -1, listed[first + np.maximum(local, 0)])
     mapped = np.array([*(texture.layered for texture in textures.values()), False])
     values["layered"] = (
         (values["coat"] > 0.0)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from generator.core.geometry import TextureData, UInt8
 from generator.core.se3 import Array
 from generator.renderers.kernels.records import Texture
+from generator.renderers.structs import record_of
 
 Pixels = NDArray[Any]
 
@@ -25,14 +26,14 @@ class DeviceTexture:
     """One texture on the device.
 
     Attributes:
-        record: Value of a Texture record.
+        record: A Texture record [1].
         keep: The device arrays that the record points to.
         texels: One of them: packed colours of all levels, the coarsest last.
         layered: Whether it has maps that plain surfaces do not: emission, metal, occlusion.
         pierced: Whether it has holes.
     """
 
-    record: object
+    record: NDArray[np.void]
     keep: tuple[object, ...]
     texels: wp.array
     nbytes: int
@@ -63,7 +64,7 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     record.cover = wp.array(cover, dtype=wp.uint8, device=device)
     record.offsets = wp.array(np.cumsum([0, *sizes[:-1]]), dtype=wp.int32, device=device)
     return DeviceTexture(
-        record.numpy_value(),
+        record_of(record, Texture),
         (*on_device, record.cover, record.offsets),
         on_device[0],
         sum(values.nbytes for values in images) + cover.nbytes,

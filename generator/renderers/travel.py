@@ -9,6 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.capture import Beams
+from generator.core.motion import poses_of
 from generator.core.scene import Body, Lidar, Scene
 from generator.core.se3 import Array
 from generator.renderers.kernels import lidar as kernels
@@ -54,8 +55,8 @@ def travelling(
     travel.rows = wp.array(rows, dtype=int, device=device)
     travel.B_mesh_lidar = wp.array(B_mesh_lidar, dtype=wp.mat33, device=device)
     travel.eye_mesh = wp.array(eye_mesh, dtype=wp.vec3, device=device)
-    travel.phases = wp.array(phases, dtype=float, device=device)
-    travel.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device)
+    travel.phases = wp.array(phases, dtype=float, device=device, copy=False)
+    travel.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device, copy=False)
     return _enclosing(world, movers, stock), travel
 
 
@@ -65,15 +66,15 @@ def _movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
         return []
     keys_s = scene.time_s + np.linspace(float(time_s.min()), float(time_s.max()), KEYS)
     numbers = {body.name: k for k, body in enumerate(scene.bodies)}
-    movers = []
-    for track in scene.tracks:
-        if track.end_s <= keys_s[0] or track.start_s >= keys_s[-1] or track.body not in numbers:
-            continue
-        R, t = track.poses(keys_s)
-        if (t != t[0]).any() or (R[0] != R).any():
-            number = numbers[track.body]
-            movers.append(Mover(number, scene.bodies[number], R, t))
-    return sorted(movers, key=lambda mover: mover.number)
+    tracks = [
+        track
+        for track in scene.tracks
+        if track.end_s > keys_s[0] and track.start_s < keys_s[-1] and track.body in numbers
+    ]
+    R, t = poses_of(tracks, keys_s)
+    moves = (t != t[:, :1]).any(axis=(1, 2)) | (R[:, :1] != R).any(axis=(1, 2, 3))
+    moving = sorted((numbers[tracks[k].body], int(k)) for k in np.flatnonzero(moves))
+    return [Mover(number, scene.bodies[number], R[k], t[k]) for number, k in moving]
 
 
 def _seen_from(
@@ -93,22 +94,24 @@ def _seen_from(
 
 
 def _enclosing(world: PackedWorld, movers: list[Mover], stock: AssetStock) -> PackedWorld:
-    """The world with a hierarchy that finds movers wherever they are."""
+    """The world with boxes that hold movers wherever they are."""
     if not movers:
         return world
     low_m, high_m = world.placed["low_m"].copy(), world.placed["high_m"].copy()
-    for mover in movers:
-        mesh = stock.mesh(mover.body.asset)
-        middle = 0.5 * (mesh.low_m + mesh.high_m) * mover.body.scale
-        half = 0.5 * (mesh.high_m - mesh.low_m) * mover.body.scale
-        R = mover.R_world_mesh
-        centre = mover.t_world_mesh + np.einsum("kij,j->ki", R, middle, optimize=False)
-        reach = np.einsum("kij,j->ki", np.abs(R), half, optimize=False) + SLACK_M
-        low_m[mover.number] = (centre - reach).min(axis=0)
-        high_m[mover.number] = (centre + reach).max(axis=0)
-    tree = wp.Bvh(
-        wp.array(low_m, dtype=wp.vec3, device=stock.device),
-        wp.array(high_m, dtype=wp.vec3, device=stock.device),
+    numbers = [mover.number for mover in movers]
+    meshes = [stock.mesh(mover.body.asset) for mover in movers]
+    scale = np.array([mover.body.scale for mover in movers])[:, None]
+    low, high = (
+        np.stack(corner) for corner in zip(*((m.low_m, m.high_m) for m in meshes), strict=True)
     )
-    world.record.tree = tree.id
-    return replace(world, keep=(*world.keep, tree))
+    R = np.stack([mover.R_world_mesh for mover in movers])
+    t = np.stack([mover.t_world_mesh for mover in movers])
+    centre = t + np.einsum("nkij,nj->nki", R, 0.5 * (low + high) * scale, optimize=False)
+    half = 0.5 * (high - low) * scale
+    reach = np.einsum("nkij,nj->nki", np.abs(R), half, optimize=False) + SLACK_M
+    low_m[numbers] = (centre - reach).min(axis=1)
+    high_m[numbers] = (centre + reach).max(axis=1)
+    lows_m, highs_m = (
+        wp.array(corner, dtype=wp.vec3, device=stock.device) for corner in (low_m, high_m)
+    )
+    return replace(world, lows_m=lows_m, highs_m=highs_m)

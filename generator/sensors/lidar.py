@@ -143,6 +143,7 @@ class LidarSensor(Mounted):
             model.range_m[1],
             shots.origins_m,
             shots.time_s,
+            sweep.order,
         )
         pulses = pulses_of(renderer.scan(scene, lidar, beams), model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
@@ -173,13 +174,14 @@ class Found:
     @classmethod
     def of(cls, pulses: Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]) -> Found:
         """These candidates of these pulses."""
+        which = rows * pulses.light.shape[1] + picks
         return cls(
             rows,
-            pulses.range_m[rows, picks],
-            pulses.reflectance[rows, picks],
-            pulses.instance_id[rows, picks],
-            pulses.category_id[rows, picks],
-            pulses.surface[rows, picks],
+            pulses.range_m.ravel().take(which),
+            pulses.reflectance.ravel().take(which),
+            pulses.instance_id.ravel().take(which),
+            pulses.category_id.ravel().take(which),
+            pulses.surface.ravel().take(which),
         )
 
 
@@ -210,10 +212,13 @@ def _points(found: Found, shots: Shots, sweep: Sweep, model: LidarModel) -> NDAr
     points: NDArray[Any] = np.zeros(len(rows), POINT)
     points["position_m"] = shots.points_m(rows, found.range_m)
     points["intensity"] = reported_intensity(found.reflectance, model)
-    points["time_s"] = sweep.time_s[rows]
-    points["ring"] = sweep.ring[rows]
+    points["time_s"] = sweep.time_s.take(rows)
+    points["ring"] = sweep.ring.take(rows)
+    points["return_number"] = points["return_count"] = 1
     for name in LABELS:
         points[name] = getattr(found, name)
+    if (np.diff(rows) > 0).all():
+        return points
     per_pulse = np.bincount(rows, minlength=len(sweep.ring))
     first = np.cumsum(per_pulse) - per_pulse
     points["return_number"] = np.arange(len(rows)) - first[rows] + 1

@@ -70,7 +70,7 @@ def pulses_of(echoes: Echoes, model: LidarModel, keep: Kept = "dual") -> Pulses:
         return pulses
     pulses = Pulses(*(getattr(pulses, name).copy() for name in Pulses.__slots__))
     if rays == 1 and keep != "strongest":
-        none = {name: np.repeat(_nothing(fields[name]), DETOURS_MAX, axis=1) for name in FIELDS}
+        none = {name: _nothing(name, fields[name], DETOURS_MAX) for name in FIELDS}
         dark: Float32 = np.zeros(none["range_m"].shape, np.float32)
         more = Pulses(none["range_m"], dark, *(none[name] for name in FIELDS[1:]))
         pulses = joined(pulses, more)
@@ -147,9 +147,9 @@ def reported_intensity(reflectance: Float32, model: LidarModel) -> Float32:
     return np.asarray(told, dtype=np.float32)
 
 
-def _nothing(field: NDArray[Any]) -> NDArray[Any]:
-    """What a field of echoes [n, 1] says of nothing."""
-    return np.full((len(field), 1), np.inf if field.dtype == np.float32 else 0, field.dtype)
+def _nothing(name: str, like: NDArray[Any], candidates: int) -> NDArray[Any]:
+    """What a field of echoes says of nothing, for as many pulses."""
+    return np.full((len(like), candidates), np.inf if name == "range_m" else 0, like.dtype)
 
 
 def _put_detours(
@@ -157,7 +157,10 @@ def _put_detours(
 ) -> None:
     """Merge what rays met besides into the peaks of their beams, in place; the strongest stay."""
     rays = fields["range_m"].shape[1]
-    order = np.argsort(detours.ray, kind="stable")
+    rivals = np.arange(len(detours.ray))
+    if pulses.light.shape[1] == 1:
+        rivals = _rivals(pulses, detours, model)
+    order = rivals[np.argsort(detours.ray[rivals], kind="stable")]
     ray = detours.ray[order]
     # A ray's second detour, if it has two, goes into a slot of its own.
     again = (np.diff(ray, prepend=-1) == 0).astype(np.int64)
@@ -173,6 +176,18 @@ def _put_detours(
     best = np.argsort(-peaks.light, axis=1, kind="stable")[:, : pulses.light.shape[1]]
     for name in Pulses.__slots__:
         getattr(pulses, name)[rows] = np.take_along_axis(getattr(peaks, name), best, axis=1)
+
+
+def _rivals(pulses: Pulses, detours: Detours, model: LidarModel) -> NDArray[np.intp]:
+    """Detours of the single rays whose strongest peak may change: most are far fainter than it."""
+    ray = detours.ray
+    light = light_of(detours.reflectance, detours.range_m, model)
+    # Two that run into one have at most twice the light of one; a hair for what is rounded.
+    strong = (DETOURS_MAX * 1.001) * light >= pulses.light[ray, 0]
+    near = detours.range_m - pulses.range_m[ray, 0] <= 1.001 * model.pulse_m
+    changed: NDArray[np.bool_] = np.zeros(len(pulses.light), np.bool_)
+    changed[ray[strong | near]] = True
+    return np.flatnonzero(changed[ray])
 
 
 def _merged(fields: Mapping[str, NDArray[Any]], rays: int, model: LidarModel) -> Pulses:

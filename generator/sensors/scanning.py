@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -108,11 +109,17 @@ class Sweep:
         directions: Unit vectors in the lidar frame, float32 [n, 3].
         ring: Row of the table, uint16 [n].
         time_s: From the start of the sweep, float32 [n].
+        order: As of Beams.
     """
 
     directions: NDArray[np.float32]
     ring: NDArray[np.uint16]
     time_s: NDArray[np.float32]
+    order: NDArray[np.int32] | None = None
+
+
+TILE = (32, 4)
+"""Columns and rings whose pulses are neighbours in a sweep's order."""
 
 
 def sweep_of(model: LidarModel, start_s: float) -> Sweep:
@@ -125,7 +132,9 @@ def sweep_of(model: LidarModel, start_s: float) -> Sweep:
     return _turn(model) if model.prisms is None else _rosette(model, model.prisms, start_s)
 
 
+@lru_cache(maxsize=8)
 def _turn(model: LidarModel) -> Sweep:
+    """The same at every turn, and therefore not to be written to."""
     elevation = model.elevations_rad()
     rings = len(elevation)
     columns = max(1, round(model.points_per_second / (model.rotation_hz * rings)))
@@ -145,11 +154,24 @@ def _turn(model: LidarModel) -> Sweep:
     )
     time_s = np.broadcast_to((turned / model.rotation_hz)[:, None], azimuth.shape)
     ring = np.broadcast_to(np.arange(rings), azimuth.shape)
-    return Sweep(
+    fields = (
         directions.reshape(-1, 3).astype(np.float32),
         ring.reshape(-1).astype(np.uint16),
         time_s.reshape(-1).astype(np.float32),
+        _tiled(azimuth),
     )
+    for field in fields:
+        field.setflags(write=False)
+    return Sweep(*fields)
+
+
+def _tiled(azimuth: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Pulses of azimuths [columns, rings] tile by tile."""
+    columns, rings = azimuth.shape
+    column = np.floor((0.5 - azimuth / (2.0 * math.pi)) * columns).astype(np.int64) % columns
+    ring = np.broadcast_to(np.arange(rings), azimuth.shape)
+    keys = (column, ring, ring // TILE[1], column // TILE[0])
+    return np.lexsort([key.reshape(-1) for key in keys]).astype(np.int32)
 
 
 def _rosette(model: LidarModel, prisms: Prisms, start_s: float) -> Sweep:

@@ -34,8 +34,12 @@ class Shots:
 
     def points_m(self, rows: NDArray[np.intp], range_m: Float32) -> Float32:
         """Points [m] on some pulses, float32 [k, 3]."""
-        points: Float32 = self.directions[rows] * range_m[:, None]
-        return points if self.origins_m is None else points + self.origins_m[rows]
+        # take() and in place: half the time of indexing and a sum.
+        points: Float32 = self.directions.take(rows, axis=0)
+        points *= range_m[:, None]
+        if self.origins_m is not None:
+            points += self.origins_m.take(rows, axis=0)
+        return points
 
 
 def shots_of(scene: Scene, lidar: Lidar, sweep: Sweep) -> Shots:
@@ -64,12 +68,22 @@ def shots_of(scene: Scene, lidar: Lidar, sweep: Sweep) -> Shots:
     t_lidar_shot = np.einsum("ji,nj->ni", R[-1], t[:-1] - t[-1], optimize=False)
     if np.abs(t_lidar_shot).max() < 1e-6 and np.abs(R_lidar_shot - R_lidar_shot[0]).max() < 1e-7:
         return Shots(sweep.directions, None, time_s)
-    column = np.cumsum(fresh) - 1
+    count = np.diff(np.append(np.flatnonzero(fresh), len(fresh)))
     return Shots(
-        np.einsum("nij,nj->ni", R_lidar_shot[column], sweep.directions, optimize=False),
-        t_lidar_shot.astype(np.float32)[column],
+        _turned(R_lidar_shot, sweep.directions, count),
+        t_lidar_shot.astype(np.float32).repeat(count, axis=0),
         time_s,
     )
+
+
+def _turned(R: Float32, vectors: Float32, count: NDArray[np.intp]) -> Float32:
+    """Vectors [n, 3] after rotations [m, 3, 3], each of which turns the next ``count`` of them."""
+    turned = np.zeros_like(vectors)
+    for i in range(3):
+        # Coordinate by coordinate: four times as fast as a sum over the short last axis.
+        for j in range(3):
+            turned[:, i] += R[:, i, j].repeat(count) * vectors[:, j]
+    return turned
 
 
 def carrier(scene: Scene, lidar: Lidar) -> tuple[str, SE3]:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from generator.core.instants import at, with_placed_sensors
 from generator.core.intrinsics import Intrinsics
-from generator.core.motion import STILL, Change, JointTrack, Track
+from generator.core.motion import STILL, Change, JointTrack, Track, poses_of
 from generator.core.scene import Body, Camera, Device, Instance, Lidar, Light, Rig, Scene
 from generator.core.se3 import SE3
 
@@ -38,6 +38,24 @@ def test_a_track_passes_through_its_knots(points: list[tuple[float, float, float
     track = track_of(points)
     for k, knot in enumerate(track.knots):
         assert track.pose(1.0 + 0.25 * k) == knot
+
+
+def test_poses_of_several_tracks_are_those_of_each() -> None:
+    """Tracks of different beginnings, steps and lengths; before, between and after their knots."""
+    tracks = [
+        track_of([(0, 0, 0), (1, 2, 0), (5, 2, 1), (6, -1, 1)]),
+        track_of([(3, 0, 0), (4, 0, 0)], 0.1),
+        track_of([(0, 0, 0), (-1, 2, 0), (-5, 2, 1), (0, 0, 2)]),
+    ]
+    times_s = np.array([0.5, 1.0, 1.06, 1.31, 1.75, 1.76, 9.0])
+
+    rotations, translations = poses_of(tracks, times_s)
+
+    for i, track in enumerate(tracks):
+        for k, time_s in enumerate(times_s.tolist()):
+            pose = track.pose(time_s)
+            np.testing.assert_allclose(rotations[i, k], pose.rotation(), atol=1e-14)
+            np.testing.assert_allclose(translations[i, k], pose.translation_m, atol=1e-13)
 
 
 @QUICK

@@ -5,24 +5,27 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
+import warp as wp
 
 from generator.core.capture import Channel, Reading
 from generator.core.geometry import Material
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
 from generator.core.se3 import SE3, look_at
+from generator.core.streams import Streams
 from generator.renderers.device import open_device
 from generator.renderers.lamps import main_lamps
-from generator.renderers.lens import glare, lens_drops
-from generator.renderers.packing import pack_world
+from generator.renderers.lens import GLARE_FACTOR, add_glare, glare, lens_drops
+from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.precipitation import exposure_time_s, poisson, rain, snow, traces
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.warp import WarpRenderer
 from tests.randomizers.doubles import rng_of
-from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
+from tests.renderers.fake_library import FakeLibrary, box_mesh, forward_camera, plane_mesh
 
 RGB = frozenset({Channel.RGB})
 SEEN = frozenset({Channel.RGB, Channel.RANGE, Channel.INSTANCE})
@@ -285,15 +288,36 @@ def test_drops_hide_their_share_of_the_lens() -> None:
     assert np.mean(shares) == pytest.approx(0.05, rel=0.15)
 
 
+def veiled(image: np.ndarray, share: float) -> np.ndarray:
+    """The image after its lens has scattered a share of the light."""
+    stock = AssetStock(FakeLibrary({}), open_device("cpu"))
+    radiance = wp.array(image.reshape(-1, 3), dtype=wp.vec3, device="cpu")
+    view = pack_view(forward_camera((image.shape[1], image.shape[0])), stock)
+    add_glare(view, share, radiance, stock)
+    return np.array(radiance.numpy()).reshape(image.shape)
+
+
 def test_glare_moves_light_and_makes_none() -> None:
     """A bright point far from the edges keeps its sum; its neighbourhood gets some of it."""
     image = np.zeros((512, 512, 3), np.float32)
     image[250, 260] = 1000.0
-    veil = glare(image)
+    veil = veiled(image, 1.0)
 
     assert veil.sum(dtype=np.float64) == pytest.approx(image.sum(dtype=np.float64), rel=1e-3)
     assert veil[250, 260, 0] > veil[250, 300, 0] > 0.0
     assert veil.min() >= 0.0
+
+
+def test_glare_is_enlarged_bilinearly() -> None:
+    """As OpenCV does it, in images of any size, and mixed with what arrives straight."""
+    for height, width in ((64, 96), (50, 67), (3, 9)):
+        rng = Streams(seed=1, scene=0).rng("image")
+        image = rng.uniform(0.0, 9.0, (height, width, 3)).astype(np.float32)
+        coarse = glare(image) / 3.0
+        size = (coarse.shape[1] * GLARE_FACTOR, coarse.shape[0] * GLARE_FACTOR)
+        veil = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
+
+        np.testing.assert_allclose(veiled(image, 0.25), 0.75 * image + 0.25 * veil, rtol=1e-4)
 
 
 def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:

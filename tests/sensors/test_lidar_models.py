@@ -106,3 +106,24 @@ def test_a_scanner_either_turns_or_draws_a_rosette() -> None:
         LidarModel.model_validate({**plain, "elevations_deg": ()})
     with pytest.raises(ValidationError, match="must rise"):
         LidarModel.model_validate({**plain, "range_m": (100.0, 1.0)})
+
+
+@pytest.mark.parametrize("name", ["HDL-64E", "OS1-64", "VLP-16"])
+def test_pulses_in_the_order_of_a_sweep_are_neighbours(name: str) -> None:
+    """Every pulse once, and the first hundred of each tile within a few degrees."""
+    sweep = sweep_of(lidar_model(name), 0.0)
+    assert sweep.order is not None
+    np.testing.assert_array_equal(np.sort(sweep.order), np.arange(len(sweep.ring)))
+
+    runs = sweep.directions[sweep.order][: len(sweep.order) // 128 * 128].reshape(-1, 128, 3)
+    middle = runs.mean(axis=1, keepdims=True)
+    apart = np.degrees(np.arccos(np.clip((runs * middle).sum(axis=2), -1.0, 1.0)))
+    assert np.median(apart.max(axis=1)) < 9.0
+
+
+def test_a_sweep_that_is_shared_cannot_be_written_to() -> None:
+    """It is made once for each model."""
+    sweep = sweep_of(lidar_model("VLP-16"), 0.0)
+    assert sweep_of(lidar_model("VLP-16"), 5.0) is sweep
+    with pytest.raises(ValueError, match="read-only"):
+        sweep.directions[0] = 0.0

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.core.capture import POINT, Beams, Echoes, PointCloud
+from generator.core.capture import POINT, Beams, Detours, Echoes, PointCloud
 from generator.core.errors import ConfigError
 from generator.core.geometry import SURFACES
 from generator.core.scene import Camera, Lidar, Scene, Weather
@@ -247,3 +247,31 @@ def test_the_mount_turns_left_and_upwards() -> None:
     np.testing.assert_allclose(up.rotate(ahead), [[0.0, 0.0, 1.0]], atol=1e-5)
     assert up.translation_m == (0.1, 0.2, 0.3)
     assert isinstance(up, SE3)
+
+
+def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None:
+    """Rays whose detours are near or far, faint or strong: against merging every one of them."""
+    n, draw = 4000, rng(3)
+    first = echoes(draw.uniform(5.0, 40.0, (n, 1)))
+    first = replace(first, reflectance=draw.uniform(0.0, 0.2, (n, 1)).astype(np.float32))
+    ray = np.sort(np.concatenate([np.arange(0, n, 2), np.arange(0, n, 5)]))
+    m = len(ray)
+    far_m = first.range_m[ray, 0] + np.where(draw.random(m) < 0.4, 0.3, 4.0) * draw.random(m)
+    detours = Detours(
+        ray,
+        far_m.astype(np.float32),
+        (draw.random(m) ** 4).astype(np.float32),
+        np.full(m, 9, np.uint16),
+        np.full(m, 3, np.uint16),
+        np.full(m, 1, np.uint8),
+    )
+    seen = replace(first, detours=detours)
+
+    strongest = pulses_of(seen, MODEL, "strongest")
+    every = pulses_of(seen, MODEL, "dual")
+
+    best = every.light.argmax(axis=1)[:, None]
+    assert 0.05 < (strongest.instance_id == 9).mean() < 0.5
+    for name in ("range_m", "light", "reflectance", "instance_id", "category_id", "surface"):
+        expected = np.take_along_axis(getattr(every, name), best, axis=1)
+        np.testing.assert_array_equal(getattr(strongest, name), expected)

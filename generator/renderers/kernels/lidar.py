@@ -4,6 +4,17 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.bundles import (
+    FAR_M,
+    Boxes,
+    Bundle,
+    Listed,
+    list_bodies,
+    no_rays,
+    ray_enters,
+    reciprocals,
+    with_ray,
+)
 from generator.renderers.kernels.ground import Coat, coat_at, porosity_of
 from generator.renderers.kernels.holes import solid_hit
 from generator.renderers.kernels.rays import unsheltered
@@ -64,7 +75,7 @@ class Scan:
         reach_m: Rays end here.
         spread: Tangent of the angle between a beam's axis and the rays around it.
         subrays: 1 or 7.
-        run: Rays per thread.
+        run, threads: Rays in a run, and threads that take runs in turn.
         divergence_rad: Angle of a beam: what it lights on a surface.
     """
 
@@ -74,6 +85,7 @@ class Scan:
     spread: float
     subrays: int
     run: int
+    threads: int
     divergence_rad: float
 
 
@@ -225,25 +237,50 @@ def ray_number(scan: Scan, travel: Travel, axes: wp.array(dtype=wp.vec3), i: int
 
 
 @wp.func
-def first_hit(scan: Scan, world: World, travel: Travel, ray: Ray, likely: int, offset: bool):
+def eye_of(scan: Scan, ray: Ray, offset: bool):
+    """Where a ray begins, world frame; at the lidar frame's origin unless it is ``offset``."""
+    eye_m = scan.eye_m
+    if offset:
+        eye_m += scan.R_world_lidar @ ray.origin_m
+    return eye_m
+
+
+@wp.func
+def first_hit(
+    scan: Scan,
+    world: World,
+    travel: Travel,
+    boxes: Boxes,
+    listed: Listed,
+    ray: Ray,
+    likely: int,
+    gone_m: float,
+    offset: bool,
+):
     """What a ray hits first; the ``likely`` body, if not -1, is tried first.
 
     Args:
+        listed: Bodies that it may meet.
+        gone_m: How far the ray begins after that of the list.
         offset: Whether the ray may begin elsewhere than at the lidar frame's origin.
     """
     hit = Nearest()
     hit.range_m = scan.reach_m
     hit.body = -1
-    eye_m = scan.eye_m
-    if offset:
-        eye_m += scan.R_world_lidar @ ray.origin_m
     if likely >= 0:
         hit = nearer(world, travel, likely, ray, hit, offset)
-    candidates = wp.bvh_query_ray(world.tree, eye_m, scan.R_world_lidar @ ray.direction)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, hit.range_m):
+    eye_m = eye_of(scan, ray, offset)
+    inverse = reciprocals(scan.R_world_lidar @ ray.direction)
+    count = wp.where(listed.count < 0, boxes.lows_m.shape[0], listed.count)
+    for k in range(count):
+        b = int(k)
+        if listed.count >= 0:
+            if boxes.enters_m[listed.row, k] - gone_m >= hit.range_m:
+                break
+            b = boxes.listed[listed.row, k]
         if b != likely:
-            hit = nearer(world, travel, b, ray, hit, offset)
+            if ray_enters(boxes, b, eye_m, inverse, hit.range_m):
+                hit = nearer(world, travel, b, ray, hit, offset)
     return hit
 
 
@@ -293,53 +330,86 @@ def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: f
     return below
 
 
+@wp.func
+def number_at(scan: Scan, order: wp.array(dtype=int), j: int):
+    """Number of the ray at a place in the order of beams; an empty order leaves all in theirs."""
+    i = int(j)
+    if order.shape[0] > 0:
+        i = order[j / scan.subrays] * scan.subrays + j % scan.subrays
+    return i
+
+
+@wp.func
+def with_ray_number(
+    bundle: Bundle, scan: Scan, travel: Travel, axes: wp.array(dtype=wp.vec3), i: int
+):
+    """The bundle with ray i of all."""
+    ray = ray_number(scan, travel, axes, i)
+    return with_ray(bundle, eye_of(scan, ray, True), scan.R_world_lidar @ ray.direction)
+
+
 @wp.kernel
 def scan_beams(
     scan: Scan,
     world: World,
     travel: Travel,
+    boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
+    order: wp.array(dtype=int),
     ranges_m: wp.array(dtype=float),
     reflectances: wp.array(dtype=float),
     cosines: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
+    normals: wp.array(dtype=wp.vec3),
     puddles: wp.array(dtype=float),
 ):
     """First hit of every ray; ray k of beam i is at ``i * subrays + k``.
 
-    Each thread takes ``run`` rays, one after the other: what the last one hit is tried first, and
-    mostly leaves nothing else to try. Hits are (body, material), (-1, -1) where there is nothing;
-    puddles are shares of standing water, written only where weather has left something.
+    Each thread takes runs of ``run`` rays, one after the other: what the last one hit is tried
+    first, and mostly leaves nothing else to try. Hits are (body, material), (-1, -1) where there is
+    nothing; normals, in the lidar frame, are written where there is a mirror, and puddles, shares
+    of standing water, where weather has left something.
+
+    Args:
+        order: Beams, neighbours after each other; empty = they are already.
     """
     t = wp.tid()
-    end = wp.min((t + 1) * scan.run, ranges_m.shape[0])
-    last = int(-1)
-    for i in range(t * scan.run, end):
-        ray = ray_number(scan, travel, axes, i)
-        hit = first_hit(scan, world, travel, ray, last, travel.keys > 0)
-        last = hit.body
-        if hit.body < 0:
-            hits[i] = wp.vec2i(-1, -1)
-            ranges_m[i] = wp.inf
-            reflectances[i] = 0.0
-            cosines[i] = 0.0
-            if world.ground.covered != 0:
-                puddles[i] = 0.0
-        else:
-            n_lidar = normal_of(scan, world, travel, ray, hit)
-            cosine = wp.min(wp.abs(wp.dot(n_lidar, ray.direction)), 1.0)
-            material = surface_index(world, wp.vec2i(hit.body, hit.face))
-            hits[i] = wp.vec2i(hit.body, material)
-            ranges_m[i] = hit.range_m
-            cosines[i] = cosine
-            if world.ground.covered == 0:
-                reflectances[i] = returned(lights[material], cosine)
+    for begin in range(t * scan.run, ranges_m.shape[0], scan.threads * scan.run):
+        end = wp.min(begin + scan.run, ranges_m.shape[0])
+        bundle = no_rays()
+        for j in range(begin, end):
+            bundle = with_ray_number(bundle, scan, travel, axes, number_at(scan, order, j))
+        listed = list_bodies(boxes, t, bundle, scan.reach_m)
+        last = int(-1)
+        for j in range(begin, end):
+            i = number_at(scan, order, j)
+            ray = ray_number(scan, travel, axes, i)
+            hit = first_hit(scan, world, travel, boxes, listed, ray, last, 0.0, travel.keys > 0)
+            last = hit.body
+            if hit.body < 0:
+                hits[i] = wp.vec2i(-1, -1)
+                ranges_m[i] = wp.inf
+                reflectances[i] = 0.0
+                cosines[i] = 0.0
+                if world.ground.covered != 0:
+                    puddles[i] = 0.0
             else:
-                coat = coat_of(scan, world, ray, hit.range_m, material, n_lidar)
-                light = weathered(world, lights[material], coat, material, cosine)
-                reflectances[i] = returned(light, cosine)
-                puddles[i] = coat.puddle * (1.0 - wp.min(coat.snow, 1.0))
+                n_lidar = normal_of(scan, world, travel, ray, hit)
+                cosine = wp.min(wp.abs(wp.dot(n_lidar, ray.direction)), 1.0)
+                material = surface_index(world, wp.vec2i(hit.body, hit.face))
+                hits[i] = wp.vec2i(hit.body, material)
+                ranges_m[i] = hit.range_m
+                cosines[i] = cosine
+                if lights[material].mirror > 0.0 or world.ground.covered != 0:
+                    normals[i] = n_lidar
+                if world.ground.covered == 0:
+                    reflectances[i] = returned(lights[material], cosine)
+                else:
+                    coat = coat_of(scan, world, ray, hit.range_m, material, n_lidar)
+                    light = weathered(world, lights[material], coat, material, cosine)
+                    reflectances[i] = returned(light, cosine)
+                    puddles[i] = coat.puddle * (1.0 - wp.min(coat.snow, 1.0))
 
 
 @wp.kernel
@@ -347,6 +417,7 @@ def look_through(
     scan: Scan,
     world: World,
     travel: Travel,
+    boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
     picked: wp.array(dtype=int),
@@ -356,33 +427,51 @@ def look_through(
     hits: wp.array(dtype=wp.vec2i),
 ):
     """What picked rays, which have met a pane, meet behind it and behind any further pane."""
-    j = wp.tid()
-    hits[j] = wp.vec2i(-1, -1)
-    ray = ray_number(scan, travel, axes, picked[j])
-    begin_m = ray.origin_m
-    way_m = wp.max(first_m[picked[j]] - LIFT_M, 0.0)
-    passed = float(1.0)
-    for face in range(FACES_MAX):
-        if passed > 0.0:
-            ray.origin_m = begin_m + ray.direction * way_m
-            hit = first_hit(scan, world, travel, ray, -1, True)
-            if hit.body < 0:
-                passed = 0.0
-            else:
-                way_m += hit.range_m + LIFT_M
-                n = normal_of(scan, world, travel, ray, hit)
-                cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
-                material = surface_index(world, wp.vec2i(hit.body, hit.face))
-                if face > 0:
-                    # Each further pane is overwritten by what is behind it, if anything is.
-                    hits[j] = wp.vec2i(hit.body, material)
-                    ranges_m[j] = way_m - LIFT_M
-                    reflectances[j] = passed * returned(lights[material], cosine)
-                if lights[material].clear == 0.0:
-                    passed = 0.0
-                elif face == 0 or hit.range_m > PANE_M:
-                    kept = lights[material].clear * (1.0 - fresnel(lights[material].mirror, cosine))
-                    passed *= kept * kept
+    t = wp.tid()
+    for begin in range(t * scan.run, picked.shape[0], scan.threads * scan.run):
+        end = wp.min(begin + scan.run, picked.shape[0])
+        bundle = no_rays()
+        for j in range(begin, end):
+            bundle = with_ray_number(bundle, scan, travel, axes, picked[j])
+        listed = list_bodies(boxes, t, bundle, FAR_M)
+        for j in range(begin, end):
+            hits[j] = wp.vec2i(-1, -1)
+            ray = ray_number(scan, travel, axes, picked[j])
+            begin_m = ray.origin_m
+            way_m = wp.max(first_m[picked[j]] - LIFT_M, 0.0)
+            passed = float(1.0)
+            for face in range(FACES_MAX):
+                if passed > 0.0:
+                    ray.origin_m = begin_m + ray.direction * way_m
+                    hit = first_hit(scan, world, travel, boxes, listed, ray, -1, way_m, True)
+                    if hit.body < 0:
+                        passed = 0.0
+                    else:
+                        way_m += hit.range_m + LIFT_M
+                        n = normal_of(scan, world, travel, ray, hit)
+                        cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
+                        material = surface_index(world, wp.vec2i(hit.body, hit.face))
+                        clear = lights[material].clear
+                        if face > 0:
+                            # Each further pane is overwritten by what is behind it, if anything is.
+                            hits[j] = wp.vec2i(hit.body, material)
+                            ranges_m[j] = way_m - LIFT_M
+                            reflectances[j] = passed * returned(lights[material], cosine)
+                        if clear == 0.0:
+                            passed = 0.0
+                        elif face == 0 or hit.range_m > PANE_M:
+                            kept = clear * (1.0 - fresnel(lights[material].mirror, cosine))
+                            passed *= kept * kept
+
+
+@wp.func
+def mirrored(ray: Ray, n: wp.vec3, range_m: float):
+    """A ray after its reflection at a range, where the surface has normal n."""
+    facing = wp.dot(n, ray.direction)
+    ray.origin_m = ray.origin_m + ray.direction * range_m
+    ray.direction = unit(ray.direction - n * (2.0 * facing))
+    ray.origin_m += ray.direction * LIFT_M - n * (wp.sign(facing) * LIFT_M)
+    return ray
 
 
 @wp.kernel
@@ -390,11 +479,13 @@ def look_in_mirrors(
     scan: Scan,
     world: World,
     travel: Travel,
+    boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
     picked: wp.array(dtype=int),
     first_m: wp.array(dtype=float),
     first_hits: wp.array(dtype=wp.vec2i),
+    normals: wp.array(dtype=wp.vec3),
     waters: wp.array(dtype=float),
     ranges_m: wp.array(dtype=float),
     reflectances: wp.array(dtype=float),
@@ -407,30 +498,31 @@ def look_in_mirrors(
     Args:
         waters: Share of each picked ray's end that is a puddle; 0 = the material mirrors.
     """
-    j = wp.tid()
-    i = picked[j]
-    hits[j] = wp.vec2i(-1, -1)
-    ray = ray_number(scan, travel, axes, i)
-    near = Nearest()
-    near.range_m = first_m[i] + LIFT_M
-    near.body = -1
-    near = nearer(world, travel, first_hits[i][0], ray, near, True)
-    if near.body < 0:
-        return
-    n = normal_of(scan, world, travel, ray, near)
-    facing = wp.dot(n, ray.direction)
-    cosine = wp.min(wp.abs(facing), 1.0)
-    mirrored = fresnel(lights[first_hits[i][1]].mirror, cosine)
-    if waters[j] > 0.0:
-        mirrored = waters[j] * fresnel(WATER_F0, cosine)
-    ray.origin_m = ray.origin_m + ray.direction * near.range_m
-    ray.direction = unit(ray.direction - n * (2.0 * facing))
-    ray.origin_m += ray.direction * LIFT_M - n * (wp.sign(facing) * LIFT_M)
-    hit = first_hit(scan, world, travel, ray, -1, True)
-    if hit.body >= 0:
-        n2 = normal_of(scan, world, travel, ray, hit)
-        material = surface_index(world, wp.vec2i(hit.body, hit.face))
-        hits[j] = wp.vec2i(hit.body, material)
-        ranges_m[j] = near.range_m + LIFT_M + hit.range_m
-        cosine = wp.min(wp.abs(wp.dot(n2, ray.direction)), 1.0)
-        reflectances[j] = mirrored * mirrored * returned(lights[material], cosine)
+    t = wp.tid()
+    for begin in range(t * scan.run, picked.shape[0], scan.threads * scan.run):
+        end = wp.min(begin + scan.run, picked.shape[0])
+        bundle = no_rays()
+        for j in range(begin, end):
+            i = picked[j]
+            ray = mirrored(ray_number(scan, travel, axes, i), normals[i], first_m[i])
+            bundle = with_ray(bundle, eye_of(scan, ray, True), scan.R_world_lidar @ ray.direction)
+        listed = list_bodies(boxes, t, bundle, scan.reach_m)
+        last = int(-1)
+        for j in range(begin, end):
+            i = picked[j]
+            ray = ray_number(scan, travel, axes, i)
+            cosine = wp.min(wp.abs(wp.dot(normals[i], ray.direction)), 1.0)
+            kept = fresnel(lights[first_hits[i][1]].mirror, cosine)
+            if waters[j] > 0.0:
+                kept = waters[j] * fresnel(WATER_F0, cosine)
+            ray = mirrored(ray, normals[i], first_m[i])
+            hit = first_hit(scan, world, travel, boxes, listed, ray, last, 0.0, True)
+            last = hit.body
+            hits[j] = wp.vec2i(-1, -1)
+            if hit.body >= 0:
+                n = normal_of(scan, world, travel, ray, hit)
+                material = surface_index(world, wp.vec2i(hit.body, hit.face))
+                hits[j] = wp.vec2i(hit.body, material)
+                ranges_m[j] = first_m[i] + LIFT_M + hit.range_m
+                cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
+                reflectances[j] = kept * kept * returned(lights[material], cosine)

@@ -134,12 +134,43 @@ def refract_in_drops(
                 radiance[i] = radiance[i] * (1.0 - cover) + seen * cover
 
 
+@wp.struct
+class Between:
+    """Two neighbours of a coarse image in one direction, and the share of the second."""
+
+    first: int
+    after: int
+    part: float
+
+
+@wp.func
+def between(i: int, factor: int, count: int):
+    """Where pixel i of an image lies in one that is coarser by a factor, of ``count`` pixels."""
+    place = (float(i) + 0.5) / float(factor) - 0.5
+    place = wp.clamp(place, 0.0, float(count - 1))
+    at = Between()
+    at.first = wp.min(int(place), wp.max(count - 2, 0))
+    at.after = wp.min(at.first + 1, count - 1)
+    at.part = place - float(at.first)
+    return at
+
+
 @wp.kernel
-def mix_images(
-    veil: wp.array(dtype=wp.vec3),
+def mix_coarse(
+    veil: wp.array(dtype=wp.vec3, ndim=2),
+    factor: int,
+    width: int,
+    weight: float,
     share: float,
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Give a share of the light to another image."""
+    """Give a share of the light to a coarser image, bilinearly enlarged and weighted."""
     i = wp.tid()
-    radiance[i] = radiance[i] * (1.0 - share) + veil[i] * share
+    row = between(i / width, factor, veil.shape[0])
+    column = between(i % width, factor, veil.shape[1])
+    left = veil[row.first, column.first] * (1.0 - row.part)
+    left += veil[row.after, column.first] * row.part
+    right = veil[row.first, column.after] * (1.0 - row.part)
+    right += veil[row.after, column.after] * row.part
+    light = (left * (1.0 - column.part) + right * column.part) * weight
+    radiance[i] = radiance[i] * (1.0 - share) + light * share

@@ -1,0 +1,92 @@
+"""What a renderer keeps between calls changes no pixel and no point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from generator.core.capture import Channel
+from generator.core.geometry import Material, TextureData
+from generator.core.scene import Body, Light, Scene, Weather
+from generator.core.se3 import SE3
+from generator.renderers.cache import ObjectCache
+from generator.renderers.device import open_device
+from generator.renderers.packing import pack_world
+from generator.renderers.stock import AssetStock
+from generator.renderers.warp import WarpRenderer
+from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh
+
+CHECKER = TextureData(np.full((4, 4, 3), 128, np.uint8))
+LIBRARY = FakeLibrary(
+    {"box": box_mesh(), "floor": plane_mesh(20.0)}, {"brick": CHECKER, "ash": CHECKER}
+)
+SCENE = Scene(
+    "cubes",
+    (Body("floor", "floor"), Body("box", "box", SE3((0.0, 0.0, 0.5)), instance_id=1)),
+    lights=(Light("lamp", "sphere", (1.0, 2.0, 3.0), intensity_cd=900.0),),
+    weather=Weather(wetness=0.8, puddles=0.3, seed=4),
+)
+EYES = tuple(
+    camera_at(eye_m, (0.0, 0.0, 0.5), size_px=(96, 64))
+    for eye_m in ((3.0, 0.5, 2.0), (-1.0, 3.0, 1.5))
+)
+CHANNELS = frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE})
+
+
+def test_values_are_kept_by_identity_and_the_oldest_go() -> None:
+    """An equal object is another; a value asked for again stays."""
+    cache: ObjectCache[int] = ObjectCache(2)
+    first, second, third = [1], [1], [1]
+    made: list[int] = []
+
+    def make() -> int:
+        made.append(len(made))
+        return made[-1]
+
+    assert [cache.get(key, make) for key in (first, first, second)] == [0, 0, 1]
+    assert cache.get(first, make) == 0
+    assert cache.get(third, make) == 2, "the third value displaces the second"
+    assert [cache.get(key, make) for key in (first, second)] == [0, 3]
+
+
+def test_cameras_of_one_scene_see_what_they_see_of_a_fresh_one() -> None:
+    """Weather, lamps and places of one view are not left in the next."""
+    shared = WarpRenderer(LIBRARY, "cpu")
+
+    for eye in (*EYES, EYES[0]):
+        alone = WarpRenderer(LIBRARY, "cpu").render(replace(SCENE), eye, CHANNELS)
+        seen = shared.render(SCENE, eye, CHANNELS)
+        for channel in CHANNELS:
+            np.testing.assert_array_equal(seen.channels[channel], alone.channels[channel])
+
+
+def test_another_scene_is_packed_anew() -> None:
+    """A body that moved and one that was painted, in a scene that is equal otherwise."""
+    renderer = WarpRenderer(LIBRARY, "cpu")
+    red = (Material((0.8, 0.1, 0.1)),)
+    before = renderer.render(SCENE, EYES[0], CHANNELS).channels
+    floor, box = SCENE.bodies
+    moved = replace(SCENE, bodies=(floor, replace(box, T_world_body=SE3((0.0, 1.0, 0.5)))))
+    painted = replace(SCENE, bodies=(floor, replace(box, materials=red)))
+
+    after = renderer.render(moved, EYES[0], CHANNELS).channels
+    colored = renderer.render(painted, EYES[0], CHANNELS).channels
+
+    assert (before[Channel.Z_DEPTH] != after[Channel.Z_DEPTH]).any()
+    np.testing.assert_array_equal(before[Channel.Z_DEPTH], colored[Channel.Z_DEPTH])
+    on_box = before[Channel.INSTANCE] == 1
+    assert (before[Channel.RGB][on_box] != colored[Channel.RGB][on_box]).any(axis=1).mean() > 0.9
+
+
+def test_textures_of_several_bodies_find_their_places() -> None:
+    """Materials with and without textures, in any order of bodies."""
+    stock = AssetStock(LIBRARY, open_device("cpu"))
+    plain, brick, wood = (Material(texture=name) for name in ("", "brick", "ash"))
+    looks = ((plain,), (brick,), (wood,), (plain,), (brick,))
+    bodies = tuple(Body(f"{k}", "box", materials=look) for k, look in enumerate(looks))
+
+    record = pack_world(Scene("t", bodies), EYES[0], stock).record
+
+    assert record.surfaces.numpy()["texture"].tolist() == [-1, 1, 0, -1, 1]
+    assert len(record.textures.numpy()) == 2
