@@ -61,6 +61,9 @@ from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
 MIRROR_ROUGHNESS = wp.constant(0.15)
+# Ambient occlusion is looked at only where more than this share of its light is seen.
+AMBIENT_SHARE = wp.constant(0.2)
+MOSTLY_CLEAR = wp.constant(0.9)
 # Clear surfaces that a ray passes one after the other.
 SURFACES_MAX = wp.constant(8)
 
@@ -262,13 +265,24 @@ def light_of_meeting(
     occlusion: float,
     p: wp.vec3,
     d: wp.vec3,
+    share: float,
+    clear: float,
     k: int,
 ):
-    """Light of a surface that a ray has met, towards where it came from."""
-    origin = ray_origin(world, m.hit, m.weight, p, d * 1.0)
+    """Light of a surface that a ray has met, towards where it came from.
+
+    Args:
+        share: Of that light in the pixel.
+        clear: Share of it that only glitters: nobody sees whether that is shaded.
+    """
+    origin = ray_origin(world, m.hit, m.weight, p, d)
     for j in range(world.lamps.shape[0]):
-        probe.lit[j, k] = seen_part(world, world.lamps[j], origin, m.normal, probe.parts)
-    open_sky = seen_sky(world, origin, m.normal, probe.disc, probe.radius_m) * occlusion
+        probe.lit[j, k] = 1.0
+        if clear < MOSTLY_CLEAR:
+            probe.lit[j, k] = seen_part(world, world.lamps[j], origin, m.normal, probe.parts)
+    open_sky = occlusion
+    if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
+        open_sky *= seen_sky(world, origin, m.normal, probe.disc, probe.radius_m)
     surface = surface_index(world, m.hit)
     return light_at(world, surface, look, p, -d, probe.lit, open_sky, k)
 
@@ -327,6 +341,8 @@ def gone_on(world: World, ray: Ray, m: Meeting, look: Look, clear: float, opacit
                 wp.sqrt(look.albedo[0]), wp.sqrt(look.albedo[1]), wp.sqrt(look.albedo[2])
             )
             onward += wp.cw_mul(ray.share, root) * ((1.0 - f) * clear * opacity)
+            side = wp.where(m.entering != 0, 1.0, -1.0)
+            ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, m.hit) * ray.width_m
             if wp.dot(way, way) == 0.0:
                 # All is reflected back inside.
                 way = ray.d + m.normal * (2.0 * c)
@@ -361,13 +377,15 @@ def seen_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
                 look = coated(world, surface, look, coat, n)
             clear = world.surfaces[surface].transmission * (1.0 - look.metallic)
             opacity = world.surfaces[surface].opacity
-            light = light_of_meeting(world, probe, m, look, maps.occlusion, p, ray.d, k)
-            own = wp.cw_mul(light.diffuse, look.albedo) * (1.0 - clear) + light.rest
-            own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow - wp.vec3(1.0))
-            if clear > 0.0 and m.entering == 0 and world.surfaces[surface].thin == 0:
-                # From inside nothing but what goes on is seen.
-                own = wp.vec3(0.0)
-            total += wp.cw_mul(ray.share, own) * opacity
+            # From inside a solid nothing but what goes on is seen.
+            if clear == 0.0 or m.entering != 0 or world.surfaces[surface].thin != 0:
+                share = wp.max(ray.share)
+                light = light_of_meeting(
+                    world, probe, m, look, maps.occlusion, p, ray.d, share, clear, k
+                )
+                own = wp.cw_mul(light.diffuse, look.albedo) * (1.0 - clear) + light.rest
+                own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow - wp.vec3(1.0))
+                total += wp.cw_mul(ray.share, own) * opacity
             if clear > 0.0 or opacity < 1.0:
                 ray = gone_on(world, ray, m, look, clear, opacity)
                 ray.origin = beyond(p, ray.d, view.eye_m)
@@ -524,6 +542,8 @@ def ray_of(
                 ior = world.surfaces[surface].ior
                 eta = wp.where(weight[0] > 1.5, 1.0 / ior, ior)
                 bent = refracted(d, layers.n, eta)
+                side = wp.where(weight[0] > 1.5, -1.0, 1.0)
+                ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, hit) * width_m
                 if wp.dot(bent, bent) > 0.0:
                     ray.d = bent
         elif world.surfaces[surface].thin != 0:
