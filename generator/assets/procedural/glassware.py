@@ -66,7 +66,7 @@ def wine_glass(seed: int) -> Solid:
     below = [(0.0, 0.0015), (0.8 * foot, 0.0015), (foot, 0.0), (foot, 0.002), (stem, 0.008)]
     rounded = [0.0, 0.0, 0.0004, 0.0004, 0.012, 0.02, 0.03, 0.05]
     within = [0.45 * wall, 0.45 * wall, 0.05, 0.025, 0.0]
-    profile = fillet([*below, *outer, *inner], [*rounded, *within], 3)
+    profile = fillet([*below, *outer, *inner], [*rounded, *within], 2)
     levels = [_around(rim, wall, height), _around(belly, wall, wide)]
     floor = (0.5 * belly, 0.62 * belly, low + 0.008)
     parts = [
@@ -76,7 +76,7 @@ def wine_glass(seed: int) -> Solid:
         *hulls.ring(floor, levels[1], 10),
         *hulls.ring(levels[1], levels[0], 10),
     ]
-    return centred([lathe(profile, 36)], (_glass(rng),), parts)
+    return centred([lathe(profile, 32)], (_glass(rng),), parts)
 
 
 def _around(radius: float, wall: float, z: float) -> tuple[float, float, float]:

@@ -27,7 +27,7 @@ from generator.renderers.kernels.dielectrics import (
     refracted,
 )
 from generator.renderers.kernels.ground import coat_at, coated, footprint
-from generator.renderers.kernels.holes import solid_hit, uv_at
+from generator.renderers.kernels.holes import OUT_OF_LINE, solid_hit, uv_at
 from generator.renderers.kernels.lattice import ray_origin
 from generator.renderers.kernels.look import Look, look_at_hit
 from generator.renderers.kernels.rays import FARTHEST
@@ -55,7 +55,7 @@ from generator.renderers.kernels.shade import (
     seen_sky,
 )
 from generator.renderers.kernels.sky import sky_irradiance, sky_reflection
-from generator.renderers.kernels.surface import facing
+from generator.renderers.kernels.surface import facet_of, facing
 from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
@@ -64,6 +64,8 @@ MIRROR_ROUGHNESS = wp.constant(0.15)
 # Ambient occlusion is looked at only where more than this share of its light is seen.
 AMBIENT_SHARE = wp.constant(0.2)
 MOSTLY_CLEAR = wp.constant(0.9)
+# Neighbours on a layered surface that differ more than this are looked at more closely.
+CONTRAST = wp.constant(0.06)
 # Clear surfaces that a ray passes one after the other.
 SURFACES_MAX = wp.constant(8)
 
@@ -553,6 +555,72 @@ def ray_of(
     return ray
 
 
+@wp.struct
+class Point:
+    """A point of a face at a point of the image; fields as surface.resolve makes them."""
+
+    way: wp.vec3
+    weight: wp.vec2
+    normal: wp.vec3
+
+
+@wp.func
+def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
+    """Where a ray through a point of the image meets the plane of a face."""
+    facet = facet_of(world, hit)
+    d = pixel_direction(view, x_px, y_px)
+    det = wp.dot(d, facet.across)
+    inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
+    u = wp.clamp(wp.dot(d, facet.along_u) * inverse, 0.0, 1.0)
+    v = wp.clamp(wp.dot(d, facet.along_v) * inverse, 0.0, 1.0 - u)
+    side = wp.where(det < 0.0, -1.0, 1.0)
+    d_world = view.R_world_camera @ d
+    point = Point()
+    point.way = d_world * (facet.depth * inverse)
+    point.weight = wp.vec2(u + 1.0 - side, v)
+    point.normal = facing((facet.n + facet.n_u * u + facet.n_v * v) * side, d_world)
+    return point
+
+
+# Two kernels call it: it is compiled once.
+@wp.func(**OUT_OF_LINE)
+def layered_radiance(
+    view: View,
+    world: World,
+    images: Images,
+    i: int,
+    x_px: float,
+    y_px: float,
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: float,
+    exposed: float,
+    probe: Probe,
+    k: int,
+):
+    """Radiance of a layered surface that pixel i sees, at a point of the image in that pixel."""
+    hit = images.hits[i]
+    surface = surface_index(world, hit)
+    point = point_at(view, world, hit, x_px, y_px)
+    n = point.normal
+    v = unit(-point.way)
+    p = view.eye_m + point.way
+    width_m = pixel_width(view, i, images.z_m[i])
+    look, maps = looked_at(world, surface, hit, point.weight, n, width_m, v)
+    bare = float(1.0)
+    if world.ground.covered != 0:
+        coat = coat_at(world, surface, p, n, exposed, footprint(view, p, n, 1.0))
+        look = coated(world, surface, look, coat, n)
+        bare = 1.0 - wp.min(coat.snow, 1.0)
+    sky = open_sky * maps.occlusion
+    layers = layers_at(world, surface, look, maps, bare, n, p, v, lit, sky, k)
+    c = layers.own
+    for part in range(4):
+        ray = ray_of(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
+        if wp.max(ray.share) > 0.0:
+            c += seen_along(view, world, probe, ray, k)
+    return c
+
+
 @wp.kernel
 def shade_layers(
     view: View,
@@ -568,30 +636,96 @@ def shade_layers(
     """Shade those of a list of pixels that see layered surfaces, each by itself."""
     k = wp.tid()
     i = pixels[k]
-    hit = images.hits[i]
-    surface = surface_index(world, hit)
-    if world.surfaces[surface].layered == 0:
+    if world.surfaces[surface_index(world, images.hits[i])].layered != 0:
+        x = float(i % view.width) + 0.5
+        y = float(i / view.width) + 0.5
+        radiance[i] = layered_radiance(
+            view, world, images, i, x, y, lit, open_sky[0, k], exposed[k], probe, k
+        )
+
+
+@wp.func
+def contrast(a: wp.vec3, b: wp.vec3):
+    """How far two lights are apart, 0 to 1."""
+    light = a[1] + a[0] + a[2]
+    other = b[1] + b[0] + b[2]
+    return wp.abs(light - other) / wp.max(light + other, 1.0e-12)
+
+
+@wp.kernel
+def find_contrasts(
+    view: View,
+    world: World,
+    images: Images,
+    pixels: wp.array(dtype=int),
+    radiance: wp.array(dtype=wp.vec3),
+    count: wp.array(dtype=int),
+    places: wp.array(dtype=int),
+):
+    """List the places in a list of those layered pixels in which edges are seen.
+
+    Args:
+        count: Length of the new list; 0 at first.
+        places: The new list, in any order.
+    """
+    k = wp.tid()
+    i = pixels[k]
+    if world.surfaces[surface_index(world, images.hits[i])].layered == 0:
         return
-    x = float(i % view.width) + 0.5
-    y = float(i / view.width) + 0.5
-    d = view.R_world_camera @ pixel_direction(view, x, y)
-    v = unit(-d)
-    z = images.z_m[i]
-    n = images.normals[i]
-    weight = images.weights[i]
-    width_m = pixel_width(view, i, z)
-    look, maps = looked_at(world, surface, hit, weight, n, width_m, v)
-    p = view.eye_m + d * z
-    bare = float(1.0)
-    if world.ground.covered != 0:
-        coat = coat_at(world, surface, p, n, exposed[k], footprint(view, p, n, 1.0))
-        look = coated(world, surface, look, coat, n)
-        bare = 1.0 - wp.min(coat.snow, 1.0)
-    sky = open_sky[0, k] * maps.occlusion
-    layers = layers_at(world, surface, look, maps, bare, n, p, v, lit, sky, k)
-    c = layers.own
-    for part in range(4):
-        ray = ray_of(view, world, layers, part, hit, weight, n, p, d * z, width_m)
-        if wp.max(ray.share) > 0.0:
-            c += seen_along(view, world, probe, ray, k)
-    radiance[i] = c
+    x = i % view.width
+    y = i / view.width
+    largest = float(0.0)
+    for side in range(4):
+        u = wp.clamp(x + (side & 1) * (1 - (side & 2)), 0, view.width - 1)
+        v = wp.clamp(y + (1 - (side & 1)) * (1 - (side & 2)), 0, view.height - 1)
+        j = v * view.width + u
+        if images.hits[j][0] == images.hits[i][0]:
+            largest = wp.max(largest, contrast(radiance[i], radiance[j]))
+    if largest > CONTRAST:
+        places[wp.atomic_add(count, 0, 1)] = k
+
+
+@wp.kernel
+def shade_contrasts(
+    view: View,
+    world: World,
+    images: Images,
+    places: wp.array(dtype=int),
+    pixels: wp.array(dtype=int),
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: wp.array(dtype=float, ndim=2),
+    exposed: wp.array(dtype=float),
+    probe: Probe,
+    offsets: wp.array(dtype=wp.vec2),
+    listed: wp.array(dtype=int),
+    mixed: wp.array(dtype=wp.vec3),
+):
+    """Radiance of pixels with contrasts: the mean over parts of each.
+
+    Args:
+        offsets: Positions within a pixel, [0, 1).
+        listed: The pixels.
+        mixed: In their order.
+    """
+    place = wp.tid()
+    k = places[place]
+    i = pixels[k]
+    x = float(i % view.width)
+    y = float(i / view.width)
+    total = wp.vec3(0.0)
+    for s in range(offsets.shape[0]):
+        total += layered_radiance(
+            view,
+            world,
+            images,
+            i,
+            x + offsets[s][0],
+            y + offsets[s][1],
+            lit,
+            open_sky[0, k],
+            exposed[k],
+            probe,
+            k,
+        )
+    listed[place] = i
+    mixed[place] = total / float(offsets.shape[0])
