@@ -319,6 +319,12 @@ def sky_along(world: World, ray: Ray):
 
 
 @wp.func
+def root_of(color: wp.vec3):
+    """The square root of a colour, channel by channel."""
+    return wp.vec3(wp.sqrt(color[0]), wp.sqrt(color[1]), wp.sqrt(color[2]))
+
+
+@wp.func
 def gone_on(world: World, ray: Ray, m: Meeting, look: Look, clear: float, opacity: float):
     """A ray behind a surface: its direction, and its share of what is there.
 
@@ -339,10 +345,7 @@ def gone_on(world: World, ray: Ray, m: Meeting, look: Look, clear: float, opacit
             eta = wp.where(m.entering != 0, ior, 1.0 / ior)
             way = refracted(ray.d, m.normal, eta)
             f = fresnel_dielectric(c, eta)
-            root = wp.vec3(
-                wp.sqrt(look.albedo[0]), wp.sqrt(look.albedo[1]), wp.sqrt(look.albedo[2])
-            )
-            onward += wp.cw_mul(ray.share, root) * ((1.0 - f) * clear * opacity)
+            onward += wp.cw_mul(ray.share, root_of(look.albedo)) * ((1.0 - f) * clear * opacity)
             side = wp.where(m.entering != 0, 1.0, -1.0)
             ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, m.hit) * ray.width_m
             if wp.dot(way, way) == 0.0:
@@ -419,6 +422,48 @@ class Layers:
 
 
 @wp.func
+def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
+    """What glass mirrors and what it lets through, from outside; ``c`` is the cosine to it."""
+    f = fresnel_dielectric(c, world.surfaces[surface].ior)
+    mirrored = wp.vec3(f)
+    passed = root_of(albedo) * (1.0 - f)
+    if world.surfaces[surface].thin != 0:
+        mirrored = pane_reflectance(f, albedo)
+        passed = pane_transmittance(f, albedo)
+    return mirrored, passed
+
+
+@wp.func
+def below_coat(
+    world: World,
+    surface: int,
+    layers: Layers,
+    coat: float,
+    n: wp.vec3,
+    p: wp.vec3,
+    v: wp.vec3,
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: float,
+    k: int,
+):
+    """Layers under a clear coat of that weight, which takes what it reflects from all of them."""
+    c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
+    rough = world.surfaces[surface].coat_roughness
+    lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
+    share = coat * lacquer.gloss[0]
+    shine = light_of_lamps(world, lacquer, n, p, v, lit, k).shine
+    layers.own = layers.own * (1.0 - share) + shine * coat
+    layers.mirror = layers.mirror * (1.0 - share)
+    layers.behind = layers.behind * (1.0 - share)
+    if lacquer.roughness < MIRROR_ROUGHNESS:
+        layers.coat = share
+    else:
+        sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
+        layers.own += sky * (share * open_lobe(lacquer, open_sky))
+    return layers
+
+
+@wp.func
 def layers_at(
     world: World,
     surface: int,
@@ -442,55 +487,33 @@ def layers_at(
     layers.n = look.normal
     n_v = wp.dot(look.normal, v)
     clear = world.surfaces[surface].transmission * (1.0 - look.metallic) * bare
-    ior = world.surfaces[surface].ior
     specular = look.specular
     if clear > 0.0:
+        ior = world.surfaces[surface].ior
         normal = (ior - 1.0) / (ior + 1.0)
         specular = normal * normal / 0.08
     brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, specular, n_v)
+    gloss = brdf.gloss
+    if clear > 0.0:
+        c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
+        mirrored, passed = glass_shares(world, surface, look.albedo, c)
+        gloss = gloss * (1.0 - clear) + mirrored * clear
+        layers.behind = passed * clear
     lamps = light_of_lamps(world, brdf, look.normal, p, v, lit, k)
     ambient = sky_irradiance(world.sky, look.normal) * open_sky
-    gloss = brdf.gloss
-    c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
-    if clear > 0.0:
-        f = fresnel_dielectric(c, ior)
-        passed = wp.vec3(1.0 - f)
-        if world.surfaces[surface].thin != 0:
-            passed = pane_transmittance(f, look.albedo)
-            gloss = gloss * (1.0 - clear) + pane_reflectance(f, look.albedo) * clear
-        else:
-            root = wp.vec3(
-                wp.sqrt(look.albedo[0]), wp.sqrt(look.albedo[1]), wp.sqrt(look.albedo[2])
-            )
-            passed = wp.cw_mul(passed, root)
-            gloss = gloss * (1.0 - clear) + wp.vec3(f) * clear
-        layers.behind = passed * clear
-    under = wp.cw_mul(brdf.matte, look.albedo) * (1.0 - clear)
-    own = wp.cw_mul(under, lamps.lux * (1.0 / wp.pi) + ambient) + lamps.shine
-    own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
-    mirrors = look.metallic >= 0.5 or clear > 0.0
-    if mirrors and brdf.roughness < MIRROR_ROUGHNESS:
+    diffuse = wp.cw_mul(brdf.matte, look.albedo) * (1.0 - clear)
+    layers.own = wp.cw_mul(diffuse, lamps.lux * (1.0 / wp.pi) + ambient) + lamps.shine
+    layers.own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
+    if brdf.roughness < MIRROR_ROUGHNESS and (look.metallic >= 0.5 or clear > 0.0):
         layers.mirror = gloss
     else:
-        mirrored = look.normal * (2.0 * n_v) - v
-        sky = sky_reflection(world.sky, mirrored, brdf.roughness)
-        own += wp.cw_mul(gloss, sky) * open_lobe(brdf, open_sky)
+        sky = sky_reflection(world.sky, look.normal * (2.0 * n_v) - v, brdf.roughness)
+        layers.own += wp.cw_mul(gloss, sky) * open_lobe(brdf, open_sky)
     coat = world.surfaces[surface].coat * bare
     if coat > 0.0:
-        rough = world.surfaces[surface].coat_roughness
-        lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
-        share = coat * lacquer.gloss[0]
-        shine = light_of_lamps(world, lacquer, n, p, v, lit, k).shine
-        own = own * (1.0 - share) + shine * coat
-        layers.mirror = layers.mirror * (1.0 - share)
-        layers.behind = layers.behind * (1.0 - share)
-        if lacquer.roughness < MIRROR_ROUGHNESS:
-            layers.coat = share
-        else:
-            sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
-            own += sky * (share * open_lobe(lacquer, open_sky))
+        layers = below_coat(world, surface, layers, coat, n, p, v, lit, open_sky, k)
     opacity = 1.0 - (1.0 - world.surfaces[surface].opacity) * bare
-    layers.own = own * opacity
+    layers.own = layers.own * opacity
     layers.mirror = layers.mirror * opacity
     layers.coat = layers.coat * opacity
     layers.behind = layers.behind * opacity
