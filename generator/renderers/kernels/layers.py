@@ -54,7 +54,7 @@ from generator.renderers.kernels.shade import (
     seen_part,
     seen_sky,
 )
-from generator.renderers.kernels.sky import sky_irradiance, sky_reflection
+from generator.renderers.kernels.sky import sky_image, sky_irradiance, sky_reflection
 from generator.renderers.kernels.surface import facet_of, facing
 from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_at
 
@@ -313,8 +313,11 @@ class Ray:
 def sky_along(world: World, ray: Ray):
     """What a ray sees that meets nothing."""
     c = wp.vec3(0.0)
-    if ray.mirrored != 0 or world.sky.visible != 0:
+    if ray.mirrored != 0:
         c = sky_reflection(world.sky, ray.d, ray.roughness)
+    elif world.sky.visible != 0:
+        # With its sun, which is a lamp to what mirrors.
+        c = sky_image(world.sky, ray.d)
     return c
 
 
