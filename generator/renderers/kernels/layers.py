@@ -54,7 +54,7 @@ from generator.renderers.kernels.shade import (
     seen_part,
     seen_sky,
 )
-from generator.renderers.kernels.sky import sky_irradiance, sky_reflection
+from generator.renderers.kernels.sky import sky_image, sky_irradiance, sky_reflection
 from generator.renderers.kernels.surface import facet_of, facing
 from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_at
 
@@ -313,8 +313,11 @@ class Ray:
 def sky_along(world: World, ray: Ray):
     """What a ray sees that meets nothing."""
     c = wp.vec3(0.0)
-    if ray.mirrored != 0 or world.sky.visible != 0:
+    if ray.mirrored != 0:
         c = sky_reflection(world.sky, ray.d, ray.roughness)
+    elif world.sky.visible != 0:
+        # With its sun, which is a lamp to what mirrors.
+        c = sky_image(world.sky, ray.d)
     return c
 
 
@@ -451,13 +454,13 @@ def below_coat(
     rough = world.surfaces[surface].coat_roughness
     lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
     share = coat * lacquer.gloss[0]
-    above = light_of_lamps(world, lacquer, n, p, v, lit, k)
-    layers.own = layers.own * (1.0 - share) + above.shine * coat
+    lamps = light_of_lamps(world, lacquer, n, p, v, lit, k)
+    layers.own = layers.own * (1.0 - share) + lamps.shine * coat
     layers.mirror = layers.mirror * (1.0 - share)
     layers.behind = layers.behind * (1.0 - share)
     if lacquer.roughness < MIRROR_ROUGHNESS:
         layers.coat = share
-        layers.own -= above.shown * coat
+        layers.own -= lamps.shown * coat
     else:
         sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
         layers.own += sky * (share * open_lobe(lacquer, open_sky))
