@@ -77,3 +77,10 @@ def random_pair(key: wp.uint32, dimension: int, sample: wp.uint32):
     first = scrambled(index, mixed_bits(seed ^ wp.uint32(0x2511E9B3)))
     second = scrambled(pascal(index), mixed_bits(seed ^ wp.uint32(0x63D83595)))
     return wp.vec2(unit_float(reversed_bits(first)), unit_float(reversed_bits(second)))
+
+
+@wp.func
+def random_number(key: wp.uint32, dimension: int, sample: wp.uint32):
+    """A number in [0, 1) that has nothing to do with any other."""
+    seed = mixed_bits(key ^ (wp.uint32(dimension) * wp.uint32(0x2C1B3C6D)))
+    return unit_float(mixed_bits(seed + sample))
