@@ -55,7 +55,12 @@ from generator.renderers.kernels.path_lights import (
     sky_place,
     sky_weight,
 )
-from generator.renderers.kernels.path_random import mixed_bits, random_number, random_pair
+from generator.renderers.kernels.path_random import (
+    mixed_bits,
+    place_on_curve,
+    random_number,
+    random_pair,
+)
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.kernels.rays import path_along, cut, unsheltered
 from generator.renderers.kernels.records import (
@@ -100,6 +105,7 @@ class Budget:
         first: Number of the first sample.
         samples: How many are taken now.
         whole: How many a pixel gets in all.
+        sample_bits: Bits that number these.
         bounces: Number of times that light is scattered at most.
         key: Of the image: tells its noise from that of others.
         clear: 1 where some surface lets light through, so that shadows have to look closer.
@@ -110,6 +116,7 @@ class Budget:
     first: int
     samples: int
     whole: int
+    sample_bits: int
     bounces: int
     key: wp.uint32
     clear: int
@@ -661,10 +668,16 @@ def trace_paths(
     i = wp.tid()
     if not shows(view, i):
         return
-    key = mixed_bits(wp.uint32(i) ^ budget.key)
+    # Pixels whose places are too many for the sequence's numbers begin others.
+    place = place_on_curve(i % view.width, i / view.width)
+    bits = wp.uint32(budget.sample_bits)
+    key = budget.key
+    if budget.sample_bits > 0:
+        key = mixed_bits(key ^ (place >> (wp.uint32(32) - bits)))
+    first = (place << bits) + wp.uint32(budget.first)
     total = wp.vec3(0.0)
     for k in range(budget.samples):
-        total += path_light(view, world, table, budget, i, key, wp.uint32(budget.first + k))
+        total += path_light(view, world, table, budget, i, key, first + wp.uint32(k))
     light[i] = light[i] + total
 
 
