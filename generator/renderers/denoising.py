@@ -18,7 +18,7 @@ def require_denoiser() -> None:
         import pyoidn  # noqa: F401
     except ImportError as error:
         raise ConfigError(
-            "renderer.denoise needs the package 'pyoidn', which cannot be loaded"
+            "render.denoise needs the package 'pyoidn', which cannot be loaded"
             f" ({error}). Install it with: pip install 'gen-data[denoise]', or switch it off."
         ) from error
 
@@ -55,6 +55,6 @@ def denoised(light: Float32, albedo: Float32, normal: Float32) -> Float32:
             chosen.execute()
         fault = device.get_error()
     if fault is not None:
-        raise ConfigError(f"renderer.denoise: Open Image Denoise reports: {fault}")
+        raise ConfigError(f"render.denoise: Open Image Denoise reports: {fault}")
     clean: Float32 = result * np.float32(1.0 / scale)
     return clean

@@ -114,7 +114,7 @@ class PathTracer:
         device, n = self._stock.device, view.width * view.height
         shape = (view.height, view.width, 3)
         albedo, normal = (wp.zeros(n, dtype=wp.vec3, device=device) for _ in range(2))
-        inputs = [view, world.record, _GUIDE_SAMPLES, 0]
+        inputs = [view, world.record, _GUIDE_SAMPLES]
         wp.launch(trace_guides, n, inputs, [albedo, normal], device=device)
         clean = denoised(*(image.numpy().reshape(shape) for image in (radiance, albedo, normal)))
         radiance.assign(clean.reshape(-1, 3))
@@ -126,6 +126,7 @@ class PathTracer:
         surfaces = world.record.surfaces.numpy()
         budget = path.Budget()
         budget.whole = self._settings.samples
+        budget.sample_bits = (self._settings.samples - 1).bit_length()
         budget.bounces = self._settings.max_bounces
         budget.key = int(rng.integers(1 << 32))
         budget.clear = int(((surfaces["transmission"] > 0.0) | (surfaces["opacity"] < 1.0)).any())

@@ -51,9 +51,16 @@ from generator.renderers.kernels.path_lights import (
     meet_lamp,
     preferred,
     sky_density,
+    sky_light,
+    sky_place,
     sky_weight,
 )
-from generator.renderers.kernels.path_random import mixed_bits, random_pair
+from generator.renderers.kernels.path_random import (
+    mixed_bits,
+    place_on_curve,
+    random_number,
+    random_pair,
+)
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.kernels.rays import path_along, cut, unsheltered
 from generator.renderers.kernels.records import (
@@ -71,8 +78,7 @@ from generator.renderers.kernels.records import (
     unit,
     vertex_at,
 )
-from generator.renderers.kernels.sky import sky_image
-from generator.renderers.kernels.surface import facing, mesh_point
+from generator.renderers.kernels.surface import facing
 from generator.renderers.kernels.water import water_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -99,6 +105,7 @@ class Budget:
         first: Number of the first sample.
         samples: How many are taken now.
         whole: How many a pixel gets in all.
+        sample_bits: Bits that number these.
         bounces: Number of times that light is scattered at most.
         key: Of the image: tells its noise from that of others.
         clear: 1 where some surface lets light through, so that shadows have to look closer.
@@ -109,6 +116,7 @@ class Budget:
     first: int
     samples: int
     whole: int
+    sample_bits: int
     bounces: int
     key: wp.uint32
     clear: int
@@ -213,10 +221,11 @@ def vertex_of(world: World, hit: Hit, d: wp.vec3, width_m: float):
     p0 = vertex_at(world, g, corner[0])
     R = world.bodies[b].R_world_mesh
     v = Vertex()
-    m = mesh_point(world, hit.at, hit.weight)
-    v.p = R @ (m * world.bodies[b].scale) + world.bodies[b].t_world_mesh
     e1 = vertex_at(world, g, corner[1]) - p0
-    v.flat = R @ unit(wp.cross(e1, vertex_at(world, g, corner[2]) - p0))
+    e2 = vertex_at(world, g, corner[2]) - p0
+    m = p0 + e1 * hit.weight[0] + e2 * hit.weight[1]
+    v.p = R @ (m * world.bodies[b].scale) + world.bodies[b].t_world_mesh
+    v.flat = R @ unit(wp.cross(e1, e2))
     v.outside = wp.dot(v.flat, d) < 0.0
     side = wp.where(v.outside, 1.0, -1.0)
     v.flat = v.flat * side
@@ -346,12 +355,13 @@ def sky_met(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3
     """Light of the sky that a ray meets."""
     light = wp.vec3(0.0)
     if world.sky.luminance > 0.0:
+        place = sky_place(world.sky, d)
         part = float(1.0)
         if a.density >= 0.0 and budget.lights != 2:
-            asked = sky_density(world.sky, table, d) * sky_weight(world.sky, a.n)
+            asked = sky_density(table, place) * sky_weight(world.sky, a.n)
             asked = asked / wp.max(a.total, 1.0e-20)
             part = preferred(a.density, asked) * float(budget.lights >> 1)
-        light = sky_image(world.sky, d) * part
+        light = sky_light(world.sky, place) * part
     return light
 
 
@@ -369,22 +379,21 @@ def light_asked(
     s: Bsdf,
     v: Vertex,
     o: wp.vec3,
+    x: wp.vec3,
+    y: wp.vec3,
     choice: Choice,
     u: wp.vec2,
 ):
-    """Light of one source that a vertex sends on."""
+    """Light of one source that a vertex sends on; x, y complete its shading frame."""
     light = wp.vec3(0.0)
     g = Glimpse()
     if choice.source == SKY:
         g = draw_sky(world.sky, table, u)
-        g.radiance = sky_image(world.sky, g.direction)
     elif world.lamps[choice.source].kind <= SUN:
         g = draw_ball(world.lamps[choice.source], o, u)
     else:
         g = draw_panel(world.lamps[choice.source], o, u)
-    n = v.look.normal
-    x, y = frame_of(n)
-    l = to_frame(g.direction, x, y, n)  # noqa: E741
+    l = to_frame(g.direction, x, y, v.look.normal)  # noqa: E741
     if g.distance_m > 0.0 and l[2] > 0.0 and wp.dot(g.direction, v.flat) > 0.0:
         f, density = evaluate(s, l)
         asked = g.density * choice.part
@@ -464,10 +473,12 @@ def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
 
 
 @wp.func
-def deal(world: World, v: Vertex, w: wp.vec3, number: float):
+def deal(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample: wp.uint32):
     """What a vertex is; ``w`` points to where the path comes from, in the shading frame."""
     out = Dealt()
-    lot = number
+    lot = float(0.0)
+    if v.opacity < 1.0 or v.clear > 0.0:
+        lot = random_pair(key, pair, sample)[0]
     if v.opacity < 1.0:
         if lot >= v.opacity:
             out.kind = STRAIGHT
@@ -518,7 +529,6 @@ def step_from(
     budget: Budget,
     v: Vertex,
     d: wp.vec3,
-    lot: float,
     key: wp.uint32,
     pair: int,
     sample: wp.uint32,
@@ -527,14 +537,13 @@ def step_from(
 
     Args:
         d: Direction in which the path has come.
-        lot: In [0, 1), for what the vertex is.
-        key, pair, sample: Of the numbers for directions and sources.
+        key, pair, sample: Of the first of its PAIRS pairs of numbers.
     """
     n = v.look.normal
     x, y = frame_of(n)
     w = to_frame(-d, x, y, n)
     w = wp.vec3(w[0], w[1], wp.max(w[2], 1.0e-3))
-    dealt = deal(world, v, w, lot)
+    dealt = deal(world, v, w, key, pair, sample)
     step = Step()
     step.density = -1.0
     step.straight = dealt.kind == STRAIGHT
@@ -543,8 +552,8 @@ def step_from(
     step.weight = dealt.weight
     if step.straight:
         return step
-    u = random_pair(key, pair, sample)
-    choices = random_pair(key, pair + 1, sample)
+    u = random_pair(key, pair + 1, sample)
+    choices = random_pair(key, pair + 2, sample)
     sent = Scattering()
     if dealt.kind == SOLID:
         sent = scatter_glass(dealt.bsdf, choices[0], u)
@@ -565,8 +574,8 @@ def step_from(
         step.density = sent.density
         step.total = choice.total
         if choice.part > 0.0 and budget.lights != 2:
-            u = random_pair(key, pair + 2, sample)
-            step.light = light_asked(world, table, budget, dealt.bsdf, v, o, choice, u)
+            u = random_pair(key, pair + 3, sample)
+            step.light = light_asked(world, table, budget, dealt.bsdf, v, o, x, y, choice, u)
     step.o = lifted(v.p, side)
     step.d = x * sent.l[0] + y * sent.l[1] + n * sent.l[2]
     if wp.dot(step.d, side) <= 0.0:
@@ -620,8 +629,7 @@ def path_light(
                 light += wp.cw_mul(through, v.glow)
             if bounces < budget.bounces and passages < PASSAGES_MAX:
                 pair = 1 + PAIRS * (bounces + passages)
-                lots = random_pair(key, pair, sample)
-                step = step_from(world, table, budget, v, d, lots[0], key, pair + 1, sample)
+                step = step_from(world, table, budget, v, d, key, pair, sample)
                 light += wp.cw_mul(through, step.light)
                 through = wp.cw_mul(through, step.weight)
                 going = wp.max(through) > 0.0
@@ -643,7 +651,7 @@ def path_light(
                         cone = wp.max(cone, wp.min(spread, 0.5))
                     if going and bounces >= SURE_BOUNCES:
                         keep = wp.min(wp.max(through), 0.95)
-                        going = lots[1] < keep
+                        going = random_number(key, pair, sample) < keep
                         through = through * (1.0 / keep)
     return light
 
@@ -660,10 +668,16 @@ def trace_paths(
     i = wp.tid()
     if not shows(view, i):
         return
-    key = mixed_bits(wp.uint32(i) ^ budget.key)
+    # Pixels whose places are too many for the sequence's numbers begin others.
+    place = place_on_curve(i % view.width, i / view.width)
+    bits = wp.uint32(budget.sample_bits)
+    key = budget.key
+    if budget.sample_bits > 0:
+        key = mixed_bits(key ^ (place >> (wp.uint32(32) - bits)))
+    first = (place << bits) + wp.uint32(budget.first)
     total = wp.vec3(0.0)
     for k in range(budget.samples):
-        total += path_light(view, world, table, budget, i, key, wp.uint32(budget.first + k))
+        total += path_light(view, world, table, budget, i, key, first + wp.uint32(k))
     light[i] = light[i] + total
 
 

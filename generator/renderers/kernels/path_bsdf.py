@@ -194,6 +194,8 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
     diffuse = n_l * (1.0 / wp.pi)
     f = s.diffuse * diffuse
     density = diffuse * (1.0 - s.p_coat - s.p_shine)
+    if s.p_shine == 0.0 and s.coat == 0.0:
+        return f, density
     h = unit(s.v + l)
     v_h = wp.max(wp.dot(s.v, h), 0.0)
     if s.p_shine > 0.0:

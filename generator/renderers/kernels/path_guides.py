@@ -18,7 +18,6 @@ def trace_guides(
     view: View,
     world: World,
     samples: int,
-    key: wp.uint32,
     albedo: wp.array(dtype=wp.vec3),
     normal: wp.array(dtype=wp.vec3),
 ):
@@ -28,7 +27,7 @@ def trace_guides(
         return
     colors = wp.vec3(0.0)
     normals = wp.vec3(0.0)
-    pixel = mixed_bits(wp.uint32(i) ^ key)
+    pixel = mixed_bits(wp.uint32(i))
     for k in range(samples):
         place = random_pair(pixel, 0, wp.uint32(k))
         x = float(i % view.width) + place[0]

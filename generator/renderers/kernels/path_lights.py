@@ -249,8 +249,38 @@ def interval_of(shares: wp.array(dtype=float), last: int, u: float):
 
 
 @wp.func
+def sky_place(sky: Sky, d: wp.vec3):
+    """Where a unit direction lies in the sky's image, [0, 1) along rows and columns; its sine."""
+    x = sky.cos_yaw * d[0] + sky.sin_yaw * d[1]
+    y = sky.cos_yaw * d[1] - sky.sin_yaw * d[0]
+    z = wp.clamp(d[2], -1.0, 1.0)
+    right = 0.5 - wp.atan2(y, x) * (0.5 / wp.pi)
+    return wp.vec3(right, wp.acos(z) / wp.pi, wp.sqrt(1.0 - z * z))
+
+
+@wp.func
+def sky_light(sky: Sky, place: wp.vec3):
+    """The image at a place, bilinear, as ``sky.panorama`` reads it."""
+    height = sky.image.shape[0]
+    width = sky.image.shape[1]
+    x = place[0] * float(width) - 0.5
+    y = place[1] * float(height) - 0.5
+    x0 = floor_int(x)
+    y0 = floor_int(y)
+    fx = x - float(x0)
+    fy = y - float(y0)
+    xa = wp.where(x0 < 0, width - 1, wp.min(x0, width - 1))
+    xb = wp.where(x0 + 1 >= width, 0, x0 + 1)
+    ya = wp.clamp(y0, 0, height - 1)
+    yb = wp.clamp(y0 + 1, 0, height - 1)
+    top = sky.image[ya, xa] * (1.0 - fx) + sky.image[ya, xb] * fx
+    bottom = sky.image[yb, xa] * (1.0 - fx) + sky.image[yb, xb] * fx
+    return (top * (1.0 - fy) + bottom * fy) * sky.luminance
+
+
+@wp.func
 def draw_sky(sky: Sky, table: SkyTable, u: wp.vec2):
-    """A direction of the sky, drawn by the brightness of the image; radiance is not told."""
+    """A direction of the sky, drawn by the brightness of the image."""
     height = table.rows.shape[0] - 1
     width = table.columns.shape[1] - 1
     row = interval_of(table.rows, height, u[1])
@@ -269,27 +299,23 @@ def draw_sky(sky: Sky, table: SkyTable, u: wp.vec2):
         sky.cos_yaw * e[0] - sky.sin_yaw * e[1], sky.cos_yaw * e[1] + sky.sin_yaw * e[0], e[2]
     )
     g.distance_m = AT_INFINITY
+    g.radiance = sky_light(sky, wp.vec3(x, y, sine))
     cells = float(width) * float(height)
     g.density = tall * wide * cells / (2.0 * wp.pi * wp.pi * wp.max(sine, 1.0e-6))
     return g
 
 
 @wp.func
-def sky_density(sky: Sky, table: SkyTable, d: wp.vec3):
-    """The density with which ``draw_sky`` draws a unit direction [1/sr]."""
+def sky_density(table: SkyTable, place: wp.vec3):
+    """The density with which ``draw_sky`` draws the direction at a place [1/sr]."""
     height = table.rows.shape[0] - 1
     width = table.columns.shape[1] - 1
-    x = sky.cos_yaw * d[0] + sky.sin_yaw * d[1]
-    y = sky.cos_yaw * d[1] - sky.sin_yaw * d[0]
-    z = wp.clamp(d[2], -1.0, 1.0)
-    column = floor_int((0.5 - wp.atan2(y, x) * (0.5 / wp.pi)) * float(width))
-    row = floor_int(wp.acos(z) * float(height) / wp.pi)
-    column = wp.clamp(column, 0, width - 1)
-    row = wp.clamp(row, 0, height - 1)
+    column = wp.clamp(int(place[0] * float(width)), 0, width - 1)
+    row = wp.clamp(int(place[1] * float(height)), 0, height - 1)
     share = table.rows[row + 1] - table.rows[row]
     share *= table.columns[row, column + 1] - table.columns[row, column]
-    sine = wp.max(wp.sqrt(1.0 - z * z), 1.0e-6)
-    return share * float(width) * float(height) / (2.0 * wp.pi * wp.pi * sine)
+    cells = float(width) * float(height)
+    return share * cells / (2.0 * wp.pi * wp.pi * wp.max(place[2], 1.0e-6))
 
 
 @wp.struct
