@@ -73,6 +73,18 @@ def test_a_streak_is_as_long_as_the_way_and_holds_the_same_light(renderer: WarpR
     assert blurred[32] / sharp.max() == pytest.approx(0.5, abs=0.05)
 
 
+def test_a_streak_along_columns_is_as_long_as_the_way(renderer: WarpRenderer) -> None:
+    """Twenty rows up and down, though the middle of the exposure shows nothing there."""
+    track = even_track("lamp", LAMP.T_world_body, (0.0, 1000.0 / PX_PER_M, 0.0))
+    scene = world(LAMP, tracks=(track,), shutter=Shutter(exposure_s=0.04, samples=80), time_s=0.0)
+    blurred = shot(renderer, scene).channels[Channel.RADIANCE][:, 48, 1].astype(np.float64)
+
+    # From 16 to 48 at first: the streak leaves the image on both sides.
+    assert (blurred[:60] > 1.0).all()
+    assert blurred[32] / 100.0 == pytest.approx(32.0 / 40.0, abs=0.03)
+    assert blurred[4] / 100.0 == pytest.approx(8.5 / 40.0, abs=0.03)
+
+
 def test_labels_of_a_long_exposure_are_those_of_its_middle(renderer: WarpRenderer) -> None:
     """Every label image and silhouette is that of an instant."""
     scene = passing(300.0, Shutter(exposure_s=0.05))
