@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from generator.core.capture import Channel, Reading
 from generator.core.intrinsics import Intrinsics
 from generator.core.lens import PINHOLE, Lens
-from generator.core.rows import seen_points
+from generator.core.rows import seen_points, world_points
 from generator.core.scene import Body, Scene
 from generator.core.se3 import SE3
 from generator.core.shutter import INSTANT, Shutter
@@ -291,3 +291,21 @@ def test_a_camera_without_rolling_rows_projects_as_ever() -> None:
     expected = scene.cameras[0].T_world_camera.inverse().apply(np.array([[0.0, 0.0, 3.0]]))
     np.testing.assert_allclose(p_camera, expected, atol=1e-6)
     np.testing.assert_allclose(image_px, LENS.project(expected), atol=1e-4)
+
+
+def test_points_of_pixels_are_placed_by_their_rows(renderer: WarpRenderer) -> None:
+    """A still wall before a camera that drives towards it and turns: all points lie on it."""
+    wall = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
+    scene = world(
+        wall, shutter=Shutter(0.0, 0.08), time_s=0.0,
+        camera_velocity_m_s=(1.0, 0.0, 12.0), camera_turn_rad_s=0.5,
+    )  # fmt: skip
+    seen = shot(renderer, scene)
+    rows, columns = (index.ravel() for index in np.indices(seen.channels[Channel.RANGE].shape))
+    rays = LENS.pixel_rays()[rows, columns]
+    p_camera = rays * seen.channels[Channel.RANGE][rows, columns, None].astype(np.float64)
+
+    p_world = world_points(scene, scene.cameras[0], p_camera, rows)
+    as_if_at_once = scene.cameras[0].T_world_camera.apply(p_camera)
+    assert np.abs(as_if_at_once[:, 2] - 6.0).max() > 0.3
+    assert np.abs(p_world[:, 2] - 6.0).max() < 0.02
