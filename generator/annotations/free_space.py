@@ -16,6 +16,7 @@ from generator.config.strict import Strict
 from generator.core.boxes import tight_box
 from generator.core.capture import Channel, Reading
 from generator.core.interfaces import AssetLibrary
+from generator.core.rows import world_points
 from generator.core.sample import ImageTruth, MaskPx
 from generator.core.scene import Body, Scene
 from generator.core.se3 import SE3
@@ -54,7 +55,7 @@ class FreeSpace(Strict):
         ground = _ground(background, assets, grid)
         p_camera = reading.camera.intrinsics.pixel_rays()[rows, columns]
         p_camera = p_camera * ranges_m[rows, columns, None].astype(np.float64)
-        p_world = reading.camera.T_world_camera.apply(p_camera)
+        p_world = world_points(scene, reading.camera, p_camera, rows)
         here = (p_world[:, 0] - x) ** 2 + (p_world[:, 1] - y) ** 2 < self.far_m**2
         cells = grid.cells(p_world)
         on = np.where(here[:, None], np.floor(cells[:, :2]), 0.0).astype(np.intp)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from generator.core.scene import Camera, Instance, Scene
 from generator.core.se3 import IDENTITY, SE3, Array
@@ -41,6 +42,25 @@ def seen_points(
         v = np.clip(image_px[:, 1], 0.0, lens.height_px)
         delays_s = np.where(np.isfinite(v), shutter.delay_s(v, lens.height_px), delays_s)
     return p_camera, image_px
+
+
+def world_points(
+    scene: Scene, camera: Camera, p_camera_m: Array, rows: NDArray[np.integer]
+) -> Array:
+    """Where in the world points are that pixels of some rows show, [n, 3].
+
+    Args:
+        scene: At the image's instant.
+        camera: Of the scene, or its equal.
+        p_camera_m: In the camera frame of each row's instant, shape [n, 3].
+        rows: Numbers of the rows, shape [n].
+    """
+    if not camera.shutter.rolls:
+        return camera.T_world_camera.apply(p_camera_m)
+    delays_s = camera.shutter.row_delays_s(camera.intrinsics.height_px)
+    R, t = _camera_poses(scene, camera, delays_s)
+    placed: Array = np.einsum("nij,nj->ni", R[rows], p_camera_m, optimize=False) + t[rows]
+    return placed
 
 
 def _carrier_of(scene: Scene, instance: Instance) -> str:

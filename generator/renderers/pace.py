@@ -19,7 +19,6 @@ BAND_PX = 0.25
 """Nothing that is seen moves farther within a band of rows."""
 BLUR_PX = 0.3
 """Nor within a slice of an exposure, if the camera's number of samples allows."""
-_SPREAD_ROWS = 12
 _STRIDE_PX = 4
 
 
@@ -51,9 +50,9 @@ def pace_of(see: Sight) -> Pace:
     points = points_of(shown, carriers, _STRIDE_PX)
     before, after = (find(points, [end], carriers, _STRIDE_PX).image_px for end in ends)
     way = after - before
-    length = np.sqrt((way * way).sum(axis=-1))
-    fastest = np.max(length, axis=1, initial=0.0, where=np.isfinite(length)) / shutter.open_s
-    speeds = _spread(np.repeat(fastest, _STRIDE_PX)[: len(shown.z_m)])
+    length = np.where(np.isfinite(way).all(axis=-1), np.sqrt((way * way).sum(axis=-1)), 0.0)
+    vertical = np.where(length > 0.0, np.abs(way[..., 1]), 0.0)
+    speeds = _spread(length.max(axis=1) / shutter.open_s, vertical.max(axis=1), len(shown.z_m))
     wanted = math.ceil(float(speeds.max()) * shutter.exposure_s / BLUR_PX)
     blurred = speeds * shutter.exposure_s > BLUR_PX
     return Pace(speeds, min(max(wanted, 1), shutter.samples), blurred)
@@ -96,11 +95,19 @@ def band_starts(motion_px: Array) -> list[int]:
     return [int(row) for row in np.flatnonzero(begins)]
 
 
-def _spread(speeds: Array) -> Array:
-    """The highest speed near each row: what moves may be there by the time it is exposed."""
-    padded = np.pad(speeds, _SPREAD_ROWS, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _SPREAD_ROWS + 1)
-    highest: Array = windows.max(axis=1)
+def _spread(speeds: Array, travels_px: Array, height: int) -> Array:
+    """The highest speed of what comes to be in each row while the shutter is open, [height].
+
+    Args:
+        speeds: In every few rows.
+        travels_px: How far the same things go up or down meanwhile.
+        height: Of the image.
+    """
+    highest = np.zeros(height)
+    reaches = np.ceil(0.5 * np.minimum(travels_px, 2.0 * height)).astype(int) + 2 * _STRIDE_PX
+    for k, (speed, reach) in enumerate(zip(speeds, reaches, strict=True)):
+        rows = slice(max(k * _STRIDE_PX - reach, 0), (k + 1) * _STRIDE_PX + reach)
+        highest[rows] = np.maximum(highest[rows], speed)
     return highest
 
 

@@ -76,8 +76,9 @@ def exposed(
     drawn = channels - FLOW - _LIT - {Channel.AMODAL}
     if Channel.AMODAL in channels:
         drawn = drawn | {Channel.INSTANCE}
-    lit = camera.ev100 is None and channels & _LIT
-    ev100 = _metered(near, studio) if lit else camera.ev100
+    ev100 = camera.ev100
+    if ev100 is None and channels & _LIT:
+        ev100 = _metered(near, studio)
     shown, images = _images(near, bands, drawn | channels & _LIT, pace, ev100, studio)
     outlines: dict[int, Silhouette] = {}
     if Channel.AMODAL in channels:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from exporters.coco import Coco
 from exporters.images import png
 from generator.core.capture import Channel
+from generator.core.shutter import Shutter
 
 H, W = 7, 9
 
@@ -72,3 +79,18 @@ def test_occlusion_is_white() -> None:
 
     assert values.dtype == np.uint8
     assert np.array_equal(values, 255 * hidden)
+
+
+def test_coco_tells_how_long_and_when_rows_were_exposed(world: Any, tmp_path: Path) -> None:
+    """Of cameras with a shutter; the images of others say nothing about it."""
+    shutter = Shutter(0.008, -0.025)
+    cameras = [replace(world.camera("dash"), shutter=shutter), world.camera("color")]
+    sample = world.sample(0, [world.instance(1, "car", 12.0, 0.0, 0.3)], cameras)
+    info = world.info(1, sensors=("color", "dash"))
+
+    folder = world.export(Coco(), info, [sample], tmp_path)
+    images = json.loads((folder / "annotations/instances_train.json").read_text())["images"]
+
+    rows = {image["sensor"]: image for image in images}
+    assert (rows["dash"]["exposure_s"], rows["dash"]["readout_s"]) == (0.008, -0.025)
+    assert not {"exposure_s", "readout_s"} & rows["color"].keys()

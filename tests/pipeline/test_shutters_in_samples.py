@@ -11,6 +11,7 @@ import pytest
 from generator.assemble.recipe import open_pipeline
 from generator.assemble.spec import load_spec
 from generator.core.capture import Channel, Reading
+from generator.core.instants import at
 from generator.core.sample import Sample
 from generator.core.shutter import INSTANT
 from generator.pipeline import Pipeline
@@ -70,10 +71,10 @@ def test_the_camera_of_the_truth_tells_when_its_rows_were_exposed(sample: Sample
 
 def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample) -> None:
     """Against a camera at the same place that sees one instant: other pixels, softer ones."""
-    camera = replace(sample.scene.camera("dash"), shutter=INSTANT)
-    wanted = frozenset({Channel.RGB, Channel.INSTANCE, Channel.Z_DEPTH})
-    instant = pipeline.renderer.render(sample.scene, camera, wanted)
     rolled = reading(sample)
+    scene = at(sample.scene, rolled.time_s)
+    camera = replace(scene.camera("dash"), shutter=INSTANT)
+    instant = pipeline.renderer.render(scene, camera, frozenset({Channel.RGB, Channel.INSTANCE}))
 
     def detail(image: np.ndarray) -> float:
         road = image[100:, :, 1].astype(float)
@@ -104,4 +105,14 @@ def test_flow_of_the_street_is_that_of_the_next_image(pipeline: Pipeline, sample
     found = then.channels[Channel.INSTANCE][row, column][seen]
 
     assert seen.mean() > 0.5
-    assert (ids == found).mean() > 0.99
+    # What is left are leaves and poles, narrower than the pixels of so small an image.
+    assert (ids == found).mean() > 0.98
+
+
+def test_the_first_image_of_a_drive_is_exposed_while_things_move(pipeline: Pipeline) -> None:
+    """It is read late enough, and has nothing to look back on yet."""
+    first = reading(pipeline.sample(0))
+
+    assert first.time_s - 0.5 * first.camera.shutter.open_s > 0.0
+    assert np.isnan(first.channels[Channel.FLOW_BACKWARD]).all()
+    assert np.isfinite(first.channels[Channel.FLOW_FORWARD]).mean() > 0.9

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from generator.core.capture import Channel, Reading
 from generator.core.intrinsics import Intrinsics
 from generator.core.lens import PINHOLE, Lens
-from generator.core.rows import seen_points
+from generator.core.rows import seen_points, world_points
 from generator.core.scene import Body, Scene
 from generator.core.se3 import SE3
 from generator.core.shutter import INSTANT, Shutter
@@ -71,6 +71,18 @@ def test_a_streak_is_as_long_as_the_way_and_holds_the_same_light(renderer: WarpR
     assert blurred.sum() == pytest.approx(sharp.sum(), rel=5e-3)
     # A box that passes evenly leaves a ramp: half as bright at the middle of its edge.
     assert blurred[32] / sharp.max() == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_streak_along_columns_is_as_long_as_the_way(renderer: WarpRenderer) -> None:
+    """Twenty rows up and down, though the middle of the exposure shows nothing there."""
+    track = even_track("lamp", LAMP.T_world_body, (0.0, 1000.0 / PX_PER_M, 0.0))
+    scene = world(LAMP, tracks=(track,), shutter=Shutter(exposure_s=0.04, samples=80), time_s=0.0)
+    blurred = shot(renderer, scene).channels[Channel.RADIANCE][:, 48, 1].astype(np.float64)
+
+    # From 16 to 48 at first: the streak leaves the image on both sides.
+    assert (blurred[:60] > 1.0).all()
+    assert blurred[32] / 100.0 == pytest.approx(32.0 / 40.0, abs=0.03)
+    assert blurred[4] / 100.0 == pytest.approx(8.5 / 40.0, abs=0.03)
 
 
 def test_labels_of_a_long_exposure_are_those_of_its_middle(renderer: WarpRenderer) -> None:
@@ -279,3 +291,21 @@ def test_a_camera_without_rolling_rows_projects_as_ever() -> None:
     expected = scene.cameras[0].T_world_camera.inverse().apply(np.array([[0.0, 0.0, 3.0]]))
     np.testing.assert_allclose(p_camera, expected, atol=1e-6)
     np.testing.assert_allclose(image_px, LENS.project(expected), atol=1e-4)
+
+
+def test_points_of_pixels_are_placed_by_their_rows(renderer: WarpRenderer) -> None:
+    """A still wall before a camera that drives towards it and turns: all points lie on it."""
+    wall = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
+    scene = world(
+        wall, shutter=Shutter(0.0, 0.08), time_s=0.0,
+        camera_velocity_m_s=(1.0, 0.0, 12.0), camera_turn_rad_s=0.5,
+    )  # fmt: skip
+    seen = shot(renderer, scene)
+    rows, columns = (index.ravel() for index in np.indices(seen.channels[Channel.RANGE].shape))
+    rays = LENS.pixel_rays()[rows, columns]
+    p_camera = rays * seen.channels[Channel.RANGE][rows, columns, None].astype(np.float64)
+
+    p_world = world_points(scene, scene.cameras[0], p_camera, rows)
+    as_if_at_once = scene.cameras[0].T_world_camera.apply(p_camera)
+    assert np.abs(as_if_at_once[:, 2] - 6.0).max() > 0.3
+    assert np.abs(p_world[:, 2] - 6.0).max() < 0.02
