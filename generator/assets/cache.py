@@ -33,7 +33,7 @@ from generator.core.serial import canonical_json
 T = TypeVar("T")
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 1
+FORMAT = 2
 """Raised whenever the same sources would be stored as other arrays."""
 # Little: renderers and physics engines keep what they made of it.
 _MEMORY_BYTES = 24 * 1024 * 1024
