@@ -7,7 +7,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Flag, LogUniform, Probability, Uniform, UnitInterval
+from generator.config.distributions import (
+    Constant,
+    Flag,
+    LogUniform,
+    Probability,
+    Uniform,
+    UnitInterval,
+)
 from generator.core.geometry import Material
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Body, Scene
@@ -18,6 +25,10 @@ from randomizers.color_space import linear_of_hsv
 
 PAINT = "paint"
 _DUST: Vec3 = (0.17, 0.145, 0.115)
+_PIGMENT = 0.45
+"""Roughness of the pigment below a clear coat."""
+_WORN = 0.4
+"""Roughness of a clear coat, as a share of that of a paint which looks like it from afar."""
 _SOILED = ("paint", "glass", "rim", "tyre", "trim", "chrome", "plate", "headlight", "taillight")
 
 
@@ -60,6 +71,8 @@ class VehiclePaint(LookRandomizer):
         roughness: Of the clear coat: 0.1 waxed, 0.3 weathered.
         metallic: Whether the paint has flakes of metal; white never has.
         dirt: Share of dust in every colour of the vehicle.
+        coat: Weight of a clear coat that mirrors what is around, by a ray per pixel; with it
+            ``roughness`` tells how worn that coat is. 0 = the paint itself shines.
     """
 
     type: Literal["vehicle_paint"] = "vehicle_paint"
@@ -68,6 +81,7 @@ class VehiclePaint(LookRandomizer):
     roughness: UnitInterval = LogUniform(0.1, 0.3)
     metallic: Flag = Probability(0.6)
     dirt: UnitInterval = Uniform(0.0, 0.25)
+    coat: UnitInterval = Constant(0.0)
 
     def model_post_init(self, context: object) -> None:
         """Refuse colours that do not exist, and weights of which none counts."""
@@ -99,12 +113,17 @@ class VehiclePaint(LookRandomizer):
             for low, high in (paint.hue, paint.saturation, paint.value)
         )
         flakes = self.metallic.draw(rng) and name != "white"
-        return Material(
+        material = Material(
             base_color=linear_of_hsv(hue, saturation, value),
             roughness=round(self.roughness.draw(rng), 4),
             metallic=0.25 if flakes else 0.0,
             specular=0.6,
         )
+        coat = round(self.coat.draw(rng), 4)
+        if not coat:
+            return material
+        worn = round(_WORN * material.roughness, 4)
+        return replace(material, roughness=_PIGMENT, coat=coat, coat_roughness=worn)
 
 
 def _finished(body: Body, assets: AssetIndex, paint: Material | None, dirt: float) -> Body:
@@ -118,6 +137,8 @@ def _finished(body: Body, assets: AssetIndex, paint: Material | None, dirt: floa
                 roughness=paint.roughness,
                 metallic=paint.metallic,
                 specular=paint.specular,
+                coat=paint.coat,
+                coat_roughness=paint.coat_roughness,
                 texture="",
             )
         return _dusty(material, dirt) if material.role in _SOILED else material
@@ -134,4 +155,7 @@ def _dusty(material: Material, dirt: float) -> Material:
         for clean, dust in zip(material.base_color, _DUST, strict=True)
     )
     rough = round(material.roughness + (0.8 - material.roughness) * share, 4)
-    return replace(material, base_color=(red, green, blue), roughness=rough)
+    dusty = replace(material, base_color=(red, green, blue), roughness=rough)
+    if not material.coat:
+        return dusty
+    return replace(dusty, coat=round(material.coat * (1.0 - share), 6))

@@ -19,7 +19,13 @@ from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.lamps import keep_main_lamps
 from generator.renderers.layers import ListedPixels, shade_layers
 from generator.renderers.lens import add_glare, wet_lens
-from generator.renderers.occlusion import lamp_parts, openness, sampled_lattice, sunflower
+from generator.renderers.occlusion import (
+    lamp_parts,
+    openness,
+    pixel_parts,
+    sampled_lattice,
+    sunflower,
+)
 from generator.renderers.packing import PackedWorld
 from generator.renderers.pierced import has_holes, trace_over_samples
 from generator.renderers.precipitation import draw_precipitation
@@ -27,9 +33,6 @@ from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Projected, Seen
 from generator.renderers.weather import expose_ground, fill_air
-
-# Column of the sample in each row of a pixel, far from that of the rows beside it.
-_ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -172,12 +175,6 @@ def _drawn_samples(
         listed = projected.in_view[pierced]
         trace_over_samples(world, view, listed, pixels, parts, nearness, hits)
     return hits
-
-
-def pixel_parts(n: int) -> Array:
-    """Sample positions in a pixel, [0, 1), shape [n, 2]: no two in one row or column (n-rooks)."""
-    columns = _ROOKS[n]
-    return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
 
 
 def images_of(seen: Seen) -> shade.Images:

@@ -101,9 +101,15 @@ def infrared_of(material: Material, color: Array) -> tuple[float, ...]:
     if material.role in TEXTILES:
         diffuse = 0.45 + 0.4 * red
     diffuse *= 1.0 - material.metallic
+    # Panes of known roles go by their role; other clear things by what they say of visible light.
+    passed = material.transmission * red * material.opacity + 1.0 - material.opacity
+    clear = CLEAR.get(material.role, passed)
+    if material.role not in DIFFUSE:
+        diffuse *= (1.0 - material.transmission) * material.opacity
     even, rim = oren_nayar(SLOPE_RAD if material.role in ROUGH else 0.0)
     specular = material.metallic * red + (1.0 - material.metallic) * 0.08 * material.specular
-    mirror, clear = MIRRORS.get(material.role, 0.0), CLEAR.get(material.role, 0.0)
+    normal = ((material.ior - 1.0) / (material.ior + 1.0)) ** 2
+    mirror = MIRRORS.get(material.role, normal if material.transmission > 0.5 else 0.0)
     alpha = max(material.roughness * material.roughness, ALPHA_MIN)
     retro = RETRO.get(material.role, 0.0)
     return (diffuse * even, diffuse * rim, specular, alpha, retro, mirror, clear)

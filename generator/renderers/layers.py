@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from generator.renderers.kernels import records, shade
-from generator.renderers.occlusion import lamp_parts, sunflower
+from generator.renderers.kernels import records, shade, tone
+from generator.renderers.occlusion import lamp_parts, pixel_parts, sunflower
 from generator.renderers.packing import PackedWorld
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
@@ -41,7 +41,10 @@ def shade_layers(
     stock: AssetStock,
     settings: RenderSettings,
 ) -> None:
-    """Shade those of the listed pixels that see layered surfaces, in place."""
+    """Shade those of the listed pixels that see layered surfaces, in place.
+
+    Where edges are seen in them or through them, by several rays.
+    """
     # A module of its own: scenes without such surfaces neither compile nor load it.
     from generator.renderers.kernels import layers
 
@@ -52,5 +55,18 @@ def shade_layers(
     probe.radius_m = settings.ambient_occlusion_radius_m
     probe.lit = stock.scratch("lit where rays end", listed.lit.shape, float)
     frame = [view, world.record, images]
-    inputs = [*frame, listed.pixels, listed.lit, listed.open_sky, listed.exposed, probe]
-    wp.launch(layers.shade_layers, listed.count, inputs, [radiance], device=device)
+    seen = [listed.pixels, listed.lit, listed.open_sky, listed.exposed, probe]
+    wp.launch(layers.shade_layers, listed.count, [*frame, *seen], [radiance], device=device)
+    if settings.antialias == 1:
+        return
+    count = wp.zeros(1, dtype=wp.int32, device=device)
+    places = stock.scratch("contrasts", view.width * view.height, wp.int32)
+    inputs = [*frame, listed.pixels, radiance]
+    wp.launch(layers.find_contrasts, listed.count, inputs, [count, places], device=device)
+    found = int(count.numpy()[0])
+    pixels = stock.scratch("contrast pixels", view.width * view.height, wp.int32)
+    mixed = stock.scratch("contrast colours", view.width * view.height, wp.vec3)
+    offsets = wp.array(pixel_parts(settings.antialias), dtype=wp.vec2, device=device)
+    inputs = [*frame, places, *seen, offsets]
+    wp.launch(layers.shade_contrasts, found, inputs, [pixels, mixed], device=device)
+    wp.launch(tone.put_mixed, found, [pixels, mixed], [radiance], device=device)

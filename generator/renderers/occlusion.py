@@ -19,6 +19,8 @@ from generator.renderers.visibility import Seen
 _STRIDE_PX = 3
 _TILE = int(shafts.TILE)
 _LIST_LENGTH = int(shafts.LIST_LENGTH)
+# Column of the sample in each row of a pixel, far from that of the rows beside it.
+_ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -89,6 +91,12 @@ def sunflower(n: int) -> Array:
 def lamp_parts(n: int, settings: RenderSettings) -> Array:
     """Points of a lamp's disc that shadows look at, shape [n, 2]; all at its centre if hard."""
     return sunflower(n) * (1.0 if settings.shadows == "soft" else 0.0)
+
+
+def pixel_parts(n: int) -> Array:
+    """Sample positions in a pixel, [0, 1), shape [n, 2]: no two in one row or column (n-rooks)."""
+    columns = _ROOKS[n]
+    return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
 
 
 def cosine_hemisphere(n: int) -> Array:

@@ -24,7 +24,8 @@ LONGEST_SIDE_M = {
     "milk_carton": (0.1, 0.26), "mug": (0.09, 0.14), "nut": (0.012, 0.04), "orange": (0.06, 0.1),
     "pear": (0.08, 0.13), "pipe_elbow": (0.03, 0.09), "plate": (0.15, 0.32),
     "screwdriver": (0.14, 0.28), "spoon": (0.11, 0.23), "stepped_shaft": (0.04, 0.2),
-    "toy_block": (0.03, 0.1), "vase": (0.13, 0.3), "washer": (0.014, 0.04), "wrench": (0.1, 0.26),
+    "toy_block": (0.03, 0.1), "tumbler": (0.07, 0.16), "vase": (0.13, 0.3),
+    "washer": (0.014, 0.04), "wine_glass": (0.15, 0.24), "wrench": (0.1, 0.26),
 }  # fmt: skip
 
 # What is open by design: a gable that sits on its box, pipe ends covered by collars.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -132,6 +133,21 @@ def test_everything_on_a_moving_body_moves_with_it() -> None:
     assert then.lidar("top").T_world_lidar.translation_m == (1.0, 0.0, 2.1)
     assert then.device("imu").T_world_device.translation_m == (1.1, 0.0, 0.4)
     assert then.body("tree") == scene().body("tree")
+
+
+def test_a_panel_turns_with_its_body() -> None:
+    """A quarter turn about Z: normal and first side with it; both stay unit and at right angles."""
+    panel = Light(
+        "p", "rectangle", (1.0, 0.0, 1.0), (1.0, 0.0, 0.0), side=(0.0, 1.0, 0.0), body="car"
+    )
+    turned = SE3.about_z(0.5 * math.pi)
+    moving = replace(scene(), lights=(panel,), tracks=(Track("car", 1.0, (SE3(), turned)),))
+
+    (then,) = at(moving, 1.0).lights
+
+    assert then.position_m == pytest.approx((0.0, 1.0, 1.0))
+    assert then.direction == pytest.approx((0.0, 1.0, 0.0))
+    assert then.side == pytest.approx((-1.0, 0.0, 0.0))
 
 
 def test_changes_hold_until_the_next_one() -> None:

@@ -18,6 +18,7 @@ from generator.core.se3 import SE3, Vec3
 from generator.renderers.device import open_device
 from generator.renderers.kernels import lighting, records
 from generator.renderers.kernels.brdf import make_brdf, specular_lobe
+from generator.renderers.lamps import main_lamps
 from generator.renderers.lobes import lobe_albedo
 from generator.renderers.packing import lamp_records
 from generator.renderers.settings import RenderSettings
@@ -114,7 +115,7 @@ def _at_points(  # noqa: ANN202, PLR0917
     wider = lighting.widening(lamps[0], beam, alpha)
     if share > 0.0:
         lobe = specular_lobe(s, n[i], v[i], way, n_l, wider)
-        mirrored[i] = lobe[1] * n_l * beam.normal_lux[1]
+        mirrored[i] = lobe[1] * n_l * beam.normal_lux[1] * lighting.risen(lamps[0], beam, n[i])
     total = wp.float32(0.0)
     for k in range(panel.shape[0]):
         to_part = panel[k] - p[i]
@@ -335,6 +336,18 @@ def _fixture_mesh(size_m: Vec3, front: Material):  # noqa: ANN202
     vertices = mesh.vertices_m + np.array([0.0, 0.0, 0.5 * size_m[2]], np.float32)
     low = (vertices[mesh.faces][..., 2] < 1e-6).all(axis=1)
     return replace(mesh, vertices_m=vertices, face_slots=low.astype(np.int32))
+
+
+def test_of_many_panels_those_that_light_what_is_seen_are_kept() -> None:
+    """One that faces away lights nothing, however strong and near; the others go by their light."""
+    down = replace(RECTANGLE, position_m=(0.0, 0.0, 2.0), direction=(0.0, 0.0, -1.0))
+    away = replace(down, direction=(0.0, 0.0, 1.0), intensity_cd=1e5)
+    far = replace(down, position_m=(0.0, 0.0, 20.0))
+    p, n = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
+
+    kept = main_lamps(lamp_records([away, far, down]), p, n, 2)
+
+    assert kept.tolist() == [1, 2]
 
 
 @pytest.mark.parametrize("visible", [True, False])

@@ -11,8 +11,8 @@ from generator.core.capture import Channel
 from generator.core.geometry import Material
 from generator.core.scene import Body, Camera, Environment, Light, Scene
 from generator.core.se3 import SE3
-from generator.renderers.color import pixel_parts
 from generator.renderers.exposure import automatic_ev100, exposure_of, filmic, tone_curve
+from generator.renderers.occlusion import pixel_parts
 from generator.renderers.settings import RenderSettings
 from generator.renderers.warp import WarpRenderer
 from tests.renderers.fake_library import (

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.core.capture import Channel
-from generator.core.geometry import Float32
+from generator.core.geometry import Float32, Material
 from generator.core.scene import Body, Environment, Light, Region, Scene
 from generator.core.se3 import SE3, Vec3
 from generator.renderers.brightest import SkyLamp, without_brightest
@@ -298,6 +298,25 @@ def test_the_sun_of_a_panorama_is_seen_where_it_is() -> None:
 
     np.testing.assert_array_equal(images[0], images[1])
     assert images[0].max() > 100.0 * np.median(images[0])
+
+
+def test_the_sun_of_a_panorama_is_seen_through_a_pane() -> None:
+    """Clear glass passes 0.92 of it; what stands for it as a lamp is not lost from the view."""
+    pane = Material((1.0, 1.0, 1.0), 0.0, transmission=1.0)
+    scene, library = scene_under(Environment("sun", MEAN_CD_M2))
+    library.meshes["sheet"] = plane_mesh(6.0, (pane,))
+    towards = 10.0 * np.array((0.6, 0.3, 0.7))
+    camera = camera_at((0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0)
+    behind = replace(scene, bodies=(*scene.bodies, Body("s", "sheet", SE3((0.0, 0.0, 2.0)))))
+    open_air, through = (
+        WarpRenderer(library, "cpu", PLAIN)
+        .render(one, camera, frozenset({Channel.RADIANCE}))
+        .channels[Channel.RADIANCE]
+        for one in (scene, behind)
+    )
+
+    brightest = np.unravel_index(int(open_air[..., 1].argmax()), open_air.shape[:2])
+    assert through[brightest][1] > 0.7 * open_air[brightest][1]
 
 
 def test_a_large_low_sun_lights_what_it_has_half_set_for() -> None:

@@ -124,3 +124,17 @@ def test_camera_and_lidar_see_the_same_world() -> None:
     assert near.mean() > 0.99
     ids = reading.channels[Channel.INSTANCE][v.astype(int), u.astype(int)]
     assert (ids == echoes.instance_id[:, 0]).mean() > 0.999
+
+
+def test_what_is_clear_to_the_eye_is_clear_to_a_laser() -> None:
+    """Without a role, transmission and opacity tell what passes; Fresnel tells what is mirrored."""
+    white = np.ones(3)
+    glass = Material((1, 1, 1), 0.04, transmission=0.75, ior=1.5)
+    veil = Material((1, 1, 1), 1.0, opacity=0.25)
+
+    even, _, _, _, _, mirror, clear = infrared_of(glass, white)
+    assert (clear, mirror) == pytest.approx((0.75, 0.04))
+    assert even == pytest.approx(0.25)
+    even, _, _, _, _, mirror, clear = infrared_of(veil, white)
+    assert (clear, mirror, even) == pytest.approx((0.75, 0.0, 0.25))
+    assert infrared_of(Material(), white)[5:] == (0.0, 0.0)

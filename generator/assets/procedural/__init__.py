@@ -44,6 +44,12 @@ def _household(
     return Family(name, category, tags, variants, mass_kg, stackable, 1, {}, Lazy(build))
 
 
+def _glassware(name: str, category: str, mass_kg: float) -> Family:
+    build = Lazy(f"glassware:{name}")
+    tags = ("container", "glassware")
+    return Family(name, category, tags, 16, mass_kg, False, 1, {}, build)
+
+
 def _part(name: str, mass_kg: float, variants: int = 12, *, stackable: bool = False) -> Family:
     build = Lazy(f"parts:{name}")
     return Family(name, name, ("part",), variants, mass_kg, stackable, 1, {}, build)
@@ -80,14 +86,17 @@ FAMILIES: Mapping[str, Family] = _table(
         _household(
             "plate", "plate", "tableware", 24, 0.5, stackable=False, build="tableware:plate"
         ),
-        _household(
-            "bottle",
-            "bottle",
-            "container printed",
-            36,
-            0.7,
-            stackable=False,
-            build="bottles:bottle",
+        replace(
+            _household(
+                "bottle",
+                "bottle",
+                "container printed",
+                36,
+                0.7,
+                stackable=False,
+                build="bottles:bottle",
+            ),
+            version=2,
         ),
         _household("can", "can", "container printed", 32, 0.36, stackable=True, build="cans:can"),
         _household(
@@ -135,6 +144,8 @@ FAMILIES: Mapping[str, Family] = _table(
         _household("ball", "sports ball", "toy", 20, 0.06, stackable=False, build="toys:ball"),
         _household("candle", "candle", "decoration", 16, 0.2, stackable=False, build="toys:candle"),
         _household("vase", "vase", "decoration", 16, 0.6, stackable=False, build="toys:vase"),
+        _glassware("tumbler", "drinking glass", 0.25),
+        _glassware("wine_glass", "wine glass", 0.15),
         _part("hex_bolt", 0.06, 20),
         _part("nut", 0.02, 15),
         _part("washer", 0.012, 15),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from generator.core.geometry import Material
 # Width by height of the unrolled label, which the drawing of its texture goes by.
 LABEL_ASPECT = 2.6
 
+_WATER_IOR = 1.33
 # Label paper stands this much proud of the wall.
 _PROUD_M = 0.0003
 _FILLINGS = ("#6d0f1c", "#b34a12", "#d9a02a", "#3b1a12", "#7a8a2a", "#c9b48a", "#4a1030")
@@ -39,8 +40,9 @@ class _BottleStyle:
         shoulder: (radius as a share of the body's beyond the neck's, height as a share of the way
             from label to neck) of the points between body and neck.
         depth: Extent along Y as a share of that along X.
-        colors: Of the body.
+        colors: Of the body; of what is clear, the tint of what is seen through all of it.
         caps: Of the cap.
+        clear: Whether it is full of water: body and filling refract as one.
     """
 
     height_m: tuple[float, float]
@@ -54,6 +56,7 @@ class _BottleStyle:
     colors: tuple[str, ...]
     caps: tuple[str, ...]
     gloss: tuple[float, float] = (0.06, 0.15)
+    clear: bool = False
 
 
 _DARK_GLASS = ("#1d3320", "#26331c", "#3a2413", "#142a25", "#2d1a10", "#4a5a34")
@@ -94,6 +97,7 @@ BOTTLES: Mapping[str, _BottleStyle] = {
         1.0,
         _CLEAR,
         CAPS,
+        clear=True,
     ),
     "soda": _BottleStyle(
         (0.215, 0.25),
@@ -167,6 +171,8 @@ def bottle(seed: int) -> Solid:
     flat = np.array([1.0, style.depth, 1.0])
     parts = [hull * flat for hull in hulls.stack(_climbing(stages))]
     body = Material(jittered(linear(pick(style.colors, rng)), 0.1, rng), between(*style.gloss, rng))
+    if style.clear:
+        body = replace(body, roughness=0.04, transmission=1.0, ior=_WATER_IOR, thin=False)
     label = printed(f"texture/label?seed={seed}", between(0.35, 0.6, rng))
     flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
     return centred(flattened, (body, label, plastic(rng, style.caps)), parts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from generator.assets.procedural.family import Facts, Family, Lazy, TextureFamily
@@ -93,7 +93,7 @@ FAMILIES: Mapping[str, Family] = _table(
         _family("bollard", _FURNITURE, 8, "furniture:bollard"),
         _plain("cone", "cone", f"{_FURNITURE} road_works", 6, "furniture:traffic_cone"),
         _plain("post_box", "post_box", _FURNITURE, 6, "furniture:post_box"),
-        _plain("bus_stop", "bus_stop", _FURNITURE, 4, "furniture:bus_stop"),
+        replace(_plain("bus_stop", "bus_stop", _FURNITURE, 4, "furniture:bus_stop"), version=2),
         _plain("utility_pole", "utility_pole", _FURNITURE, 4, "furniture:utility_pole"),
         _plain("cabinet", "cabinet", _FURNITURE, 6, "furniture:cabinet"),
         _plain("bike_rack", "bike_rack", _FURNITURE, 6, "furniture:bike_rack"),

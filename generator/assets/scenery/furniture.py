@@ -245,7 +245,7 @@ def bus_stop(seed: int) -> Solid:
     panel = block((-x + 0.05, -half - 0.05, 0.3), (x - 0.3, -half + 0.05, 2.1), 0.01)
     poster = [facing(0.0, (-0.5, 0.5), (0.4, 2.0)).rotated("z", turn).moved(-0.15, -half + side)
               for turn, side in ((0.5 * math.pi, 0.055), (-0.5 * math.pi, -0.055))]  # fmt: skip
-    glass = Material((0.05, 0.06, 0.06), roughness=0.05, specular=0.7, role="glass")
+    glass = Material((0.9, 0.95, 0.93), roughness=0.05, transmission=1.0, role="glass")
     parts = [*posts, *(p.painted(1) for p in panes), roof.painted(2), seat.painted(3), *feet, panel]
     parts += [p.painted(4) for p in poster]
     wood = patterned("texture/wood_grain?seed=2", 1.2, 0.7, (0.8, 0.75, 0.7))

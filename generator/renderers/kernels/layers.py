@@ -27,7 +27,7 @@ from generator.renderers.kernels.dielectrics import (
     refracted,
 )
 from generator.renderers.kernels.ground import coat_at, coated, footprint
-from generator.renderers.kernels.holes import solid_hit, uv_at
+from generator.renderers.kernels.holes import OUT_OF_LINE, solid_hit, uv_at
 from generator.renderers.kernels.lattice import ray_origin
 from generator.renderers.kernels.look import Look, look_at_hit
 from generator.renderers.kernels.rays import FARTHEST
@@ -54,13 +54,18 @@ from generator.renderers.kernels.shade import (
     seen_part,
     seen_sky,
 )
-from generator.renderers.kernels.sky import sky_irradiance, sky_reflection
-from generator.renderers.kernels.surface import facing
+from generator.renderers.kernels.sky import sky_image, sky_irradiance, sky_reflection
+from generator.renderers.kernels.surface import facet_of, facing
 from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
 MIRROR_ROUGHNESS = wp.constant(0.15)
+# Ambient occlusion is looked at only where more than this share of its light is seen.
+AMBIENT_SHARE = wp.constant(0.2)
+MOSTLY_CLEAR = wp.constant(0.9)
+# Neighbours on a layered surface that differ more than this are looked at more closely.
+CONTRAST = wp.constant(0.06)
 # Clear surfaces that a ray passes one after the other.
 SURFACES_MAX = wp.constant(8)
 
@@ -262,13 +267,24 @@ def light_of_meeting(
     occlusion: float,
     p: wp.vec3,
     d: wp.vec3,
+    share: float,
+    clear: float,
     k: int,
 ):
-    """Light of a surface that a ray has met, towards where it came from."""
-    origin = ray_origin(world, m.hit, m.weight, p, d * 1.0)
+    """Light of a surface that a ray has met, towards where it came from.
+
+    Args:
+        share: Of that light in the pixel.
+        clear: Share of it that only glitters: nobody sees whether that is shaded.
+    """
+    origin = ray_origin(world, m.hit, m.weight, p, d)
     for j in range(world.lamps.shape[0]):
-        probe.lit[j, k] = seen_part(world, world.lamps[j], origin, m.normal, probe.parts)
-    open_sky = seen_sky(world, origin, m.normal, probe.disc, probe.radius_m) * occlusion
+        probe.lit[j, k] = 1.0
+        if clear < MOSTLY_CLEAR:
+            probe.lit[j, k] = seen_part(world, world.lamps[j], origin, m.normal, probe.parts)
+    open_sky = occlusion
+    if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
+        open_sky *= seen_sky(world, origin, m.normal, probe.disc, probe.radius_m)
     surface = surface_index(world, m.hit)
     return light_at(world, surface, look, p, -d, probe.lit, open_sky, k)
 
@@ -297,9 +313,18 @@ class Ray:
 def sky_along(world: World, ray: Ray):
     """What a ray sees that meets nothing."""
     c = wp.vec3(0.0)
-    if ray.mirrored != 0 or world.sky.visible != 0:
+    if ray.mirrored != 0:
         c = sky_reflection(world.sky, ray.d, ray.roughness)
+    elif world.sky.visible != 0:
+        # With its sun, which is a lamp to what mirrors.
+        c = sky_image(world.sky, ray.d)
     return c
+
+
+@wp.func
+def root_of(color: wp.vec3):
+    """The square root of a colour, channel by channel."""
+    return wp.vec3(wp.sqrt(color[0]), wp.sqrt(color[1]), wp.sqrt(color[2]))
 
 
 @wp.func
@@ -323,10 +348,9 @@ def gone_on(world: World, ray: Ray, m: Meeting, look: Look, clear: float, opacit
             eta = wp.where(m.entering != 0, ior, 1.0 / ior)
             way = refracted(ray.d, m.normal, eta)
             f = fresnel_dielectric(c, eta)
-            root = wp.vec3(
-                wp.sqrt(look.albedo[0]), wp.sqrt(look.albedo[1]), wp.sqrt(look.albedo[2])
-            )
-            onward += wp.cw_mul(ray.share, root) * ((1.0 - f) * clear * opacity)
+            onward += wp.cw_mul(ray.share, root_of(look.albedo)) * ((1.0 - f) * clear * opacity)
+            side = wp.where(m.entering != 0, 1.0, -1.0)
+            ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, m.hit) * ray.width_m
             if wp.dot(way, way) == 0.0:
                 # All is reflected back inside.
                 way = ray.d + m.normal * (2.0 * c)
@@ -361,13 +385,15 @@ def seen_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
                 look = coated(world, surface, look, coat, n)
             clear = world.surfaces[surface].transmission * (1.0 - look.metallic)
             opacity = world.surfaces[surface].opacity
-            light = light_of_meeting(world, probe, m, look, maps.occlusion, p, ray.d, k)
-            own = wp.cw_mul(light.diffuse, look.albedo) * (1.0 - clear) + light.rest
-            own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow - wp.vec3(1.0))
-            if clear > 0.0 and m.entering == 0 and world.surfaces[surface].thin == 0:
-                # From inside nothing but what goes on is seen.
-                own = wp.vec3(0.0)
-            total += wp.cw_mul(ray.share, own) * opacity
+            # From inside a solid nothing but what goes on is seen.
+            if clear == 0.0 or m.entering != 0 or world.surfaces[surface].thin != 0:
+                share = wp.max(ray.share)
+                light = light_of_meeting(
+                    world, probe, m, look, maps.occlusion, p, ray.d, share, clear, k
+                )
+                own = wp.cw_mul(light.diffuse, look.albedo) * (1.0 - clear) + light.rest
+                own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow - wp.vec3(1.0))
+                total += wp.cw_mul(ray.share, own) * opacity
             if clear > 0.0 or opacity < 1.0:
                 ray = gone_on(world, ray, m, look, clear, opacity)
                 ray.origin = beyond(p, ray.d, view.eye_m)
@@ -399,6 +425,49 @@ class Layers:
 
 
 @wp.func
+def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
+    """What glass mirrors and what it lets through, from outside; ``c`` is the cosine to it."""
+    f = fresnel_dielectric(c, world.surfaces[surface].ior)
+    mirrored = wp.vec3(f)
+    passed = root_of(albedo) * (1.0 - f)
+    if world.surfaces[surface].thin != 0:
+        mirrored = pane_reflectance(f, albedo)
+        passed = pane_transmittance(f, albedo)
+    return mirrored, passed
+
+
+@wp.func
+def below_coat(
+    world: World,
+    surface: int,
+    layers: Layers,
+    coat: float,
+    n: wp.vec3,
+    p: wp.vec3,
+    v: wp.vec3,
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: float,
+    k: int,
+):
+    """Layers under a clear coat of that weight, which takes what it reflects from all of them."""
+    c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
+    rough = world.surfaces[surface].coat_roughness
+    lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
+    share = coat * lacquer.gloss[0]
+    lamps = light_of_lamps(world, lacquer, n, p, v, lit, k)
+    layers.own = layers.own * (1.0 - share) + lamps.shine * coat
+    layers.mirror = layers.mirror * (1.0 - share)
+    layers.behind = layers.behind * (1.0 - share)
+    if lacquer.roughness < MIRROR_ROUGHNESS:
+        layers.coat = share
+        layers.own -= lamps.shown * coat
+    else:
+        sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
+        layers.own += sky * (share * open_lobe(lacquer, open_sky))
+    return layers
+
+
+@wp.func
 def layers_at(
     world: World,
     surface: int,
@@ -422,57 +491,34 @@ def layers_at(
     layers.n = look.normal
     n_v = wp.dot(look.normal, v)
     clear = world.surfaces[surface].transmission * (1.0 - look.metallic) * bare
-    ior = world.surfaces[surface].ior
     specular = look.specular
     if clear > 0.0:
+        ior = world.surfaces[surface].ior
         normal = (ior - 1.0) / (ior + 1.0)
         specular = normal * normal / 0.08
     brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, specular, n_v)
+    gloss = brdf.gloss
+    if clear > 0.0:
+        c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
+        mirrored, passed = glass_shares(world, surface, look.albedo, c)
+        gloss = gloss * (1.0 - clear) + mirrored * clear
+        layers.behind = passed * clear
     lamps = light_of_lamps(world, brdf, look.normal, p, v, lit, k)
     ambient = sky_irradiance(world.sky, look.normal) * open_sky
-    gloss = brdf.gloss
-    c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
-    if clear > 0.0:
-        f = fresnel_dielectric(c, ior)
-        passed = wp.vec3(1.0 - f)
-        if world.surfaces[surface].thin != 0:
-            passed = pane_transmittance(f, look.albedo)
-            gloss = gloss * (1.0 - clear) + pane_reflectance(f, look.albedo) * clear
-        else:
-            root = wp.vec3(
-                wp.sqrt(look.albedo[0]), wp.sqrt(look.albedo[1]), wp.sqrt(look.albedo[2])
-            )
-            passed = wp.cw_mul(passed, root)
-            gloss = gloss * (1.0 - clear) + wp.vec3(f) * clear
-        layers.behind = passed * clear
-    under = wp.cw_mul(brdf.matte, look.albedo) * (1.0 - clear)
-    own = wp.cw_mul(under, lamps.lux * (1.0 / wp.pi) + ambient) + lamps.shine
-    own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
-    mirrors = look.metallic >= 0.5 or clear > 0.0
-    if mirrors and brdf.roughness < MIRROR_ROUGHNESS:
+    diffuse = wp.cw_mul(brdf.matte, look.albedo) * (1.0 - clear)
+    layers.own = wp.cw_mul(diffuse, lamps.lux * (1.0 / wp.pi) + ambient) + lamps.shine
+    layers.own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
+    if brdf.roughness < MIRROR_ROUGHNESS and (look.metallic >= 0.5 or clear > 0.0):
         layers.mirror = gloss
-        own -= lamps.shown
+        layers.own -= lamps.shown
     else:
-        mirrored = look.normal * (2.0 * n_v) - v
-        sky = sky_reflection(world.sky, mirrored, brdf.roughness)
-        own += wp.cw_mul(gloss, sky) * open_lobe(brdf, open_sky)
+        sky = sky_reflection(world.sky, look.normal * (2.0 * n_v) - v, brdf.roughness)
+        layers.own += wp.cw_mul(gloss, sky) * open_lobe(brdf, open_sky)
     coat = world.surfaces[surface].coat * bare
     if coat > 0.0:
-        rough = world.surfaces[surface].coat_roughness
-        lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
-        share = coat * lacquer.gloss[0]
-        above = light_of_lamps(world, lacquer, n, p, v, lit, k)
-        own = own * (1.0 - share) + above.shine * coat
-        layers.mirror = layers.mirror * (1.0 - share)
-        layers.behind = layers.behind * (1.0 - share)
-        if lacquer.roughness < MIRROR_ROUGHNESS:
-            layers.coat = share
-            own -= above.shown * coat
-        else:
-            sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
-            own += sky * (share * open_lobe(lacquer, open_sky))
+        layers = below_coat(world, surface, layers, coat, n, p, v, lit, open_sky, k)
     opacity = 1.0 - (1.0 - world.surfaces[surface].opacity) * bare
-    layers.own = own * opacity
+    layers.own = layers.own * opacity
     layers.mirror = layers.mirror * opacity
     layers.coat = layers.coat * opacity
     layers.behind = layers.behind * opacity
@@ -526,6 +572,8 @@ def ray_of(
                 ior = world.surfaces[surface].ior
                 eta = wp.where(weight[0] > 1.5, 1.0 / ior, ior)
                 bent = refracted(d, layers.n, eta)
+                side = wp.where(weight[0] > 1.5, -1.0, 1.0)
+                ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, hit) * width_m
                 if wp.dot(bent, bent) > 0.0:
                     ray.d = bent
         elif world.surfaces[surface].thin != 0:
@@ -533,6 +581,72 @@ def ray_of(
             ray.share = wp.vec3(0.0)
         ray.origin = beyond(p, ray.d, view.eye_m)
     return ray
+
+
+@wp.struct
+class Point:
+    """A point of a face at a point of the image; fields as surface.resolve makes them."""
+
+    way: wp.vec3
+    weight: wp.vec2
+    normal: wp.vec3
+
+
+@wp.func
+def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
+    """Where a ray through a point of the image meets the plane of a face."""
+    facet = facet_of(world, hit)
+    d = pixel_direction(view, x_px, y_px)
+    det = wp.dot(d, facet.across)
+    inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
+    u = wp.clamp(wp.dot(d, facet.along_u) * inverse, 0.0, 1.0)
+    v = wp.clamp(wp.dot(d, facet.along_v) * inverse, 0.0, 1.0 - u)
+    side = wp.where(det < 0.0, -1.0, 1.0)
+    d_world = view.R_world_camera @ d
+    point = Point()
+    point.way = d_world * (facet.depth * inverse)
+    point.weight = wp.vec2(u + 1.0 - side, v)
+    point.normal = facing((facet.n + facet.n_u * u + facet.n_v * v) * side, d_world)
+    return point
+
+
+# Two kernels call it: it is compiled once.
+@wp.func(**OUT_OF_LINE)
+def layered_radiance(
+    view: View,
+    world: World,
+    images: Images,
+    i: int,
+    x_px: float,
+    y_px: float,
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: float,
+    exposed: float,
+    probe: Probe,
+    k: int,
+):
+    """Radiance of a layered surface that pixel i sees, at a point of the image in that pixel."""
+    hit = images.hits[i]
+    surface = surface_index(world, hit)
+    point = point_at(view, world, hit, x_px, y_px)
+    n = point.normal
+    v = unit(-point.way)
+    p = view.eye_m + point.way
+    width_m = pixel_width(view, i, images.z_m[i])
+    look, maps = looked_at(world, surface, hit, point.weight, n, width_m, v)
+    bare = float(1.0)
+    if world.ground.covered != 0:
+        coat = coat_at(world, surface, p, n, exposed, footprint(view, p, n, 1.0))
+        look = coated(world, surface, look, coat, n)
+        bare = 1.0 - wp.min(coat.snow, 1.0)
+    sky = open_sky * maps.occlusion
+    layers = layers_at(world, surface, look, maps, bare, n, p, v, lit, sky, k)
+    c = layers.own
+    for part in range(4):
+        ray = ray_of(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
+        if wp.max(ray.share) > 0.0:
+            c += seen_along(view, world, probe, ray, k)
+    return c
 
 
 @wp.kernel
@@ -550,30 +664,96 @@ def shade_layers(
     """Shade those of a list of pixels that see layered surfaces, each by itself."""
     k = wp.tid()
     i = pixels[k]
-    hit = images.hits[i]
-    surface = surface_index(world, hit)
-    if world.surfaces[surface].layered == 0:
+    if world.surfaces[surface_index(world, images.hits[i])].layered != 0:
+        x = float(i % view.width) + 0.5
+        y = float(i / view.width) + 0.5
+        radiance[i] = layered_radiance(
+            view, world, images, i, x, y, lit, open_sky[0, k], exposed[k], probe, k
+        )
+
+
+@wp.func
+def contrast(a: wp.vec3, b: wp.vec3):
+    """How far two lights are apart, 0 to 1."""
+    light = a[1] + a[0] + a[2]
+    other = b[1] + b[0] + b[2]
+    return wp.abs(light - other) / wp.max(light + other, 1.0e-12)
+
+
+@wp.kernel
+def find_contrasts(
+    view: View,
+    world: World,
+    images: Images,
+    pixels: wp.array(dtype=int),
+    radiance: wp.array(dtype=wp.vec3),
+    count: wp.array(dtype=int),
+    places: wp.array(dtype=int),
+):
+    """List the places in a list of those layered pixels in which edges are seen.
+
+    Args:
+        count: Length of the new list; 0 at first.
+        places: The new list, in any order.
+    """
+    k = wp.tid()
+    i = pixels[k]
+    if world.surfaces[surface_index(world, images.hits[i])].layered == 0:
         return
-    x = float(i % view.width) + 0.5
-    y = float(i / view.width) + 0.5
-    d = view.R_world_camera @ pixel_direction(view, x, y)
-    v = unit(-d)
-    z = images.z_m[i]
-    n = images.normals[i]
-    weight = images.weights[i]
-    width_m = pixel_width(view, i, z)
-    look, maps = looked_at(world, surface, hit, weight, n, width_m, v)
-    p = view.eye_m + d * z
-    bare = float(1.0)
-    if world.ground.covered != 0:
-        coat = coat_at(world, surface, p, n, exposed[k], footprint(view, p, n, 1.0))
-        look = coated(world, surface, look, coat, n)
-        bare = 1.0 - wp.min(coat.snow, 1.0)
-    sky = open_sky[0, k] * maps.occlusion
-    layers = layers_at(world, surface, look, maps, bare, n, p, v, lit, sky, k)
-    c = layers.own
-    for part in range(4):
-        ray = ray_of(view, world, layers, part, hit, weight, n, p, d * z, width_m)
-        if wp.max(ray.share) > 0.0:
-            c += seen_along(view, world, probe, ray, k)
-    radiance[i] = c
+    x = i % view.width
+    y = i / view.width
+    largest = float(0.0)
+    for side in range(4):
+        u = wp.clamp(x + (side & 1) * (1 - (side & 2)), 0, view.width - 1)
+        v = wp.clamp(y + (1 - (side & 1)) * (1 - (side & 2)), 0, view.height - 1)
+        j = v * view.width + u
+        if images.hits[j][0] == images.hits[i][0]:
+            largest = wp.max(largest, contrast(radiance[i], radiance[j]))
+    if largest > CONTRAST:
+        places[wp.atomic_add(count, 0, 1)] = k
+
+
+@wp.kernel
+def shade_contrasts(
+    view: View,
+    world: World,
+    images: Images,
+    places: wp.array(dtype=int),
+    pixels: wp.array(dtype=int),
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: wp.array(dtype=float, ndim=2),
+    exposed: wp.array(dtype=float),
+    probe: Probe,
+    offsets: wp.array(dtype=wp.vec2),
+    listed: wp.array(dtype=int),
+    mixed: wp.array(dtype=wp.vec3),
+):
+    """Radiance of pixels with contrasts: the mean over parts of each.
+
+    Args:
+        offsets: Positions within a pixel, [0, 1).
+        listed: The pixels.
+        mixed: In their order.
+    """
+    place = wp.tid()
+    k = places[place]
+    i = pixels[k]
+    x = float(i % view.width)
+    y = float(i / view.width)
+    total = wp.vec3(0.0)
+    for s in range(offsets.shape[0]):
+        total += layered_radiance(
+            view,
+            world,
+            images,
+            i,
+            x + offsets[s][0],
+            y + offsets[s][1],
+            lit,
+            open_sky[0, k],
+            exposed[k],
+            probe,
+            k,
+        )
+    listed[place] = i
+    mixed[place] = total / float(offsets.shape[0])

@@ -22,6 +22,8 @@ SUN = wp.constant(2)
 RECTANGLE = wp.constant(3)
 DISK = wp.constant(4)
 
+# Suns with a larger tangent of their radius, such as windows of a panorama, set little by little.
+WIDE_SUN = wp.constant(0.08)
 # Where a sun is taken to be; no scene is larger.
 SUN_DISTANCE_M = wp.constant(1.0e3)
 # Rectangles farther away than this many of their radii are points with a cosine, to 0.1 %.
@@ -159,16 +161,15 @@ def edge_flow(a: wp.vec3, b: wp.vec3):
 def facing(lamp: Lamp, beam: Beam, p_world: wp.vec3, n: wp.vec3):
     """Illuminance on a surface with normal n, relative to that on one which faces the beam.
 
-    The cosine where all of the lamp is over the horizon, else what its part over it gives:
+    The cosine where all of the lamp is over the horizon, and for spheres, spots and all but wide
+    suns, which light nothing once their centre has set. Else what the part over the horizon gives:
     disks are polygons then, right to a thousandth of what all of the disk gives.
     """
     cosine = wp.dot(n, beam.direction)
     if lamp.kind < RECTANGLE:
-        if wp.abs(cosine) < beam.spread:
-            sine2 = beam.spread * beam.spread
-            if lamp.kind == SUN:
-                sine2 = sine2 / (1.0 + sine2)
-            cosine = setting_ball(cosine, wp.min(sine2, 0.9999))
+        if lamp.kind == SUN and lamp.radius > WIDE_SUN and wp.abs(cosine) < lamp.radius:
+            sine2 = lamp.radius * lamp.radius
+            cosine = setting_ball(cosine, sine2 / (1.0 + sine2))
         return wp.max(cosine, 0.0)
     to_centre = lamp.position_m - p_world
     if wp.dot(n, to_centre) < lamp.radius:
@@ -176,6 +177,15 @@ def facing(lamp: Lamp, beam: Beam, p_world: wp.vec3, n: wp.vec3):
         if whole > 0.0:
             cosine = setting_panel(lamp, to_centre, n) / whole
     return wp.max(cosine, 0.0)
+
+
+@wp.func
+def risen(lamp: Lamp, beam: Beam, n: wp.vec3):
+    """About what share of a wide lamp is over the horizon."""
+    share = float(1.0)
+    if lamp.kind >= RECTANGLE or (lamp.kind == SUN and lamp.radius > WIDE_SUN):
+        share = wp.clamp(0.5 + 0.5 * wp.dot(n, beam.direction) / beam.spread, 0.0, 1.0)
+    return share
 
 
 @wp.func

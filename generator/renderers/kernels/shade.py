@@ -7,7 +7,7 @@ import warp as wp
 from generator.renderers.kernels.brdf import Brdf, make_brdf, specular_lobe
 from generator.renderers.kernels.ground import coat_at, coated, footprint
 from generator.renderers.kernels.lattice import Lattice, cell_at, ray_origin
-from generator.renderers.kernels.lighting import beam_from, facing, towards_mirror, widening
+from generator.renderers.kernels.lighting import beam_from, facing, risen, towards_mirror, widening
 from generator.renderers.kernels.look import Look, look_at_hit, plain_look
 from generator.renderers.kernels.occlusion import frame_of, surface_tolerance, way_to_lamp
 from generator.renderers.kernels.rays import blocked, free_path, path_along, unsheltered
@@ -110,6 +110,7 @@ def light_of_lamps(
                 arriving = beam.normal_lux * (n_l * visible)
                 light.lux += arriving
                 shine = wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
+                shine *= risen(world.lamps[j], beam, n)
                 light.shine += shine
                 if world.lamps[j].shown != 0:
                     light.shown += shine

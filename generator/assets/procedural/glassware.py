@@ -1,0 +1,87 @@
+"""Drinking glasses: bodies of revolution of solid glass, hollow in physics too."""
+
+from __future__ import annotations
+
+from generator.assets.procedural import hulls
+from generator.assets.procedural.draw import between, pick, rng_of
+from generator.assets.procedural.family import Solid
+from generator.assets.procedural.mesh import centred
+from generator.assets.procedural.shapes import fillet, lathe
+from generator.core.geometry import Material
+from generator.core.se3 import Vec3
+from generator.core.streams import Rng
+
+# What one wall leaves of white light; soda-lime glass has a touch of green.
+_TINTS: tuple[Vec3, ...] = (
+    (0.97, 0.98, 0.97),
+    (0.97, 0.98, 0.97),
+    (0.97, 0.98, 0.97),
+    (0.86, 0.93, 0.95),
+    (0.86, 0.95, 0.88),
+    (0.95, 0.88, 0.72),
+)
+
+
+def tumbler(seed: int) -> Solid:
+    """A drinking glass with a thick bottom. Slots: glass."""
+    rng = rng_of("tumbler", seed)
+    height, top = between(0.085, 0.145, rng), between(0.03, 0.042, rng)
+    bottom, wall = top * between(0.74, 0.98, rng), between(0.0016, 0.0026, rng)
+    floor = between(0.006, 0.013, rng)
+    inner = bottom - wall + (top - bottom) * floor / height
+    profile = fillet(
+        [
+            (0.0, 0.001),
+            (0.75 * bottom, 0.001),
+            (0.85 * bottom, 0.0),
+            (bottom, 0.0),
+            (top, height),
+            (top - wall, height),
+            (inner, floor),
+            (0.0, floor),
+        ],
+        [0.0, 0.0, 0.0, 0.003, 0.45 * wall, 0.45 * wall, 0.005, 0.0],
+        4,
+    )
+    base = hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
+    walls = hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
+    return centred([lathe(profile, 48)], (_glass(rng),), [base, *walls])
+
+
+def wine_glass(seed: int) -> Solid:
+    """A goblet on a stem. Slots: glass."""
+    rng = rng_of("wine_glass", seed)
+    foot, stem = between(0.032, 0.038, rng), between(0.0035, 0.0045, rng)
+    height, belly = between(0.17, 0.22, rng), between(0.034, 0.044, rng)
+    rim, wall = belly * between(0.72, 0.9, rng), between(0.0012, 0.0018, rng)
+    low = height * between(0.38, 0.48, rng)
+    wide = low + (height - low) * between(0.38, 0.5, rng)
+    outer = [(stem, low - 0.008), (0.62 * belly, low + 0.008), (belly, wide), (rim, height)]
+    inner = [
+        (rim - wall, height),
+        (belly - wall, wide),
+        (0.55 * belly, low + 0.009),
+        (0.0, low + 0.004),
+    ]
+    below = [(0.0, 0.0015), (0.8 * foot, 0.0015), (foot, 0.0), (foot, 0.002), (stem, 0.008)]
+    rounded = [0.0, 0.0, 0.0004, 0.0004, 0.012, 0.02, 0.03, 0.05]
+    within = [0.45 * wall, 0.45 * wall, 0.05, 0.025, 0.0]
+    profile = fillet([*below, *outer, *inner], [*rounded, *within], 2)
+    levels = [_around(rim, wall, height), _around(belly, wall, wide)]
+    floor = (0.5 * belly, 0.62 * belly, low + 0.008)
+    parts = [
+        hulls.frustum((foot, 0.0), (foot, 0.003)),
+        hulls.frustum((stem, 0.003), (stem, low - 0.008)),
+        hulls.frustum((stem, low - 0.008), (0.62 * belly, low + 0.008)),
+        *hulls.ring(floor, levels[1], 10),
+        *hulls.ring(levels[1], levels[0], 10),
+    ]
+    return centred([lathe(profile, 32)], (_glass(rng),), parts)
+
+
+def _around(radius: float, wall: float, z: float) -> tuple[float, float, float]:
+    return (radius - wall, radius, z)
+
+
+def _glass(rng: Rng) -> Material:
+    return Material(pick(_TINTS, rng), roughness=0.04, transmission=1.0, ior=1.52, thin=False)
