@@ -129,9 +129,7 @@ class PathTracer:
         budget.sample_bits = (self._settings.samples - 1).bit_length()
         budget.bounces = self._settings.max_bounces
         budget.key = int(rng.integers(1 << 32))
-        budget.clear = int(
-            ((surfaces["transmission"] > 0.0) | (surfaces["opacity"] < 1.0)).any()
-        )
+        budget.clear = int(((surfaces["transmission"] > 0.0) | (surfaces["opacity"] < 1.0)).any())
         budget.lights = lights
         return budget
 
@@ -144,9 +142,7 @@ class PathTracer:
             table.rows = wp.array(rows, dtype=float, device=device)
             table.columns = wp.array(columns, dtype=float, device=device)
             small = cv2.resize(image, _IRRADIANCE_SIZE, interpolation=cv2.INTER_AREA)
-            irradiance = wp.array(
-                irradiance_coefficients(small), dtype=wp.vec3, device=device
-            )
+            irradiance = wp.array(irradiance_coefficients(small), dtype=wp.vec3, device=device)
             return _SkyLight(table, irradiance, rows.nbytes + columns.nbytes)
 
         return self._skies.get(environment_id, make)

@@ -289,7 +289,7 @@ def test_both_techniques_together_are_less_noisy_than_either() -> None:
 
 
 def test_error_falls_faster_than_that_of_independent_samples() -> None:
-    """Sixteen times the samples: four times less error by chance, at least six by scrambled nets."""
+    """Sixteen times the samples: a quarter of the error by chance, a sixth by scrambled nets."""
     sun = Light("lamp", "sphere", (0.3, 0.0, 1.0), intensity_cd=100.0, radius_m=0.3)
     scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK)
 

@@ -62,7 +62,7 @@ from generator.renderers.kernels.path_random import (
     random_pair,
 )
 from generator.renderers.kernels.raster import Z_NEAR_M
-from generator.renderers.kernels.rays import path_along, cut, unsheltered
+from generator.renderers.kernels.rays import cut, path_along, unsheltered
 from generator.renderers.kernels.records import (
     HOLES,
     View,
