@@ -35,9 +35,13 @@ def mitsuba_scene(
     """The scene, loaded.
 
     Args:
+        scene: What is shown.
+        camera: By which camera.
+        library: What its assets are.
         bsdfs: By body name; bodies without one have Lambert's in their base colour.
         environment: The emitter that stands for the scene's environment; None = a constant one of
             its luminance.
+        max_bounces: As of the renderer's settings.
     """
     mi = mitsuba()
     world: dict[str, Any] = {
@@ -101,7 +105,8 @@ def _mesh(body: Body, data: MeshData, bsdf: Mapping[str, Any]) -> Any:
     properties = mi.Properties()
     properties["mesh_bsdf"] = mi.load_dict(dict(bsdf))
     n, m = len(data.vertices_m), len(data.faces)
-    mesh = mi.Mesh(body.name, n, m, props=properties, has_vertex_normals=True, has_vertex_texcoords=True)
+    attributes = {"has_vertex_normals": True, "has_vertex_texcoords": True}
+    mesh = mi.Mesh(body.name, n, m, props=properties, **attributes)
     R = body.T_world_body.rotation()
     vertices = data.vertices_m.astype(np.float64) * body.scale @ R.T
     vertices += np.asarray(body.T_world_body.translation_m)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -289,7 +291,7 @@ def test_both_techniques_together_are_less_noisy_than_either() -> None:
 
 
 def test_error_falls_faster_than_that_of_independent_samples() -> None:
-    """Sixteen times the samples: four times less error by chance, at least six by scrambled nets."""
+    """Sixteen times the samples: a quarter of the error by chance, a sixth by scrambled nets."""
     sun = Light("lamp", "sphere", (0.3, 0.0, 1.0), intensity_cd=100.0, radius_m=0.3)
     scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK)
 
@@ -364,3 +366,22 @@ def test_snow_whitens_and_puddles_mirror() -> None:
     assert radiance_of(snowed, from_above(), ground(dark), 32).mean() > 60.0
     # Darker below, and 2 % that water mirrors.
     assert 3.0 < radiance_of(soaked, from_above(), ground(dark), 32).mean() < 10.0
+
+
+def test_the_other_tier_never_loads_the_kernels_of_paths() -> None:
+    """Starting cold it costs what it did."""
+    code = (
+        "import sys; from generator.renderers.settings import RenderSettings;"
+        "from generator.renderers.warp import WarpRenderer;"
+        "from generator.core.capture import Channel; from tests.renderers import fake_library as f;"
+        "from generator.core.scene import Scene;"
+        "WarpRenderer(f.FakeLibrary({}), 'cpu').render("
+        "Scene('t', ()), f.camera_at((0, 0, 1), (1, 0, 1), (8, 8)), frozenset({Channel.RGB}));"
+        "assert 'generator.renderers.color' in sys.modules;"
+        "loaded = [name for name in sys.modules if '.path' in name and 'renderers' in name];"
+        "assert not loaded, loaded"
+    )
+
+    finished = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+
+    assert finished.returncode == 0, finished.stderr.decode()

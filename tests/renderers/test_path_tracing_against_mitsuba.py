@@ -109,7 +109,11 @@ def panel_pose(behind_m: float) -> SE3:
 
 
 def still_life(
-    material: Material, bsdf: Mapping[str, Any], *lights: Light, exact: bool = True, sky: float = 60.0
+    material: Material,
+    bsdf: Mapping[str, Any],
+    *lights: Light,
+    exact: bool = True,
+    sky: float = 60.0,
 ) -> Picture:
     """A ball on the ground."""
     library = FakeLibrary(
@@ -133,7 +137,9 @@ def still_life(
     return Picture(scene, camera, library, {"ball": bsdf}, exact=exact)
 
 
-DISK = Light("disk", "disk", (-1.5, -1.2, 2.0), (0.6, 0.48, -0.64), radius_m=0.4, intensity_cd=500.0)
+DISK = Light(
+    "disk", "disk", (-1.5, -1.2, 2.0), (0.6, 0.48, -0.64), radius_m=0.4, intensity_cd=500.0
+)
 BALL = Light("bulb", "sphere", (-0.2, 0.9, 1.9), radius_m=0.15, intensity_cd=300.0)
 SUN = Light(
     "sun", "sun", direction=(0.48, 0.6, -0.64), illuminance_lux=900.0, angular_radius_rad=1e-4
@@ -227,9 +233,8 @@ def textured() -> Picture:
     cloth = (replace(matte(1.0)[0], texture="cloth"),)
     meshes = {**picture.library.meshes, "ground": plane_mesh(4.0, cloth)}
     library = FakeLibrary(meshes, {"cloth": TextureData(albedo)})
-    bitmap = {
-        "type": "bitmap", "bitmap": mitsuba().Bitmap(albedo[::-1].copy()), "filter_type": "bilinear",
-    }  # fmt: skip
+    image = mitsuba().Bitmap(albedo[::-1].copy())
+    bitmap = {"type": "bitmap", "bitmap": image, "filter_type": "bilinear"}
     lambert = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": bitmap}}
     scene = replace(picture.scene, lights=(PANEL,))
     return replace(picture, scene=scene, library=library, bsdfs={"ground": lambert}, exact=False)

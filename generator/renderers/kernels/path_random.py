@@ -30,15 +30,19 @@ def mixed_bits(key: wp.uint32):
 
 
 @wp.func
+def swapped(bits: wp.uint32, width: wp.uint32, mask: wp.uint32):
+    """Neighbouring groups of that many bits in each other's place; the mask is of every second."""
+    return ((bits & mask) << width) | ((bits >> width) & mask)
+
+
+@wp.func
 def reversed_bits(bits: wp.uint32):
     """The same bits, the last first."""
-    x = bits
-    x = (x << wp.uint32(16)) | (x >> wp.uint32(16))
-    x = ((x & wp.uint32(0x00FF00FF)) << wp.uint32(8)) | ((x >> wp.uint32(8)) & wp.uint32(0x00FF00FF))
-    x = ((x & wp.uint32(0x0F0F0F0F)) << wp.uint32(4)) | ((x >> wp.uint32(4)) & wp.uint32(0x0F0F0F0F))
-    x = ((x & wp.uint32(0x33333333)) << wp.uint32(2)) | ((x >> wp.uint32(2)) & wp.uint32(0x33333333))
-    x = ((x & wp.uint32(0x55555555)) << wp.uint32(1)) | ((x >> wp.uint32(1)) & wp.uint32(0x55555555))
-    return x
+    x = (bits << wp.uint32(16)) | (bits >> wp.uint32(16))
+    x = swapped(x, wp.uint32(8), wp.uint32(0x00FF00FF))
+    x = swapped(x, wp.uint32(4), wp.uint32(0x0F0F0F0F))
+    x = swapped(x, wp.uint32(2), wp.uint32(0x33333333))
+    return swapped(x, wp.uint32(1), wp.uint32(0x55555555))
 
 
 @wp.func
