@@ -16,6 +16,7 @@ import numpy as np
 
 from generator.assets.catalogue import Finish, MeshEntry, Region, RobotEntry
 from generator.assets.convex import convex_parts, one_hull
+from generator.assets.coverage import with_reached_holes
 from generator.assets.decimate import decimated
 from generator.assets.folder import Folder
 from generator.assets.images import decode
@@ -72,7 +73,16 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         entry = entry.model_copy(update={"origin": "center"})
     else:
         looks, collides, images = _raw(folder, entry)
-    soup = _finished(joined(looks), entry.materials, place, asset_id)
+    decoded = {name: decode(data, f"{place}#{name}", alpha=True) for name, data in images.items()}
+    whole = with_reached_holes(
+        joined(looks),
+        lambda name: (
+            decoded[name]
+            if name in decoded
+            else decode(folder.read(name), str(folder.root / name), alpha=True)
+        ),
+    )
+    soup = _finished(whole, entry.materials, place, asset_id)
     matrix = upright(entry)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
@@ -84,7 +94,6 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         collision = convex_parts(solid, place, entry.parts)
     else:
         collision = convex_parts(_solid_of(mesh, entry.max_faces), place, entry.parts)
-    decoded = {name: decode(data, f"{place}#{name}", alpha=True) for name, data in images.items()}
     keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
     return Imported(mesh, collision, decoded, keypoints)
 

@@ -271,3 +271,19 @@ def test_maps_of_several_sizes_take_the_largest() -> None:
     small, large = np.full((2, 2, 3), 70, np.uint8), np.full((4, 8, 3), 9, np.uint8)
     texture = composed(Maps(albedo="s", emission="l"), {"s": small, "l": large}.__getitem__)
     assert texture.albedo.shape == (4, 8, 3) and (texture.albedo == 70).all()
+
+
+def test_coverage_that_no_face_reaches_is_left_out(folder: Path) -> None:
+    """An atlas that is transparent beside the triangle's corner of it: the mesh stays solid."""
+    atlas = np.full((8, 8, 4), 200, np.uint8)
+    atlas[..., 3] = np.where(np.arange(8) < 4, 255, 0)
+    (folder / "wood.png").write_bytes(png(atlas))
+    for name, wide in (("t", 0.4), ("u", 1.0)):
+        (folder / f"{name}.obj").write_text(TRIANGLE_OBJ.replace("vt 1 0", f"vt {wide} 0"))
+    (folder / "m.mtl").write_text("newmtl m\nmap_Kd wood.png\nmap_d wood.png\n")
+    library = open_library([folder], cache_dir=folder.parent / "cache")
+
+    names = [library.mesh(f"user/{name}").materials[0].texture for name in ("t", "u")]
+
+    assert library.texture(names[0]).alpha is None
+    assert library.texture(names[1]).alpha is not None

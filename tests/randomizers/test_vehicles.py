@@ -101,6 +101,26 @@ def test_only_paint_is_painted_and_dust_takes_everything_towards_its_colour() ->
         assert slots(dirty)[role].roughness > slots(clean)[role].roughness
 
 
+def test_a_coat_lies_over_paint_alone_and_dust_dulls_it() -> None:
+    """Weight 1 on clean paint, 0.6 under 40 % dust; other roles have none; colours stay."""
+    plain, clean, dusty = (
+        VehiclePaint(
+            name="paint",
+            targets=("traffic",),
+            probability=Constant(True),
+            dirt=Constant(dirt),
+            coat=Constant(coat),
+        )(road(), FakeAssets(), rng_of()).bodies[0]
+        for coat, dirt in ((0.0, 0.0), (1.0, 0.0), (1.0, 0.4))
+    )
+
+    assert {m.role for m in clean.materials if m.coat} == {"paint"}
+    assert slots(clean)["paint"].coat == 1.0 and slots(plain)["paint"].coat == 0.0
+    assert slots(dusty)["paint"].coat == pytest.approx(0.6)
+    assert slots(clean)["paint"].base_color == slots(plain)["paint"].base_color
+    assert slots(clean)["paint"].coat_roughness < 0.15 < slots(clean)["paint"].roughness
+
+
 def test_a_colour_that_does_not_exist_is_refused() -> None:
     """The error names those that do."""
     with pytest.raises(ValueError, match="unknown colour 'pink'; expected white, black"):

@@ -176,7 +176,7 @@ class Meeting:
     entering: int
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def met(world: World, origin: wp.vec3, d: wp.vec3):
     """The first surface along a ray."""
     m = Meeting()
@@ -240,7 +240,7 @@ def above(r: wp.vec3, n: wp.vec3):
     return unit(r + n * wp.max(0.02 - wp.dot(r, n), 0.0))
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def looked_at(
     world: World,
     surface: int,
@@ -258,7 +258,7 @@ def looked_at(
     return look, maps
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def light_of_meeting(
     world: World,
     probe: Probe,
@@ -467,7 +467,7 @@ def below_coat(
     return layers
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def layers_at(
     world: World,
     surface: int,
