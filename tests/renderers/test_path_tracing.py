@@ -205,6 +205,26 @@ def test_a_panel_seen_in_a_mirror_has_its_luminance() -> None:
     np.testing.assert_allclose(image.mean(), 500.0, rtol=2e-3)
 
 
+def test_a_panel_that_a_body_shows_gives_its_light_once() -> None:
+    """The body's own light is the lamp's: the floor is lit as by the lamp alone."""
+    glowing = replace(MATTE, base_color=(0.0, 0.0, 0.0), emission_cd_m2=(1000.0, 1000.0, 1000.0))
+    library = FakeLibrary(
+        {"plane": plane_mesh(20.0, (MATTE,)), "face": plane_mesh(1.0, (glowing,))}
+    )
+    lamp = Light(
+        "lamp", "rectangle", (0.0, 0.0, 1.2), side=(1.0, 0.0, 0.0), size_m=(1.0, 1.0),
+        intensity_cd=1000.0, body="face",
+    )  # fmt: skip
+    bodies = (Body("p", "plane"), Body("face", "face", SE3((0.0, 0.0, 1.202))))
+    camera = camera_at((0.0, -1.0, 0.8), (0.0, 0.0, 0.0), (8, 8), hfov_deg=2.0)
+    shown = Scene("t", bodies, lights=(lamp,), environment=DARK)
+    alone = Scene("t", bodies[:1], lights=(lamp,), environment=DARK)
+
+    floor, expected = (radiance_of(scene, camera, library, 256, 1) for scene in (shown, alone))
+
+    np.testing.assert_allclose(floor.mean(), expected.mean(), rtol=0.01)
+
+
 def test_emission_shines_in_the_picture_and_on_what_is_near() -> None:
     """A closed room that emits 10 cd/m^2 and reflects a half: 10 + 5 + 2.5 ... = 20."""
     glowing = replace(MATTE, emission_cd_m2=(10.0, 10.0, 10.0))
