@@ -12,7 +12,7 @@ from generator.renderers.looks import Looks
 from generator.renderers.structs import stacked
 from generator.renderers.textures import DeviceTexture
 
-MIRROR_ROUGHNESS = 0.15
+MIRROR_ROUGHNESS = 0.1
 """Smoother surfaces than this mirror what is around them; on others an environment will do."""
 
 

@@ -60,12 +60,12 @@ from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
-MIRROR_ROUGHNESS = wp.constant(0.15)
+MIRROR_ROUGHNESS = wp.constant(0.1)
 # Ambient occlusion is looked at only where more than this share of its light is seen.
 AMBIENT_SHARE = wp.constant(0.2)
 MOSTLY_CLEAR = wp.constant(0.9)
 # Neighbours on a layered surface that differ more than this are looked at more closely.
-CONTRAST = wp.constant(0.06)
+CONTRAST = wp.constant(0.1)
 # Clear surfaces that a ray passes one after the other.
 SURFACES_MAX = wp.constant(8)
 
