@@ -129,7 +129,9 @@ class PathTracer:
         budget.sample_bits = (self._settings.samples - 1).bit_length()
         budget.bounces = self._settings.max_bounces
         budget.key = int(rng.integers(1 << 32))
-        budget.clear = int(((surfaces["transmission"] > 0.0) | (surfaces["opacity"] < 1.0)).any())
+        panes = (surfaces["transmission"] > 0.0) & (surfaces["thin"] != 0)
+        panes &= surfaces["roughness"] < float(path.CLEAR_ROUGHNESS)
+        budget.clear = int((panes | (surfaces["opacity"] < 1.0)).any())
         budget.lights = lights
         return budget
 

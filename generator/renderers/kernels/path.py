@@ -304,6 +304,13 @@ def is_clear_pane(world: World, surface: int):
 
 
 @wp.func
+def lets_straight(world: World, surface: int):
+    """Whether light may pass a surface unbent."""
+    pane = world.surfaces[surface].transmission > 0.0 and is_clear_pane(world, surface)
+    return pane or world.surfaces[surface].opacity < 1.0
+
+
+@wp.func
 def light_through(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear: int):
     """What is left of light from a distance."""
     through = wp.vec3(1.0, 1.0, 1.0)
@@ -319,15 +326,17 @@ def light_through(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear
         hit = first_hit(world, origin, d, rest_m)
         going = False
         if hit.at[0] >= 0:
-            v = vertex_of(world, hit, d, 0.0)
-            through = wp.cw_mul(through, pane_leaves(world, v, d))
-            passages += 1
-            if wp.max(through) > 0.0 and passages < PASSAGES_MAX:
+            leaves = wp.vec3(0.0)
+            if lets_straight(world, surface_index(world, hit.at)):
+                v = vertex_of(world, hit, d, 0.0)
+                leaves = pane_leaves(world, v, d)
                 origin = lifted(v.p, -v.flat)
-                rest_m -= hit.t
-                going = rest_m > 0.0
-            else:
+            through = wp.cw_mul(through, leaves)
+            passages += 1
+            rest_m -= hit.t
+            if passages == PASSAGES_MAX:
                 through = wp.vec3(0.0)
+            going = wp.max(through) > 0.0 and rest_m > 0.0
     return through
 
 
