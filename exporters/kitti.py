@@ -217,7 +217,8 @@ class Kitti(Strict):
             units = depth_units(z_m, info.depth_scale_m)
         else:
             path = media_path(shard_dir, camera, Channel.Z_DEPTH, sample.index)
-            units = read_depth_units(path)[first_px::stride_px, first_px::stride_px]
+            rows = slice(first_px, None, stride_px)
+            units = read_depth_units(path, rows)[:, first_px::stride_px]
         z_depth_m = units * info.depth_scale_m
         return lidar_points(sample.truth[camera].camera.intrinsics, z_depth_m, stride_px)
 

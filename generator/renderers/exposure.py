@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -53,6 +54,7 @@ def automatic_ev100(radiance: Float32) -> float:
     return round(min(max(ev100, _EV100_RANGE[0]), _EV100_RANGE[1]) * 256.0) / 256.0
 
 
+@cache
 def tone_curve(tone: Literal["filmic", "srgb"]) -> NDArray[np.uint8]:
     """Bytes of exposed radiance ``v``, indexed by ``v / (1 + v)`` from 0 to 1."""
     index = np.arange(_CURVE_ENTRIES) / (_CURVE_ENTRIES - 1.0)

@@ -32,6 +32,10 @@ class ListedPixels:
     exposed: wp.array
 
 
+_PARTS = 2
+"""Rays per pixel where edges are seen in a mirror or through glass."""
+
+
 def shade_layers(
     world: PackedWorld,
     view: records.View,
@@ -66,7 +70,7 @@ def shade_layers(
     found = int(count.numpy()[0])
     pixels = stock.scratch("contrast pixels", view.width * view.height, wp.int32)
     mixed = stock.scratch("contrast colours", view.width * view.height, wp.vec3)
-    offsets = wp.array(pixel_parts(settings.antialias), dtype=wp.vec2, device=device)
+    offsets = wp.array(pixel_parts(_PARTS), dtype=wp.vec2, device=device)
     inputs = [*frame, places, *seen, offsets]
     wp.launch(layers.shade_contrasts, found, inputs, [pixels, mixed], device=device)
     wp.launch(tone.put_mixed, found, [pixels, mixed], [radiance], device=device)

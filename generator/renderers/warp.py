@@ -47,7 +47,7 @@ class WarpRenderer:
         self._settings = settings or RenderSettings()
         if self._settings.visibility == "raster" and not self._device.is_cpu:
             raise ConfigError(
-                f"renderer.visibility: 'raster' works on the CPU only, not on '{self._device}';"
+                f"render.visibility: 'raster' works on the CPU only, not on '{self._device}';"
                 " choose 'auto' or 'rays'."
             )
         compile_kernels(self._device.alias)
