@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from generator.core.se3 import Array, Vec3
 
 BORDER_M = 0.029
 """How far on the wrong side of a box's face a point may be: 3 cm, less rounding."""
+_ENDS = np.array([(i, j, k) for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (0.0, -1.0)])
+"""Corners in units of length, width and height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +37,9 @@ class UprightBox:
         """The eight corners in the camera frame [m], shape [8, 3]."""
         height, width, length = self.size_hwl_m
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        along, across = np.array([c, 0.0, -s]), np.array([s, 0.0, c])
-        signs = [(i, j, k) for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (0.0, -1.0)]
-        ends = [
-            i * length * along + j * width * across + (0.0, k * height, 0.0) for i, j, k in signs
-        ]
-        return np.asarray(self.bottom_m) + np.array(ends)
+        along, across = _ENDS[:, 0] * length, _ENDS[:, 1] * width
+        ends = np.stack([along * c + across * s, _ENDS[:, 2] * height, across * c - along * s], -1)
+        return np.asarray(self.bottom_m) + ends
 
     def depths_m(self, points_m: Array) -> Array:
         """How deep points [n, 3] of the camera frame lie inside; negative outside."""
@@ -52,6 +52,7 @@ class UprightBox:
         return depths
 
 
+@lru_cache(1024)
 def upright_box(box: OrientedBox) -> UprightBox:
     """The smallest upright box, headed like the object's x axis, around an oriented box.
 
