@@ -42,7 +42,10 @@ def split_sky(world: PackedWorld, scene: Scene, stock: AssetStock) -> PackedWorl
         return world
     lit = with_own_record(world)
     lit.record.sky = sky_record(environment, split)
-    lamps = np.concatenate([world.record.lamps.numpy(), lamp_records(suns)])
+    added = lamp_records(suns)
+    # Mirrored rays find them in the panorama.
+    added["shown"] = 1
+    lamps = np.concatenate([world.record.lamps.numpy(), added])
     lit.record.lamps = wp.array(lamps, dtype=records.Lamp, device=stock.device)
     return lit
 

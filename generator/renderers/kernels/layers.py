@@ -54,7 +54,12 @@ from generator.renderers.kernels.shade import (
     seen_part,
     seen_sky,
 )
-from generator.renderers.kernels.sky import sky_image, sky_irradiance, sky_reflection
+from generator.renderers.kernels.sky import (
+    sky_image,
+    sky_irradiance,
+    sky_reflection,
+    sky_rest,
+)
 from generator.renderers.kernels.surface import facet_of, facing
 from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_at
 
@@ -314,9 +319,10 @@ def sky_along(world: World, ray: Ray):
     """What a ray sees that meets nothing."""
     c = wp.vec3(0.0)
     if ray.mirrored != 0:
+        # With the parts for which lamps stand, in their own shapes.
         c = sky_reflection(world.sky, ray.d, ray.roughness)
+        c += sky_image(world.sky, ray.d) - sky_rest(world.sky, ray.d)
     elif world.sky.visible != 0:
-        # With its sun, which is a lamp to what mirrors.
         c = sky_image(world.sky, ray.d)
     return c
 

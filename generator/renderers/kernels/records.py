@@ -179,7 +179,7 @@ class Lamp:
             they are at right angles to each other and to ``direction``.
         radius: Of the ball or the disk, or of the circle around the rectangle [m], or tangent of
             the sun's angular radius.
-        shown: 1 where a body before which a panel hangs shows it, so that rays find it.
+        shown: 1 where rays find it: a body before which a panel hangs, a part of a panorama.
         cos_outer, cos_inner: Where a spot has faded to nothing, and where it begins to fade.
         cutoff: Slope below which a dipped headlight lights the road; 0 = no such light.
     """
