@@ -31,7 +31,7 @@ from generator.core.errors import AssetError
 from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, UInt8
 from generator.core.se3 import SE3
 
-VERSION = 4
+VERSION = 5
 """Raised whenever the same files would come out as other geometry."""
 _WHITEST = 0.85
 """Files say 1 for white; no matt surface reflects more than fresh snow does (about 0.85)."""
@@ -256,7 +256,13 @@ def _with_regions(soup: Soup, regions: Sequence[Region]) -> Soup:
 
 
 def _with_finish(material: Material, finish: Finish) -> Material:
+    """What the finish says, and of the file what it leaves.
+
+    A finish with a colour stands for a surface of its own: what is behind the file's is not seen.
+    """
     changes = {k: v for k, v in finish.model_dump().items() if v is not None}
+    if "base_color" in changes:
+        changes = {"opacity": 1.0, "transmission": 0.0, **changes}
     if changes.pop("textured", None) is False:
         changes["texture"] = ""
     return replace(material, **changes)

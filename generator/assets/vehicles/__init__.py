@@ -17,7 +17,7 @@ def _vehicle(name: str, variants: int, mass_kg: float, module: str, **parameters
         variants=variants,
         mass_kg=mass_kg,
         stackable=False,
-        version=5,
+        version=6,
         parameters=parameters,
         build=Lazy(path),
         facts=Lazy(f"{path}_facts"),
