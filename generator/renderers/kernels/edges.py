@@ -50,15 +50,18 @@ def find_edges(view: View, images: Images, count: wp.array(dtype=int), pixels: w
         pixels: The list, in any order.
     """
     y = wp.tid()
+    left = bool(False)
     for x in range(view.width):
         i = y * view.width + x
+        right = differ(images, i, clamped_pixel(view, x + 1, y))
         if (
-            differ(images, i, clamped_pixel(view, x + 1, y))
-            or differ(images, i, clamped_pixel(view, x - 1, y))
+            left
+            or right
             or differ(images, i, clamped_pixel(view, x, y + 1))
             or differ(images, i, clamped_pixel(view, x, y - 1))
         ):
             pixels[wp.atomic_add(count, 0, 1)] = i
+        left = right
 
 
 @wp.func

@@ -70,7 +70,7 @@ MIRROR_ROUGHNESS = wp.constant(0.1)
 AMBIENT_SHARE = wp.constant(0.2)
 MOSTLY_CLEAR = wp.constant(0.9)
 # Neighbours on a layered surface that differ more than this are looked at more closely.
-CONTRAST = wp.constant(0.1)
+CONTRAST = wp.constant(0.15)
 # Clear surfaces that a ray passes one after the other.
 SURFACES_MAX = wp.constant(8)
 
