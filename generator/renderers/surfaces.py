@@ -12,9 +12,6 @@ from generator.renderers.looks import Looks
 from generator.renderers.structs import stacked
 from generator.renderers.textures import DeviceTexture
 
-MIRROR_ROUGHNESS = 0.1
-"""Smoother surfaces than this mirror what is around them; on others an environment will do."""
-
 
 def surface_records(
     looks: Sequence[Looks], textures: Mapping[str, DeviceTexture]
@@ -39,7 +36,7 @@ def surface_records(
         (values["coat"] > 0.0)
         | (values["transmission"] > 0.0)
         | (values["opacity"] < 1.0)
-        | ((values["metallic"] >= 0.5) & (values["roughness"] < MIRROR_ROUGHNESS))
+        | ((values["metallic"] >= 0.5) & (values["roughness"] < records.MIRROR_ROUGHNESS))
         | mapped[values["texture"]]
     )
     return values

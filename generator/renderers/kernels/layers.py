@@ -33,6 +33,7 @@ from generator.renderers.kernels.look import Look, look_at_hit
 from generator.renderers.kernels.rays import FARTHEST
 from generator.renderers.kernels.records import (
     HOLES,
+    MIRROR_ROUGHNESS,
     View,
     World,
     corners_of,
@@ -65,7 +66,6 @@ from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
-MIRROR_ROUGHNESS = wp.constant(0.1)
 # Ambient occlusion is looked at only where more than this share of its light is seen.
 AMBIENT_SHARE = wp.constant(0.2)
 MOSTLY_CLEAR = wp.constant(0.9)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import warp as wp
 
 NOTHING = wp.constant(-1)
+# Smoother surfaces mirror what is around them; on others an environment will do.
+MIRROR_ROUGHNESS = wp.constant(0.1)
 PINHOLE = wp.constant(0)
 BROWN_CONRADY = wp.constant(1)
 KANNALA_BRANDT = wp.constant(2)
