@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from generator.core.capture import Channel
 from generator.core.geometry import Float32
 from generator.core.scene import Camera
 from generator.core.se3 import Array
@@ -88,6 +90,22 @@ def pass_lens(
     wet_lens(world.weather, camera, view, radiance, stock)
     add_glare(view, settings.glare, radiance, stock)
     darken_outside(view, radiance)
+
+
+def developed(
+    lit: LitImage,
+    view: records.View,
+    channels: frozenset[Channel],
+    stock: AssetStock,
+    settings: RenderSettings,
+) -> dict[Channel, NDArray[Any]]:
+    """Those of the channels RADIANCE and RGB that are asked for."""
+    images: dict[Channel, NDArray[Any]] = {}
+    if Channel.RADIANCE in channels:
+        images[Channel.RADIANCE] = radiance_image(lit, view)
+    if Channel.RGB in channels:
+        images[Channel.RGB] = color_image(lit, view, stock, settings)
+    return images
 
 
 def radiance_image(lit: LitImage, view: records.View) -> Float32:

@@ -24,10 +24,9 @@ from generator.core.scene import Camera, Scene
 from generator.core.shutter import INSTANT
 from generator.renderers.color import (
     LitImage,
-    color_image,
+    developed,
     metered_ev100,
     pass_lens,
-    radiance_image,
 )
 from generator.renderers.flow import FLOW, flow_images
 from generator.renderers.lamps import main_lamp_numbers
@@ -193,12 +192,7 @@ def _developed(
     """What the lens adds, and the response of the camera."""
     stock, settings, view = studio.stock, studio.settings, near.view
     pass_lens(near.world, near.moment.camera, view, z_m, lit, stock, settings)
-    images: dict[Channel, NDArray[Any]] = {}
-    if Channel.RADIANCE in channels:
-        images[Channel.RADIANCE] = radiance_image(lit, view)
-    if Channel.RGB in channels:
-        images[Channel.RGB] = color_image(lit, view, stock, settings)
-    return images
+    return developed(lit, view, channels, stock, settings)
 
 
 def _metered(near: Sight, studio: Studio) -> float:

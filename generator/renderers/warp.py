@@ -8,7 +8,7 @@ from generator.core.capture import Beams, Channel, Echoes, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
-from generator.renderers.color import color_image, radiance_image
+from generator.renderers.color import developed
 from generator.renderers.compiling import compile_kernels
 from generator.renderers.device import open_device
 from generator.renderers.flow import FLOW, flow_images
@@ -77,10 +77,7 @@ class WarpRenderer:
         if channels & {Channel.RGB, Channel.RADIANCE}:
             lit = lit_image(scene, camera, world, view, seen, self._studio)
             ev100 = lit.ev100
-            if Channel.RADIANCE in channels:
-                images[Channel.RADIANCE] = radiance_image(lit, view)
-            if Channel.RGB in channels:
-                images[Channel.RGB] = color_image(lit, view, self._stock, self._settings)
+            images |= developed(lit, view, channels, self._stock, self._settings)
         outlines = {}
         if Channel.AMODAL in channels:
             ids = images[Channel.INSTANCE]
