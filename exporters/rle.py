@@ -37,7 +37,8 @@ def run_lengths(mask: MaskPx, height_px: int, width_px: int) -> list[int]:
         # A run that ends where the next column's begins is one run.
         meets = np.flatnonzero(borders[1:-1:2] == borders[2::2])
         borders = np.delete(borders, np.concatenate([2 * meets + 1, 2 * meets + 2]))
-    lengths = np.diff(borders, prepend=0, append=height_px * width_px)
+    ends = np.concatenate([[0], borders, [height_px * width_px]])
+    lengths = ends[1:] - ends[:-1]
     # A mask that ends in the last pixel has no closing run of zeros.
     counts: list[int] = lengths.tolist()
     return counts if counts[-1] or len(counts) == 1 else counts[:-1]

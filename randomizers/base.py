@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
 
 from generator.config.strict import Strict
+from generator.core.cache import ObjectCache
 from generator.core.errors import ConfigError, did_you_mean
-from generator.core.geometry import Material
+from generator.core.geometry import Asset, Material
 from generator.core.interfaces import AssetIndex, Stage
 from generator.core.scene import Body, Scene
 from generator.core.streams import Rng
+
+_BY_WORD: ObjectCache[Mapping[str, tuple[str, ...]]] = ObjectCache(2)
 
 
 class RandomizerBase(Strict):
@@ -93,20 +96,25 @@ def textures_named(assets: AssetIndex, names: tuple[str, ...], field: str) -> tu
     Raises:
         ConfigError: there is none for a name.
     """
-    found: set[str] = set()
-    every = assets.find((), kind="texture")
+    textures = assets.find((), kind="texture")
+    by_word = _BY_WORD.get(textures, lambda: _by_word(textures))
     for name in names:
-        fitting = {a.asset_id for a in every if name in a.tags or _family(a.asset_id) == name}
-        if not fitting:
-            known = sorted(
-                {_family(a.asset_id) for a in every} | {t for a in every for t in a.tags}
-            )
+        if name not in by_word:
+            known = sorted(by_word)
             raise ConfigError(
                 f"{field}: there is no texture '{name}'; expected one of {', '.join(known)}"
                 f"{did_you_mean(name, known)}"
             )
-        found |= fitting
-    return tuple(sorted(found))
+    return tuple(sorted({texture for name in names for texture in by_word[name]}))
+
+
+def _by_word(textures: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
+    """Ids of textures by tag and by family."""
+    by_word: dict[str, list[str]] = {}
+    for texture in textures:
+        for word in {_family(texture.asset_id), *texture.tags}:
+            by_word.setdefault(word, []).append(texture.asset_id)
+    return {word: tuple(ids) for word, ids in by_word.items()}
 
 
 def pick(options: tuple[str, ...], rng: Rng) -> str:

@@ -18,7 +18,6 @@ import os
 import struct
 import tempfile
 import zlib
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -28,8 +27,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.core.cache import ByteCache, Sized
 from generator.core.serial import canonical_json
 
+S = TypeVar("S", bound=Sized)
 T = TypeVar("T")
 Arrays = dict[str, NDArray[Any]]
 
@@ -82,6 +83,14 @@ class DiskCache:
             _replace(self.folder / name, lambda file: file.write(canonical_json(value).encode()))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Held:
+    """A result and the size of the arrays that it is made of."""
+
+    value: Any
+    nbytes: int
+
+
 class Store:
     """Results by content key, in memory before disk before computing them.
 
@@ -90,43 +99,37 @@ class Store:
 
     def __init__(self, disk: DiskCache, max_bytes: int = _MEMORY_BYTES) -> None:
         self._disk = disk
-        self._max_bytes = max_bytes
-        self._bytes = 0
-        self._results: OrderedDict[str, tuple[Any, int]] = OrderedDict()
+        self._memory: ByteCache[_Held] = ByteCache(max_bytes)
 
-    def get(
-        self,
-        key: str,
-        compute: Callable[[], Arrays],
-        view: Callable[[Arrays], T],
-        *,
-        stored: bool = True,
-    ) -> T:
+    def get(self, key: str, compute: Callable[[], Arrays], view: Callable[[Arrays], T]) -> T:
         """The result under a key of its own.
 
         Args:
             key: Content key of everything that the result depends on.
             compute: Makes its arrays when they are nowhere.
             view: Makes the result of its arrays.
-            stored: Whether the disk keeps it, too.
         """
-        if key not in self._results:
-            arrays = self._disk.arrays(key, compute) if stored else compute()
-            self._keep(key, view(arrays), sum(array.nbytes for array in arrays.values()))
-        self._results.move_to_end(key)
-        result: T = self._results[key][0]
-        return result
+
+        def read() -> _Held:
+            arrays = self._disk.arrays(key, compute)
+            return _Held(view(arrays), sum(array.nbytes for array in arrays.values()))
+
+        value: T = self._memory.get(key, read).value
+        return value
+
+    def computed(self, key: str, compute: Callable[[], S]) -> S:
+        """The result under a key of its own, kept in memory only."""
+
+        def make() -> _Held:
+            value = compute()
+            return _Held(value, value.nbytes)
+
+        value: S = self._memory.get(key, make).value
+        return value
 
     def __len__(self) -> int:
         """How many results are in memory."""
-        return len(self._results)
-
-    def _keep(self, key: str, result: object, size: int) -> None:
-        self._results[key] = (result, size)
-        self._bytes += size
-        while self._bytes > self._max_bytes and len(self._results) > 1:
-            _, (_, dropped) = self._results.popitem(last=False)
-            self._bytes -= dropped
+        return len(self._memory)
 
 
 def _load(path: Path, key: str) -> Arrays | None:

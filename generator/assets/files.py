@@ -60,6 +60,8 @@ class Files:
         self._listed: dict[str, Listed] | None = None
         self._urdfs: dict[str, Urdf] = {}
         self._stages: dict[str, StageModel] = {}
+        self._hashed: dict[str, dict[str, str]] = {}
+        self._keys: dict[str, str] = {}
 
     def names(self) -> Iterator[str]:
         """Every id."""
@@ -242,21 +244,27 @@ class Files:
 
     def _key(self, one: Listed) -> str:
         """Hash of the files and of everything that the import does with them."""
-        return content_key(
-            {
-                "format": FORMAT,
-                "version": VERSION,
-                "id": one.asset_id,
-                "entry": one.entry.model_dump(exclude={"licence", "author", "source"}),
-                "files": self._files(one),
-            }
-        )
+        if one.asset_id not in self._keys:
+            self._keys[one.asset_id] = content_key(
+                {
+                    "format": FORMAT,
+                    "version": VERSION,
+                    "id": one.asset_id,
+                    "entry": one.entry.model_dump(exclude={"licence", "author", "source"}),
+                    "files": self._files(one),
+                }
+            )
+        return self._keys[one.asset_id]
 
     def _files(self, one: Listed) -> dict[str, str]:
-        folder = Folder(one.root)
-        files = self._digests.of(folder, one.entry.file)
-        collision = one.entry.collision if isinstance(one.entry, MeshEntry) else ""
-        return {**files, **self._digests.of(folder, collision)} if collision else files
+        """Digests of an asset's files as they were when it was first asked for."""
+        if one.asset_id not in self._hashed:
+            folder = Folder(one.root)
+            files = self._digests.of(folder, one.entry.file)
+            collision = one.entry.collision if isinstance(one.entry, MeshEntry) else ""
+            more = self._digests.of(folder, collision) if collision else {}
+            self._hashed[one.asset_id] = {**files, **more}
+        return self._hashed[one.asset_id]
 
     def _check_unchanged(self, one: Listed, folder: Folder) -> None:
         """What was parsed is what was hashed."""

@@ -17,6 +17,7 @@ from generator.assets.procedural.family import (
     Family,
     TextureFamily,
 )
+from generator.core.cache import Sized
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import Asset, Float32, TextureData
 
@@ -33,7 +34,7 @@ TABLES = (
     "generator.assets.skies",
 )
 """Packages with tables ``FAMILIES``, ``TEXTURES`` or ``ENVIRONMENTS``."""
-T = TypeVar("T")
+S = TypeVar("S", bound=Sized)
 
 
 class Generated:
@@ -93,11 +94,11 @@ class Generated:
         if not isinstance(family, Family):
             raise AssetError(f"asset '{asset_id}': is no object but one of kind {_kind(family)}")
 
-        def compute() -> Arrays:
+        def compute() -> Imported:
             solid = family.build(**_arguments(asset_id, family))
-            return pack(Imported(solid.mesh, solid.collision, {}, solid.keypoints))
+            return Imported(solid.mesh, solid.collision, {}, solid.keypoints)
 
-        return self._result(asset_id, family, compute, unpack)
+        return self._result(asset_id, family, compute, pack, unpack)
 
     def texture(self, asset_id: AssetId) -> TextureData:
         """Images of a texture."""
@@ -107,7 +108,8 @@ class Generated:
         return self._result(
             asset_id,
             family,
-            lambda: pack_texture(family.build(**_arguments(asset_id, family))),
+            lambda: family.build(**_arguments(asset_id, family)),
+            pack_texture,
             unpack_texture,
         )
 
@@ -121,7 +123,8 @@ class Generated:
         return self._result(
             asset_id,
             family,
-            lambda: {"radiance": family.build(**_arguments(asset_id, family))},
+            lambda: family.build(**_arguments(asset_id, family)),
+            lambda radiance: {"radiance": radiance},
             lambda arrays: arrays["radiance"],
         )
 
@@ -129,14 +132,17 @@ class Generated:
         self,
         asset_id: AssetId,
         family: AnyFamily,
-        compute: Callable[[], Arrays],
-        view: Callable[[Arrays], T],
-    ) -> T:
+        compute: Callable[[], S],
+        packed: Callable[[S], Arrays],
+        unpacked: Callable[[Arrays], S],
+    ) -> S:
         key = self._key(asset_id, family)
         offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
         stored = offered or isinstance(family, TextureFamily) or family.stored
         try:
-            return self._store.get(key, compute, view, stored=stored)
+            if not stored:
+                return self._store.computed(key, compute)
+            return self._store.get(key, lambda: packed(compute()), unpacked)
         except ValueError as error:
             raise AssetError(f"asset '{asset_id}': cannot be made: {error}") from error
 

@@ -55,6 +55,14 @@ class Imported:
     images: Mapping[str, UInt8]
     keypoints: tuple[Keypoint, ...] = ()
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes held by its arrays."""
+        held = sum(image.nbytes for image in self.images.values())
+        if self.collision is not None:
+            held += sum(part.nbytes for part in self.collision.parts_m)
+        return held if self.mesh is None else held + self.mesh.nbytes
+
 
 def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = "") -> Imported:
     """An object from its mesh or URDF file. Raises AssetError if it is unfit.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -88,6 +88,12 @@ class MeshData:
     face_slots: Int32
     materials: tuple[Material, ...]
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes held by its arrays."""
+        arrays = (self.vertices_m, self.faces, self.normals, self.uvs, self.face_slots)
+        return sum(array.nbytes for array in arrays)
+
     def bounds_m(self) -> tuple[Vec3, Vec3]:
         """Smallest and largest coordinates."""
         # Column by column: reducing [n, 3] over its rows takes five times as long.
@@ -120,6 +126,12 @@ class TextureData:
     occlusion: UInt8 | None = None
     emission: UInt8 | None = None
     alpha: UInt8 | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held by its images."""
+        images = (getattr(self, image.name) for image in fields(self))
+        return sum(image.nbytes for image in images if image is not None)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -7,15 +7,22 @@ floats above its support.
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from generator.core.geometry import ConvexParts
 from generator.core.se3 import SE3, Array, Vec3
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 SHELL_M = 0.001
 """Bullet's own thickness for hulls; parts of a compound cannot have another."""
@@ -113,17 +120,15 @@ def scale_step(scale: float) -> int:
 
 def collision_shape(parts: ConvexParts) -> CollisionShape:
     """The shape of an asset's convex parts."""
-    measured = [_measured(part) for part in parts.parts_m]
-    volumes_m3 = np.array([volume for _, volume, _ in measured])
-    middles = np.stack([middle for _, _, middle in measured])
+    measured = _measured(parts.parts_m)
+    volumes_m3 = np.array([part.volume_m3 for part in measured])
+    middles = np.stack([part.center_m for part in measured])
     # Parts that are all flat have no volume; then every part weighs the same.
     weights = volumes_m3 if volumes_m3.sum() > 0.0 else np.ones(len(measured))
     center = (weights[:, None] * middles).sum(axis=0) / weights.sum()
     x, y, z = (round(float(v), 9) for v in center)
     offset = np.array([x, y, z])
-    hulls = tuple(
-        Hull(hull.vertices_m - offset, hull.retreats, hull.width_m) for hull, _, _ in measured
-    )
+    hulls = tuple(Hull(part.vertices_m - offset, part.retreats, part.width_m) for part in measured)
     boxes = [_as_box(hull.vertices_m) for hull in hulls]
     exact = tuple(box for box in boxes if box is not None)
     return CollisionShape(
@@ -131,45 +136,100 @@ def collision_shape(parts: ConvexParts) -> CollisionShape:
     )
 
 
-def _measured(points: Array) -> tuple[Hull, float, Array]:
-    """The hull of some points, its volume [m^3] and its centre of mass [m]."""
+@dataclass(frozen=True, eq=False, slots=True)
+class _Part:
+    """One convex part as it was given, measured.
+
+    Attributes:
+        vertices_m, retreats, width_m: As a Hull's, in the asset's frame.
+        center_m: Of mass, [3].
+    """
+
+    vertices_m: Array
+    retreats: Array
+    width_m: float
+    volume_m3: float
+    center_m: Array
+
+
+def _measured(parts_m: Sequence[Array]) -> list[_Part]:
+    """Hulls of parts: all faces of all parts at once, for numpy's overhead is most of the work."""
     from scipy.spatial import ConvexHull, QhullError
 
-    middle = points.mean(axis=0)
-    try:
-        hull = ConvexHull(points - middle)
-    except QhullError:  # flat: nothing to shrink and no weight
-        return Hull(points, np.zeros_like(points), 0.0), 0.0, middle
-    kept = np.sort(hull.vertices)
-    triangles = hull.points[hull.simplices]
-    normals = hull.equations[:, :3]
-    volumes = np.abs(_dot(triangles[:, 0], _cross(triangles[:, 1], triangles[:, 2]))) / 6.0
-    volume_m3 = float(volumes.sum())
-    moment = (volumes[:, None] * triangles.sum(axis=1) / 4.0).sum(axis=0)
-    depths = np.einsum("fk,nk->fn", normals, hull.points[kept], optimize=False)
-    width_m = float((depths.max(axis=1) - depths.min(axis=1)).min())
-    meets = (hull.simplices[None, :, :] == kept[:, None, None]).any(axis=2)
-    retreats = _retreats(normals, meets.astype(np.float64))
-    return Hull(points[kept], retreats, width_m), volume_m3, middle + moment / volume_m3
+    middles = [points.mean(axis=0) for points in parts_m]
+    hulls: dict[int, ConvexHull] = {}
+    for k, part in enumerate(parts_m):
+        # Flat parts have nothing to shrink and no weight.
+        with contextlib.suppress(QhullError):
+            hulls[k] = ConvexHull(part - middles[k])
+    measured = [
+        _Part(p, np.zeros_like(p), 0.0, 0.0, m) for p, m in zip(parts_m, middles, strict=True)
+    ]
+    if not hulls:
+        return measured
+    solid = list(hulls.values())
+    first = np.cumsum([0, *(len(hull.points) for hull in solid)])
+    points = np.concatenate([hull.points for hull in solid])
+    faces = np.concatenate([hull.simplices + n for hull, n in zip(solid, first[:-1], strict=True)])
+    normals = np.concatenate([hull.equations[:, :3] for hull in solid])
+    retreats = _retreats(normals, faces, len(points))
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    volumes_m3 = np.abs(_dot(a, _cross(b, c))) / 6.0
+    moments = volumes_m3[:, None] * (a + b + c) / 4.0
+    starts = np.cumsum([0, *(len(hull.simplices) for hull in solid[:-1])])
+    volumes_m3 = np.add.reduceat(volumes_m3, starts)
+    moments = np.add.reduceat(moments, starts)
+    for n, (k, hull) in enumerate(hulls.items()):
+        kept = np.sort(hull.vertices)
+        measured[k] = _Part(
+            parts_m[k][kept],
+            retreats[first[n] + kept],
+            _width_m(hull),
+            float(volumes_m3[n]),
+            middles[k] + moments[n] / volumes_m3[n],
+        )
+    return measured
 
 
-def _retreats(normals: Array, meets: Array) -> Array:
+def _width_m(hull: ConvexHull) -> float:
+    """Smallest distance between a face and the vertex farthest behind it."""
+    depths = np.einsum("kf,kn->fn", hull.equations[:, :3].T, hull.points.T, optimize=False)
+    return float((depths.max(axis=1) - depths.min(axis=1)).min())
+
+
+def _retreats(normals: Array, faces: NDArray[Any], points: int) -> Array:
     """Where vertices go when their faces move inward by one: ``n . x = -1``, by least squares.
 
     A trace of damping picks the shortest answer where all faces of a vertex lie in one plane.
 
     Args:
         normals: Of the faces, shape [f, 3].
-        meets: 1 where a vertex belongs to a face, else 0, shape [v, f].
+        faces: Their corners, shape [f, 3].
+        points: Number of points, those on no face included.
+
+    Returns:
+        Shape [points, 3].
     """
-    squares = np.einsum("fi,fj->fij", normals, normals, optimize=False)
-    a = np.einsum("vf,fij->vij", meets, squares, optimize=False) + 1e-9 * np.eye(3)
-    b = np.einsum("vf,fi->vi", meets, normals, optimize=False)
-    rows = (_cross(a[:, 1], a[:, 2]), _cross(a[:, 2], a[:, 0]), _cross(a[:, 0], a[:, 1]))
-    cofactors = np.stack(rows, axis=1)
-    x: Array = -_dot(cofactors, b[:, None, :]) / _dot(a[:, 0], cofactors[:, 0])[:, None]
+    corners = faces.T.reshape(-1)
+    nx, ny, nz = normals.T
+    terms = (nx * nx, nx * ny, nx * nz, ny * ny, ny * nz, nz * nz, nx, ny, nz)
+    sums = [np.bincount(corners, np.tile(term, 3), points).astype(np.float64) for term in terms]
+    xx, xy, xz, yy, yz, zz, *b = sums
+    xx, yy, zz = xx + 1e-9, yy + 1e-9, zz + 1e-9
+    # Cofactors of the symmetric matrix.
+    c_xx, c_xy, c_xz = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    c_yy, c_yz, c_zz = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    scale = -1.0 / (xx * c_xx + xy * c_xy + xz * c_xz)
+    x = np.stack(
+        [
+            (c_xx * b[0] + c_xy * b[1] + c_xz * b[2]) * scale,
+            (c_xy * b[0] + c_yy * b[1] + c_yz * b[2]) * scale,
+            (c_xz * b[0] + c_yz * b[1] + c_zz * b[2]) * scale,
+        ],
+        axis=1,
+    )
     lengths = np.sqrt(_dot(x, x))[:, None]
-    return x * np.minimum(1.0, _RETREAT_MAX / lengths)
+    return x * np.minimum(1.0, _RETREAT_MAX / np.maximum(lengths, 1e-12))
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -186,9 +246,11 @@ def _cross(a: Array, b: Array) -> Array:
 
 def _as_box(points: Array) -> tuple[Vec3, Vec3] | None:
     """Centre and half extents of a hull whose vertices are the corners of an upright box."""
+    if len(points) != 8:
+        return None
     low, high = points.min(axis=0), points.max(axis=0)
     center, half = 0.5 * (low + high), 0.5 * (high - low)
-    if len(points) != 8 or (np.abs(np.abs(points - center) - half) > 1e-6 * half.max()).any():
+    if (np.abs(np.abs(points - center) - half) > 1e-6 * half.max()).any():
         return None
     (cx, cy, cz), (hx, hy, hz) = center.tolist(), half.tolist()
     return (cx, cy, cz), (hx, hy, hz)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from generator.core.capture import Channel
 from generator.core.geometry import Float32
 from generator.core.scene import Camera
-from generator.core.se3 import Array
 from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
 from generator.renderers.kernels import antialias, gather, optics, raster, records, shade, tone
 from generator.renderers.kernels import samples as mixing
@@ -146,14 +145,14 @@ def mix_edges(
     wp.launch(find_edges, view.height, [view, images], [count, pixels], device=device)
     edges = pixels[: int(count.numpy()[0])]
     mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=device)
-    parts = pixel_parts(samples)
     frame = [view, world.record, images, radiance, edges]
     if seen.projected is not None:
-        drawn = _drawn_samples(world, view, seen, seen.projected, edges, parts, stock)
+        drawn = _drawn_samples(world, view, seen, seen.projected, edges, samples, stock)
         inputs = [*frame, drawn, exposure]
         wp.launch(mixing.mix_samples, len(edges), inputs, [mixed], device=device)
     else:
-        inputs = [*frame, wp.array(parts, dtype=wp.vec2, device=device), exposure, Z_NEAR_M]
+        parts = stock.constant(wp.vec2, pixel_parts, samples)
+        inputs = [*frame, parts, exposure, Z_NEAR_M]
         wp.launch(antialias.antialias, len(edges), inputs, [mixed], device=device)
     wp.launch(tone.put_mixed, len(edges), [edges, mixed], [radiance], device=device)
 
@@ -171,7 +170,7 @@ def _drawn_samples(
     seen: Seen,
     projected: Projected,
     pixels: wp.array,
-    parts: Array,
+    samples: int,
     stock: AssetStock,
 ) -> wp.array:
     """What the parts of listed pixels see: (body, face), shape [pixels, parts]; (-1, -1)."""
@@ -181,10 +180,10 @@ def _drawn_samples(
     floors.fill_(mixing.UNLISTED)
     inputs = [view, images_of(seen), pixels]
     wp.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors], device=device)
-    shape = (max(len(pixels), 1), len(parts))
+    shape = (max(len(pixels), 1), samples)
     nearness = wp.zeros(shape, dtype=float, device=device)
     hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=device)
-    offsets = wp.array((parts * 256.0 - 128.0).astype(np.int32), dtype=wp.vec2i, device=device)
+    offsets = stock.constant(wp.vec2i, _offsets, samples)
     window = raster.Window()
     window.width, window.height = view.width, view.height
     pierced = has_holes(world.placed)[projected.in_view]
@@ -194,8 +193,14 @@ def _drawn_samples(
     wp.launch(mixing.draw_samples, len(bodies), inputs, [nearness, hits], device=device)
     if pierced.any():
         listed = projected.in_view[pierced]
+        parts = pixel_parts(samples)
         trace_over_samples(world, view, listed, pixels, parts, nearness, hits)
     return hits
+
+
+def _offsets(samples: int) -> NDArray[np.int32]:
+    """Of a pixel's parts from its centre, in steps of 1/256 pixel, shape [samples, 2]."""
+    return (pixel_parts(samples) * 256.0 - 128.0).astype(np.int32)
 
 
 def images_of(seen: Seen) -> shade.Images:
@@ -240,8 +245,8 @@ def _shaded(
     lit = stock.scratch("listed lit", (around.lit.shape[0], room), float)
     open_sky = stock.scratch("listed sky", (1, room), float)
     exposed = stock.scratch("listed exposed", room, float)
-    parts = wp.array(lamp_parts(4, settings), dtype=wp.vec2, device=device)
-    disc = wp.array(sunflower(4), dtype=wp.vec2, device=device)
+    parts = stock.constant(wp.vec2, lamp_parts, 4, settings.shadows)
+    disc = stock.constant(wp.vec2, sunflower, 4)
     radius_m = settings.ambient_occlusion_radius_m
     inputs = [*frame, lattice, around.lit, around.open_sky, parts, disc, radius_m, pixels]
     wp.launch(shade.look_around, listed, inputs, [lit, open_sky, exposed], device=device)

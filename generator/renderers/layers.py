@@ -54,8 +54,8 @@ def shade_layers(
 
     device = stock.device
     probe = layers.Probe()
-    probe.parts = wp.array(lamp_parts(4, settings), dtype=wp.vec2, device=device)
-    probe.disc = wp.array(sunflower(4), dtype=wp.vec2, device=device)
+    probe.parts = stock.constant(wp.vec2, lamp_parts, 4, settings.shadows)
+    probe.disc = stock.constant(wp.vec2, sunflower, 4)
     probe.radius_m = settings.ambient_occlusion_radius_m
     probe.lit = stock.scratch("lit where rays end", listed.lit.shape, float)
     frame = [view, world.record, images]
@@ -70,7 +70,7 @@ def shade_layers(
     found = int(count.numpy()[0])
     pixels = stock.scratch("contrast pixels", view.width * view.height, wp.int32)
     mixed = stock.scratch("contrast colours", view.width * view.height, wp.vec3)
-    offsets = wp.array(pixel_parts(_PARTS), dtype=wp.vec2, device=device)
+    offsets = stock.constant(wp.vec2, pixel_parts, _PARTS)
     inputs = [*frame, places, *seen, offsets]
     wp.launch(layers.shade_contrasts, found, inputs, [pixels, mixed], device=device)
     wp.launch(tone.put_mixed, found, [pixels, mixed], [radiance], device=device)

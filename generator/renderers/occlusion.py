@@ -76,7 +76,7 @@ def openness(
     inputs = [world.record, lattice, columns, radius_m, shares, lists]
     wp.launch(shafts.list_occluders, tiles, inputs, device=stock.device)
     return Openness(
-        _lit(world, view, lattice, lists, shares, lamp_parts(48, settings), stock),
+        _lit(world, view, lattice, lists, shares, settings, stock),
         _open_sky(world, view, lattice, lists, columns, radius_m, stock),
     )
 
@@ -88,9 +88,9 @@ def sunflower(n: int) -> Array:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def lamp_parts(n: int, settings: RenderSettings) -> Array:
+def lamp_parts(n: int, shadows: str) -> Array:
     """Points of a lamp's disc that shadows look at, shape [n, 2]; all at its centre if hard."""
-    return sunflower(n) * (1.0 if settings.shadows == "soft" else 0.0)
+    return sunflower(n) * (1.0 if shadows == "soft" else 0.0)
 
 
 def pixel_parts(n: int) -> Array:
@@ -112,7 +112,7 @@ def _lit(
     lattice: lattice_kernels.Lattice,
     lists: wp.array,
     shares: wp.array,
-    parts: Array,
+    settings: RenderSettings,
     stock: AssetStock,
 ) -> wp.array:
     device = stock.device
@@ -121,7 +121,7 @@ def _lit(
     lit = stock.scratch("lit", (max(lamps, 1), n), float)
     if lamps == 0:
         return lit
-    disc = wp.array(parts, dtype=wp.vec2, device=device)
+    disc = stock.constant(wp.vec2, lamp_parts, 48, settings.shadows)
     columns = -(-lattice.width // _TILE)
     inputs = [world.record, lattice, columns, lists, disc, shares]
     for parity in (0, 1):
@@ -147,7 +147,7 @@ def _open_sky(
     if radius_m == 0.0:
         open_sky.fill_(1.0)
         return open_sky
-    hemisphere = wp.array(cosine_hemisphere(16), dtype=wp.vec3, device=stock.device)
+    hemisphere = stock.constant(wp.vec3, cosine_hemisphere, 16)
     inputs = [world.record, lattice, columns, lists, hemisphere, radius_m]
     wp.launch(occlusion.probe_ambient, n, inputs, [probed], device=stock.device)
     _smooth(view, lattice, probed, open_sky, stock)

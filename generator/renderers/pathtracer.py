@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import cv2
 import warp as wp
 
+from generator.core.cache import ByteCache
 from generator.core.scene import Camera, Scene
 from generator.core.streams import Streams
-from generator.renderers.cache import ByteCache
 from generator.renderers.color import darken_outside, images_of
 from generator.renderers.denoising import denoised, require_denoiser
 from generator.renderers.environments import irradiance_coefficients

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +10,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from generator.core.cache import ByteCache, ObjectCache
 from generator.core.geometry import Material
 from generator.core.interfaces import AssetLibrary
 from generator.core.intrinsics import Intrinsics
-from generator.renderers.cache import ByteCache, ObjectCache
 from generator.renderers.environments import DeviceEnvironment, upload_environment, upload_split
 from generator.renderers.lobes import lobe_albedo
 from generator.renderers.meshes import DeviceMesh, upload_mesh
@@ -54,6 +55,7 @@ class AssetStock:
         self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)
         self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES)
         self._scratch: ByteCache[_Scratch] = ByteCache(_SCRATCH_BYTES)
+        self._constants: dict[tuple[object, ...], wp.array] = {}
 
     def mesh(self, asset_id: str) -> DeviceMesh:
         """Geometry of an asset."""
@@ -89,6 +91,15 @@ class AssetStock:
     def optics(self, intrinsics: Intrinsics) -> DeviceOptics:
         """Directions through the pixels of a camera that is no pinhole."""
         return self._optics.get(repr(intrinsics), lambda: upload_optics(intrinsics, self.device))
+
+    def constant(
+        self, dtype: Any, make: Callable[..., NDArray[Any]], *arguments: object
+    ) -> wp.array:
+        """An array that a function of nothing else makes, kept for good."""
+        key = (make.__name__, *arguments)
+        if key not in self._constants:
+            self._constants[key] = wp.array(make(*arguments), dtype=dtype, device=self.device)
+        return self._constants[key]
 
     def scratch(self, name: str, shape: int | tuple[int, ...], dtype: Any) -> wp.array:
         """An array with left-over contents: touching fresh memory costs as much as filling it.

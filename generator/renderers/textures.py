@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import cv2
@@ -116,16 +117,20 @@ def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint
     the eye as sRGB does and are quick to undo. Roughness is the fourth channel: its square, the
     width of a highlight, is what coarser levels average.
     """
-    linear_of = srgb_to_linear(np.arange(256) / 255.0)
-    root_of = np.floor(np.sqrt(linear_of) * 255.0 + 0.5).astype(np.uint8)
-    finest = _with_fourth(cv2.LUT(albedo, root_of), roughness)
+    finest = _with_fourth(cv2.LUT(albedo, _root_of()), roughness)
     levels = [finest]
     if max(finest.shape[:2]) > 1:
-        squared = finest.astype(np.uint16)
-        squared *= squared
+        squared = cv2.multiply(finest, finest, dtype=cv2.CV_16U).reshape(finest.shape)
         image = halved(squared).astype(np.float32) * np.float32(255.0**-2)
         levels += [_in_bytes(cv2.sqrt(level)) for level in _halvings(image)]
     return [level.shape[0] * level.shape[1] for level in levels], _packed(levels)
+
+
+@cache
+def _root_of() -> UInt8:
+    """Square roots of linear values by sRGB values."""
+    linear_of = srgb_to_linear(np.arange(256) / 255.0)
+    return np.floor(np.sqrt(linear_of) * 255.0 + 0.5).astype(np.uint8)
 
 
 def _means(finest: Pixels) -> NDArray[np.uint32]:

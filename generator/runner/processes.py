@@ -11,6 +11,7 @@ import os
 import pickle
 import signal
 import time
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -49,7 +50,8 @@ class Crew:
     """The worker processes of one run. A context manager: leaves no process behind."""
 
     def __init__(self, job: Job) -> None:
-        self._payload = pickle.dumps(job)
+        # Compressed it fits into a pipe: a spawn need not wait for the process to read it.
+        self._payload = zlib.compress(pickle.dumps(job))
         self._logs = job.store.run_dir
         self._context = multiprocessing.get_context("spawn")
         self._children: dict[int, _Child] = {}

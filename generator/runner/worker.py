@@ -16,6 +16,7 @@ import resource
 import signal
 import sys
 import traceback
+import zlib
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -35,14 +36,14 @@ PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 def worker_main(
     number: int, connection: Connection, parent_pid: int, payload: bytes, log: Path
 ) -> None:
-    """Entry of the process. ``payload`` is a pickled Job; None on the connection ends it."""
+    """Entry of the process. ``payload`` is a Job, pickled and compressed; None ends the process."""
     _die_with(parent_pid)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     _redirect_output(log)
     try:
-        _work(number, connection, pickle.loads(payload))
+        _work(number, connection, pickle.loads(zlib.decompress(payload)))
     except (EOFError, BrokenPipeError):
         # The supervisor is gone, and with it whoever would read a report.
         sys.exit(1)

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from generator.core.cache import ObjectCache
 from generator.core.capture import Channel
 from generator.core.geometry import Material, TextureData
 from generator.core.scene import Body, Light, Scene, Weather
 from generator.core.se3 import SE3
-from generator.renderers.cache import ObjectCache
 from generator.renderers.device import open_device
 from generator.renderers.packing import pack_world
 from generator.renderers.stock import AssetStock

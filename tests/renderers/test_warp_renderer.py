@@ -10,13 +10,13 @@ import numpy as np
 import psutil
 import pytest
 
+from generator.core.cache import ByteCache
 from generator.core.capture import Channel, Reading
 from generator.core.errors import ConfigError
 from generator.core.geometry import Material
 from generator.core.scene import Body, Camera, Light, Scene
 from generator.core.se3 import SE3
 from generator.renderers import TABLE
-from generator.renderers.cache import ByteCache
 from generator.renderers.meshes import is_convex_solid
 from generator.renderers.settings import RenderSettings
 from generator.renderers.warp import WarpRenderer

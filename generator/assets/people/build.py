@@ -60,17 +60,47 @@ class _Sheet:
     materials: tuple[Material, ...]
 
 
-def built(person: Person, body: Body) -> Solid:
-    """The mesh of a person; the origin is on the ground between the feet, +X is ahead."""
+@dataclass(frozen=True, eq=False, slots=True)
+class Figure:
+    """A person shaped and dressed, before any pose: what all their poses share.
+
+    Attributes:
+        body: The template.
+        points_m: The template's points in the person's shape, [n, 3].
+        scale: From the template's size to the person's.
+        layers: Skin, garments and hair: the points of the body that each hangs on, its places,
+            faces, index of the material of each face, and materials.
+    """
+
+    body: Body
+    points_m: Array
+    scale: float
+    layers: tuple[tuple[Indices, Array, Indices, Indices, tuple[Material, ...]], ...]
+
+
+def dressed(person: Person, body: Body) -> Figure:
+    """A person's figure, whatever their pose."""
     points = body.shaped(person.figure)
     scale = person.height_m / float(
         points[body.landmark("crown"), 2] - points[body.landmark("sole"), 2]
     )
     points *= scale
+    rng = rng_of("person/folds", person.seed)
+    made = []
+    for layer in layers(person):
+        phases = 2.0 * math.pi * np.array([rng.random() for _ in range(_PHASES)])
+        materials = tuple(material for _, material in layer.zones)
+        made.append((*displaced(body, layer, points, phases), materials))
+    return Figure(body, points, scale, tuple(made))
+
+
+def built(person: Person, figure: Figure) -> Solid:
+    """The mesh of a person; the origin is on the ground between the feet, +X is ahead."""
+    body, points, scale = figure.body, figure.points_m, figure.scale
     bones = len(body.bones)
     rotations = rotations_of(body, points[:bones], _stance(person))
     transforms = bone_transforms(body, points[:bones], rotations)
-    sheets = _sheets(person, body, points, transforms)
+    sheets = _sheets(figure, transforms)
     marks = slice(0, bones + len(LANDMARKS))
     posed = skinned(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
     sheets += [
@@ -93,14 +123,10 @@ def _stance(person: Person) -> Stance:
     return shortened(made, _NARROW_STRIDE) if narrow and person.pose != "sit" else made
 
 
-def _sheets(person: Person, body: Body, points: Array, transforms: Array) -> list[_Sheet]:
-    rng = rng_of("person/folds", person.seed)
-    made = []
-    for layer in layers(person):
-        phases = 2.0 * math.pi * np.array([rng.random() for _ in range(_PHASES)])
-        used, places, faces, slots = displaced(body, layer, points, phases)
+def _sheets(figure: Figure, transforms: Array) -> list[_Sheet]:
+    body, made = figure.body, []
+    for used, places, faces, slots, materials in figure.layers:
         moved = skinned(places, body.weight_bones[used], body.weights[used], transforms)
-        materials = tuple(material for _, material in layer.zones)
         made.append(_Sheet(moved, vertex_normals(moved, faces), faces, slots, materials))
     return made
 

@@ -41,6 +41,10 @@ class ByteCache(Generic[S]):
             self._held_bytes -= dropped.nbytes
         return value
 
+    def __len__(self) -> int:
+        """How many values are held."""
+        return len(self._values)
+
 
 class ObjectCache(Generic[V]):
     """Values made of objects that never change, for the latest of these objects.
