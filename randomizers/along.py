@@ -143,12 +143,14 @@ class Along(RandomizerBase):
                 used = self.used.draw(rng)
                 if at_m + length_m > line.length_m:
                     break
-                place = line.pose(at_m + 0.5 * length_m, left_m)
-                pose = standing_on_lane(place, line.lane, bounds_m, group.facing, turn).rounded()
-                footprint = Footprint.of(pose, bounds_m)
-                if used and ground.is_free(footprint.grown(self.spare_m)):
-                    ground.add(footprint)
-                    yield Place(asset, scale, pose)
+                if used:
+                    place = line.pose(at_m + 0.5 * length_m, left_m)
+                    pose = standing_on_lane(place, line.lane, bounds_m, group.facing, turn)
+                    pose = pose.rounded()
+                    footprint = Footprint.of(pose, bounds_m)
+                    if ground.is_free(footprint.grown(self.spare_m)):
+                        ground.add(footprint)
+                        yield Place(asset, scale, pose)
                 at_m += length_m + self.gap_m.draw(rng)
 
     def _strewn(

@@ -120,7 +120,8 @@ def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint
     finest = _with_fourth(cv2.LUT(albedo, _root_of()), roughness)
     levels = [finest]
     if max(finest.shape[:2]) > 1:
-        squared = cv2.multiply(finest, finest, dtype=cv2.CV_16U).reshape(finest.shape)
+        squared = finest.astype(np.uint16)
+        squared *= squared
         image = halved(squared).astype(np.float32) * np.float32(255.0**-2)
         levels += [_in_bytes(cv2.sqrt(level)) for level in _halvings(image)]
     return [level.shape[0] * level.shape[1] for level in levels], _packed(levels)

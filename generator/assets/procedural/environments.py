@@ -162,15 +162,15 @@ def directions(height_px: int) -> Array:
     return np.stack([x, y, z], axis=2)
 
 
-def normalised(image: Array) -> Float32:
+def normalised(image: Array | Float32) -> Float32:
     """The image scaled to mean luminance 1 by solid angle."""
     image = np.maximum(image, 0.0)
     rows = image.shape[0]
     edges = np.cos(math.pi * np.arange(rows + 1) / rows)
     weight = (edges[:-1] - edges[1:]) / 2.0
     # Channel by channel: reducing over the short last axis takes five times as long.
-    red, green, blue = (image[..., k] * _LUMINANCE[k] for k in range(3))
-    luminance = (red + green + blue).mean(axis=1)
+    red, green, blue = (image[..., k] * float(_LUMINANCE[k]) for k in range(3))
+    luminance = (red + green + blue).mean(axis=1, dtype=np.float64)
     scaled: Float32 = (image / float((luminance * weight).sum())).astype(np.float32)
     return scaled
 

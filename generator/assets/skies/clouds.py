@@ -32,7 +32,7 @@ _OCTAVES = 7
 
 def cloud_layer(
     d: Array, cloudiness: float, sun_altitude_rad: float, seed: int
-) -> tuple[Array, Array]:
+) -> tuple[Float32, Float32]:
     """How much of each direction clouds hide, and how bright they are there.
 
     Args:
@@ -48,17 +48,17 @@ def cloud_layer(
     levels = _layer(cloudiness, sun_altitude_rad, seed)
     up = d[:, 0, 2]
     way_m = _way_to_layer(np.maximum(up, 0.0))
-    seen = np.zeros((*d.shape[:2], 2))
+    seen = np.zeros((*d.shape[:2], 2), np.float32)
     level_of_row = _levels_of(up, len(levels), 2 * d.shape[0])
     for k, level in enumerate(levels):
         near = np.clip(1.0 - np.abs(level_of_row - k), 0.0, 1.0)
         rows = np.flatnonzero((near > 0.0) & (up > 0.0))
         if rows.size:
             flat_m = _HEIGHT_M / (up[rows, None, None] + _HEAPING)
-            place = d[rows, :, :2] * flat_m / _TILE_M
-            seen[rows] += near[rows, None, None] * _sampled(level, place)
-    clear = np.exp(-way_m / _HAZE_M)[:, None]
-    brightness = seen[..., 1] / np.maximum(seen[..., 0], 1e-6)
+            place = d[rows, :, :2] * (flat_m / _TILE_M)
+            seen[rows] += near[rows, None, None].astype(np.float32) * _sampled(level, place)
+    clear = np.exp(-way_m / _HAZE_M)[:, None].astype(np.float32)
+    brightness = seen[..., 1] / np.maximum(seen[..., 0], np.float32(1e-6))
     return seen[..., 0] * clear, brightness
 
 
@@ -124,17 +124,18 @@ def _halvings(layer: Float32) -> list[Float32]:
     return levels
 
 
-def _sampled(layer: Float32, place: Array) -> Array:
+def _sampled(layer: Float32, place: Array) -> Float32:
     """The repeating layer at places in units of its length, bilinear."""
     size = layer.shape[0]
     position = place * size - 0.5
-    first = np.floor(position).astype(np.int64)
-    part = position - first
+    floor = np.floor(position)
+    part = (position - floor).astype(np.float32)
+    first = floor.astype(np.int32)
     (x0, y0), (x1, y1) = (((first[..., 0] + s) % size, (first[..., 1] + s) % size) for s in (0, 1))
     fx, fy = part[..., 0, None], part[..., 1, None]
     cells = layer.reshape(size * size, -1)
     a, b, c, d = (cells.take(y * size + x, axis=0) for y in (y0, y1) for x in (x0, x1))
-    lower = a * (1.0 - fx) + b * fx
-    upper = c * (1.0 - fx) + d * fx
-    mixed: Array = lower * (1.0 - fy) + upper * fy
+    lower = a + (b - a) * fx
+    upper = c + (d - c) * fx
+    mixed: Float32 = lower + (upper - lower) * fy
     return mixed

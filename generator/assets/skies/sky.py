@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from generator.assets.skies.clouds import cloud_layer
 from generator.core.geometry import Float32
 
 Array = NDArray[np.float64]
+Image = TypeVar("Image", NDArray[np.float64], NDArray[np.float32])
 
 MODELS = ("measured", "preetham")
 """Where a sky's luminances come from."""
@@ -129,7 +131,7 @@ def mean_luminance_cd_m2(model: SkyModel) -> float:
     return float((rows * weights).sum())
 
 
-def luminance_cd_m2(model: SkyModel, rows: int) -> Array:
+def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
     """Luminance of sky and land, linear RGB [rows, 2 * rows, 3].
 
     Raises:
@@ -140,11 +142,12 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Array:
     above, below = d[: rows // 2], d[rows // 2 :]
     if model.model == "preetham":
         zenith = daylight.preetham_zenith_cd_m2(model.sun_altitude_rad, model.turbidity)
-        image = zenith * clear_sky(above, model.sun_altitude_rad, model.turbidity, pale=0.0)
+        half = clear_sky(above[:, :rows], model.sun_altitude_rad, model.turbidity, pale=0.0)
+        image = _mirrored(zenith * half)
         return np.concatenate([image, _land(image, below, model)])
     night_lux = daylight.night_illuminance_lux(model.cloudiness)
     day_lux = daylight.sky_illuminance_lux(model.sun_altitude_rad, model.cloudiness) - night_lux
-    image = np.zeros_like(above)
+    image = np.zeros(above.shape, np.float32)
     if day_lux > _NEGLIGIBLE * night_lux:
         image += _scaled(_daylit(above, model), day_lux)
     if night_lux > _NEGLIGIBLE * day_lux:
@@ -167,7 +170,7 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float =
     angle = np.arccos(np.clip(towards, -1.0, 1.0))
 
     # Gradation is the same along a row, and all three formulas ask for the same cosines.
-    rows_up, cosine_squared = up[:, :1], np.cos(angle) ** 2
+    rows_up, cosine_squared = up[:, :1], np.clip(towards, -1.0, 1.0) ** 2
 
     def relative(coefficients: tuple[tuple[float, float], ...]) -> Array:
         c = [factor * turbidity + constant for factor, constant in coefficients]
@@ -203,31 +206,45 @@ def _perez(up: Array, angle: Array, cosine_squared: Array, c: list[float]) -> Ar
     return luminance
 
 
-def _daylit(d: Array, model: SkyModel) -> Array:
+def _mirrored(half: Array) -> Float32:
+    """Both sides of the plane through the sun and the zenith, which differ in clouds only."""
+    return np.concatenate([half, half[:, ::-1]], axis=1).astype(np.float32)
+
+
+def _daylit(d: Array, model: SkyModel) -> Float32:
     """What the sun lights, any unit: clear air, clouds in it, a closed deck."""
     altitude = model.sun_altitude_rad
-    by_day = clear_sky(d, max(altitude, math.radians(1.5)), model.turbidity)
+    half = d[:, : d.shape[1] // 2]
+    by_day = clear_sky(half, max(altitude, math.radians(1.5)), model.turbidity)
     dusk = 1.0 - _ramp(-1.0, 6.0, model.sun_altitude_deg)
     by_day = _scaled(by_day, 1.0)
     if dusk > 0.0:
-        by_day = by_day * (1.0 - dusk) + _scaled(_twilight(d, model), 1.0) * dusk
+        by_day = by_day * (1.0 - dusk) + _scaled(_twilight(half, model), 1.0) * dusk
+    image = _mirrored(by_day)
     if model.cloudiness == 0.0:
-        return by_day
+        return image
     cover, light = cloud_layer(d, model.cloudiness, altitude, model.seed)
     # A white cloud sends back what sun and sky throw on it.
     clear_lux = daylight.sky_illuminance_lux(altitude)
     sun_lux = daylight.sun_illuminance_lux(altitude, model.turbidity) * max(math.sin(altitude), 0.1)
     warm = np.array(daylight.sun_color(max(altitude, 0.01), model.turbidity))
     lit = (0.7 * sun_lux * warm + 1.3 * clear_lux * _DECK) / (math.pi * clear_lux)
-    towards = (d[..., 0] * math.cos(altitude) + d[..., 2] * math.sin(altitude))[..., None]
-    rim = 1.0 + 0.9 * np.exp((towards - 1.0) / 0.03)
-    clouds = light[..., None] * lit * rim
-    broken = by_day + cover[..., None] * (clouds - by_day)
+    towards = half[..., 0] * math.cos(altitude) + half[..., 2] * math.sin(altitude)
+    rim = _mirrored(1.0 + 0.9 * np.exp((towards - 1.0) / 0.03))
+    _lay(image, cover, (light * rim)[..., None] * lit.astype(np.float32))
     closed = _ramp(0.6, 0.95, model.cloudiness)
     if closed == 0.0:
-        return _scaled(broken, 1.0)
-    deck = overcast_sky(d) * (0.72 + 0.5 * np.where(cover > 0.0, light, 0.5))[..., None]
-    return _scaled(broken, 1.0) * (1.0 - closed) + _scaled(deck, 1.0) * closed
+        return _scaled(image, 1.0)
+    shade = np.float32(0.72) + np.float32(0.5) * np.where(cover > 0.0, light, np.float32(0.5))
+    deck: Float32 = overcast_sky(d[:, :1]).astype(np.float32) * shade[..., None]
+    return _scaled(image, 1.0 - closed) + _scaled(deck, closed)
+
+
+def _lay(image: Float32, cover: Float32, clouds: Float32) -> None:
+    """Lay clouds over a sky, in place; their image is used up."""
+    clouds -= image
+    clouds *= cover[..., None]
+    image += clouds
 
 
 def _twilight(d: Array, model: SkyModel) -> Array:
@@ -249,44 +266,46 @@ def _twilight(d: Array, model: SkyModel) -> Array:
     return image + glow * band * (1.1 + 2.6 * low * ahead**3)
 
 
-def _night(d: Array, model: SkyModel) -> Array:
+def _night(d: Array, model: SkyModel) -> Float32:
     """Airglow, and a city's lights scattered back: strongest low, or from the clouds' bases."""
-    up = np.maximum(d[..., 2:], 0.0)
-    glow = (0.35 + 0.65 * np.exp(-up / 0.22)) * _CITY
-    clear: Array = 0.22 * _AIRGLOW + glow
-    if model.cloudiness == 0.0:
-        return clear
-    cover, light = cloud_layer(d, model.cloudiness, 1.0, model.seed)
-    clouds = 5.0 * _CITY * (0.4 + 0.6 * light[..., None]) * (0.6 + 0.4 * np.exp(-up / 0.4))
-    mixed: Array = clear + cover[..., None] * (clouds - clear)
-    return mixed
+    up = np.maximum(d[:, :1, 2:], 0.0)
+    clear = 0.22 * _AIRGLOW + (0.35 + 0.65 * np.exp(-up / 0.22)) * _CITY
+    image: Float32 = np.broadcast_to(clear, d.shape).astype(np.float32)
+    if model.cloudiness > 0.0:
+        cover, light = cloud_layer(d, model.cloudiness, 1.0, model.seed)
+        glow = (5.0 * _CITY * (0.6 + 0.4 * np.exp(-up / 0.4))).astype(np.float32)
+        _lay(image, cover, (np.float32(0.4) + np.float32(0.6) * light)[..., None] * glow)
+    return image
 
 
-def _land(image: Array, d: Array, model: SkyModel) -> Array:
+def _land(image: Float32, d: Array, model: SkyModel) -> Float32:
     """What lies below the horizon: land that sun and sky light, hazy where it is far."""
     altitude = model.sun_altitude_rad
     sun = sun_lux(model) * max(math.sin(altitude), 0.0) * np.array(daylight.sun_color(altitude))
-    light = np.einsum("hwc,h->c", image, _cosine_weights(len(image)), optimize=False) + sun
+    light = _level_light(image) + sun
     soil = _SOIL if model.ground_albedo < 0.5 else np.ones(3)
     land = model.ground_albedo / math.pi * light * soil
     land = land + _STREETS_CD_M2 * _ramp(-1.0, -8.0, model.sun_altitude_deg) * _CITY
-    far = np.exp(d[..., 2:] / 0.02)
-    hazy: Array = land + (image[-1:] - land) * far
-    return hazy
+    far = np.exp(d[:, :1, 2:] / 0.02)
+    mixed: Float32 = (land + (image[-1:] - land) * far).astype(np.float32)
+    return mixed
 
 
-def _scaled(image: Array, lux: float) -> Array:
-    """A sky that gives that illuminance on level ground."""
-    light = np.einsum("hwc,h->c", image, _cosine_weights(len(image)), optimize=False)
-    scaled: Array = image * (lux / float((light * _LUMINANCE).sum()))
+def _scaled(image: Image, lux: float) -> Image:
+    """A sky, or its half, that gives that illuminance on level ground."""
+    scaled: Image = image * image.dtype.type(lux / float((_level_light(image) * _LUMINANCE).sum()))
     return scaled
 
 
-def _cosine_weights(rows: int) -> Array:
-    """Solid angle times cosine of the pixels of each row of a hemisphere, zenith first."""
+def _level_light(image: Array | Float32) -> Array:
+    """Illuminance of level ground by a hemisphere, or by two of the half that is given; RGB."""
+    rows = len(image)
     edges = np.cos(0.5 * math.pi * np.arange(rows + 1) / rows)
-    weights: Array = math.pi * (edges[:-1] ** 2 - edges[1:] ** 2) / (4 * rows)
-    return weights
+    # Solid angle times cosine of each row, zenith first.
+    weights = math.pi * (edges[:-1] ** 2 - edges[1:] ** 2)
+    means = image.mean(axis=1, dtype=np.float64)
+    light: Array = (weights[:, None] * means).sum(axis=0)
+    return light
 
 
 def _row_weights(rows: int) -> Array:
