@@ -302,9 +302,10 @@ def _level_light(image: Array | Float32) -> Array:
     rows = len(image)
     edges = np.cos(0.5 * math.pi * np.arange(rows + 1) / rows)
     # Solid angle times cosine of each row, zenith first.
-    weights = math.pi * (edges[:-1] ** 2 - edges[1:] ** 2)
-    means = image.mean(axis=1, dtype=np.float64)
-    light: Array = (weights[:, None] * means).sum(axis=0)
+    weights = math.pi * (edges[:-1] ** 2 - edges[1:] ** 2) / image.shape[1]
+    flat = image.reshape(rows, -1)
+    columns = np.einsum("hk,h->k", flat, weights.astype(image.dtype), optimize=False)
+    light: Array = columns.reshape(-1, 3).sum(axis=0, dtype=np.float64)
     return light
 
 
