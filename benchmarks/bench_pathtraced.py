@@ -18,6 +18,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -49,15 +50,16 @@ def picture_of(name: str) -> Picture:
 def own(picture: Picture) -> Render:
     """This project's tier; images of other names have other noise."""
 
+    @cache
+    def renderer_of(samples: int) -> WarpRenderer:
+        return WarpRenderer(picture.library, "cpu", settings_of(samples))
+
     def render(samples: int, seed: int) -> np.ndarray:
         camera = replace(picture.camera, name=f"camera {seed}")
-        renderer = renderers.setdefault(
-            samples, WarpRenderer(picture.library, "cpu", settings_of(samples))
-        )
+        renderer = renderer_of(samples)
         reading = renderer.render(picture.scene, camera, frozenset({Channel.RADIANCE}))
         return reading.channels[Channel.RADIANCE].astype(np.float64)
 
-    renderers: dict[int, WarpRenderer] = {}
     return render
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from generator.core.geometry import Float32
@@ -10,6 +12,7 @@ _ENTRIES = 32
 _STRATA = 24
 
 
+@cache
 def lobe_albedo() -> Float32:
     """Factors on F0 and F90 by roughness and cosine to the viewer, shape [32, 32, 2].
 
@@ -38,6 +41,7 @@ def lobe_albedo() -> Float32:
     return table
 
 
+@cache
 def smith_albedo() -> Float32:
     """As ``lobe_albedo``, finer and with Smith's height-correlated masking as it is: [64, 64, 2].
 
