@@ -16,7 +16,7 @@ from generator.assemble.spec import load_spec
 def main() -> None:
     """Print the table that the README records."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--n", type=int, default=80, help="frames; sequences have 20")
+    parser.add_argument("--n", type=int, default=400, help="frames; sequences have 20")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--rig", default="kitti_rig", help="name of a configuration")
     arguments = parser.parse_args()

@@ -31,7 +31,7 @@ def spec_of(weather: str) -> Spec:
 def main() -> None:
     """Print the table that the README records."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--n", type=int, default=100)
+    parser.add_argument("--n", type=int, default=500)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--weather", default="", help="one preset instead of all")
     arguments = parser.parse_args()

@@ -121,7 +121,7 @@ def _draw(pybullet: Any, client: int, camera: Any, folder: Path) -> None:
 def main() -> None:
     """Print the table that the README records."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--n", type=int, default=200)
+    parser.add_argument("--n", type=int, default=1500)
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
 

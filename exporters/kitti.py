@@ -49,6 +49,7 @@ from pydantic import Field
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
 from exporters.sensors import laser_scanner, pinhole_camera, scanned
+from exporters.sequences import check_frame_names
 from exporters.upright import BORDER_M, UprightBox, boxed_members, upright_box
 from generator.config.strict import Strict
 from generator.core.boxes import BoxPx
@@ -77,8 +78,6 @@ SITTING = frozenset({"sit", "sitting"})
 """Values of a person's attribute ``pose`` that make it ``Person_sitting``."""
 
 SPLITS = ("train", "val", "test")
-FRAMES_MAX = 1_000_000
-"""Frame names have six digits."""
 
 DONT_CARE = "DontCare"
 
@@ -138,11 +137,7 @@ class Kitti(Strict):
                 f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
                 "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
             )
-        if info.n > FRAMES_MAX:
-            raise ConfigError(
-                f"exporter 'kitti': frame names have six digits, {info.n} samples do not fit; "
-                f"make at most {FRAMES_MAX} samples"
-            )
+        check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write label, calibration and points of each sample, and which split it belongs to.

@@ -37,6 +37,7 @@ from exporters.sensors import pinhole_camera, rgb_cameras
 from exporters.sequences import (
     Frame,
     camera_mount,
+    check_frame_names,
     frame_facts,
     read_sequences,
     write_bytes,
@@ -50,8 +51,6 @@ from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.sample import Sample
 from generator.core.stereo import baseline_m
 
-FRAMES_MAX = 1_000_000
-"""Frame names have six digits."""
 SPLITS = ("train", "val", "test")
 LABELS = {Channel.DISPARITY: "disp_occ_0", Channel.DISPARITY_VISIBLE: "disp_noc_0"}
 """Folders of the left camera's channels."""
@@ -80,11 +79,7 @@ class KittiStereo(Strict):
                 samples.
         """
         self._pair(info)
-        if info.n > FRAMES_MAX:
-            raise ConfigError(
-                f"exporter '{self.type}': frame names have six digits, {info.n} samples do not "
-                f"fit; make at most {FRAMES_MAX} samples"
-            )
+        check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the calibration of each pair, and a line about it.

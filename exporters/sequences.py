@@ -24,6 +24,7 @@ from generator.core.se3 import SE3, Array
 from generator.core.serial import canonical_json
 
 FRAMES_NAME = "frames.jsonl"
+_FRAMES_MAX = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,19 @@ def sequence_of(info: DatasetInfo, index: int) -> int:
 def sequence_count(info: DatasetInfo) -> int:
     """Number of sequences; the last one may be cut short."""
     return -(-info.n // info.steps_per_scene)
+
+
+def check_frame_names(info: DatasetInfo, exporter: str) -> None:
+    """Refuse a data set with more samples than names of six digits.
+
+    Raises:
+        ConfigError: it has.
+    """
+    if info.n > _FRAMES_MAX:
+        raise ConfigError(
+            f"exporter '{exporter}': frame names have six digits, {info.n} samples do not fit; "
+            f"make at most {_FRAMES_MAX} samples"
+        )
 
 
 def check_sequence_count(info: DatasetInfo, limit: int, exporter: str) -> None:

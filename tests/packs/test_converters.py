@@ -160,6 +160,31 @@ def test_a_region_takes_its_triangles_and_no_others(tmp_path: Path) -> None:
     assert [point.name for point in library.keypoints("test/box")] == ["lamp"]
 
 
+@pytest.mark.parametrize(
+    ("finish", "expected"),
+    [
+        ({"base_color": [0.01, 0.01, 0.01]}, ((0.01, 0.01, 0.01), 1.0, 0.0)),
+        ({"base_color": [0.5, 0.6, 0.6], "transmission": 0.9}, ((0.5, 0.6, 0.6), 1.0, 0.9)),
+        ({"roughness": 0.1}, ((0.5, 0.5, 0.5), 0.25, 0.0)),
+    ],
+)
+def test_a_finish_with_a_colour_hides_what_the_files_surface_let_through(
+    finish: dict[str, object], expected: tuple[object, float, float], tmp_path: Path
+) -> None:
+    """A quarter opaque in the file; a finish without a colour keeps it so, or it says otherwise."""
+    folder = tmp_path / "packs" / "test"
+    folder.mkdir(parents=True)
+    (folder / "box.mtl").write_text("newmtl pane\nKd 0.5 0.5 0.5\nd 0.25\n", encoding="utf-8")
+    text = "mtllib box.mtl\nusemtl pane\n" + BOX
+    (folder / "box.obj").write_text(text, encoding="utf-8")
+    entry = {"id": "box", "file": "box.obj", "category": "box", "up": "z",
+             "materials": {"pane": finish}}  # fmt: skip
+    (folder / "index.json").write_text(json.dumps({"assets": [entry]}), encoding="utf-8")
+    library = open_library(cache_dir=tmp_path / "cache", packs=tmp_path / "packs")
+    (material,) = library.mesh("test/box").materials
+    assert (material.base_color, material.opacity, material.transmission) == expected
+
+
 def test_a_package_without_a_selected_model_is_refused(tmp_path: Path) -> None:
     """It is another release of the catalogue."""
     with pytest.raises(AssetError, match="holds no model"):

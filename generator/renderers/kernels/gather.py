@@ -58,18 +58,12 @@ class Quad:
     Attributes:
         face: (body, face) of the first corner.
         normal: Mean of the corners', unit, world frame.
-        normal_camera, height: ``dot(normal_camera, d) * z - height`` is how far the point at
-            depth z along a pixel's direction is from the mean plane [m].
-        tolerance_m: Bound on it.
         to_viewer: Unit, from the middle.
     """
 
     smooth: int
     face: wp.vec2i
     normal: wp.vec3
-    normal_camera: wp.vec3
-    height: float
-    tolerance_m: float
     to_viewer: wp.vec3
 
 
@@ -85,7 +79,7 @@ def quad_at(view: View, world: World, images: Images, lattice: Lattice, q: int):
     quad.face = images.hits[lattice.pixel[q]]
     p = lattice.p_m[q]
     n = lattice.normal[q]
-    quad.tolerance_m = surface_tolerance(view, p)
+    tolerance_m = surface_tolerance(view, p)
     middle = p
     mean = n
     smooth = bool(True)
@@ -97,7 +91,7 @@ def quad_at(view: View, world: World, images: Images, lattice: Lattice, q: int):
                 other = images.hits[lattice.pixel[r]]
                 smooth = other[0] == quad.face[0] and other[1] == quad.face[1]
                 if not smooth:
-                    cosine = agree(p, n, lattice.p_m[r], lattice.normal[r], quad.tolerance_m)
+                    cosine = agree(p, n, lattice.p_m[r], lattice.normal[r], tolerance_m)
                     smooth = cosine > SMOOTH_COSINE
                 middle += lattice.p_m[r]
                 mean += lattice.normal[r]
@@ -105,8 +99,6 @@ def quad_at(view: View, world: World, images: Images, lattice: Lattice, q: int):
         quad.smooth = 1
         middle = middle * 0.25
         quad.normal = unit(mean)
-        quad.normal_camera = wp.transpose(view.R_world_camera) @ quad.normal
-        quad.height = wp.dot(quad.normal, middle - view.eye_m)
         quad.to_viewer = unit(view.eye_m - middle)
     return quad
 
@@ -244,11 +236,14 @@ def gathered_radiance(
 def one_face(view: View, images: Images, face: wp.vec2i, x0: int, x1: int, y0: int, y1: int):
     """Whether all pixels of a rectangle see one face."""
     same = bool(True)
-    for y in range(y0, y1):
-        for x in range(x0, x1):
-            hit = images.hits[y * view.width + x]
-            if hit[0] != face[0] or hit[1] != face[1]:
-                same = False
+    y = int(y0)
+    while y < y1 and same:
+        i = int(y * view.width + x0)
+        while i < y * view.width + x1 and same:
+            hit = images.hits[i]
+            same = hit[0] == face[0] and hit[1] == face[1]
+            i += 1
+        y += 1
     return same
 
 
@@ -319,7 +314,8 @@ def light_patch(
         if covered:
             coat = coats[q] * up + coats[below] * down
             coat_step = (coats[q + 1] * up + coats[below + 1] * down - coat) * right_step
-        for x in range(x0, x1):
+        x = int(x0)
+        while x < x1:
             i = y * view.width + x
             color = albedo
             lit = diffuse
@@ -341,6 +337,7 @@ def light_patch(
             radiance[i] = wp.cw_mul(lit, color) + shine
             diffuse += diffuse_step
             rest += rest_step
+            x += 1
 
 
 @wp.kernel
@@ -386,7 +383,8 @@ def gather_light(
                 )
         if not whole:
             for y in range(y0, y1):
-                for x in range(x0, x1):
+                x = int(x0)
+                while x < x1:
                     i = y * view.width + x
                     d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
                     d_world = view.R_world_camera @ d
@@ -402,3 +400,4 @@ def gather_light(
                         pixels[wp.atomic_add(count, 0, 1)] = i
                     else:
                         radiance[i] = c
+                    x += 1

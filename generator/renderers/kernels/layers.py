@@ -61,7 +61,7 @@ from generator.renderers.kernels.sky import (
     sky_reflection,
     sky_rest,
 )
-from generator.renderers.kernels.surface import facet_of, facing
+from generator.renderers.kernels.surface import facet_of, seen_normal
 from generator.renderers.kernels.texturing import FULL, mixed, sampler_of, taps_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
@@ -209,7 +209,7 @@ def met(world: World, origin: wp.vec3, d: wp.vec3):
         n = normal_at(world, g, corner[0]) * u + normal_at(world, g, corner[1]) * v
         n += normal_at(world, g, corner[2]) * w
         side = wp.where(m.entering != 0, 1.0, -1.0)
-        m.normal = facing(world.bodies[m.hit[0]].R_world_mesh @ n * side, d)
+        m.normal = seen_normal(world.bodies[m.hit[0]].R_world_mesh @ n * side, d)
         m.weight = wp.vec2(v + 1.0 - side, w)
     return m
 
@@ -612,7 +612,7 @@ def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
     point = Point()
     point.way = d_world * (facet.depth * inverse)
     point.weight = wp.vec2(u + 1.0 - side, v)
-    point.normal = facing((facet.n + facet.n_u * u + facet.n_v * v) * side, d_world)
+    point.normal = seen_normal((facet.n + facet.n_u * u + facet.n_v * v) * side, d_world)
     return point
 
 

@@ -233,14 +233,18 @@ def classify_blocks(
     row, column, j = wp.tid()
     found = int(0)
     for y in range(4 * row, wp.min(4 * row + 4, lattice.height)):
-        for x in range(4 * column, wp.min(4 * column + 4, lattice.width)):
-            value = values[j, y * lattice.width + x]
+        k = int(y * lattice.width + 4 * column)
+        end = y * lattice.width + wp.min(4 * column + 4, lattice.width)
+        # While: Warp's ranges take longer than what is done in them.
+        while k < end:
+            value = values[j, k]
             if value == 0.0:
                 found = found | 1
             elif value == 1.0:
                 found = found | 2
             elif value != UNSEEN:
                 found = found | 4
+            k += 1
     classes[row, column, j] = found
 
 
@@ -264,11 +268,13 @@ def window_bits(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int,
     own = lattice.surface[i]
     found = int(0)
     for v in range(wp.max(y - 2, 0), wp.min(y + 3, lattice.height)):
-        for u in range(wp.max(x - 2, 0), wp.min(x + 3, lattice.width)):
-            k = v * lattice.width + u
+        k = int(v * lattice.width + wp.max(x - 2, 0))
+        end = v * lattice.width + wp.min(x + 3, lattice.width)
+        while k < end:
             if lattice.surface[k] == own:
                 value = values[j, k]
                 found = found | wp.where(value == 1.0, 2, wp.where(value == 0.0, 1, 0))
+            k += 1
     return found
 
 
@@ -356,11 +362,13 @@ def sum_rows(
         total = wp.vec2(0.0, 0.0)
         if lattice.surface[i] >= 0 and not (found == 1 or found == 2):  # noqa: PLR1714
             tolerance_m = surface_tolerance(view, lattice.p_m[i])
-            for u in range(wp.max(x - 2, 0), wp.min(x + 3, lattice.width)):
-                k = i + u - x
+            k = int(i + wp.max(-x, -2))
+            end = i + wp.min(lattice.width - 1 - x, 2)
+            while k <= end:
                 value = values[j, k]
                 if value != UNSEEN and alike(lattice, i, k, tolerance_m):
-                    total += wp.vec2(value, 1.0) * rim_weight(u - x, 2)
+                    total += wp.vec2(value, 1.0) * rim_weight(k - i, 2)
+                k += 1
         sums[j, i] = total
 
 
@@ -376,10 +384,12 @@ def column_sum(
     """The sums of rows, summed above and below a point, on its own surface."""
     y = i / lattice.width
     total = wp.vec2(0.0, 0.0)
-    for v in range(wp.max(y - half, 0), wp.min(y + half + 1, lattice.height)):
-        k = i + (v - y) * lattice.width
+    v = int(wp.max(-y, -half))
+    while v <= wp.min(lattice.height - 1 - y, half):
+        k = i + v * lattice.width
         if alike(lattice, i, k, tolerance_m):
-            total += sums[j, k] * rim_weight(v - y, half)
+            total += sums[j, k] * rim_weight(v, half)
+        v += 1
     return total
 
 

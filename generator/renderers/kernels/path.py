@@ -78,7 +78,7 @@ from generator.renderers.kernels.records import (
     unit,
     vertex_at,
 )
-from generator.renderers.kernels.surface import facing
+from generator.renderers.kernels.surface import seen_normal
 from generator.renderers.kernels.water import water_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -233,7 +233,7 @@ def vertex_of(world: World, hit: Hit, d: wp.vec3, width_m: float):
     n = normal_at(world, g, corner[0]) * (1.0 - hit.weight[0] - hit.weight[1])
     n += normal_at(world, g, corner[1]) * hit.weight[0]
     n += normal_at(world, g, corner[2]) * hit.weight[1]
-    smooth = facing((R @ n) * side, d)
+    smooth = seen_normal((R @ n) * side, d)
     v.surface = surface_index(world, hit.at)
     weight = wp.vec2(hit.weight[0] + 1.0 - side, hit.weight[1])
     v.look = look_at_hit(world, v.surface, hit.at, weight, smooth, width_m, -d)
@@ -243,7 +243,7 @@ def vertex_of(world: World, hit: Hit, d: wp.vec3, width_m: float):
         v = layered(world, v, hit.at, weight, width_m)
     if world.ground.covered != 0:
         v = weathered(world, v, smooth, width_m)
-    v.look.normal = facing(v.look.normal, d)
+    v.look.normal = seen_normal(v.look.normal, d)
     return v
 
 

@@ -245,7 +245,9 @@ def draw_nearest(
         c_here = c + wp.int64(first) * e.c.dx
         row = plane.c + float(y) * plane.dy
         pixel = y * stride + e.x_first + first
-        for x in range(e.x_first + first, e.x_first + last + 1):
+        # While: Warp's ranges take longer than what is done in them.
+        x = int(e.x_first + first)
+        while x <= e.x_first + last:
             if (a_here | b_here | c_here) >= wp.int64(0):
                 w = wp.clamp(row + float(x) * plane.dx, plane.low, plane.high)
                 if w > nearness[pixel]:
@@ -255,6 +257,7 @@ def draw_nearest(
             b_here += e.b.dx
             c_here += e.c.dx
             pixel += 1
+            x += 1
         a += e.a.dy
         b += e.b.dy
         c += e.c.dy
@@ -276,8 +279,9 @@ def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array(dtype=
         a_here = a + wp.int64(first) * e.a.dx
         b_here = b + wp.int64(first) * e.b.dx
         c_here = c + wp.int64(first) * e.c.dx
-        pixel = first_pixel + y * stride + e.x_first + first
-        for _x in range(first, last + 1):
+        pixel = int(first_pixel + y * stride + e.x_first + first)
+        end = pixel + last - first
+        while pixel <= end:
             if (a_here | b_here | c_here) >= wp.int64(0):
                 mask[pixel] = wp.uint8(1)
             a_here += e.a.dx

@@ -140,6 +140,8 @@ def draw_samples_of(
     ec = side_of(r, p, area, x_middle, y_middle)
     pixel = wp.int64(256)
     slack = 0.5 * (wp.abs(plane.dx) + wp.abs(plane.dy))
+    samples = offsets.shape[0]
+    # While: Warp's ranges take longer than what is done in them.
     for y in range(y_first, y_last + 1):
         rows = wp.int64(y - y_first) * pixel
         a = ea.value + rows * ea.dy
@@ -150,17 +152,18 @@ def draw_samples_of(
         a += wp.int64(start) * pixel * ea.dx
         b += wp.int64(start) * pixel * eb.dx
         c += wp.int64(start) * pixel * ec.dx
-        for x in range(x_first + start, x_first + end + 1):
+        x = int(x_first + start)
+        while x <= x_first + end:
             i = y * window.width + x
             if plane.high >= floors[i] and (
                 (a + ea.reach) | (b + eb.reach) | (c + ec.reach)
             ) >= wp.int64(0):
-                k = numbers[i]
                 row = plane.c + float(y) * plane.dy + float(x) * plane.dx
-                count = offsets.shape[0]
+                k = numbers[i]
+                s = int(0)
                 if row + slack < floors[i]:
-                    count = 0
-                for s in range(count):
+                    s = samples
+                while s < samples:
                     right = wp.int64(offsets[s][0])
                     down = wp.int64(offsets[s][1])
                     inside = a + right * ea.dx + down * ea.dy
@@ -174,9 +177,11 @@ def draw_samples_of(
                         if w > nearness[k, s]:
                             nearness[k, s] = w
                             hits[k, s] = wp.vec2i(body, face)
+                    s += 1
             a += pixel * ea.dx
             b += pixel * eb.dx
             c += pixel * ec.dx
+            x += 1
 
 
 @wp.func
@@ -193,8 +198,10 @@ def floor_below(
         if (x_last - x_first) * (y_last - y_first) > 64:
             return 0.0
         for y in range(y_first, y_last + 1):
-            for x in range(x_first, x_last + 1):
-                lowest = lesser(lowest, floors[y * window.width + x])
+            i = int(y * window.width + x_first)
+            while i <= y * window.width + x_last:
+                lowest = lesser(lowest, floors[i])
+                i += 1
     return lowest
 
 

@@ -72,7 +72,7 @@ def facet_of(world: World, hit: wp.vec2i):
 
 
 @wp.func
-def facing(n: wp.vec3, d_world: wp.vec3):
+def seen_normal(n: wp.vec3, d_world: wp.vec3):
     """A unit normal that is not turned away from the viewer.
 
     Interpolation may tip a normal over the horizon: it is brought back to where it is seen edge-on.
@@ -133,7 +133,7 @@ def resolve(
                 side = wp.where(det < 0.0, -1.0, 1.0)
                 z_m[row + x] = z
                 weights[row + x] = wp.vec2(u + 1.0 - side, v)
-                normals[row + x] = facing(n * side, view.R_world_camera @ d)
+                normals[row + x] = seen_normal(n * side, view.R_world_camera @ d)
                 x += 1
                 same = False
                 if x < end:
