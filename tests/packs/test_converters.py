@@ -165,7 +165,7 @@ def test_a_region_takes_its_triangles_and_no_others(tmp_path: Path) -> None:
     [
         ({"base_color": [0.01, 0.01, 0.01]}, ((0.01, 0.01, 0.01), 1.0, 0.0)),
         ({"base_color": [0.5, 0.6, 0.6], "transmission": 0.9}, ((0.5, 0.6, 0.6), 1.0, 0.9)),
-        ({"roughness": 0.1}, ((0.5, 0.5, 0.5), 0.25, 0.0)),
+        ({"roughness": 0.1}, ((0.0, 0.0, 0.0), 0.25, 0.0)),
     ],
 )
 def test_a_finish_with_a_colour_hides_what_the_files_surface_let_through(
@@ -174,7 +174,7 @@ def test_a_finish_with_a_colour_hides_what_the_files_surface_let_through(
     """A quarter opaque in the file; a finish without a colour keeps it so, or it says otherwise."""
     folder = tmp_path / "packs" / "test"
     folder.mkdir(parents=True)
-    (folder / "box.mtl").write_text("newmtl pane\nKd 0.5 0.5 0.5\nd 0.25\n", encoding="utf-8")
+    (folder / "box.mtl").write_text("newmtl pane\nKd 0 0 0\nd 0.25\n", encoding="utf-8")
     text = "mtllib box.mtl\nusemtl pane\n" + BOX
     (folder / "box.obj").write_text(text, encoding="utf-8")
     entry = {"id": "box", "file": "box.obj", "category": "box", "up": "z",
