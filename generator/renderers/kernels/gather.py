@@ -293,8 +293,7 @@ def light_patch(
     sampler = Sampler()
     tilt = Tilt()
     if texture >= 0:
-        i = lattice.pixel[q]
-        width_m = pixel_width(view, i, images.z_m[i])
+        width_m = pixel_width(view, lattice.pixel[q], images.z_m[lattice.pixel[q]])
         sampler = quad_sampler(world, texture, quad, patch, width_m)
         if world.textures[texture].has_bumps != 0:
             tilt = quad_tilt(lattice, lights, q, quad)
@@ -314,14 +313,14 @@ def light_patch(
         if covered:
             coat = coats[q] * up + coats[below] * down
             coat_step = (coats[q + 1] * up + coats[below + 1] * down - coat) * right_step
+        # While: Warp's ranges are slow where little is done in them.
         x = int(x0)
         while x < x1:
-            i = y * view.width + x
             color = albedo
-            lit = diffuse
-            shine = rest
+            lit, shine = diffuse, rest
             if texture >= 0:
-                p = pixel_direction(view, float(x) + 0.5, float(y) + 0.5) * images.z_m[i]
+                p = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+                p = p * images.z_m[y * view.width + x]
                 u = patch.u + wp.dot(patch.to_u, p)
                 v = patch.v + wp.dot(patch.to_v, p)
                 texel = texel_at(world, texture, sampler, u, v, bumpy)
@@ -334,7 +333,7 @@ def light_patch(
             if covered:
                 color = laid_on(coat, color)
             coat += coat_step
-            radiance[i] = wp.cw_mul(lit, color) + shine
+            radiance[y * view.width + x] = wp.cw_mul(lit, color) + shine
             diffuse += diffuse_step
             rest += rest_step
             x += 1

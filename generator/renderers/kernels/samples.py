@@ -109,6 +109,17 @@ def span_to(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side
 
 
 @wp.func
+def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, at: wp.vec2i):
+    """Whether a triangle whose edges have values a, b, c at a point covers the one ``at`` off."""
+    right = wp.int64(at[0])
+    down = wp.int64(at[1])
+    inside = a + right * ea.dx + down * ea.dy
+    inside = inside | (b + right * eb.dx + down * eb.dy)
+    inside = inside | (c + right * ec.dx + down * ec.dy)
+    return inside >= wp.int64(0)
+
+
+@wp.func
 def draw_samples_of(
     numbers: wp.array(dtype=int),
     floors: wp.array(dtype=float),
@@ -159,25 +170,20 @@ def draw_samples_of(
                 (a + ea.reach) | (b + eb.reach) | (c + ec.reach)
             ) >= wp.int64(0):
                 row = plane.c + float(y) * plane.dy + float(x) * plane.dx
-                k = numbers[i]
-                s = int(0)
-                if row + slack < floors[i]:
-                    s = samples
-                while s < samples:
-                    right = wp.int64(offsets[s][0])
-                    down = wp.int64(offsets[s][1])
-                    inside = a + right * ea.dx + down * ea.dy
-                    inside = inside | (b + right * eb.dx + down * eb.dy)
-                    inside = inside | (c + right * ec.dx + down * ec.dy)
-                    if inside >= wp.int64(0):
-                        w = row + 0.00390625 * (
-                            float(offsets[s][0]) * plane.dx + float(offsets[s][1]) * plane.dy
-                        )
-                        w = wp.clamp(w, plane.low, plane.high)
-                        if w > nearness[k, s]:
-                            nearness[k, s] = w
-                            hits[k, s] = wp.vec2i(body, face)
-                    s += 1
+                if row + slack >= floors[i]:
+                    k = numbers[i]
+                    s = int(0)
+                    while s < samples:
+                        at = offsets[s]
+                        if covers(ea, eb, ec, a, b, c, at):
+                            w = row + 0.00390625 * (
+                                float(at[0]) * plane.dx + float(at[1]) * plane.dy
+                            )
+                            w = wp.clamp(w, plane.low, plane.high)
+                            if w > nearness[k, s]:
+                                nearness[k, s] = w
+                                hits[k, s] = wp.vec2i(body, face)
+                        s += 1
             a += pixel * ea.dx
             b += pixel * eb.dx
             c += pixel * ec.dx
