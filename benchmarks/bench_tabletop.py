@@ -34,7 +34,7 @@ EVERYTHING = (
     "randomizers.finish.coated={probability: 0.4}",
     "randomizers.finish.clear={probability: 0.2}",
     "randomizers.finish.solid={probability: 0.5}",
-    "randomizers.cover.probability=0.5",
+    "randomizers.cover.probability={probability: 0.5}",
 )
 
 

@@ -313,8 +313,7 @@ def light_patch(
         if covered:
             coat = coats[q] * up + coats[below] * down
             coat_step = (coats[q + 1] * up + coats[below + 1] * down - coat) * right_step
-        # While: Warp's ranges are slow where little is done in them.
-        x = int(x0)
+        x = int(x0)  # Warp's ranges are slow where little is done in them.
         while x < x1:
             color = albedo
             lit, shine = diffuse, rest
