@@ -3,9 +3,10 @@
 Two scenes of the tests, a closed box and a gold ball under a panel and a sky, 128x96. Each renderer
 makes a reference of its own, then images of 1, 2, 4, ... samples until their FLIP against it
 (Andersson et al. 2020) falls below 0.05; between two of them time is interpolated on logarithmic
-axes. Beside this project's tier on the CPU runs Mitsuba 3: vectorised (``llvm_ad_rgb``, which loads
-an LLVM of the system, see DRJIT_LIBLLVM_PATH), or ``scalar_rgb`` where that fails. Every renderer
-runs in a process of its own; time is the process's CPU time of one image, kernels being ready.
+axes. Beside this project's tier on the CPU, as it is and with its denoiser, runs Mitsuba 3:
+vectorised (``llvm_ad_rgb``, which loads an LLVM of the system, see DRJIT_LIBLLVM_PATH), or
+``scalar_rgb`` where that fails; its denoiser needs a GPU of one make. Every renderer runs in a
+process of its own; time is the process's CPU time of one image, kernels being ready.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from tests.renderers.paths import settings_of
 from tests.renderers.test_path_tracing_against_mitsuba import PICTURES, Picture, flip_of
 
 SCENES = ("cornell", "metal")
+OWN = ("own", "own, denoised")
 SIZE_PX = (128, 96)
 GOAL = 0.05
 SAMPLES = tuple(2**k for k in range(11))
@@ -47,12 +49,13 @@ def picture_of(name: str) -> Picture:
     return replace(picture, camera=replace(picture.camera, intrinsics=intrinsics))
 
 
-def own(picture: Picture) -> Render:
+def own(picture: Picture, *, denoise: bool = False) -> Render:
     """This project's tier; images of other names have other noise."""
 
     @cache
     def renderer_of(samples: int) -> WarpRenderer:
-        return WarpRenderer(picture.library, "cpu", settings_of(samples))
+        settings = settings_of(samples).model_copy(update={"denoise": denoise})
+        return WarpRenderer(picture.library, "cpu", settings)
 
     def render(samples: int, seed: int) -> np.ndarray:
         camera = replace(picture.camera, name=f"camera {seed}")
@@ -75,9 +78,8 @@ def theirs(picture: Picture, variant: str) -> Render:
     return lambda samples, seed: np.array(mi.render(loaded, spp=samples, seed=seed), np.float64)
 
 
-def measured(render: Render, reference_samples: int) -> list[tuple[int, float, float]]:
+def measured(render: Render, reference: np.ndarray) -> list[tuple[int, float, float]]:
     """(samples, CPU seconds, FLIP) until the goal is reached."""
-    reference = render(reference_samples, 1)
     rows = []
     for samples in SAMPLES:
         render(samples, 2)
@@ -114,29 +116,31 @@ def main() -> None:
     """Print a table, or one renderer's figures as JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--reference", type=int, default=4096, help="samples of references")
-    parser.add_argument("--renderer", help="own, or a variant of Mitsuba: that one alone")
+    parser.add_argument("--renderer", help="one of OWN or a variant of Mitsuba: that one alone")
     arguments = parser.parse_args()
     if arguments.renderer:
         figures = {}
         for scene in SCENES:
             picture = picture_of(scene)
-            alone = arguments.renderer == "own"
-            render = own(picture) if alone else theirs(picture, arguments.renderer)
-            figures[scene] = measured(render, arguments.reference)
+            ours = arguments.renderer in OWN
+            plain = own(picture) if ours else theirs(picture, arguments.renderer)
+            render = own(picture, denoise=True) if arguments.renderer == OWN[1] else plain
+            figures[scene] = measured(render, plain(arguments.reference, 1))
         print(json.dumps(figures))
         return
-    table = {"own": in_a_process("own", arguments.reference)}
-    for variant in ("llvm_ad_rgb", "scalar_rgb"):
-        table[variant] = in_a_process(variant, arguments.reference)
+    table = {
+        renderer: in_a_process(renderer, arguments.reference)
+        for renderer in (*OWN, "llvm_ad_rgb", "scalar_rgb")
+    }
     for renderer, figures in table.items():
         if figures is None:
-            print(f"{renderer:12} cannot run here")
+            print(f"{renderer:13} cannot run here")
             continue
         for scene, rows in figures.items():
             samples, cpu_s, flip = rows[-1]
             per_path_us = 1e6 * cpu_s / (samples * SIZE_PX[0] * SIZE_PX[1])
             print(
-                f"{renderer:12} {scene:8} FLIP {GOAL} after {seconds_to_goal(rows):6.2f} CPU s;"
+                f"{renderer:13} {scene:8} FLIP {GOAL} after {seconds_to_goal(rows):6.2f} CPU s;"
                 f" {samples} samples: FLIP {flip:.4f}, {per_path_us:.2f} us per path"
             )
 

@@ -25,16 +25,15 @@ OVERRIDES = (
 )
 
 
-# All that light and materials can do at once: panels that shine and are seen, spots, balls; coats,
-# panes, solid glass, metal, bumps; mirrors and panoramas are in the scene anyway.
+# All that lights and materials can do: balls, spots, rectangles and disks, panels that are seen;
+# coats, panes, solid glass, metal, bumps. Mirrors, panoramas and exposure are in the scene anyway.
 EVERYTHING = (
-    "randomizers.clutter.count=10",
-    "randomizers.softboxes.count=2",
-    "randomizers.softboxes.kind={choice: [sphere, spot, rectangle, disk]}",
+    *OVERRIDES,
+    "randomizers.lamps.kind={choice: [sphere, spot, rectangle, disk]}",
+    "randomizers.lamps.visible=true",
     "randomizers.finish.coated={probability: 0.4}",
     "randomizers.finish.clear={probability: 0.2}",
     "randomizers.finish.solid={probability: 0.5}",
-    "randomizers.cover.probability={probability: 0.5}",
 )
 
 
@@ -46,7 +45,7 @@ def spec_of(views_per_scene: int) -> Spec:
 
 def everything() -> Spec:
     """The tabletop with every effect of the realtime tier."""
-    return load_spec("tabletop_panels.yaml", seed=1, overrides=EVERYTHING)
+    return load_spec("tabletop.yaml", seed=1, overrides=EVERYTHING)
 
 
 def first_sample_s() -> float:
