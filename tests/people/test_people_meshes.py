@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from generator.assets.people.build import built, dressed
+from generator.assets.people.families import simple_person
 from generator.assets.people.gait import POSES
 from generator.assets.people.person import Person, drawn_person
 from generator.assets.procedural.family import Solid
@@ -178,3 +179,17 @@ def test_the_same_person_is_the_same_bytes(kind: str) -> None:
     assert first.mesh.normals.tobytes() == second.mesh.normals.tobytes()
     assert first.keypoints == second.keypoints
     assert first.mesh.materials == second.mesh.materials
+
+
+def test_a_pose_is_the_same_whatever_the_same_person_did_before() -> None:
+    """Shape and clothes are kept from pose to pose; nothing of a pose is."""
+    first = simple_person(7, "walk", 0.25).mesh
+    simple_person(7, "sit", 0.0)
+    again, fresh = (
+        simple_person(7, "walk", 0.25).mesh,
+        made(drawn_person(7, "walk", 0.25), "simple"),
+    )
+    for name in ("vertices_m", "normals", "faces", "face_slots"):
+        expected = getattr(first, name).tobytes()
+        assert getattr(again, name).tobytes() == expected
+        assert getattr(fresh.mesh, name).tobytes() == expected
