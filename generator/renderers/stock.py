@@ -21,10 +21,10 @@ from generator.renderers.optics import DeviceOptics, upload_optics
 from generator.renderers.textures import DeviceTexture, upload_texture
 
 _MESH_BYTES = 176 << 20
-_TEXTURE_BYTES = 192 << 20
+_TEXTURE_BYTES = 160 << 20
 _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
-_SCRATCH_BYTES = 96 << 20
+_SCRATCH_BYTES = 64 << 20
 _BODIES = 2048
 """Bodies whose materials are remembered."""
 
