@@ -213,7 +213,10 @@ def _retreats(normals: Array, faces: NDArray[Any], points: int) -> Array:
     corners = faces.T.reshape(-1)
     nx, ny, nz = normals.T
     terms = (nx * nx, nx * ny, nx * nz, ny * ny, ny * nz, nz * nz, nx, ny, nz)
-    sums = [np.bincount(corners, np.tile(term, 3), points).astype(np.float64) for term in terms]
+    sums = [
+        np.bincount(corners, np.tile(term, 3), points).astype(np.float64, copy=False)
+        for term in terms
+    ]
     xx, xy, xz, yy, yz, zz, *b = sums
     xx, yy, zz = xx + 1e-9, yy + 1e-9, zz + 1e-9
     # Cofactors of the symmetric matrix.

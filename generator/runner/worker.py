@@ -36,7 +36,15 @@ PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 def worker_main(
     number: int, connection: Connection, parent_pid: int, payload: bytes, log: Path
 ) -> None:
-    """Entry of the process. ``payload`` is a Job, pickled and compressed; None ends the process."""
+    """Entry of the process. None on the connection ends it.
+
+    Args:
+        number: Of the worker.
+        connection: Shards come in, events go out.
+        parent_pid: The process ends with that one.
+        payload: A Job, pickled and compressed.
+        log: Takes what the process prints.
+    """
     _die_with(parent_pid)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

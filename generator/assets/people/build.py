@@ -61,6 +61,22 @@ class _Sheet:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class _Piece:
+    """Skin, a garment or hair before any pose.
+
+    Attributes:
+        used: Points of the body that its vertices move with, [n].
+        vertices_m, faces, slots, materials: As of a sheet.
+    """
+
+    used: Indices
+    vertices_m: Array
+    faces: Indices
+    slots: Indices
+    materials: tuple[Material, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Figure:
     """A person shaped and dressed, before any pose: what all their poses share.
 
@@ -68,14 +84,13 @@ class Figure:
         body: The template.
         points_m: The template's points in the person's shape, [n, 3].
         scale: From the template's size to the person's.
-        layers: Skin, garments and hair: the points of the body that each hangs on, its places,
-            faces, index of the material of each face, and materials.
+        pieces: From the skin outwards.
     """
 
     body: Body
     points_m: Array
     scale: float
-    layers: tuple[tuple[Indices, Array, Indices, Indices, tuple[Material, ...]], ...]
+    pieces: tuple[_Piece, ...]
 
 
 def dressed(person: Person, body: Body) -> Figure:
@@ -90,7 +105,7 @@ def dressed(person: Person, body: Body) -> Figure:
     for layer in layers(person):
         phases = 2.0 * math.pi * np.array([rng.random() for _ in range(_PHASES)])
         materials = tuple(material for _, material in layer.zones)
-        made.append((*displaced(body, layer, points, phases), materials))
+        made.append(_Piece(*displaced(body, layer, points, phases), materials))
     return Figure(body, points, scale, tuple(made))
 
 
@@ -100,7 +115,7 @@ def built(person: Person, figure: Figure) -> Solid:
     bones = len(body.bones)
     rotations = rotations_of(body, points[:bones], _stance(person))
     transforms = bone_transforms(body, points[:bones], rotations)
-    sheets = _sheets(figure, transforms)
+    sheets = [_posed(piece, body, transforms) for piece in figure.pieces]
     marks = slice(0, bones + len(LANDMARKS))
     posed = skinned(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
     sheets += [
@@ -123,12 +138,11 @@ def _stance(person: Person) -> Stance:
     return shortened(made, _NARROW_STRIDE) if narrow and person.pose != "sit" else made
 
 
-def _sheets(figure: Figure, transforms: Array) -> list[_Sheet]:
-    body, made = figure.body, []
-    for used, places, faces, slots, materials in figure.layers:
-        moved = skinned(places, body.weight_bones[used], body.weights[used], transforms)
-        made.append(_Sheet(moved, vertex_normals(moved, faces), faces, slots, materials))
-    return made
+def _posed(piece: _Piece, body: Body, transforms: Array) -> _Sheet:
+    bones, weights = body.weight_bones[piece.used], body.weights[piece.used]
+    moved = skinned(piece.vertices_m, bones, weights, transforms)
+    normals = vertex_normals(moved, piece.faces)
+    return _Sheet(moved, normals, piece.faces, piece.slots, piece.materials)
 
 
 def _grounded(sheets: list[_Sheet], body: Body, posed: Array) -> tuple[MeshData, Array]:

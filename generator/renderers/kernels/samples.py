@@ -152,7 +152,6 @@ def draw_samples_of(
     pixel = wp.int64(256)
     slack = 0.5 * (wp.abs(plane.dx) + wp.abs(plane.dy))
     samples = offsets.shape[0]
-    # While: Warp's ranges take longer than what is done in them.
     for y in range(y_first, y_last + 1):
         rows = wp.int64(y - y_first) * pixel
         a = ea.value + rows * ea.dy
@@ -163,6 +162,7 @@ def draw_samples_of(
         a += wp.int64(start) * pixel * ea.dx
         b += wp.int64(start) * pixel * eb.dx
         c += wp.int64(start) * pixel * ec.dx
+        # While: Warp's ranges take longer than what is done in them.
         x = int(x_first + start)
         while x <= x_first + end:
             i = y * window.width + x
