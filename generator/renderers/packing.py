@@ -20,6 +20,7 @@ from generator.renderers.meshes import DeviceMesh
 from generator.renderers.stock import AssetStock
 from generator.renderers.structs import dtype_of, on_device, stacked
 from generator.renderers.surfaces import pierced_bodies, pierced_slots, surface_records
+from generator.renderers.trees import body_tree
 
 _LENSES: dict[LensModel, int] = {
     "pinhole": records.PINHOLE,
@@ -55,6 +56,23 @@ class PackedWorld:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class _Trees:
+    """What finds bodies for rays: fields of the World record.
+
+    Attributes:
+        tree: On CUDA empty.
+        hierarchy: On the CPU None.
+        pierced: Numbers of bodies.
+        pierced_hierarchy: None where there are none.
+    """
+
+    tree: wp.array
+    hierarchy: wp.Bvh | None
+    pierced: wp.array
+    pierced_hierarchy: wp.Bvh | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class _Places:
     """Where the bodies of a scene are, whoever looks at them.
 
@@ -62,7 +80,7 @@ class _Places:
         placed: Body records without what depends on the camera.
         R_world_mesh, t_world_mesh, scale: Of the bodies, float64 [n, 3, 3], [n, 3] and [n].
         vertex_count, lows_m, highs_m: As of PackedWorld.
-        tree: The hierarchy over their boxes.
+        trees: What rays find them by.
     """
 
     placed: NDArray[np.void]
@@ -72,7 +90,7 @@ class _Places:
     vertex_count: int
     lows_m: wp.array
     highs_m: wp.array
-    tree: wp.Bvh
+    trees: _Trees
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -138,11 +156,11 @@ def _before(camera: Camera, packed: _Packed, weather: Weather, stock: AssetStock
         _see(placed, places, camera)
     # A record of its own: weather and lamps are put into it for one view.
     record = _copy_of(packed.record)
-    record.tree = places.tree.id
+    _fill_trees(record, places.trees)
     record.bodies = on_device(placed, records.Body, stock.device)
     return PackedWorld(
         record,
-        (places.tree, *packed.assets),
+        (places.trees, *packed.assets),
         placed,
         places.vertex_count,
         weather,
@@ -191,7 +209,7 @@ def _places(
     """Fill in where bodies are, and put a hierarchy over them."""
     R, t, scale, vertex_count = _place(placed, bodies, meshes)
     placed["low_m"], placed["high_m"] = _world_boxes(placed, meshes)
-    # A hierarchy needs a box; rays never meet this one.
+    # Kernels over boxes need one; rays never meet this one.
     nowhere = np.full((1, 3), 1e9, np.float32)
     low = placed["low_m"] if len(placed) else nowhere
     high = placed["high_m"] if len(placed) else nowhere
@@ -199,8 +217,29 @@ def _places(
         wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=stock.device)
         for corner in (low, high)
     )
-    tree = wp.Bvh(lows_m, highs_m)
-    return _Places(placed, R, t, scale, vertex_count, lows_m, highs_m, tree)
+    trees = _trees(placed, lows_m, highs_m, stock.device)
+    return _Places(placed, R, t, scale, vertex_count, lows_m, highs_m, trees)
+
+
+def _trees(
+    placed: NDArray[np.void], lows_m: wp.array, highs_m: wp.array, device: wp.Device
+) -> _Trees:
+    low, high = (np.ascontiguousarray(placed[name]) for name in ("low_m", "high_m"))
+    tree = np.zeros(0, np.float32) if device.is_cuda else body_tree(low, high)
+    pierced = np.flatnonzero(placed["pierced"]).astype(np.int32)
+    corners = (wp.array(of[pierced], dtype=wp.vec3, device=device) for of in (low, high))
+    return _Trees(
+        wp.array(tree, dtype=wp.float32, device=device),
+        wp.Bvh(lows_m, highs_m) if device.is_cuda else None,
+        wp.array(pierced, dtype=wp.int32, device=device),
+        wp.Bvh(*corners) if len(pierced) else None,
+    )
+
+
+def _fill_trees(record: records.World, trees: _Trees) -> None:
+    record.tree, record.pierced = trees.tree, trees.pierced
+    record.hierarchy = trees.hierarchy.id if trees.hierarchy else 0
+    record.pierced_hierarchy = trees.pierced_hierarchy.id if trees.pierced_hierarchy else 0
 
 
 def pack_view(camera: Camera, stock: AssetStock) -> records.View:

@@ -16,6 +16,7 @@ from generator.renderers.meshes import boxes_around
 from generator.renderers.packing import pack_view, pack_world
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
+from generator.renderers.trees import face_boxes
 from generator.renderers.visibility import bodies_within, project
 from generator.renderers.warp import WarpRenderer
 from tests.renderers.fake_library import (
@@ -130,7 +131,7 @@ def test_labels_do_not_depend_on_bodies_out_of_view() -> None:
 def test_every_face_lies_in_one_of_the_boxes(name: str) -> None:
     """All three corners of each face in the same box."""
     mesh = MESHES[name]
-    lows, highs = boxes_around(mesh.vertices_m, mesh.faces)
+    lows, highs = boxes_around(*face_boxes(mesh.vertices_m, mesh.faces))
     corners = mesh.vertices_m[mesh.faces]
     within = (corners[:, None] >= lows[None, :, None]) & (corners[:, None] <= highs[None, :, None])
     assert within.all(axis=(2, 3)).any(axis=1).all()

@@ -17,6 +17,7 @@ from generator.renderers.kernels.records import (
     HOLES,
     View,
     World,
+    flat_normal,
     pixel_direction,
     shows,
     to_mesh_point,
@@ -117,10 +118,10 @@ def traced_source(
             last = b
             o = to_mesh_point(world, b, origin)
             answer = solid_hit(world, b, o, to_mesh_vector(world, b, d), nearest, HOLES)
-            if answer.result:
+            if answer.face >= 0:
                 nearest = answer.t
                 source = j
-                normal = world.bodies[b].R_world_mesh @ answer.normal
+                normal = flat_normal(world, wp.vec2i(b, answer.face))
     if nearest < FARTHEST:
         source = most_alike(view, images, x, y, source, normal)
     return source

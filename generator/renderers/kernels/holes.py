@@ -17,6 +17,7 @@ from generator.renderers.kernels.records import (
     floor_int,
     vertex_at,
 )
+from generator.renderers.kernels.tree import Found, any_in_mesh, first_in_mesh
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -124,60 +125,88 @@ def passable(world: World, b: int, face: int, weights: wp.vec3, through: int):
 
 @wp.struct
 class Strike:
-    """Where a ray meets a mesh, as ``wp.mesh_query_ray`` tells it; ``result`` is 0 where not."""
+    """Where a ray meets a mesh.
 
-    result: int
+    Attributes:
+        face: -1 where it does not.
+        t: Parameter along the ray.
+        u, v: Barycentric, of the face's first and second corner.
+    """
+
     face: int
     t: float
     u: float
     v: float
-    normal: wp.vec3
+
+
+@wp.func
+def strike_of(found: Found):
+    """The same as numbers of 32 bits."""
+    strike = Strike()
+    strike.t = float(found[0])
+    strike.u = float(found[1])
+    strike.v = float(found[2])
+    strike.face = int(found[3])
+    return strike
 
 
 @wp.func(**OUT_OF_LINE)
 def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
     """The first point of a body with holes that a ray does not pass; arguments as for solid_hit."""
-    mesh = world.geometries[world.bodies[b].geometry].mesh
+    g = world.bodies[b].geometry
     strike = Strike()
+    strike.face = -1
     begin = float(0.0)
     faces = int(0)
     going = bool(True)
     while going:
         going = False
-        answer = wp.mesh_query_ray(mesh, o + d * begin, d, reach - begin)
-        if answer.result:
-            weights = wp.vec3(answer.u, answer.v, 1.0 - answer.u - answer.v)
-            if passable(world, b, answer.face, weights, through):
-                begin += answer.t * 1.000001 + STEP_M / wp.length(d)
+        met = strike_of(
+            first_in_mesh(
+                world.geometries[g].tree,
+                world.geometries[g].mesh,
+                o + d * begin,
+                d,
+                reach - begin,
+            )
+        )
+        if met.face >= 0:
+            weights = wp.vec3(met.u, met.v, 1.0 - met.u - met.v)
+            if passable(world, b, met.face, weights, through):
+                begin += met.t * 1.000001 + STEP_M / wp.length(d)
                 faces += 1
                 going = faces < FACES_MAX
             else:
-                strike.result = 1
-                strike.t = begin + answer.t
-                strike.face = answer.face
-                strike.u = answer.u
-                strike.v = answer.v
-                strike.normal = answer.normal
+                strike = met
+                strike.t = begin + met.t
     return strike
 
 
 @wp.func
 def solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
-    """The first point of a body that a ray does not pass, as ``wp.mesh_query_ray`` tells it.
+    """The first point of a body that a ray does not pass.
 
     Args:
         o, d: The ray in the mesh frame.
         reach: Largest parameter along it.
         through: What it may pass, HOLES or CLEAR or both.
     """
-    mesh = world.geometries[world.bodies[b].geometry].mesh
-    answer = wp.mesh_query_ray(mesh, o, d, reach)
+    g = world.bodies[b].geometry
+    strike = Strike()
     if (world.bodies[b].pierced & through) != 0:
         strike = beyond_holes(world, b, o, d, reach, through)
-        answer.result = strike.result != 0
-        answer.face = strike.face
-        answer.t = strike.t
-        answer.u = strike.u
-        answer.v = strike.v
-        answer.normal = strike.normal
-    return answer
+    else:
+        strike = strike_of(
+            first_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
+        )
+    return strike
+
+
+@wp.func
+def cut_in_mesh(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+    """Whether a body cuts a ray that passes what ``through`` says; arguments as for solid_hit."""
+    g = world.bodies[b].geometry
+    hit = any_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
+    if hit and (world.bodies[b].pierced & through) != 0:
+        hit = beyond_holes(world, b, o, d, reach, through).face >= 0
+    return hit

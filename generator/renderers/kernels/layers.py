@@ -27,22 +27,21 @@ from generator.renderers.kernels.dielectrics import (
     refracted,
 )
 from generator.renderers.kernels.ground import coat_at, coated, footprint
-from generator.renderers.kernels.holes import OUT_OF_LINE, solid_hit, uv_at
+from generator.renderers.kernels.holes import OUT_OF_LINE, uv_at
 from generator.renderers.kernels.lattice import ray_origin
 from generator.renderers.kernels.look import Look, look_at_hit
-from generator.renderers.kernels.rays import FARTHEST
+from generator.renderers.kernels.rays import FARTHEST, first_met
 from generator.renderers.kernels.records import (
     HOLES,
     MIRROR_ROUGHNESS,
     View,
     World,
     corners_of,
+    flat_normal,
     normal_at,
     pixel_direction,
     pixel_width,
     surface_index,
-    to_mesh_point,
-    to_mesh_vector,
     unit,
     vertex_at,
 )
@@ -184,29 +183,17 @@ class Meeting:
 @wp.func(**OUT_OF_LINE)
 def met(world: World, origin: wp.vec3, d: wp.vec3):
     """The first surface along a ray."""
+    first = first_met(world, origin, d, FARTHEST, HOLES)
     m = Meeting()
-    m.hit = wp.vec2i(-1, -1)
-    m.t = FARTHEST
-    u = float(0.0)
-    v = float(0.0)
-    candidates = wp.bvh_query_ray(world.tree, origin, d)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, m.t):
-        o = to_mesh_point(world, b, origin)
-        answer = solid_hit(world, b, o, to_mesh_vector(world, b, d), m.t, HOLES)
-        if answer.result:
-            m.t = answer.t
-            m.hit = wp.vec2i(b, answer.face)
-            u = answer.u
-            v = answer.v
-            m.entering = wp.where(
-                wp.dot(world.bodies[b].R_world_mesh @ answer.normal, d) < 0.0, 1, 0
-            )
+    m.hit = first.at
+    m.t = first.t
     if m.hit[0] >= 0:
         g = world.bodies[m.hit[0]].geometry
         corner = corners_of(world, g, m.hit[1])
-        w = 1.0 - u - v
-        n = normal_at(world, g, corner[0]) * u + normal_at(world, g, corner[1]) * v
+        v = first.weight[0]
+        w = first.weight[1]
+        m.entering = wp.where(wp.dot(flat_normal(world, m.hit), d) < 0.0, 1, 0)
+        n = normal_at(world, g, corner[0]) * (1.0 - v - w) + normal_at(world, g, corner[1]) * v
         n += normal_at(world, g, corner[2]) * w
         side = wp.where(m.entering != 0, 1.0, -1.0)
         m.normal = seen_normal(world.bodies[m.hit[0]].R_world_mesh @ n * side, d)

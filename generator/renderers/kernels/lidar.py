@@ -199,7 +199,7 @@ def nearer(world: World, travel: Travel, b: int, ray: Ray, hit: Nearest, offset:
     elif offset:
         o += world.bodies[b].B_mesh_camera @ ray.origin_m
     answer = solid_hit(world, b, o, d, hit.range_m, HOLES)
-    if answer.result:
+    if answer.face >= 0:
         hit.range_m = answer.t
         hit.body = b
         hit.face = answer.face

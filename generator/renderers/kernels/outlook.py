@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.holes import beyond_holes
+from generator.renderers.kernels.holes import cut_in_mesh
 from generator.renderers.kernels.raster import Window
 from generator.renderers.kernels.rays import FARTHEST
 from generator.renderers.kernels.records import (
@@ -82,7 +82,6 @@ def trace_silhouettes(
     if row >= outlook.window.height:
         return
     b = outlook.body
-    mesh = world.geometries[world.bodies[b].geometry].mesh
     for column in range(outlook.window.width):
         i = outlook.first_pixel + row * outlook.stride + column
         if mask[i] == wp.uint8(0):
@@ -92,8 +91,5 @@ def trace_silhouettes(
             if wp.dot(d, d) > 0.5:
                 o = to_mesh_point(world, b, view.eye_m + d * t_min)
                 way = to_mesh_vector(world, b, d)
-                met = wp.mesh_query_ray_anyhit(mesh, o, way, FARTHEST)
-                if met and (world.bodies[b].pierced & HOLES) != 0:
-                    met = beyond_holes(world, b, o, way, FARTHEST, HOLES).result != 0
-                if met:
+                if cut_in_mesh(world, b, o, way, FARTHEST, HOLES):
                     mask[i] = wp.uint8(1)

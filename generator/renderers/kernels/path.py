@@ -20,7 +20,6 @@ from generator.renderers.kernels.dielectrics import (
     pane_transmittance,
 )
 from generator.renderers.kernels.ground import coat_at, coated
-from generator.renderers.kernels.holes import solid_hit
 from generator.renderers.kernels.layers import maps_at
 from generator.renderers.kernels.lighting import SUN
 from generator.renderers.kernels.look import Look, look_at_hit
@@ -62,7 +61,7 @@ from generator.renderers.kernels.path_random import (
     random_pair,
 )
 from generator.renderers.kernels.raster import Z_NEAR_M
-from generator.renderers.kernels.rays import cut, path_along, unsheltered
+from generator.renderers.kernels.rays import Met, cut, first_met, path_along, unsheltered
 from generator.renderers.kernels.records import (
     HOLES,
     View,
@@ -73,8 +72,6 @@ from generator.renderers.kernels.records import (
     pixel_width,
     shows,
     surface_index,
-    to_mesh_point,
-    to_mesh_vector,
     unit,
     vertex_at,
 )
@@ -122,21 +119,6 @@ class Budget:
     key: wp.uint32
     clear: int
     lights: int
-
-
-@wp.struct
-class Hit:
-    """The first surface along a ray.
-
-    Attributes:
-        at: (body, face); (-1, -1) for nothing.
-        t: Along the ray.
-        weight: Barycentric, of the face's second and third corner.
-    """
-
-    at: wp.vec2i
-    t: float
-    weight: wp.vec2
 
 
 @wp.struct
@@ -188,25 +170,6 @@ class Anchor:
 
 
 @wp.func
-def first_hit(world: World, o: wp.vec3, d: wp.vec3, reach: float):
-    """The first surface along a ray of unit direction."""
-    hit = Hit()
-    hit.at = wp.vec2i(-1, -1)
-    hit.t = reach
-    candidates = wp.bvh_query_ray(world.tree, o, d)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, hit.t):
-        origin = to_mesh_point(world, b, o)
-        direction = to_mesh_vector(world, b, d)
-        answer = solid_hit(world, b, origin, direction, hit.t, HOLES)
-        if answer.result:
-            hit.t = answer.t
-            hit.at = wp.vec2i(b, answer.face)
-            hit.weight = wp.vec2(answer.v, 1.0 - answer.u - answer.v)
-    return hit
-
-
-@wp.func
 def lifted(p: wp.vec3, n: wp.vec3):
     """A ray's origin off a surface, on the side of a normal."""
     size = wp.abs(p[0]) + wp.abs(p[1]) + wp.abs(p[2])
@@ -214,7 +177,7 @@ def lifted(p: wp.vec3, n: wp.vec3):
 
 
 @wp.func
-def vertex_of(world: World, hit: Hit, d: wp.vec3, width_m: float):
+def vertex_of(world: World, hit: Met, d: wp.vec3, width_m: float):
     """The surface at a hit, dry and bare."""
     b = hit.at[0]
     g = world.bodies[b].geometry
@@ -323,7 +286,7 @@ def light_through(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear
     passages = int(0)
     going = bool(True)
     while going:
-        hit = first_hit(world, origin, d, rest_m)
+        hit = first_met(world, origin, d, rest_m, HOLES)
         going = False
         if hit.at[0] >= 0:
             leaves = wp.vec3(0.0)
@@ -623,7 +586,7 @@ def path_light(
     going = bool(True)
     while going:
         going = False
-        hit = first_hit(world, o, d, AT_INFINITY)
+        hit = first_met(world, o, d, AT_INFINITY, HOLES)
         end_m = a.way_m + wp.where(hit.at[0] < 0, 2.0 * AT_INFINITY, hit.t)
         shown = int(0)
         if bounces > 0:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.path import first_hit, vertex_of
+from generator.renderers.kernels.path import vertex_of
 from generator.renderers.kernels.path_lights import AT_INFINITY
 from generator.renderers.kernels.path_random import mixed_bits, random_pair
 from generator.renderers.kernels.raster import Z_NEAR_M
-from generator.renderers.kernels.records import View, World, pixel_direction, shows, unit
+from generator.renderers.kernels.rays import first_met
+from generator.renderers.kernels.records import HOLES, View, World, pixel_direction, shows, unit
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -33,7 +34,7 @@ def trace_guides(
         x = float(i % view.width) + place[0]
         y = float(i / view.width) + place[1]
         d = unit(view.R_world_camera @ pixel_direction(view, x, y))
-        hit = first_hit(world, view.eye_m + d * Z_NEAR_M, d, AT_INFINITY)
+        hit = first_met(world, view.eye_m + d * Z_NEAR_M, d, AT_INFINITY, HOLES)
         if hit.at[0] < 0:
             colors += wp.vec3(1.0, 1.0, 1.0)
         else:

@@ -56,7 +56,7 @@ def nearness_of(
     if behind > 0.0:
         reach = 1.0 / behind - z_near_m
     answer = solid_hit(world, b, o, to_mesh_vector(world, b, d), reach, HOLES)
-    if answer.result:
+    if answer.face >= 0:
         nearness = 1.0 / (answer.t + z_near_m)
         face = answer.face
     return nearness, face

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.holes import OUT_OF_LINE, beyond_holes, solid_hit
+from generator.renderers.kernels.holes import (
+    OUT_OF_LINE,
+    beyond_holes,
+    cut_in_mesh,
+    solid_hit,
+)
 from generator.renderers.kernels.records import (
     CLEAR,
     HOLES,
@@ -17,6 +22,7 @@ from generator.renderers.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
+from generator.renderers.kernels.tree import any_in_scene, first_in_scene
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -27,25 +33,58 @@ SHELTER_M = wp.constant(2.5)
 LIGHT = wp.constant(HOLES | CLEAR)
 
 
-@wp.func
-def nearest_hit(world: World, origin: wp.vec3, direction: wp.vec3, t_min: float):
-    """(body, face) of the first surface beyond ``t_min``; (-1, -1) where there is none.
+@wp.struct
+class Met:
+    """Where a ray meets a surface.
 
-    Parameters along the ray are in units of the direction's length.
+    Attributes:
+        at: (body, face); (-1, -1) where it meets none.
+        t: Parameter along the ray; how far it was followed where it meets nothing.
+        weight: Barycentric, of the face's second and third corner.
     """
-    nearest = float(FARTHEST)
-    hit = wp.vec2i(-1, -1)
-    start = origin + direction * t_min
-    candidates = wp.bvh_query_ray(world.tree, start, direction)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, nearest):
-        o = to_mesh_point(world, b, start)
-        d = to_mesh_vector(world, b, direction)
-        answer = solid_hit(world, b, o, d, nearest, HOLES)
-        if answer.result:
-            nearest = answer.t
-            hit = wp.vec2i(b, answer.face)
-    return hit
+
+    at: wp.vec2i
+    t: float
+    weight: wp.vec2
+
+
+@wp.func
+def first_met(world: World, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+    """The first surface that a ray does not pass.
+
+    Args:
+        reach: Largest parameter along the ray.
+        through: What it may pass, HOLES or CLEAR or both.
+    """
+    found = first_in_scene(
+        world.tree, world.hierarchy, world.bodies, world.geometries, o, d, reach, through
+    )
+    met = Met()
+    met.at = wp.vec2i(int(found[4]), int(found[3]))
+    met.t = float(found[0])
+    met.weight = wp.vec2(float(found[2]), 1.0 - float(found[1]) - float(found[2]))
+    if world.pierced_hierarchy != wp.uint64(0):
+        met = first_pierced(world, o, d, through, met)
+    return met
+
+
+@wp.func(**OUT_OF_LINE)
+def first_pierced(world: World, o: wp.vec3, d: wp.vec3, through: int, before: Met):
+    """The first point of bodies that may be passed, or what the ray meets before."""
+    met = before
+    candidates = wp.bvh_query_ray(world.pierced_hierarchy, o, d)
+    k = int(0)
+    while wp.bvh_query_next(candidates, k, met.t):
+        b = world.pierced[k]
+        if (world.bodies[b].pierced & through) != 0:
+            origin = to_mesh_point(world, b, o)
+            direction = to_mesh_vector(world, b, d)
+            strike = beyond_holes(world, b, origin, direction, met.t, through)
+            if strike.face >= 0:
+                met.t = strike.t
+                met.at = wp.vec2i(b, strike.face)
+                met.weight = wp.vec2(strike.v, 1.0 - strike.u - strike.v)
+    return met
 
 
 @wp.kernel
@@ -57,7 +96,7 @@ def trace_pixels(view: View, world: World, t_min: float, hits: wp.array(dtype=wp
     d = view.R_world_camera @ pixel_direction(view, x, y)
     hit = wp.vec2i(-1, -1)
     if shows(view, i):
-        hit = nearest_hit(world, view.eye_m, d, t_min)
+        hit = first_met(world, view.eye_m + d * t_min, d, FARTHEST, HOLES).at
     hits[i] = hit
 
 
@@ -101,10 +140,7 @@ def cut_by(world: World, b: int, path: Path, through: int):
     if hit:
         o = to_mesh_point(world, b, path.origin)
         d = to_mesh_vector(world, b, path.way)
-        mesh = world.geometries[world.bodies[b].geometry].mesh
-        hit = wp.mesh_query_ray_anyhit(mesh, o, d, 1.0)
-        if hit and (world.bodies[b].pierced & through) != 0:
-            hit = beyond_holes(world, b, o, d, 1.0, through).result != 0
+        hit = cut_in_mesh(world, b, o, d, 1.0, through)
     return hit
 
 
@@ -120,16 +156,36 @@ def blocked(world: World, path: Path):
     return cut(world, path, LIGHT)
 
 
-@wp.func(**OUT_OF_LINE)
+@wp.func
 def cut(world: World, path: Path, through: int):
     """Whether anything cuts a path that passes what ``through`` says."""
+    hit = any_in_scene(
+        world.tree,
+        world.hierarchy,
+        world.bodies,
+        world.geometries,
+        path.origin,
+        path.way,
+        1.0,
+        through,
+    )
+    if not hit and world.pierced_hierarchy != wp.uint64(0):
+        hit = cut_by_pierced(world, path, through)
+    return hit
+
+
+@wp.func(**OUT_OF_LINE)
+def cut_by_pierced(world: World, path: Path, through: int):
+    """Whether a body that may be passed cuts a path."""
     hit = bool(False)
-    candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, 1.0):
-        hit = cut_by(world, b, path, through)
-        if hit:
-            break
+    candidates = wp.bvh_query_ray(world.pierced_hierarchy, path.origin, path.way)
+    k = int(0)
+    while wp.bvh_query_next(candidates, k, 1.0):
+        b = world.pierced[k]
+        if (world.bodies[b].pierced & through) != 0:
+            hit = cut_by(world, b, path, through)
+            if hit:
+                break
     return hit
 
 
@@ -151,15 +207,10 @@ def blocked_by_listed(
     return hit
 
 
-@wp.func(**OUT_OF_LINE)
+@wp.func
 def free_path(world: World, path: Path):
     """The part of a path that is free, from 0 to 1."""
-    free = float(1.0)
-    candidates = wp.bvh_query_ray(world.tree, path.origin, path.way)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, free):
-        free = freed_by(world, b, path, free)
-    return free
+    return first_met(world, path.origin, path.way, 1.0, LIGHT).t
 
 
 @wp.func
@@ -185,9 +236,9 @@ def freed_by(world: World, b: int, path: Path, free: float):
     if enters_box(world, b, path):
         o = to_mesh_point(world, b, path.origin)
         d = to_mesh_vector(world, b, path.way)
-        answer = solid_hit(world, b, o, d, free, LIGHT)
-        if answer.result:
-            free = answer.t
+        strike = solid_hit(world, b, o, d, free, LIGHT)
+        if strike.face >= 0:
+            free = strike.t
     return free
 
 

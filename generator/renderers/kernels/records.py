@@ -53,12 +53,15 @@ class Geometry:
     """One mesh in its own frame.
 
     Attributes:
+        mesh: Warp's hierarchy, on CUDA; 0 on the CPU.
+        tree: That of generator.renderers.trees, on the CPU; empty on CUDA.
         faces: Three vertex indices per face, flat.
         box_lows_m, box_highs_m: Corners of boxes that together hold all faces.
         convex: 1 where the mesh is a convex solid: seen from outside it never shades itself.
     """
 
     mesh: wp.uint64
+    tree: wp.array(dtype=wp.float32)
     vertices_m: wp.array(dtype=wp.vec3)
     normals: wp.array(dtype=wp.vec3)
     uvs: wp.array(dtype=wp.vec2)
@@ -343,11 +346,17 @@ class World:
     """Everything that is not the camera.
 
     Attributes:
-        tree: Top-level hierarchy over the bodies' boxes.
+        tree: Over the bodies' boxes, see generator.renderers.trees; empty on CUDA.
+        hierarchy: Warp's over the same, on CUDA; 0 on the CPU.
+        pierced: Bodies of which rays may pass some faces.
+        pierced_hierarchy: Warp's over their boxes; 0 where there are none.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
     """
 
-    tree: wp.uint64
+    tree: wp.array(dtype=wp.float32)
+    hierarchy: wp.uint64
+    pierced: wp.array(dtype=wp.int32)
+    pierced_hierarchy: wp.uint64
     geometries: wp.array(dtype=Geometry)
     bodies: wp.array(dtype=Body)
     surfaces: wp.array(dtype=Surface)
@@ -389,6 +398,16 @@ def corners_of(world: World, g: int, face: int):
 def vertex_at(world: World, g: int, i: int):
     """Vertex i of geometry g."""
     return world.geometries[g].vertices_m[i]
+
+
+@wp.func
+def flat_normal(world: World, hit: wp.vec2i):
+    """Unit normal of a (body, face) in the world, on the side where its corners turn left."""
+    g = world.bodies[hit[0]].geometry
+    corner = corners_of(world, g, hit[1])
+    p = vertex_at(world, g, corner[0])
+    n = wp.cross(vertex_at(world, g, corner[1]) - p, vertex_at(world, g, corner[2]) - p)
+    return world.bodies[hit[0]].R_world_mesh @ wp.normalize(n)
 
 
 @wp.func

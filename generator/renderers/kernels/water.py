@@ -15,19 +15,17 @@ from generator.renderers.kernels.ground import (
     puddle_at,
     snow_at,
 )
-from generator.renderers.kernels.holes import solid_hit
 from generator.renderers.kernels.lattice import Lattice, cell_at, corner_of, ray_origin
 from generator.renderers.kernels.lighting import SUN, beam_from
 from generator.renderers.kernels.optics import pixel_of
-from generator.renderers.kernels.rays import unsheltered
+from generator.renderers.kernels.rays import first_met, unsheltered
 from generator.renderers.kernels.records import (
     HOLES,
     View,
     World,
+    flat_normal,
     pixel_direction,
     surface_index,
-    to_mesh_point,
-    to_mesh_vector,
     unit,
 )
 from generator.renderers.kernels.shade import Images
@@ -35,6 +33,9 @@ from generator.renderers.kernels.sky import sky_irradiance, sky_rest
 from generator.renderers.kernels.texturing import sampler_of, texel_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# How far mirrored rays are followed.
+MIRRORED_M = wp.constant(1.0e3)
 
 # Fresnel reflectance of water at normal incidence.
 WATER_F0 = wp.constant(0.02)
@@ -162,21 +163,11 @@ def mirrored(
     width: float,
 ):
     """Radiance along a mirrored ray."""
-    nearest = float(1.0e3)
-    hit = wp.vec2i(-1, -1)
-    normal = wp.vec3(0.0)
-    candidates = wp.bvh_query_ray(world.tree, origin, d)
-    b = int(0)
-    while wp.bvh_query_next(candidates, b, nearest):
-        o = to_mesh_point(world, b, origin)
-        answer = solid_hit(world, b, o, to_mesh_vector(world, b, d), nearest, HOLES)
-        if answer.result:
-            nearest = answer.t
-            hit = wp.vec2i(b, answer.face)
-            normal = world.bodies[b].R_world_mesh @ answer.normal
-    if hit[0] < 0:
+    m = first_met(world, origin, d, MIRRORED_M, HOLES)
+    if m.at[0] < 0:
         return mirrored_sky(world, d, width)
-    return mirrored_body(view, world, images, radiance, origin, d, nearest, hit, normal)
+    normal = flat_normal(world, m.at)
+    return mirrored_body(view, world, images, radiance, origin, d, m.t, m.at, normal)
 
 
 @wp.func
