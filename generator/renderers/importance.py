@@ -13,16 +13,20 @@ _HEIGHT_MAX = 512
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def sky_shares(image: Float32) -> tuple[Float32, Float32]:
+def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]:
     """Cumulated light of an equirectangular image, looked up bilinearly.
 
     Args:
         image: Radiance, [h, 2h, 3].
+        whole: Whether to take all light, or what is brighter than the mean: the rest is found as
+            well by surfaces that look around. Source: Karlik et al., "MIS compensation", SIGGRAPH
+            Asia 2019, section 5.
 
     Returns:
-        Shares of the light above the upper edge of each row, [rows + 1], and in each row of its
-        light left of each column's edge, [rows, columns + 1]. Images of more than 512 rows have
-        theirs taken together. Wherever there is light, there is a share.
+        The part of the light that is taken; shares of that above the upper edge of each row,
+        [rows + 1]; and in each row those left of each column's edge, [rows, columns + 1]. Images
+        of more than 512 rows have theirs taken together. If ``whole``, there is a share wherever
+        there is light.
     """
     luminance = np.einsum("hwc,c->hw", image.astype(np.float64), _LUMINANCE, optimize=False)
     light = _mean_of_texels(np.maximum(luminance, 0.0))
@@ -30,10 +34,15 @@ def sky_shares(image: Float32) -> tuple[Float32, Float32]:
         size = (2 * _HEIGHT_MAX, _HEIGHT_MAX)
         light = np.asarray(cv2.resize(light, size, interpolation=cv2.INTER_AREA), np.float64)
     edges = np.cos(np.pi * np.arange(len(light) + 1) / len(light))
-    light = light * (edges[:-1] - edges[1:])[:, None]
-    if not light.any():
-        light = np.ones_like(light)
-    return _cumulated(light.sum(axis=1)), _cumulated(light)
+    areas = (edges[:-1] - edges[1:])[:, None]
+    taken = light * areas
+    if not whole:
+        mean = float(taken.sum()) / (float(areas.sum()) * light.shape[1])
+        taken = np.maximum(light - mean, 0.0) * areas
+    part = float(taken.sum()) / max(float((light * areas).sum()), 1e-300)
+    # Below what rounding leaves of an even sky.
+    part = part if part > 1e-6 else 0.0
+    return part, _cumulated(taken.sum(axis=1)), _cumulated(taken)
 
 
 def _mean_of_texels(values: Array) -> Array:

@@ -86,7 +86,7 @@ class PathTracer:
             seed: Images of other seeds have other noise.
             lights: How sources are found: 1 by asking them, 2 by meeting them, 3 by both.
         """
-        sky = self._sky_light(scene.environment.image)
+        sky = self._sky_light(scene.environment.image, whole=lights == 1)
         record = world.record
         record.lobes = self._lobes
         record.lamps = wp.array(
@@ -135,16 +135,17 @@ class PathTracer:
         budget.lights = lights
         return budget
 
-    def _sky_light(self, environment_id: str) -> _SkyLight:
+    def _sky_light(self, environment_id: str, *, whole: bool) -> _SkyLight:
         def make() -> _SkyLight:
             device = self._stock.device
             image = self._stock.assets.environment(environment_id)
-            rows, columns = sky_shares(image)
+            part, rows, columns = sky_shares(image, whole=whole)
             table = SkyTable()
+            table.part = part
             table.rows = wp.array(rows, dtype=float, device=device)
             table.columns = wp.array(columns, dtype=float, device=device)
             small = cv2.resize(image, _IRRADIANCE_SIZE, interpolation=cv2.INTER_AREA)
             irradiance = wp.array(irradiance_coefficients(small), dtype=wp.vec3, device=device)
             return _SkyLight(table, irradiance, rows.nbytes + columns.nbytes)
 
-        return self._skies.get(environment_id, make)
+        return self._skies.get((environment_id, whole), make)

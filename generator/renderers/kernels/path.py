@@ -20,6 +20,7 @@ from generator.renderers.kernels.dielectrics import (
     pane_transmittance,
 )
 from generator.renderers.kernels.ground import coat_at, coated
+from generator.renderers.kernels.holes import OUT_OF_LINE
 from generator.renderers.kernels.layers import maps_at
 from generator.renderers.kernels.lighting import SUN
 from generator.renderers.kernels.look import Look, look_at_hit
@@ -210,7 +211,7 @@ def vertex_of(world: World, hit: Met, d: wp.vec3, width_m: float):
     return v
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def layered(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: float):
     """A surface with all there is to it."""
     maps = maps_at(world, v.surface, at, weight, width_m)
@@ -228,7 +229,7 @@ def layered(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: flo
     return v
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
     """A surface as the weather leaves it; ``n`` is its normal without bumps."""
     exposed = float(1.0)
@@ -277,10 +278,17 @@ def lets_straight(world: World, surface: int):
 def light_through(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear: int):
     """What is left of light from a distance."""
     through = wp.vec3(1.0, 1.0, 1.0)
-    if clear == 0:
-        if cut(world, path_along(o, d * distance_m), HOLES):
-            through = wp.vec3(0.0)
-        return through
+    if clear != 0:
+        through = light_through_panes(world, o, d, distance_m)
+    elif cut(world, path_along(o, d * distance_m), HOLES):
+        through = wp.vec3(0.0)
+    return through
+
+
+@wp.func(**OUT_OF_LINE)
+def light_through_panes(world: World, o: wp.vec3, d: wp.vec3, distance_m: float):
+    """What is left of light where some surfaces let it through."""
+    through = wp.vec3(1.0, 1.0, 1.0)
     origin = o
     rest_m = distance_m
     passages = int(0)
@@ -330,8 +338,8 @@ def sky_met(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3
     if world.sky.luminance > 0.0:
         place = sky_place(world.sky, d)
         part = float(1.0)
-        if a.density >= 0.0 and budget.lights != 2:
-            asked = sky_density(table, place) * sky_weight(world.sky, a.n)
+        if a.density >= 0.0 and budget.lights != 2 and table.part > 0.0:
+            asked = sky_density(table, place) * sky_weight(world.sky, table, a.n)
             asked = asked / wp.max(a.total, 1.0e-20)
             part = preferred(a.density, asked) * float(budget.lights >> 1)
         light = sky_light(world.sky, place) * part
@@ -410,7 +418,7 @@ def lot_between(reflected: float, passed: float):
     return p
 
 
-@wp.func
+@wp.func(**OUT_OF_LINE)
 def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
     """Glass; of panes, whether they reflect or let pass. ``w`` is to where the path comes from."""
     out = Dealt()
@@ -543,7 +551,7 @@ def step_from(
     o = lifted(v.p, v.flat)
     # Inside glass nothing is asked: what is outside is seen by going there.
     if dealt.kind == OPAQUE or (dealt.kind == SOLID and v.outside):
-        choice = choose_source(world, o, n, choices[1])
+        choice = choose_source(world, table, o, n, choices[1])
         step.density = sent.density
         step.total = choice.total
         if choice.part > 0.0 and budget.lights != 2:

@@ -1,7 +1,8 @@
 """Light sources, for paths: drawn from, and met by chance.
 
 Sources: Veach, "Robust Monte Carlo methods for light transport simulation", 1997 (multiple
-importance sampling, power heuristic); Shirley, Wang and Zimmerman, "Monte Carlo techniques for
+importance sampling, power heuristic); Karlik et al., "MIS compensation: optimizing sampling
+techniques in multiple importance sampling", SIGGRAPH Asia 2019 (skies); Shirley, Wang and Zimmerman, "Monte Carlo techniques for
 direct lighting calculations", ACM TOG 15(1), 1996 (spheres by their cone, panels by area).
 """
 
@@ -25,13 +26,15 @@ SKY = wp.constant(-1)
 
 @wp.struct
 class SkyTable:
-    """Where a sky's light comes from.
+    """Where the light comes from for which a sky is asked.
 
     Attributes:
+        part: Of the sky's light; the rest is left to paths that meet it by chance.
         rows: Share of the light above each row's upper edge, [rows + 1].
         columns: In each row, share of its light left of each column's edge, [rows, columns + 1].
     """
 
+    part: float
     rows: wp.array(dtype=float)
     columns: wp.array(dtype=float, ndim=2)
 
@@ -109,10 +112,13 @@ def lamp_weight(lamp: Lamp, p: wp.vec3, n: wp.vec3):
 
 
 @wp.func
-def sky_weight(sky: Sky, n: wp.vec3):
-    """About the illuminance [lx] that the sky gives a surface."""
-    mean = luminance(sky.irradiance[0]) * sky.luminance
-    return wp.pi * (luminance(sky_irradiance(sky, n)) + SKY_FLOOR * mean)
+def sky_weight(sky: Sky, table: SkyTable, n: wp.vec3):
+    """About the illuminance [lx] that a surface gets from what the sky is asked for."""
+    weight = float(0.0)
+    if table.part * sky.luminance > 0.0:
+        mean = luminance(sky.irradiance[0]) * sky.luminance
+        weight = wp.pi * table.part * (luminance(sky_irradiance(sky, n)) + SKY_FLOOR * mean)
+    return weight
 
 
 @wp.func
@@ -334,13 +340,11 @@ class Choice:
 
 
 @wp.func
-def choose_source(world: World, p: wp.vec3, n: wp.vec3, u: float):
+def choose_source(world: World, table: SkyTable, p: wp.vec3, n: wp.vec3, u: float):
     """One source, nearly in proportion to the light that it gives a surface if nothing shades."""
     c = Choice()
     c.source = SKY
-    weight = float(0.0)
-    if world.sky.luminance > 0.0:
-        weight = sky_weight(world.sky, n)
+    weight = sky_weight(world.sky, table, n)
     c.total = weight
     rest = u
     for j in range(world.lamps.shape[0]):
