@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import warp as wp
+
+from generator.renderers import kernels
+from generator.renderers.device import open_device
 
 _FIRST_SAMPLE = """
 from generator.assemble.recipe import open_pipeline
@@ -17,6 +22,12 @@ spec = load_spec("tabletop.yaml", overrides=["sensors=[{type: rgb_camera, size_p
 with open_pipeline(spec) as pipeline:
     pipeline.sample(0)
 """
+
+KERNEL_MODULES = sorted(
+    path.stem
+    for path in Path(kernels.__path__[0]).glob("*.py")
+    if "@wp.kernel" in path.read_text(encoding="utf-8")
+)
 
 
 @pytest.mark.slow
@@ -32,6 +43,19 @@ def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes(tmp_path: 
     for _process in range(2):
         subprocess.run([sys.executable, "-c", _FIRST_SAMPLE], env=environment, check=True)
         assert _modules(tmp_path) == compiled
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", KERNEL_MODULES)
+def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
+    """To PTX, which takes Warp's compiler but no GPU."""
+    open_device("cpu")
+    module = importlib.import_module(f"{kernels.__name__}.{name}")
+
+    wp.compile_aot_module(module, arch=80, module_dir=tmp_path, use_ptx=True)
+
+    (assembly,) = tmp_path.glob("*.ptx")
+    assert ".entry" in assembly.read_text()
 
 
 def _modules(cache: Path) -> list[str]:

@@ -18,9 +18,10 @@ from generator.renderers.kernels.records import Body, Geometry
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-Found = wp.types.vector(length=5, dtype=wp.float64)
+Found = wp.spatial_vectord
 """Where a ray meets something: parameter, weights of a face's first and second corner, face, body;
-body and face are -1 where it meets nothing."""
+body and face are -1 where it meets nothing. The last of the six numbers is spare; older Warps know
+only types of their own as results of native functions."""
 
 _RAY = """
     typedef float Lanes __attribute__((ext_vector_type(8)));
@@ -205,7 +206,7 @@ _IN_SCENE = """
 """
 
 _IN_SCENE_CUDA = """
-    wp::bvh_query_t candidates = wp::bvh_query_ray(hierarchy, o, d);
+    wp::bvh_query_t candidates = wp::bvh_query_ray(hierarchy, o, d, -1);
     float t = reach, u = 0.0f, v = 0.0f;
     int body = -1, face = -1, b = 0;
     while (!(ANY && body >= 0) && wp::bvh_query_next(candidates, b, t)) {
@@ -227,7 +228,7 @@ _IN_SCENE_CUDA = """
 def _snippet(cpu: str, cuda: str, *, found: bool) -> str:
     """One text for both devices; on the CPU out of line: most modules go through trees often."""
     told = """
-    typedef wp::vec_t<5, double> Found;
+    typedef wp::vec_t<6, double> Found;
     auto told = [](float t, float u, float v, int face, int body) {
         Found found;
         found[0] = t; found[1] = u; found[2] = v; found[3] = face; found[4] = body;
@@ -251,7 +252,7 @@ def _scene_snippet(*, found: bool) -> str:
 @wp.func_native(_snippet(_FIRST_IN_MESH, _FIRST_IN_MESH_CUDA, found=True))
 def first_in_mesh(
     tree: wp.array(dtype=wp.float32), mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
-) -> Found:
+) -> wp.spatial_vectord:
     """The first face along a ray in the mesh frame, nearer than a parameter."""
     ...
 
@@ -276,7 +277,7 @@ def first_in_scene(
     d: wp.vec3,
     reach: float,
     through: int,
-) -> Found:
+) -> wp.spatial_vectord:
     """The first face along a ray of all bodies but those that are pierced by what it passes."""
     ...
 
