@@ -1,12 +1,12 @@
 """CPU seconds until a path-traced image looks converged: ``python -m benchmarks.bench_pathtraced``.
 
-Two scenes of the tests, a closed box and a gold ball under a panel and a sky, 128x96. Each renderer
-makes a reference of its own, then images of 1, 2, 4, ... samples until their FLIP against it
-(Andersson et al. 2020) falls below 0.05; between two of them time is interpolated on logarithmic
-axes. Beside this project's tier on the CPU, as it is and with its denoiser, runs Mitsuba 3:
-vectorised (``llvm_ad_rgb``, which loads an LLVM of the system, see DRJIT_LIBLLVM_PATH), or
-``scalar_rgb`` where that fails; its denoiser needs a GPU of one make. Every renderer runs in a
-process of its own; time is the process's CPU time of one image, kernels being ready.
+The scenes of the tests against Mitsuba, 128x96; half an hour for all twelve. Each renderer makes a
+reference of its own, then images of 1, 2, 4, ... samples until their FLIP against it (Andersson et
+al. 2020) falls below 0.05; between two of them time is interpolated on logarithmic axes. Beside
+this project's tier on the CPU, as it is and with its denoiser, runs Mitsuba 3: vectorised
+(``llvm_ad_rgb``, which loads an LLVM of the system, see DRJIT_LIBLLVM_PATH), and ``scalar_rgb``;
+its denoiser needs a GPU of one make. Every renderer runs in a process of its own; time is the
+process's CPU time of one image, kernels being ready.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -30,7 +30,6 @@ from tests.renderers.mitsuba_scene import mitsuba_scene
 from tests.renderers.paths import settings_of
 from tests.renderers.test_path_tracing_against_mitsuba import PICTURES, Picture, flip_of
 
-SCENES = ("cornell", "metal")
 OWN = ("own", "own, denoised")
 SIZE_PX = (128, 96)
 GOAL = 0.05
@@ -103,10 +102,12 @@ def seconds_to_goal(rows: list[tuple[int, float, float]]) -> float:
     return math.exp(math.log(t0) + part * math.log(t1 / t0))
 
 
-def in_a_process(renderer: str, reference_samples: int) -> dict[str, list] | None:
-    """All scenes by one renderer; None if it cannot run here."""
+def in_a_process(
+    renderer: str, scenes: Sequence[str], reference_samples: int
+) -> dict[str, list] | None:
+    """Scenes by one renderer; None if it cannot run here."""
     command = [sys.executable, "-m", "benchmarks.bench_pathtraced", "--renderer", renderer]
-    command += ["--reference", str(reference_samples)]
+    command += ["--reference", str(reference_samples), "--scenes", *scenes]
     finished = subprocess.run(command, capture_output=True, text=True, check=False)
     lines = [line for line in finished.stdout.splitlines() if line.startswith("{")]
     return json.loads(lines[-1]) if finished.returncode == 0 and lines else None
@@ -117,10 +118,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--reference", type=int, default=4096, help="samples of references")
     parser.add_argument("--renderer", help="one of OWN or a variant of Mitsuba: that one alone")
+    parser.add_argument("--scenes", nargs="+", choices=PICTURES, default=list(PICTURES))
     arguments = parser.parse_args()
     if arguments.renderer:
         figures = {}
-        for scene in SCENES:
+        for scene in arguments.scenes:
             picture = picture_of(scene)
             ours = arguments.renderer in OWN
             plain = own(picture) if ours else theirs(picture, arguments.renderer)
@@ -129,7 +131,7 @@ def main() -> None:
         print(json.dumps(figures))
         return
     table = {
-        renderer: in_a_process(renderer, arguments.reference)
+        renderer: in_a_process(renderer, arguments.scenes, arguments.reference)
         for renderer in (*OWN, "llvm_ad_rgb", "scalar_rgb")
     }
     for renderer, figures in table.items():
@@ -140,7 +142,7 @@ def main() -> None:
             samples, cpu_s, flip = rows[-1]
             per_path_us = 1e6 * cpu_s / (samples * SIZE_PX[0] * SIZE_PX[1])
             print(
-                f"{renderer:13} {scene:8} FLIP {GOAL} after {seconds_to_goal(rows):6.2f} CPU s;"
+                f"{renderer:13} {scene:15} FLIP {GOAL} after {seconds_to_goal(rows):6.3f} CPU s;"
                 f" {samples} samples: FLIP {flip:.4f}, {per_path_us:.2f} us per path"
             )
 

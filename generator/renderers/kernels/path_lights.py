@@ -2,8 +2,9 @@
 
 Sources: Veach, "Robust Monte Carlo methods for light transport simulation", 1997 (multiple
 importance sampling, power heuristic); Karlik et al., "MIS compensation: optimizing sampling
-techniques in multiple importance sampling", SIGGRAPH Asia 2019 (skies); Shirley, Wang and Zimmerman, "Monte Carlo techniques for
-direct lighting calculations", ACM TOG 15(1), 1996 (spheres by their cone, panels by area).
+techniques in multiple importance sampling", SIGGRAPH Asia 2019 (skies); Shirley, Wang and
+Zimmerman, "Monte Carlo techniques for direct lighting calculations", ACM TOG 15(1), 1996 (spheres
+by their cone, panels by area).
 """
 
 from __future__ import annotations
