@@ -148,4 +148,4 @@ class PathTracer:
             irradiance = wp.array(irradiance_coefficients(small), dtype=wp.vec3, device=device)
             return _SkyLight(table, irradiance, rows.nbytes + columns.nbytes)
 
-        return self._skies.get((environment_id, whole), make)
+        return self._skies.get(f"{environment_id} {whole}", make)
