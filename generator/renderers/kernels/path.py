@@ -566,6 +566,17 @@ def step_from(
 
 
 @wp.func
+def anchor_of(step: Step, n: wp.vec3):
+    """The anchor that a vertex with a normal becomes, where a path has just left it."""
+    a = Anchor()
+    a.p = step.o
+    a.n = n
+    a.density = step.density
+    a.total = step.total
+    return a
+
+
+@wp.func
 def path_light(
     view: View,
     world: World,
@@ -623,17 +634,12 @@ def path_light(
                     a.way_m = end_m
                 else:
                     bounces += 1
-                    a.p = step.o
-                    a.n = v.look.normal
-                    a.density = step.density
-                    a.total = step.total
-                    a.way_m = 0.0
+                    a = anchor_of(step, v.look.normal)
                     if a.density > 0.0:
                         # A direction stands for those around it that are not drawn.
                         spread = wp.sqrt(1.0 / (a.density * float(budget.whole)))
                         cone = wp.max(cone, wp.min(spread, 0.5))
-                    if bounces == 1:
-                        worth = WORTH * wp.max(through)
+                    worth = wp.where(bounces == 1, WORTH * wp.max(through), worth)
                     keep = wp.max(through) / wp.max(worth, 1.0e-20)
                     if going and keep < 1.0:
                         going = random_number(key, pair, sample) < keep

@@ -19,9 +19,8 @@ from generator.renderers.kernels.records import Body, Geometry
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 Found = wp.spatial_vectord
-"""Where a ray meets something: parameter, weights of a face's first and second corner, face, body;
-body and face are -1 where it meets nothing. The last of the six numbers is spare; older Warps know
-only types of their own as results of native functions."""
+"""Where a ray meets something: parameter, weights of a face's first and second corner, face, body
+(0 within a mesh), and a spare number; face and body are -1 where it meets nothing."""
 
 _RAY = """
     typedef float Lanes __attribute__((ext_vector_type(8)));
@@ -156,31 +155,13 @@ _RAY = """
     };
 """
 
-_FIRST_IN_MESH = """
+_IN_MESH = """
     Ray ray;
     start(ray, o, d);
     Walk walk;
     walk.top = 0;
     Strike strike = {reach, 0.0f, 0.0f, -1};
-    search(walk, tree.data, ray, strike, false);
-    return told(strike.t, strike.u, strike.v, strike.face, -1);
-"""
-
-_FIRST_IN_MESH_CUDA = """
-    float t = reach, u = 0.0f, v = 0.0f, sign;
-    int face = -1;
-    wp::vec3 normal;
-    wp::mesh_query_ray(mesh, o, d, reach, t, u, v, sign, normal, face);
-    return told(t, u, v, face, -1);
-"""
-
-_ANY_IN_MESH = """
-    Ray ray;
-    start(ray, o, d);
-    Walk walk;
-    walk.top = 0;
-    Strike strike = {reach, 0.0f, 0.0f, -1};
-    return search(walk, tree.data, ray, strike, true);
+    const int body = search(walk, tree.data, ray, strike, ANY) ? 0 : -1;
 """
 
 _IN_SCENE = """
@@ -205,51 +186,69 @@ _IN_SCENE = """
     } while (!(ANY && body >= 0) && next(walk, 0, strike.t, code));
 """
 
-_IN_SCENE_CUDA = """
+_STRIKE_ON_CUDA = """
+    struct { float t, u, v; int face; } strike = {reach, 0.0f, 0.0f, -1};
+    float sign;
+    wp::vec3 normal;
+    auto search = [&](uint64_t mesh, const wp::vec3& o, const wp::vec3& d) {
+        return ANY ? wp::mesh_query_ray_anyhit(mesh, o, d, strike.t)
+                   : wp::mesh_query_ray(mesh, o, d, strike.t, strike.t, strike.u, strike.v, sign,
+                                        normal, strike.face);
+    };
+"""
+
+_IN_MESH_ON_CUDA = """
+    const int body = search(mesh, o, d) ? 0 : -1;
+"""
+
+_IN_SCENE_ON_CUDA = """
     wp::bvh_query_t candidates = wp::bvh_query_ray(hierarchy, o, d, -1);
-    float t = reach, u = 0.0f, v = 0.0f;
-    int body = -1, face = -1, b = 0;
-    while (!(ANY && body >= 0) && wp::bvh_query_next(candidates, b, t)) {
+    int body = -1, b = 0;
+    while (!(ANY && body >= 0) && wp::bvh_query_next(candidates, b, strike.t)) {
         const auto& placed = bodies.data[b];
         if (placed.pierced & through)
             continue;
         const wp::vec3 begin = mul(placed.B_mesh_world, o) + placed.t_mesh_world;
-        const wp::vec3 way = mul(placed.B_mesh_world, d);
-        const uint64_t mesh = geometries.data[placed.geometry].mesh;
-        float sign;
-        wp::vec3 normal;
-        if (ANY ? wp::mesh_query_ray_anyhit(mesh, begin, way, t)
-                : wp::mesh_query_ray(mesh, begin, way, t, t, u, v, sign, normal, face))
+        if (search(geometries.data[placed.geometry].mesh, begin, mul(placed.B_mesh_world, d)))
             body = b;
     }
 """
 
+_FOUND = """
+    wp::vec_t<6, double> found;
+    found[0] = strike.t;
+    found[1] = strike.u;
+    found[2] = strike.v;
+    found[3] = strike.face;
+    found[4] = body;
+    return found;
+"""
 
-def _snippet(cpu: str, cuda: str, *, found: bool) -> str:
-    """One text for both devices; on the CPU out of line: most modules go through trees often."""
-    told = """
-    typedef wp::vec_t<6, double> Found;
-    auto told = [](float t, float u, float v, int face, int body) {
-        Found found;
-        found[0] = t; found[1] = u; found[2] = v; found[3] = face; found[4] = body;
-        return found;
-    };
+
+def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
+    """One text for both devices.
+
+    On the CPU it is a function out of line: most modules go through trees in several places.
+
+    Args:
+        cpu, cuda: Look for a ``body`` and its ``strike``, either one (if ``ANY``) or the first.
+        first: Whether to tell all about the first, or whether there is any.
     """
-    result = "Found" if found else "bool"
-    walk = f"auto walked = [&]() __attribute__((noinline)) -> {result} {{{cpu}}};\nreturn walked();"
-    return f"{told}\n#ifdef __CUDA_ARCH__\n{cuda}\n#else\n{_RAY}\n{walk}\n#endif\n"
+    any_only = f"constexpr bool ANY = {str(not first).lower()};"
+    told = _FOUND if first else "    return body >= 0;\n"
+    return f"""
+#ifdef __CUDA_ARCH__
+    {any_only}{_STRIKE_ON_CUDA}{cuda}{told}
+#else
+    auto walked = [&]() __attribute__((noinline)) {{
+    {any_only}{_RAY}{cpu}{told}
+    }};
+    return walked();
+#endif
+"""
 
 
-def _scene_snippet(*, found: bool) -> str:
-    any_only = f"const bool ANY = {str(not found).lower()};"
-    cpu = "return told(strike.t, strike.u, strike.v, strike.face, body);"
-    cuda = "return told(t, u, v, face, body);"
-    if not found:
-        cpu = cuda = "return body >= 0;"
-    return _snippet(any_only + _IN_SCENE + cpu, any_only + _IN_SCENE_CUDA + cuda, found=found)
-
-
-@wp.func_native(_snippet(_FIRST_IN_MESH, _FIRST_IN_MESH_CUDA, found=True))
+@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=True))
 def first_in_mesh(
     tree: wp.array(dtype=wp.float32), mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> wp.spatial_vectord:
@@ -257,9 +256,7 @@ def first_in_mesh(
     ...
 
 
-@wp.func_native(
-    _snippet(_ANY_IN_MESH, "return wp::mesh_query_ray_anyhit(mesh, o, d, reach);", found=False)
-)
+@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=False))
 def any_in_mesh(
     tree: wp.array(dtype=wp.float32), mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> bool:
@@ -267,7 +264,7 @@ def any_in_mesh(
     ...
 
 
-@wp.func_native(_scene_snippet(found=True))
+@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, first=True))
 def first_in_scene(
     tree: wp.array(dtype=wp.float32),
     hierarchy: wp.uint64,
@@ -282,7 +279,7 @@ def first_in_scene(
     ...
 
 
-@wp.func_native(_scene_snippet(found=False))
+@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, first=False))
 def any_in_scene(
     tree: wp.array(dtype=wp.float32),
     hierarchy: wp.uint64,
