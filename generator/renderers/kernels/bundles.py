@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.records import greater, lesser
+from generator.renderers.kernels.records import greater, greater_of, lesser, lesser_of
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -64,18 +64,6 @@ def no_rays():
     bundle.way_low = wp.vec3(FAR_M)
     bundle.way_high = wp.vec3(-FAR_M)
     return bundle
-
-
-@wp.func
-def lesser_of(a: wp.vec3, b: wp.vec3):
-    """The smaller of each coordinate."""
-    return wp.vec3(lesser(a[0], b[0]), lesser(a[1], b[1]), lesser(a[2], b[2]))
-
-
-@wp.func
-def greater_of(a: wp.vec3, b: wp.vec3):
-    """The larger of each coordinate."""
-    return wp.vec3(greater(a[0], b[0]), greater(a[1], b[1]), greater(a[2], b[2]))
 
 
 @wp.func

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.records import greater, lesser
+from generator.renderers.kernels.records import greater_of, lesser_of
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -45,18 +45,6 @@ class Boxes:
 
 
 @wp.func
-def lower(a: wp.vec3, b: wp.vec3):
-    """The lower corner of the box around two."""
-    return wp.vec3(lesser(a[0], b[0]), lesser(a[1], b[1]), lesser(a[2], b[2]))
-
-
-@wp.func
-def higher(a: wp.vec3, b: wp.vec3):
-    """The higher corner of the box around two."""
-    return wp.vec3(greater(a[0], b[0]), greater(a[1], b[1]), greater(a[2], b[2]))
-
-
-@wp.func
 def half_area(low: wp.vec3, high: wp.vec3):
     """Half of a box's surface."""
     e = high - low
@@ -82,8 +70,8 @@ def around(boxes: Boxes, begin: int, end: int):
     high = -low
     i = int(begin)
     while i < end:
-        low = lower(low, boxes.lows[boxes.order[i]])
-        high = higher(high, boxes.highs[boxes.order[i]])
+        low = lesser_of(low, boxes.lows[boxes.order[i]])
+        high = greater_of(high, boxes.highs[boxes.order[i]])
         i += 1
     return low, high
 
@@ -102,8 +90,8 @@ def cut_along(
     while i < end:
         box = boxes.order[i]
         k = bin_of(middle(boxes, box)[axis], origin, scale)
-        boxes.bin_lows[k] = lower(boxes.bin_lows[k], boxes.lows[box])
-        boxes.bin_highs[k] = higher(boxes.bin_highs[k], boxes.highs[box])
+        boxes.bin_lows[k] = lesser_of(boxes.bin_lows[k], boxes.lows[box])
+        boxes.bin_highs[k] = greater_of(boxes.bin_highs[k], boxes.highs[box])
         boxes.bin_counts[k] = boxes.bin_counts[k] + 1
         i += 1
     low = nothing
@@ -111,8 +99,8 @@ def cut_along(
     count = int(0)
     k = int(BINS - 1)
     while k > 0:
-        low = lower(low, boxes.bin_lows[k])
-        high = higher(high, boxes.bin_highs[k])
+        low = lesser_of(low, boxes.bin_lows[k])
+        high = greater_of(high, boxes.bin_highs[k])
         count += boxes.bin_counts[k]
         boxes.costs[k] = FARTHEST
         if count > 0:
@@ -125,8 +113,8 @@ def cut_along(
     count = int(0)
     k = int(1)
     while k < BINS:
-        low = lower(low, boxes.bin_lows[k - 1])
-        high = higher(high, boxes.bin_highs[k - 1])
+        low = lesser_of(low, boxes.bin_lows[k - 1])
+        high = greater_of(high, boxes.bin_highs[k - 1])
         count += boxes.bin_counts[k - 1]
         if count > 0 and boxes.costs[k] < FARTHEST:
             cost = boxes.costs[k] + half_area(low, high) * float((count + leaf - 1) / leaf)
@@ -144,8 +132,8 @@ def split(boxes: Boxes, begin: int, end: int, leaf: int):
     high = -low
     i = int(begin)
     while i < end:
-        low = lower(low, middle(boxes, boxes.order[i]))
-        high = higher(high, middle(boxes, boxes.order[i]))
+        low = lesser_of(low, middle(boxes, boxes.order[i]))
+        high = greater_of(high, middle(boxes, boxes.order[i]))
         i += 1
     best = float(FARTHEST)
     best_axis = int(-1)

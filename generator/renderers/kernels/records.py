@@ -333,6 +333,18 @@ def greater(a: float, b: float):
 
 
 @wp.func
+def lesser_of(a: wp.vec3, b: wp.vec3):
+    """The smaller of each coordinate."""
+    return wp.vec3(lesser(a[0], b[0]), lesser(a[1], b[1]), lesser(a[2], b[2]))
+
+
+@wp.func
+def greater_of(a: wp.vec3, b: wp.vec3):
+    """The larger of each coordinate."""
+    return wp.vec3(greater(a[0], b[0]), greater(a[1], b[1]), greater(a[2], b[2]))
+
+
+@wp.func
 def floor_int(x: float):
     """The largest integer <= x; ``wp.floor`` is a library call on the plainest processors."""
     i = int(x)
