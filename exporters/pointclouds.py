@@ -21,10 +21,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.base import ExporterBase
 from exporters.clouds import read_points, scanner_of
 from exporters.images import link_or_copy
 from exporters.sensors import scanned
-from generator.config.strict import Strict
 from generator.core.boxes import OrientedBox
 from generator.core.errors import ConfigError
 from generator.core.instants import at
@@ -53,7 +53,7 @@ PLY_TYPES = {"<f4": "float", "<u2": "uint16", "|u1": "uint8"}
 PCD_TYPES = {"<f4": ("4", "F"), "<u2": ("2", "U"), "|u1": ("1", "U")}
 
 
-class PointClouds(Strict):
+class PointClouds(ExporterBase):
     """PLY or PCD files of every laser scan."""
 
     type: Literal["pointclouds"] = "pointclouds"

@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
 import cv2
 
-from generator.annotations.truth import AnyAnnotator, complete_truth, frame_truth
-from generator.assemble.spec import Layout, Spec
-from generator.assemble.tables import TABLES
+from generator.annotations.truth import complete_truth, frame_truth
+from generator.assemble.spec import SceneConfig, Spec
+from generator.assemble.tables import ANNOTATIONS, default_plugin
 from generator.assets.library import Library, open_library
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex, DatasetInfo, Exporter, GeometryExporter, Renderer
+from generator.core.interfaces import (
+    AnyAnnotator,
+    AssetIndex,
+    DatasetInfo,
+    Exporter,
+    Modality,
+    Randomizer,
+    SensorInfo,
+)
 from generator.core.scene import Scene, SharedValue
-from generator.core.streams import Streams
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.pipeline.pipeline import Recipe, SceneSource
 from generator.sensors.mounting import refuse_buried, stride, within_steps
 from scene_templates.builder import build
 
-BLUEPRINTS_KEPT = 32
-IMAGING = ("camera", "lidar")
-LOOKING = (*IMAGING, "event_camera")
-"""Modalities that see nothing from inside the body that carries them."""
+NOMINAL_SCENES_KEPT = 32
 
 
 @dataclass(frozen=True)
@@ -53,14 +57,14 @@ class PipelineFactory:
             recipe,
             library,
             open_physics=partial(open_engine, library, spec.head.physics),
-            open_renderer=partial(_renderer, spec, library),
+            open_renderer=partial(spec.render.open, library),
         )
 
     @cached_property
     def nominal(self) -> tuple[Scene, ...]:
         """Nominal scenes that between them hold whatever a scene may hold."""
         library = open_library(self.spec.asset_folders)
-        return tuple(nominal_scene(self.spec, layout, library) for layout in self.spec.probes)
+        return tuple(nominal_scene(self.spec, config, library) for config in self.spec.probes)
 
     @cached_property
     def categories(self) -> tuple[str, ...]:
@@ -94,49 +98,45 @@ def recipe_of(
     """
     _check_durations(spec)
     annotators = _annotators(spec)
-    info = DatasetInfo(
-        name=spec.name,
-        seed=spec.head.seed,
-        n=n,
-        views_per_scene=spec.head.views_per_scene,
-        categories=categories,
-        sensors=tuple(sorted(s.name for s in spec.sensors if s.modality == "camera")),
-        lidars=tuple(sorted(s.name for s in spec.sensors if s.modality == "lidar")),
-        media={s.name: tuple(s.media) for s in spec.sensors if s.modality == "camera"},
-        depth_scale_m=spec.head.depth_scale_m,
-        devices={s.name: s.modality for s in spec.sensors if s.modality not in IMAGING},
-        steps_per_scene=spec.head.steps_per_scene,
-        step_s=spec.head.step_s,
-        lenses={s.name: s.intrinsics().lens.model for s in spec.sensors if s.modality == "camera"},
-    )
-    exporters = _exporters(spec, info, library)
-    needed = frozenset().union(*(a.channels for a in annotators), extra_channels)
+    info = dataset_info(spec, n, categories)
     return Recipe(
-        seed=spec.head.seed,
-        views_per_scene=spec.head.views_per_scene,
-        blueprint=blueprints(spec, library),
+        info=info,
+        open_scene=scene_source(spec, library),
         sensors=spec.sensors,
-        channels=needed,
+        channels=frozenset().union(*(a.channels for a in annotators), extra_channels),
         image_truth=partial(
             complete_truth, annotators=annotators, thresholds=spec.head.labels, assets=library
         ),
         frame_truth=partial(frame_truth, annotators=annotators, assets=library),
         split_shares=spec.split_shares,
         layout_attempts_max=spec.head.physics.layout_attempts_max,
-        info=info,
-        exporters=exporters,
-        strides=_strides(spec),
-        offsets_s={s.name: s.time_offset_s for s in spec.sensors if s.time_offset_s},
+        exporters=_exporters(spec, info, library),
+        strides=_strides(info),
+    )
+
+
+def dataset_info(spec: Spec, n: int, categories: tuple[str, ...]) -> DatasetInfo:
+    """Facts about the data set of a configuration."""
+    return DatasetInfo(
+        name=spec.name,
+        seed=spec.head.seed,
+        n=n,
+        views_per_scene=spec.head.views_per_scene,
+        categories=categories,
+        sensors=tuple(sorted((s.describe() for s in spec.sensors), key=lambda s: s.name)),
+        depth_scale_m=spec.head.depth_scale_m,
+        steps_per_scene=spec.head.steps_per_scene,
+        step_s=spec.head.step_s,
     )
 
 
 def _check_durations(spec: Spec) -> None:
-    """Raises ConfigError if a sequence goes on after what moves in it has come to its end."""
+    """Raises ConfigError if a sequence is longer than the motion in it."""
     lasts_s = (spec.head.steps_per_scene - 1) * spec.head.step_s
-    for layout in spec.probes:
-        for randomizer in layout.randomizers:
-            duration_s = getattr(randomizer, "duration_s", None)
-            if isinstance(duration_s, float) and duration_s < lasts_s - 1e-9:
+    for config in spec.probes:
+        for randomizer in config.randomizers:
+            duration_s = randomizer.motion_duration_s
+            if duration_s is not None and duration_s < lasts_s - 1e-9:
                 raise ConfigError(
                     f"randomizers.{randomizer.name}.duration_s: {duration_s:g} s is shorter than "
                     f"the sequences, {spec.head.steps_per_scene} steps of {spec.head.step_s:g} s; "
@@ -144,43 +144,55 @@ def _check_durations(spec: Spec) -> None:
                 )
 
 
-def _strides(spec: Spec) -> dict[str, int]:
-    """Every how many steps a sensor reads; devices may also read several times in one."""
+def _strides(info: DatasetInfo) -> dict[str, int]:
+    """Steps from one reading of a sensor to the next; devices may read several times per step."""
     return {
-        s.name: stride(s.name, s.rate_hz, spec.head.step_s)
-        for s in spec.sensors
-        if s.modality in IMAGING or not within_steps(s.rate_hz, spec.head.step_s)
+        s.name: stride(s.name, s.rate_hz, info.step_s)
+        for s in info.sensors
+        if s.modality is not Modality.DEVICE or not within_steps(s.rate_hz, info.step_s)
     }
 
 
-def blueprints(spec: Spec, assets: AssetIndex) -> Callable[[Streams], Blueprint]:
-    """The function that tells what one scene is made from; it remembers the last few."""
+def scene_source(spec: Spec, assets: AssetIndex) -> SceneSource:
+    """The nominal scene and the randomizers of given streams; the last few are remembered."""
 
-    @lru_cache(maxsize=BLUEPRINTS_KEPT)
-    def made(shared: tuple[tuple[str, SharedValue], ...]) -> Blueprint:
-        layout = spec.layout(shared)
-        return Blueprint(nominal_scene(spec, layout, assets), layout.randomizers)
+    @lru_cache(maxsize=NOMINAL_SCENES_KEPT)
+    def made(shared: tuple[tuple[str, SharedValue], ...]) -> tuple[Scene, Sequence[Randomizer]]:
+        config = spec.scene_config(shared)
+        return nominal_scene(spec, config, assets), config.randomizers
 
     return lambda streams: made(spec.shared(streams))
 
 
-def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
-    """The template's scene with every sensor mounted."""
-    scene = build(spec.head.template or spec.name, layout.elements, assets)
-    scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
+def nominal_scene(spec: Spec, config: SceneConfig, assets: AssetIndex) -> Scene:
+    """The template's scene with every sensor mounted.
+
+    Raises:
+        ConfigError: an element or a sensor has no place in it.
+    """
+    scene = build(spec.head.template or spec.name, config.elements, assets)
+    scene = replace(scene, shared=config.shared, step_s=spec.head.step_s)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)
-        if sensor.modality in LOOKING:
-            refuse_buried(scene, sensor.name, sensor, assets)
+        info = sensor.describe()
+        _check_mounted(scene, info)
+        if info.needs_clear_view:
+            refuse_buried(scene, info.name, assets)
     return scene
 
 
-def _renderer(spec: Spec, library: Library) -> Renderer:
-    render = spec.head.render
-    renderer: Renderer = TABLES["renderer"].load(render.renderer)(
-        library, render.device, render.settings
-    )
-    return renderer
+def _check_mounted(scene: Scene, info: SensorInfo) -> None:
+    """Raises ConfigError if a plug-in's ``mount`` and ``describe`` contradict each other."""
+    mounted = {
+        Modality.CAMERA: [camera.name for camera in scene.cameras],
+        Modality.LIDAR: [lidar.name for lidar in scene.lidars],
+        Modality.DEVICE: [device.name for device in scene.devices],
+    }
+    if info.name not in mounted[info.modality]:
+        raise ConfigError(
+            f"sensor '{info.name}': describe() names a {info.modality.value}, but mount() adds no"
+            f" {info.modality.value} of this name to the scene"
+        )
 
 
 def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...]:
@@ -197,22 +209,19 @@ def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...
 
 
 def _annotators(spec: Spec) -> Sequence[AnyAnnotator]:
-    """Those that were asked for, then those that exporters read besides."""
+    """The configuration's, then those that exporters need besides."""
     annotators = dict(spec.annotations)
     for exporter in spec.exporters:
         for name in sorted(exporter.needs - annotators.keys()):
-            annotators[name] = TABLES["annotation"].load(name)()
+            annotators[name] = default_plugin(ANNOTATIONS, name)
     return list(annotators.values())
 
 
 def _exporters(spec: Spec, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
     exporters: dict[str, Exporter] = {}
     for exporter in spec.exporters:
-        name = exporter.type
-        if name in exporters:
-            raise ConfigError(f"exporters: '{name}' is listed twice")
+        if exporter.type in exporters:
+            raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
         exporter.check(info)
-        exporters[name] = (
-            exporter.with_assets(library) if isinstance(exporter, GeometryExporter) else exporter
-        )
+        exporters[exporter.type] = exporter.with_assets(library)
     return exporters

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from generator.assemble.spec import PLUGIN_LISTS, VARYING, Head
-from generator.assemble.tables import TABLES
+from generator.assemble.spec import DEFAULT_RENDERER, PLUGIN_LISTS, VARYING, Head
+from generator.assemble.tables import ANNOTATIONS, RENDERERS
 from generator.config.schema import json_schema
 from generator.config.strict import Strict
+from generator.core.plugins import PluginTable
 
 SHARED: list[dict[str, Any]] = [
     {"type": "string", "pattern": r"^\$shared\.", "description": "A shared value."},
@@ -25,11 +26,15 @@ def config_schema() -> dict[str, Any]:
     definitions: dict[str, Any] = {}
     schema = _hoisted(json_schema(Head), definitions)
     properties = schema["properties"]
-    for key, kind in PLUGIN_LISTS.items():
+    for key, table in PLUGIN_LISTS.items():
         properties[key] = {
             "type": "array",
-            "items": {"oneOf": [_plugin(kind, name, definitions) for name in TABLES[kind]]},
+            "items": {"oneOf": [_plugin(table, name, definitions) for name in table]},
         }
+    properties["render"] = {
+        "description": "How images are made.",
+        "anyOf": [_plugin(RENDERERS, name, definitions) for name in RENDERERS],
+    }
     # A configuration overrides its template's elements by name; a template lists them.
     properties["elements"] = {
         "description": "Overrides by element name, or the whole list of elements.",
@@ -41,7 +46,7 @@ def config_schema() -> dict[str, Any]:
     }
     properties["annotations"] = {
         "type": "array",
-        "items": {"oneOf": [{"enum": list(TABLES["annotation"])}, *_parametric(definitions)]},
+        "items": {"oneOf": [{"enum": list(ANNOTATIONS)}, *_parametric(definitions)]},
         "description": "What is computed about every object, image and sample.",
     }
     return {
@@ -54,25 +59,30 @@ def config_schema() -> dict[str, Any]:
 
 def _parametric(definitions: dict[str, Any]) -> list[dict[str, str]]:
     """Annotators that have parameters, which may be written as mappings."""
-    table = TABLES["annotation"]
     return [
-        _plugin("annotation", name, definitions)
-        for name in table
-        if issubclass(table.load(name), Strict)
+        _plugin(ANNOTATIONS, name, definitions)
+        for name in ANNOTATIONS
+        if _model(ANNOTATIONS, name).model_fields.keys() - {ANNOTATIONS.tag}
     ]
 
 
-def _plugin(kind: str, name: str, definitions: dict[str, Any]) -> dict[str, str]:
-    schema = _hoisted(json_schema(TABLES[kind].load(name)), definitions)
-    if f"{kind}s" in VARYING:
+def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> dict[str, str]:
+    schema = _hoisted(json_schema(_model(table, name)), definitions)
+    if table in VARYING.values():
         schema["properties"] = {
-            key: part if key in ("type", "name") else {"anyOf": [part, *SHARED]}
+            key: part if key in (table.tag, "name") else {"anyOf": [part, *SHARED]}
             for key, part in schema["properties"].items()
         }
-    # ``type`` chooses the plug-in, so it has to be written even where a default exists.
-    schema["required"] = sorted({"type", *schema.get("required", ())})
-    definitions[f"{kind}.{name}"] = schema
-    return {"$ref": f"#/$defs/{kind}.{name}"}
+    if (table, name) != (RENDERERS, DEFAULT_RENDERER):
+        # The tag chooses the plug-in, so it has to be written even where its field has a default.
+        schema["required"] = sorted({table.tag, *schema.get("required", ())})
+    definitions[f"{table.kind}.{name}"] = schema
+    return {"$ref": f"#/$defs/{table.kind}.{name}"}
+
+
+def _model(table: PluginTable[Any], name: str) -> type[Strict]:
+    model: type[Strict] = table.load(name)
+    return model
 
 
 def _hoisted(schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:

@@ -123,7 +123,7 @@ def contact_sheet(
         with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
             samples = _samples(pipeline.sample, first, n, step)
             info = pipeline.info
-            shown = info.media if own else dict.fromkeys(info.sensors, wanted)
+            shown = info.media if own else dict.fromkeys(info.cameras, wanted)
             drawn = tiles(samples, shown, labels=labels, devices=own)
             images += pictures(drawn, tile_px, captions=captions)
     write_sheet(arranged(images, columns), out)

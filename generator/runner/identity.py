@@ -13,7 +13,6 @@ from generator.assets.paths import packs_dir
 from generator.core.geometry import Asset
 from generator.core.scene import Scene
 from generator.runner.plan import Plan
-from randomizers.base import RandomizerBase
 
 BYTES_DEPEND_ON = (
     "numpy",
@@ -66,10 +65,9 @@ def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
     ids = {asset_id for scene in factory.nominal for asset_id in _ids(scene)}
     drawn = {
         asset_id
-        for layout in factory.spec.probes
-        for randomizer in layout.randomizers
-        if isinstance(randomizer, RandomizerBase)
-        for asset_id in randomizer.may_draw(library)
+        for config in factory.spec.probes
+        for randomizer in config.randomizers
+        for asset_id in randomizer.possible_assets(library)
     }
     return tuple(library.get(asset_id) for asset_id in sorted(ids | drawn))
 

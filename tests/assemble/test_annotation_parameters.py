@@ -38,7 +38,7 @@ def test_names_and_mappings_may_be_mixed(tmp_path: Path) -> None:
     [
         ("[{type: bev_map, pxm: 0.5}]", r"annotations\[0\].pxm: unknown key .*'px_m'"),
         ("[{type: bev_map, px_m: -1}]", r"annotations\[0\].px_m: "),
-        ("[{type: boxes2d, px_m: 1}]", "takes no parameters; expected the name alone: - boxes2d"),
+        ("[{type: boxes2d, px_m: 1}]", r"annotations\[0\].px_m: unknown key"),
         ("[lanes, {type: lanes, far_m: 9}]", "the annotation 'lanes' is listed twice"),
         ("[{type: bev_mpa}]", "unknown annotation 'bev_mpa'; .*did you mean 'bev_map'"),
         ("[{px_m: 1}]", "unknown annotation"),

@@ -14,6 +14,8 @@ from generator.core.errors import ConfigError
 from generator.core.instants import with_placed_sensors
 from generator.core.scene import Scene
 from generator.core.se3 import SE3
+from generator.sensors.lidar import LidarSensor
+from generator.sensors.rgb_camera import RgbCamera
 
 
 def rig_scene(name: str, *overrides: str) -> Scene:
@@ -66,8 +68,8 @@ def test_nuscenes_cameras_see_all_around() -> None:
 def test_nuscenes_cameras_are_released_as_the_scanner_passes_them() -> None:
     """At a camera's offset in time, a clockwise turn of 50 ms has reached its axis, to a degree."""
     spec = load_spec("nuscenes_rig")
-    scanner = next(s for s in spec.sensors if s.modality == "lidar")
-    cameras = [s for s in spec.sensors if s.modality == "camera"]
+    scanner = next(s for s in spec.sensors if isinstance(s, LidarSensor))
+    cameras = [s for s in spec.sensors if isinstance(s, RgbCamera)]
     for camera in cameras:
         looks_deg = scanner.yaw_deg - 360.0 * scanner.rotation_hz * camera.time_offset_s
         assert abs(math.remainder(looks_deg - camera.yaw_deg, 360.0)) < 1.0

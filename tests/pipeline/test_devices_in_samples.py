@@ -17,7 +17,7 @@ from generator.core.scene import Instance
 from generator.core.se3 import SE3
 from generator.core.streams import Streams
 from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.pipeline.pipeline import Recipe
 from generator.sensors.gnss import Gnss
 from generator.sensors.imu import Imu
 from generator.sensors.mounting import Instrument
@@ -55,6 +55,12 @@ class Boxes:
 class AtRest:
     """Physics that finds every scene at rest."""
 
+    def __enter__(self) -> AtRest:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        pass
+
     def settle(self, scene: object) -> Settled:
         """The scene as it is."""
         return Settled(scene)  # type: ignore[arg-type]
@@ -66,9 +72,7 @@ def pipeline(seed: int = 3) -> Pipeline:
     for sensor in SENSORS:
         scene = sensor.mount(scene)
     recipe = Recipe(
-        seed=seed,
-        views_per_scene=2,
-        blueprint=lambda streams: Blueprint(scene, ()),
+        open_scene=lambda streams: (scene, ()),
         sensors=SENSORS,
         channels=frozenset({Channel.INSTANCE}),
         image_truth=lambda scene, reading: None,  # type: ignore[arg-type, return-value]
@@ -80,9 +84,7 @@ def pipeline(seed: int = 3) -> Pipeline:
             8,
             2,
             ("car",),
-            (),
-            {},
-            devices={s.name: s.modality for s in SENSORS},
+            tuple(s.describe() for s in SENSORS),
             steps_per_scene=STEPS,
         ),
         exporters={},

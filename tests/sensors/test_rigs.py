@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,13 +14,13 @@ from generator.assets.library import open_library
 from generator.core.capture import POINT, Capture, PointCloud, Reading
 from generator.core.errors import ConfigError
 from generator.core.instants import at, with_placed_sensors
-from generator.core.interfaces import DatasetInfo, Settled
+from generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
 from generator.core.motion import Track
 from generator.core.sample import FrameTruth, ImageTruth
 from generator.core.scene import Body, Lane, Rig, Scene
 from generator.core.se3 import SE3
 from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.pipeline.pipeline import Recipe
 from generator.sensors.lidar import LidarSensor
 from generator.sensors.mounting import stride
 from generator.sensors.rgb_camera import RgbCamera
@@ -126,11 +127,21 @@ class Watching:
 class AtRest:
     """Physics that leaves every scene as it is."""
 
+    def __enter__(self) -> AtRest:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        pass
+
     def settle(self, scene: Scene) -> Settled:
         return Settled(scene)
 
 
-def sampled(index: int, **recipe: Any) -> tuple[Capture, dict[str, float], dict[str, float]]:
+def sampled(
+    index: int,
+    offsets_s: Mapping[str, float] = {},
+    **recipe: Any,  # noqa: B006
+) -> tuple[Capture, dict[str, float], dict[str, float]]:
     """What a camera and a scanner return, and the times that truth was asked for."""
     annotated: dict[str, float] = {}
     swept: dict[str, float] = {}
@@ -148,19 +159,23 @@ def sampled(index: int, **recipe: Any) -> tuple[Capture, dict[str, float], dict[
         RgbCamera(name="late", rig="ego"),
         LidarSensor(name="top", rig="ego"),
     )
+    infos = tuple(
+        SensorInfo(name, modality, time_offset_s=offsets_s.get(name, 0.0))
+        for name, modality in (
+            ("early", Modality.CAMERA),
+            ("late", Modality.CAMERA),
+            ("top", Modality.LIDAR),
+        )
+    )
     made = Recipe(
-        seed=1,
-        views_per_scene=1,
-        blueprint=lambda streams: Blueprint(scene, ()),
+        open_scene=lambda streams: (scene, ()),
         sensors=(Watching("early"), Watching("late"), Watching("top", lidar=True)),  # type: ignore[arg-type]
         channels=frozenset(),
         image_truth=image_truth,
         frame_truth=frame_truth,
         split_shares={"train": 1.0},
         layout_attempts_max=1,
-        info=DatasetInfo(
-            "t", 1, 9, 1, (), ("early", "late"), {}, lidars=("top",), steps_per_scene=4
-        ),
+        info=DatasetInfo("t", 1, 9, 1, (), infos, steps_per_scene=4),
         exporters={},
         **recipe,
     )
