@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from benchmarks.runs import machine
-from generator.assemble.recipe import blueprints
+from generator.assemble.recipe import scene_source
 from generator.assemble.spec import load_spec
 from generator.assets.library import Library, open_library
 from generator.core.errors import LayoutRejected
@@ -37,9 +37,8 @@ def full_street(library: Library, seed: int) -> tuple[Scene, TrafficFlow]:
     ]
     spec = load_spec("street_sequence.yaml", seed=seed, overrides=overrides)
     streams = Streams(seed, 0)
-    plan = blueprints(spec, library)(streams)
-    scene = plan.nominal
-    for randomizer in plan.randomizers:
+    scene, randomizers = scene_source(spec, library)(streams)
+    for randomizer in randomizers:
         if isinstance(randomizer, TrafficFlow):
             return scene, randomizer.model_copy(update={"duration_s": 5.0})
         scene = randomizer(scene, library, streams.rng(f"randomizer/{randomizer.name}"))

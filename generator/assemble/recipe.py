@@ -97,7 +97,7 @@ def recipe_of(
             writes.
     """
     _check_durations(spec)
-    annotators = _annotators(spec)
+    annotators = annotators_of(spec)
     info = dataset_info(spec, n, categories)
     return Recipe(
         info=info,
@@ -208,7 +208,7 @@ def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...
     return tuple(sorted(placed | possible))
 
 
-def _annotators(spec: Spec) -> Sequence[AnyAnnotator]:
+def annotators_of(spec: Spec) -> Sequence[AnyAnnotator]:
     """The configuration's, then those that exporters need besides."""
     annotators = dict(spec.annotations)
     for exporter in spec.exporters:

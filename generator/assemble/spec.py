@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -152,6 +152,13 @@ class Spec:
     def randomizers(self) -> tuple[Randomizer, ...]:
         """The randomizers of the first scene."""
         return self.probes[0].randomizers
+
+    def plugins(self) -> Iterator[object]:
+        """Every plug-in that it is made of."""
+        yield self.render
+        yield from (*self.sensors, *self.annotations.values(), *self.exporters)
+        for config in self.probes:
+            yield from (*config.elements, *config.randomizers)
 
     def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
         """The shared values of one scene, sorted by name."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar, cast
 
 import exporters
@@ -15,7 +15,7 @@ from generator.config.problems import Problems
 from generator.config.strict import Strict
 from generator.config.validation import validate
 from generator.core.errors import ConfigError, did_you_mean
-from generator.core.plugins import PluginTable
+from generator.core.plugins import PluginTable, package_of, third_party
 
 ELEMENTS = scene_templates.TABLE
 RANDOMIZERS = randomizers.TABLE
@@ -29,6 +29,9 @@ TABLES: Mapping[str, PluginTable[Any]] = {
     for table in (ELEMENTS, RANDOMIZERS, SENSORS, ANNOTATIONS, EXPORTERS, RENDERERS)
 }
 """For what treats all kinds alike: ``gen-data describe`` and the JSON Schema."""
+
+ASSET_FAMILY = "asset_family"
+"""Kind of the plug-ins that the asset library loads by itself."""
 
 P = TypeVar("P")
 
@@ -52,6 +55,18 @@ def default_plugin(table: PluginTable[P], name: str) -> P:
         ConfigError: the name is unknown, or its class is no plug-in of this kind.
     """
     return table.load(name)()
+
+
+def third_party_packages(plugins: Iterable[object]) -> dict[str, str]:
+    """``{name: version}`` of the installed packages that some plug-ins come from.
+
+    Packages with asset families are always among them: their families take part in every selection
+    by tags.
+    """
+    classes = {f"{type(p).__module__}:{type(p).__qualname__}" for p in plugins}
+    found = [e for kind in TABLES for e in third_party(kind).values() if e.value in classes]
+    packages = (package_of(entry) for entry in (*found, *third_party(ASSET_FAMILY).values()))
+    return dict(sorted(tuple(package.split(" ", 1)) for package in packages))
 
 
 def find_plugin(name: str) -> tuple[str, type]:

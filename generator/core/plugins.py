@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from generator.core.errors import ConfigError, did_you_mean
 
@@ -65,11 +65,6 @@ class PluginTable(Generic[P]):
             raise ConfigError(f"{self.kind} '{name}': {path} {fault}")
         return plugin
 
-    def package(self, name: str) -> str:
-        """Name and version of the third-party package of a plug-in; empty for our own."""
-        entry = None if name in self.entries else third_party(self.kind).get(name)
-        return package_of(entry) if entry is not None else ""
-
     def _fault(self, plugin: type[P], name: str) -> str:
         """Why a class is no plug-in of this kind; empty if it is one."""
         if not self.protocols:
@@ -81,16 +76,13 @@ class PluginTable(Generic[P]):
         if all(lacking):
             fewest = min(lacking, key=lambda members: len(members))
             protocol = self.protocols[lacking.index(fewest)]
-            return (
-                f"lacks {', '.join(fewest)}; see generator.core.interfaces."
-                f"{protocol.__name__}"
-            )
+            return f"lacks {', '.join(fewest)}; see generator.core.interfaces.{protocol.__name__}"
         if f"'{name}'" not in str(_field_type(plugin, self.tag)).replace('"', "'"):
             return f"""needs a field `{self.tag}: Literal["{name}"] = "{name}"`"""
         return ""
 
 
-def loaded(path: str, what: str) -> type:
+def loaded(path: str, what: str) -> Any:
     """The object at ``module:Name``.
 
     Raises:
@@ -98,10 +90,9 @@ def loaded(path: str, what: str) -> type:
     """
     module, _, attribute = path.partition(":")
     try:
-        found: type = getattr(importlib.import_module(module), attribute)
+        return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"{what}: {path} cannot be imported: {error}") from error
-    return found
 
 
 def third_party(kind: str) -> Mapping[str, EntryPoint]:
@@ -116,8 +107,8 @@ def _third_party(kind: str) -> dict[str, EntryPoint]:
 
 
 def package_of(entry: EntryPoint) -> str:
-    """Name and version of the package that an entry point is from."""
-    return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "unknown"
+    """Name and version of the package that an entry point is from, with a space between."""
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "unknown 0"
 
 
 def _members(protocol: type[object]) -> set[str]:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 from generator import __version__
-from generator.assemble.recipe import PipelineFactory
+from generator.assemble.recipe import PipelineFactory, annotators_of
+from generator.assemble.tables import third_party_packages
 from generator.assets.library import open_library
 from generator.assets.packs import TAG, installed
 from generator.assets.paths import packs_dir
@@ -38,6 +39,7 @@ def plan_of(factory: PipelineFactory) -> Plan:
             "gen-data": __version__,
             **{name: _release(name) for name in BYTES_DEPEND_ON},
             **_packs(assets),
+            **third_party_packages((*spec.plugins(), *annotators_of(spec))),
         },
         assets={asset.asset_id: asset.sha256 for asset in assets},
     )

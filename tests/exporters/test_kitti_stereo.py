@@ -132,8 +132,8 @@ def test_data_sets_without_a_pair_are_refused(world: Any) -> None:
     with pytest.raises(ConfigError, match="expected one of: rear, right"):
         KittiStereo().check(three)
     KittiStereo(right="right").check(three)
+    bent = replace(info.sensor("right"), lens="brown_conrady")
     with pytest.raises(ConfigError, match="'right' has a lens of the model"):
-        bent = replace(info.sensor("right"), lens="brown_conrady")
         KittiStereo().check(replace(info, sensors=(info.sensor("left"), bent)))
 
 

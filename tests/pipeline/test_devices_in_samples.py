@@ -56,10 +56,11 @@ class AtRest:
     """Physics that finds every scene at rest."""
 
     def __enter__(self) -> AtRest:
+        """Nothing to start."""
         return self
 
     def __exit__(self, *exception: object) -> None:
-        pass
+        """Nor to stop."""
 
     def settle(self, scene: object) -> Settled:
         """The scene as it is."""

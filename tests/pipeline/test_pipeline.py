@@ -60,10 +60,11 @@ class AcceptingPhysics:
         self.settled = 0
 
     def __enter__(self) -> AcceptingPhysics:
+        """Nothing to start."""
         return self
 
     def __exit__(self, *exception: object) -> None:
-        pass
+        """Nor to stop."""
 
     def settle(self, scene: Scene) -> Settled:
         """The scene as it is."""
@@ -75,10 +76,11 @@ class RefusingPhysics:
     """Physics that never finds rest."""
 
     def __enter__(self) -> RefusingPhysics:
+        """Nothing to start."""
         return self
 
     def __exit__(self, *exception: object) -> None:
-        pass
+        """Nor to stop."""
 
     def settle(self, scene: Scene) -> Settled:
         """A rejection with alternating reasons."""

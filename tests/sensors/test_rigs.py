@@ -15,11 +15,12 @@ from generator.core.capture import POINT, Capture, PointCloud, Reading
 from generator.core.errors import ConfigError
 from generator.core.instants import at, with_placed_sensors
 from generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
-from generator.core.motion import Track
+from generator.core.motion import Change, Track
 from generator.core.sample import FrameTruth, ImageTruth
 from generator.core.scene import Body, Lane, Rig, Scene
 from generator.core.se3 import SE3
 from generator.pipeline import Pipeline
+from generator.pipeline.freeze import Timeline
 from generator.pipeline.pipeline import Recipe
 from generator.sensors.lidar import LidarSensor
 from generator.sensors.mounting import stride
@@ -128,10 +129,11 @@ class AtRest:
     """Physics that leaves every scene as it is."""
 
     def __enter__(self) -> AtRest:
+        """Nothing to start."""
         return self
 
     def __exit__(self, *exception: object) -> None:
-        pass
+        """Nor to stop."""
 
     def settle(self, scene: Scene) -> Settled:
         return Settled(scene)
@@ -140,7 +142,7 @@ class AtRest:
 def sampled(
     index: int,
     offsets_s: Mapping[str, float] = {},
-    **recipe: Any,  # noqa: B006
+    **recipe: Any,
 ) -> tuple[Capture, dict[str, float], dict[str, float]]:
     """What a camera and a scanner return, and the times that truth was asked for."""
     annotated: dict[str, float] = {}
@@ -198,6 +200,25 @@ def test_sensors_read_at_their_own_offsets_and_labels_are_of_then() -> None:
         "top": capture.clouds["top"].lidar.T_world_lidar.translation_m[1],
     }
     assert y == pytest.approx({"early": 4.6, "late": 4.8, "top": 4.9}, abs=1e-5)
+
+
+def test_a_sensor_that_reads_early_sees_what_has_not_changed_yet() -> None:
+    """A lamp lights at 0.18 s; at step 2 (0.2 s) a camera reads 0.05 s earlier, another at once."""
+    lamp, lit = Body("lamp", "unlit"), Change(0.18, "lamp", asset="lit")
+    view = replace(driven(), bodies=(*driven().bodies, lamp), changes=(lit,), instances=())
+    timeline = Timeline(view, open_library(()), {})
+    assets = [timeline.at(time_s).body("lamp").asset for time_s in (0.2, 0.2 - 0.05, 0.2)]
+
+    assert assets == ["lit", "unlit", "lit"]
+
+
+def test_an_instant_does_not_depend_on_those_before_it() -> None:
+    """Asked after others or alone: the same scene."""
+    one, other = (Timeline(driven(), open_library(()), {}) for _ in range(2))
+    for time_s in (0.1, 0.35, 0.05):
+        one.at(time_s)
+
+    assert one.at(0.2) == other.at(0.2)
 
 
 def test_slower_sensors_are_missing_from_the_steps_between() -> None:

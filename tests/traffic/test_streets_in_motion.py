@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import blueprints, open_pipeline, recipe_of
+from generator.assemble.recipe import open_pipeline, recipe_of, scene_source
 from generator.assemble.spec import Spec, load_spec
 from generator.assets.library import Library, open_library
 from generator.core.errors import ConfigError, LayoutRejected
@@ -40,10 +40,9 @@ def moving_scene(seed: int, of: Spec | None = None) -> Scene:
     """A street that moves: the first attempt that is not refused."""
     for attempt in range(10):
         streams = Streams(seed, 0, attempt=attempt)
-        plan = blueprints(of or spec(), library())(streams)
-        scene = plan.nominal
+        scene, randomizers = scene_source(of or spec(), library())(streams)
         try:
-            for randomizer in plan.randomizers:
+            for randomizer in randomizers:
                 scene = randomizer(scene, library(), streams.rng(f"randomizer/{randomizer.name}"))
         except LayoutRejected:
             continue
