@@ -65,8 +65,9 @@ def third_party_packages(plugins: Iterable[object]) -> dict[str, str]:
     """
     classes = {f"{type(p).__module__}:{type(p).__qualname__}" for p in plugins}
     found = [e for kind in TABLES for e in third_party(kind).values() if e.value in classes]
-    packages = (package_of(entry) for entry in (*found, *third_party(ASSET_FAMILY).values()))
-    return dict(sorted(tuple(package.split(" ", 1)) for package in packages))
+    entries = (*found, *third_party(ASSET_FAMILY).values())
+    packages = sorted({package_of(entry) for entry in entries})
+    return {name: version for name, _, version in (p.partition(" ") for p in packages)}
 
 
 def find_plugin(name: str) -> tuple[str, type]:

@@ -72,9 +72,9 @@ class PluginTable(Generic[P]):
         if not hasattr(plugin, "model_validate_json"):
             return "cannot be read from YAML: derive it from generator.config.strict.Strict"
         own = {m for base in plugin.__mro__ for m in (*vars(base), *_annotations(base))}
-        lacking = [sorted(_members(protocol) - own) for protocol in self.protocols]
+        lacking: list[list[str]] = [sorted(_members(protocol) - own) for protocol in self.protocols]
         if all(lacking):
-            fewest = min(lacking, key=lambda members: len(members))
+            fewest = min(lacking, key=len)
             protocol = self.protocols[lacking.index(fewest)]
             return f"lacks {', '.join(fewest)}; see generator.core.interfaces.{protocol.__name__}"
         if f"'{name}'" not in str(_field_type(plugin, self.tag)).replace('"', "'"):
