@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -174,3 +175,13 @@ def test_an_unknown_field_is_refused_at_its_place(installed: str, tmp_path: Path
     assert done.returncode != 0
     assert "strange.yaml:18:36: render.luminance: unknown key" in done.stderr
     assert "luminance_cd_m2" in done.stderr
+
+
+def test_the_examples_of_the_contributors_guide_are_those_of_the_package() -> None:
+    """Each block of code with a file's name in its first line is a part of that file."""
+    guide = (ROOT / "CONTRIBUTING.md").read_text()
+    blocks = re.findall(r"^```\w+\n# (tests/\S+)\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL)
+
+    assert len(blocks) == 8
+    for path, text in blocks:
+        assert text.rstrip() in (ROOT / path).read_text(), path
