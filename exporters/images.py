@@ -55,6 +55,9 @@ FLOW_UNITS_PER_PX = 64
 SIGNED_ZERO = 32_768
 """Value of 0 in 16-bit images of what may be negative."""
 
+NO_NORMAL = 128
+"""Value of all three components in images of normals where there is no surface."""
+
 ENCODING = {
     Channel.RGB: (RowFilter.SUB, 1),
     Channel.Z_DEPTH: (RowFilter.SUB, 1),
@@ -120,6 +123,59 @@ def png(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:
         raise ConfigError(f"channel '{channel.value}' cannot be written as an image; use {known}")
     row_filter, level = ENCODING[channel]
     return encode_png(_pixels(channel, image, depth_scale_m), row_filter, level)
+
+
+def read_image(path: Path, channel: Channel, depth_scale_m: float) -> NDArray[Any]:
+    """One channel as a sensor saw it, from its PNG: the inverse of ``png`` up to its rounding.
+
+    Args:
+        path: Of the file.
+        channel: What the image shows.
+        depth_scale_m: Metres per unit of depth and range images.
+
+    Returns:
+        The array as listed at ``Channel``; its values for "nothing" are restored.
+
+    Raises:
+        StorageError: the file is missing or no PNG.
+    """
+    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise StorageError(f"{path}: missing or no PNG file; make the data set again")
+    if pixels.ndim == 3:
+        pixels = np.ascontiguousarray(pixels[..., ::-1])
+    return _values(channel, pixels, depth_scale_m)
+
+
+def _values(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
+    """Physical values of the pixels of a PNG."""
+    match channel:
+        case Channel.Z_DEPTH | Channel.RANGE | Channel.MEASURED_DEPTH:
+            return np.where(pixels > 0, pixels * depth_scale_m, np.inf).astype(np.float32)
+        case Channel.DISPARITY | Channel.DISPARITY_VISIBLE:
+            return (pixels / 256.0).astype(np.float32)
+        case Channel.FLOW_FORWARD | Channel.FLOW_BACKWARD:
+            return _signed_values(pixels, 1.0 / FLOW_UNITS_PER_PX)[..., :2]
+        case Channel.SCENE_FLOW:
+            return _signed_values(pixels, depth_scale_m)
+        case Channel.FLOW_OCCLUDED_FORWARD | Channel.FLOW_OCCLUDED_BACKWARD:
+            return (pixels > 0).astype(np.uint8)
+        case Channel.NORMALS:
+            unit = np.where(pixels == NO_NORMAL, 0.0, pixels / 127.5 - 1.0)
+            length = np.linalg.norm(unit, axis=-1, keepdims=True)
+            return np.divide(unit, length, out=np.zeros_like(unit), where=length > 0.0).astype(
+                np.float32
+            )
+        case Channel.OBJECT_COORDINATES:
+            return (pixels / 65_535.0).astype(np.float32)
+        case _:
+            return pixels
+
+
+def _signed_values(pixels: NDArray[Any], unit: float) -> NDArray[np.float32]:
+    """The inverse of ``_signed_units``: NaN where all three values are 0."""
+    values = (pixels.astype(np.float64) - SIGNED_ZERO) * unit
+    return np.where((pixels == 0).all(axis=-1, keepdims=True), np.nan, values).astype(np.float32)
 
 
 def depth_units(depth_m: NDArray[np.floating], depth_scale_m: float) -> UInt16:

@@ -228,6 +228,24 @@ def spec_of_source(
     return _spec(resolved_document(document, seed=seed, overrides=overrides, without=without), name)
 
 
+def spec_of_text(
+    text: str,
+    name: str,
+    *,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    without: Sequence[str] = (),
+) -> Spec:
+    """The configuration in a YAML text; ``name`` is what messages call it.
+
+    Raises:
+        ConfigError: telling everything that is wrong, each with its place.
+    """
+    document = parse(text, name)
+    document = resolved_document(document, seed=seed, overrides=overrides, without=without)
+    return _spec(document, name.strip("<>"))
+
+
 def _spec(document: Node, name: str) -> Spec:
     assert isinstance(document.content, Mapping)
     problems = Problems()

@@ -2,6 +2,8 @@
 
 GenDataError                        1  should not be raised itself
 +-- ConfigError                     2  configuration or usage
+|   +-- UnknownNameError            2  a name that the data set does not have; also a KeyError
+|   +-- SampleIndexError            2  an index beyond the data set; also an IndexError
 +-- AssetError                      3  a mesh, texture or robot cannot be used
 +-- StorageError                    4  disk full, no permission, foreign folder; resumable
 +-- DeterminismError                5  the same shard came out with other bytes
@@ -29,6 +31,17 @@ class ConfigError(GenDataError):
     """The configuration or the command line is wrong."""
 
     exit_code = 2
+
+
+class UnknownNameError(ConfigError, KeyError):
+    """A sensor, channel or other part of a sample that does not exist, asked for by its name."""
+
+    # KeyError shows the representation of its message, quotes and all.
+    __str__ = Exception.__str__
+
+
+class SampleIndexError(ConfigError, IndexError):
+    """The index of a sample that the data set does not have."""
 
 
 class AssetError(GenDataError):

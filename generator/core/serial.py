@@ -1,6 +1,8 @@
 """Frozen dataclasses <-> plain JSON values, by their type hints.
 
 Canonical JSON: sorted keys, shortest round-trip floats, no NaN, UTF-8 (in the spirit of RFC 8785).
+A binary mask becomes ``{"size": [height, width], "runs": [...]}``: lengths of its row-major runs,
+beginning with the unset pixels.
 """
 
 from __future__ import annotations
@@ -13,6 +15,9 @@ from collections.abc import Callable, Mapping
 from enum import Enum
 from functools import cache, partial
 from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 T = TypeVar("T")
 
@@ -33,11 +38,15 @@ def to_plain(value: Any) -> Any:
         return {str(key): to_plain(item) for key, item in value.items()}
     if isinstance(value, (set, frozenset)):
         return sorted(to_plain(item) for item in value)
+    if isinstance(value, np.ndarray) and value.dtype == bool and value.ndim == 2:
+        return {"size": list(value.shape), "runs": _encode_runs(value)}
     return value
 
 
 def from_plain(kind: type[T], plain: Any) -> T:
     """The inverse of ``to_plain`` for a dataclass (or any annotation made of them).
+
+    A value that already is an instance of the dataclass it stands for is kept as it is.
 
     Raises:
         TypeError, KeyError: if the value does not fit the type.
@@ -77,6 +86,10 @@ def _builder(kind: Any) -> Callable[[Any], Any]:
         return _tuple_builder(arguments)
     if origin is typing.Literal:
         return partial(_one_of, arguments)
+    if origin is Mapping and arguments[0] in (str, int):
+        return _mapping_builder(*arguments)
+    if origin is np.ndarray:
+        return _decode_runs
     return float if kind is float else _itself
 
 
@@ -87,6 +100,8 @@ def _dataclass_builder(kind: type) -> Callable[[Any], Any]:
         return {name: _builder(hint) for name, hint in typing.get_type_hints(kind).items()}
 
     def build(plain: Any) -> Any:
+        if isinstance(plain, kind):
+            return plain
         by_name = builders()
         return kind(**{name: by_name[name](item) for name, item in plain.items()})
 
@@ -99,6 +114,28 @@ def _tuple_builder(arguments: tuple[Any, ...]) -> Callable[[Any], Any]:
         return lambda plain: tuple(build(item) for item in plain)
     builders = [_builder(argument) for argument in arguments]
     return lambda plain: tuple(b(item) for b, item in zip(builders, plain, strict=True))
+
+
+def _mapping_builder(key: Any, value: Any) -> Callable[[Any], Any]:
+    build = _builder(value)
+    # JSON knows no other keys than strings.
+    return lambda plain: {key(name): build(item) for name, item in plain.items()}
+
+
+def _encode_runs(mask: NDArray[np.bool_]) -> list[int]:
+    """Lengths of the row-major runs of equal pixels; the first one is of unset pixels."""
+    flat = mask.ravel()
+    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+    ends = np.concatenate([[0], changes, [flat.size]])
+    runs: list[int] = np.diff(ends).tolist()
+    return [0, *runs] if flat.size and flat[0] else runs
+
+
+def _decode_runs(plain: Mapping[str, list[int]]) -> NDArray[np.bool_]:
+    """The mask of ``_encode_runs``, bool [height, width]."""
+    runs = plain["runs"]
+    values = np.arange(len(runs)) % 2 == 1
+    return np.repeat(values, runs).reshape(plain["size"])
 
 
 def _one_of(allowed: tuple[Any, ...], plain: Any) -> Any:

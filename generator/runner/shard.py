@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from generator.core.capture import Capture, Reading
 from generator.core.interfaces import DatasetInfo, Exporter
 from generator.core.sample import Sample
+from generator.runner.labels import LABELS_NAME, labels_line
 from generator.runner.plan import Plan
 from generator.runner.provenance import SCENES_NAME, scene_line
 from generator.runner.record import ShardRecord, describe_shard
@@ -138,6 +139,8 @@ def _written(
             with (folder / SCENES_NAME).open("a", encoding="utf-8") as scenes:
                 base = next((s for s in before if s.scene_index == sample.scene_index), None)
                 scenes.write(scene_line(sample, base) + "\n")
+            with (folder / LABELS_NAME).open("a", encoding="utf-8") as labels:
+                labels.write(labels_line(sample) + "\n")
         encode_s = time.process_time() - started_s
     on_sample(replace(sample, timings_s={**sample.timings_s, "encode": encode_s}))
     return without_pixels(sample)

@@ -1,0 +1,64 @@
+"""Configurations as users of the Python API give them: files, names, dictionaries, objects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any
+
+from generator.core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from generator.assemble.spec import Spec
+
+ConfigLike = str | PathLike[str] | Mapping[str, Any]
+"""A file, a shipped name, the folder of a data set, or a dictionary of the same content."""
+
+
+def load_config(
+    config: ConfigLike,
+    *,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    without: Sequence[str] = (),
+) -> Spec:
+    """The validated configuration.
+
+    Raises:
+        ConfigError: the message names everything that is wrong, with its place.
+    """
+    from generator.assemble.spec import spec_of_source, spec_of_text
+
+    choice: dict[str, Any] = {"seed": seed, "overrides": overrides, "without": without}
+    if isinstance(config, Mapping):
+        return spec_of_text(_yaml_text(config), "<config>", **choice)
+    return spec_of_source(fspath(config), **choice)
+
+
+def _yaml_text(config: Mapping[str, Any]) -> str:
+    """The dictionary as a document: messages quote its lines."""
+    import yaml
+
+    try:
+        return yaml.safe_dump(_plain(config), sort_keys=False, allow_unicode=True)
+    except yaml.YAMLError as error:
+        raise ConfigError(f"<config>: holds a value that is no YAML: {error}") from None
+
+
+def _plain(value: Any) -> Any:
+    """Dictionaries, lists and scalars of a value; typed plug-ins become their YAML."""
+    from pydantic import BaseModel
+
+    if isinstance(value, BaseModel):
+        return _plain(value.model_dump(mode="json", exclude_unset=True) | _type_of(value))
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return fspath(value) if isinstance(value, PathLike) else value
+
+
+def _type_of(plugin: Any) -> dict[str, str]:
+    """The ``type`` of a plug-in, which is a default and so never set by its user."""
+    kind = getattr(plugin, "type", None)
+    return {} if kind is None else {"type": kind}

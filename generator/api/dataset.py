@@ -1,0 +1,257 @@
+"""Data sets as lazy sequences of samples."""
+
+from __future__ import annotations
+
+import copy
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from os import PathLike
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
+
+from generator.api.config import ConfigLike, load_config
+from generator.api.sample import Sample
+from generator.api.stored import StoredSamples
+from generator.core.errors import ConfigError, SampleIndexError, did_you_mean
+from generator.core.sample import Sample as CoreSample
+
+if TYPE_CHECKING:
+    from generator.core.capture import Channel
+    from generator.pipeline import Pipeline
+
+Self = TypeVar("Self", bound="SampleSequence")
+
+UNBOUNDED = range(sys.maxsize)
+"""Indices of a data set whose size was not given."""
+
+
+class SampleSource(Protocol):
+    """Where the samples of a sequence come from."""
+
+    def sample(self, index: int) -> CoreSample:
+        """The sample of that number."""
+        ...
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names; category id ``k`` is ``categories[k - 1]``."""
+        ...
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """The resolved configuration as plain values."""
+        ...
+
+    def close(self) -> None:
+        """Release engines; a later call of ``sample`` starts them again."""
+        ...
+
+
+class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", None]):
+    """Samples by index. Slices are sequences over the same source; nothing is computed early.
+
+    Iteration, ``len``, negative indices and ``in`` work as they do for a list. A sequence can be
+    pickled: another process makes the same samples.
+    """
+
+    def __init__(self, source: SampleSource, indices: range) -> None:
+        self._source = source
+        self._indices = indices
+
+    @overload
+    def __getitem__(self, index: int) -> Sample: ...
+
+    @overload
+    def __getitem__(self: Self, index: slice) -> Self: ...
+
+    def __getitem__(self: Self, index: int | slice) -> Sample | Self:
+        """One sample, or the sequence of some.
+
+        Raises:
+            SampleIndexError: the index is out of range; it is also an IndexError.
+            SampleError: the sample cannot be made.
+        """
+        if isinstance(index, slice):
+            part = copy.copy(self)
+            part._indices = self._indices[index]
+            return part
+        if index < 0 and not self._is_bounded:
+            raise SampleIndexError(f"index {index}: a data set without a size has no end; give n=")
+        try:
+            number = self._indices[index]
+        except IndexError:
+            raise SampleIndexError(
+                f"index {index} is out of range for {len(self._indices)} samples"
+            ) from None
+        return Sample(self._source.sample(number))
+
+    def __len__(self) -> int:
+        """Number of samples.
+
+        Raises:
+            TypeError: the data set has no size.
+        """
+        if not self._is_bounded:
+            raise TypeError("a data set without a size has no length; give n=, or take a slice")
+        return len(self._indices)
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Samples in order; without an end if the data set has no size."""
+        for number in self._indices:
+            yield Sample(self._source.sample(number))
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names of all categories; category id ``k`` is ``categories[k - 1]``."""
+        return self._source.categories
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """The resolved configuration as plain dictionaries, lists, strings and numbers."""
+        return self._source.config
+
+    def close(self) -> None:
+        """Release the engines; using the sequence again starts them again."""
+        self._source.close()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the sequence."""
+        self.close()
+
+    @property
+    def _is_bounded(self) -> bool:
+        return self._indices.stop != UNBOUNDED.stop
+
+
+class Dataset(SampleSequence):
+    """The samples that a configuration describes, generated when they are read.
+
+    Sample ``i`` depends on the configuration, the seed and ``i`` alone: it has the same pixels and
+    labels whatever was read before it, and in every process.
+
+    Args:
+        config: A YAML file, a shipped name such as ``tabletop.yaml``, the folder of a data set, or
+            a dictionary with the same content; paths in a dictionary are relative to the current
+            folder.
+        seed: Replaces the configuration's seed.
+        n: Number of samples; None = without an end.
+        overrides: ``KEY=VALUE`` texts as of ``gen-data --set``.
+        without: Names of randomizers to leave out.
+        channels: Names of channels that every camera renders besides its own, such as
+            ``normals``.
+
+    Raises:
+        ConfigError: the configuration is wrong; the message names every place.
+
+    Example:
+        >>> data = Dataset("tabletop.yaml", seed=7)
+        >>> data[3].cameras["color"].rgb.shape
+        (480, 640, 3)
+    """
+
+    def __init__(
+        self,
+        config: ConfigLike,
+        *,
+        seed: int | None = None,
+        n: int | None = None,
+        overrides: Sequence[str] = (),
+        without: Sequence[str] = (),
+        channels: Sequence[str] = (),
+    ) -> None:
+        if n is not None and n < 0:
+            raise ConfigError(f"n: {n} is negative; expected 0 or more")
+        spec = load_config(config, seed=seed, overrides=overrides, without=without)
+        indices = UNBOUNDED if n is None else range(n)
+        super().__init__(GeneratedSamples(spec, _channels(channels)), indices)
+
+    def __repr__(self) -> str:
+        """Name and size."""
+        size = f"{len(self)} samples" if self._is_bounded else "no end"
+        return f"<Dataset '{self.config.get('template', '')}': {size}>"
+
+
+class GeneratedSamples:
+    """Samples made by a pipeline in this process, which starts when the first one is read."""
+
+    def __init__(self, spec: Any, channels: frozenset[Channel]) -> None:
+        from generator.assemble.recipe import PipelineFactory
+
+        self._make_pipeline = PipelineFactory(spec, n=1, extra_channels=channels)
+        self._pipeline: Pipeline | None = None
+        self._resources = ExitStack()
+
+    def sample(self, index: int) -> CoreSample:
+        """The sample of that number."""
+        from threadpoolctl import threadpool_limits
+
+        # Sums in BLAS depend on the number of threads, and with them the last bits of a pose.
+        with threadpool_limits(limits=1):
+            return self._opened().sample(index)
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names of all categories that a sample may contain."""
+        return self._make_pipeline.categories
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """The resolved configuration."""
+        return self._make_pipeline.spec.resolved
+
+    def close(self) -> None:
+        """Stop the engines."""
+        self._pipeline = None
+        self._resources.close()
+
+    def _opened(self) -> Pipeline:
+        if self._pipeline is None:
+            self._pipeline = self._resources.enter_context(self._make_pipeline())
+        return self._pipeline
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Engines stay in their process."""
+        return {**self.__dict__, "_pipeline": None, "_resources": ExitStack()}
+
+
+class StoredDataset(SampleSequence):
+    """A finished data set on disk, read back as the samples that were written."""
+
+    def __init__(self, folder: str | PathLike[str]) -> None:
+        source = StoredSamples(folder)
+        super().__init__(source, range(source.n))
+        self.folder = source.folder
+
+    def __repr__(self) -> str:
+        """Folder and size."""
+        return f"<StoredDataset '{self.folder}': {len(self)} samples>"
+
+
+def open_dataset(folder: str | PathLike[str]) -> StoredDataset:
+    """Open a finished data set; its samples equal those that were generated.
+
+    Colour, ids and labels are exact; depth and other measures have the resolution of their files.
+
+    Raises:
+        StorageError: the folder holds no finished data set.
+    """
+    return StoredDataset(folder)
+
+
+def _channels(names: Sequence[str]) -> frozenset[Channel]:
+    from generator.core.capture import Channel
+
+    known = {channel.value: channel for channel in Channel if channel is not Channel.AMODAL}
+    for name in names:
+        if name not in known:
+            raise ConfigError(
+                f"channels: unknown channel '{name}'; expected some of {', '.join(known)}"
+                f"{did_you_mean(name, known)}"
+            )
+    return frozenset(known[name] for name in names)

@@ -1,0 +1,308 @@
+"""A sample as users of the Python API see it: images, boxes and points by sensor name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.boxes import BoxPx, OrientedBox
+from generator.core.capture import Channel, PointCloud, Reading
+from generator.core.errors import UnknownNameError, did_you_mean
+from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth
+from generator.core.sample import Sample as CoreSample
+from generator.core.scene import Scene
+from generator.core.se3 import Array
+
+T = TypeVar("T")
+
+
+class ByName(Mapping[str, T], Generic[T]):
+    """A read-only mapping whose missing names are reported with the names that exist."""
+
+    def __init__(self, kind: str, values: Mapping[str, T]) -> None:
+        self._kind = kind
+        self._values = values
+
+    def __getitem__(self, name: str) -> T:
+        """The value of that name.
+
+        Raises:
+            UnknownNameError: there is none; it is also a KeyError.
+        """
+        if name not in self._values:
+            names = ", ".join(self._values) or "none"
+            raise UnknownNameError(
+                f"there is no {self._kind} '{name}'; expected one of: {names}"
+                f"{did_you_mean(str(name), self._values)}"
+            )
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names, in order."""
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        """As a dictionary."""
+        return repr(dict(self._values))
+
+
+@dataclass(frozen=True, slots=True)
+class Box2d:
+    """The tight box around the visible pixels of an object.
+
+    Attributes:
+        category: Name.
+        category_id: From 1, in the sorted order of the data set's categories.
+        instance_id: Value of the object's pixels in ``CameraReading.instance_ids``.
+        x_min, y_min, x_max, y_max: Half-open, in pixels: ``width = x_max - x_min``.
+        visible_fraction: Visible share of the whole silhouette; None without the annotation
+            ``visibility``.
+    """
+
+    category: str
+    category_id: int
+    instance_id: int
+    x_min: int
+    y_min: int
+    x_max: int
+    y_max: int
+    visible_fraction: float | None = None
+
+    @property
+    def xyxy(self) -> tuple[int, int, int, int]:
+        """Corners, as torchvision has them."""
+        return self.x_min, self.y_min, self.x_max, self.y_max
+
+    @property
+    def xywh(self) -> tuple[int, int, int, int]:
+        """Corner and size, as COCO has them."""
+        return self.x_min, self.y_min, self.x_max - self.x_min, self.y_max - self.y_min
+
+
+@dataclass(frozen=True, slots=True)
+class Box3d:
+    """The oriented box around an object.
+
+    Attributes:
+        category, category_id, instance_id: As of Box2d.
+        box: In the world frame; ``box.corners()`` are its corners [m], shape [8, 3].
+        box_camera: In the camera frame.
+    """
+
+    category: str
+    category_id: int
+    instance_id: int
+    box: OrientedBox
+    box_camera: OrientedBox | None = None
+
+
+class CameraReading:
+    """What one camera captured, and the annotations of its image.
+
+    Arrays are [height, width, ...]; their values for "nothing" are those of CONVENTIONS.md.
+    """
+
+    def __init__(self, reading: Reading, truth: ImageTruth) -> None:
+        self._reading = reading
+        self._truth = truth
+
+    @property
+    def name(self) -> str:
+        """The sensor's name."""
+        return self._reading.sensor
+
+    @property
+    def channels(self) -> Mapping[str, NDArray[Any]]:
+        """Every image by the name of its channel, such as ``normals``; decoded when read."""
+        return ByName("channel", _ChannelNames(self._reading.channels))
+
+    @property
+    def rgb(self) -> NDArray[np.uint8]:
+        """Colour image in sRGB, uint8 [height, width, 3]."""
+        return self.channels["rgb"]
+
+    @property
+    def depth_m(self) -> NDArray[np.float32]:
+        """Distance along the optical axis [m], float32 [height, width]; inf where nothing is."""
+        return self.channels["depth"]
+
+    @property
+    def instance_ids(self) -> NDArray[np.uint16]:
+        """Instance id of each pixel, uint16 [height, width]; 0 where nothing is."""
+        return self.channels["instance"]
+
+    @property
+    def category_ids(self) -> NDArray[np.uint16]:
+        """Category id of each pixel, uint16 [height, width]; 0 where nothing is."""
+        return self.channels["category"]
+
+    @property
+    def objects(self) -> tuple[ObjectTruth, ...]:
+        """All annotations of all instances in the image, in the order of their ids."""
+        return self._truth.objects
+
+    @property
+    def truth(self) -> ImageTruth:
+        """All annotations of the image, those of no single object included."""
+        return self._truth
+
+    @cached_property
+    def boxes2d(self) -> tuple[Box2d, ...]:
+        """Boxes of the annotated objects that have a visible pixel."""
+        return tuple(
+            Box2d(*_identity(item), *_corners(item.box), item.visible_fraction)
+            for item in self._truth.objects
+            if item.instance.annotated and item.box is not None
+        )
+
+    @cached_property
+    def boxes3d(self) -> tuple[Box3d, ...]:
+        """Oriented boxes of the annotated objects; empty without the annotation ``boxes3d``."""
+        return tuple(
+            Box3d(*_identity(item), item.box3d_world, item.box3d_camera)
+            for item in self._truth.objects
+            if item.instance.annotated and item.box3d_world is not None
+        )
+
+    @property
+    def K(self) -> Array:  # noqa: N802
+        """Intrinsic matrix, float64 [3, 3]; pixel ``i`` has its centre at ``i + 0.5``."""
+        return self._reading.camera.intrinsics.matrix()
+
+    @property
+    def T_world_camera(self) -> Array:  # noqa: N802
+        """Camera coordinates (X right, Y down, Z forward) to world coordinates, [4, 4]."""
+        return self._truth.camera.T_world_camera.matrix()
+
+    @property
+    def time_s(self) -> float:
+        """The instant of depth, ids and boxes, from the start of the sequence [s]."""
+        return self._reading.time_s
+
+    @property
+    def ev100(self) -> float | None:
+        """Exposure value at ISO 100, set or metered; None without a colour image."""
+        return self._reading.ev100
+
+    def __repr__(self) -> str:
+        """Name, channels and number of boxes."""
+        names = ", ".join(channel.value for channel in self._reading.channels)
+        return f"<CameraReading '{self.name}': {names}; {len(self.boxes2d)} boxes>"
+
+
+class _ChannelNames(Mapping[str, NDArray[Any]]):
+    """Images by the name of their channel."""
+
+    def __init__(self, images: Mapping[Channel, NDArray[Any]]) -> None:
+        self._images = images
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """The image of that channel."""
+        return self._images[Channel(name)]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is such a channel."""
+        return any(channel.value == name for channel in self._images)
+
+    def __iter__(self) -> Iterator[str]:
+        """The names, in order."""
+        return (channel.value for channel in self._images)
+
+    def __len__(self) -> int:
+        """Number of channels."""
+        return len(self._images)
+
+
+class Sample:
+    """One element of a data set, generated or read from disk.
+
+    Attributes:
+        core: The same sample as the generator's own record, with everything that is known.
+    """
+
+    def __init__(self, core: CoreSample) -> None:
+        self.core = core
+
+    @property
+    def index(self) -> int:
+        """Number in the data set, from 0."""
+        return self.core.index
+
+    @property
+    def split(self) -> str:
+        """``train``, ``val`` or ``test``: the same for all views of a scene."""
+        return self.core.split
+
+    @property
+    def scene(self) -> Scene:
+        """The complete, frozen world: bodies, instances, lights, cameras."""
+        return self.core.scene
+
+    @cached_property
+    def cameras(self) -> Mapping[str, CameraReading]:
+        """By name, the cameras that read at this sample."""
+        readings, truth = self.core.capture.readings, self.core.truth
+        return ByName(
+            "camera", {name: CameraReading(readings[name], truth[name]) for name in truth}
+        )
+
+    @property
+    def lidars(self) -> Mapping[str, PointCloud]:
+        """By name, the scans of the laser scanners that read at this sample."""
+        return ByName("laser scanner", self.core.capture.clouds)
+
+    @property
+    def measurements(self) -> Mapping[str, NDArray[np.void]]:
+        """By name, the records of radars, inertial units and all other devices."""
+        tables = self.core.capture.tables
+        return ByName("device", {name: table.rows for name, table in tables.items()})
+
+    @property
+    def boxes2d(self) -> Mapping[str, tuple[Box2d, ...]]:
+        """By camera, the boxes of the annotated objects that have a visible pixel."""
+        return self._by_camera(lambda camera: camera.boxes2d)
+
+    @property
+    def boxes3d(self) -> Mapping[str, tuple[Box3d, ...]]:
+        """By camera, the oriented boxes of the annotated objects."""
+        return self._by_camera(lambda camera: camera.boxes3d)
+
+    @property
+    def objects(self) -> Mapping[str, tuple[ObjectTruth, ...]]:
+        """By camera, all annotations of all instances in its image."""
+        return self._by_camera(lambda camera: camera.objects)
+
+    @property
+    def ego(self) -> FrameTruth | None:
+        """The ego vehicle's pose, motion and surroundings; None where none was annotated."""
+        return self.core.frame
+
+    def _by_camera(self, read: Callable[[CameraReading], T]) -> Mapping[str, T]:
+        return ByName("camera", {name: read(camera) for name, camera in self.cameras.items()})
+
+    def __repr__(self) -> str:
+        """Index, split and sensors."""
+        sensors = ", ".join(_names(self.cameras, self.lidars, self.core.capture.tables))
+        return f"<Sample {self.index} ({self.split}): {sensors}>"
+
+
+def _names(*groups: Iterable[str]) -> list[str]:
+    return [name for group in groups for name in group]
+
+
+def _corners(box: BoxPx) -> tuple[int, int, int, int]:
+    return box.x_min, box.y_min, box.x_max, box.y_max
+
+
+def _identity(item: ObjectTruth) -> tuple[str, int, int]:
+    """Category, category id and instance id."""
+    return item.instance.category, item.instance.category_id, item.instance.instance_id

@@ -1,0 +1,183 @@
+"""Samples read back from a finished data set."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.capture import Capture, Channel, PointCloud, Reading, Table
+from generator.core.errors import StorageError
+from generator.core.interfaces import cloud_path, media_path, table_path
+from generator.core.sample import Sample
+from generator.runner.labels import LABELS_NAME, Labels, read_labels
+from generator.runner.plan import load_plan
+from generator.runner.provenance import SCENES_NAME, KeptScene, kept_scenes
+from generator.runner.store import MANIFEST_NAME, SHARDS_NAME
+
+SHARDS_KEPT = 4
+"""Shards whose scenes and labels stay in memory; images are read when they are asked for."""
+
+
+class StoredSamples:
+    """Samples of a finished data set, by index.
+
+    Raises:
+        StorageError: the folder holds no finished data set.
+    """
+
+    def __init__(self, folder: str | PathLike[str]) -> None:
+        self.folder = Path(folder)
+        self._plan = load_plan(self.folder)
+        self._info = self._manifest()["info"]
+        self._shard = lru_cache(SHARDS_KEPT)(self._read_shard)
+
+    @property
+    def n(self) -> int:
+        """Number of samples."""
+        return self._plan.n
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names of all categories."""
+        return tuple(self._info["categories"])
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """The resolved configuration that the data set was made with."""
+        config: Mapping[str, Any] = self._plan.config
+        return config
+
+    def sample(self, index: int) -> Sample:
+        """The sample of that number; its images are decoded when they are read.
+
+        Raises:
+            StorageError: a file of the sample's shard is missing or damaged.
+        """
+        shard = index // self._plan.shard_size
+        folder = self._shard_dir(shard)
+        kept, labels = self._shard(shard)[index - shard * self._plan.shard_size]
+        return Sample(
+            index=kept.index,
+            scene_index=kept.scene_index,
+            view_index=kept.view_index,
+            step_index=kept.step_index,
+            split=kept.split,
+            scene=kept.scene,
+            capture=self._capture(folder, labels),
+            truth=labels.truth,
+            attempts=kept.attempts,
+            cameras=tuple(self._info["sensors"]),
+            frame=labels.frame,
+        )
+
+    def close(self) -> None:
+        """Forget the shards in memory."""
+        self._shard.cache_clear()
+
+    def _capture(self, folder: Path, labels: Labels) -> Capture:
+        index = labels.index
+        readings = {
+            name: Reading(
+                name,
+                labels.truth[name].camera,
+                ImageFiles(folder, name, index, self._channels(name), self._info["depth_scale_m"]),
+                time_s=image.time_s,
+                ev100=image.ev100,
+            )
+            for name, image in labels.images.items()
+        }
+        clouds = {
+            name: PointCloud(name, scan.lidar, _load(cloud_path(folder, name, index)), scan.time_s)
+            for name, scan in labels.scans.items()
+        }
+        tables = {
+            name: Table(name, table.device, _load(table_path(folder, name, index)), table.time_s)
+            for name, table in labels.tables.items()
+        }
+        return Capture(readings, clouds, tables)
+
+    def _channels(self, camera: str) -> tuple[Channel, ...]:
+        return tuple(Channel(name) for name in self._info["media"][camera])
+
+    def _read_shard(self, shard: int) -> list[tuple[KeptScene, Labels]]:
+        folder = self._shard_dir(shard)
+        try:
+            scenes = list(kept_scenes(folder / SCENES_NAME))
+            by_index = {kept.index: kept.scene for kept in scenes}
+            return list(zip(scenes, read_labels(folder / LABELS_NAME, by_index), strict=True))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise StorageError(
+                f"{folder}: its scenes or labels cannot be read ({error}); check the data set with:"
+                f"\n    gen-data verify {self.folder} --full"
+            ) from error
+
+    def _shard_dir(self, shard: int) -> Path:
+        return self.folder / SHARDS_NAME / f"{shard:06d}"
+
+    def _manifest(self) -> dict[str, Any]:
+        path = self.folder / MANIFEST_NAME
+        try:
+            manifest: dict[str, Any] = json.loads(path.read_bytes())
+        except FileNotFoundError:
+            raise StorageError(
+                f"{path}: missing; the data set is unfinished: run the command that began it again"
+            ) from None
+        except ValueError as error:
+            raise StorageError(f"{path}: damaged ({error})") from None
+        return manifest
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Another process opens the folder itself."""
+        return {"folder": self.folder}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Open the folder."""
+        self.__init__(state["folder"])  # type: ignore[misc]
+
+
+class ImageFiles(Mapping[Channel, NDArray[Any]]):
+    """Images of one reading by channel; each is decoded when it is read, and not kept."""
+
+    def __init__(
+        self,
+        folder: Path,
+        sensor: str,
+        index: int,
+        channels: tuple[Channel, ...],
+        depth_scale_m: float,
+    ) -> None:
+        self._paths = {c: media_path(folder, sensor, c, index) for c in channels}
+        self._depth_scale_m = depth_scale_m
+
+    def __getitem__(self, channel: Channel) -> NDArray[Any]:
+        """Decode one image."""
+        from exporters.images import read_image
+
+        return read_image(self._paths[channel], channel, self._depth_scale_m)
+
+    def __iter__(self) -> Iterator[Channel]:
+        """The channels, in order."""
+        return iter(self._paths)
+
+    def __contains__(self, channel: object) -> bool:
+        """Whether the reading has the channel; decodes nothing."""
+        return channel in self._paths
+
+    def __len__(self) -> int:
+        """Number of channels."""
+        return len(self._paths)
+
+
+def _load(path: Path) -> NDArray[np.void]:
+    try:
+        records: NDArray[np.void] = np.load(path, allow_pickle=False)
+    except (OSError, ValueError) as error:
+        raise StorageError(f"{path}: cannot be read ({error}); make the data set again") from error
+    return records

@@ -1,0 +1,266 @@
+"""``import gen_data``: data sets as lazy sequences, generated or read back from disk."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import gen_data
+from exporters.images import SIGNED_ZERO, png, read_image
+from generator.core.capture import Channel
+from generator.core.serial import to_plain
+from tests.end_to_end.running import environment
+
+SMALL = ("sensors.color.size_px=[96, 72]", "shard_size=3")
+MINIMAL = {
+    "template": "tabletop",
+    "elements": {"clutter": {"count": 2}},
+    "randomizers": [{"type": "camera_pose", "name": "orbit", "distance_m": {"uniform": [0.8, 1]}}],
+    "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [64, 48]}],
+    "annotations": ["boxes2d"],
+}
+
+
+@pytest.fixture(scope="module")
+def data() -> gen_data.Dataset:
+    """Small tabletop samples without an end."""
+    return gen_data.Dataset("tabletop.yaml", seed=1, overrides=SMALL)
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> gen_data.StoredDataset:
+    """Seven samples of the same configuration, written by one worker process."""
+    folder = tmp_path_factory.mktemp("stored") / "tabletop"
+    gen_data.generate("tabletop.yaml", 7, out=folder, workers=1, seed=1, overrides=SMALL)
+    return gen_data.open(folder)
+
+
+def test_a_sample_has_images_boxes_objects_and_the_scene(data: gen_data.Dataset) -> None:
+    """Each visible box is the extent of its object's pixels, computed here from the id image."""
+    sample = data[4]
+    camera = sample.cameras["color"]
+
+    assert camera.rgb.shape == (72, 96, 3)
+    assert camera.depth_m.dtype == np.float32
+    assert len(camera.objects) >= len(camera.boxes2d) > 0
+    for box in sample.boxes2d["color"]:
+        rows, columns = np.nonzero(camera.instance_ids == box.instance_id)
+        extent = (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
+        assert box.xyxy == extent
+        assert data.categories[box.category_id - 1] == box.category
+    assert {body.name for body in sample.scene.bodies} >= {"table"}
+
+
+def test_order_of_reading_does_not_matter(data: gen_data.Dataset) -> None:
+    """A sample made first in a fresh data set equals the same one made after others."""
+    _ = data[0], data[2]
+    fresh = gen_data.Dataset("tabletop.yaml", seed=1, overrides=SMALL)
+
+    np.testing.assert_array_equal(fresh[5].cameras["color"].rgb, data[5].cameras["color"].rgb)
+
+
+def test_a_pickled_data_set_makes_the_same_samples(data: gen_data.Dataset) -> None:
+    """Loaders of other libraries send the data set to their worker processes."""
+    other = pickle.loads(pickle.dumps(data))
+
+    np.testing.assert_array_equal(other[1].cameras["color"].rgb, data[1].cameras["color"].rgb)
+
+
+def test_slices_are_lazy_and_have_a_length(data: gen_data.Dataset) -> None:
+    """A slice of an endless data set is bounded; indices count from its first sample."""
+    part = data[10:1000:5]
+
+    assert len(part) == 198
+    assert part[1].index == 15
+    assert [sample.index for sample in data[3:5]] == [3, 4]
+
+
+def test_a_data_set_without_a_size_has_no_length_and_no_end(data: gen_data.Dataset) -> None:
+    """Both refusals say how to bound it."""
+    with pytest.raises(TypeError, match="n="):
+        len(data)
+    with pytest.raises(gen_data.SampleIndexError, match="n="):
+        _ = data[-1]
+
+
+def test_an_index_beyond_the_data_set_is_an_index_error() -> None:
+    """Of a documented type with a message, so that ``for`` loops of other libraries end."""
+    data = gen_data.Dataset("tabletop.yaml", n=5, overrides=SMALL)
+
+    with pytest.raises(gen_data.SampleIndexError, match="index 5 is out of range for 5 samples"):
+        _ = data[5]
+    assert issubclass(gen_data.SampleIndexError, IndexError)
+
+
+def test_an_unknown_name_tells_which_exist(data: gen_data.Dataset) -> None:
+    """Sensors and channels alike; the error is also a KeyError, so that ``get`` works."""
+    sample = data[0]
+
+    with pytest.raises(gen_data.UnknownNameError, match=r"no camera 'colour'.*'color'"):
+        _ = sample.cameras["colour"]
+    with pytest.raises(gen_data.UnknownNameError, match="there is no channel 'normals'"):
+        _ = sample.cameras["color"].channels["normals"]
+    assert sample.cameras.get("left") is None
+
+
+def test_channels_can_be_rendered_in_addition() -> None:
+    """Unit normals where something is seen, though the configuration writes none."""
+    data = gen_data.Dataset(MINIMAL, channels=["normals"])
+    camera = data[0].cameras["color"]
+
+    lengths = np.linalg.norm(camera.channels["normals"], axis=-1)
+    np.testing.assert_allclose(lengths[np.isfinite(camera.depth_m)], 1.0, atol=1e-5)
+    with pytest.raises(gen_data.ConfigError, match="unknown channel 'normal'"):
+        gen_data.Dataset(MINIMAL, channels=["normal"])
+
+
+def test_a_dictionary_equals_the_file_with_its_content(tmp_path: Path) -> None:
+    """The resolved configurations are the same."""
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(MINIMAL))
+
+    assert gen_data.Dataset(MINIMAL).config == gen_data.Dataset(file).config
+
+
+def test_typed_plug_ins_can_stand_in_a_dictionary() -> None:
+    """An object of a plug-in's class means what its YAML means."""
+    sensor = {"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 70.0}
+    typed = gen_data.Dataset({**MINIMAL, "sensors": [sensor]})
+    from generator.sensors.rgb_camera import RgbCamera
+
+    camera = RgbCamera(name="color", size_px=(64, 48), hfov_deg=70.0)
+    assert gen_data.Dataset({**MINIMAL, "sensors": [camera]}).config == typed.config
+
+
+def test_faults_in_a_dictionary_name_the_field() -> None:
+    """The message is that of a file, with a place in the dictionary's own YAML."""
+    wrong = {**MINIMAL, "views_per_scene": "many"}
+
+    with pytest.raises(gen_data.ConfigError, match=r"<config>:\d+:\d+: views_per_scene: "):
+        gen_data.Dataset(wrong)
+
+
+def test_what_is_read_back_is_what_was_generated(
+    data: gen_data.Dataset, stored: gen_data.StoredDataset
+) -> None:
+    """Colour, ids, labels and scene are equal; depth up to half a unit of its file."""
+    assert len(stored) == 7
+    for generated, read in zip(data[:7], stored, strict=True):
+        ours, theirs = generated.cameras["color"], read.cameras["color"]
+        np.testing.assert_array_equal(theirs.rgb, ours.rgb)
+        np.testing.assert_array_equal(theirs.instance_ids, ours.instance_ids)
+        near = ours.depth_m < 6.5
+        np.testing.assert_allclose(theirs.depth_m[near], ours.depth_m[near], atol=0.51e-4)
+        assert to_plain(read.core.truth) == to_plain(generated.core.truth)
+        assert to_plain(read.ego) == to_plain(generated.ego)
+        assert read.scene == generated.scene
+        assert (read.split, read.index) == (generated.split, generated.index)
+
+
+def test_masks_survive_the_disk(data: gen_data.Dataset, stored: gen_data.StoredDataset) -> None:
+    """Pixel by pixel, in the place where they were."""
+    for ours, theirs in zip(data[6].objects["color"], stored[6].objects["color"], strict=True):
+        assert ours.mask is not None and theirs.mask is not None
+        assert (ours.mask.x_px, ours.mask.y_px) == (theirs.mask.x_px, theirs.mask.y_px)
+        np.testing.assert_array_equal(ours.mask.pixels, theirs.mask.pixels)
+
+
+def test_a_stored_data_set_can_be_pickled(stored: gen_data.StoredDataset) -> None:
+    """The copy reads the same files."""
+    assert pickle.loads(pickle.dumps(stored))[2].boxes2d["color"] == stored[2].boxes2d["color"]
+
+
+def test_an_unfinished_folder_cannot_be_opened(tmp_path: Path) -> None:
+    """The message names what is missing."""
+    with pytest.raises(gen_data.StorageError, match=r"plan\.json: missing"):
+        gen_data.open(tmp_path)
+
+
+def test_progress_is_reported(tmp_path: Path) -> None:
+    """The callback sees every sample of the data set."""
+    seen: list[int] = []
+    gen_data.generate(
+        MINIMAL, 2, out=tmp_path / "out", workers=0, on_progress=lambda p: seen.append(p.done)
+    )
+
+    assert max(seen) == 2
+
+
+def test_public_names_are_the_listed_ones() -> None:
+    """Every name of the list exists, and ``dir`` shows just these."""
+    for name in gen_data.__all__:
+        assert getattr(gen_data, name) is not None
+    assert dir(gen_data) == sorted(gen_data.__all__)
+
+
+def test_importing_loads_no_engine() -> None:
+    """``import gen_data`` is quick: numpy and all that is heavier wait until they are needed."""
+    program = "import sys, gen_data; print(sorted({'numpy', 'warp', 'pydantic'} & {*sys.modules}))"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=environment(), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+
+    assert done.stdout.strip() == "[]"
+
+
+def test_packages_of_the_same_names_do_no_harm(tmp_path: Path) -> None:
+    """A user's own ``configs``, ``exporters`` and ``tests`` lie beside the script, and it works."""
+    for name in ("configs", "exporters", "tests", "generator", "randomizers"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("raise ImportError('not this one')\n")
+    script = tmp_path / "mine.py"
+    script.write_text(
+        "import gen_data\n"
+        f"data = gen_data.Dataset('tabletop.yaml', overrides={SMALL!r})\n"
+        "print(len(data[3].boxes2d['color']))\n"
+        f"gen_data.generate('tabletop.yaml', 1, out='out', workers=1, overrides={SMALL!r})\n"
+    )
+
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 0
+    assert (tmp_path / "out" / "manifest.json").is_file()
+
+
+@pytest.mark.parametrize("channel", [c for c in Channel if c.value.startswith(("flow_", "scene"))])
+def test_images_of_motion_are_read_as_written(channel: Channel, tmp_path: Path) -> None:
+    """Values on the grid of the file return exactly; NaN stays NaN."""
+    rng = np.random.Generator(np.random.Philox(key=1))
+    if channel.value.startswith("flow_occluded"):
+        image = rng.integers(0, 2, (5, 7)).astype(np.uint8)
+    else:
+        unit, depth = (1 / 64, 2) if channel.value.startswith("flow") else (0.001, 3)
+        units = rng.integers(1 - SIGNED_ZERO, SIGNED_ZERO, (5, 7, depth))
+        image = (units * unit).astype(np.float32)
+        image[2, 3] = np.nan
+    path = tmp_path / "image.png"
+    path.write_bytes(png(channel, image, 0.001))
+
+    np.testing.assert_allclose(read_image(path, channel, 0.001), image, atol=1e-6)
+
+
+def test_normals_are_read_as_unit_vectors(tmp_path: Path) -> None:
+    """Within the 8 bits of the file, and zero where there is no surface."""
+    rng = np.random.Generator(np.random.Philox(key=2))
+    normals = rng.normal(size=(6, 8, 3))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    normals[0, 0] = 0.0
+    path = tmp_path / "image.png"
+    path.write_bytes(png(Channel.NORMALS, normals.astype(np.float32), 0.001))
+
+    read = read_image(path, Channel.NORMALS, 0.001)
+
+    assert (read[0, 0] == 0.0).all()
+    angles = np.arccos(np.clip((read * normals).sum(axis=-1), -1.0, 1.0))[1:]
+    assert np.degrees(angles).max() < 0.7
