@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from generator.assets.procedural import FAMILIES, Solid
+from generator.assets.procedural import FAMILIES
+from generator.assets.procedural.family import Solid
 from generator.assets.procedural.furniture import (
     SLOTS,
     bin_interior_m,

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from generator.assets.procedural import FAMILIES, TEXTURES, Solid
+from generator.assets.procedural import FAMILIES, TEXTURES
+from generator.assets.procedural.family import Solid
 from generator.core.geometry import MeshData
 
 SEEDS = (0, 1, 7, 11)

@@ -1,11 +1,14 @@
-"""What a line of the tables is: a named generator of objects, textures or environments."""
+"""Families: named generators of objects, textures and environments, and the tables they are in."""
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+import yaml
 
 from generator.core.geometry import ConvexParts, Float32, Keypoint, MeshData, TextureData
 
@@ -130,7 +133,7 @@ class Lazy:
     """A function named by ``module:function`` and imported when first called.
 
     Attributes:
-        path: Module relative to this package, or its full name, and the function in it.
+        path: Full name of the module, and the function in it.
     """
 
     path: str
@@ -138,6 +141,87 @@ class Lazy:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the function."""
         module, _, function = self.path.partition(":")
-        if not module.startswith("generator."):
-            module = f"{__package__}.{module}"
         return getattr(importlib.import_module(module), function)(*args, **kwargs)
+
+
+@dataclass(frozen=True)
+class ConstantFacts:
+    """Facts that are the same for every variant."""
+
+    subcategory: str
+
+    def __call__(self, **_: Any) -> Facts:
+        """The facts, whatever the arguments."""
+        return Facts(self.subcategory)
+
+
+class FamilyTables(NamedTuple):
+    """The families of one package, by name."""
+
+    objects: Mapping[str, Family]
+    textures: Mapping[str, TextureFamily]
+    environments: Mapping[str, EnvironmentFamily]
+
+
+def load_families(package: str) -> FamilyTables:
+    """The tables in ``families.yaml`` of a package; the file's own header explains its keys."""
+    text = (files(package) / "families.yaml").read_text(encoding="utf-8")
+    plain = yaml.safe_load(text)
+
+    def table(section: str, make: Callable[..., Any]) -> Mapping[str, Any]:
+        rows = plain.get(section, {})
+        return {name: make(name, **_arguments(package, row)) for name, row in rows.items()}
+
+    return FamilyTables(
+        table("objects", _object_family),
+        table("textures", TextureFamily),
+        table("environments", EnvironmentFamily),
+    )
+
+
+def _object_family(  # noqa: PLR0913  (the columns of the table)
+    name: str,
+    *,
+    build: Lazy,
+    tags: tuple[str, ...],
+    version: int,
+    variants: int,
+    parameters: Mapping[str, object],
+    category: str = "",
+    mass_kg: float = 0.0,
+    stackable: bool = False,
+    subcategory: str = "",
+    facts: bool = False,
+    stored: bool = True,
+) -> Family:
+    return Family(
+        name=name,
+        category=category or name,
+        tags=tags,
+        variants=variants,
+        mass_kg=mass_kg,
+        stackable=stackable,
+        version=version,
+        parameters=parameters,
+        build=build,
+        facts=Lazy(f"{build.path}_facts")
+        if facts
+        else (ConstantFacts(subcategory) if subcategory else None),
+        stored=stored,
+    )
+
+
+def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of the table as keywords: lists become tuples, ``build`` a function."""
+    parameters = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in row.get("parameters", {}).items()
+    }
+    return {
+        "version": 1,
+        "variants": 0,
+        **row,
+        "build": Lazy(f"{package}.{row['build']}"),
+        "tags": tuple(sorted(row["tags"])),
+        "parameters": parameters,
+    }
