@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from generator.sensors.lenses import CALIBRATIONS
 from pydantic import ValidationError
 
 from generator.core.capture import Channel, Reading
 from generator.core.lens import COEFFICIENTS
 from generator.core.scene import Camera, Region, Scene
 from generator.core.streams import Streams
-from generator.sensors.lenses import CALIBRATIONS
 from generator.sensors.rgb_camera import RgbCamera
 
 
