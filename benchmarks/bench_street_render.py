@@ -16,7 +16,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.bench_render import frame_ms, timed_launches
+from benchmarks.bench_render import frame_ms, photograph, timed_launches
 from generator.core.capture import Channel
 from generator.core.errors import AssetError
 from generator.core.geometry import (
@@ -258,7 +258,7 @@ def main() -> None:
     triangles = sum(len(library.mesh(body.asset).faces) for body in scenes[0].bodies)
     print(f"{len(scenes[0].bodies)} bodies, {triangles / 1e6:.2f} million triangles")
     renderer = WarpRenderer(library, "cpu")
-    renderer.render(scenes[0], scenes[0].cameras[0], CHANNELS)
+    photograph(renderer, scenes[0], CHANNELS)
     for label in ("first time", "again"):
         spent_ms = [frame_ms(renderer, [scene], CHANNELS, 1)[0] for scene in scenes[1:]]
         print(f"CPU ms per frame, {label}: {', '.join(f'{ms:.0f}' for ms in spent_ms)}")

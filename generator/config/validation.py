@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 from generator.config.document import Node
 from generator.config.faults import Fault, located, without_union_noise
 from generator.config.problems import FieldPath, Position, Problems, dotted
+from generator.config.renaming import with_present_keys
 from generator.config.wording import fact
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -29,6 +30,7 @@ def validate(
     Returns:
         An instance; None where there was a problem.
     """
+    node = with_present_keys(node, model, problems, field_prefix)
     # In JSON mode, strictness means what YAML needs: a list is a tuple's only spelling and a
     # string an enum's, but a string is still no number.
     try:

@@ -14,13 +14,14 @@ from generator.core.scene import Camera, Device, Lidar
 
 
 class Channel(str, Enum):
-    """An image a renderer can make. Label channels come from the pixel-centre ray alone.
+    """An image of a scene. Label channels come from the pixel-centre ray alone.
 
     ====================  ======================  ==========================================
     channel               array                   meaning; value for "nothing"
     ====================  ======================  ==========================================
-    RGB                   uint8 [h, w, 3]         sRGB, anti-aliased
-    RADIANCE              float32 [h, w, 3]       luminance, linear RGB [cd/m^2], anti-aliased
+    RGB                   uint8 [h, w, 3]         sRGB: a photograph, which a camera develops from
+                                                  RADIANCE; a renderer ends there
+    RADIANCE              float32 [h, w, 3]       luminance, linear RGB [cd/m^2]: means over pixels
     Z_DEPTH               float32 [h, w]          along the optical axis [m]; inf, also beside and
                                                   behind the camera, where wide lenses look
     RANGE                 float32 [h, w]          along the ray [m]; inf
@@ -98,7 +99,7 @@ class Reading:
         silhouettes: By instance id; empty unless AMODAL was asked for.
         time_s: The instant that depth, ids and boxes refer to; behind a rolling shutter, that of
             the image's middle, while each row has its own (``camera.shutter``).
-        ev100: Exposure value that was set or metered; None where there is no colour.
+        ev100: Exposure value that was set or metered; None where there is no photograph.
     """
 
     sensor: str

@@ -1,26 +1,20 @@
-"""The RGB image: light and shade, then exposure."""
+"""Radiance of the realtime tier: light and shade, weather, anti-aliasing."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from generator.core.capture import Channel
 from generator.core.geometry import Float32
 from generator.core.scene import Camera
-from generator.renderers.exposure import automatic_ev100, exposure_of, tone_curve
-from generator.renderers.kernels import antialias, gather, optics, raster, records, shade, tone
+from generator.renderers.kernels import antialias, gather, optics, raster, records, shade
 from generator.renderers.kernels import samples as mixing
-from generator.renderers.kernels.edges import find_edges
+from generator.renderers.kernels.edges import find_edges, put_mixed
 from generator.renderers.kernels.lattice import Lattice
 from generator.renderers.kernels.raster import Z_NEAR_M
 from generator.renderers.lamps import keep_main_lamps
 from generator.renderers.layers import ListedPixels, shade_layers
-from generator.renderers.lens import add_glare, wet_lens
 from generator.renderers.occlusion import (
     lamp_parts,
     openness,
@@ -35,19 +29,6 @@ from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Projected, Seen
 from generator.renderers.weather import expose_ground, fill_air
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class LitImage:
-    """What a camera receives, and how it is exposed.
-
-    Attributes:
-        radiance: Luminance in linear RGB [cd/m^2], anti-aliased, flat; scratch memory.
-        ev100: The exposure that was set or metered.
-    """
-
-    radiance: wp.array
-    ev100: float
 
 
 def surface_light(
@@ -67,62 +48,18 @@ def surface_light(
     return radiance
 
 
-def metered_ev100(camera: Camera, view: records.View, radiance: wp.array) -> float:
-    """The exposure value that a camera is set to, or else that suits what it sees."""
-    if camera.ev100 is not None:
-        return camera.ev100
-    return automatic_ev100(radiance.numpy().reshape(view.height, view.width, 3))
-
-
-def pass_lens(
-    world: PackedWorld,
-    camera: Camera,
-    view: records.View,
-    z_m: wp.array,
-    lit: LitImage,
+def add_falling(
+    world: PackedWorld, camera: Camera, view: records.View, z_m: wp.array, radiance: wp.array,
     stock: AssetStock,
-    settings: RenderSettings,
-) -> None:
-    """Add what falls before the lens, drops on it and its glare, in place; depths as of Seen."""
-    radiance = lit.radiance
-    draw_precipitation(world, camera, view, z_m, radiance, ev100=lit.ev100, stock=stock)
-    wet_lens(world.weather, camera, view, radiance, stock)
-    add_glare(view, settings.glare, radiance, stock)
-    darken_outside(view, radiance)
+) -> None:  # fmt: skip
+    """Draw rain and snow between the camera and what it sees, in place; depths as of Seen."""
+    if draw_precipitation(world, camera, view, z_m, radiance, stock):
+        darken_outside(view, radiance)
 
 
-def developed(
-    lit: LitImage,
-    view: records.View,
-    channels: frozenset[Channel],
-    stock: AssetStock,
-    settings: RenderSettings,
-) -> dict[Channel, NDArray[Any]]:
-    """Those of the channels RADIANCE and RGB that are asked for."""
-    images: dict[Channel, NDArray[Any]] = {}
-    if Channel.RADIANCE in channels:
-        images[Channel.RADIANCE] = radiance_image(lit, view)
-    if Channel.RGB in channels:
-        images[Channel.RGB] = color_image(lit, view, stock, settings)
-    return images
-
-
-def radiance_image(lit: LitImage, view: records.View) -> Float32:
-    """Luminance in linear RGB [cd/m^2], float32 [h, w, 3]."""
-    image: Float32 = lit.radiance.numpy().reshape(view.height, view.width, 3).copy()
-    return image
-
-
-def color_image(
-    lit: LitImage, view: records.View, stock: AssetStock, settings: RenderSettings
-) -> NDArray[np.uint8]:
-    """sRGB, uint8 [h, w, 3]."""
-    device, n = stock.device, view.width * view.height
-    exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
-    curve = wp.array(tone_curve(settings.tone), dtype=wp.uint8, device=device)
-    rgb = wp.zeros((n, 3), dtype=wp.uint8, device=device)
-    wp.launch(tone.develop, n, [lit.radiance, exposure, curve], [rgb], device=device)
-    image: NDArray[np.uint8] = rgb.numpy().reshape(view.height, view.width, 3)
+def radiance_image(radiance: wp.array, view: records.View) -> Float32:
+    """Luminance in linear RGB [cd/m^2], float32 [h, w, 3]; a copy of the flat array."""
+    image: Float32 = radiance.numpy().reshape(view.height, view.width, 3).copy()
     return image
 
 
@@ -130,15 +67,14 @@ def mix_edges(
     world: PackedWorld,
     view: records.View,
     seen: Seen,
-    lit: LitImage,
+    radiance: wp.array,
     stock: AssetStock,
     settings: RenderSettings,
 ) -> None:
-    """Anti-alias, in place."""
-    if settings.antialias == 1:
+    """Anti-alias in place: pixels on edges become the mean of their samples' radiance."""
+    samples = settings.antialias
+    if samples == 1:
         return
-    radiance, samples = lit.radiance, settings.antialias
-    exposure = exposure_of(lit.ev100 - settings.exposure_compensation_ev)
     device, images = stock.device, images_of(seen)
     count = wp.zeros(1, dtype=wp.int32, device=device)
     pixels = stock.scratch("listed pixels", view.width * view.height, wp.int32)
@@ -148,13 +84,13 @@ def mix_edges(
     frame = [view, world.record, images, radiance, edges]
     if seen.projected is not None:
         drawn = _drawn_samples(world, view, seen, seen.projected, edges, samples, stock)
-        inputs = [*frame, drawn, exposure]
+        inputs = [*frame, drawn]
         wp.launch(mixing.mix_samples, len(edges), inputs, [mixed], device=device)
     else:
         parts = stock.constant(wp.vec2, pixel_parts, samples)
-        inputs = [*frame, parts, exposure, Z_NEAR_M]
+        inputs = [*frame, parts, Z_NEAR_M]
         wp.launch(antialias.antialias, len(edges), inputs, [mixed], device=device)
-    wp.launch(tone.put_mixed, len(edges), [edges, mixed], [radiance], device=device)
+    wp.launch(put_mixed, len(edges), [edges, mixed], [radiance], device=device)
 
 
 def darken_outside(view: records.View, radiance: wp.array) -> None:

@@ -24,7 +24,7 @@ from generator.renderers import kernels
 
 EVERY_FRAME = (
     "shade", "occlusion", "raster", "gather", "silhouette", "samples", "shafts", "surface",
-    "edges", "lattice", "tone", "sky", "growing",
+    "edges", "lattice", "sky", "growing",
 )  # fmt: skip
 """Modules of kernels that every photograph takes, in an order that deals them out evenly."""
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from generator.renderers.kernels import records, shade, tone
+from generator.renderers.kernels import edges, records, shade
 from generator.renderers.occlusion import lamp_parts, pixel_parts, sunflower
 from generator.renderers.packing import PackedWorld
 from generator.renderers.settings import RenderSettings
@@ -73,4 +73,4 @@ def shade_layers(
     offsets = stock.constant(wp.vec2, pixel_parts, _PARTS)
     inputs = [*frame, places, *seen, offsets]
     wp.launch(layers.shade_contrasts, found, inputs, [pixels, mixed], device=device)
-    wp.launch(tone.put_mixed, found, [pixels, mixed], [radiance], device=device)
+    wp.launch(edges.put_mixed, found, [pixels, mixed], [radiance], device=device)

@@ -18,6 +18,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from generator.core.colorimetry import luminance
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Weather
 from generator.core.se3 import Array
@@ -31,6 +32,9 @@ _NEAREST_M = 0.35
 _APERTURE_M = 0.002
 _EXPOSURE_S = (1.0 / 500.0, 1.0 / 40.0)
 _F_NUMBER = 2.0
+# White is 1.2 * 2^EV100 cd/m^2 (ISO 12232), and metering puts the light's middle at this share.
+_MIDDLE_GREY = 0.18
+_METERED_EVERY = 61
 _COUNT_MAX = 60_000
 _SPHERE_MAX = 480_000
 # Diameter of a flake over that of the drop it melts to: its density is about 0.05.
@@ -71,8 +75,26 @@ def snow(rate_mm_h: float) -> Kind:
     return Kind(density, slope_per_mm * 1e3 / _FLAKE, least_mm * 1e-3 * _FLAKE, 14.0)
 
 
-def exposure_time_s(ev100: float) -> float:
-    """Of a camera at ISO 100 and f/2, within what such cameras can."""
+def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
+    """The exposure value that a camera is set to, or one that suits the light it receives.
+
+    Args:
+        radiance: Linear RGB [cd/m^2], flat.
+        fixed_ev100: Of the camera; None = it meters for itself. Its median luminance stands for
+            what it will meter: only the length of streaks depends on it.
+    """
+    if fixed_ev100 is not None:
+        return fixed_ev100
+    levels = luminance(radiance.numpy()[::_METERED_EVERY])
+    # Black pixels, beyond a lens's field or without a background, say nothing about the light.
+    lit = levels[levels > 0.0]
+    median_cd_m2 = float(np.median(lit)) if len(lit) else 0.0
+    # On a grid, so that the last bit of a logarithm is never seen.
+    return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * _MIDDLE_GREY)) * 16.0) / 16.0
+
+
+def usual_exposure_s(ev100: float) -> float:
+    """Exposure time of a camera at ISO 100 and f/2, within what such cameras can."""
     return float(min(max(_F_NUMBER**2 / 2.0**ev100, _EXPOSURE_S[0]), _EXPOSURE_S[1]))
 
 
@@ -82,13 +104,15 @@ def draw_precipitation(
     view: records.View,
     z_m: wp.array,
     radiance: wp.array,
-    *,
-    ev100: float,
     stock: AssetStock,
-) -> None:
-    """Draw what falls over the image, in place; nothing where nothing falls."""
+) -> bool:
+    """Draw what falls over the image, in place; whether anything falls."""
     weather = world.weather
-    exposure_s = camera.shutter.exposure_s or exposure_time_s(ev100)
+    if weather.rain_mm_h <= 0.0 and weather.snow_mm_h <= 0.0:
+        return False
+    exposure_s = camera.shutter.exposure_s
+    if not exposure_s:
+        exposure_s = usual_exposure_s(light_level_ev100(radiance, camera.ev100))
     found = [
         traces(kind, camera, weather, exposure_s, name)
         for name, rate, kind in (
@@ -97,9 +121,9 @@ def draw_precipitation(
         )
         if rate > 0.0
     ]
-    values = np.concatenate(found) if found else np.zeros(0, particles.Streak.numpy_dtype())
+    values = np.concatenate(found)
     if not len(values):
-        return
+        return False
     values = values[np.argsort(-values["z_m"], kind="stable")]
     first, listed = _rows(values, view.height)
     streaks = wp.array(values, dtype=particles.Streak, device=stock.device)
@@ -109,6 +133,7 @@ def draw_precipitation(
     lists = [wp.array(a, dtype=wp.int32, device=stock.device) for a in (first, listed)]
     inputs = [view.width, z_m, streaks, *lists]
     wp.launch(particles.draw_streaks, view.height, inputs, [radiance], device=stock.device)
+    return True
 
 
 def traces(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -10,7 +11,7 @@ from generator.config.strict import Strict
 
 
 class RenderSettings(Strict):
-    """How images are made. Labels do not depend on it.
+    """How radiance is computed. Labels do not depend on it; cameras have settings of their own.
 
     Attributes:
         tier: ``realtime`` has no noise and takes a tenth of a second; ``pathtraced`` follows light
@@ -23,10 +24,6 @@ class RenderSettings(Strict):
         shadows: ``soft`` follows the size of every light, ``hard`` takes lights for points.
         ambient_occlusion_radius_m: How far away a surface still darkens its neighbourhood; 0
             switches ambient occlusion off.
-        exposure_compensation_ev: Added to the exposure, in stops; positive is brighter.
-        tone: ``filmic`` has a soft shoulder and toe; ``srgb`` clips at white.
-        glare: Share of the light that the lens scatters around bright sources; 0.02 suits a clean
-            lens, 0.1 a dirty one.
         environment_shadow: ``auto`` lets the brightest parts of a panorama throw shadows, where
             the scene is open to it and has no sun of its own; ``off`` takes all of it for light
             without shadows.
@@ -35,6 +32,11 @@ class RenderSettings(Strict):
             or the faster one on the device.
     """
 
+    moved_keys: ClassVar[Mapping[str, str]] = {
+        key: f"sensors[].image_pipeline.{key}: it is a property of each camera"
+        for key in ("tone", "glare", "exposure_compensation_ev")
+    }
+
     tier: Literal["realtime", "pathtraced"] = "realtime"
     samples: int = Field(64, ge=1, le=65536)
     max_bounces: int = Field(16, ge=1, le=256)
@@ -42,9 +44,6 @@ class RenderSettings(Strict):
     antialias: Literal[1, 2, 4, 8] = 4
     shadows: Literal["soft", "hard"] = "soft"
     ambient_occlusion_radius_m: float = Field(0.25, ge=0.0)
-    exposure_compensation_ev: float = Field(0.0, ge=-10.0, le=10.0)
-    tone: Literal["filmic", "srgb"] = "filmic"
-    glare: float = Field(0.0, ge=0.0, le=0.5)
     environment_shadow: Literal["auto", "off"] = "auto"
     max_lamps: int = Field(16, ge=1)
     visibility: Literal["auto", "raster", "rays"] = "auto"

@@ -1,9 +1,9 @@
-"""Images whose rows are exposed at several instants, or for a while.
+"""Radiance and labels of images whose rows are exposed at several instants, or for a while.
 
-Labels are those of each row's own instant, the middle of its exposure. Light is averaged over the
-exposure: time is cut into slices, every slice is rendered at its middle as far as rows are exposed
-then, and every row is the mean of its slices. Both take no more instants than motion in the image
-makes necessary.
+The camera's shutter names the instants. Labels are those of each row's own instant, the middle of
+its exposure. Light is averaged over the exposure: time is cut into slices, every slice is rendered
+at its middle as far as rows are exposed then, and every row is the mean of its slices. Both take no
+more instants than motion in the image makes necessary.
 """
 
 from __future__ import annotations
@@ -21,13 +21,7 @@ from numpy.typing import NDArray
 from generator.core.capture import Channel, Reading, Silhouette
 from generator.core.geometry import Float32
 from generator.core.scene import Camera, Scene
-from generator.core.shutter import INSTANT
-from generator.renderers.color import (
-    LitImage,
-    developed,
-    metered_ev100,
-    pass_lens,
-)
+from generator.renderers.color import add_falling, radiance_image
 from generator.renderers.flow import FLOW, flow_images
 from generator.renderers.lamps import main_lamp_numbers
 from generator.renderers.moments import Band, Moment, Sight, Studio, moves, sight
@@ -36,11 +30,6 @@ from generator.renderers.pace import Pace, bands_of, pace_of
 from generator.renderers.packing import moved_world, with_own_record
 from generator.renderers.shown import Light, Shown, drawn_bands, with_margin
 from generator.renderers.tiers import smooth_edges, tier_light
-
-_LIT = frozenset({Channel.RGB, Channel.RADIANCE})
-_METERING = 4
-_LINEAR_EV100 = 40.0
-"""So short an exposure that edges are mixed linearly: a mean over time adds up light."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -72,18 +61,15 @@ def exposed(
     if len(bands) == 1 and pace.samples == 1:
         return None
     near = _with_main_lamps(near, studio)
-    drawn = channels - FLOW - _LIT - {Channel.AMODAL}
+    drawn = channels - FLOW - {Channel.AMODAL}
     if Channel.AMODAL in channels:
         drawn = drawn | {Channel.INSTANCE}
-    ev100 = camera.ev100
-    if ev100 is None and channels & _LIT:
-        ev100 = _metered(near, studio)
-    shown, images = _images(near, bands, drawn | channels & _LIT, pace, ev100, studio)
+    shown, images = _images(near, bands, drawn, pace, studio)
     outlines: dict[int, Silhouette] = {}
     if Channel.AMODAL in channels:
         outlines = rolled_silhouettes(bands, images[Channel.INSTANCE], studio, near)
     images |= flow_images(near, shown, channels, studio)
-    return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
+    return Reading(camera.name, camera, images, outlines, scene.time_s)
 
 
 def _images(
@@ -91,24 +77,23 @@ def _images(
     bands: Sequence[Band],
     channels: frozenset[Channel],
     pace: Pace,
-    ev100: float | None,
     studio: Studio,
 ) -> tuple[Shown, dict[Channel, NDArray[Any]]]:
-    """What pixels show, labels of it and, if asked for, the photograph."""
-    labels = channels - _LIT
-    if ev100 is None or not channels & _LIT:
+    """What pixels show, labels of it and, if asked for, radiance."""
+    labels = channels - {Channel.RADIANCE}
+    if Channel.RADIANCE not in channels:
         return drawn_bands(bands, labels, studio, near)
+    light = partial(light_of, studio=studio)
     if pace.samples > 1:
-        light = partial(light_of, ev100=_LINEAR_EV100, studio=studio)
         shown, images = drawn_bands(bands, labels, studio, near)
         mean = _averaged(slices_of(near.moment, pace.samples, pace.blurred), light, near, studio)
     else:
-        light = partial(light_of, ev100=ev100, studio=studio)
         shown, images = drawn_bands(bands, labels, studio, near, light)
-        mean = images.pop(Channel.RADIANCE)
-    lit = LitImage(_on_device(mean, wp.vec3, studio), ev100)
+        mean = images[Channel.RADIANCE]
+    radiance = _on_device(mean, wp.vec3, studio)
     depths = _on_device(shown.z_m, float, studio)
-    return shown, images | _developed(lit, depths, near, channels, studio)
+    add_falling(near.world, near.moment.camera, near.view, depths, radiance, studio.stock)
+    return shown, images | {Channel.RADIANCE: radiance_image(radiance, near.view)}
 
 
 def slices_of(
@@ -159,13 +144,14 @@ def _averaged(slices: Sequence[Slice], light: Light, near: Sight, studio: Studio
     return mean
 
 
-def light_of(see: Sight, ev100: float, studio: Studio) -> Float32:
+def light_of(see: Sight, studio: Studio) -> Float32:
     """What comes from every pixel, anti-aliased; valid until the next call."""
     # What light does to the world's record is of no concern to those who start from it.
     see = replace(see, world=with_own_record(see.world))
-    lit = LitImage(_radiance(see, studio), ev100)
-    smooth_edges(see.world, see.view, see.seen, lit, studio)
-    image: Float32 = lit.radiance.numpy().reshape(see.view.height, see.view.width, 3)
+    scene, camera = see.moment.scene, see.moment.camera
+    radiance = tier_light(scene, camera, see.world, see.view, see.seen, studio)
+    smooth_edges(see.world, see.view, see.seen, radiance, studio)
+    image: Float32 = radiance.numpy().reshape(see.view.height, see.view.width, 3)
     return image
 
 
@@ -184,34 +170,3 @@ def _on_device(image: Float32, dtype: Any, studio: Studio) -> wp.array:
     """An image as kernels have it, flat."""
     flat = image.reshape(-1, *image.shape[2:])
     return wp.array(flat, dtype=dtype, device=studio.stock.device)
-
-
-def _developed(
-    lit: LitImage, z_m: wp.array, near: Sight, channels: frozenset[Channel], studio: Studio
-) -> dict[Channel, NDArray[Any]]:
-    """What the lens adds, and the response of the camera."""
-    stock, settings, view = studio.stock, studio.settings, near.view
-    pass_lens(near.world, near.moment.camera, view, z_m, lit, stock, settings)
-    return developed(lit, view, channels, stock, settings)
-
-
-def _metered(near: Sight, studio: Studio) -> float:
-    """The exposure value for the middle, from an image of a quarter of the size."""
-    lens = near.moment.camera.intrinsics
-    small = replace(
-        lens,
-        width_px=max(lens.width_px // _METERING, 1),
-        height_px=max(lens.height_px // _METERING, 1),
-        fx_px=lens.fx_px / _METERING,
-        fy_px=lens.fy_px / _METERING,
-        cx_px=lens.cx_px / _METERING,
-        cy_px=lens.cy_px / _METERING,
-    )
-    camera = replace(near.moment.camera, intrinsics=small, shutter=INSTANT)
-    see = sight(Moment(near.moment.scene, camera), studio, None, near)
-    return metered_ev100(camera, see.view, _radiance(see, studio))
-
-
-def _radiance(see: Sight, studio: Studio) -> wp.array:
-    """What comes from pixel centres [cd/m^2], flat; scratch memory."""
-    return tier_light(see.moment.scene, see.moment.camera, see.world, see.view, see.seen, studio)

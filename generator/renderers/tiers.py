@@ -5,13 +5,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.core.scene import Camera, Scene
-from generator.renderers.color import (
-    LitImage,
-    metered_ev100,
-    mix_edges,
-    pass_lens,
-    surface_light,
-)
+from generator.renderers.color import mix_edges, surface_light
 from generator.renderers.kernels.records import View
 from generator.renderers.moments import Studio
 from generator.renderers.packing import PackedWorld
@@ -34,18 +28,9 @@ def tier_light(
     return surface_light(world, view, seen, stock, settings)
 
 
-def smooth_edges(world: PackedWorld, view: View, seen: Seen, lit: LitImage, studio: Studio) -> None:
+def smooth_edges(
+    world: PackedWorld, view: View, seen: Seen, radiance: wp.array, studio: Studio
+) -> None:
     """Anti-alias what has not been averaged over pixels, in place."""
     if studio.paths is None:
-        mix_edges(world, view, seen, lit, studio.stock, studio.settings)
-
-
-def lit_image(
-    scene: Scene, camera: Camera, world: PackedWorld, view: View, seen: Seen, studio: Studio
-) -> LitImage:
-    """Light, shade and weather, before the camera's response."""
-    radiance = tier_light(scene, camera, world, view, seen, studio)
-    lit = LitImage(radiance, metered_ev100(camera, view, radiance))
-    pass_lens(world, camera, view, seen.z_m, lit, studio.stock, studio.settings)
-    smooth_edges(world, view, seen, lit, studio)
-    return lit
+        mix_edges(world, view, seen, radiance, studio.stock, studio.settings)

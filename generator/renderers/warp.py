@@ -8,7 +8,7 @@ from generator.core.capture import Beams, Channel, Echoes, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Camera, Lidar, Scene
-from generator.renderers.color import developed
+from generator.renderers.color import add_falling, radiance_image
 from generator.renderers.compiling import compile_kernels
 from generator.renderers.device import open_device
 from generator.renderers.flow import FLOW, flow_images
@@ -21,7 +21,7 @@ from generator.renderers.shown import shown_in
 from generator.renderers.shutter import exposed
 from generator.renderers.silhouettes import silhouettes
 from generator.renderers.stock import AssetStock
-from generator.renderers.tiers import lit_image
+from generator.renderers.tiers import smooth_edges, tier_light
 from generator.renderers.visibility import see
 
 
@@ -34,7 +34,7 @@ class WarpRenderer:
     Args:
         assets: Where meshes, textures and environments come from.
         device: ``cpu``, ``cuda:N``, or ``auto`` for the first CUDA device if there is one.
-        settings: How colour images are made.
+        settings: How radiance is computed.
 
     Raises:
         ConfigError: if the device does not exist, or a denoiser is asked for and not there.
@@ -73,11 +73,11 @@ class WarpRenderer:
         if Channel.AMODAL in channels:
             channels = channels | {Channel.INSTANCE}
         images = label_images(scene, world, view, seen, channels)
-        ev100 = camera.ev100
-        if channels & {Channel.RGB, Channel.RADIANCE}:
-            lit = lit_image(scene, camera, world, view, seen, self._studio)
-            ev100 = lit.ev100
-            images |= developed(lit, view, channels, self._stock, self._settings)
+        if Channel.RADIANCE in channels:
+            radiance = tier_light(scene, camera, world, view, seen, self._studio)
+            smooth_edges(world, view, seen, radiance, self._studio)
+            add_falling(world, camera, view, seen.z_m, radiance, self._stock)
+            images[Channel.RADIANCE] = radiance_image(radiance, view)
         outlines = {}
         if Channel.AMODAL in channels:
             ids = images[Channel.INSTANCE]
@@ -85,7 +85,7 @@ class WarpRenderer:
         if channels & FLOW:
             near = Sight(Moment.of(scene, camera), world, view, seen)
             images |= flow_images(near, shown_in(near), channels, self._studio)
-        return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
+        return Reading(camera.name, camera, images, outlines, scene.time_s)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
         """What the rays of a laser scanner's beams hit first, and how well it reflects."""

@@ -16,6 +16,7 @@ from generator.core.interfaces import Renderer, SensorInfo
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Scene
 from generator.core.streams import Rng
+from generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 from generator.sensors.depth.model import DepthModel, SidePx
 from generator.sensors.depth.view import View
 from generator.sensors.mounting import Mounted
@@ -23,6 +24,7 @@ from generator.sensors.presets import known_preset, preset
 from generator.sensors.rgb_camera import with_camera
 
 MODELS = "generator.sensors.depth"
+IDEAL = ImagePipeline()
 OWN = frozenset({Channel.MEASURED_DEPTH, Channel.INFRARED})
 
 DepthImage = Literal[
@@ -110,7 +112,7 @@ class DepthCamera(Mounted):
                 f"sensor '{self.name}': a depth camera is a pinhole, got the lens "
                 f"{camera.intrinsics.lens.model}; leave it out of what randomizers change"
             )
-        seen = renderer.render(scene, camera, asked - OWN)
+        seen = capture_photograph(scene, renderer, camera, asked - OWN, IDEAL, rng)
         if not OWN & asked:
             return seen
         device = self.device

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,10 +20,10 @@ from generator.core.se3 import SE3, look_at
 from generator.core.shutter import INSTANT, Shutter
 from generator.core.stereo import baseline_m, disparity_px, seen_by_both
 from generator.core.streams import Rng
-from generator.sensors.formation.chain import Formation, photograph
-from generator.sensors.lenses import LensConfig, Pinhole, Published
+from generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from generator.sensors.camera.lens_models import LensConfig, Pinhole, Published
+from generator.sensors.camera.shutter import ExposureTime, RollingShutter, shutter_of
 from generator.sensors.mounting import Mounted, known_rig
-from generator.sensors.shutters import ExposureTime, RollingShutter, shutter_of
 
 Image = Literal[
     "rgb",
@@ -73,11 +74,12 @@ class RgbCamera(Mounted):
         rolling_shutter: How its rows are read one after the other; null = all at once. Labels in
             the image, keypoints included, are those of each row's instant; labels in space those of
             the middle row's, which is the instant of the step.
-        formation: How its photographs come about; null = an ideal camera.
+        image_pipeline: From radiance to photographs: lens, exposure, sensor, tone, JPEG.
         stereo_with: For its channels ``disparity`` and ``disparity_visible``: name of the camera
             to its right that makes a rectified pair with it.
     """
 
+    former_keys: ClassVar[Mapping[str, str]] = {"formation": "image_pipeline"}
     type: Literal["rgb_camera"] = "rgb_camera"
     name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     size_px: tuple[SidePx, SidePx] = (640, 480)
@@ -87,7 +89,7 @@ class RgbCamera(Mounted):
     ev100: float | None = None
     exposure: ExposureTime | None = None
     rolling_shutter: RollingShutter | None = None
-    formation: Formation | None = None
+    image_pipeline: ImagePipeline = ImagePipeline()
     stereo_with: str = ""
 
     @model_validator(mode="after")
@@ -144,7 +146,7 @@ class RgbCamera(Mounted):
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Reading:
-        """Its own channels and those asked for; only colour is subject to its optics and noise.
+        """Its own channels and those asked for; only RGB passes through its image pipeline.
 
         Raises:
             SampleError: it makes no rectified pair with the camera it should.
@@ -152,30 +154,15 @@ class RgbCamera(Mounted):
         asked = channels | set(self.media)
         if self.stereo_with and PAIRED & asked:
             below = (asked - PAIRED) | {Channel.Z_DEPTH}
-            return self._with_disparity(scene, renderer, self._seen(scene, renderer, below, rng))
-        return self._seen(scene, renderer, asked, rng)
+            reading = self._capture(scene, renderer, below, rng)
+            return self._with_disparity(scene, renderer, reading)
+        return self._capture(scene, renderer, asked, rng)
 
-    def _seen(
-        self, scene: Scene, renderer: Renderer, asked: frozenset[Channel], rng: Rng
+    def _capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Reading:
         camera = scene.camera(self.name)
-        if self.formation is None or Channel.RGB not in asked:
-            return renderer.render(scene, camera, asked)
-        # Wide lenses see what has no depth along the axis, and are focused at a distance.
-        depth = Channel.Z_DEPTH if camera.intrinsics.straight else Channel.RANGE
-        needed = (asked - {Channel.RGB}) | {Channel.RADIANCE, depth}
-        seen = renderer.render(scene, camera, needed)
-        assert seen.ev100 is not None, "who renders radiance meters it"
-        photo = photograph(
-            seen.channels[Channel.RADIANCE],
-            seen.channels[depth],
-            camera.intrinsics,
-            seen.ev100,
-            self.formation,
-            rng,
-        )
-        images = {k: v for k, v in seen.channels.items() if k in asked}
-        return replace(seen, channels={**images, Channel.RGB: photo})
+        return capture_photograph(scene, renderer, camera, channels, self.image_pipeline, rng)
 
     def _with_disparity(self, scene: Scene, renderer: Renderer, seen: Reading) -> Reading:
         """The reading with disparities to the camera on its right."""

@@ -104,13 +104,17 @@ def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
     from generator.assemble.recipe import PipelineFactory
     from generator.assemble.spec import spec_of_source
     from generator.core.capture import Channel
+    from generator.core.streams import Streams
     from generator.runner.provenance import kept_scenes
 
     kept = list(kept_scenes(dataset / "shards" / "000002" / "scenes.jsonl"))[3]
     scene = kept.scene
-    pipeline = PipelineFactory(spec_of_source(str(dataset)), n=15)()
+    spec = spec_of_source(str(dataset))
+    pipeline = PipelineFactory(spec, n=15)()
+    (camera,) = (sensor for sensor in spec.sensors if sensor.name == "color")
+    stream = Streams(seed=0, scene=0).rng("color")
 
-    reading = pipeline.renderer.render(scene, scene.camera("color"), frozenset({Channel.RGB}))
+    reading = camera.capture(scene, pipeline.renderer, frozenset({Channel.RGB}), stream)
 
     name = f"{kept.index:09d}.png"
     path = dataset / "shards" / "000002" / "color" / "rgb" / name

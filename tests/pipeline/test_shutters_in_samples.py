@@ -14,7 +14,9 @@ from generator.core.capture import Channel, Reading
 from generator.core.instants import at
 from generator.core.sample import Sample
 from generator.core.shutter import INSTANT
+from generator.core.streams import Streams
 from generator.pipeline import Pipeline
+from generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 SIZE_PX = (240, 136)
 
@@ -74,7 +76,10 @@ def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample
     rolled = reading(sample)
     scene = at(sample.scene, rolled.time_s)
     camera = replace(scene.camera("dash"), shutter=INSTANT)
-    instant = pipeline.renderer.render(scene, camera, frozenset({Channel.RGB, Channel.INSTANCE}))
+    channels = frozenset({Channel.RGB, Channel.INSTANCE})
+    stream = Streams(seed=0, scene=0).rng("dash")
+    renderer = pipeline.renderer
+    instant = capture_photograph(scene, renderer, camera, channels, ImagePipeline(), stream)
 
     def detail(image: np.ndarray) -> float:
         road = image[100:, :, 1].astype(float)

@@ -276,8 +276,8 @@ def test_nothing_changes_where_no_shadow_would_be_seen(what: str) -> None:
     camera = camera_at((1.5, -1.0, 1.2), (0.0, 0.0, 0.1), (64, 48), hfov_deg=50.0)
     images = [
         WarpRenderer(library, "cpu", settings)
-        .render(replace(scene, cameras=(camera,)), camera, frozenset({Channel.RGB}))
-        .channels[Channel.RGB]
+        .render(replace(scene, cameras=(camera,)), camera, frozenset({Channel.RADIANCE}))
+        .channels[Channel.RADIANCE]
         for settings in (PLAIN, OFF)
     ]
 

@@ -21,7 +21,6 @@ from generator.renderers.kernels.records import View
 from generator.renderers.outlooks import cone_around
 from generator.renderers.packing import pack_view
 from generator.renderers.precipitation import rain, traces
-from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.warp import WarpRenderer
 from tests.renderers.embree import near_edges, open3d_or_skip
@@ -117,7 +116,7 @@ def test_a_lens_without_coefficients_is_a_pinhole() -> None:
     ]
     lamp = Light("lamp", "sphere", (0.0, -1.0, 1.0), intensity_cd=500.0)
     scene = replace(scene_of(*bodies), lights=(lamp,))
-    channels = LABELS | {Channel.RGB}
+    channels = LABELS | {Channel.RADIANCE}
 
     plain = rendered(scene, ahead(pinhole), channels)
     bent = rendered(
@@ -129,8 +128,8 @@ def test_a_lens_without_coefficients_is_a_pinhole() -> None:
         assert (apart < 1e-4).mean() > 0.999
     same = plain.channels[Channel.INSTANCE] == bent.channels[Channel.INSTANCE]
     assert same.mean() > 0.999
-    colors = [r.channels[Channel.RGB].astype(int) for r in (plain, bent)]
-    assert np.abs(colors[0] - colors[1]).max(axis=-1)[same].mean() < 0.2
+    colors = [r.channels[Channel.RADIANCE] for r in (plain, bent)]
+    assert np.abs(colors[0] - colors[1]).max(axis=-1)[same].mean() < 2e-3 * colors[0].mean()
     for instance_id, silhouette in plain.silhouettes.items():
         area, other = silhouette.mask.sum(), bent.silhouettes[instance_id].mask.sum()
         assert abs(int(area) - int(other)) <= 0.01 * area
@@ -320,11 +319,13 @@ def test_panoramas_have_no_seam() -> None:
     scene = replace(scene_of(Body("room", "room", SE3((0.0, 0.0, -2.0)))), lights=(lamp,))
     camera = Camera("camera", look_at((0.3, 0.2, 0.0), (3.0, 1.0, 0.2)), k)
 
-    image = rendered(scene, camera, frozenset({Channel.RGB})).channels[Channel.RGB].astype(float)
+    reading = rendered(scene, camera, frozenset({Channel.RADIANCE}))
+
+    image = reading.channels[Channel.RADIANCE].astype(float)
 
     steps = np.abs(image - np.roll(image, 1, axis=1)).mean(axis=(0, 2))
-    assert image.mean() > 20.0
-    assert steps[0] < 2.0 * np.median(steps[1:]) + 1.0
+    assert image.mean() > 5.0
+    assert steps[0] < 2.0 * np.median(steps[1:]) + 0.01 * image.mean()
 
 
 def test_a_frame_does_not_depend_on_the_lenses_before_it() -> None:
@@ -336,7 +337,7 @@ def test_a_frame_does_not_depend_on_the_lenses_before_it() -> None:
     names = ("barrel", "fisheye", "barrel")
 
     first, _, third = (
-        renderer.render(scene, ahead(CAMERAS[name]), LABELS | {Channel.RGB}) for name in names
+        renderer.render(scene, ahead(CAMERAS[name]), LABELS | {Channel.RADIANCE}) for name in names
     )
 
     for channel, image in first.channels.items():
@@ -350,17 +351,16 @@ def test_dark_corners_see_nothing() -> None:
     room = Body("room", "room", SE3((0.0, 0.0, -2.0)), instance_id=1)
     lamp = Light("lamp", "sphere", (0.0, 0.0, 1.0), intensity_cd=300.0)
     scene = replace(scene_of(room), lights=(lamp,))
-    settings = RenderSettings(glare=0.1)
 
-    reading = WarpRenderer(LIBRARY, "cpu", settings).render(scene, ahead(k), LABELS | {Channel.RGB})
+    reading = WarpRenderer(LIBRARY, "cpu").render(scene, ahead(k), LABELS | {Channel.RADIANCE})
 
     dark = np.isnan(k.pixel_rays()[..., 0])
     assert 0.2 < dark.mean() < 0.6
-    assert not reading.channels[Channel.RGB][dark].any()
+    assert not reading.channels[Channel.RADIANCE][dark].any()
     assert np.isinf(reading.channels[Channel.RANGE][dark]).all()
     assert not reading.channels[Channel.INSTANCE][dark].any()
     assert (reading.channels[Channel.INSTANCE][~dark] == 1).all()
-    assert (reading.channels[Channel.RGB][~dark] > 0).all()
+    assert (reading.channels[Channel.RADIANCE][~dark] > 0).all()
 
 
 def test_edges_are_smooth() -> None:
@@ -368,11 +368,9 @@ def test_edges_are_smooth() -> None:
     ball = Body("ball", "ball", SE3((0.3, 0.2, 2.0)), instance_id=1)
     lamp = Light("lamp", "sphere", (0.0, 0.0, -2.0), intensity_cd=3000.0)
     scene = replace(scene_of(ball), lights=(lamp,))
-    camera = replace(ahead(CAMERAS["barrel"]), ev100=9.0)
+    grey = rendered(scene, ahead(CAMERAS["barrel"]), LABELS | {Channel.RADIANCE})
 
-    grey = rendered(scene, camera, LABELS | {Channel.RGB})
-
-    level = grey.channels[Channel.RGB][..., 0].astype(float)
+    level = grey.channels[Channel.RADIANCE][..., 0].astype(float)
     mask = (grey.channels[Channel.INSTANCE] == 1).astype(np.uint8)
     rim = (cv2.dilate(mask, np.ones((3, 3))) > 0) & (cv2.erode(mask, np.ones((3, 3))) == 0)
     inner = np.median(level[cv2.erode(mask, np.ones((5, 5))) > 0])

@@ -325,7 +325,7 @@ def test_error_falls_faster_than_that_of_independent_samples() -> None:
 def test_the_same_scene_gives_the_same_bytes() -> None:
     """Two renderers, one of which has rendered something else before."""
     scene, camera, library = mixed_scene()
-    channels = frozenset({Channel.RGB, Channel.RADIANCE, Channel.INSTANCE})
+    channels = frozenset({Channel.RADIANCE, Channel.INSTANCE})
     first, second = (WarpRenderer(library, "cpu", settings_of(4)) for _ in range(2))
     second.render(replace(scene, lights=()), camera, channels)
 
@@ -338,13 +338,13 @@ def test_the_same_scene_gives_the_same_bytes() -> None:
 def test_labels_do_not_depend_on_the_tier() -> None:
     """They come from the pixel-centre ray."""
     scene, camera, library = mixed_scene()
-    channels = frozenset({Channel.RGB, Channel.INSTANCE, Channel.Z_DEPTH, Channel.NORMALS})
+    channels = frozenset({Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH, Channel.NORMALS})
     traced = WarpRenderer(library, "cpu", settings_of(1)).render(scene, camera, channels)
     drawn = WarpRenderer(library, "cpu").render(scene, camera, channels)
 
-    for channel in channels - {Channel.RGB}:
+    for channel in channels - {Channel.RADIANCE}:
         assert traced.channels[channel].tobytes() == drawn.channels[channel].tobytes()
-    assert (traced.channels[Channel.RGB] != drawn.channels[Channel.RGB]).any()
+    assert (traced.channels[Channel.RADIANCE] != drawn.channels[Channel.RADIANCE]).any()
 
 
 def test_both_tiers_agree_where_light_comes_straight_from_lamps() -> None:
@@ -396,7 +396,7 @@ def test_the_other_tier_never_loads_the_kernels_of_paths() -> None:
         "from generator.core.capture import Channel; from tests.renderers import fake_library as f;"
         "from generator.core.scene import Scene;"
         "WarpRenderer(f.FakeLibrary({}), 'cpu').render("
-        "Scene('t', ()), f.camera_at((0, 0, 1), (1, 0, 1), (8, 8)), frozenset({Channel.RGB}));"
+        "Scene('t', ()), f.camera_at((0, 0, 1), (1, 0, 1), (8, 8)), frozenset({Channel.RADIANCE}));"
         "assert 'generator.renderers.color' in sys.modules;"
         "loaded = [name for name in sys.modules if '.path' in name and 'renderers' in name];"
         "assert not loaded, loaded"

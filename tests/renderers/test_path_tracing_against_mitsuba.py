@@ -20,7 +20,8 @@ from generator.core.geometry import Material, TextureData
 from generator.core.scene import Body, Camera, Environment, Light, Scene
 from generator.core.se3 import SE3
 from generator.renderers.environments import texel_directions
-from generator.renderers.exposure import automatic_ev100, exposure_of, linear_to_srgb
+from generator.sensors.camera.exposure import metered_ev100, saturation_cd_m2
+from generator.sensors.camera.tone import display_values
 from tests.renderers.fake_library import (
     DARK,
     FakeLibrary,
@@ -287,10 +288,9 @@ def flip_of(reference: np.ndarray, image: np.ndarray) -> float:
     """Mean FLIP (Andersson et al. 2020) of two radiance images, exposed alike."""
     import flip_evaluator
 
-    exposure = exposure_of(automatic_ev100(reference.astype(np.float32)))
+    white = saturation_cd_m2(metered_ev100(reference.astype(np.float32)))
     shown = [
-        linear_to_srgb(np.clip(light * exposure, 0.0, 1.0)).astype(np.float32)
-        for light in (reference, image)
+        display_values(light / white, "srgb").astype(np.float32) for light in (reference, image)
     ]
     return float(flip_evaluator.evaluate(shown[0], shown[1], "LDR")[1])
 

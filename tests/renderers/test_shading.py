@@ -27,28 +27,19 @@ from tests.renderers.fake_library import (
     sphere_mesh,
 )
 
-LINEAR = RenderSettings(tone="srgb", ambient_occlusion_radius_m=0.0)
-EV100 = 8.0
-SATURATION_CD_M2 = 1.2 * 2.0**EV100
-"""Luminance that is white at this exposure, by the saturation-based speed of ISO 12232."""
-
-
-def linear(rgb: np.ndarray) -> np.ndarray:
-    """SRGB bytes to linear values, by IEC 61966-2-1."""
-    v = rgb / 255.0
-    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
+OPEN = RenderSettings(ambient_occlusion_radius_m=0.0)
 
 
 def luminance_of(
     scene: Scene,
     camera: Camera,
     library: FakeLibrary,
-    settings: RenderSettings = LINEAR,
+    settings: RenderSettings = OPEN,
 ) -> np.ndarray:
-    """cd/m^2 of every pixel and channel, from the bytes of an image at fixed exposure."""
+    """cd/m^2 of every pixel and channel."""
     renderer = WarpRenderer(library, "cpu", settings)
-    reading = renderer.render(scene, camera, frozenset({Channel.RGB}))
-    return linear(reading.channels[Channel.RGB]) * SATURATION_CD_M2
+    reading = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
+    return reading.channels[Channel.RADIANCE]
 
 
 def ground(material: Material = MATTE) -> FakeLibrary:
@@ -56,7 +47,7 @@ def ground(material: Material = MATTE) -> FakeLibrary:
 
 
 def from_above(size_px: tuple[int, int] = (48, 36)) -> Camera:
-    return camera_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), size_px, hfov_deg=20.0, ev100=EV100)
+    return camera_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), size_px, hfov_deg=20.0)
 
 
 def test_a_matte_plane_under_a_sun_has_luminance_e_rho_over_pi() -> None:
@@ -74,15 +65,14 @@ def test_a_lamp_falls_off_with_the_square_of_its_distance() -> None:
     """I cos / d^2: 800 cd at 2 m straight above is 200 lx below, less at the sides."""
     lamp = Light("lamp", "sphere", (0.0, 0.0, 2.0), intensity_cd=800.0, radius_m=0.02)
     scene = Scene("t", (Body("p", "plane"),), lights=(lamp,), environment=DARK)
-    camera = camera_at((0.0, 0.0, 1.9), (0.0, 0.0, 0.0), (48, 36), hfov_deg=90.0, ev100=6.0)
+    camera = camera_at((0.0, 0.0, 1.9), (0.0, 0.0, 0.0), (48, 36), hfov_deg=90.0)
 
-    rgb = WarpRenderer(ground(), "cpu", LINEAR).render(scene, camera, frozenset({Channel.RGB}))
+    measured = luminance_of(scene, camera, ground())[..., 1]
 
     x = (np.arange(48) + 0.5 - 24.0) / 24.0 * 1.9
     y = (np.arange(36) + 0.5 - 18.0) / 24.0 * 1.9
     d2 = x[None] ** 2 + y[:, None] ** 2 + 4.0
     expected = 800.0 * 2.0 / d2**1.5 * 0.5 / math.pi
-    measured = linear(rgb.channels[Channel.RGB])[..., 1] * 1.2 * 2.0**6
     assert np.abs(measured / expected - 1.0).max() < 0.03
 
 
@@ -109,7 +99,7 @@ def test_a_matte_ball_under_a_uniform_sky_has_luminance_albedo_times_sky(albedo:
     material = Material(base_color=albedo, roughness=1.0, specular=0.0)
     library = FakeLibrary({"ball": sphere_mesh(0.5, 32, (material,))})
     scene = Scene("t", (Body("b", "ball"),), environment=Environment(luminance_cd_m2=200.0))
-    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (48, 36), hfov_deg=20.0, ev100=EV100)
+    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (48, 36), hfov_deg=20.0)
 
     luminance = luminance_of(scene, camera, library)
 
@@ -123,7 +113,7 @@ def test_a_white_metal_vanishes_in_a_furnace(roughness: float) -> None:
     material = Material(base_color=(1.0, 1.0, 1.0), roughness=roughness, metallic=1.0)
     library = FakeLibrary({"ball": sphere_mesh(0.5, 32, (material,))})
     scene = Scene("t", (Body("b", "ball"),), environment=Environment(luminance_cd_m2=200.0))
-    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (48, 36), hfov_deg=20.0, ev100=EV100)
+    camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (48, 36), hfov_deg=20.0)
 
     luminance = luminance_of(scene, camera, library)
 
@@ -188,7 +178,7 @@ def shadow_profile(radius_m: float, settings: RenderSettings) -> tuple[np.ndarra
     lamp = Light("lamp", "sphere", (0.0, 0.0, 2.0), intensity_cd=800.0, radius_m=radius_m)
     bodies = (Body("p", "plane"), Body("slab", "slab", SE3((0.0, 0.0, 0.51))))
     scene = Scene("t", bodies, lights=(lamp,), environment=DARK)
-    camera = camera_at((0.4, 0.0, 8.0), (0.4, 0.0, 0.0), (320, 60), hfov_deg=7.0, ev100=EV100)
+    camera = camera_at((0.4, 0.0, 8.0), (0.4, 0.0, 0.0), (320, 60), hfov_deg=7.0)
     luminance = luminance_of(scene, camera, library, settings)[30, :, 1]
     width_m = 16.0 * math.tan(math.radians(3.5))
     x = 0.4 + ((np.arange(320) + 0.5) / 320.0 - 0.5) * width_m
@@ -202,7 +192,7 @@ def test_the_penumbra_of_a_ball_has_the_width_of_similar_triangles() -> None:
     The penumbra is 2 * 0.2 * 0.52 / 1.48 = 0.141 m wide; the part of a disc beyond a line gives
     its profile. Smoothing over 12 px = 0.037 m rounds its ends off.
     """
-    x, visible = shadow_profile(0.2, LINEAR)
+    x, visible = shadow_profile(0.2, OPEN)
 
     s = np.clip((x - 0.3 * 2.0 / 1.48) / (0.2 * 0.52 / 1.48), -1.0, 1.0)
     expected = 1.0 - (np.arccos(s) - s * np.sqrt(1.0 - s * s)) / math.pi
@@ -225,8 +215,8 @@ def test_the_penumbra_of_a_sun_has_the_width_of_its_disc() -> None:
     )  # fmt: skip
     bodies = (Body("p", "plane"), Body("slab", "slab", SE3((0.0, 0.0, 0.51))))
     scene = Scene("t", bodies, lights=(sun,), environment=DARK)
-    camera = camera_at((0.4, 0.0, 8.0), (0.4, 0.0, 0.0), (320, 60), hfov_deg=7.0, ev100=6.0)
-    renderer = WarpRenderer(library, "cpu", LINEAR)
+    camera = camera_at((0.4, 0.0, 8.0), (0.4, 0.0, 0.0), (320, 60), hfov_deg=7.0)
+    renderer = WarpRenderer(library, "cpu", OPEN)
 
     lit = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
 
@@ -242,7 +232,7 @@ def test_the_penumbra_of_a_sun_has_the_width_of_its_disc() -> None:
 
 def test_hard_shadows_have_no_penumbra() -> None:
     """The same lamp, taken for a point: from dark to light within the smoothing window."""
-    x, visible = shadow_profile(0.2, LINEAR.model_copy(update={"shadows": "hard"}))
+    x, visible = shadow_profile(0.2, OPEN.model_copy(update={"shadows": "hard"}))
 
     on_ground = x > 0.33
     assert visible[on_ground & (x < 0.38)].max() < 0.03
@@ -255,15 +245,15 @@ def test_a_shadow_touches_what_throws_it() -> None:
     bodies = (Body("p", "plane"), Body("b", "box", SE3((0.0, 0.0, 0.1)), 0.2))
     library = FakeLibrary({"plane": plane_mesh(20.0, (MATTE,)), "box": box_mesh()})
     scene = Scene("t", bodies, lights=(sun,), environment=DARK)
-    camera = camera_at((0.0, -0.02, 4.0), (0.0, 0.0, 0.0), (320, 240), hfov_deg=12.0, ev100=EV100)
-    renderer = WarpRenderer(library, "cpu", LINEAR)
+    camera = camera_at((0.0, -0.02, 4.0), (0.0, 0.0, 0.0), (320, 240), hfov_deg=12.0)
+    renderer = WarpRenderer(library, "cpu", OPEN)
 
     reading = renderer.render(
-        scene, camera, frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.NORMALS})
+        scene, camera, frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.NORMALS})
     )
 
     p = camera.T_world_camera.apply(camera.intrinsics.unproject(reading.channels[Channel.Z_DEPTH]))
-    luminance = linear(reading.channels[Channel.RGB])[..., 1]
+    luminance = reading.channels[Channel.RADIANCE][..., 1]
     floor = (p[..., 2] < 1e-3) & (np.abs(p[..., 1]) < 0.05)
     behind = floor & (p[..., 0] > 0.108) & (p[..., 0] < 0.22)
     before = floor & (p[..., 0] < -0.115)
@@ -301,13 +291,13 @@ def test_mesh_uvs_put_v_0_at_the_bottom_of_the_image() -> None:
     material = Material((1.0, 1.0, 1.0), 1.0, specular=0.0, texture="t")
     library = FakeLibrary({"plane": plane_mesh(2.0, (material,))}, {"t": halves()})
     scene = Scene("t", (Body("p", "plane"),), environment=Environment(luminance_cd_m2=200.0))
-    camera = camera_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (64, 64), hfov_deg=28.0, ev100=EV100)
-    reading = WarpRenderer(library, "cpu", LINEAR).render(
-        scene, camera, frozenset({Channel.RGB, Channel.Z_DEPTH})
+    camera = camera_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (64, 64), hfov_deg=28.0)
+    reading = WarpRenderer(library, "cpu", OPEN).render(
+        scene, camera, frozenset({Channel.RADIANCE, Channel.Z_DEPTH})
     )
 
     p = camera.T_world_camera.apply(camera.intrinsics.unproject(reading.channels[Channel.Z_DEPTH]))
-    strongest = reading.channels[Channel.RGB].argmax(axis=-1)
+    strongest = reading.channels[Channel.RADIANCE].argmax(axis=-1)
     clear = np.isfinite(p).all(axis=-1) & (np.abs(p[..., :2]) > 0.1).all(axis=-1)
     clear &= (np.abs(p[..., :2]) < 0.9).all(axis=-1)
     expected = np.where(p[..., 0] < 0, 0, np.where(p[..., 1] > 0, 1, 2))
@@ -350,13 +340,13 @@ def test_the_sky_is_seen_and_mirrored_where_it_is(
     # A mirror that faces half-way between eye and spot shows it: here the eye is at 90 degrees.
     side = np.roll(seen, 1)
     eye = tuple(float(v) for v in 4.0 * side)
-    camera = camera_at(eye, (0.0, 0.0, 0.0), (96, 96), hfov_deg=16.0, ev100=4.0)
+    camera = camera_at(eye, (0.0, 0.0, 0.0), (96, 96), hfov_deg=16.0)
 
-    reading = WarpRenderer(library, "cpu", LINEAR).render(
-        scene, camera, frozenset({Channel.RGB, Channel.NORMALS})
+    reading = WarpRenderer(library, "cpu", OPEN).render(
+        scene, camera, frozenset({Channel.RADIANCE, Channel.NORMALS})
     )
 
-    brightness = reading.channels[Channel.RGB][..., 1].astype(float)
+    brightness = reading.channels[Channel.RADIANCE][..., 1].astype(float)
     normals = camera.T_world_camera.rotate(reading.channels[Channel.NORMALS])
     on_ball = np.abs(normals).sum(axis=-1) > 0
     weights = np.where(on_ball & (brightness > 0.9 * brightness[on_ball].max()), 1.0, 0.0)

@@ -33,7 +33,7 @@ LABELS = frozenset(
         Channel.OBJECT_COORDINATES,
     }
 )
-ALL = LABELS | {Channel.RGB, Channel.RADIANCE, Channel.AMODAL}
+ALL = LABELS | {Channel.RADIANCE, Channel.AMODAL}
 # Its face is 2.5 m away and 80 / 2.5 = 32 px wide and high.
 LAMP = Body("lamp", "lamp", SE3((0.0, 0.0, 3.0)), instance_id=1)
 PX_PER_M = 80.0 / 2.5
@@ -94,7 +94,7 @@ def test_labels_of_a_long_exposure_are_those_of_its_middle(renderer: WarpRendere
         assert np.array_equal(long.channels[channel], instant.channels[channel]), channel
     assert np.array_equal(long.silhouettes[1].mask, instant.silhouettes[1].mask)
     assert long.time_s == instant.time_s
-    assert not np.array_equal(long.channels[Channel.RGB], instant.channels[Channel.RGB])
+    assert not np.array_equal(long.channels[Channel.RADIANCE], instant.channels[Channel.RADIANCE])
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, len
     rows = timed_bands(near.moment, list(range(0, LENS.height_px, 5)))
 
     def light(see):  # noqa: ANN001, ANN202
-        return light_of(see, 5.0, studio)
+        return light_of(see, studio)
 
     one, images = drawn_bands(whole_bands, LABELS, studio, near, light)
     other, banded = drawn_bands(rows, LABELS, studio, near, light)

@@ -5,35 +5,31 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
-import warp as wp
 
 from generator.core.capture import Channel, Reading
 from generator.core.geometry import Material
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
 from generator.core.se3 import SE3, look_at
-from generator.core.streams import Streams
 from generator.renderers.device import open_device
 from generator.renderers.lamps import main_lamps
-from generator.renderers.lens import GLARE_FACTOR, add_glare, glare, lens_drops
-from generator.renderers.packing import pack_view, pack_world
-from generator.renderers.precipitation import exposure_time_s, poisson, rain, snow, traces
+from generator.renderers.packing import pack_world
+from generator.renderers.precipitation import poisson, rain, snow, traces, usual_exposure_s
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.warp import WarpRenderer
 from tests.randomizers.doubles import rng_of
-from tests.renderers.fake_library import FakeLibrary, box_mesh, forward_camera, plane_mesh
+from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
-RGB = frozenset({Channel.RGB})
-SEEN = frozenset({Channel.RGB, Channel.RANGE, Channel.INSTANCE})
+RADIANCE = frozenset({Channel.RADIANCE})
+SEEN = frozenset({Channel.RADIANCE, Channel.RANGE, Channel.INSTANCE})
 LENS = Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)
 FINE = Intrinsics(288, 192, 240.0, 240.0, 144.0, 96.0)
-AHEAD = Camera("front", look_at((0.0, 0.0, 1.5), (10.0, 0.0, 1.2)), LENS, ev100=8.0)
-DOWN = Camera("top", look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), LENS, ev100=8.0)
-PLAIN = RenderSettings(tone="srgb", ambient_occlusion_radius_m=0.0, antialias=1)
+AHEAD = Camera("front", look_at((0.0, 0.0, 1.5), (10.0, 0.0, 1.2)), LENS)
+DOWN = Camera("top", look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), LENS)
+PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0, antialias=1)
 ASPHALT = (Material(base_color=(0.3, 0.3, 0.3), roughness=0.95, specular=0.0),)
 BLACK = (Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0),)
 SUN = Light("sun", "sun", direction=(0.8, 0.0, -0.6), illuminance_lux=1500.0)
@@ -56,7 +52,7 @@ def library() -> FakeLibrary:
 
 @pytest.fixture(scope="module")
 def renderer(library: FakeLibrary) -> WarpRenderer:
-    """No tone curve: values that formulas can tell."""
+    """Without ambient occlusion: values that formulas can tell."""
     return WarpRenderer(library, "cpu", PLAIN)
 
 
@@ -77,19 +73,17 @@ def flat(weather: Weather, *bodies: Body) -> Scene:
                  weather=weather)  # fmt: skip
 
 
-def luminance(reading: Reading, ev100: float = 8.0) -> np.ndarray:
-    """Luminance [cd/m^2] of an 8-bit image: sRGB undone, white is 1.2 * 2^EV100."""
-    value = reading.channels[Channel.RGB][..., 1].astype(float) / 255.0
-    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    return linear * 1.2 * 2.0**ev100
+def luminance(reading: Reading) -> np.ndarray:
+    """Of grey things [cd/m^2]."""
+    return reading.channels[Channel.RADIANCE][..., 1].astype(float)
 
 
 def test_no_weather_changes_no_byte(renderer: WarpRenderer) -> None:
     """A seed alone, and a height of fog that is not there, are no weather."""
     light = (Environment(luminance_cd_m2=60.0), SUN)
-    plain = renderer.render(street(Weather(), *light), AHEAD, RGB).channels[Channel.RGB]
+    plain = renderer.render(street(Weather(), *light), AHEAD, RADIANCE).channels[Channel.RADIANCE]
     empty = Weather(seed=99, fog_height_m=50.0)
-    seeded = renderer.render(street(empty, *light), AHEAD, RGB).channels[Channel.RGB]
+    seeded = renderer.render(street(empty, *light), AHEAD, RADIANCE).channels[Channel.RADIANCE]
 
     assert plain.tobytes() == seeded.tobytes()
 
@@ -103,7 +97,7 @@ def test_labels_do_not_see_the_weather(renderer: WarpRenderer) -> None:
 
     for channel in sorted(channels & clear.channels.keys(), key=lambda c: c.value):
         same = clear.channels[channel].tobytes() == stormy.channels[channel].tobytes()
-        assert same != (channel in (Channel.RGB, Channel.RADIANCE)), channel
+        assert same != (channel is Channel.RADIANCE), channel
     assert clear.silhouettes.keys() == stormy.silhouettes.keys() == {1, 2}
     for key, silhouette in clear.silhouettes.items():
         assert np.array_equal(silhouette.mask, stormy.silhouettes[key].mask)
@@ -114,8 +108,8 @@ def test_same_weather_makes_the_same_bytes_in_another_renderer(library: FakeLibr
     light = (Environment(luminance_cd_m2=60.0), SUN)
     first, again, other = (
         WarpRenderer(library, "cpu", PLAIN)
-        .render(street(weather, *light), AHEAD, RGB)
-        .channels[Channel.RGB]
+        .render(street(weather, *light), AHEAD, RADIANCE)
+        .channels[Channel.RADIANCE]
         .tobytes()
         for weather in (STORM, STORM, replace(STORM, seed=6))
     )
@@ -157,7 +151,7 @@ def test_fog_thins_with_height(renderer: WarpRenderer) -> None:
 def test_lamp_in_fog_has_a_halo(renderer: WarpRenderer) -> None:
     """Before the black wall there is light around the lamp, less of it farther away."""
     lamp = Light("lamp", "sphere", position_m=(10.0, 0.0, 1.2), intensity_cd=4000.0)
-    foggy = renderer.render(street(Weather(fog_extinction_per_m=0.05), DARK, lamp), AHEAD, RGB)
+    foggy = renderer.render(street(Weather(fog_extinction_per_m=0.05), DARK, lamp), AHEAD, RADIANCE)
     row = luminance(foggy)[32, 48:]
 
     assert row[1] > row[8] > row[20] > 0.0
@@ -166,9 +160,10 @@ def test_lamp_in_fog_has_a_halo(renderer: WarpRenderer) -> None:
 def test_soaked_asphalt_keeps_a_fifth_of_its_albedo(renderer: WarpRenderer) -> None:
     """Lagarde 2013: a porous surface is darkened by lerp(1, 0.2, wetness)."""
     half = (slice(24, 40), slice(36, 60))
-    dry = luminance(renderer.render(flat(Weather()), DOWN, RGB))[half].mean()
+    dry = luminance(renderer.render(flat(Weather()), DOWN, RADIANCE))[half].mean()
     for wetness in (0.5, 1.0):
-        wet = luminance(renderer.render(flat(Weather(wetness=wetness)), DOWN, RGB))[half].mean()
+        soaked = renderer.render(flat(Weather(wetness=wetness)), DOWN, RADIANCE)
+        wet = luminance(soaked)[half].mean()
         # Half of the pixel is a film of water with a reflectance of 2 %, in a dark room.
         film = 1.0 - 0.5 * wetness * 0.02
         assert wet / dry == pytest.approx((1.0 - 0.8 * wetness) * film, rel=0.03)
@@ -176,11 +171,11 @@ def test_soaked_asphalt_keeps_a_fifth_of_its_albedo(renderer: WarpRenderer) -> N
 
 def test_nothing_falls_below_a_lid(renderer: WarpRenderer) -> None:
     """Beneath a low roof the road stays as it was."""
-    side = Camera("side", look_at((0.0, -4.0, 0.6), (0.0, 0.0, 0.0)), FINE, ev100=9.0)
+    side = Camera("side", look_at((0.0, -4.0, 0.6), (0.0, 0.0, 0.0)), FINE)
     lid = Body("lid", "lid", SE3((0.0, 0.0, 1.4)))
     under = Environment(luminance_cd_m2=100.0)
     dry, snowy = (
-        luminance(renderer.render(replace(flat(w, lid), environment=under), side, RGB), 9.0)
+        luminance(renderer.render(replace(flat(w, lid), environment=under), side, RADIANCE))
         for w in (Weather(), Weather(snow_cover=1.0))
     )
 
@@ -191,8 +186,8 @@ def test_nothing_falls_below_a_lid(renderer: WarpRenderer) -> None:
 @pytest.mark.parametrize("cover", [0.25, 0.75])
 def test_snow_covers_its_share_of_the_ground(renderer: WarpRenderer, cover: float) -> None:
     """Over many square metres, and as white as snow: an albedo of 0.8 to 0.9."""
-    high = Camera("high", look_at((0.0, 0.0, 30.0), (0.0, 0.0, 0.0)), FINE, ev100=8.0)
-    image = luminance(renderer.render(flat(Weather(snow_cover=cover, seed=3)), high, RGB))
+    high = Camera("high", look_at((0.0, 0.0, 30.0), (0.0, 0.0, 0.0)), FINE)
+    image = luminance(renderer.render(flat(Weather(snow_cover=cover, seed=3)), high, RADIANCE))
     white = 0.83 * 900.0 / math.pi
 
     assert (image > 0.5 * white).mean() == pytest.approx(cover, abs=0.08)
@@ -205,13 +200,13 @@ def test_puddles_mirror_what_stands_behind_them(renderer: WarpRenderer) -> None:
                      emission_cd_m2=(200.0, 200.0, 200.0)),)  # fmt: skip
     scene = street(Weather(puddles=1.0))
     wall = replace(scene.body("wall"), materials=glow)
-    reading = renderer.render(scene.with_bodies(wall), replace(AHEAD, ev100=6.0), RGB)
+    reading = renderer.render(scene.with_bodies(wall), AHEAD, RADIANCE)
     row, column = 58, 80
     d = AHEAD.T_world_camera.rotation() @ [(column - 47.5) / 80.0, (row - 31.5) / 80.0, 1.0]
     cosine = -d[2] / np.linalg.norm(d)
     fresnel = 0.02 + 0.98 * (1.0 - cosine) ** 5
 
-    assert luminance(reading, 6.0)[row, column] == pytest.approx(200.0 * fresnel, rel=0.06)
+    assert luminance(reading)[row, column] == pytest.approx(200.0 * fresnel, rel=0.06)
 
 
 def test_streaks_are_a_poisson_process() -> None:
@@ -262,7 +257,7 @@ def test_nearer_things_hide_what_falls_behind_them(renderer: WarpRenderer) -> No
         for w in (Weather(), weather):
             scene = street(w, light)
             wall = replace(scene.body("wall"), T_world_body=SE3((x + 0.1, 0.0, 0.0)))
-            pictures.append(luminance(renderer.render(scene.with_bodies(wall), AHEAD, RGB)))
+            pictures.append(luminance(renderer.render(scene.with_bodies(wall), AHEAD, RADIANCE)))
         changed.append(float((np.abs(pictures[1] - pictures[0]) > 0.5).mean()))
 
     assert changed[1] > 0.02
@@ -271,53 +266,9 @@ def test_nearer_things_hide_what_falls_behind_them(renderer: WarpRenderer) -> No
 
 def test_exposure_time_follows_the_light() -> None:
     """T = N^2 / 2^EV at f/2, held between 1/500 s and 1/40 s."""
-    assert exposure_time_s(9.0) == pytest.approx(4.0 / 512.0)
-    assert exposure_time_s(15.0) == pytest.approx(1.0 / 500.0)
-    assert exposure_time_s(0.0) == pytest.approx(1.0 / 40.0)
-
-
-def test_drops_hide_their_share_of_the_lens() -> None:
-    """Discs thrown at random overlap: 1 - exp(-sum of areas / image)."""
-    camera = replace(AHEAD, intrinsics=Intrinsics(960, 640, 800.0, 800.0, 480.0, 320.0))
-    shares = []
-    for seed in range(60):
-        drops = lens_drops(Weather(lens_drops=0.05, seed=seed), camera)
-        area = 0.9 * math.pi * float((drops[:, 2] ** 2).sum())
-        shares.append(1.0 - math.exp(-area / (960 * 640)))
-
-    assert np.mean(shares) == pytest.approx(0.05, rel=0.15)
-
-
-def veiled(image: np.ndarray, share: float) -> np.ndarray:
-    """The image after its lens has scattered a share of the light."""
-    stock = AssetStock(FakeLibrary({}), open_device("cpu"))
-    radiance = wp.array(image.reshape(-1, 3), dtype=wp.vec3, device="cpu")
-    view = pack_view(forward_camera((image.shape[1], image.shape[0])), stock)
-    add_glare(view, share, radiance, stock)
-    return np.array(radiance.numpy()).reshape(image.shape)
-
-
-def test_glare_moves_light_and_makes_none() -> None:
-    """A bright point far from the edges keeps its sum; its neighbourhood gets some of it."""
-    image = np.zeros((512, 512, 3), np.float32)
-    image[250, 260] = 1000.0
-    veil = veiled(image, 1.0)
-
-    assert veil.sum(dtype=np.float64) == pytest.approx(image.sum(dtype=np.float64), rel=1e-3)
-    assert veil[250, 260, 0] > veil[250, 300, 0] > 0.0
-    assert veil.min() >= 0.0
-
-
-def test_glare_is_enlarged_bilinearly() -> None:
-    """As OpenCV does it, in images of any size, and mixed with what arrives straight."""
-    for height, width in ((64, 96), (50, 67), (3, 9)):
-        rng = Streams(seed=1, scene=0).rng("image")
-        image = rng.uniform(0.0, 9.0, (height, width, 3)).astype(np.float32)
-        coarse = glare(image) / 3.0
-        size = (coarse.shape[1] * GLARE_FACTOR, coarse.shape[0] * GLARE_FACTOR)
-        veil = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
-
-        np.testing.assert_allclose(veiled(image, 0.25), 0.75 * image + 0.25 * veil, rtol=1e-4)
+    assert usual_exposure_s(9.0) == pytest.approx(4.0 / 512.0)
+    assert usual_exposure_s(15.0) == pytest.approx(1.0 / 500.0)
+    assert usual_exposure_s(0.0) == pytest.approx(1.0 / 40.0)
 
 
 def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:
@@ -344,7 +295,7 @@ def test_lamps_left_out_change_little(library: FakeLibrary) -> None:
     scene = street(Weather(), DARK, *lamps)
     few, every = (
         luminance(WarpRenderer(library, "cpu", PLAIN.model_copy(update={"max_lamps": n})).render(
-            scene, replace(AHEAD, ev100=4.0), RGB), 4.0)
+            scene, AHEAD, RADIANCE))
         for n in (16, 40)
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from generator.core.capture import Channel, Reading
 from generator.core.lens import COEFFICIENTS
 from generator.core.scene import Camera, Region, Scene
 from generator.core.streams import Streams
-from generator.sensors.lenses import CALIBRATIONS
+from generator.sensors.camera.lens_models import CALIBRATIONS
 from generator.sensors.rgb_camera import RgbCamera
 
 
@@ -165,7 +165,7 @@ def test_photographs_are_focused_along_the_axis_or_at_a_distance(lens: str, dept
             "size_px": (32, 24),
             "lens": {"model": lens},
             "channels": ("rgb",),
-            "formation": {"focus": {"pixel_um": 3.0}},
+            "image_pipeline": {"focus": {"pixel_um": 3.0}},
         }
     )
     renderer = Rendering()

@@ -27,7 +27,8 @@ class Asked:
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
         del scene
         self.camera, self.channels = camera, channels
-        return Reading(camera.name, camera, {})
+        shape = (camera.intrinsics.height_px, camera.intrinsics.width_px, 3)
+        return Reading(camera.name, camera, {Channel.RADIANCE: np.ones(shape, np.float32)})
 
 
 def rng() -> Rng:
@@ -76,7 +77,7 @@ def test_a_capture_renders_its_own_channels_and_those_asked_for() -> None:
 
     reading = sensor.capture(scene, renderer, frozenset({Channel.AMODAL}), rng())
 
-    assert renderer.channels == {Channel.RGB, Channel.Z_DEPTH, Channel.AMODAL}
+    assert renderer.channels == {Channel.RADIANCE, Channel.Z_DEPTH, Channel.AMODAL}
     assert renderer.camera == scene.camera("eye")
     assert reading.sensor == "eye"
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.edges import most_alike, nearby, tone_weight
+from generator.renderers.kernels.edges import most_alike, nearby
 from generator.renderers.kernels.holes import hole_at, solid_hit
 from generator.renderers.kernels.rays import FARTHEST
 from generator.renderers.kernels.records import (
@@ -135,7 +135,6 @@ def antialias(
     radiance: wp.array(dtype=wp.vec3),
     pixels: wp.array(dtype=int),
     offsets: wp.array(dtype=wp.vec2),
-    exposure: float,
     t_min: float,
     mixed: wp.array(dtype=wp.vec3),
 ):
@@ -160,7 +159,7 @@ def antialias(
         if images.hits[j][0] >= 0 and not seen_before(view, images, x, y, k):
             parts = cover(view, world, images, offsets, x, y, j, parts)
     total = wp.vec3(0.0)
-    weights = float(0.0)
+    lit = int(0)
     for s in range(offsets.shape[0]):
         source = parts.source[s]
         if source < 0:
@@ -168,9 +167,7 @@ def antialias(
             y_px = float(y) + offsets[s][1]
             source = traced_source(view, world, images, x, y, x_px, y_px, t_min)
         if source >= 0:
-            exposed = radiance[source] * exposure
-            w = tone_weight(exposed)
-            total += exposed * w
-            weights += w
-    if weights > 0.0:
-        mixed[row] = total * (1.0 / (weights * exposure))
+            total += radiance[source]
+            lit += 1
+    if lit > 0:
+        mixed[row] = total * (1.0 / float(lit))

@@ -86,7 +86,10 @@ def most_alike(view: View, images: Images, x: int, y: int, source: int, normal: 
     return found
 
 
-@wp.func
-def tone_weight(exposed: wp.vec3):
-    """Weight of a sample: bright ones count less, as they would after the tone curve."""
-    return 1.0 / (1.0 + 0.2126 * exposed[0] + 0.7152 * exposed[1] + 0.0722 * exposed[2])
+@wp.kernel
+def put_mixed(
+    pixels: wp.array(dtype=int), mixed: wp.array(dtype=wp.vec3), radiance: wp.array(dtype=wp.vec3)
+):
+    """Put the mixed radiance of listed pixels in its place."""
+    row = wp.tid()
+    radiance[pixels[row]] = mixed[row]

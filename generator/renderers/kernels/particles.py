@@ -1,10 +1,9 @@
-"""Rain and snow in the air, and drops on the lens."""
+"""Rain and snow in the air."""
 
 from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.ground import lumps, smooth
 from generator.renderers.kernels.lighting import beam_from
 from generator.renderers.kernels.records import View, World, floor_int, unit
 from generator.renderers.kernels.sky import sky_irradiance
@@ -81,96 +80,3 @@ def draw_streaks(
             i = y * width + x
             if cover > 0.0 and streaks[s].z_m < z_m[i]:
                 radiance[i] = radiance[i] * (1.0 - cover) + streaks[s].radiance * cover
-
-
-@wp.func
-def blurred_at(image: wp.array(dtype=wp.vec3, ndim=2), x: float, y: float):
-    """A small image at a place in [0, 1] x [0, 1], bilinear."""
-    u = wp.clamp(x, 0.0, 1.0) * float(image.shape[1] - 1)
-    v = wp.clamp(y, 0.0, 1.0) * float(image.shape[0] - 1)
-    i = wp.min(int(v), image.shape[0] - 2)
-    j = wp.min(int(u), image.shape[1] - 2)
-    fu = u - float(j)
-    fv = v - float(i)
-    top = image[i, j] * (1.0 - fu) + image[i, j + 1] * fu
-    bottom = image[i + 1, j] * (1.0 - fu) + image[i + 1, j + 1] * fu
-    return top * (1.0 - fv) + bottom * fv
-
-
-@wp.kernel
-def refract_in_drops(
-    width: int,
-    height: int,
-    drops: wp.array(dtype=wp.vec4),
-    image: wp.array(dtype=wp.vec3, ndim=2),
-    radiance: wp.array(dtype=wp.vec3),
-):
-    """Show the scene small, upside down and blurred in each drop on the lens.
-
-    Args:
-        drops: Centre and radius [px], and a number that shapes the outline.
-        image: The scene, small and blurred.
-    """
-    i = wp.tid()
-    x = float(i % width) + 0.5
-    y = float(i / width) + 0.5
-    for k in range(drops.shape[0]):
-        drop = drops[k]
-        ox = (x - drop[0]) / drop[2]
-        oy = (y - drop[1]) / drop[2]
-        if wp.abs(ox) < 1.4 and wp.abs(oy) < 1.4:
-            seed = int(drop[3])
-            # Outlines wobble; drops hang a little.
-            wobble = 1.0 + 0.22 * lumps(1.3 * ox + 7.0, 1.3 * oy + 7.0, seed)
-            off = wp.sqrt(ox * ox + 0.8 * oy * oy) * wobble
-            cover = smooth(1.0, 0.78, off)
-            if cover > 0.0:
-                # A drop is a lens of some ninety degrees; towards its rim it bends more.
-                bend = 0.30 + 0.12 * off * off
-                u = 0.5 + 0.5 * (drop[0] / float(width) - 0.5) - bend * ox
-                v = 0.5 + 0.5 * (drop[1] / float(height) - 0.5) - bend * oy
-                rim = 1.0 - 0.55 * smooth(0.55, 1.0, off)
-                seen = blurred_at(image, u, v) * rim
-                radiance[i] = radiance[i] * (1.0 - cover) + seen * cover
-
-
-@wp.struct
-class Between:
-    """Two neighbours of a coarse image in one direction, and the share of the second."""
-
-    first: int
-    after: int
-    part: float
-
-
-@wp.func
-def between(i: int, factor: int, count: int):
-    """Where pixel i of an image lies in one that is coarser by a factor, of ``count`` pixels."""
-    place = (float(i) + 0.5) / float(factor) - 0.5
-    place = wp.clamp(place, 0.0, float(count - 1))
-    at = Between()
-    at.first = wp.min(int(place), wp.max(count - 2, 0))
-    at.after = wp.min(at.first + 1, count - 1)
-    at.part = place - float(at.first)
-    return at
-
-
-@wp.kernel
-def mix_coarse(
-    veil: wp.array(dtype=wp.vec3, ndim=2),
-    factor: int,
-    width: int,
-    weight: float,
-    share: float,
-    radiance: wp.array(dtype=wp.vec3),
-):
-    """Give a share of the light to a coarser image, bilinearly enlarged and weighted."""
-    i = wp.tid()
-    row = between(i / width, factor, veil.shape[0])
-    column = between(i % width, factor, veil.shape[1])
-    left = veil[row.first, column.first] * (1.0 - row.part)
-    left += veil[row.after, column.first] * row.part
-    right = veil[row.first, column.after] * (1.0 - row.part)
-    right += veil[row.after, column.after] * row.part
-    light = (left * (1.0 - column.part) + right * column.part) * weight
-    radiance[i] = radiance[i] * (1.0 - share) + light * share

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.edges import most_alike, nearby, tone_weight
+from generator.renderers.kernels.edges import most_alike, nearby
 from generator.renderers.kernels.raster import (
     UNSNAPPED,
     Z_NEAR_M,
@@ -303,7 +303,6 @@ def mix_samples(
     radiance: wp.array(dtype=wp.vec3),
     pixels: wp.array(dtype=int),
     hits: wp.array(dtype=wp.vec2i, ndim=2),
-    exposure: float,
     mixed: wp.array(dtype=wp.vec3),
 ):
     """Radiance of listed pixels: the mean over their samples, in the order of the list."""
@@ -312,7 +311,7 @@ def mix_samples(
     x = i % view.width
     y = i / view.width
     total = wp.vec3(0.0)
-    weights = float(0.0)
+    lit = int(0)
     last = wp.vec2i(-2, -2)
     source = int(-1)
     for s in range(hits.shape[1]):
@@ -321,10 +320,8 @@ def mix_samples(
             source = lender(view, world, images, x, y, hit)
             last = hit
         if source >= 0:
-            exposed = radiance[source] * exposure
-            w = tone_weight(exposed)
-            total += exposed * w
-            weights += w
+            total += radiance[source]
+            lit += 1
     mixed[row] = radiance[i]
-    if weights > 0.0:
-        mixed[row] = total * (1.0 / (weights * exposure))
+    if lit > 0:
+        mixed[row] = total * (1.0 / float(lit))

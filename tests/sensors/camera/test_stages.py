@@ -1,4 +1,4 @@
-"""The way from light to a photograph: each stage does what physics and standards say."""
+"""Stages of the image pipeline: each does what physics and standards say."""
 
 from __future__ import annotations
 
@@ -14,14 +14,20 @@ from pydantic import ValidationError
 from generator.config.distributions import Constant
 from generator.core.intrinsics import Intrinsics
 from generator.core.lens import Lens
+from generator.core.scene import Camera, Weather
+from generator.core.se3 import SE3
 from generator.core.streams import Rng, Streams
-from generator.sensors.cameras import camera_names
-from generator.sensors.formation import development, optics
-from generator.sensors.formation.chain import Formation, Shutter, exposure_for, photograph
-from generator.sensors.formation.photosites import Pattern, Photosites, exposed, mosaic
+from generator.sensors.camera import isp, optics
+from generator.sensors.camera.exposure import ExposureControl, exposure_settings
+from generator.sensors.camera.image_pipeline import ImagePipeline, develop
+from generator.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
+from generator.sensors.camera.jpeg import through_jpeg
+from generator.sensors.camera.presets import camera_names
+from generator.sensors.camera.tone import to_bytes
 
 FAR = np.full((48, 64), np.inf)
-EYE = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
+EYE = Camera("eye", SE3(), Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0), ev100=8.0)
+WHITE_CD_M2 = 1.2 * 2.0**8
 PATTERNS: tuple[Pattern, ...] = ("rggb", "bggr", "grbg", "gbrg")
 
 
@@ -35,21 +41,27 @@ def flat(*color: float, shape: tuple[int, int] = (48, 64)) -> Any:
     return np.full((*shape, 3), color, np.float32)
 
 
-def made(**values: Any) -> Formation:
-    """A formation of plain values, as YAML gives them."""
-    return Formation.model_validate_json(json.dumps(values))
+def made(**values: Any) -> ImagePipeline:
+    """An image pipeline of plain values, as YAML gives them."""
+    return ImagePipeline.model_validate_json(json.dumps(values))
+
+
+def photograph(radiance: Any, pipeline: ImagePipeline, stream: Rng | None = None) -> Any:
+    """Bytes of a photograph at EV 8 in fair weather."""
+    image = np.asarray(radiance, np.float32)
+    return develop(image, FAR, EYE, Weather(), pipeline, stream or rng()).rgb
 
 
 @pytest.mark.parametrize("level", [0.02, 0.1, 0.5, 0.9])
 @pytest.mark.parametrize("gain", [1.0, 4.0])
 def test_variance_is_that_of_photons_and_reading(level: float, gain: float) -> None:
     """Photon transfer (EMVA 1288): variance = mean / well + (read / well)^2 + step^2 / 12."""
-    sites = Photosites(
+    sites = ImageSensor(
         full_well_e=10_000.0, read_noise_e=Constant(5.0), dark_current_e_s=Constant(0.0), prnu=0.0,
         dsnu_e=0.0, bits=14,
     )  # fmt: skip
     light = np.full((400, 500), level, np.float32)
-    raw = exposed(light, gain, 0.01, sites, rng())
+    raw = expose(light, gain, 0.01, sites, rng())
     well_e = 10_000.0 / gain
     expected = level / well_e + (5.0 / well_e) ** 2 + (1.0 / (2**14 - 1)) ** 2 / 12.0
     n = light.size
@@ -59,35 +71,37 @@ def test_variance_is_that_of_photons_and_reading(level: float, gain: float) -> N
 
 def test_dark_current_adds_noise_and_no_light() -> None:
     """Its mean is taken off by the black level; its variance is its number of electrons."""
-    sites = Photosites(
+    sites = ImageSensor(
         full_well_e=10_000.0, read_noise_e=Constant(20.0), dark_current_e_s=Constant(900.0),
         prnu=0.0, dsnu_e=0.0, bits=16,
     )  # fmt: skip
-    raw = exposed(np.full((300, 300), 0.2, np.float32), 1.0, 1.0, sites, rng())
+    raw = expose(np.full((300, 300), 0.2, np.float32), 1.0, 1.0, sites, rng())
     assert float(raw.mean()) == pytest.approx(0.2, abs=1e-4)
     assert float(raw.var()) == pytest.approx((2000 + 900 + 400) / 1e8, rel=0.03)
 
 
 def test_a_full_well_reads_white() -> None:
     """Light beyond saturation stays at 1."""
-    sites = Photosites(prnu=0.0, dsnu_e=0.0)
-    raw = exposed(np.full((20, 20), 3.0, np.float32), 1.0, 0.01, sites, rng())
+    sites = ImageSensor(prnu=0.0, dsnu_e=0.0)
+    raw = expose(np.full((20, 20), 3.0, np.float32), 1.0, 0.01, sites, rng())
     assert (raw == 1.0).all()
 
 
 def test_several_exposures_read_light_far_beyond_white() -> None:
     """Three at 16:1 tell 100 times white from 200 times, each within a few per cent."""
-    sites = Photosites(exposures=3, exposure_ratio=16.0, full_well_e=24_500.0, prnu=0.0, dsnu_e=0.0)
+    sites = ImageSensor(
+        exposures=3, exposure_ratio=16.0, full_well_e=24_500.0, prnu=0.0, dsnu_e=0.0
+    )
     for light in (0.1, 2.0, 100.0, 200.0):
-        raw = exposed(np.full((50, 50), light, np.float32), 1.0, 0.01, sites, rng())
+        raw = expose(np.full((50, 50), light, np.float32), 1.0, 0.01, sites, rng())
         assert float(raw.mean()) == pytest.approx(light, rel=0.01)
         assert float(raw.std()) < 0.05 * light
 
 
 def test_numbers_are_whole_steps_of_the_converter() -> None:
     """Eight bits: multiples of 1 / 255."""
-    sites = Photosites(bits=8)
-    raw = exposed(np.full((30, 30), 0.4, np.float32), 1.0, 0.01, sites, rng())
+    sites = ImageSensor(bits=8)
+    raw = expose(np.full((30, 30), 0.4, np.float32), 1.0, 0.01, sites, rng())
     np.testing.assert_allclose(raw * 255.0, np.rint(raw * 255.0), atol=1e-4)
 
 
@@ -95,10 +109,10 @@ def test_hot_pixels_stay_where_they_are() -> None:
     """The same photosites in every picture of a device; others in another device."""
 
     def hot(seed: int, name: str) -> Any:
-        sites = Photosites(
+        sites = ImageSensor(
             hot_pixels=0.01, dark_current_e_s=Constant(100.0), device_seed=seed, prnu=0.0
         )
-        return exposed(np.zeros((100, 100), np.float32), 1.0, 0.03, sites, rng(name)) > 0.03
+        return expose(np.zeros((100, 100), np.float32), 1.0, 0.03, sites, rng(name)) > 0.03
 
     first, again, other = hot(1, "a"), hot(1, "b"), hot(2, "a")
     assert 50 <= first.sum() <= 150
@@ -111,7 +125,7 @@ def test_hot_pixels_stay_where_they_are() -> None:
 def test_demosaicing_gives_flat_colours_back(pattern: Pattern, method: Any) -> None:
     """Each filter's colour is found again in its own channel."""
     raw = mosaic(flat(0.8, 0.4, 0.1), pattern)
-    image = development.demosaiced(raw, pattern, method, 1.0)
+    image = isp.demosaiced(raw, pattern, method, 1.0)
     np.testing.assert_allclose(image[4:-4, 4:-4], flat(0.8, 0.4, 0.1)[4:-4, 4:-4], atol=2e-4)
 
 
@@ -199,16 +213,6 @@ def test_red_is_larger_and_blue_smaller_by_the_asked_pixels_at_the_corner() -> N
     assert radius[1] - radius[2] == pytest.approx(4.0 * share, abs=0.1)
 
 
-def test_bloom_spreads_light_and_keeps_it() -> None:
-    """The sum of a bright dot's light far from the border stays; its neighbours brighten."""
-    image = np.zeros((256, 256, 3), np.float32)
-    image[126:130, 126:130] = 1000.0
-    soft = optics.bloomed(image, 0.1)
-    assert float(soft.sum()) == pytest.approx(float(image.sum()), rel=0.02)
-    assert soft[128, 140, 0] > 0.0
-    assert soft[127, 127, 0] < 1000.0
-
-
 def test_the_circle_of_confusion_is_that_of_a_thin_lens() -> None:
     """50 mm at f/2 focused at 2 m, a point at 4 m: 50^2 / 2 * 2000 / (4000 * 1950) = 0.3205 mm."""
     z = np.array([[2.0, 4.0, np.inf, 1.0]])
@@ -244,46 +248,42 @@ def test_a_sharp_foreground_does_not_bleed_into_a_blurred_background() -> None:
 
 def test_exposure_is_reached_by_time_before_gain() -> None:
     """EV100 10 at f/2 and ISO 100: 2^2 / 2^10 s. In the dark the longest time, then gain."""
-    shutter = Shutter(f_number=2.0, time_s=(1e-4, 0.04), iso=(100.0, 1600.0))
-    bright = exposure_for(10.0, shutter)
+    control = ExposureControl(f_number=2.0, time_s=(1e-4, 0.04), iso=(100.0, 1600.0))
+    bright = exposure_settings(10.0, control)
     assert (bright.time_s, bright.gain) == (pytest.approx(4.0 / 1024.0), 1.0)
-    dim = exposure_for(4.0, shutter)
+    dim = exposure_settings(4.0, control)
     assert dim.time_s == 0.04
     assert dim.gain == pytest.approx(4.0 / 16.0 / 0.04)
     assert dim.ev100 == pytest.approx(4.0)
-    dark = exposure_for(-6.0, shutter)
+    dark = exposure_settings(-6.0, control)
     assert dark.gain == 16.0
     assert dark.ev100 > -6.0
 
 
 def test_grey_stays_grey_through_matrix_and_mosaic() -> None:
     """Noise-free photosites and a strong colour matrix: three equal channels."""
-    formation = made(
-        photosites={"full_well_e": 1e7, "read_noise_e": 0, "prnu": 0, "dsnu_e": 0, "bits": 16},
+    pipeline = made(
+        image_sensor={"full_well_e": 1e7, "read_noise_e": 0, "prnu": 0, "dsnu_e": 0, "bits": 16},
         color_matrix=[[1.7, -0.55, -0.15], [-0.25, 1.45, -0.2], [0, -0.5, 1.5]],
-        shutter={"time_s": [1e-6, 10.0]},
+        exposure_control={"time_s": [1e-6, 10.0]},
         tone="linear",
     )
-    luminance = flat(0.5, 0.5, 0.5) * 1.2 * 2.0**8
-    photo = photograph(luminance.astype(np.float32), FAR, EYE, 8.0, formation, rng())
+    photo = photograph(flat(0.5, 0.5, 0.5) * WHITE_CD_M2, pipeline)
     assert np.abs(photo.astype(int) - 128).max() <= 1
 
 
 def test_an_ideal_camera_shows_luminance_by_its_curve() -> None:
     """IEC 61966-2-1: a quarter of white is byte 137."""
-    luminance = (flat(0.25, 0.25, 0.25) * 1.2 * 2.0**8).astype(np.float32)
-    formation = made(tone="srgb", shutter={"time_s": [1e-6, 10.0]})
-    photo = photograph(luminance, FAR, EYE, 8.0, formation, rng())
+    photo = photograph(flat(0.25, 0.25, 0.25) * WHITE_CD_M2, made(tone="srgb"))
     assert (photo == 137).all()
 
 
 def test_white_balance_takes_out_the_light_of_a_lamp() -> None:
     """Orange light on grey things: grey again with a full share, orange without."""
     random = Streams(seed=1, scene=0).rng("patches").random((48, 64, 1))
-    scene = (random * np.array([0.8, 0.5, 0.2]) * 1.2 * 2.0**8).astype(np.float32)
-    wide = {"time_s": [1e-6, 10.0]}
-    grey = photograph(scene, FAR, EYE, 8.0, made(white_balance=1, tone="srgb", shutter=wide), rng())
-    plain = photograph(scene, FAR, EYE, 8.0, made(tone="srgb", shutter=wide), rng())
+    scene = random * np.array([0.8, 0.5, 0.2]) * WHITE_CD_M2
+    grey = photograph(scene, made(white_balance=1, tone="srgb"))
+    plain = photograph(scene, made(tone="srgb"))
     balanced = grey.reshape(-1, 3).mean(axis=0)
     assert np.ptp(balanced) < 6.0
     assert np.ptp(plain.reshape(-1, 3).mean(axis=0)) > 60.0
@@ -293,21 +293,20 @@ def test_compression_leaves_its_traces_and_little_else() -> None:
     """A noisy image through JPEG differs, by less the better the quality."""
     ramp = np.linspace(0.2, 0.8, 64, dtype=np.float32)[:, None, None]
     noise = 0.05 * rng().standard_normal((64, 64, 1)).astype(np.float32)
-    image = development.to_bytes(np.repeat(ramp + noise, 3, axis=2))
-    rough = development.through_jpeg(image, 30).astype(int) - image
-    fine = development.through_jpeg(image, 98).astype(int) - image
+    image = to_bytes(np.repeat(ramp + noise, 3, axis=2))
+    rough = through_jpeg(image, 30).astype(int) - image
+    fine = through_jpeg(image, 98).astype(int) - image
     assert np.abs(rough).mean() > 1.5 * np.abs(fine).mean() > 0.0
 
 
-@pytest.mark.parametrize("name", camera_names())
+@pytest.mark.parametrize("name", sorted(set(camera_names()) - {"ideal"}))
 def test_every_preset_takes_the_same_picture_twice(name: str) -> None:
     """Same stream, same bytes; a picture of a mid-grey scene is neither black nor white."""
-    formation = made(preset=name)
-    luminance = flat(40.0, 45.0, 50.0)
-    depth = np.full((48, 64), 2.0)
-    one = photograph(luminance, depth, EYE, 8.0, formation, rng())
-    two = photograph(luminance, depth, EYE, 8.0, formation, rng())
-    other = photograph(luminance, depth, EYE, 8.0, formation, rng("another"))
+    radiance, depth_m = flat(40.0, 45.0, 50.0), np.full((48, 64), 2.0)
+    one, two, other = (
+        develop(radiance, depth_m, EYE, Weather(), made(preset=name), rng(stream)).rgb
+        for stream in ("one", "one", "another")
+    )
     assert one.shape == (48, 64, 3)
     assert (one == two).all()
     assert (one != other).any()
@@ -316,10 +315,10 @@ def test_every_preset_takes_the_same_picture_twice(name: str) -> None:
 
 def test_given_values_win_over_a_preset() -> None:
     """Also inside the sensor's data."""
-    formation = made(preset="phone", photosites={"bits": 14}, tone="srgb")
-    assert formation.tone == "srgb"
-    assert formation.photosites is not None
-    assert (formation.photosites.bits, formation.photosites.full_well_e) == (14, 10_000.0)
+    pipeline = made(preset="phone", image_sensor={"bits": 14}, tone="srgb")
+    assert pipeline.tone == "srgb"
+    assert pipeline.image_sensor is not None
+    assert (pipeline.image_sensor.bits, pipeline.image_sensor.full_well_e) == (14, 10_000.0)
 
 
 @pytest.mark.parametrize(
@@ -327,7 +326,7 @@ def test_given_values_win_over_a_preset() -> None:
     [
         ({"preset": "fone"}, "phone.*did you mean 'phone'"),
         ({"color_matrix": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "grey stays grey"),
-        ({"shutter": {"time_s": [0.1, 0.01]}}, "time_s must rise"),
+        ({"exposure_control": {"time_s": [0.1, 0.01]}}, "time_s must rise"),
         ({"vignetting": 1.5}, "1.5"),
     ],
 )

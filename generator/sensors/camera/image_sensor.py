@@ -1,4 +1,4 @@
-"""Photosites: from light to numbers, with the noise of the way.
+"""The image sensor: from light to numbers, with the noise of photons, pixels and reading.
 
 The model is that of EMVA standard 1288: electrons are Poisson around light times response plus dark
 current times time; a gain, read noise and a converter of so many bits follow.
@@ -16,6 +16,7 @@ from pydantic import Field
 from generator.config.distributions import NonNegative
 from generator.config.distributions.discrete import Constant
 from generator.config.strict import Strict
+from generator.core.colorimetry import luminance
 from generator.core.geometry import Float32
 from generator.core.streams import Rng, Streams
 
@@ -26,7 +27,7 @@ _FILTERS = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "grbg": (1, 0, 2, 1), "g
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-class Photosites(Strict):
+class ImageSensor(Strict):
     """An image sensor's data sheet.
 
     Attributes:
@@ -65,7 +66,7 @@ def mosaic(image: Float32, pattern: Pattern) -> Float32:
         pattern: Filters; ``mono`` takes luminance.
     """
     if pattern == "mono":
-        return np.asarray(image @ np.array([0.2126, 0.7152, 0.0722], np.float32), np.float32)
+        return np.asarray(luminance(image), np.float32)
     raw = np.empty_like(image[..., 0])
     for k, channel in enumerate(_FILTERS[pattern]):
         raw[k // 2 :: 2, k % 2 :: 2] = image[k // 2 :: 2, k % 2 :: 2, channel]
@@ -81,47 +82,47 @@ def filter_at(pattern: Pattern, height: int, width: int) -> NDArray[np.intp]:
     return filters
 
 
-def exposed(light: Float32, gain: float, time_s: float, sites: Photosites, rng: Rng) -> Float32:
+def expose(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng) -> Float32:
     """Numbers of the converter for light on the photosites, float32 [h, w]; 1 = saturated.
 
     Args:
         light: 1 saturates the photosites at this gain; any range.
         gain: ISO over base ISO, 1 or more: the well is used up to ``full_well_e / gain``.
         time_s: How long it is exposed.
-        sites: The sensor.
+        sensor: Its data sheet.
         rng: Draws the noise.
 
     Returns:
         Linear values from 0; above 1 only where several exposures are joined.
     """
-    joined = _reading(light, gain, time_s, sites, rng)
+    joined = _reading(light, gain, time_s, sensor, rng)
     reach = 1.0
-    for _ in range(1, sites.exposures):
-        reach *= sites.exposure_ratio
-        shorter = _reading(light / reach, gain, time_s / reach, sites, rng)
+    for _ in range(1, sensor.exposures):
+        reach *= sensor.exposure_ratio
+        shorter = _reading(light / reach, gain, time_s / reach, sensor, rng)
         # A photosite that is nearly full is read from the next shorter exposure.
-        joined = np.where(joined >= 0.95 * reach / sites.exposure_ratio, shorter * reach, joined)
+        joined = np.where(joined >= 0.95 * reach / sensor.exposure_ratio, shorter * reach, joined)
     return joined.astype(np.float32)
 
 
-def _reading(light: Float32, gain: float, time_s: float, sites: Photosites, rng: Rng) -> Float32:
-    well_e = sites.full_well_e / gain
-    response, offset_e, dark = _fixed_pattern(light.shape, sites)
-    dark_e = sites.dark_current_e_s.draw(rng) * time_s
+def _reading(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng) -> Float32:
+    well_e = sensor.full_well_e / gain
+    response, offset_e, dark = _fixed_pattern(light.shape, sensor)
+    dark_e = sensor.dark_current_e_s.draw(rng) * time_s
     mean_e = np.clip(light, 0.0, 8.0) * response * well_e + dark_e * dark
     # A photosite that light overfills eight times over is as full as one that it fills.
     electrons = rng.poisson(mean_e).astype(np.float32)
     noise = rng.standard_normal(light.shape, dtype=np.float32)
-    level = electrons + sites.read_noise_e.draw(rng) * noise + offset_e - dark_e
-    steps = np.float32((1 << sites.bits) - 1)
+    level = electrons + sensor.read_noise_e.draw(rng) * noise + offset_e - dark_e
+    steps = np.float32((1 << sensor.bits) - 1)
     return np.asarray(np.clip(np.rint(level / well_e * steps), 0, steps) / steps, np.float32)
 
 
 @lru_cache(maxsize=8)
-def _fixed_pattern(shape: tuple[int, int], sites: Photosites) -> tuple[Float32, Float32, Float32]:
+def _fixed_pattern(shape: tuple[int, int], sensor: ImageSensor) -> tuple[Float32, Float32, Float32]:
     """Response, dark level [e] and dark current over its mean of every photosite: one device's."""
-    rng = Streams(seed=sites.device_seed, scene=0).rng("photosites")
-    response = 1.0 + sites.prnu * rng.standard_normal(shape, dtype=np.float32)
-    offset_e = sites.dsnu_e * rng.standard_normal(shape, dtype=np.float32)
-    dark = np.where(rng.random(shape) < sites.hot_pixels, np.float32(200.0), np.float32(1.0))
+    rng = Streams(seed=sensor.device_seed, scene=0).rng("photosites")
+    response = 1.0 + sensor.prnu * rng.standard_normal(shape, dtype=np.float32)
+    offset_e = sensor.dsnu_e * rng.standard_normal(shape, dtype=np.float32)
+    dark = np.where(rng.random(shape) < sensor.hot_pixels, np.float32(200.0), np.float32(1.0))
     return response.astype(np.float32), offset_e.astype(np.float32), dark.astype(np.float32)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,11 +16,11 @@ from generator.renderers.settings import RenderSettings
 from generator.renderers.warp import WarpRenderer
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, sphere_mesh
 
-RGB = frozenset({Channel.RGB})
+RADIANCE = frozenset({Channel.RADIANCE})
 LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
-DOWN = Camera("top", look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), LENS, ev100=8.0)
+DOWN = Camera("top", look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), LENS)
 CHALK = (Material(base_color=(0.5, 0.5, 0.5), roughness=1.0, specular=0.0),)
-PLAIN = RenderSettings(tone="srgb", ambient_occlusion_radius_m=0.0)
+PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0)
 DARK = Environment(luminance_cd_m2=0.0)
 
 
@@ -39,18 +38,8 @@ def library() -> FakeLibrary:
 
 @pytest.fixture(scope="module")
 def renderer(library: FakeLibrary) -> WarpRenderer:
-    """No tone curve, no ambient occlusion: values that formulas can tell."""
+    """Without ambient occlusion: values that formulas can tell."""
     return WarpRenderer(library, "cpu", PLAIN)
-
-
-def luminance_cd_m2(rgb: np.ndarray, ev100: float) -> np.ndarray:
-    """Luminance of an 8-bit grey image: sRGB undone, white is 1.2 * 2^EV100 cd/m^2.
-
-    Source: Lagarde and de Rousiers, "Moving Frostbite to physically based rendering", 2014.
-    """
-    value = rgb[..., 1].astype(float) / 255.0
-    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    return linear * 1.2 * 2.0**ev100
 
 
 def test_sun_on_chalk_has_the_luminance_of_lamberts_law(renderer: WarpRenderer) -> None:
@@ -60,19 +49,18 @@ def test_sun_on_chalk_has_the_luminance_of_lamberts_law(renderer: WarpRenderer) 
     sun = Light("sun", "sun", direction=direction, illuminance_lux=900.0)
     scene = Scene("t", bodies=(Body("plane", "plane"),), lights=(sun,), environment=DARK)
 
-    rgb = renderer.render(scene, DOWN, RGB).channels[Channel.RGB]
+    radiance = renderer.render(scene, DOWN, RADIANCE).channels[Channel.RADIANCE]
 
     expected = 0.5 * 900.0 * math.cos(tilt) / math.pi
-    np.testing.assert_allclose(luminance_cd_m2(rgb, 8.0), expected, rtol=0.02)
+    np.testing.assert_allclose(radiance[..., 1], expected, rtol=0.02)
 
 
 def test_lamp_obeys_the_inverse_square_law(renderer: WarpRenderer) -> None:
     """Straight below a lamp of 500 cd at 2 m: E = 125 lx; at a slant E = I cos / d^2."""
     lamp = Light("lamp", "sphere", (0.0, 0.0, 2.0), intensity_cd=500.0, radius_m=0.001)
     scene = Scene("t", bodies=(Body("plane", "plane"),), lights=(lamp,), environment=DARK)
-    camera = replace(DOWN, ev100=5.0)
 
-    shown = luminance_cd_m2(renderer.render(scene, camera, RGB).channels[Channel.RGB], 5.0)
+    shown = renderer.render(scene, DOWN, RADIANCE).channels[Channel.RADIANCE][..., 1]
 
     x_m = (np.arange(64) + 0.5 - 32) / 60 * 3.0
     d2 = x_m**2 + (0.5 / 60 * 3.0) ** 2 + 4.0
@@ -84,11 +72,10 @@ def test_chalk_in_an_even_environment_shows_its_albedo(renderer: WarpRenderer) -
     """A ball in light of equal luminance from everywhere reflects rho * L at every point."""
     around = Environment(luminance_cd_m2=100.0, visible=False)
     scene = Scene("t", bodies=(Body("ball", "ball"),), environment=around)
-    camera = replace(DOWN, ev100=6.5)
 
-    rgb = renderer.render(scene, camera, RGB).channels[Channel.RGB]
+    radiance = renderer.render(scene, DOWN, RADIANCE).channels[Channel.RADIANCE]
 
-    shown = luminance_cd_m2(rgb[20:28, 28:36], 6.5)
+    shown = radiance[20:28, 28:36, 1]
     np.testing.assert_allclose(shown, 50.0, rtol=0.04)
 
 
@@ -100,9 +87,9 @@ def test_white_metal_reflects_all_light_but_what_it_shades(roughness: float) -> 
     around = Environment(luminance_cd_m2=100.0, visible=False)
     scene = Scene("t", bodies=(Body("ball", "ball"),), environment=around)
 
-    rgb = WarpRenderer(library, "cpu", PLAIN).render(scene, replace(DOWN, ev100=7.0), RGB)
+    radiance = WarpRenderer(library, "cpu", PLAIN).render(scene, DOWN, RADIANCE)
 
-    shown = luminance_cd_m2(rgb.channels[Channel.RGB][20:28, 28:36], 7.0)
+    shown = radiance.channels[Channel.RADIANCE][20:28, 28:36][..., 1]
     assert shown.max() < 104.0
     assert shown.min() > 60.0
 
@@ -111,13 +98,13 @@ def test_invisible_environment_is_black_and_visible_one_has_its_luminance(
     renderer: WarpRenderer,
 ) -> None:
     """Pixels that hit nothing."""
-    up = Camera("up", look_at((0.0, 0.0, 1.0), (0.0, 0.0, 5.0)), LENS, ev100=7.0)
+    up = Camera("up", look_at((0.0, 0.0, 1.0), (0.0, 0.0, 5.0)), LENS)
     seen = Scene("t", environment=Environment(luminance_cd_m2=60.0))
     hidden = Scene("t", environment=Environment(luminance_cd_m2=60.0, visible=False))
 
-    shown = luminance_cd_m2(renderer.render(seen, up, RGB).channels[Channel.RGB], 7.0)
+    shown = renderer.render(seen, up, RADIANCE).channels[Channel.RADIANCE][..., 1]
     np.testing.assert_allclose(shown, 60.0, rtol=0.02)
-    assert not renderer.render(hidden, up, RGB).channels[Channel.RGB].any()
+    assert not renderer.render(hidden, up, RADIANCE).channels[Channel.RADIANCE].any()
 
 
 def test_shadow_touches_its_box_and_has_a_penumbra_of_similar_triangles(
@@ -129,9 +116,10 @@ def test_shadow_touches_its_box_and_has_a_penumbra_of_similar_triangles(
     box = Body("box", "box", SE3((0.0, 0.0, 0.5)))
     scene = Scene("t", bodies=(Body("plane", "plane"), box), lights=(lamp,), environment=DARK)
     lens = Intrinsics(320, 240, 260.0, 260.0, 160.0, 120.0)
-    camera = Camera("c", look_at((1.0, 0.0, 5.0), (1.0, 0.001, 0.0)), lens, ev100=8.0)
+    camera = Camera("c", look_at((1.0, 0.0, 5.0), (1.0, 0.001, 0.0)), lens)
 
-    rgb = WarpRenderer(library, "cpu", PLAIN).render(scene, camera, RGB).channels[Channel.RGB]
+    reading = WarpRenderer(library, "cpu", PLAIN).render(scene, camera, RADIANCE)
+    radiance = reading.channels[Channel.RADIANCE]
 
     # The top edge at x = 0.5, z = 1 is seen from the lamp's centre under a slope of 3.5 / 3.
     middle_m = 0.5 + 3.5 / 3.0
@@ -140,15 +128,15 @@ def test_shadow_touches_its_box_and_has_a_penumbra_of_similar_triangles(
         [[x, 0.0, 0.0] for x in (0.53, middle_m - 1.6 * spread_m, middle_m + 1.6 * spread_m)]
     )
     u, v = camera.intrinsics.project(camera.T_world_camera.inverse().apply(p)).astype(int).T
-    at_box, umbra, lit = (int(rgb[b, a, 1]) for a, b in zip(u, v, strict=True))
+    at_box, umbra, lit = (float(radiance[b, a, 1]) for a, b in zip(u, v, strict=True))
 
-    assert at_box <= 2
-    assert umbra <= 2
-    assert lit > 60
+    assert at_box < 0.2
+    assert umbra < 0.2
+    assert lit > 15.0
     middle = camera.T_world_camera.inverse().apply(np.array([[middle_m, 0.0, 0.0]]))
     a, b = camera.intrinsics.project(middle).astype(int)[0]
-    penumbra = luminance_cd_m2(rgb[b - 2 : b + 3, a - 2 : a + 3], 8.0).mean()
-    full = luminance_cd_m2(rgb[v[2] : v[2] + 1, u[2] : u[2] + 1], 8.0).mean()
+    penumbra = radiance[b - 2 : b + 3, a - 2 : a + 3, 1].mean()
+    full = lit
     assert 0.25 < penumbra / full < 0.75
 
 
@@ -158,16 +146,13 @@ def test_flat_lit_plane_has_no_acne(renderer: WarpRenderer) -> None:
     sun = Light("sun", "sun", direction=direction, illuminance_lux=3000.0)
     scene = Scene("t", bodies=(Body("plane", "plane"),), lights=(sun,), environment=DARK)
 
-    rgb = renderer.render(scene, replace(DOWN, ev100=7.0), RGB).channels[Channel.RGB]
+    radiance = renderer.render(scene, DOWN, RADIANCE).channels[Channel.RADIANCE]
 
-    assert int(rgb.max()) - int(rgb.min()) <= 2
-    assert rgb.min() > 20
+    np.testing.assert_allclose(radiance, 0.5 * 3000.0 * -direction[2] / math.pi, rtol=0.01)
 
 
-def test_automatic_exposure_does_not_depend_on_the_brightness_of_the_lamps(
-    library: FakeLibrary,
-) -> None:
-    """Ten times the light gives the same picture within two grey levels."""
+def test_radiance_grows_with_the_light(library: FakeLibrary) -> None:
+    """Ten times the light gives ten times the radiance, on edges too: nothing is exposed yet."""
     renderer = WarpRenderer(library, "cpu")
     bodies = (Body("plane", "plane"), Body("ball", "ball", SE3((0.2, 0.1, 0.5))))
     images = []
@@ -175,11 +160,10 @@ def test_automatic_exposure_does_not_depend_on_the_brightness_of_the_lamps(
         lamp = Light("lamp", "sphere", (1.0, 1.0, 3.0), intensity_cd=400.0 * strength)
         around = Environment(luminance_cd_m2=20.0 * strength)
         scene = Scene("t", bodies=bodies, lights=(lamp,), environment=around)
-        camera = replace(DOWN, ev100=None)
-        images.append(renderer.render(scene, camera, RGB).channels[Channel.RGB].astype(int))
+        images.append(renderer.render(scene, DOWN, RADIANCE).channels[Channel.RADIANCE])
 
-    assert np.abs(images[0] - images[1]).max() <= 2
-    assert 60 < images[0].mean() < 200
+    np.testing.assert_allclose(images[1], 10.0 * images[0], rtol=1e-3)
+    assert images[0].min() > 0.0
 
 
 def test_antialiasing_changes_edges_only(library: FakeLibrary) -> None:
@@ -189,13 +173,14 @@ def test_antialiasing_changes_edges_only(library: FakeLibrary) -> None:
     scene = Scene("t", bodies=(box,), lights=(lamp,), environment=Environment(visible=False))
     images = []
     for samples in (1, 4):
-        settings = RenderSettings(antialias=samples, tone="srgb", ambient_occlusion_radius_m=0.0)
+        settings = RenderSettings(antialias=samples, ambient_occlusion_radius_m=0.0)
         renderer = WarpRenderer(library, "cpu", settings)
-        images.append(renderer.render(scene, DOWN, RGB).channels[Channel.RGB].astype(int))
-    changed = np.abs(images[0] - images[1]).max(axis=-1) > 2
+        images.append(renderer.render(scene, DOWN, RADIANCE).channels[Channel.RADIANCE])
+    bright = images[0].max()
+    changed = np.abs(images[0] - images[1]).max(axis=-1) > 0.01 * bright
 
     assert 0.005 < changed.mean() < 0.2
-    partial = (images[1][..., 1] > 5) & (images[1][..., 1] < images[0][..., 1].max() - 5)
+    partial = (images[1][..., 1] > 0.02 * bright) & (images[1][..., 1] < 0.98 * bright)
     assert partial.sum() > changed.sum() / 2
 
 
@@ -208,7 +193,7 @@ def test_picture_does_not_depend_on_what_was_rendered_before(library: FakeLibrar
         bodies = (Body("plane", "plane"), Body("ball", "ball", SE3((x, 0.0, 0.5)), instance_id=1))
         return Scene("t", bodies=bodies, lights=(lamp,))
 
-    channels = frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE})
+    channels = frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.INSTANCE})
     first = renderer.render(scene_at(0.0), DOWN, channels).channels
     kept = {channel: image.copy() for channel, image in first.items()}
     for step in range(20):
@@ -223,7 +208,7 @@ def test_picture_does_not_depend_on_what_was_rendered_before(library: FakeLibrar
 def test_returned_images_are_not_overwritten_by_the_next_render(library: FakeLibrary) -> None:
     """A reading belongs to its caller."""
     renderer = WarpRenderer(library, "cpu")
-    channels = frozenset({Channel.RGB, Channel.Z_DEPTH})
+    channels = frozenset({Channel.RADIANCE, Channel.Z_DEPTH})
     scene = Scene("t", bodies=(Body("plane", "plane"),))
     reading = renderer.render(scene, DOWN, channels)
     kept = {channel: image.copy() for channel, image in reading.channels.items()}
@@ -235,8 +220,9 @@ def test_returned_images_are_not_overwritten_by_the_next_render(library: FakeLib
 
 
 def test_empty_scene_in_the_dark_is_black(library: FakeLibrary) -> None:
-    """No bodies, no lights, no environment, automatic exposure: black, not NaN."""
-    camera = replace(DOWN, ev100=None)
+    """No bodies, no lights, no environment: black, not NaN."""
     dark = Scene("t", environment=Environment(luminance_cd_m2=0.0))
 
-    assert not WarpRenderer(library, "cpu").render(dark, camera, RGB).channels[Channel.RGB].any()
+    reading = WarpRenderer(library, "cpu").render(dark, DOWN, RADIANCE)
+
+    assert not reading.channels[Channel.RADIANCE].any()

@@ -16,15 +16,6 @@ from generator.core.se3 import Array
 _BLUR_LEVELS = (0.0, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0)
 """Radii of the layers between which a defocused image is composed [px]."""
 
-_BLOOM_RADII = (0.004, 0.02, 0.08)
-_BLOOM_SHARES = (0.5, 0.3, 0.2)
-_GHOSTS = (
-    (-0.35, 0.02, (0.5, 1.0, 0.6)),
-    (-0.8, 0.05, (1.0, 0.5, 0.5)),
-    (0.5, 0.03, (0.5, 0.6, 1.0)),
-)
-"""Ghosts of a bright spot: place on the line through the centre, radius over width, tint."""
-
 
 def blur_radius_px(
     z_m: NDArray[np.floating], focus_m: float, focal_m: float, f_number: float, pitch_m: float
@@ -142,57 +133,6 @@ def with_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
             borderMode=cv2.BORDER_REPLICATE,
         )
     return np.asarray(out, np.float32)
-
-
-def bloomed(image: Float32, share: float) -> Float32:
-    """A share of all light is scattered in the lens: a narrow core and a wide veil.
-
-    Energy is kept. The sum of Gaussians stands for the point spread of Spencer et al.,
-    "Physically-based glare effects for digital images", SIGGRAPH 1995.
-    """
-    width = image.shape[1]
-    veil = np.zeros_like(image)
-    for radius, part in zip(_BLOOM_RADII, _BLOOM_SHARES, strict=True):
-        veil += part * _gaussian(image, radius * width)
-    return np.asarray((1.0 - share) * image + share * veil, np.float32)
-
-
-def flared(image: Float32, share: float, white: float) -> Float32:
-    """Ghosts of what is far brighter than white, mirrored about the centre of the image.
-
-    Args:
-        image: What is seen.
-        share: Of the light beyond white that comes back as ghosts.
-        white: Luminance that saturates.
-    """
-    beyond = np.maximum(image - 4.0 * white, 0.0)
-    if not beyond.any():
-        return image
-    height, width = image.shape[:2]
-    out = image.copy()
-    for place, radius, tint in _GHOSTS:
-        shift = np.array(
-            [
-                [place, 0.0, (1.0 - place) * 0.5 * (width - 1)],
-                [0.0, place, (1.0 - place) * 0.5 * (height - 1)],
-            ]
-        )
-        # Shrunk images gather the light of what they shrink.
-        ghost = cv2.warpAffine(beyond, shift, (width, height), flags=cv2.INTER_AREA)
-        ghost = _gaussian(ghost, radius * width)
-        out += share * place * place * ghost * np.asarray(tint, np.float32)
-    return np.asarray(out, np.float32)
-
-
-def _gaussian(image: Float32, sigma_px: float) -> Float32:
-    """A wide blur at a coarse scale: smooth images need few pixels."""
-    halvings = max(0, int(math.log2(max(sigma_px, 1.0) / 2.0)))
-    small = image
-    for _ in range(halvings):
-        small = cv2.resize(small, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-    small = cv2.GaussianBlur(small, (0, 0), sigma_px / 2**halvings, borderType=cv2.BORDER_REPLICATE)
-    size = (image.shape[1], image.shape[0])
-    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 def _disc(radius_px: float) -> Float32:

@@ -1,0 +1,108 @@
+"""Exposure: what a camera's meter says, and the time and gain by which it is reached."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from generator.config.strict import Strict
+from generator.core.colorimetry import luminance
+from generator.core.geometry import Float32
+from generator.core.se3 import Array
+
+_MIDDLE_GREY = 0.18
+# A 30th of a second at f/1.4 and ISO 3200, to snow in the sun: beyond, an automatic exposure stays
+# where it is, so that night stays night.
+_EV100_RANGE = (1.0, 17.0)
+_METERED_EVERY = 4
+
+
+class ExposureControl(Strict):
+    """How an image sensor's exposure is reached: long first, then with gain.
+
+    Attributes:
+        f_number: Of the aperture.
+        time_s: Shortest and longest exposure.
+        iso: Base and highest speed.
+    """
+
+    f_number: float = Field(2.0, ge=0.7, le=64)
+    time_s: tuple[float, float] = (1e-5, 1.0 / 30.0)
+    iso: tuple[float, float] = (100.0, 3200.0)
+
+    @model_validator(mode="after")
+    def _ranges_rise(self) -> ExposureControl:
+        for name, (low, high) in (("time_s", self.time_s), ("iso", self.iso)):
+            if not 0.0 < low <= high:
+                raise ValueError(f"{name} must rise from above 0, got [{low:g}, {high:g}]")
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class ExposureSettings:
+    """How a photograph is exposed.
+
+    Attributes:
+        time_s: How long.
+        gain: ISO over base ISO.
+        ev100: Exposure value at ISO 100 that this amounts to.
+    """
+
+    time_s: float
+    gain: float
+    ev100: float
+
+
+def saturation_cd_m2(ev100: float) -> float:
+    """The luminance that saturates the sensor [cd/m^2].
+
+    Saturation-based speed: L_max = 1.2 * 2^EV100 (ISO 12232; Lagarde and de Rousiers 2014).
+    """
+    return float(1.2 * 2.0**ev100)
+
+
+def metered_ev100(radiance: Float32) -> float:
+    """The exposure value that puts the centre-weighted log-average luminance at middle grey.
+
+    Source: Reinhard et al., "Photographic tone reproduction for digital images", 2002.
+
+    Args:
+        radiance: Linear RGB [cd/m^2], shape [h, w, 3].
+    """
+    sparse = radiance[::_METERED_EVERY, ::_METERED_EVERY].astype(np.float64)
+    levels = luminance(sparse)
+    weights = _centre_weights(*levels.shape)
+    brightest = float(levels.max(initial=0.0))
+    if brightest <= 0.0:
+        return _EV100_RANGE[0]
+    # Black pixels (a missing background) say nothing about the light. A lamp in the picture is no
+    # measure of black.
+    bright = float(np.quantile(levels[levels > 0.0], 0.95))
+    counted = levels > 1e-4 * bright
+    logs = np.log2(levels[counted])
+    average = float((logs * weights[counted]).sum() / weights[counted].sum())
+    ev100 = average - math.log2(1.2 * _MIDDLE_GREY)
+    # On a grid, so that the last bit of a logarithm is never seen.
+    return round(min(max(ev100, _EV100_RANGE[0]), _EV100_RANGE[1]) * 256.0) / 256.0
+
+
+def exposure_settings(ev100: float, control: ExposureControl) -> ExposureSettings:
+    """The exposure nearest to an exposure value: time first, then gain, within what there is.
+
+    ``2^EV100 = N^2 / t * 100 / ISO`` (ISO 12232).
+    """
+    base, highest = control.iso
+    wanted_s = control.f_number**2 / 2.0**ev100 * 100.0 / base
+    time_s = min(max(wanted_s, control.time_s[0]), control.time_s[1])
+    gain = min(max(wanted_s / time_s, 1.0), highest / base)
+    reached = math.log2(control.f_number**2 / time_s * 100.0 / (base * gain))
+    return ExposureSettings(time_s, gain, reached)
+
+
+def _centre_weights(height: int, width: int) -> Array:
+    y = (np.arange(height) + 0.5) / height * 2.0 - 1.0
+    x = (np.arange(width) + 0.5) / width * 2.0 - 1.0
+    return 1.0 - 0.5 * np.clip(x[None] ** 2 + y[:, None] ** 2, 0.0, 1.0)

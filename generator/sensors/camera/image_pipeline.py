@@ -1,0 +1,404 @@
+"""The image pipeline: every stage from radiance to the bytes of a photograph, in order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from generator.config.distributions import (
+    Bounds,
+    Constant,
+    NonNegative,
+    Positive,
+    Scalar,
+    UnitInterval,
+)
+from generator.config.strict import Strict
+from generator.core.capture import Channel, Reading
+from generator.core.geometry import Float32
+from generator.core.interfaces import Renderer
+from generator.core.scene import Camera, Scene, Weather
+from generator.core.streams import Rng
+from generator.sensors.camera import isp, optics
+from generator.sensors.camera.exposure import (
+    ExposureControl,
+    ExposureSettings,
+    exposure_settings,
+    metered_ev100,
+    saturation_cd_m2,
+)
+from generator.sensors.camera.flare import add_flare
+from generator.sensors.camera.glare import add_glare
+from generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
+from generator.sensors.camera.jpeg import through_jpeg
+from generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
+from generator.sensors.camera.presets import camera_preset
+from generator.sensors.camera.tone import Tone, display_values, to_bytes, toned_bytes
+
+NONE = Constant(0.0)
+Row = tuple[float, float, float]
+
+
+class Focus(Strict):
+    """A lens that is sharp at one distance only.
+
+    Attributes:
+        distance_m: Where it is sharp; null = at the depth in the middle of the image.
+        pixel_um: Size of a photosite: with the focal length in pixels it gives that of the lens.
+    """
+
+    distance_m: Positive | None = None
+    pixel_um: float = Field(3.0, gt=0, le=100)
+
+
+class ImagePipeline(Strict):
+    """How a photograph comes about; a stage that is left out does nothing.
+
+    Attributes:
+        preset: A camera of ``generator/sensors/camera/presets``, whose values hold where none is
+            given; ``ideal`` has an exposure and a tone curve, and no errors of lens or sensor.
+        focus: Depth of field.
+        flare: Share of the light far beyond white that returns as ghosts.
+        glare: Share of all light that the lens scatters around its source; 0.02 suits a clean
+            lens, 0.1 a dirty one.
+        chromatic_aberration_px: Between red and blue images and the green one, at the corners.
+        natural_vignetting: Whether light falls off with the angle to the axis: with the fourth
+            power of its cosine, and as ``fisheye_pupil`` says before a fisheye.
+        fisheye_pupil: Power of the cosine by which a fisheye's pupil is foreshortened: 0 turns to
+            the light, 1 is flat.
+        vignetting: Share of the light that the barrel takes at the corners.
+        exposure_compensation_ev: Added to the exposure, in stops; positive is brighter.
+        exposure_error_ev: Error of metering, in stops; positive is brighter.
+        exposure_control: Aperture, times and gains of an image sensor; without one, every exposure
+            is reached.
+        image_sensor: The sensor; null = an ideal one.
+        color_matrix: Rows of linear sRGB from white-balanced raw colours; rows sum to 1.
+        white_balance: Share of the light's colour that is taken out, by the grey-world assumption.
+        warmth_ev: Error of the white balance: red over blue, in stops.
+        demosaic: Method.
+        saturation: Factor on colour.
+        tone: Curve, see ``generator/sensors/camera/tone.py``; ``log`` is for sensors of several
+            exposures.
+        sharpening: Amount of unsharp masking.
+        sharpening_px: Its radius.
+        jpeg_quality: Of compression, 1 to 100; null = none.
+    """
+
+    former_keys: ClassVar[Mapping[str, str]] = {
+        "bloom": "glare",
+        "photosites": "image_sensor",
+        "shutter": "exposure_control",
+    }
+
+    preset: str = "ideal"
+    focus: Focus | None = None
+    flare: UnitInterval = NONE
+    glare: UnitInterval = NONE
+    chromatic_aberration_px: Scalar = NONE
+    natural_vignetting: bool = False
+    fisheye_pupil: float = Field(0.0, ge=0, le=1)
+    vignetting: UnitInterval = NONE
+    exposure_compensation_ev: Annotated[Scalar, Bounds(-10, 10)] = NONE
+    exposure_error_ev: Annotated[Scalar, Bounds(-8, 8)] = NONE
+    exposure_control: ExposureControl = ExposureControl()
+    image_sensor: ImageSensor | None = None
+    color_matrix: tuple[Row, Row, Row] | None = None
+    white_balance: UnitInterval = NONE
+    warmth_ev: Annotated[Scalar, Bounds(-3, 3)] = NONE
+    demosaic: isp.Demosaic = "edge_aware"
+    saturation: NonNegative = Constant(1.0)
+    tone: Tone = "filmic"
+    sharpening: NonNegative = NONE
+    sharpening_px: float = Field(1.0, gt=0, le=10)
+    jpeg_quality: Annotated[Scalar, Bounds(1, 100)] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_preset(cls, given: Any) -> Any:
+        """The preset's values below those that are given."""
+        if not isinstance(given, Mapping):
+            return given
+        preset = given.get("preset", "ideal")
+        below = camera_preset(preset) if isinstance(preset, str) else {}
+        return _with_tuples(_merged(below, given))
+
+    @model_validator(mode="after")
+    def _keeps_grey(self) -> ImagePipeline:
+        for row in self.color_matrix or ():
+            if abs(sum(row) - 1.0) > 1e-6:
+                raise ValueError(f"color_matrix: a row sums to {sum(row):g}; expected 1, so that"
+                                 " grey stays grey")  # fmt: skip
+        return self
+
+    @property
+    def headroom(self) -> float:
+        """Of the sensor: the largest value that it reads, where 1 saturates one exposure."""
+        sensor = self.image_sensor
+        return 1.0 if sensor is None else sensor.exposure_ratio ** (sensor.exposures - 1)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Shot:
+    """One photograph, as its stages know it.
+
+    Attributes:
+        pipeline: The camera's configuration.
+        camera: Where it is, and its lens.
+        radiance: As rendered, float32 [h, w, 3].
+        weather: Drops on the lens.
+        depth_m: Along the optical axis or, before a lens that is no pinhole, along the ray [h, w];
+            inf = nothing. None where no stage reads it.
+        exposure: As set or metered.
+        rng: Draws parameters and noise.
+    """
+
+    pipeline: ImagePipeline
+    camera: Camera
+    radiance: Float32
+    weather: Weather
+    depth_m: NDArray[np.floating] | None
+    exposure: ExposureSettings
+    rng: Rng
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Light:
+    """A linear image between two stages.
+
+    Attributes:
+        values: Linear RGB, float32 [h, w, 3]; not to be written to.
+        white: The value that saturates the sensor.
+    """
+
+    values: Float32
+    white: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Photograph:
+    """An image as a camera writes it.
+
+    Attributes:
+        rgb: sRGB, uint8 [h, w, 3].
+        ev100: Exposure value that was set or metered, without compensation and errors.
+    """
+
+    rgb: NDArray[np.uint8]
+    ev100: float
+
+
+def capture_photograph(
+    scene: Scene,
+    renderer: Renderer,
+    camera: Camera,
+    channels: frozenset[Channel],
+    pipeline: ImagePipeline,
+    rng: Rng,
+) -> Reading:
+    """The renderer's channels of a camera and, if RGB is asked for, its photograph."""
+    if Channel.RGB not in channels:
+        return renderer.render(scene, camera, channels)
+    needed = (channels - {Channel.RGB}) | {Channel.RADIANCE}
+    # Wide lenses see what has no depth along the axis, and are focused at a distance.
+    depth = Channel.Z_DEPTH if camera.intrinsics.straight else Channel.RANGE
+    if pipeline.focus is not None:
+        needed = needed | {depth}
+    reading = renderer.render(scene, camera, needed)
+    radiance = reading.channels[Channel.RADIANCE]
+    depth_m = reading.channels.get(depth)
+    photo = develop(radiance, depth_m, camera, scene.weather, pipeline, rng)
+    images = {k: image for k, image in reading.channels.items() if k in channels}
+    return replace(reading, channels={**images, Channel.RGB: photo.rgb}, ev100=photo.ev100)
+
+
+def develop(
+    radiance: Float32,
+    depth_m: NDArray[np.floating] | None,
+    camera: Camera,
+    weather: Weather,
+    pipeline: ImagePipeline,
+    rng: Rng,
+) -> Photograph:
+    """The photograph of an image of radiance: metering, then all of ``STAGES`` in order.
+
+    Args:
+        radiance: Linear Rec. 709 colours [cd/m^2], float32 [h, w, 3].
+        depth_m: As of ``Shot``; read only where the pipeline has a focus.
+        camera: Its lens, and its exposure value where that is fixed.
+        weather: Drops on the lens.
+        pipeline: The camera's configuration.
+        rng: Draws parameters and noise.
+    """
+    ev100 = metered_ev100(radiance) if camera.ev100 is None else camera.ev100
+    wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)
+    wanted -= pipeline.exposure_error_ev.draw(rng)
+    exposure = ExposureSettings(0.0, 1.0, wanted)
+    if pipeline.image_sensor is not None:
+        exposure = exposure_settings(wanted, pipeline.exposure_control)
+    shot = Shot(pipeline, camera, radiance, weather, depth_m, exposure, rng)
+    light = Light(radiance, saturation_cd_m2(exposure.ev100))
+    for stage in STAGES:
+        light = stage(light, shot)
+    return Photograph(_compress(_tone(light, shot), shot), ev100)
+
+
+def _wet_lens(light: Light, shot: Shot) -> Light:
+    drops = lens_drops(shot.weather, shot.camera)
+    return replace(light, values=refract_in_drops(light.values, drops)) if len(drops) else light
+
+
+def _defocus(light: Light, shot: Shot) -> Light:
+    focus = shot.pipeline.focus
+    if focus is None:
+        return light
+    assert shot.depth_m is not None, "a camera with a focus renders depth"
+    focal_m = shot.camera.intrinsics.fx_px * focus.pixel_um * 1e-6
+    at_m = focus.distance_m
+    focus_m = _centre_m(shot.depth_m) if at_m is None else at_m.draw(shot.rng)
+    radius_px = optics.blur_radius_px(
+        shot.depth_m, max(focus_m, 2.0 * focal_m), focal_m,
+        shot.pipeline.exposure_control.f_number, focus.pixel_um * 1e-6,
+    )  # fmt: skip
+    return replace(light, values=optics.defocused(light.values, radius_px))
+
+
+def _flare(light: Light, shot: Shot) -> Light:
+    share = shot.pipeline.flare.draw(shot.rng)
+    if share <= 0.0:
+        return light
+    return replace(light, values=add_flare(light.values, share, light.white))
+
+
+def _glare(light: Light, shot: Shot) -> Light:
+    share = shot.pipeline.glare.draw(shot.rng)
+    return replace(light, values=add_glare(light.values, share)) if share > 0.0 else light
+
+
+def _chromatic_aberration(light: Light, shot: Shot) -> Light:
+    corner_px = shot.pipeline.chromatic_aberration_px.draw(shot.rng)
+    if corner_px == 0.0:
+        return light
+    return replace(light, values=optics.with_chromatic_aberration(light.values, corner_px))
+
+
+def _vignetting(light: Light, shot: Shot) -> Light:
+    loss = shot.pipeline.vignetting.draw(shot.rng)
+    values = optics.vignetted(light.values, loss) if loss > 0.0 else light.values
+    if shot.pipeline.natural_vignetting:
+        falloff = optics.natural_falloff(shot.camera.intrinsics, shot.pipeline.fisheye_pupil)
+        values = values * falloff[..., None]
+    return replace(light, values=values)
+
+
+def _image_circle(light: Light, shot: Shot) -> Light:
+    """No light where the lens shows nothing; what spreads, spreads beyond."""
+    lens = shot.camera.intrinsics
+    if lens.straight or light.values is shot.radiance:
+        return light
+    inside = np.isfinite(lens.pixel_rays()[..., 2:])
+    return replace(light, values=np.where(inside, light.values, np.float32(0.0)))
+
+
+def _image_sensor(light: Light, shot: Shot) -> Light:
+    """Numbers of the sensor, white-balanced and demosaiced, as linear sRGB in which 1 is white."""
+    pipeline, sensor = shot.pipeline, shot.pipeline.image_sensor
+    if sensor is None:
+        return _white_balance(light, shot)
+    camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
+    image = light.values * np.float32(1.0 / light.white) @ camera_from_srgb.T
+    received = np.maximum(mosaic(image, sensor.pattern), 0.0)
+    raw = expose(received, shot.exposure.gain, shot.exposure.time_s, sensor, shot.rng)
+    share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
+    if sensor.pattern != "mono":
+        gains = isp.white_balance_gains(image, share, warmth_ev)
+        raw = raw * gains[filter_at(sensor.pattern, *raw.shape)]
+    white = 2.0 * pipeline.headroom
+    image = isp.demosaiced(raw, sensor.pattern, pipeline.demosaic, white)
+    return Light(image @ srgb_from_camera.T, 1.0)
+
+
+def _white_balance(light: Light, shot: Shot) -> Light:
+    """The white balance of an ideal sensor, in the camera's colours."""
+    pipeline = shot.pipeline
+    share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
+    if share == 0.0 and warmth_ev == 0.0:
+        return light
+    camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
+    image = light.values * np.float32(1.0 / light.white) @ camera_from_srgb.T
+    gains = isp.white_balance_gains(image, share, warmth_ev)
+    return Light(image * gains @ srgb_from_camera.T, 1.0)
+
+
+def _saturation(light: Light, shot: Shot) -> Light:
+    factor = shot.pipeline.saturation.draw(shot.rng)
+    return light if factor == 1.0 else replace(light, values=isp.saturated(light.values, factor))
+
+
+Stage = Callable[[Light, Shot], Light]
+
+STAGES: tuple[Stage, ...] = (
+    _wet_lens,
+    _defocus,
+    _flare,
+    _glare,
+    _chromatic_aberration,
+    _vignetting,
+    _image_circle,
+    _image_sensor,
+    _saturation,
+)
+"""From radiance to linear sRGB, in the order of a real camera; tone and JPEG follow."""
+
+
+def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
+    """Bytes; sharpening is done on display values."""
+    pipeline, scale = shot.pipeline, 1.0 / light.white
+    amount = pipeline.sharpening.draw(shot.rng)
+    if amount <= 0.0:
+        return toned_bytes(light.values, scale, pipeline.tone, pipeline.headroom)
+    display = display_values(light.values * np.float32(scale), pipeline.tone, pipeline.headroom)
+    return to_bytes(isp.sharpened(display, amount, pipeline.sharpening_px))
+
+
+def _compress(image: NDArray[np.uint8], shot: Shot) -> NDArray[np.uint8]:
+    quality = shot.pipeline.jpeg_quality
+    return image if quality is None else through_jpeg(image, round(quality.draw(shot.rng)))
+
+
+def _color_matrices(pipeline: ImagePipeline) -> tuple[Float32, Float32]:
+    """Camera colours from linear sRGB, and back, float32 [3, 3]."""
+    if pipeline.color_matrix is None:
+        return np.eye(3, dtype=np.float32), np.eye(3, dtype=np.float32)
+    back = np.array(pipeline.color_matrix)
+    return np.linalg.inv(back).astype(np.float32), back.astype(np.float32)
+
+
+def _centre_m(depth_m: NDArray[np.floating]) -> float:
+    """Median depth of the middle ninth of an image; 1 km where nothing is there."""
+    height, width = depth_m.shape
+    middle = depth_m[height // 3 : height - height // 3, width // 3 : width - width // 3]
+    there = middle[np.isfinite(middle)]
+    return float(np.median(there)) if len(there) else 1000.0
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of both, the upper ones first; mappings that name models are merged within."""
+    merged = dict(below)
+    for key, value in above.items():
+        under = merged.get(key)
+        both = isinstance(value, Mapping) and isinstance(under, Mapping)
+        inner = both and key in ("focus", "exposure_control", "image_sensor")
+        merged[key] = _merged(under, value) if inner else value  # type: ignore[arg-type]
+    return merged
+
+
+def _with_tuples(value: Any) -> Any:
+    """YAML knows only lists; what passes through Python must say what it means."""
+    if isinstance(value, Mapping):
+        return {key: _with_tuples(item) for key, item in value.items()}
+    return tuple(map(_with_tuples, value)) if isinstance(value, list) else value

@@ -1,0 +1,80 @@
+"""The image signal processor: from the image sensor's numbers to colours."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import cv2
+import numpy as np
+
+from generator.core.colorimetry import luminance
+from generator.core.geometry import Float32
+from generator.sensors.camera.image_sensor import Pattern
+
+Demosaic = Literal["bilinear", "edge_aware"]
+
+# OpenCV names a pattern after the second row's second and third photosites.
+_BAYER = {"rggb": "BG", "bggr": "RG", "grbg": "GB", "gbrg": "GR"}
+_DEPTH = 65_535.0
+
+
+def demosaiced(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> Float32:
+    """Three colours at every photosite, float32 [h, w, 3].
+
+    Args:
+        raw: Linear values [h, w].
+        pattern: Filters of the photosites.
+        method: Of interpolation.
+        white: Largest value that is kept.
+    """
+    if pattern == "mono":
+        return np.asarray(np.repeat(raw[..., None], 3, axis=-1), np.float32)
+    suffix = "_EA" if method == "edge_aware" else ""
+    code = getattr(cv2, f"COLOR_Bayer{_BAYER[pattern]}2RGB{suffix}")
+    steps = np.rint(np.clip(raw / white, 0.0, 1.0) * _DEPTH).astype(np.uint16)
+    return np.asarray(cv2.cvtColor(steps, code) * np.float32(white / _DEPTH), np.float32)
+
+
+def grey_world_gains(image: Float32) -> Float32:
+    """Factors on red, green and blue that make the mean of an image grey, float32 [3].
+
+    Clipped pixels say nothing. Buchsbaum, "A spatial processor model for object colour
+    perception", 1980.
+
+    Args:
+        image: Linear; 1 saturates.
+    """
+    seen = image.reshape(-1, 3)[::7]
+    seen = seen[(seen.max(axis=1) < 0.95) & (seen.min(axis=1) > 0.0)]
+    if len(seen) < 16:
+        return np.ones(3, np.float32)
+    means = seen.mean(axis=0, dtype=np.float64)
+    return np.asarray(np.clip(means[1] / means, 0.3, 3.0), np.float32)
+
+
+def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float32:
+    """Factors on red, green and blue, float32 [3]; green is the measure.
+
+    Args:
+        image: Linear; 1 saturates.
+        share: Of the light's colour that is taken out, by the grey-world assumption.
+        warmth_ev: Error: red over blue, in stops.
+    """
+    gains = np.ones(3, np.float32)
+    if share > 0.0:
+        gains = grey_world_gains(image) ** np.float32(share)
+    error = np.array([2.0 ** (0.5 * warmth_ev), 1.0, 2.0 ** (-0.5 * warmth_ev)], np.float32)
+    return np.asarray(gains * error, np.float32)
+
+
+def saturated(image: Float32, factor: float) -> Float32:
+    """Colours as many times as far from grey of the same luminance."""
+    grey = luminance(image)[..., None]
+    colors: Float32 = grey + np.float32(factor) * (image - grey)
+    return colors
+
+
+def sharpened(display: Float32, amount: float, radius_px: float) -> Float32:
+    """Unsharp masking of display values."""
+    blurred = cv2.GaussianBlur(display, (0, 0), radius_px)
+    return np.asarray(np.clip(display + amount * (display - blurred), 0.0, 1.0), np.float32)

@@ -1,0 +1,130 @@
+"""Radiance: anti-aliasing, environment and ambient occlusion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from generator.core.capture import Channel
+from generator.core.geometry import Material
+from generator.core.scene import Body, Camera, Environment, Light, Scene
+from generator.core.se3 import SE3
+from generator.renderers.occlusion import pixel_parts
+from generator.renderers.settings import RenderSettings
+from generator.renderers.warp import WarpRenderer
+from tests.renderers.fake_library import (
+    DARK,
+    FakeLibrary,
+    box_mesh,
+    camera_at,
+    forward_camera,
+    plane_mesh,
+    sphere_mesh,
+)
+
+LIBRARY = FakeLibrary({"plane": plane_mesh(100.0), "box": box_mesh(), "ball": sphere_mesh(0.5)})
+
+
+def radiance_of(scene: Scene, camera: Camera, settings: RenderSettings | None = None) -> np.ndarray:
+    renderer = WarpRenderer(LIBRARY, "cpu", settings)
+    return renderer.render(scene, camera, frozenset({Channel.RADIANCE})).channels[Channel.RADIANCE]
+
+
+def glowing(pose: SE3, asset: str = "box", scale: float = 1.0, emission: float = 100.0) -> Body:
+    material = Material((0.0, 0.0, 0.0), 1.0, specular=0.0, emission_cd_m2=(emission,) * 3)
+    return Body("glow", asset, pose, scale, materials=(material,))
+
+
+def test_an_edge_is_as_grey_as_it_is_covered() -> None:
+    """A quarter of a pixel on a glowing box of 300 cd/m^2 before black: 75 cd/m^2."""
+    left_m = (22.75 - 32.0) / 50.0 * 2.0
+    scene = Scene("t", (glowing(SE3((left_m + 0.5, 0.0, 2.5)), emission=300.0),), environment=DARK)
+    camera = forward_camera()
+
+    smooth = radiance_of(scene, camera)[24, 20:25, 0]
+    rough = radiance_of(scene, camera, RenderSettings(antialias=1))[24, 20:25, 0]
+
+    np.testing.assert_allclose(rough, [0.0, 0.0, 0.0, 300.0, 300.0], rtol=1e-5)
+    np.testing.assert_allclose(smooth, [0.0, 0.0, 75.0, 300.0, 300.0], rtol=1e-5)
+
+
+def test_anti_aliasing_does_not_touch_labels() -> None:
+    """Ids and depth are those of pixel centres, with or without it."""
+    scene = Scene("t", (Body("b", "ball", SE3((0.1, 0.0, 2.0)), instance_id=3),))
+    wanted = frozenset({Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH})
+    images = [
+        WarpRenderer(LIBRARY, "cpu", RenderSettings(antialias=n))
+        .render(scene, forward_camera(), wanted)
+        .channels
+        for n in (1, 8)
+    ]
+
+    for channel in (Channel.INSTANCE, Channel.Z_DEPTH):
+        np.testing.assert_array_equal(images[0][channel], images[1][channel])
+    assert (images[0][Channel.RADIANCE] != images[1][Channel.RADIANCE]).any()
+
+
+@pytest.mark.parametrize("n", [2, 4, 8])
+def test_parts_of_a_pixel_share_no_row_and_no_column(n: int) -> None:
+    """So that nearly upright and nearly level edges get n + 1 shades."""
+    parts = pixel_parts(n)
+
+    for axis in range(2):
+        assert sorted(parts[:, axis]) == [(k + 0.5) / n for k in range(n)]
+    assert not np.allclose(parts[:, 0], parts[:, 1])
+
+
+def test_nothing_shows_the_environment_or_black() -> None:
+    """Pixels that see no body: the sky's image if it is visible."""
+    seen = Scene("t", environment=Environment(luminance_cd_m2=300.0))
+    unseen = Scene("t", environment=Environment(luminance_cd_m2=300.0, visible=False))
+
+    np.testing.assert_allclose(radiance_of(seen, forward_camera()), 300.0, rtol=1e-5)
+    assert not radiance_of(unseen, forward_camera()).any()
+
+
+def test_a_corner_is_darker_than_the_open_floor() -> None:
+    """Ambient occlusion: at the foot of a wall half of the sky is hidden, far from it none."""
+    matte = Material((0.5, 0.5, 0.5), 1.0, specular=0.0)
+    bodies = (
+        Body("floor", "plane", materials=(matte,)),
+        Body("wall", "box", SE3((0.0, 1.0, 0.5)), materials=(matte,)),
+    )
+    scene = Scene("t", bodies, environment=Environment(luminance_cd_m2=300.0))
+    camera = camera_at((0.0, 0.0, 3.0), (0.0, 0.01, 0.0), (24, 384), hfov_deg=1.6)
+
+    shaded = radiance_of(scene, camera)[:, 12, 1]
+    flat = RenderSettings(ambient_occlusion_radius_m=0.0)
+    plain = radiance_of(scene, camera, flat)[:, 12, 1]
+
+    # 286 px to the metre: the wall begins 143 px above the centre, row 192.
+    foot = 192 - 143 + 4
+    assert shaded[foot] < 0.8 * plain[foot]
+    np.testing.assert_allclose(shaded[192:], plain[192:], rtol=0.01)
+    assert (np.diff(shaded[foot:192]) >= -0.01 * plain[foot]).all()
+
+
+def test_a_lit_ball_has_no_noise() -> None:
+    """Neighbouring pixels inside a matte ball under a large lamp differ by little."""
+    matte = Material((0.6, 0.6, 0.6), 1.0, specular=0.0)
+    bodies = (
+        Body("ball", "ball", SE3((0.0, 0.0, 0.5)), materials=(matte,)),
+        Body("floor", "plane", materials=(matte,)),
+    )
+    lamp = Light("l", "sphere", (1.0, -1.0, 2.5), intensity_cd=600.0, radius_m=0.2)
+    scene = Scene("t", bodies, lights=(lamp,), environment=Environment(luminance_cd_m2=20.0))
+    camera = camera_at((0.0, -2.5, 1.5), (0.0, 0.0, 0.4), (160, 120), hfov_deg=40.0)
+    settings = RenderSettings(antialias=1)
+    renderer = WarpRenderer(LIBRARY, "cpu", settings)
+
+    channels = renderer.render(
+        scene, camera, frozenset({Channel.RADIANCE, Channel.NORMALS})
+    ).channels
+
+    level = channels[Channel.RADIANCE][..., 1]
+    normals = channels[Channel.NORMALS]
+    alike = (normals[:, 1:] * normals[:, :-1]).sum(axis=-1) > math.cos(math.radians(8.0))
+    steps = np.abs(np.diff(level, axis=1))[alike]
+    assert np.quantile(steps, 0.99) <= 0.06 * level.max()

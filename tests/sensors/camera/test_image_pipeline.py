@@ -1,0 +1,219 @@
+"""The image pipeline as one chain: its order, its presets, its place in configurations."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from generator.assemble.spec import load_spec
+from generator.config.renaming import RenamedKeyWarning
+from generator.core.capture import Channel, Reading
+from generator.core.errors import ConfigError
+from generator.core.intrinsics import Intrinsics
+from generator.core.lens import Lens
+from generator.core.scene import Camera, Scene, Weather
+from generator.core.se3 import SE3
+from generator.core.streams import Rng, Streams
+from generator.sensors.camera.image_pipeline import (
+    STAGES,
+    ImagePipeline,
+    capture_photograph,
+    develop,
+)
+from generator.sensors.camera.presets import camera_names
+from generator.sensors.camera.tone import display_values, to_bytes
+
+LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
+CAMERA = Camera("eye", SE3(), LENS, ev100=8.0)
+WHITE_CD_M2 = 1.2 * 2.0**8
+
+
+def rng() -> Rng:
+    """A stream."""
+    return Streams(seed=5, scene=0).rng("test")
+
+
+def speckled(height: int = 48, width: int = 64) -> Any:
+    """Radiance from black to five times white [cd/m^2]."""
+    image = Streams(seed=2, scene=0).rng("image").uniform(0.0, 5.0, (height, width, 3)) ** 3
+    return (image / 25.0 * WHITE_CD_M2).astype(np.float32)
+
+
+class Rendering:
+    """A renderer of one image that remembers the channels it was asked for."""
+
+    def __init__(self, radiance: Any) -> None:
+        self.radiance, self.asked = radiance, frozenset[Channel]()
+
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+        """All channels are that image."""
+        self.asked = channels
+        return Reading(camera.name, camera, dict.fromkeys(channels, self.radiance))
+
+    def scan(self, *_: Any) -> Any:
+        raise NotImplementedError
+
+
+def test_the_chain_has_the_order_of_a_camera() -> None:
+    """Glass first, from its front to its barrel, then the sensor, then colours."""
+    assert [stage.__name__.strip("_") for stage in STAGES] == [
+        "wet_lens", "defocus", "flare", "glare", "chromatic_aberration", "vignetting",
+        "image_circle", "image_sensor", "saturation",
+    ]  # fmt: skip
+
+
+def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
+    """Drops, blur, ghosts, veil, fringes, dark corners, noise, colours, tone and JPEG."""
+    everything: dict[str, Any] = {
+        "focus": {"distance_m": 0.2, "pixel_um": 100}, "exposure_control": {"f_number": 0.7},
+        "flare": 0.5, "glare": 0.3, "chromatic_aberration_px": 3,
+        "vignetting": 0.5, "natural_vignetting": True, "exposure_compensation_ev": 1,
+        "image_sensor": {"full_well_e": 500}, "color_matrix": [[2, -1, 0], [0, 1, 0], [0, 0, 1]],
+        "saturation": 0.3, "white_balance": 1, "tone": "knee", "sharpening": 1, "jpeg_quality": 40,
+    }  # fmt: skip
+
+    def picture(given: dict[str, Any], weather: Weather) -> Any:
+        pipeline = ImagePipeline.model_validate_json(json.dumps(given))
+        return develop(speckled(), np.full((48, 64), 2.0), CAMERA, weather, pipeline, rng()).rgb
+
+    wet = Weather(lens_drops=0.3, seed=3)
+    whole = picture(everything, wet)
+
+    assert (whole != picture(everything, Weather())).any()
+    for key in everything:
+        less = {name: value for name, value in everything.items() if name != key}
+        assert (whole != picture(less, wet)).any(), key
+
+
+def test_ideal_is_a_preset_and_the_default() -> None:
+    """It exposes, and applies Uchimura's curve: nothing else happens to the radiance."""
+    assert "ideal" in camera_names()
+    assert ImagePipeline() == ImagePipeline(preset="ideal")
+
+    photo = develop(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng())
+
+    expected = to_bytes(display_values(speckled().astype(np.float64) / WHITE_CD_M2, "filmic"))
+    assert np.abs(photo.rgb.astype(int) - expected).max() <= 1
+    assert photo.ev100 == 8.0
+
+
+def test_an_ideal_camera_reaches_every_exposure() -> None:
+    """Limits of time and gain are those of an image sensor."""
+    night = np.full((48, 64, 3), 0.25 * 1.2 * 2.0**-9, np.float32)
+    camera = Camera("eye", SE3(), LENS, ev100=-9.0)
+
+    ideal = develop(night, None, camera, Weather(), ImagePipeline(tone="srgb"), rng()).rgb
+
+    # IEC 61966-2-1: a quarter of white is byte 137.
+    assert (ideal == 137).all()
+
+
+def test_exposure_compensation_is_in_stops() -> None:
+    """+1 stop shows half the luminance in the same tone."""
+    pushed = ImagePipeline.model_validate_json('{"exposure_compensation_ev": 1.0}')
+
+    plain = develop(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng()).rgb
+    brighter = develop(0.5 * speckled(), None, CAMERA, Weather(), pushed, rng()).rgb
+
+    np.testing.assert_array_equal(plain, brighter)
+
+
+def test_glare_ends_where_the_lens_shows_nothing() -> None:
+    """Outside a fisheye's field: black, though light is scattered all around."""
+    lens = Lens("kannala_brandt", (0.0,) * 4, half_field_rad=0.6)
+    camera = Camera("eye", SE3(), Intrinsics(96, 96, 40.0, 40.0, 48.0, 48.0, lens), ev100=8.0)
+    dark = np.isnan(camera.intrinsics.pixel_rays()[..., 0])
+    radiance = np.where(dark[..., None], 0.0, speckled(96, 96)).astype(np.float32)
+    veiled = ImagePipeline.model_validate_json('{"glare": 0.1}')
+
+    rgb = develop(radiance, None, camera, Weather(), veiled, rng()).rgb
+
+    assert 0.2 < dark.mean() < 0.9
+    assert not rgb[dark].any()
+    assert (rgb[~dark] > 0).all()
+
+
+def test_renderers_are_asked_for_radiance_and_only_for_the_depth_that_is_needed() -> None:
+    """RGB is the camera's; radiance is not kept unless it was asked for."""
+    renderer = Rendering(speckled())
+
+    def captured(*channels: Channel) -> Reading:
+        return capture_photograph(
+            Scene("t"), renderer, CAMERA, frozenset(channels), ImagePipeline(), rng()
+        )
+
+    reading = captured(Channel.RGB, Channel.INSTANCE)
+    assert renderer.asked == {Channel.RADIANCE, Channel.INSTANCE}
+    assert set(reading.channels) == {Channel.RGB, Channel.INSTANCE}
+    assert reading.ev100 == 8.0
+    assert set(captured(Channel.RGB, Channel.RADIANCE).channels) == {Channel.RGB, Channel.RADIANCE}
+    captured(Channel.INSTANCE)
+    assert renderer.asked == {Channel.INSTANCE}
+
+
+def test_radiance_is_left_as_it_was() -> None:
+    """Whatever the chain does, the reading's radiance is no part of it."""
+    radiance = speckled()
+    kept = radiance.copy()
+    pipeline = ImagePipeline.model_validate_json('{"preset": "webcam", "focus": null}')
+    develop(radiance, None, CAMERA, Weather(lens_drops=0.2), pipeline, rng())
+    assert np.array_equal(radiance, kept)
+
+
+def written(tmp_path: Path, text: str) -> str:
+    """A configuration with that text in it."""
+    path = tmp_path / "own.yaml"
+    path.write_text(f"template: tabletop\n{text}")
+    return str(path)
+
+
+def test_former_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_path: Path) -> None:
+    """``formation`` with ``bloom``, ``shutter`` and ``photosites``, each told at its place."""
+    own = written(
+        tmp_path,
+        "sensors:\n"
+        "  - type: rgb_camera\n"
+        "    formation:\n"
+        "      bloom: 0.02\n"
+        "      shutter: {f_number: 4.0}\n"
+        "      photosites: {bits: 10}\n",
+    )
+
+    with pytest.warns(RenamedKeyWarning) as warned:
+        (camera,) = load_spec(own).sensors
+
+    pipeline = camera.image_pipeline
+    assert pipeline.glare.mean() == 0.02
+    assert pipeline.exposure_control.f_number == 4.0
+    assert pipeline.image_sensor.bits == 10
+    told = [str(warning.message) for warning in warned]
+    assert any("own.yaml:4:5: " in text and "now 'image_pipeline'" in text for text in told)
+    for name in ("glare", "exposure_control", "image_sensor"):
+        assert any(f"now '{name}'" in text for text in told), name
+
+
+def test_a_former_key_beside_its_new_name_is_unknown(tmp_path: Path) -> None:
+    """No value is dropped without a word."""
+    own = written(tmp_path, "sensors:\n  - {type: rgb_camera, formation: {}, image_pipeline: {}}\n")
+    with pytest.raises(ConfigError, match=r"own\.yaml:3:24: .*unknown key 'formation'"):
+        load_spec(own)
+
+
+@pytest.mark.parametrize("key", ["tone", "glare", "exposure_compensation_ev"])
+def test_properties_of_cameras_are_refused_under_render(tmp_path: Path, key: str) -> None:
+    """One line with the place, and the key's new one."""
+    own = written(
+        tmp_path, f"render:\n  antialias: 2\n  {key}: 0.1\nsensors: [{{type: rgb_camera}}]\n"
+    )
+
+    with pytest.raises(ConfigError) as refused:
+        load_spec(own)
+
+    first = str(refused.value).splitlines()[0]
+    assert f"own.yaml:4:3: render.{key}: " in first
+    assert f"sensors[].image_pipeline.{key}" in first
+    assert "unknown key" not in str(refused.value)
