@@ -115,7 +115,6 @@ def recipe_of(
         seed=spec.head.seed,
         views_per_scene=spec.head.views_per_scene,
         blueprint=blueprints(spec, library),
-        sensors=spec.sensors,
         channels=needed,
         image_truth=partial(
             complete_truth, annotators=annotators, thresholds=spec.head.labels, assets=library
@@ -159,7 +158,8 @@ def blueprints(spec: Spec, assets: AssetIndex) -> Callable[[Streams], Blueprint]
     @lru_cache(maxsize=BLUEPRINTS_KEPT)
     def made(shared: tuple[tuple[str, SharedValue], ...]) -> Blueprint:
         layout = spec.layout(shared)
-        return Blueprint(nominal_scene(spec, layout, assets), layout.randomizers)
+        scene = nominal_scene(spec, layout, assets)
+        return Blueprint(scene, layout.randomizers, layout.sensors)
 
     return lambda streams: made(spec.shared(streams))
 
@@ -168,7 +168,7 @@ def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
     """The template's scene with every sensor mounted."""
     scene = build(spec.head.template or spec.name, layout.elements, assets)
     scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
-    for sensor in spec.sensors:
+    for sensor in layout.sensors:
         scene = sensor.mount(scene)
         if sensor.modality in LOOKING:
             refuse_buried(scene, sensor.name, sensor, assets)

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from generator.assemble.spec import PLUGIN_LISTS, VARYING, Head
+from generator.assemble.spec import CONSTANT, PLUGIN_LISTS, VARYING, Head
 from generator.assemble.tables import TABLES
-from generator.config.schema import json_schema
+from generator.config.schema import json_schema, with_shared_values
 from generator.config.strict import Strict
 
-SHARED: list[dict[str, Any]] = [
-    {"type": "string", "pattern": r"^\$shared\.", "description": "A shared value."},
-    {
-        "type": "object",
-        "required": ["given"],
-        "description": "The entry that a shared value selects.",
-    },
-]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -63,12 +55,10 @@ def _parametric(definitions: dict[str, Any]) -> list[dict[str, str]]:
 
 
 def _plugin(kind: str, name: str, definitions: dict[str, Any]) -> dict[str, str]:
-    schema = _hoisted(json_schema(TABLES[kind].load(name)), definitions)
+    schema = json_schema(TABLES[kind].load(name))
     if f"{kind}s" in VARYING:
-        schema["properties"] = {
-            key: part if key in ("type", "name") else {"anyOf": [part, *SHARED]}
-            for key, part in schema["properties"].items()
-        }
+        schema = with_shared_values(schema, CONSTANT[f"{kind}s"])
+    schema = _hoisted(schema, definitions)
     # ``type`` chooses the plug-in, so it has to be written even where a default exists.
     schema["required"] = sorted({"type", *schema.get("required", ())})
     definitions[f"{kind}.{name}"] = schema

@@ -15,7 +15,7 @@ from generator.assemble.documents import config_document, resolved_document
 from generator.assemble.tables import TABLES
 from generator.config.document import Node, parse
 from generator.config.problems import Problems
-from generator.config.shared import drawn, probes, refers, resolved
+from generator.config.shared import drawn, probes, refers, resolved, varying_place
 from generator.config.strict import Strict
 from generator.config.validation import validate
 from generator.core.errors import ConfigError, did_you_mean
@@ -102,6 +102,7 @@ class Layout:
     shared: tuple[tuple[str, SharedValue], ...]
     elements: tuple[Any, ...]
     randomizers: tuple[Any, ...]
+    sensors: tuple[Any, ...]
 
 
 PLUGIN_LISTS = {
@@ -112,8 +113,29 @@ PLUGIN_LISTS = {
 }
 """Lists of a configuration and the kind of plug-in they hold."""
 
-VARYING = ("elements", "randomizers")
-"""Lists that may depend on shared values."""
+CONSTANT = {
+    "elements": ("type", "name"),
+    "randomizers": ("type", "name"),
+    "sensors": (
+        "type",
+        "name",
+        "model",
+        "size_px",
+        "channels",
+        "stereo_with",
+        "rate_hz",
+        "rotation_hz",
+        "time_offset_s",
+        "lens.model",
+    ),
+}
+"""Lists that may depend on shared values, and the fields of their items that may not.
+
+What all samples of a data set have in common, such as the size of its images, is no matter of a
+scene.
+"""
+
+VARYING = tuple(CONSTANT)
 
 
 @dataclass(frozen=True)
@@ -124,7 +146,7 @@ class Spec:
         name: Of the configuration; names the default output folder.
         resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
             the same Spec again.
-        sensors, exporters: Plug-ins, in order.
+        exporters: Plug-ins, in order.
         annotations: Annotators by name, in order.
         probes: Layouts that between them show what scenes can be; one where nothing is shared.
         document: The merged document; layouts are made from it.
@@ -133,7 +155,6 @@ class Spec:
     name: str
     resolved: Mapping[str, Any]
     head: Head
-    sensors: tuple[Any, ...]
     annotations: Mapping[str, Any]
     exporters: tuple[Any, ...]
     probes: tuple[Layout, ...]
@@ -148,6 +169,11 @@ class Spec:
     def randomizers(self) -> tuple[Any, ...]:
         """The randomizers of the first scene."""
         return self.probes[0].randomizers
+
+    @property
+    def sensors(self) -> tuple[Any, ...]:
+        """The sensors of the first scene; those of others differ in parameters only."""
+        return self.probes[0].sensors
 
     def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
         """The shared values of one scene, sorted by name."""
@@ -229,15 +255,18 @@ def _spec(document: Node, name: str) -> Spec:
     head = validate(head_node, Head, problems)
     for key, node in document.content.items():
         if key not in ("shared", *VARYING) and refers(node):
-            problems.add(node.position, key, f"shared values serve {' and '.join(VARYING)} only")
+            fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
+            problems.add(node.position, key, fact)
     plugins = {
         key: _plugins(document.content[key], key, kind, problems)
         for key, kind in PLUGIN_LISTS.items()
         if key not in VARYING
     }
     annotations = _annotations(document.content["annotations"], problems)
-    if not plugins["sensors"] and not len(problems):
+    if not document.content["sensors"].content and not len(problems):
         problems.add(document.position, "sensors", "at least one sensor is needed")
+    for key, names in CONSTANT.items():
+        _refuse_varying(document.content[key], key, names)
     probes_ = _probed(document, head.seed if head else 0, problems)
     problems.raise_if_any()
     assert head is not None
@@ -250,6 +279,21 @@ def _spec(document: Node, name: str) -> Spec:
         document=document,
         **plugins,
     )
+
+
+def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
+    """Raises ConfigError where a field depends on shared values that all scenes have in common."""
+    fact = "is the same in all scenes of a data set; "
+    fact += "expected a value that does not depend on shared ones"
+    problems = Problems()
+    for number, item in enumerate(listed.content if isinstance(listed.content, tuple) else ()):
+        for name in names:
+            place = varying_place(item, name)
+            if place == item.position:
+                problems.add(place, f"{key}[{number}]", fact)
+            elif place is not None:
+                problems.add(place, f"{key}[{number}].{name}", fact)
+    problems.raise_if_any()
 
 
 def _probed(document: Node, seed: int, problems: Problems) -> tuple[Layout, ...]:

@@ -42,8 +42,27 @@ def refers(node: Node) -> bool:
     """Whether a value depends on shared ones."""
     if isinstance(node.content, tuple):
         return any(refers(item) for item in node.content)
+    if isinstance(node.content, Mapping) and GIVEN not in node.content:
+        return any(refers(item) for item in node.content.values())
+    return _is_reference(node)
+
+
+def varying_place(item: Node, path: str) -> Position | None:
+    """Where the value at a dotted path depends on shared values; None if it is constant.
+
+    A selection on the way there makes the value vary, too.
+    """
+    node: Node | None = item
+    for part in path.split("."):
+        if node is None or _is_reference(node):
+            break
+        node = node.get(part)
+    return node.position if node is not None and refers(node) else None
+
+
+def _is_reference(node: Node) -> bool:
     if isinstance(node.content, Mapping):
-        return GIVEN in node.content or any(refers(item) for item in node.content.values())
+        return GIVEN in node.content
     return isinstance(node.content, str) and node.content.startswith(REFERENCE)
 
 

@@ -43,6 +43,7 @@ class Blueprint:
 
     nominal: Scene
     randomizers: Sequence[Randomizer]
+    sensors: Sequence[Sensor]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,6 @@ class Recipe:
     seed: int
     views_per_scene: int
     blueprint: Callable[[Streams], Blueprint]
-    sensors: Sequence[Sensor]
     channels: frozenset[Channel]
     image_truth: Callable[[Scene, Reading], ImageTruth]
     split_shares: Mapping[str, float]
@@ -83,6 +83,7 @@ class AcceptedScene:
 
     Attributes:
         randomizers: What draws its views.
+        sensors: What captures them.
         attempt: Number of the attempt that was accepted, from 0.
         timings_s: CPU seconds by stage, all attempts together.
     """
@@ -90,6 +91,7 @@ class AcceptedScene:
     index: int
     scene: Scene
     randomizers: Sequence[Randomizer]
+    sensors: Sequence[Sensor]
     attempt: int
     timings_s: Mapping[str, float]
 
@@ -179,7 +181,7 @@ class Pipeline:
             view = self.drawn_view(accepted, view_index)
             scene = self._instant(view.scene, step_index * self.info.step_s)
             streams = replace(view.streams, step=step_index)
-        capture, truth = self._captured(scene, streams, timings)
+        capture, truth = self._captured(scene, accepted.sensors, streams, timings)
         with _timed(timings, "annotate"):
             swept = {n: self._instant(scene, c.time_s) for n, c in capture.clouds.items()}
             described = self.recipe.frame_truth
@@ -200,14 +202,18 @@ class Pipeline:
         )
 
     def _captured(
-        self, scene: Scene, streams: Streams, timings_s: dict[str, float]
+        self,
+        scene: Scene,
+        sensors: Sequence[Sensor],
+        streams: Streams,
+        timings_s: dict[str, float],
     ) -> tuple[Capture, dict[str, ImageTruth]]:
         """What every sensor sees at its own instant, and the truth about every image at that."""
         readings: dict[str, Reading] = {}
         clouds: dict[str, PointCloud] = {}
         tables: dict[str, Table] = {}
         truth: dict[str, ImageTruth] = {}
-        for sensor in self.recipe.sensors:
+        for sensor in sensors:
             if streams.step % self.recipe.strides.get(sensor.name, 1):
                 continue
             rng = streams.rng(f"sensor/{sensor.name}")
@@ -263,7 +269,9 @@ class Pipeline:
                 settled = self._physics.settle(scene)
             if settled.rejection is None:
                 scene = frozen_scene(settled.scene, self.assets, self._category_ids)
-                return AcceptedScene(scene_index, scene, plan.randomizers, attempt, timings)
+                return AcceptedScene(
+                    scene_index, scene, plan.randomizers, plan.sensors, attempt, timings
+                )
             rejections.append(settled.rejection)
         raise SceneRejected(scene_index, tuple(rejections))
 

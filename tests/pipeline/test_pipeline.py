@@ -102,8 +102,7 @@ def pipeline(
     recipe = Recipe(
         seed=seed,
         views_per_scene=views_per_scene,
-        blueprint=lambda streams: Blueprint(sensor.mount(Scene("test")), randomizers),
-        sensors=(sensor,),
+        blueprint=lambda streams: Blueprint(sensor.mount(Scene("test")), randomizers, (sensor,)),
         channels=frozenset(),
         image_truth=lambda scene, reading: ImageTruth(reading.camera, ()),
         split_shares=splits or {"train": 0.8, "val": 0.2},

@@ -148,11 +148,11 @@ def sampled(index: int, **recipe: Any) -> tuple[Capture, dict[str, float], dict[
         RgbCamera(name="late", rig="ego"),
         LidarSensor(name="top", rig="ego"),
     )
+    watching = (Watching("early"), Watching("late"), Watching("top", lidar=True))
     made = Recipe(
         seed=1,
         views_per_scene=1,
-        blueprint=lambda streams: Blueprint(scene, ()),
-        sensors=(Watching("early"), Watching("late"), Watching("top", lidar=True)),  # type: ignore[arg-type]
+        blueprint=lambda streams: Blueprint(scene, (), watching),  # type: ignore[arg-type]
         channels=frozenset(),
         image_truth=image_truth,
         frame_truth=frame_truth,
