@@ -9,7 +9,14 @@ from types import ModuleType
 
 import configs
 import scene_templates
-from generator.config.document import Node, load, merge, with_override
+from generator.assemble.inheritance import (
+    LISTS,
+    extended_document,
+    mapping_of,
+    overridden_elements,
+)
+from generator.config.document import Node, load, with_override
+from generator.config.paths import find_path
 from generator.config.problems import Position, Problems
 from generator.core.errors import ConfigError, did_you_mean
 from generator.sensors.sheets import with_files
@@ -19,27 +26,6 @@ SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 
 TEMPLATE_KEYS = ("shared", "elements")
 """What a template may say."""
-
-LISTS = ("randomizers", "sensors", "annotations", "exporters")
-
-
-def found_file(name: str, shipped: ModuleType, kind: str) -> Path:
-    """The file a user means: the path as given, else one that comes with the package.
-
-    Raises:
-        ConfigError: if there is neither.
-    """
-    path = Path(name)
-    if path.is_file():
-        return path
-    folder = Path(str(files(shipped)))
-    ours = sorted(p.name for p in folder.glob("*.yaml"))
-    for candidate in (name, f"{name}.yaml"):
-        if candidate in ours:
-            return folder / candidate
-    raise ConfigError(
-        f"{name}: there is no such {kind}; shipped are {', '.join(ours)}{did_you_mean(name, ours)}"
-    )
 
 
 def resolved_document(
@@ -52,7 +38,7 @@ def resolved_document(
     Raises:
         ConfigError: naming the place of what is wrong.
     """
-    content = dict(_mapping(document))
+    content = dict(mapping_of(document))
     template = _template(document)
     content["elements"] = _elements(document, template)
     _inherit_shared(content, template)
@@ -73,7 +59,7 @@ def resolved_document(
 
 def _with_sensor_files(document: Node) -> Node:
     """The document with what sensors keep in files in their places."""
-    content, sensors = dict(_mapping(document)), document.get("sensors")
+    content, sensors = dict(mapping_of(document)), document.get("sensors")
     if sensors is not None and isinstance(sensors.content, tuple):
         listed = tuple(with_files(sensor) for sensor in sensors.content)
         content["sensors"] = Node(sensors.position, listed, sensors.key_positions)
@@ -81,8 +67,18 @@ def _with_sensor_files(document: Node) -> Node:
 
 
 def config_document(name: str) -> Node:
-    """The document of a configuration, by path or shipped name."""
-    return load(found_file(name, configs, "configuration"))
+    """The document of a configuration, by path or shipped name, with all that it extends.
+
+    Raises:
+        ConfigError: a file is missing or invalid, or extends itself.
+    """
+    shipped = _files_of(configs)
+    return extended_document(find_path(name, None, "", "configuration", shipped=shipped), shipped)
+
+
+def _files_of(package: ModuleType) -> list[Path]:
+    """The YAML files that a package ships."""
+    return sorted(Path(str(files(package))).glob("*.yaml"))
 
 
 def _template(document: Node) -> Node | None:
@@ -97,9 +93,12 @@ def _template(document: Node) -> Node | None:
         problems.add(where, "template", "expected the name of a template, or a list of elements")
         problems.raise_if_any()
         raise AssertionError("unreachable")
-    loaded = load(found_file(template.content, scene_templates, "template"))
+    shipped = _files_of(scene_templates)
+    loaded = load(
+        find_path(template.content, template.position, "template", "template", shipped=shipped)
+    )
     problems = Problems()
-    for key in _mapping(loaded):
+    for key in mapping_of(loaded):
         if key not in TEMPLATE_KEYS:
             fact = f"unknown key; a template has {' and '.join(TEMPLATE_KEYS)}"
             problems.add(loaded.key_position(key), key, fact + did_you_mean(key, TEMPLATE_KEYS))
@@ -115,7 +114,7 @@ def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
     own, inherited = content.get("shared"), template.get("shared") if template else None
     if inherited is None or (own is not None and not isinstance(own.content, Mapping)):
         return
-    entries = {**_mapping(inherited), **(_mapping(own) if own else {})}
+    entries = {**mapping_of(inherited), **(mapping_of(own) if own else {})}
     positions = {**inherited.key_positions, **(own.key_positions if own else {})}
     content["shared"] = Node((own or inherited).position, entries, positions)
 
@@ -131,29 +130,7 @@ def _elements(document: Node, template: Node | None) -> Node:
         raise ConfigError(f"{template.position.file}: a template needs a list of elements")
     if given is None:
         return elements
-    return _overridden(elements, given)
-
-
-def _overridden(elements: Node, overrides: Node) -> Node:
-    assert isinstance(elements.content, tuple)
-    by_name = {str(_scalar(node, "name")): node for node in elements.content}
-    problems = Problems()
-    if not isinstance(overrides.content, Mapping):
-        problems.add(overrides.position, "elements", "expected overrides by element name")
-    else:
-        for name, node in overrides.content.items():
-            if name not in by_name and node.get("type") is not None:
-                # What the template lacks and says what it is comes after all of the template's.
-                named = Node(overrides.key_position(name), name, text=name)
-                by_name[name] = merge(Node(node.position, {"name": named}), node)
-            elif name not in by_name:
-                fact = f"the template has no element '{name}'; expected one of "
-                fact += ", ".join(by_name) + did_you_mean(name, by_name)
-                problems.add(overrides.key_position(name), f"elements.{name}", fact)
-            else:
-                by_name[name] = merge(by_name[name], node)
-    problems.raise_if_any()
-    return Node(elements.position, tuple(by_name.values()))
+    return overridden_elements(elements, given)
 
 
 def _without_randomizers(document: Node, names: Sequence[str]) -> Node:
@@ -168,19 +145,13 @@ def _without_randomizers(document: Node, names: Sequence[str]) -> Node:
                 f"{', '.join(known)}{did_you_mean(name, known)}"
             )
     kept = tuple(n for n, name in zip(listed.content, known, strict=True) if name not in names)
-    content = {**_mapping(document), "randomizers": Node(listed.position, kept)}
+    content = {**mapping_of(document), "randomizers": Node(listed.position, kept)}
     return Node(document.position, content, document.key_positions)
 
 
 def _scalar(node: Node, key: str) -> object:
     found = node.get(key)
     return None if found is None else found.content
-
-
-def _mapping(node: Node) -> Mapping[str, Node]:
-    if not isinstance(node.content, Mapping):
-        raise ConfigError(f"{node.position}: expected a mapping of settings")
-    return node.content
 
 
 def _made(content: dict[str, Node] | tuple[Node, ...] | int) -> Node:

@@ -14,6 +14,7 @@ from generator.annotations.truth import Thresholds
 from generator.assemble.documents import config_document, resolved_document
 from generator.assemble.tables import TABLES
 from generator.config.document import Node, parse
+from generator.config.paths import find_path
 from generator.config.problems import Problems
 from generator.config.shared import drawn, probes, refers, resolved, varying_place
 from generator.config.strict import Strict
@@ -193,7 +194,12 @@ class Spec:
     @property
     def asset_folders(self) -> tuple[Path, ...]:
         """Where the user keeps assets."""
-        return tuple(Path(folder).expanduser() for folder in self.head.assets.folders)
+        listed = self.document.get("assets", "folders")
+        nodes = listed.content if listed is not None and isinstance(listed.content, tuple) else ()
+        return tuple(
+            find_path(node.text, node.position, f"assets.folders[{k}]", "folder", is_folder=True)
+            for k, node in enumerate(nodes)
+        )
 
     @property
     def split_shares(self) -> dict[str, float]:
@@ -270,7 +276,7 @@ def _spec(document: Node, name: str) -> Spec:
     probes_ = _probed(document, head.seed if head else 0, problems)
     problems.raise_if_any()
     assert head is not None
-    return Spec(
+    spec = Spec(
         name,
         document.plain(),
         head,
@@ -279,6 +285,8 @@ def _spec(document: Node, name: str) -> Spec:
         document=document,
         **plugins,
     )
+    _ = spec.asset_folders  # A folder that is missing is refused before anything runs.
+    return spec
 
 
 def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:

@@ -44,7 +44,7 @@ def refers(node: Node) -> bool:
         return any(refers(item) for item in node.content)
     if isinstance(node.content, Mapping) and GIVEN not in node.content:
         return any(refers(item) for item in node.content.values())
-    return _is_reference(node)
+    return is_reference(node)
 
 
 def varying_place(item: Node, path: str) -> Position | None:
@@ -54,13 +54,14 @@ def varying_place(item: Node, path: str) -> Position | None:
     """
     node: Node | None = item
     for part in path.split("."):
-        if node is None or _is_reference(node):
+        if node is None or is_reference(node):
             break
         node = node.get(part)
     return node.position if node is not None and refers(node) else None
 
 
-def _is_reference(node: Node) -> bool:
+def is_reference(node: Node) -> bool:
+    """Whether a value stands for a shared one, or is selected by one."""
     if isinstance(node.content, Mapping):
         return GIVEN in node.content
     return isinstance(node.content, str) and node.content.startswith(REFERENCE)
