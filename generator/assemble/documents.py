@@ -16,6 +16,7 @@ from generator.assemble.inheritance import (
     overridden_elements,
 )
 from generator.config.document import Node, load, with_override
+from generator.config.merging import merge
 from generator.config.paths import find_path
 from generator.config.problems import Position, Problems
 from generator.core.errors import ConfigError, did_you_mean
@@ -24,7 +25,7 @@ from generator.sensors.sheets import with_files
 SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
 
-TEMPLATE_KEYS = ("shared", "elements")
+TEMPLATE_KEYS = ("shared", "defaults", "elements")
 """What a template may say."""
 
 
@@ -100,7 +101,7 @@ def _template(document: Node) -> Node | None:
     problems = Problems()
     for key in mapping_of(loaded):
         if key not in TEMPLATE_KEYS:
-            fact = f"unknown key; a template has {' and '.join(TEMPLATE_KEYS)}"
+            fact = f"unknown key; a template has {', '.join(TEMPLATE_KEYS)}"
             problems.add(loaded.key_position(key), key, fact + did_you_mean(key, TEMPLATE_KEYS))
     problems.raise_if_any()
     return loaded
@@ -128,9 +129,30 @@ def _elements(document: Node, template: Node | None) -> Node:
     elements = template.get("elements")
     if elements is None or not isinstance(elements.content, tuple):
         raise ConfigError(f"{template.position.file}: a template needs a list of elements")
+    elements = _with_defaults(elements, template.get("defaults"))
     if given is None:
         return elements
     return overridden_elements(elements, given)
+
+
+def _with_defaults(elements: Node, defaults: Node | None) -> Node:
+    """A template's elements with what it lays down for all elements of a type."""
+    if defaults is None:
+        return elements
+    assert isinstance(elements.content, tuple)
+    by_type, problems = mapping_of(defaults), Problems()
+    types = {str(_scalar(item, "type")) for item in elements.content}
+    for kind in by_type:
+        if kind not in types:
+            fact = f"no element is of this type; expected one of {', '.join(sorted(types))}"
+            fact += did_you_mean(kind, types)
+            problems.add(defaults.key_position(kind), f"defaults.{kind}", fact)
+    problems.raise_if_any()
+    merged = tuple(
+        merge(by_type[kind], item) if (kind := str(_scalar(item, "type"))) in by_type else item
+        for item in elements.content
+    )
+    return Node(elements.position, merged)
 
 
 def _without_randomizers(document: Node, names: Sequence[str]) -> Node:

@@ -15,6 +15,12 @@ from generator.core.errors import ConfigError, did_you_mean
 LISTS = ("randomizers", "sensors", "annotations", "exporters")
 """Lists of plug-ins of a configuration, besides its elements."""
 
+NAMED = (*LISTS, "elements", "shared")
+"""Sections whose entries have names, by which ``without`` leaves them out."""
+
+ALL = "all"
+"""Instead of a list of names: everything that is inherited in a section."""
+
 EXTENDS_MAX = 8
 """Longest chain of configurations that extend one another."""
 
@@ -82,11 +88,13 @@ def _without(base: Node, dropped: Node | None) -> Node:
     content, problems = dict(mapping_of(base)), Problems()
     for key, names in mapping_of(dropped).items():
         field = f"without.{key}"
-        if key not in (*LISTS, "elements"):
-            fact = f"unknown key; expected one of {', '.join((*LISTS, 'elements'))}"
+        if key not in NAMED:
+            fact = f"unknown key; expected one of {', '.join(NAMED)}"
             problems.add(dropped.key_position(key), field, fact)
+        elif names.content == ALL:
+            content.pop(key, None)
         elif not isinstance(names.content, tuple):
-            problems.add(names.position, field, "expected a list of names")
+            problems.add(names.position, field, f"expected a list of names, or {ALL}")
         else:
             content[key] = _dropped(content.get(key), names.content, field, problems)
     problems.raise_if_any()

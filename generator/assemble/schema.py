@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
+from generator.assemble.inheritance import ALL, NAMED
 from generator.assemble.spec import CONSTANT, PLUGIN_LISTS, VARYING, Head
 from generator.assemble.tables import TABLES
 from generator.config.schema import json_schema, with_shared_values
 from generator.config.strict import Strict
 
+INHERITED = {
+    "type": "object",
+    "description": "Changes to the inherited item of this name.",
+    "required": ["name"],
+    "properties": {"type": False},
+}
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -20,7 +27,9 @@ def config_schema() -> dict[str, Any]:
     for key, kind in PLUGIN_LISTS.items():
         properties[key] = {
             "type": "array",
-            "items": {"oneOf": [_plugin(kind, name, definitions) for name in TABLES[kind]]},
+            "items": {
+                "oneOf": [INHERITED, *(_plugin(kind, name, definitions) for name in TABLES[kind])]
+            },
         }
     # A configuration overrides its template's elements by name; a template lists them.
     properties["elements"] = {
@@ -30,6 +39,17 @@ def config_schema() -> dict[str, Any]:
     properties["shared"] = {
         "type": "object",
         "description": "Values drawn once per scene that elements and randomizers refer to.",
+    }
+    properties["extends"] = {
+        "type": "string",
+        "description": "Configuration that this one is laid over: a path or a shipped name.",
+    }
+    names = {"anyOf": [{"const": ALL}, {"type": "array", "items": {"type": "string"}}]}
+    properties["without"] = {
+        "type": "object",
+        "description": "Names of what is not inherited, by section.",
+        "properties": dict.fromkeys(NAMED, names),
+        "additionalProperties": False,
     }
     properties["annotations"] = {
         "type": "array",

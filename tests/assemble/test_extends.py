@@ -162,3 +162,34 @@ def test_what_cannot_be_extended_is_refused_at_its_place(
 ) -> None:
     """Line, column, field and fact."""
     assert fact in refusal(written(folder, text))
+
+
+def template_of(folder: Path, defaults: str) -> str:
+    """Path of a configuration whose template lays down what its tables have in common."""
+    written(
+        folder,
+        f"defaults: {defaults}\n"
+        "elements:\n"
+        "  - {type: room, name: room, size_m: [4, 4, 3]}\n"
+        "  - {type: surface, name: a, asset: table, top_size_m: [1, 1]}\n"
+        "  - {type: surface, name: b, asset: table, top_size_m: [1, 1], height_m: 0.4}\n",
+        "tables.yaml",
+    )
+    camera = "sensors: [{type: rgb_camera, name: color}]\n"
+    return written(folder, f"template: tables.yaml\n{camera}elements: {{a: {{style: trestle}}}}\n")
+
+
+def test_a_template_lays_down_what_elements_of_a_type_have_in_common(tmp_path: Path) -> None:
+    """Each of them may differ, and a configuration overrides both."""
+    spec = load_spec(template_of(tmp_path, "{surface: {height_m: 0.7, style: bench}}"))
+    a, b = (e for e in spec.elements if e.type == "surface")
+
+    assert (a.height_m, a.style, b.height_m, b.style) == (0.7, "trestle", 0.4, "bench")
+
+
+def test_defaults_for_a_type_that_no_element_has_are_refused(tmp_path: Path) -> None:
+    """A misspelt type would otherwise change nothing."""
+    message = refusal(template_of(tmp_path, "{surfaces: {height_m: 0.7}}"))
+
+    assert f"{tmp_path / 'tables.yaml'}:1:12: defaults.surfaces: no element is of this" in message
+    assert "did you mean 'surface'?" in message
