@@ -7,7 +7,7 @@ from generator.core.plugins import PluginTable
 TABLE = PluginTable(
     "randomizer",
     {
-        "along": "randomizers.along:Along",
+        "lane_objects": "randomizers.along:Along",
         "arm_configuration": "randomizers.arm_configuration:ArmConfiguration",
         "arm_motion": "randomizers.arm_motion:ArmMotion",
         "backdrop": "randomizers.backdrop:Backdrop",

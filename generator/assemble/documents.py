@@ -19,6 +19,7 @@ from generator.config.document import Node, load, with_override
 from generator.config.merging import merge
 from generator.config.paths import find_path
 from generator.config.problems import Position, Problems
+from generator.config.renames import with_current_words
 from generator.core.errors import ConfigError, did_you_mean
 from generator.sensors.sheets import with_files
 
@@ -39,6 +40,7 @@ def resolved_document(
     Raises:
         ConfigError: naming the place of what is wrong.
     """
+    document = with_current_words(document)
     content = dict(mapping_of(document))
     template = _template(document)
     content["elements"] = _elements(document, template)
@@ -55,6 +57,7 @@ def resolved_document(
         if not separator:
             raise ConfigError(f"--set {text}: expected KEY=VALUE")
         resolved = with_override(resolved, path.strip(), value.strip())
+    resolved = with_current_words(resolved)
     return _without_randomizers(_with_sensor_files(resolved), without)
 
 
@@ -95,9 +98,8 @@ def _template(document: Node) -> Node | None:
         problems.raise_if_any()
         raise AssertionError("unreachable")
     shipped = _files_of(scene_templates)
-    loaded = load(
-        find_path(template.content, template.position, "template", "template", shipped=shipped)
-    )
+    path = find_path(template.content, template.position, "template", "template", shipped=shipped)
+    loaded = with_current_words(load(path))
     problems = Problems()
     for key in mapping_of(loaded):
         if key not in TEMPLATE_KEYS:

@@ -9,6 +9,7 @@ from generator.config.document import Node, load
 from generator.config.merging import merge, merge_named, name_of, with_entry
 from generator.config.paths import find_path
 from generator.config.problems import Position, Problem, Problems
+from generator.config.renames import with_current_words
 from generator.config.scalars import shown
 from generator.core.errors import ConfigError, did_you_mean
 
@@ -38,7 +39,7 @@ def extended_document(
     Raises:
         ConfigError: a file is missing or invalid, or extends itself.
     """
-    document = load(path)
+    document = with_current_words(load(path))
     base = document.get("extends")
     if base is None:
         return document

@@ -18,7 +18,7 @@ _SHARED_VALUE = {
     "description": "A shared value, or the entry that one selects.",
     "anyOf": [
         {"type": "string", "pattern": r"^\$shared\."},
-        {"type": "object", "required": ["given"]},
+        {"type": "object", "required": ["switch"]},
     ],
 }
 

@@ -31,6 +31,10 @@ class ConfigError(GenDataError):
     exit_code = 2
 
 
+class ConfigWarning(UserWarning):
+    """A configuration is valid, but probably not meant like this."""
+
+
 class AssetError(GenDataError):
     """An asset is missing, unreadable or unfit."""
 

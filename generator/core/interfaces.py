@@ -113,8 +113,8 @@ class Randomizer(Protocol):
         ...
 
     @property
-    def stage(self) -> Stage:
-        """When it runs."""
+    def stage(self) -> str:
+        """When it runs: the value of a Stage."""
         ...
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:

@@ -305,7 +305,7 @@ class Pipeline:
         self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
     ) -> Scene:
         for randomizer in randomizers:
-            if randomizer.stage is stage:
+            if randomizer.stage == stage:
                 rng = streams.rng(f"randomizer/{randomizer.name}")
                 scene = randomizer(scene, self.assets, rng)
         return scene

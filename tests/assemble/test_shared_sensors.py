@@ -20,7 +20,7 @@ elements:
   - {type: room, name: room, size_m: [4, 4, 3]}
   - {type: surface, name: table, asset: table, top_size_m: [1, 1], height_m: 0.7}
 """
-WIDE_OR_NARROW = "{given: lens, wide: 90, narrow: 40}"
+WIDE_OR_NARROW = "{switch: lens, wide: 90, narrow: 40}"
 
 
 def written(folder: Path, sensor: str) -> str:
@@ -47,7 +47,7 @@ def test_a_sensor_captures_with_the_parameters_of_its_scene(tmp_path: Path) -> N
     """What is applied to an image after rendering varies with the scene, too."""
     camera = (
         "{type: rgb_camera, name: eye, size_px: [64, 48], time_offset_s: 0, "
-        "exposure: {given: lens, wide: {time_s: 0.004}, narrow: {time_s: 0.001}}}"
+        "exposure: {switch: lens, wide: {time_s: 0.004}, narrow: {time_s: 0.001}}}"
     )
     spec = load_spec(written(tmp_path, camera))
 
@@ -63,11 +63,11 @@ def test_a_sensor_captures_with_the_parameters_of_its_scene(tmp_path: Path) -> N
         ("{type: rgb_camera, name: $shared.lens}", "sensors[0].name", 30),
         ("{type: rgb_camera, name: a, size_px: [64, $shared.height_px]}", "sensors[0].size_px", 42),
         (
-            "{type: rgb_camera, name: a, lens: {given: lens, wide: {model: pinhole}}}",
+            "{type: rgb_camera, name: a, lens: {switch: lens, wide: {model: pinhole}}}",
             "sensors[0].lens.model",
             39,
         ),
-        ("{given: lens, wide: {type: rgb_camera, name: a}}", "sensors[0]", 5),
+        ("{switch: lens, wide: {type: rgb_camera, name: a}}", "sensors[0]", 5),
     ],
 )
 def test_what_all_samples_have_in_common_cannot_depend_on_a_shared_value(

@@ -104,8 +104,8 @@ def test_a_mapping_of_another_kind_inherits_nothing(
 
 def test_a_selection_is_replaced_as_a_whole() -> None:
     """Entries of two selections by different shared values have nothing in common."""
-    base = parse("x: {given: style, old: 1, new: 2}", "base")
-    override = parse("x: {given: traffic, light: 3, otherwise: 4}", "over")
+    base = parse("x: {switch: style, old: 1, new: 2}", "base")
+    override = parse("x: {switch: traffic, light: 3, default: 4}", "over")
 
     assert merge(base, override).plain() == override.plain()
 
