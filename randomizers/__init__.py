@@ -8,7 +8,7 @@ from generator.core.plugins import PluginTable
 TABLE = PluginTable[Randomizer](
     "randomizer",
     {
-        "along": "randomizers.along:Along",
+        "lane_objects": "randomizers.along:Along",
         "arm_configuration": "randomizers.arm_configuration:ArmConfiguration",
         "arm_motion": "randomizers.arm_motion:ArmMotion",
         "backdrop": "randomizers.backdrop:Backdrop",

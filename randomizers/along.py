@@ -43,7 +43,7 @@ class Place:
 
 
 class Along(RandomizerBase):
-    """Draws the members of a template's ``along`` group anew.
+    """Draws the members of a template's ``lane_objects`` group anew.
 
     Along every lane of the group's kinds, things and gaps follow one another; what would overlap
     something that stands already is left out.
@@ -53,39 +53,39 @@ class Along(RandomizerBase):
         lanes: Only lanes of these kinds; empty = those of the group.
         roads: Only lanes of the elements with these names; empty = all.
         gap_m: Free length between neighbours of a row.
-        rows: How often every lane is walked: people go abreast.
-        used: Whether a place is used: how full a parking lane is.
+        passes: How often every lane is filled: several passes let people walk abreast.
+        occupancy: Whether a place is taken: how full a parking lane is.
         count: How many at most: a random choice of all places; null = all.
-        at_least: A layout with fewer free places is refused.
+        min_count: A layout with fewer free places is refused.
         lateral: Place across the lane, of the room there is: -1 right edge, 0 middle, 1 left edge.
         yaw_deg: Turn from the lane's direction.
-        turned: Whether it faces the other way.
+        reversed: Whether it faces the other way.
         scale: Factor on its size.
         weights: How often a category is drawn compared with the others, 1 if not listed.
-        spare_m: Nothing else is nearer than this.
+        min_clearance_m: Nothing else is nearer than this.
         junctions: Whether lanes across junctions count, too.
-        scattered: Whether things are strewn over the lanes' area, turned any way, as in
+        uniform_area: Whether things are strewn over the lanes' area, turned any way, as in
             unstructured domain randomisation (Tremblay et al. 2018); ``count`` says how many.
     """
 
-    type: Literal["along"] = "along"
-    every: Literal["scene"] = "scene"
+    type: Literal["lane_objects"] = "lane_objects"
+    stage: Literal["scene"] = "scene"
     group: str = ""
     lanes: tuple[LaneKind, ...] = ()
     roads: tuple[str, ...] = ()
     gap_m: NonNegative = Uniform(3.0, 30.0)
-    rows: int = Field(1, ge=1, le=8)
-    used: Flag = Constant(True)
+    passes: int = Field(1, ge=1, le=8)
+    occupancy: Flag = Constant(True)
     count: Count | None = None
-    at_least: int = Field(0, ge=0)
+    min_count: int = Field(0, ge=0)
     lateral: Annotated[Scalar, Bounds(-1, 1)] = Constant(0.0)
     yaw_deg: Scalar = Constant(0.0)
-    turned: Flag = Constant(False)
+    reversed: Flag = Constant(False)
     scale: Positive = Constant(1.0)
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field({})
-    spare_m: float = Field(0.15, ge=0)
+    min_clearance_m: float = Field(0.15, ge=0)
     junctions: bool = False
-    scattered: bool = False
+    uniform_area: bool = False
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with the group's members exchanged.
@@ -109,11 +109,12 @@ class Along(RandomizerBase):
             (b for b in scene.bodies if b.instance_id and b.name.partition("/")[0] not in roads),
             assets,
         )
-        walk = self._strewn if self.scattered else self._walked
+        walk = self._strewn if self.uniform_area else self._walked
         places = list(walk(lines, group, wheel, ground, assets, rng))
-        if len(places) < self.at_least:
+        if len(places) < self.min_count:
             remedy = (
-                f"a smaller at_least, gap_m or spare_m, or longer roads (randomizers.{self.name})"
+                "a smaller min_count, gap_m or min_clearance_m, or longer roads "
+                f"(randomizers.{self.name})"
             )
             raise LayoutRejected(Rejection("too few free places along lanes", remedy))
         if self.count is not None:
@@ -130,8 +131,8 @@ class Along(RandomizerBase):
         assets: AssetIndex,
         rng: Rng,
     ) -> Iterator[Place]:
-        """Things and gaps in turn along every lane, as often as there are rows."""
-        for line in lines * self.rows:
+        """Things and gaps in turn along every lane, once per pass."""
+        for line in lines * self.passes:
             at_m = float(rng.uniform()) * self.gap_m.draw(rng)
             while True:
                 asset, scale, bounds_m = self._thing(wheel, assets, rng)
@@ -139,8 +140,8 @@ class Along(RandomizerBase):
                 room_m = max(0.0, 0.5 * (line.lane.width_m - width_m))
                 left_m = room_m * self.lateral.draw(rng)
                 turn = math.radians(self.yaw_deg.draw(rng))
-                turn += math.pi if self.turned.draw(rng) else 0.0
-                used = self.used.draw(rng)
+                turn += math.pi if self.reversed.draw(rng) else 0.0
+                used = self.occupancy.draw(rng)
                 if at_m + length_m > line.length_m:
                     break
                 if used:
@@ -148,7 +149,7 @@ class Along(RandomizerBase):
                     pose = standing_on_lane(place, line.lane, bounds_m, group.facing, turn)
                     pose = pose.rounded()
                     footprint = Footprint.of(pose, bounds_m)
-                    if ground.is_free(footprint.grown(self.spare_m)):
+                    if ground.is_free(footprint.grown(self.min_clearance_m)):
                         ground.add(footprint)
                         yield Place(asset, scale, pose)
                 at_m += length_m + self.gap_m.draw(rng)
@@ -174,12 +175,12 @@ class Along(RandomizerBase):
                 turned = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
                 pose = (turned @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
                 footprint = Footprint.of(pose, bounds_m)
-                if ground.is_free(footprint.grown(self.spare_m)):
+                if ground.is_free(footprint.grown(self.min_clearance_m)):
                     ground.add(footprint)
                     yield Place(asset, scale, pose)
                     break
             else:
-                remedy = f"a smaller count or spare_m (randomizers.{self.name})"
+                remedy = f"a smaller count or min_clearance_m (randomizers.{self.name})"
                 raise LayoutRejected(Rejection("no room left between the lanes' things", remedy))
 
     def _thing(

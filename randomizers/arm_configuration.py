@@ -39,7 +39,7 @@ class ArmConfiguration(RandomizerBase):
     """
 
     type: Literal["arm_configuration"] = "arm_configuration"
-    every: Literal["scene"] = "scene"
+    stage: Literal["scene"] = "scene"
     mode: Name = Choice({"joints": 1.0, "reach": 2.0, "hold": 1.0})
     candidates: int = Field(24, ge=1, le=256)
     range_share: float = Field(0.9, gt=0, le=1)

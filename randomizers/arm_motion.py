@@ -76,7 +76,7 @@ class ArmMotion(RandomizerBase):
     """
 
     type: Literal["arm_motion"] = "arm_motion"
-    every: Literal["scene"] = "scene"
+    stage: Literal["scene"] = "scene"
     task: Name = Choice({"pick_and_place": 1.0})
     way: tuple[Stop, ...] = ()
     objects: tuple[str, ...] = ()

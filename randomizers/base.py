@@ -13,7 +13,7 @@ from generator.config.strict import Strict
 from generator.core.cache import ObjectCache
 from generator.core.errors import ConfigError, did_you_mean
 from generator.core.geometry import Asset, Material
-from generator.core.interfaces import AssetIndex, Stage
+from generator.core.interfaces import AssetIndex
 from generator.core.scene import Body, Scene
 from generator.core.streams import Rng
 
@@ -25,16 +25,11 @@ class RandomizerBase(Strict):
 
     Attributes:
         name: The key of its random stream: two of one type need two names.
-        every: scene: drawn once, all views share it. view: drawn anew for every view.
+        stage: scene: drawn once, all views share it. view: drawn anew for every view.
     """
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
-    every: Literal["scene", "view"] = "scene"
-
-    @property
-    def stage(self) -> Stage:
-        """When it runs."""
-        return Stage(self.every)
+    stage: Literal["scene", "view"] = "scene"
 
     @property
     def motion_duration_s(self) -> float | None:

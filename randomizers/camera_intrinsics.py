@@ -48,7 +48,7 @@ class CameraIntrinsics(RandomizerBase):
     """
 
     type: Literal["camera_intrinsics"] = "camera_intrinsics"
-    every: Literal["scene", "view"] = "view"
+    stage: Literal["scene", "view"] = "view"
     camera: str = ""
     hfov_deg: Annotated[Scalar, Bounds(1, 360)] | None = Uniform(50.0, 70.0)
     principal_offset_px: Scalar = Normal(0.0, 3.0, clip=(-10.0, 10.0))

@@ -43,7 +43,7 @@ class CameraOnLane(RandomizerBase):
         yaw_deg: Turn to the left of the lane's direction.
         pitch_deg: Upwards.
         roll_deg: Clockwise about the viewing direction.
-        turned: Whether it looks back.
+        reversed: Whether it looks back.
         ahead_m: The lane goes on at least this far where it looks; halved for lanes that are
             shorter than twice as long.
         free_m: Length and width of the ground around it on which nothing stands: the vehicle it
@@ -54,7 +54,7 @@ class CameraOnLane(RandomizerBase):
     """
 
     type: Literal["camera_on_lane"] = "camera_on_lane"
-    every: Literal["scene", "view"] = "view"
+    stage: Literal["scene", "view"] = "view"
     lanes: tuple[LaneKind, ...] = ("driving",)
     roads: tuple[str, ...] = ()
     height_m: Positive = Constant(1.65)
@@ -62,7 +62,7 @@ class CameraOnLane(RandomizerBase):
     yaw_deg: Scalar = Normal(0.0, 1.0, clip=(-3.0, 3.0))
     pitch_deg: Annotated[Scalar, Bounds(-89, 89)] = Normal(0.0, 0.7, clip=(-2.0, 2.0))
     roll_deg: Scalar = Normal(0.0, 0.5, clip=(-2.0, 2.0))
-    turned: Flag = Constant(False)
+    reversed: Flag = Constant(False)
     ahead_m: float = Field(40.0, ge=0)
     free_m: tuple[float, float] = (4.6, 1.9)
     clearance_m: float = Field(0.3, ge=0)
@@ -104,7 +104,7 @@ class CameraOnLane(RandomizerBase):
         """``T_world_rig`` on the ground and ``T_world_camera``; None where something stands."""
         weights = [line.length_m for line in lines]
         line = lines[_weighted(weights, float(rng.uniform()))]
-        turned = self.turned.draw(rng)
+        turned = self.reversed.draw(rng)
         ahead_m = min(self.ahead_m, 0.5 * line.length_m)
         low, high = (ahead_m, line.length_m) if turned else (0.0, line.length_m - ahead_m)
         at_m = float(rng.uniform(low, high))

@@ -34,7 +34,7 @@ class CameraPose(RandomizerBase):
     """
 
     type: Literal["camera_pose"] = "camera_pose"
-    every: Literal["scene", "view"] = "view"
+    stage: Literal["scene", "view"] = "view"
     camera: str = ""
     distance_m: Positive = Uniform(0.8, 1.3)
     azimuth_deg: Scalar = Uniform(0.0, 360.0)

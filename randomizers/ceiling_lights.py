@@ -43,7 +43,7 @@ class CeilingLights(RandomizerBase):
         temperature_k: Of all panels.
         broken: Whether a panel stays dark.
         visible: Whether they are seen, in housings with a bright front.
-        keep: Whether the lights that are there stay.
+        keep_existing: Whether the lights that are there stay.
     """
 
     type: Literal["ceiling_lights"] = "ceiling_lights"
@@ -55,11 +55,11 @@ class CeilingLights(RandomizerBase):
     temperature_k: Annotated[Scalar, Bounds(1667, 25000)] = Uniform(2700.0, 6500.0)
     broken: Flag = Probability(0.05)
     visible: bool = True
-    keep: bool = False
+    keep_existing: bool = False
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene under other lights."""
-        scene = scene if self.keep else without_lights(scene)
+        scene = scene if self.keep_existing else without_lights(scene)
         kind = self._kind(rng)
         rows, columns = self.rows.draw(rng), self.columns.draw(rng)
         color = linear_of_temperature(self.temperature_k.draw(rng))

@@ -36,17 +36,17 @@ class EgoOnLane(RandomizerBase):
         ahead_m: Its lane goes on at least this far before its front; halved for lanes that are
             shorter than twice as long.
         lateral_m: To the left of the lane's middle.
-        spare_m: Nothing else is nearer than this.
+        min_clearance_m: Nothing else is nearer than this.
     """
 
     type: Literal["ego_on_lane"] = "ego_on_lane"
-    every: Literal["scene"] = "scene"
+    stage: Literal["scene"] = "scene"
     ego: str = "ego"
     roads: tuple[str, ...] = ()
     route: tuple[Stop, ...] = ()
     ahead_m: float = Field(40.0, ge=0)
     lateral_m: Annotated[Scalar, Bounds(-5, 5)] = Normal(0.0, 0.1, clip=(-0.3, 0.3))
-    spare_m: float = Field(0.5, ge=0)
+    min_clearance_m: float = Field(0.5, ge=0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with the ego vehicle somewhere else.
@@ -77,9 +77,9 @@ class EgoOnLane(RandomizerBase):
             at_m = axles.rear_m + share * (last_m - axles.rear_m)
             pose = (line.pose(at_m, left_m) @ axles.T_body_rear.inverse()).rounded()
             footprint = Footprint.of(pose, assets.bounds_m(body.asset), body.scale)
-            if ground.is_free(footprint.grown(self.spare_m)):
+            if ground.is_free(footprint.grown(self.min_clearance_m)):
                 return scene.with_bodies(_moved(body, pose))
-        remedy = f"other roads, a smaller ahead_m or spare_m (randomizers.{self.name})"
+        remedy = f"other roads, a smaller ahead_m or min_clearance_m (randomizers.{self.name})"
         raise LayoutRejected(Rejection("no free place for the ego vehicle", remedy))
 
     def _lines(self, scene: Scene) -> list[LaneLine]:

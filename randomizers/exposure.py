@@ -20,7 +20,7 @@ class Exposure(RandomizerBase):
     """
 
     type: Literal["exposure"] = "exposure"
-    every: Literal["scene", "view"] = "view"
+    stage: Literal["scene", "view"] = "view"
     ev100: Scalar = Uniform(6.0, 8.5)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:

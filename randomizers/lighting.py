@@ -57,12 +57,12 @@ class Lighting(RandomizerBase):
         azimuth_deg: Direction around the vertical, seen from the focus.
         temperature_k: Colour temperature: 2700 is warm white, 6500 daylight.
         radius_m: Of the luminous ball or disk: the larger, the softer its shadows.
-        panel_m: Longer side of a rectangle.
+        width_m: Longer side of a rectangle.
         panel_aspect: Its shorter side, over the longer one.
         visible: Whether panels are seen, in housings with a bright front.
         cone_deg: Half angle of a spot.
         angular_radius_deg: Of the sun's disc.
-        keep: Whether the lights that are there stay.
+        keep_existing: Whether the lights that are there stay.
     """
 
     type: Literal["lighting"] = "lighting"
@@ -75,13 +75,13 @@ class Lighting(RandomizerBase):
     azimuth_deg: Scalar = Uniform(0.0, 360.0)
     temperature_k: Annotated[Scalar, Bounds(1667, 25000)] = Uniform(2700.0, 6500.0)
     radius_m: NonNegative = Uniform(0.02, 0.12)
-    panel_m: Positive = Uniform(0.4, 1.0)
+    width_m: Positive = Uniform(0.4, 1.0)
     panel_aspect: UnitInterval = Uniform(0.5, 1.0)
     visible: bool = False
     cone_deg: Annotated[Scalar, Bounds(1, 90)] = Uniform(20.0, 40.0)
     angular_radius_deg: Annotated[Scalar, Bounds(0, 20)] = Constant(0.27)
 
-    keep: bool = False
+    keep_existing: bool = False
 
     @model_validator(mode="after")
     def _has_one_strength(self) -> Lighting:
@@ -98,7 +98,7 @@ class Lighting(RandomizerBase):
         shares = [0.3 + float(rng.uniform()) for _ in range(count)]
         strength = self.illuminance_lux if self.luminous_flux_lm is None else self.luminous_flux_lm
         total = strength.draw(rng)
-        scene = scene if self.keep else without_lights(scene)
+        scene = scene if self.keep_existing else without_lights(scene)
         for k, share in enumerate(shares):
             light = self._light(scene, assets, rng, f"{self.name}/{k}", total * share / sum(shares))
             if self.visible and light.kind in PANELS:
@@ -132,7 +132,7 @@ class Lighting(RandomizerBase):
         if light.kind != "rectangle":
             radius_m = round(self.radius_m.draw(rng), 4)
             return replace(light, radius_m=radius_m), radius_m
-        longer_m = self.panel_m.draw(rng)
+        longer_m = self.width_m.draw(rng)
         sides_m = round(longer_m, 4), round(longer_m * self.panel_aspect.draw(rng), 4)
         return replace(light, size_m=sides_m), 0.5 * math.hypot(*sides_m)
 

@@ -32,7 +32,7 @@ class Objects(RandomizerBase):
     """
 
     type: Literal["objects"] = "objects"
-    every: Literal["scene"] = "scene"
+    stage: Literal["scene"] = "scene"
     group: str = ""
     count: Count = Whole(4, 10)
     scale: Positive = Constant(1.0)

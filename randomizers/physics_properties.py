@@ -28,7 +28,7 @@ class PhysicsProperties(RandomizerBase):
     """
 
     type: Literal["physics_properties"] = "physics_properties"
-    every: Literal["scene"] = "scene"
+    stage: Literal["scene"] = "scene"
     mass_factor: Positive = LogUniform(0.7, 1.4)
     friction: NonNegative = Uniform(0.4, 0.9)
     restitution: UnitInterval = Uniform(0.0, 0.1)

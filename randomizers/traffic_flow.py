@@ -96,7 +96,7 @@ class TrafficFlow(RandomizerBase):
     """
 
     type: Literal["traffic_flow"] = "traffic_flow"
-    every: Literal["scene"] = "scene"
+    stage: Literal["scene"] = "scene"
     duration_s: float = Field(10.0, gt=0, le=600)
     routes: dict[str, tuple[Stop, ...]] = Field({})
     signals: bool = True

@@ -8,7 +8,7 @@ from generator.core.plugins import PluginTable
 TABLE = PluginTable[Element](
     "element",
     {
-        "along": "scene_templates.along:Along",
+        "lane_objects": "scene_templates.along:Along",
         "backdrop": "scene_templates.backdrop:Backdrop",
         "bin": "scene_templates.bin:Bin",
         "crosswalk": "scene_templates.crosswalk:Crosswalk",

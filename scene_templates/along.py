@@ -17,7 +17,7 @@ from scene_templates.objects import AssetChoice
 
 
 class Along(Element):
-    """Things along lanes; the ``along`` randomizer of the same name draws them.
+    """Things along lanes; the ``lane_objects`` randomizer of the same name draws them.
 
     Attributes:
         lanes: Kinds of the lanes they are spread over.
@@ -28,7 +28,7 @@ class Along(Element):
         annotate: Whether labels are written for them.
     """
 
-    type: Literal["along"] = "along"
+    type: Literal["lane_objects"] = "lane_objects"
     lanes: tuple[LaneKind, ...] = Field(min_length=1)
     assets: AssetChoice
     count: int = Field(0, ge=0, le=2000)

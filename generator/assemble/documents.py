@@ -9,37 +9,25 @@ from types import ModuleType
 
 import configs
 import scene_templates
-from generator.config.document import Node, load, merge, with_override
+from generator.assemble.inheritance import (
+    LISTS,
+    extended_document,
+    mapping_of,
+    overridden_elements,
+)
+from generator.config.document import Node, load, with_override
+from generator.config.merging import merge
+from generator.config.paths import find_path
 from generator.config.problems import Position, Problems
+from generator.config.renames import with_current_words
 from generator.core.errors import ConfigError, did_you_mean
 from generator.sensors.sheets import with_files
 
 SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
 
-TEMPLATE_KEYS = ("shared", "elements")
+TEMPLATE_KEYS = ("shared", "defaults", "elements")
 """What a template may say."""
-
-LISTS = ("randomizers", "sensors", "annotations", "exporters")
-
-
-def found_file(name: str, shipped: ModuleType, kind: str) -> Path:
-    """The file a user means: the path as given, else one that comes with the package.
-
-    Raises:
-        ConfigError: if there is neither.
-    """
-    path = Path(name)
-    if path.is_file():
-        return path
-    folder = Path(str(files(shipped)))
-    ours = sorted(p.name for p in folder.glob("*.yaml"))
-    for candidate in (name, f"{name}.yaml"):
-        if candidate in ours:
-            return folder / candidate
-    raise ConfigError(
-        f"{name}: there is no such {kind}; shipped are {', '.join(ours)}{did_you_mean(name, ours)}"
-    )
 
 
 def resolved_document(
@@ -52,7 +40,8 @@ def resolved_document(
     Raises:
         ConfigError: naming the place of what is wrong.
     """
-    content = dict(_mapping(document))
+    document = with_current_words(document)
+    content = dict(mapping_of(document))
     template = _template(document)
     content["elements"] = _elements(document, template)
     _inherit_shared(content, template)
@@ -68,12 +57,13 @@ def resolved_document(
         if not separator:
             raise ConfigError(f"--set {text}: expected KEY=VALUE")
         resolved = with_override(resolved, path.strip(), value.strip())
+    resolved = with_current_words(resolved)
     return _without_randomizers(_with_sensor_files(resolved), without)
 
 
 def _with_sensor_files(document: Node) -> Node:
     """The document with what sensors keep in files in their places."""
-    content, sensors = dict(_mapping(document)), document.get("sensors")
+    content, sensors = dict(mapping_of(document)), document.get("sensors")
     if sensors is not None and isinstance(sensors.content, tuple):
         listed = tuple(with_files(sensor) for sensor in sensors.content)
         content["sensors"] = Node(sensors.position, listed, sensors.key_positions)
@@ -81,8 +71,18 @@ def _with_sensor_files(document: Node) -> Node:
 
 
 def config_document(name: str) -> Node:
-    """The document of a configuration, by path or shipped name."""
-    return load(found_file(name, configs, "configuration"))
+    """The document of a configuration, by path or shipped name, with all that it extends.
+
+    Raises:
+        ConfigError: a file is missing or invalid, or extends itself.
+    """
+    shipped = _files_of(configs)
+    return extended_document(find_path(name, None, "", "configuration", shipped=shipped), shipped)
+
+
+def _files_of(package: ModuleType) -> list[Path]:
+    """The YAML files that a package ships."""
+    return sorted(Path(str(files(package))).glob("*.yaml"))
 
 
 def _template(document: Node) -> Node | None:
@@ -97,11 +97,13 @@ def _template(document: Node) -> Node | None:
         problems.add(where, "template", "expected the name of a template, or a list of elements")
         problems.raise_if_any()
         raise AssertionError("unreachable")
-    loaded = load(found_file(template.content, scene_templates, "template"))
+    shipped = _files_of(scene_templates)
+    path = find_path(template.content, template.position, "template", "template", shipped=shipped)
+    loaded = with_current_words(load(path))
     problems = Problems()
-    for key in _mapping(loaded):
+    for key in mapping_of(loaded):
         if key not in TEMPLATE_KEYS:
-            fact = f"unknown key; a template has {' and '.join(TEMPLATE_KEYS)}"
+            fact = f"unknown key; a template has {', '.join(TEMPLATE_KEYS)}"
             problems.add(loaded.key_position(key), key, fact + did_you_mean(key, TEMPLATE_KEYS))
     problems.raise_if_any()
     return loaded
@@ -115,7 +117,7 @@ def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
     own, inherited = content.get("shared"), template.get("shared") if template else None
     if inherited is None or (own is not None and not isinstance(own.content, Mapping)):
         return
-    entries = {**_mapping(inherited), **(_mapping(own) if own else {})}
+    entries = {**mapping_of(inherited), **(mapping_of(own) if own else {})}
     positions = {**inherited.key_positions, **(own.key_positions if own else {})}
     content["shared"] = Node((own or inherited).position, entries, positions)
 
@@ -129,31 +131,30 @@ def _elements(document: Node, template: Node | None) -> Node:
     elements = template.get("elements")
     if elements is None or not isinstance(elements.content, tuple):
         raise ConfigError(f"{template.position.file}: a template needs a list of elements")
+    elements = _with_defaults(elements, template.get("defaults"))
     if given is None:
         return elements
-    return _overridden(elements, given)
+    return overridden_elements(elements, given)
 
 
-def _overridden(elements: Node, overrides: Node) -> Node:
+def _with_defaults(elements: Node, defaults: Node | None) -> Node:
+    """A template's elements with what it lays down for all elements of a type."""
+    if defaults is None:
+        return elements
     assert isinstance(elements.content, tuple)
-    by_name = {str(_scalar(node, "name")): node for node in elements.content}
-    problems = Problems()
-    if not isinstance(overrides.content, Mapping):
-        problems.add(overrides.position, "elements", "expected overrides by element name")
-    else:
-        for name, node in overrides.content.items():
-            if name not in by_name and node.get("type") is not None:
-                # What the template lacks and says what it is comes after all of the template's.
-                named = Node(overrides.key_position(name), name, text=name)
-                by_name[name] = merge(Node(node.position, {"name": named}), node)
-            elif name not in by_name:
-                fact = f"the template has no element '{name}'; expected one of "
-                fact += ", ".join(by_name) + did_you_mean(name, by_name)
-                problems.add(overrides.key_position(name), f"elements.{name}", fact)
-            else:
-                by_name[name] = merge(by_name[name], node)
+    by_type, problems = mapping_of(defaults), Problems()
+    types = {str(_scalar(item, "type")) for item in elements.content}
+    for kind in by_type:
+        if kind not in types:
+            fact = f"no element is of this type; expected one of {', '.join(sorted(types))}"
+            fact += did_you_mean(kind, types)
+            problems.add(defaults.key_position(kind), f"defaults.{kind}", fact)
     problems.raise_if_any()
-    return Node(elements.position, tuple(by_name.values()))
+    merged = tuple(
+        merge(by_type[kind], item) if (kind := str(_scalar(item, "type"))) in by_type else item
+        for item in elements.content
+    )
+    return Node(elements.position, merged)
 
 
 def _without_randomizers(document: Node, names: Sequence[str]) -> Node:
@@ -168,19 +169,13 @@ def _without_randomizers(document: Node, names: Sequence[str]) -> Node:
                 f"{', '.join(known)}{did_you_mean(name, known)}"
             )
     kept = tuple(n for n, name in zip(listed.content, known, strict=True) if name not in names)
-    content = {**_mapping(document), "randomizers": Node(listed.position, kept)}
+    content = {**mapping_of(document), "randomizers": Node(listed.position, kept)}
     return Node(document.position, content, document.key_positions)
 
 
 def _scalar(node: Node, key: str) -> object:
     found = node.get(key)
     return None if found is None else found.content
-
-
-def _mapping(node: Node) -> Mapping[str, Node]:
-    if not isinstance(node.content, Mapping):
-        raise ConfigError(f"{node.position}: expected a mapping of settings")
-    return node.content
 
 
 def _made(content: dict[str, Node] | tuple[Node, ...] | int) -> Node:

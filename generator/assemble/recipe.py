@@ -21,6 +21,7 @@ from generator.core.interfaces import (
     Exporter,
     Modality,
     Randomizer,
+    Sensor,
     SensorInfo,
 )
 from generator.core.scene import Scene, SharedValue
@@ -102,7 +103,6 @@ def recipe_of(
     return Recipe(
         info=info,
         open_scene=scene_source(spec, library),
-        sensors=spec.sensors,
         channels=frozenset().union(*(a.channels for a in annotators), extra_channels),
         image_truth=partial(
             complete_truth, annotators=annotators, thresholds=spec.head.labels, assets=library
@@ -157,9 +157,11 @@ def scene_source(spec: Spec, assets: AssetIndex) -> SceneSource:
     """The nominal scene and the randomizers of given streams; the last few are remembered."""
 
     @lru_cache(maxsize=NOMINAL_SCENES_KEPT)
-    def made(shared: tuple[tuple[str, SharedValue], ...]) -> tuple[Scene, Sequence[Randomizer]]:
+    def made(
+        shared: tuple[tuple[str, SharedValue], ...],
+    ) -> tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]:
         config = spec.scene_config(shared)
-        return nominal_scene(spec, config, assets), config.randomizers
+        return nominal_scene(spec, config, assets), config.randomizers, config.sensors
 
     return lambda streams: made(spec.shared(streams))
 
@@ -172,7 +174,7 @@ def nominal_scene(spec: Spec, config: SceneConfig, assets: AssetIndex) -> Scene:
     """
     scene = build(spec.head.template or spec.name, config.elements, assets)
     scene = replace(scene, shared=config.shared, step_s=spec.head.step_s)
-    for sensor in spec.sensors:
+    for sensor in config.sensors:
         scene = sensor.mount(scene)
         info = sensor.describe()
         _check_mounted(scene, info)

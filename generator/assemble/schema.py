@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from generator.assemble.spec import DEFAULT_RENDERER, PLUGIN_LISTS, VARYING, Head
+from generator.assemble.inheritance import ALL, NAMED
+from generator.assemble.spec import CONSTANT, DEFAULT_RENDERER, PLUGIN_LISTS, VARYING, Head
 from generator.assemble.tables import ANNOTATIONS, RENDERERS
-from generator.config.schema import json_schema
+from generator.config.schema import json_schema, with_shared_values
 from generator.config.strict import Strict
 from generator.core.plugins import PluginTable
 
-SHARED: list[dict[str, Any]] = [
-    {"type": "string", "pattern": r"^\$shared\.", "description": "A shared value."},
-    {
-        "type": "object",
-        "required": ["given"],
-        "description": "The entry that a shared value selects.",
-    },
-]
+INHERITED = {
+    "type": "object",
+    "description": "Changes to the inherited item of this name.",
+    "required": ["name"],
+    "properties": {"type": False},
+}
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -29,7 +28,7 @@ def config_schema() -> dict[str, Any]:
     for key, table in PLUGIN_LISTS.items():
         properties[key] = {
             "type": "array",
-            "items": {"oneOf": [_plugin(table, name, definitions) for name in table]},
+            "items": {"oneOf": [INHERITED, *(_plugin(table, n, definitions) for n in table)]},
         }
     properties["render"] = {
         "description": "How images are made.",
@@ -43,6 +42,17 @@ def config_schema() -> dict[str, Any]:
     properties["shared"] = {
         "type": "object",
         "description": "Values drawn once per scene that elements and randomizers refer to.",
+    }
+    properties["extends"] = {
+        "type": "string",
+        "description": "Configuration that this one is laid over: a path or a shipped name.",
+    }
+    names = {"anyOf": [{"const": ALL}, {"type": "array", "items": {"type": "string"}}]}
+    properties["without"] = {
+        "type": "object",
+        "description": "Names of what is not inherited, by section.",
+        "properties": dict.fromkeys(NAMED, names),
+        "additionalProperties": False,
     }
     properties["annotations"] = {
         "type": "array",
@@ -67,12 +77,11 @@ def _parametric(definitions: dict[str, Any]) -> list[dict[str, str]]:
 
 
 def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> dict[str, str]:
-    schema = _hoisted(json_schema(_model(table, name)), definitions)
-    if table in VARYING.values():
-        schema["properties"] = {
-            key: part if key in (table.tag, "name") else {"anyOf": [part, *SHARED]}
-            for key, part in schema["properties"].items()
-        }
+    schema = json_schema(_model(table, name))
+    varying = next((key for key, known in VARYING.items() if known is table), None)
+    if varying is not None:
+        schema = with_shared_values(schema, CONSTANT[varying])
+    schema = _hoisted(schema, definitions)
     if (table, name) != (RENDERERS, DEFAULT_RENDERER):
         # The tag chooses the plug-in, so it has to be written even where its field has a default.
         schema["required"] = sorted({table.tag, *schema.get("required", ())})

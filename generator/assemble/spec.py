@@ -22,8 +22,9 @@ from generator.assemble.tables import (
     make_plugin,
 )
 from generator.config.document import Node, parse
+from generator.config.paths import find_path
 from generator.config.problems import Problems
-from generator.config.shared import drawn, probes, refers, resolved
+from generator.config.shared import drawn, probes, refers, resolved, varying_place
 from generator.config.strict import Strict
 from generator.config.validation import validate
 from generator.core.errors import ConfigError, did_you_mean
@@ -104,17 +105,43 @@ class SceneConfig:
     shared: tuple[tuple[str, SharedValue], ...]
     elements: tuple[Element, ...]
     randomizers: tuple[Randomizer, ...]
+    sensors: tuple[Sensor, ...]
 
 
-VARYING: Mapping[str, PluginTable[Any]] = {"elements": ELEMENTS, "randomizers": RANDOMIZERS}
+VARYING: Mapping[str, PluginTable[Any]] = {
+    "elements": ELEMENTS,
+    "randomizers": RANDOMIZERS,
+    "sensors": SENSORS,
+}
 """Lists that may depend on shared values, and the plug-ins they hold."""
 
 PLUGIN_LISTS: Mapping[str, PluginTable[Any]] = {
     **VARYING,
-    "sensors": SENSORS,
     "exporters": EXPORTERS,
 }
 """Lists of plug-ins with a ``type``."""
+
+CONSTANT = {
+    "elements": ("type", "name"),
+    "randomizers": ("type", "name"),
+    "sensors": (
+        "type",
+        "name",
+        "model",
+        "size_px",
+        "channels",
+        "stereo_with",
+        "rate_hz",
+        "rotation_hz",
+        "time_offset_s",
+        "lens.model",
+    ),
+}
+"""Lists that may depend on shared values, and the fields of their items that may not.
+
+What all samples of a data set have in common, such as the size of its images, is no matter of a
+scene.
+"""
 
 
 @dataclass(frozen=True)
@@ -126,7 +153,7 @@ class Spec:
         resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
             the same Spec again.
         render: Settings of the renderer.
-        sensors, exporters: Plug-ins, in order.
+        exporters: Plug-ins, in order.
         annotations: Annotators by name, in order.
         probes: Configurations of scenes that between them show what scenes can be; one where
             nothing is shared.
@@ -137,7 +164,6 @@ class Spec:
     resolved: Mapping[str, Any]
     head: Head
     render: RendererSettings
-    sensors: tuple[Sensor, ...]
     annotations: Mapping[str, AnyAnnotator]
     exporters: tuple[Exporter, ...]
     probes: tuple[SceneConfig, ...]
@@ -153,12 +179,17 @@ class Spec:
         """The randomizers of the first scene."""
         return self.probes[0].randomizers
 
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The sensors of the first scene; those of others differ in parameters only."""
+        return self.probes[0].sensors
+
     def plugins(self) -> Iterator[object]:
         """Every plug-in that it is made of."""
         yield self.render
-        yield from (*self.sensors, *self.annotations.values(), *self.exporters)
+        yield from (*self.annotations.values(), *self.exporters)
         for config in self.probes:
-            yield from (*config.elements, *config.randomizers)
+            yield from (*config.elements, *config.randomizers, *config.sensors)
 
     def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
         """The shared values of one scene, sorted by name."""
@@ -178,7 +209,12 @@ class Spec:
     @property
     def asset_folders(self) -> tuple[Path, ...]:
         """Where the user keeps assets."""
-        return tuple(Path(folder).expanduser() for folder in self.head.assets.folders)
+        listed = self.document.get("assets", "folders")
+        nodes = listed.content if listed is not None and isinstance(listed.content, tuple) else ()
+        return tuple(
+            find_path(node.text, node.position, f"assets.folders[{k}]", "folder", is_folder=True)
+            for k, node in enumerate(nodes)
+        )
 
     @property
     def split_shares(self) -> dict[str, float]:
@@ -258,28 +294,46 @@ def _spec(document: Node, name: str) -> Spec:
     head = validate(head_node, Head, problems)
     for key, node in document.content.items():
         if key not in ("shared", *VARYING) and refers(node):
-            problems.add(node.position, key, f"shared values serve {' and '.join(VARYING)} only")
+            fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
+            problems.add(node.position, key, fact)
     render = _renderer_settings(document.content["render"], problems)
-    sensors = _named_plugins(document.content["sensors"], "sensors", SENSORS, problems)
     exporters = _plugins(document.content["exporters"], "exporters", EXPORTERS, problems)
     annotations = _annotations(document.content["annotations"], problems)
-    if not sensors and not len(problems):
+    if not document.content["sensors"].content and not len(problems):
         problems.add(document.position, "sensors", "at least one sensor is needed")
+    for key, names in CONSTANT.items():
+        _refuse_varying(document.content[key], key, names)
     probes_ = _probed(document, head.seed if head else 0, problems)
     problems.raise_if_any()
     assert head is not None
     assert render is not None
-    return Spec(
+    spec = Spec(
         name,
         document.plain(),
         head,
         render,
-        sensors,
         annotations,
         tuple(exporter for exporter in exporters if exporter is not None),
         probes_,
         document,
     )
+    _ = spec.asset_folders  # A folder that is missing is refused before anything runs.
+    return spec
+
+
+def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
+    """Raises ConfigError where a field depends on shared values that all scenes have in common."""
+    fact = "is the same in all scenes of a data set; "
+    fact += "expected a value that does not depend on shared ones"
+    problems = Problems()
+    for number, item in enumerate(listed.content if isinstance(listed.content, tuple) else ()):
+        for name in names:
+            place = varying_place(item, name)
+            if place == item.position:
+                problems.add(place, f"{key}[{number}]", fact)
+            elif place is not None:
+                problems.add(place, f"{key}[{number}].{name}", fact)
+    problems.raise_if_any()
 
 
 def _probed(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, ...]:
@@ -317,6 +371,7 @@ def _scene_config_or_problems(
         tuple(sorted(shared.items())),
         _named_plugins(lists["elements"], "elements", ELEMENTS, problems),
         _named_plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems),
+        _named_plugins(lists["sensors"], "sensors", SENSORS, problems),
     )
 
 

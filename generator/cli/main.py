@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
 from generator import __version__
 from generator.cli.options import Choice, configuration_options
-from generator.core.errors import ConfigError, GenDataError, Interrupted
+from generator.core.errors import ConfigError, ConfigWarning, GenDataError, Interrupted
 
 SINGLE_THREADED = (
     "OMP_NUM_THREADS",
@@ -126,7 +130,22 @@ def main() -> None:
     """Run the command line and leave with its exit code."""
     for name in SINGLE_THREADED:
         os.environ[name] = "1"
+    warnings.showwarning = partial(_show_warning, warnings.showwarning)
     sys.exit(_exit_code())
+
+
+def _show_warning(
+    show_others: Callable[..., None],
+    message: Warning | str,
+    category: type[Warning],
+    *place: Any,
+    **options: Any,
+) -> None:
+    """Our own warnings as one plain message; those of libraries as Python shows them."""
+    if category in (FutureWarning, ConfigWarning):
+        click.echo(f"gen-data: warning: {message}", err=True)
+    else:
+        show_others(message, category, *place, **options)
 
 
 def _exit_code() -> int:

@@ -122,22 +122,6 @@ def parse(text: str, file: str) -> Node:
     return node
 
 
-def merge(base: Node, override: Node) -> Node:
-    """``override`` laid over ``base``: mappings key by key, anything else replaced as a whole.
-
-    A one-key mapping that names a distribution is one value: it is replaced, too.
-    """
-    if not isinstance(base.content, Mapping) or not isinstance(override.content, Mapping):
-        return override
-    if is_distribution(base) or is_distribution(override):
-        return override
-    content = dict(base.content)
-    for key, node in override.content.items():
-        content[key] = merge(content[key], node) if key in content else node
-    positions = {**base.key_positions, **override.key_positions}
-    return Node(override.position, content, positions)
-
-
 def is_distribution(node: Node) -> bool:
     """Whether a node is a one-key mapping that names a distribution."""
     keys = list(node.content) if isinstance(node.content, Mapping) else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from pydantic import BaseModel
@@ -9,6 +10,17 @@ from pydantic.json_schema import GenerateJsonSchema
 
 from generator.config.describe import documented_attributes, plain_of, summary_of
 from generator.config.distributions.fields import DISTRIBUTION_TITLE
+
+SHARED_VALUE = "shared_value"
+"""Name of the definition of what stands for a shared value."""
+
+_SHARED_VALUE = {
+    "description": "A shared value, or the entry that one selects.",
+    "anyOf": [
+        {"type": "string", "pattern": r"^\$shared\."},
+        {"type": "object", "required": ["switch"]},
+    ],
+}
 
 
 def json_schema(model: type[BaseModel]) -> dict[str, Any]:
@@ -28,6 +40,46 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
     if definitions:
         schema["$defs"] = dict(sorted({**schema.get("$defs", {}), **definitions}.items()))
     return schema
+
+
+def with_shared_values(schema: dict[str, Any], constant: Collection[str] = ()) -> dict[str, Any]:
+    """The schema of a plug-in in which a shared value may stand wherever a value may.
+
+    Args:
+        schema: Of a model, definitions included.
+        constant: Names of fields that must not depend on shared values.
+    """
+    wrapped: dict[str, Any] = _wrapped(schema)
+    for name in constant:
+        if name in schema.get("properties", {}):
+            wrapped["properties"][name] = schema["properties"][name]
+    wrapped["$defs"] = {**wrapped.get("$defs", {}), SHARED_VALUE: _SHARED_VALUE}
+    return wrapped
+
+
+def _wrapped(schema: Any) -> Any:
+    """A schema in which every value below it may be a shared one."""
+    if not isinstance(schema, dict):
+        return schema
+    wrapped = dict(schema)
+    for key, part in schema.items():
+        if key == "$defs":
+            wrapped[key] = {name: _wrapped(entry) for name, entry in part.items()}
+        elif key == "properties":
+            wrapped[key] = {name: _or_shared(entry) for name, entry in part.items()}
+        elif key in ("items", "additionalProperties"):
+            wrapped[key] = _or_shared(part)
+        elif key == "prefixItems":
+            wrapped[key] = [_or_shared(item) for item in part]
+        elif key in ("anyOf", "oneOf"):
+            wrapped[key] = [_wrapped(option) for option in part]
+    return wrapped
+
+
+def _or_shared(schema: Any) -> Any:
+    if not isinstance(schema, dict) or "const" in schema:
+        return schema
+    return {"anyOf": [_wrapped(schema), {"$ref": f"#/$defs/{SHARED_VALUE}"}]}
 
 
 class _Generator(GenerateJsonSchema):

@@ -2,11 +2,11 @@
 
 A configuration may have a section ``shared`` of named values, drawn once per scene, each from a
 stream of its own, so that their order means nothing. Elsewhere ``$shared.NAME`` stands for such a
-value, and a mapping with the key ``given`` for the one of its entries that the value selects::
+value, and a mapping with the key ``switch`` for the one of its entries that the value selects::
 
     shared:
       road: {choice: {street: 3, highway: 1}}
-      lanes: {given: road, highway: 3, otherwise: {uniform_integer: [1, 2]}}
+      lanes: {switch: road, highway: 3, default: {uniform_integer: [1, 2]}}
     elements:
       - {type: road, name: main, lanes: $shared.lanes}
 
@@ -31,8 +31,8 @@ from generator.core.scene import SharedValue
 from generator.core.streams import Streams
 
 REFERENCE = "$shared."
-GIVEN = "given"
-OTHERWISE = "otherwise"
+SWITCH = "switch"
+DEFAULT = "default"
 _PROBED_SCENES = 8
 
 Shared = Mapping[str, SharedValue]
@@ -42,13 +42,33 @@ def refers(node: Node) -> bool:
     """Whether a value depends on shared ones."""
     if isinstance(node.content, tuple):
         return any(refers(item) for item in node.content)
+    if isinstance(node.content, Mapping) and SWITCH not in node.content:
+        return any(refers(item) for item in node.content.values())
+    return is_reference(node)
+
+
+def varying_place(item: Node, path: str) -> Position | None:
+    """Where the value at a dotted path depends on shared values; None if it is constant.
+
+    A selection on the way there makes the value vary, too.
+    """
+    node: Node | None = item
+    for part in path.split("."):
+        if node is None or is_reference(node):
+            break
+        node = node.get(part)
+    return node.position if node is not None and refers(node) else None
+
+
+def is_reference(node: Node) -> bool:
+    """Whether a value stands for a shared one, or is selected by one."""
     if isinstance(node.content, Mapping):
-        return GIVEN in node.content or any(refers(item) for item in node.content.values())
+        return SWITCH in node.content
     return isinstance(node.content, str) and node.content.startswith(REFERENCE)
 
 
 def resolved(node: Node, shared: Shared, field: str = "") -> Node:
-    """The document with every reference and every ``given`` replaced by what it stands for.
+    """The document with every reference and every ``switch`` replaced by what it stands for.
 
     Raises:
         ConfigError: a name is unknown, or no entry fits its value.
@@ -58,7 +78,7 @@ def resolved(node: Node, shared: Shared, field: str = "") -> Node:
         items = tuple(resolved(item, shared, f"{field}[{k}]") for k, item in enumerate(content))
         return replace(node, content=items)
     if isinstance(content, Mapping):
-        if GIVEN in content:
+        if SWITCH in content:
             key, chosen = _selected(node, shared, field)
             return resolved(chosen, shared, f"{field}.{key}")
         items_by_key = {
@@ -127,9 +147,9 @@ def _names_in(node: Node) -> set[str]:
     if isinstance(node.content, tuple):
         return {name for item in node.content for name in _names_in(item)}
     if isinstance(node.content, Mapping):
-        given = node.content.get(GIVEN)
+        name = node.content.get(SWITCH)
         names = {name for item in node.content.values() for name in _names_in(item)}
-        return names if given is None else names | {str(given.content)}
+        return names if name is None else names | {str(name.content)}
     text = str(node.content)
     return {text.removeprefix(REFERENCE)} if text.startswith(REFERENCE) else set()
 
@@ -175,16 +195,16 @@ def _outcomes(node: Node) -> tuple[SharedValue, ...]:
 
 
 def _selected(node: Node, shared: Shared, field: str) -> tuple[str, Node]:
-    """The entry of a ``given`` that the value of its name selects."""
+    """The entry of a ``switch`` that the value of its name selects."""
     assert isinstance(node.content, Mapping)
-    name = node.content[GIVEN].content
-    value = _value(str(name), shared, node.content[GIVEN].position, f"{field}.{GIVEN}")
+    name = node.content[SWITCH].content
+    value = _value(str(name), shared, node.content[SWITCH].position, f"{field}.{SWITCH}")
     for key, item in node.content.items():
-        if key not in (GIVEN, OTHERWISE) and _scalar(key) == value:
+        if key not in (SWITCH, DEFAULT) and _scalar(key) == value:
             return key, item
-    if OTHERWISE in node.content:
-        return OTHERWISE, node.content[OTHERWISE]
-    fact = f"no entry for {name} = {shown(value)}; expected one, or '{OTHERWISE}'"
+    if DEFAULT in node.content:
+        return DEFAULT, node.content[DEFAULT]
+    fact = f"no entry for {name} = {shown(value)}; expected one, or '{DEFAULT}'"
     raise ConfigError(str(Problem(node.position, field, fact)))
 
 

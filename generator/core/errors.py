@@ -44,6 +44,10 @@ class SampleIndexError(ConfigError, IndexError):
     """The index of a sample that the data set does not have."""
 
 
+class ConfigWarning(UserWarning):
+    """A configuration is valid, but probably not meant like this."""
+
+
 class AssetError(GenDataError):
     """An asset is missing, unreadable or unfit."""
 

@@ -158,8 +158,8 @@ class Randomizer(Protocol):
         ...
 
     @property
-    def stage(self) -> Stage:
-        """When it runs."""
+    def stage(self) -> str:
+        """When it runs: the value of a Stage."""
         ...
 
     @property

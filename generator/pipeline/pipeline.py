@@ -33,8 +33,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-SceneSource = Callable[[Streams], tuple[Scene, Sequence[Randomizer]]]
-"""The nominal scene of given streams, sensors mounted, and its randomizers: a pure function."""
+SceneSource = Callable[[Streams], tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]]
+"""The nominal scene of given streams with its sensors mounted, its randomizers and its sensors: a
+pure function."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,6 @@ class Recipe:
 
     info: DatasetInfo
     open_scene: SceneSource
-    sensors: Sequence[Sensor]
     channels: frozenset[Channel]
     image_truth: Callable[[Scene, Reading], ImageTruth]
     split_shares: Mapping[str, float]
@@ -71,6 +71,7 @@ class AcceptedScene:
 
     Attributes:
         randomizers: What draws its views.
+        sensors: What captures them.
         attempt: Number of the attempt that was accepted, from 0.
         timings_s: CPU seconds by stage, all attempts together.
     """
@@ -78,6 +79,7 @@ class AcceptedScene:
     index: int
     scene: Scene
     randomizers: Sequence[Randomizer]
+    sensors: Sequence[Sensor]
     attempt: int
     timings_s: Mapping[str, float]
 
@@ -168,7 +170,7 @@ class Pipeline:
             time_s = step_index * self.info.step_s
             scene = timeline.at(time_s)
             streams = replace(view.streams, step=step_index)
-        capture, truth = self._captured(timeline, time_s, streams, timings)
+        capture, truth = self._captured(timeline, time_s, accepted.sensors, streams, timings)
         with _timed(timings, "annotate"):
             swept = {name: timeline.at(c.time_s) for name, c in capture.clouds.items()}
             described = self.recipe.frame_truth
@@ -189,14 +191,19 @@ class Pipeline:
         )
 
     def _captured(
-        self, timeline: Timeline, time_s: float, streams: Streams, timings_s: dict[str, float]
+        self,
+        timeline: Timeline,
+        time_s: float,
+        sensors: Sequence[Sensor],
+        streams: Streams,
+        timings_s: dict[str, float],
     ) -> tuple[Capture, dict[str, ImageTruth]]:
         """The readings of every sensor at its own instant, and the truth about every image."""
         readings: dict[str, Reading] = {}
         clouds: dict[str, PointCloud] = {}
         tables: dict[str, Table] = {}
         truth: dict[str, ImageTruth] = {}
-        for sensor in self.recipe.sensors:
+        for sensor in sensors:
             if streams.step % self.recipe.strides.get(sensor.name, 1):
                 continue
             rng = streams.rng(f"sensor/{sensor.name}")
@@ -236,7 +243,7 @@ class Pipeline:
             streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
             try:
                 with _timed(timings, "randomize"):
-                    nominal, randomizers = self.recipe.open_scene(streams)
+                    nominal, randomizers, sensors = self.recipe.open_scene(streams)
                     scene = self._randomized(nominal, randomizers, Stage.BUILD, streams)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
@@ -245,7 +252,7 @@ class Pipeline:
                 settled = self._physics.settle(scene)
             if settled.rejection is None:
                 scene = frozen_scene(settled.scene, self.assets, self._category_ids)
-                return AcceptedScene(scene_index, scene, randomizers, attempt, timings)
+                return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
             rejections.append(settled.rejection)
         raise SceneRejected(scene_index, tuple(rejections))
 
@@ -279,7 +286,7 @@ class Pipeline:
         self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
     ) -> Scene:
         for randomizer in randomizers:
-            if randomizer.stage is stage:
+            if randomizer.stage == stage:
                 rng = streams.rng(f"randomizer/{randomizer.name}")
                 scene = randomizer(scene, self.assets, rng)
         return scene

@@ -36,14 +36,14 @@ class Errors(Strict):
     Attributes:
         noise: Density of the white noise, unit per root hertz.
         bias: Standard deviation of the bias when it is switched on.
-        bias_walk: Density of the bias's random walk, unit per second and root hertz.
-        limit: The largest value that it can tell.
+        bias_random_walk: Density of the bias's random walk, unit per second and root hertz.
+        full_scale: The largest value that it can tell.
     """
 
     noise: float = Field(ge=0)
     bias: float = Field(ge=0)
-    bias_walk: float = Field(ge=0)
-    limit: float = Field(gt=0)
+    bias_random_walk: float = Field(ge=0)
+    full_scale: float = Field(gt=0)
 
 
 class ImuModel(Strict):
@@ -84,7 +84,7 @@ class Imu(Instrument):
         rate_hz = self.rate_hz or 1.0 / scene.step_s
         read = true + self.noise * _errors(make, times_s, rate_hz, rng)
         if self.noise > 0.0:
-            limits = _of_axes(make, "limit")
+            limits = _of_axes(make, "full_scale")
             read = np.clip(read, -limits, limits)
         columns = dict(zip(AXES, np.round(read, 9).T, strict=True))
         rows = table_rows("imu", len(times_s), time_s=times_s, **columns)
@@ -112,7 +112,7 @@ def _errors(make: ImuModel, times_s: Array, rate_hz: float, rng: Rng) -> Array:
     last = round(float(times_s[-1]) * rate_hz)
     walked = np.cumsum(shared.standard_normal((last + 1, 6)), axis=0)
     rows = np.rint(times_s * rate_hz).astype(int)
-    walk = _of_axes(make, "bias_walk") / math.sqrt(rate_hz) * walked[rows]
+    walk = _of_axes(make, "bias_random_walk") / math.sqrt(rate_hz) * walked[rows]
     white = _of_axes(make, "noise") * math.sqrt(rate_hz) * rng.standard_normal((len(times_s), 6))
     errors: Array = bias + walk + white
     return errors

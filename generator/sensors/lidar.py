@@ -69,10 +69,10 @@ class LidarSensor(Mounted):
         returns: Which return of a pulse is reported; ``dual`` reports two.
         divergence: Whether beams have a width; costs seven rays instead of one.
         ideal: No noise, no missed return, no weather: every hit within range.
-        motion: What becomes of the scanner's way during a sweep. ``raw``: points are in the lidar
-            frame of each pulse's own instant. ``compensated``: in that of the sweep's middle, as in
-            KITTI's files; what moves by itself is where each pulse met it. ``frozen``: all pulses
-            leave in the middle of the sweep.
+        motion_distortion: How the scanner's motion during a sweep shows. ``raw``: points are in
+            the lidar frame of each pulse's own instant. ``deskewed``: in that of the sweep's
+            middle, as in KITTI's files; moving objects are where each pulse met them. ``none``:
+            all pulses leave in the middle of the sweep.
     """
 
     type: Literal["lidar"] = "lidar"
@@ -84,7 +84,7 @@ class LidarSensor(Mounted):
     returns: Kept = "strongest"
     divergence: bool = False
     ideal: bool = False
-    motion: Literal["raw", "compensated", "frozen"] = "compensated"
+    motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
 
     @field_validator("model")
     @classmethod
@@ -143,7 +143,7 @@ class LidarSensor(Mounted):
         lidar = scene.lidar(self.name)
         sweep = sweep_of(model, float(rng.uniform(0.0, 3600.0)))
         shots = Shots(sweep.directions)
-        if self.motion != "frozen":
+        if self.motion_distortion != "none":
             shots = shots_of(scene, lidar, sweep)
         beams = Beams(
             shots.directions,
@@ -164,7 +164,7 @@ class LidarSensor(Mounted):
         found = Found.of(pulses, rows, picks)
         if not self.ideal:
             found = _noisy(found, model, weather, rng)
-        seen_from = Shots(sweep.directions) if self.motion == "raw" else shots
+        seen_from = Shots(sweep.directions) if self.motion_distortion == "raw" else shots
         points = _points(found, seen_from, sweep, model)
         return PointCloud(self.name, lidar, points, scene.time_s)
 

@@ -65,7 +65,7 @@ class RgbCamera(Mounted):
         lens: How directions become image points: a pinhole; brown_conrady, OpenCV's usual model
             with k1 to k6, p1 and p2; kannala_brandt, its fisheye with k1 to k4; both with
             field_deg, the full angle beyond which they show nothing; equirectangular, a panorama;
-            or published, a known ``camera`` with its own field of view: kitti_raw_02, euroc_cam0
+            or calibrated, a known ``camera`` with its own field of view: kitti_raw_02, euroc_cam0
             or tum_vi_cam0.
         channels: What is written as images.
         ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
@@ -106,7 +106,7 @@ class RgbCamera(Mounted):
                 f"{PINHOLE_MAX_DEG:g}, or another lens, such as {{model: kannala_brandt}}"
             )
         if isinstance(self.lens, Published) and "hfov_deg" in self.model_fields_set:
-            raise ValueError("a published lens has its own field of view: leave out hfov_deg")
+            raise ValueError("a calibrated lens has its own field of view: leave out hfov_deg")
         if self.intrinsics().folds_over():
             raise ValueError(
                 f"lens {self.lens.model}: its polynomial folds over inside the image, where no "

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from generator.config.document import MAX_FILE_BYTES, Node, load
+from generator.config.paths import find_path
 from generator.config.problems import Position, Problem, Problems
 from generator.core.errors import ConfigError, did_you_mean
 
@@ -82,11 +83,7 @@ def _names(node: Node, endings: tuple[str, ...]) -> bool:
 
 def _path(node: Node) -> Path:
     """The file that a node names: from the folder of the document that names it."""
-    beside = Path(node.position.file).parent / node.text
-    for path in (beside, Path(node.text)):
-        if path.is_file():
-            return path
-    raise _refusal(node.position, "", f"there is no file '{node.text}', nor '{beside}'")
+    return find_path(node.text, node.position, "", "file")
 
 
 def _cells(file: str, line: int, text: str) -> list[Node]:

@@ -49,7 +49,7 @@ class Watcher(Instrument):
     which they hold. Lanes outside junctions are taken to have lines on both sides.
 
     Attributes:
-        watches: What is reported.
+        events: What is reported.
         obstacle_m: An obstacle straight ahead is reported when it is nearer than this.
         light_m: A traffic light is reported when its stop line is nearer than this.
         proximity_m: The nearest thing is reported when it is nearer to the device than this.
@@ -59,7 +59,7 @@ class Watcher(Instrument):
     kind: ClassVar[str] = "watcher"
     type: Literal["watcher"] = "watcher"
     name: str = Field("watcher", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
-    watches: tuple[Occurrence, ...] = Field(EVERYTHING, min_length=1)
+    events: tuple[Occurrence, ...] = Field(EVERYTHING, min_length=1)
     obstacle_m: float = Field(20.0, gt=0, le=500)
     light_m: float = Field(50.0, gt=0, le=500)
     proximity_m: float = Field(3.0, gt=0, le=500)
@@ -77,15 +77,15 @@ class Watcher(Instrument):
         own, others = self._company(scene)
         times_s = self._instants(scene)
         rows: list[Row] = []
-        if "collision" in self.watches:
+        if "collision" in self.events:
             rows += _collisions(own, others, times_s)
-        if "lane_invasion" in self.watches:
+        if "lane_invasion" in self.events:
             rows += _invasions(scene, own, times_s)
-        if "obstacle" in self.watches:
+        if "obstacle" in self.events:
             rows += self._obstacle(scene, own, others)
-        if "traffic_light" in self.watches:
+        if "traffic_light" in self.events:
             rows += self._light(scene, own)
-        if "proximity" in self.watches:
+        if "proximity" in self.events:
             rows += self._proximity(scene, others)
         return Table(self.name, scene.device(self.name), _table(rows), scene.time_s)
 

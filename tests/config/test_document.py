@@ -11,7 +11,7 @@ import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from generator.config.document import load, merge, parse
+from generator.config.document import load, parse
 from generator.config.problems import Position
 from generator.core.errors import ConfigError
 
@@ -426,52 +426,3 @@ def test_any_bytes_in_a_file_give_a_tree_or_an_error(
 
 
 # --- merging
-
-
-def test_merging_lays_mappings_over_each_other() -> None:
-    """Key by key, at every depth; lists and scalars are replaced as a whole."""
-    base = parse("{a: {x: 1, y: [1, 2]}, b: 1, c: {z: 1}}", "base.yaml")
-    override = parse("{a: {y: [3], w: 4}, b: {v: 5}, d: 6}", "over.yaml")
-
-    merged = merge(base, override)
-
-    assert merged.plain() == {
-        "a": {"x": 1, "y": [3], "w": 4},
-        "b": {"v": 5},
-        "c": {"z": 1},
-        "d": 6,
-    }
-
-
-def test_merged_values_keep_the_place_they_came_from() -> None:
-    """Messages point into the file in which the value stands."""
-    merged = merge(parse("a: {x: 1, y: 2}", "base.yaml"), parse("a: {y: 3}", "over.yaml"))
-    x, y, a = merged.get("a", "x"), merged.get("a", "y"), merged.get("a")
-
-    assert x is not None
-    assert y is not None
-    assert a is not None
-    assert (str(x.position), str(y.position)) == ("base.yaml:1:8", "over.yaml:1:8")
-    assert (a.key_position("x").file, a.key_position("y").file) == ("base.yaml", "over.yaml")
-
-
-def test_merging_replaces_a_distribution_by_another_as_a_whole() -> None:
-    """Two distributions must not end up in one mapping."""
-    base = parse("{r: {uniform: [0, 1]}, s: {uniform: [0, 1]}, t: 1}", "base.yaml")
-    override = parse("{r: {normal: {mean: 0, stddev: 1}}, t: {choice: [1, 2]}}", "over.yaml")
-
-    assert merge(base, override).plain() == {
-        "r": {"normal": {"mean": 0, "stddev": 1}},
-        "s": {"uniform": [0, 1]},
-        "t": {"choice": [1, 2]},
-    }
-
-
-def test_merging_leaves_its_arguments_alone() -> None:
-    """Trees are values."""
-    base, override = parse("a: {x: 1}", "b.yaml"), parse("a: {y: 2}", "o.yaml")
-
-    merge(base, override)
-
-    assert base.plain() == {"a": {"x": 1}}
-    assert override.plain() == {"a": {"y": 2}}

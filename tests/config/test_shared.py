@@ -12,7 +12,7 @@ from generator.core.errors import ConfigError
 from generator.core.streams import Streams
 
 SECTION = """
-lanes: {given: road, highway: 3, otherwise: {uniform_integer: [1, 2]}}
+lanes: {switch: road, highway: 3, default: {uniform_integer: [1, 2]}}
 road: {choice: {street: 3, highway: 1}}
 density: {uniform: [0.1, 0.5]}
 wet: {probability: 0.5}
@@ -64,7 +64,7 @@ def test_references_and_selections_are_replaced_wherever_they_stand() -> None:
     """In lists, in mappings, inside selections."""
     text = """
     a: $shared.lanes
-    b: [1, {given: road, highway: [$shared.lanes, 9], otherwise: none}]
+    b: [1, {switch: road, highway: [$shared.lanes, 9], default: none}]
     c: {uniform: [0, 1]}
     """
     node = parse(text, "test")
@@ -78,7 +78,7 @@ def test_references_and_selections_are_replaced_wherever_they_stand() -> None:
 
 def test_numbers_and_flags_select_by_value() -> None:
     """Keys are read as YAML reads them."""
-    node = parse("x: {given: k, 1: one, 2: two}\ny: {given: f, true: yes, false: no}", "test")
+    node = parse("x: {switch: k, 1: one, 2: two}\ny: {switch: f, true: yes, false: no}", "test")
     assert resolved(node, {"k": 2, "f": True}).plain() == {"x": "two", "y": "yes"}
 
 
@@ -92,7 +92,7 @@ def test_probes_show_every_outcome_of_every_choice() -> None:
     ("text", "fact"),
     [
         ("x: $shared.raod", "test:1:4: x: there is no shared value 'raod'; expected one of road"),
-        ("x: {given: road, bend: 1}", "test:1:4: x: no entry for road = 'street'"),
+        ("x: {switch: road, bend: 1}", "test:1:4: x: no entry for road = 'street'"),
     ],
 )
 def test_a_reference_that_leads_nowhere_is_one_clear_error(text: str, fact: str) -> None:

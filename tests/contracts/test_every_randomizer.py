@@ -36,7 +36,7 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields without which a randomizer cannot be made, or may leave a scene as it is."""
 
 PHYSICS_BOUND = (
-    "along", "arm_configuration", "arm_motion", "distractors", "ego_on_lane", "objects",
+    "arm_configuration", "arm_motion", "distractors", "ego_on_lane", "lane_objects", "objects",
     "physics_properties", "traffic_flow",
 )  # fmt: skip
 """Randomizers whose draws physics has to see."""
@@ -57,9 +57,11 @@ def nominal_scene() -> Scene:
         Camera(name, look_at((1.0, 0.0, 1.5), (0.0, 0.0, 0.8)), lens) for name in ("left", "right")
     )
     lanes = (Lane("lane", "driving", ((-40.0, 5.0, 0.0), (40.0, 5.0, 0.0)), 3.5, road="street"),)
-    group = ObjectGroup("along", (), ("wagon",), 1, "along", lanes=("driving",))
-    wagon = Body("along/0", "wagon", SE3((0.0, 5.0, 0.75)), instance_id=99, group="along")
-    labelled = Instance(99, "along/0", "car", 0, "wagon")
+    group = ObjectGroup("lane_objects", (), ("wagon",), 1, "along", lanes=("driving",))
+    wagon = Body(
+        "lane_objects/0", "wagon", SE3((0.0, 5.0, 0.75)), instance_id=99, group="lane_objects"
+    )
+    labelled = Instance(99, "lane_objects/0", "car", 0, "wagon")
     ego = Body("ego", "wagon", SE3((-20.0, 5.0, 0.75)), instance_id=98)
     carrier = Instance(98, "ego", "ego", 0, "wagon", annotated=False)
     scene = build("test", elements, FakeAssets())
@@ -153,7 +155,7 @@ def test_it_explains_itself(kind: str) -> None:
     undescribed = [
         name
         for name, entry in schema["properties"].items()
-        if not entry.get("description") and name not in {"type", "name", "every"}
+        if not entry.get("description") and name not in {"type", "name", "stage"}
     ]
 
     assert not undescribed
@@ -178,19 +180,19 @@ def test_values_do_not_change_after_it_is_made(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", PHYSICS_BOUND)
 def test_what_physics_has_to_see_is_drawn_per_scene_only(kind: str) -> None:
-    """``every: view`` would come after physics, and is refused."""
-    assert made(kind).stage is Stage.BUILD
-    plain = {"type": kind, "name": kind, "every": "view", **GIVEN.get(kind, {})}
-    with pytest.raises(ValidationError, match="every"):
+    """``stage: view`` would come after physics, and is refused."""
+    assert made(kind).stage == Stage.BUILD
+    plain = {"type": kind, "name": kind, "stage": "view", **GIVEN.get(kind, {})}
+    with pytest.raises(ValidationError, match="stage"):
         TABLE.load(kind).model_validate_json(json.dumps(plain))
 
 
 @pytest.mark.parametrize("kind", [kind for kind in TABLE if kind not in PHYSICS_BOUND])
 def test_looks_can_be_drawn_per_scene_or_per_view(kind: str) -> None:
-    """``every`` names the stage."""
-    for every, stage in (("scene", Stage.BUILD), ("view", Stage.VIEW)):
-        plain = {"type": kind, "name": kind, "every": every, **GIVEN.get(kind, {})}
-        assert TABLE.load(kind).model_validate_json(json.dumps(plain)).stage is stage
+    """``stage`` names the stage."""
+    for word, stage in (("scene", Stage.BUILD), ("view", Stage.VIEW)):
+        plain = {"type": kind, "name": kind, "stage": word, **GIVEN.get(kind, {})}
+        assert TABLE.load(kind).model_validate_json(json.dumps(plain)).stage == stage
 
 
 def assert_plain(value: Any) -> None:

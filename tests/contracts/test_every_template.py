@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 
 import configs
 import scene_templates
 from generator.assemble.recipe import nominal_scene
+from generator.assemble.schema import config_schema
 from generator.assemble.spec import Spec, load_spec
 from generator.assets.library import Library, open_library
 from generator.config.describe import describe
@@ -45,6 +47,12 @@ def scene_of(name: str) -> Scene:
     return nominal_scene(spec(name), spec(name).probes[0], library())
 
 
+@cache
+def validator() -> Draft202012Validator:
+    """Checks documents against the schema of configurations."""
+    return Draft202012Validator(config_schema())
+
+
 def box_m(body: Body) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of a body in the world [m], from the corners of its own box."""
     low, high = (np.array(corner) * body.scale for corner in library().bounds_m(body.asset))
@@ -56,7 +64,7 @@ def box_m(body: Body) -> tuple[np.ndarray, np.ndarray]:
 def randomized(name: str, streams: Streams) -> Scene | None:
     """One attempt at a scene, without physics; None where a randomizer found no valid draw."""
     scene = scene_of(name)
-    for randomizer in sorted(spec(name).randomizers, key=lambda r: r.stage is Stage.VIEW):
+    for randomizer in sorted(spec(name).randomizers, key=lambda r: r.stage == Stage.VIEW):
         try:
             scene = randomizer(scene, library(), streams.rng(randomizer.name))
         except LayoutRejected:
@@ -101,6 +109,16 @@ def test_configuration_tells_editors_its_schema(name: str) -> None:
     text = (Path(configs.__path__[0]) / f"{name}.yaml").read_text()
 
     assert text.startswith("# yaml-language-server: $schema=schema.json\n")
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_configuration_satisfies_the_schema_that_editors_check_it_against(name: str) -> None:
+    """jsonschema, an independent validator, finds no error in any file that is shipped."""
+    document = load(Path(configs.__path__[0]) / f"{name}.yaml").plain()
+
+    errors = [error.json_path for error in validator().iter_errors(document)]
+
+    assert not errors
 
 
 @pytest.mark.parametrize("name", CONFIGS)

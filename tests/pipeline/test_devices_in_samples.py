@@ -73,8 +73,7 @@ def pipeline(seed: int = 3) -> Pipeline:
     for sensor in SENSORS:
         scene = sensor.mount(scene)
     recipe = Recipe(
-        open_scene=lambda streams: (scene, ()),
-        sensors=SENSORS,
+        open_scene=lambda streams: (scene, (), SENSORS),
         channels=frozenset({Channel.INSTANCE}),
         image_truth=lambda scene, reading: None,  # type: ignore[arg-type, return-value]
         split_shares={"train": 1.0},

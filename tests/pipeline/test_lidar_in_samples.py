@@ -18,7 +18,7 @@ SMALL = (
     "sensors[0].size_px=[128, 64]",
     "sensors[1].model=VLP-16",
     "sensors[1].ideal=true",
-    "sensors[1].motion=frozen",
+    "sensors[1].motion_distortion=none",
     "sensors[2].size_px=[64, 32]",
 )
 

@@ -114,8 +114,7 @@ def pipeline(
     """A pipeline of test doubles."""
     sensor = OneCamera()
     recipe = Recipe(
-        open_scene=lambda streams: (sensor.mount(Scene("test")), randomizers),
-        sensors=(sensor,),
+        open_scene=lambda streams: (sensor.mount(Scene("test")), randomizers, (sensor,)),
         channels=frozenset(),
         image_truth=lambda scene, reading: ImageTruth(reading.camera, ()),
         split_shares=splits or {"train": 0.8, "val": 0.2},

@@ -65,8 +65,8 @@ def test_things_face_the_way_of_their_lane_or_its_left() -> None:
 
 def test_share_of_used_places_is_that_of_the_distribution() -> None:
     """400 places at 30 %: within four standard errors."""
-    full = drawn(street(), gap_m=Constant(0.14), spare_m=0.1)
-    some = drawn(street(), gap_m=Constant(0.14), spare_m=0.1, used=Probability(0.3))
+    full = drawn(street(), gap_m=Constant(0.14), min_clearance_m=0.1)
+    some = drawn(street(), gap_m=Constant(0.14), min_clearance_m=0.1, occupancy=Probability(0.3))
     n = len(full.bodies)
 
     assert n == pytest.approx(400, abs=4)
@@ -88,11 +88,11 @@ def test_nothing_overlaps_even_when_lanes_are_walked_often(scattered: bool) -> N
     scene = drawn(
         street(),
         gap_m=Uniform(0.0, 0.1),
-        rows=4,
+        passes=4,
         lateral=Uniform(-1.0, 1.0),
         yaw_deg=Uniform(-180.0, 180.0),
         count=Constant(120),
-        scattered=scattered,
+        uniform_area=scattered,
     )
     prints = [Footprint.of(b.T_world_body, FakeAssets().bounds_m(b.asset)) for b in scene.bodies]
 
@@ -107,14 +107,14 @@ def test_too_many_scattered_things_are_refused_by_name() -> None:
     """A square of 10 cm has room for few bricks."""
     lane = Lane("a", "driving", ((0.0, 0.0, 0.0), (0.1, 0.1, 0.0)), 0.1)
     with pytest.raises(LayoutRejected, match="no room left"):
-        drawn(replace(street(), lanes=(lane,)), count=Constant(500), scattered=True)
+        drawn(replace(street(), lanes=(lane,)), count=Constant(500), uniform_area=True)
 
 
 def test_an_impossible_density_is_refused_by_name() -> None:
     """Two lanes of 40 m have room for 40 bricks every 2 m, not for 400."""
-    assert len(drawn(street(), gap_m=Constant(1.94), at_least=38).bodies) >= 38
+    assert len(drawn(street(), gap_m=Constant(1.94), min_count=38).bodies) >= 38
     with pytest.raises(LayoutRejected, match="too few free places"):
-        drawn(street(), gap_m=Constant(1.94), at_least=400)
+        drawn(street(), gap_m=Constant(1.94), min_count=400)
 
 
 def test_the_camera_rides_where_nothing_stands() -> None:

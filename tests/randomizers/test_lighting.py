@@ -132,7 +132,7 @@ def test_illuminance_can_follow_a_sequence() -> None:
 
 
 PANELS = {
-    "panel_m": Uniform(0.4, 0.9),
+    "width_m": Uniform(0.4, 0.9),
     "panel_aspect": Uniform(0.5, 0.8),
     "radius_m": Uniform(0.2, 0.3),
 }
@@ -184,7 +184,7 @@ def test_a_visible_panel_hangs_in_a_housing_and_the_next_draw_takes_it_away() ->
     lighting = Lighting(name="soft", kind=Constant("rectangle"), visible=True, count=Constant(2))
     scene = lighting(SCENE, FakeAssets(), rng_of("soft", 3))
     again = Lighting(name="lamps")(scene, FakeAssets(), rng_of("lamps", 3))
-    kept = Lighting(name="lamps", keep=True)(scene, FakeAssets(), rng_of("lamps", 3))
+    kept = Lighting(name="lamps", keep_existing=True)(scene, FakeAssets(), rng_of("lamps", 3))
 
     assert [body.name for body in scene.bodies] == ["soft/0", "soft/1"]
     assert [light.body for light in scene.lights] == ["soft/0", "soft/1"]
@@ -208,7 +208,7 @@ def test_cameras_and_lamps_keep_clear_of_housings() -> None:
     [
         ({"illuminance_lux": -1.0}, "0"),
         ({"illuminance_lux": float("nan")}, "finite"),
-        ({"panel_m": 0.0}, "0"),
+        ({"width_m": 0.0}, "0"),
         ({"panel_aspect": 0.0}, "panel_aspect must be above 0"),
         ({"panel_aspect": 1.5}, "1"),
         ({"radius_m": -0.1}, "0"),

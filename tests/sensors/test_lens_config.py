@@ -65,7 +65,7 @@ def test_the_end_of_a_field_is_given_as_a_full_angle() -> None:
 def test_published_cameras_have_their_own_numbers(name: str) -> None:
     """At their own size: focal lengths as printed, the principal point half a pixel off."""
     known = CALIBRATIONS[name]
-    k = camera(lens={"model": "published", "camera": name}, size_px=known.size_px).intrinsics
+    k = camera(lens={"model": "calibrated", "camera": name}, size_px=known.size_px).intrinsics
 
     assert (k.fx_px, k.fy_px) == pytest.approx((known.fx_px, known.fy_px))
     assert (k.cx_px - 0.5, k.cy_px - 0.5) == pytest.approx((known.cx_px, known.cy_px))
@@ -75,7 +75,7 @@ def test_published_cameras_have_their_own_numbers(name: str) -> None:
 
 def test_a_published_camera_is_scaled_to_the_width_and_cut_to_the_height() -> None:
     """KITTI's at half its size, 100 of 256 rows: the rays of the rows that stay do not change."""
-    lens = {"model": "published", "camera": "kitti_raw_02"}
+    lens = {"model": "calibrated", "camera": "kitti_raw_02"}
     whole = camera(lens=lens, size_px=(1392, 512)).intrinsics
     small = camera(lens=lens, size_px=(696, 100)).intrinsics
 
@@ -100,7 +100,7 @@ def test_a_published_camera_is_scaled_to_the_width_and_cut_to_the_height() -> No
         ({"lens": {"model": "kannala_brandt", "p1": 0.1}}, "p1"),
         ({"lens": {"model": "wide"}}, "model"),
         (
-            {"lens": {"model": "published", "camera": "euroc_cam0"}, "hfov_deg": 60},
+            {"lens": {"model": "calibrated", "camera": "euroc_cam0"}, "hfov_deg": 60},
             "leave out hfov_deg",
         ),
     ],

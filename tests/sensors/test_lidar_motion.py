@@ -45,7 +45,9 @@ def scene_of(bodies: list[Body], *tracks: Track) -> Scene:
 
 def sweep(scene: Scene, motion: str, **fields: object) -> PointCloud:
     """A sweep without noise."""
-    sensor = LidarSensor(name="velodyne", model="VLP-16", ideal=True, motion=motion, **fields)  # type: ignore[arg-type]
+    sensor = LidarSensor(
+        name="velodyne", model="VLP-16", ideal=True, motion_distortion=motion, **fields
+    )  # type: ignore[arg-type]
     renderer = WarpRenderer(FakeLibrary(MESHES), "cpu")
     return sensor.capture(scene, renderer, frozenset(), Streams(1, 2).rng("lidar"))
 
@@ -86,7 +88,7 @@ def test_a_moving_wall_is_met_where_it_is_when_each_pulse_leaves() -> None:
     start = (20.1, 0.0, 0.0)
     scene = scene_of([Body("wall", "wall", SE3(start))], moving("wall", start, turning=False))
 
-    cloud = sweep(scene, "compensated")
+    cloud = sweep(scene, "deskewed")
 
     p = cloud.points["position_m"].astype(np.float64)
     x_m = 20.0 + SPEED_M_S[0] * times_s(cloud) - 0.5
@@ -110,11 +112,11 @@ def test_raw_points_of_a_moving_scanner_are_in_the_frame_of_their_pulse() -> Non
     assert np.ptp(cloud.points["time_s"]) > 0.02
 
 
-def test_compensated_points_are_in_the_frame_of_the_scene_s_instant() -> None:
-    """The still wall is a plane there; uncompensated it is off by decimetres."""
+def test_deskewed_points_are_in_the_frame_of_the_scene_s_instant() -> None:
+    """The still wall is a plane there; as measured it is off by decimetres."""
     scene = scene_of([Body("wall", "wall", SE3((30.1, 0.0, 0.0)))], moving("cart", (0, 0, -3)))
 
-    cloud, raw = sweep(scene, "compensated"), sweep(scene, "raw")
+    cloud, raw = sweep(scene, "deskewed"), sweep(scene, "raw")
 
     def wall_x(points: np.ndarray) -> np.ndarray:
         yaw, eye_m = scanner_poses(np.array([0.2]))
@@ -132,7 +134,7 @@ def test_points_on_a_body_that_turns_past_a_turning_scanner_lie_on_it() -> None:
     scene = scene_of([Body("box", "box", SE3(start), instance_id=1)],
                      moving("box", start), moving("cart", (0, 0, -3), turning=False))  # fmt: skip
 
-    cloud = sweep(scene, "compensated")
+    cloud = sweep(scene, "deskewed")
 
     t = times_s(cloud)
     p_world = cloud.points["position_m"] + (SPEED_M_S * 0.2 + (0.5, 0.0, 0.0))
@@ -148,19 +150,19 @@ def test_frozen_scanners_see_one_instant() -> None:
     start = (20.1, 0.0, 0.0)
     scene = scene_of([Body("wall", "wall", SE3(start))], moving("wall", start, turning=False))
 
-    x_m = sweep(scene, "frozen").points["position_m"][:, 0]
+    x_m = sweep(scene, "none").points["position_m"][:, 0]
 
     np.testing.assert_allclose(x_m, 20.0 + SPEED_M_S[0] * 0.2 - 0.5, atol=1e-4)
 
 
-@pytest.mark.parametrize("motion", ["raw", "compensated"])
+@pytest.mark.parametrize("motion", ["raw", "deskewed"])
 def test_where_nothing_moves_every_kind_of_sweep_is_the_same(motion: str) -> None:
     """Byte by byte; a track that rests moves nothing either."""
     hall = Body("hall", "hall", SE3((0.0, 0.0, -5.0)))
     still = scene_of([hall])
     resting = Track("hall", 0.1, (hall.T_world_body,) * 4)
 
-    frozen = sweep(still, "frozen").points.tobytes()
+    frozen = sweep(still, "none").points.tobytes()
 
     assert sweep(still, motion).points.tobytes() == frozen
     assert sweep(scene_of([hall], resting), motion).points.tobytes() == frozen

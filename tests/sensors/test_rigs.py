@@ -169,9 +169,9 @@ def sampled(
             ("top", Modality.LIDAR),
         )
     )
+    watching = (Watching("early"), Watching("late"), Watching("top", lidar=True))
     made = Recipe(
-        open_scene=lambda streams: (scene, ()),
-        sensors=(Watching("early"), Watching("late"), Watching("top", lidar=True)),  # type: ignore[arg-type]
+        open_scene=lambda streams: (scene, (), watching),  # type: ignore[arg-type]
         channels=frozenset(),
         image_truth=image_truth,
         frame_truth=frame_truth,

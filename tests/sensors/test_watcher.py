@@ -53,7 +53,7 @@ def test_collision_of_two_that_move_has_the_speed_between_them() -> None:
     other = thing(2, "other", "car", SE3((20.0, 0.0, 0.0)))
     coming = track_of("other", straight((20.0, 0.0), (-5.0, 0.0)))
     scene = world(others=[other], tracks=[coming])
-    rows = of_kind(readings(Watcher(watches=("collision",)), scene, 16), "collision")
+    rows = of_kind(readings(Watcher(events=("collision",)), scene, 16), "collision")
 
     assert rows["time_s"].tolist() == pytest.approx([1.04], abs=0.0101)
     assert rows[0]["value"] == pytest.approx(15.0, abs=1e-4)
@@ -157,7 +157,7 @@ def test_what_lies_flat_on_the_road_is_no_obstacle() -> None:
 def test_proximity_is_the_distance_to_the_nearest_box() -> None:
     """Of a device 1 m up and 2 m ahead: straight to the face of a wall."""
     wall = thing(4, "wall", "building", SE3((5.0, 0.0, 0.0)), WALL_M)
-    sensor = Watcher(watches=("proximity",), offset_m=(2.0, 0.0, 1.0))
+    sensor = Watcher(events=("proximity",), offset_m=(2.0, 0.0, 1.0))
     rows = reading(sensor, world(others=[wall]), 0).rows
 
     assert rows["instance_id"].tolist() == [4]
@@ -208,5 +208,5 @@ def test_a_carrier_without_a_box_is_named() -> None:
 
 def test_unknown_occurrences_are_refused() -> None:
     """When they are read."""
-    with pytest.raises(ValidationError, match="watches"):
-        Watcher(watches=("crash",))  # type: ignore[arg-type]
+    with pytest.raises(ValidationError, match="events"):
+        Watcher(events=("crash",))  # type: ignore[arg-type]

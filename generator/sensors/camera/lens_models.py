@@ -91,7 +91,7 @@ class Published(Strict):
             tum_vi_cam0, a fisheye of 195 degrees.
     """
 
-    model: Literal["published"]
+    model: Literal["calibrated"]
     camera: Literal["euroc_cam0", "kitti_raw_02", "tum_vi_cam0"]
 
     def intrinsics(self, width_px: int, height_px: int) -> Intrinsics:

@@ -1,0 +1,159 @@
+"""Configurations that extend others, and elements that override a template's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from generator.config.document import Node, load
+from generator.config.merging import merge, merge_named, name_of, with_entry
+from generator.config.paths import find_path
+from generator.config.problems import Position, Problem, Problems
+from generator.config.renames import with_current_words
+from generator.config.scalars import shown
+from generator.core.errors import ConfigError, did_you_mean
+
+LISTS = ("randomizers", "sensors", "annotations", "exporters")
+"""Lists of plug-ins of a configuration, besides its elements."""
+
+NAMED = (*LISTS, "elements", "shared")
+"""Sections whose entries have names, by which ``without`` leaves them out."""
+
+ALL = "all"
+"""Instead of a list of names: everything that is inherited in a section."""
+
+EXTENDS_MAX = 8
+"""Longest chain of configurations that extend one another."""
+
+
+def extended_document(
+    path: Path, shipped: Sequence[Path], extending: tuple[Path, ...] = ()
+) -> Node:
+    """The document in a file laid over the one that it extends.
+
+    Args:
+        path: Of the file.
+        shipped: Configurations that come with the package.
+        extending: The files that lead here, each of which extends the next.
+
+    Raises:
+        ConfigError: a file is missing or invalid, or extends itself.
+    """
+    document = with_current_words(load(path))
+    base = document.get("extends")
+    if base is None:
+        return document
+    chain = (*extending, path)
+    if not isinstance(base.content, str):
+        raise ConfigError(str(Problem(base.position, "extends", "expected a configuration")))
+    found = find_path(base.content, base.position, "extends", "configuration", shipped=shipped)
+    if found.resolve() in [file.resolve() for file in chain]:
+        fact = f"extends itself: {' -> '.join(str(file) for file in (*chain, found))}"
+        raise ConfigError(str(Problem(base.position, "extends", fact)))
+    if len(chain) > EXTENDS_MAX:
+        fact = f"more than {EXTENDS_MAX} configurations extend one another"
+        raise ConfigError(str(Problem(base.position, "extends", fact)))
+    return _inheriting(extended_document(found, shipped, chain), document)
+
+
+def _inheriting(base: Node, document: Node) -> Node:
+    """A configuration laid over the one that it extends."""
+    content = dict(mapping_of(_without(base, document.get("without"))))
+    for key, node in mapping_of(document).items():
+        if key in ("extends", "without"):
+            continue
+        inherited = content.get(key)
+        if inherited is None:
+            content[key] = node
+        elif key in (*LISTS, "elements"):
+            content[key] = _merged_items(inherited, node)
+        else:
+            content[key] = merge(inherited, node)
+    positions = {**base.key_positions, **document.key_positions}
+    return Node(document.position, content, positions)
+
+
+def _merged_items(base: Node, override: Node) -> Node:
+    """Plug-ins laid over inherited ones; elements of a template are overridden by mappings."""
+    if isinstance(base.content, tuple) and isinstance(override.content, Mapping):
+        return overridden_elements(base, override)
+    if isinstance(base.content, tuple):
+        return merge_named(base, override)
+    return merge(base, override)
+
+
+def _without(base: Node, dropped: Node | None) -> Node:
+    """The inherited document without the items that ``without`` names, section by section."""
+    if dropped is None:
+        return base
+    content, problems = dict(mapping_of(base)), Problems()
+    for key, names in mapping_of(dropped).items():
+        field = f"without.{key}"
+        if key not in NAMED:
+            fact = f"unknown key; expected one of {', '.join(NAMED)}"
+            problems.add(dropped.key_position(key), field, fact)
+        elif names.content == ALL:
+            content.pop(key, None)
+        elif not isinstance(names.content, tuple):
+            problems.add(names.position, field, f"expected a list of names, or {ALL}")
+        else:
+            content[key] = _dropped(content.get(key), names.content, field, problems)
+    problems.raise_if_any()
+    return Node(base.position, content, base.key_positions)
+
+
+def _dropped(section: Node | None, names: tuple[Node, ...], field: str, problems: Problems) -> Node:
+    """A list or mapping of plug-ins without some of them."""
+    inherited = section.content if section is not None else ()
+    kept: dict[str, Node] = {}
+    if isinstance(inherited, Mapping):
+        kept = dict(inherited)
+    elif isinstance(inherited, tuple):
+        kept = {name_of(item): item for item in inherited}
+    for name in names:
+        if str(name.content) not in kept:
+            fact = f"nothing inherited is named {shown(name.content)}; expected one of "
+            fact += ", ".join(kept) + did_you_mean(str(name.content), kept)
+            problems.add(name.position, field, fact)
+        kept.pop(str(name.content), None)
+    where = section.position if section is not None else Position("(default)", 1, 1)
+    return Node(where, kept if isinstance(inherited, Mapping) else tuple(kept.values()))
+
+
+def overridden_elements(elements: Node, overrides: Node) -> Node:
+    """A list of elements with overrides by name merged in; those with a type may be new.
+
+    Raises:
+        ConfigError: an override names no element.
+    """
+    assert isinstance(elements.content, tuple)
+    by_name = {name_of(node): node for node in elements.content}
+    problems = Problems()
+    if not isinstance(overrides.content, Mapping):
+        problems.add(overrides.position, "elements", "expected overrides by element name")
+    else:
+        for name, given in overrides.content.items():
+            key = Node(overrides.key_position(name), name, text=name)
+            node = given if given.get("name") else with_entry(given, "name", key)
+            if name not in by_name and node.get("type") is not None:
+                # A new element that states its type comes after all of the template's.
+                by_name[name] = node
+            elif name not in by_name:
+                fact = f"the template has no element '{name}'; expected one of "
+                fact += ", ".join(by_name) + did_you_mean(name, by_name)
+                problems.add(overrides.key_position(name), f"elements.{name}", fact)
+            else:
+                by_name[name] = merge(by_name[name], node)
+    problems.raise_if_any()
+    return Node(elements.position, tuple(by_name.values()))
+
+
+def mapping_of(node: Node) -> Mapping[str, Node]:
+    """The entries of a mapping.
+
+    Raises:
+        ConfigError: it is none.
+    """
+    if not isinstance(node.content, Mapping):
+        raise ConfigError(f"{node.position}: expected a mapping of settings")
+    return node.content

@@ -1,0 +1,87 @@
+"""How one document is laid over another.
+
+1. Mappings merge key by key; numbers, texts and lists are replaced as a whole.
+2. A distribution and a selection by a shared value are one value each: they are replaced.
+3. A mapping with another ``type`` (``model`` where it has no type) describes another thing: it
+   takes the place of the old one, of which nothing is left.
+4. Keys that choose assets (``asset``, ``ids``, ``tags``, ``any_of``) are alternatives: one that is
+   given drops those that are inherited.
+5. Lists of plug-ins merge item by item, see ``merge_named``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from generator.config.document import Node, is_distribution
+from generator.config.shared import is_reference
+
+ASSET_KEYS = frozenset({"asset", "ids", "tags", "any_of"})
+"""Alternatives: a mapping that gives one of these keys inherits none of them."""
+
+
+def merge(base: Node, override: Node) -> Node:
+    """``override`` laid over ``base``."""
+    if not isinstance(base.content, Mapping) or not isinstance(override.content, Mapping):
+        return override
+    if any(is_distribution(node) or is_reference(node) for node in (base, override)):
+        return override
+    if _differ_in_kind(base, override):
+        return override
+    dropped = ASSET_KEYS if ASSET_KEYS & override.content.keys() else frozenset()
+    content = {key: node for key, node in base.content.items() if key not in dropped}
+    for key, node in override.content.items():
+        content[key] = merge(content[key], node) if key in content else node
+    positions = {**base.key_positions, **override.key_positions}
+    return Node(override.position, content, positions)
+
+
+def merge_named(base: Node, override: Node) -> Node:
+    """A list of plug-ins laid over another.
+
+    An item merges with the inherited one of the same name. What is new comes after everything
+    inherited, or right before the inherited item that follows it in ``override``.
+    """
+    if not isinstance(base.content, tuple) or not isinstance(override.content, tuple):
+        return override
+    items = {name_of(item): item for item in base.content}
+    order = list(items)
+    new: list[str] = []
+    for item in override.content:
+        name = name_of(item)
+        if name in items:
+            items[name] = merge(items[name], _named_as(item, items[name]))
+            at = order.index(name)
+            order[at:at], new = new, []
+        else:
+            items[name] = item
+            new.append(name)
+    return Node(override.position, tuple(items[name] for name in (*order, *new)))
+
+
+def name_of(item: Node) -> str:
+    """What tells an item of a list of plug-ins from the others: its name, else its type."""
+    for node in (item.get("name"), item.get("type"), item):
+        if node is not None and isinstance(node.content, str):
+            return node.content
+    return str(item.position)
+
+
+def _named_as(item: Node, inherited: Node) -> Node:
+    """The item, with the name of the one it may take the place of."""
+    return item if item.get("name") else with_entry(item, "name", inherited.get("name"))
+
+
+def with_entry(node: Node, key: str, value: Node | None) -> Node:
+    """A mapping with one more entry in front; the node itself if it is no mapping."""
+    if value is None or not isinstance(node.content, Mapping):
+        return node
+    return Node(node.position, {key: value, **node.content}, node.key_positions)
+
+
+def _differ_in_kind(base: Node, override: Node) -> bool:
+    key = "type" if base.get("type") or override.get("type") else "model"
+    old, new = base.get(key), override.get(key)
+    if old is None or new is None:
+        return False
+    return isinstance(new.content, str) and old.content != new.content

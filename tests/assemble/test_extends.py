@@ -1,0 +1,195 @@
+"""A configuration may extend another: it states only what differs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from generator.assemble.documents import config_document
+from generator.assemble.spec import load_spec
+from generator.core.errors import ConfigError
+
+BASE = """\
+seed: 3
+template: tabletop
+render: {glare: 0.1, device: cpu}
+shared: {side: {uniform: [0, 1]}}
+elements: {table: {height_m: 0.8}}
+randomizers:
+  - {type: objects, name: clutter, count: 3}
+  - {type: colors, name: colors}
+sensors:
+  - {type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}
+annotations: [boxes2d]
+exporters: [{type: coco}]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a configuration to be extended."""
+    (tmp_path / "base.yaml").write_text(BASE)
+    return tmp_path
+
+
+def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
+    """Path of a configuration."""
+    path = folder / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text)
+    return str(path)
+
+
+def refusal(source: str) -> str:
+    """The message with which a configuration is refused."""
+    with pytest.raises(ConfigError) as caught:
+        load_spec(source)
+    return str(caught.value)
+
+
+def test_what_is_not_given_is_inherited(folder: Path) -> None:
+    """Sections merge key by key, plug-ins by name, new ones are appended."""
+    own = """\
+extends: base.yaml
+render: {glare: 0.2}
+elements: {table: {top_size_m: [1, 1]}}
+randomizers:
+  - {name: clutter, upright: true}
+  - {type: materials, name: finish}
+annotations: [poses]
+exporters: [{type: kitti}]
+"""
+    plain = config_document(written(folder, own)).plain()
+
+    assert plain == {
+        "seed": 3,
+        "template": "tabletop",
+        "render": {"glare": 0.2, "device": "cpu"},
+        "shared": {"side": {"uniform": [0, 1]}},
+        "elements": {"table": {"height_m": 0.8, "top_size_m": [1, 1]}},
+        "randomizers": [
+            {"type": "objects", "name": "clutter", "count": 3, "upright": True},
+            {"type": "colors", "name": "colors"},
+            {"type": "materials", "name": "finish"},
+        ],
+        "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 60}],
+        "annotations": ["boxes2d", "poses"],
+        "exporters": [{"type": "coco"}, {"type": "kitti"}],
+    }
+
+
+def test_inherited_plugins_can_be_left_out(folder: Path) -> None:
+    """Before merging, so that another of the same name starts afresh."""
+    own = """\
+extends: base.yaml
+without: {randomizers: [clutter], exporters: [coco], elements: [table], annotations: [boxes2d]}
+randomizers: [{type: materials, name: clutter}]
+"""
+    plain = config_document(written(folder, own)).plain()
+
+    assert plain["randomizers"] == [
+        {"type": "colors", "name": "colors"},
+        {"type": "materials", "name": "clutter"},
+    ]
+    assert (plain["exporters"], plain["elements"], plain["annotations"]) == ([], {}, [])
+    assert "without" not in plain
+
+
+def test_a_chain_is_followed_and_paths_start_from_each_file(folder: Path) -> None:
+    """``../base.yaml`` is relative to the file that says so, whatever the current folder is."""
+    written(folder, "extends: ../base.yaml\nseed: 4\n", "sub/middle.yaml")
+    spec = load_spec(written(folder, "extends: sub/middle.yaml\nviews_per_scene: 2\n"))
+
+    assert (spec.head.seed, spec.head.views_per_scene, spec.name) == (4, 2, "mine")
+
+
+def test_shipped_configurations_can_be_extended_even_by_one_of_the_same_name(
+    folder: Path,
+) -> None:
+    """A file never means itself."""
+    spec = load_spec(written(folder, "extends: tabletop.yaml\nseed: 99\n", "tabletop.yaml"))
+
+    assert spec.head.seed == 99
+    assert spec.randomizers == load_spec("tabletop").randomizers
+
+
+def test_an_error_in_an_inherited_value_points_to_its_own_file(folder: Path) -> None:
+    """File, line and column of the base."""
+    (folder / "base.yaml").write_text(BASE.replace("count: 3", "count: three"))
+    message = refusal(written(folder, "extends: base.yaml\n"))
+
+    assert message.startswith(f"{folder / 'base.yaml'}:7:43: randomizers[0].count: ")
+
+
+def test_a_circle_is_named(folder: Path) -> None:
+    """Every file on the way."""
+    first = written(folder, "extends: b.yaml\n", "a.yaml")
+    second = written(folder, "extends: a.yaml\n", "b.yaml")
+
+    message = refusal(first)
+
+    assert message.startswith(f"{second}:1:10: extends: extends itself: ")
+    assert f"{first} -> {second} -> {first}" in message
+
+
+def test_a_chain_has_an_end(folder: Path) -> None:
+    """Eight files deep."""
+    for k in range(10):
+        written(folder, f"extends: c{k + 1}.yaml\n", f"c{k}.yaml")
+    written(folder, BASE, "c10.yaml")
+
+    assert load_spec(str(folder / "c2.yaml")).head.seed == 3
+    assert "more than 8 configurations extend one another" in refusal(str(folder / "c1.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("text", "fact"),
+    [
+        ("extends: [base.yaml]\n", "1:10: extends: expected a configuration"),
+        ("extends: bass.yaml\n", "1:10: extends: there is no configuration 'bass.yaml'; looked"),
+        (
+            "extends: base.yaml\nwithout: {randomizers: [colour]}\n",
+            "2:25: without.randomizers: nothing inherited is named 'colour'; "
+            "expected one of clutter, colors (did you mean 'colors'?)",
+        ),
+        ("extends: base.yaml\nwithout: {sensor: [a]}\n", "2:11: without.sensor: unknown key"),
+        ("extends: base.yaml\nwithout: {sensors: a}\n", "2:20: without.sensors: expected a list"),
+    ],
+)
+def test_what_cannot_be_extended_is_refused_at_its_place(
+    folder: Path, text: str, fact: str
+) -> None:
+    """Line, column, field and fact."""
+    assert fact in refusal(written(folder, text))
+
+
+def template_of(folder: Path, defaults: str) -> str:
+    """Path of a configuration whose template lays down what its tables have in common."""
+    written(
+        folder,
+        f"defaults: {defaults}\n"
+        "elements:\n"
+        "  - {type: room, name: room, size_m: [4, 4, 3]}\n"
+        "  - {type: surface, name: a, asset: table, top_size_m: [1, 1]}\n"
+        "  - {type: surface, name: b, asset: table, top_size_m: [1, 1], height_m: 0.4}\n",
+        "tables.yaml",
+    )
+    camera = "sensors: [{type: rgb_camera, name: color}]\n"
+    return written(folder, f"template: tables.yaml\n{camera}elements: {{a: {{style: trestle}}}}\n")
+
+
+def test_a_template_lays_down_what_elements_of_a_type_have_in_common(tmp_path: Path) -> None:
+    """Each of them may differ, and a configuration overrides both."""
+    spec = load_spec(template_of(tmp_path, "{surface: {height_m: 0.7, style: bench}}"))
+    a, b = (e for e in spec.elements if e.type == "surface")
+
+    assert (a.height_m, a.style, b.height_m, b.style) == (0.7, "trestle", 0.4, "bench")
+
+
+def test_defaults_for_a_type_that_no_element_has_are_refused(tmp_path: Path) -> None:
+    """A misspelt type would otherwise change nothing."""
+    message = refusal(template_of(tmp_path, "{surfaces: {height_m: 0.7}}"))
+
+    assert f"{tmp_path / 'tables.yaml'}:1:12: defaults.surfaces: no element is of this" in message
+    assert "did you mean 'surface'?" in message

@@ -1,0 +1,119 @@
+"""Paths in configurations: relative to the file that names them, then shipped names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from generator.assemble.spec import load_spec
+from generator.config.paths import find_path
+from generator.config.problems import Position
+from generator.core.errors import ConfigError
+
+SENSOR = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}]\n"
+
+
+def at(file: Path) -> Position:
+    """A place in a document."""
+    return Position(str(file), 2, 5)
+
+
+def test_a_path_starts_from_the_file_that_names_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not from the current folder, even where that has a file of this name."""
+    for folder in ("configs", "elsewhere"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "sheet.yaml").touch()
+    document = tmp_path / "configs" / "mine.yaml"
+    document.touch()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+
+    found = find_path("sheet.yaml", at(document), "model", "file")
+
+    assert found == tmp_path / "configs" / "sheet.yaml"
+
+
+@pytest.mark.parametrize("position", [None, Position("--set", 1, 1)])
+def test_on_the_command_line_a_path_starts_from_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, position: Position | None
+) -> None:
+    """As everywhere in a shell."""
+    (tmp_path / "assets").mkdir()
+    monkeypatch.chdir(tmp_path)
+
+    assert find_path("assets", position, "", "folder", is_folder=True) == Path("assets")
+
+
+def test_a_tilde_is_the_users_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In documents, too, which no shell expands."""
+    (tmp_path / "sheet.yaml").touch()
+    monkeypatch.setenv("HOME", str(tmp_path))
+
+    found = find_path("~/sheet.yaml", at(tmp_path / "mine.yaml"), "model", "file")
+
+    assert found == tmp_path / "sheet.yaml"
+
+
+def test_shipped_names_come_last_and_need_no_suffix(tmp_path: Path) -> None:
+    """A file of the user comes before a shipped one; a file never means itself."""
+    shipped = [tmp_path / "package" / "street.yaml"]
+    document = tmp_path / "street.yaml"
+    document.touch()
+    (tmp_path / "other.yaml").touch()
+
+    def found(name: str, position: Position) -> Path:
+        return find_path(name, position, "extends", "configuration", shipped=shipped)
+
+    assert found("street", at(document)) == shipped[0]
+    assert found("street.yaml", at(document)) == shipped[0]
+    assert found("street.yaml", at(tmp_path / "other.yaml")) == document
+
+
+def test_the_message_says_where_it_was_looked_for(tmp_path: Path) -> None:
+    """Place, path, and the shipped names."""
+    document = tmp_path / "mine.yaml"
+    document.touch()
+
+    with pytest.raises(ConfigError) as caught:
+        find_path("stret", at(document), "template", "template", shipped=[Path("street.yaml")])
+
+    assert str(caught.value) == (
+        f"{document}:2:5: template: there is no template 'stret'; "
+        f"looked for '{tmp_path / 'stret'}'; shipped are street.yaml (did you mean 'street.yaml'?)"
+    )
+
+
+def test_asset_folders_start_from_the_configuration_and_do_not_enter_its_identity(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A data set is resumed from any folder: its plan holds the path as it is written."""
+    (tmp_path / "set" / "meshes").mkdir(parents=True)
+    (tmp_path / "set" / "mine.yaml").write_text(
+        "template: tabletop\nassets: {folders: [meshes]}\n" + SENSOR
+    )
+    monkeypatch.chdir(tmp_path)
+    first = load_spec("set/mine.yaml")
+    folders = first.asset_folders
+    monkeypatch.chdir(tmp_path / "set")
+    second = load_spec("mine.yaml")
+
+    assert [folder.resolve() for folder in second.asset_folders] == [tmp_path / "set" / "meshes"]
+    assert folders == (Path("set/meshes"),)
+    assert first.resolved == second.resolved
+    assert first.resolved["assets"] == {"folders": ["meshes"]}
+
+
+def test_a_missing_asset_folder_is_told_with_its_place(tmp_path: Path) -> None:
+    """Before anything runs."""
+    source = tmp_path / "mine.yaml"
+    source.write_text("template: tabletop\nassets: {folders: [mehses]}\n" + SENSOR)
+
+    with pytest.raises(ConfigError) as caught:
+        load_spec(str(source))
+
+    assert str(caught.value).startswith(
+        f"{source}:2:20: assets.folders[0]: there is no folder 'mehses'; "
+        f"looked for '{tmp_path / 'mehses'}'"
+    )

@@ -1,0 +1,121 @@
+"""Words of earlier releases are read, and a warning names the new one and its place."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import pytest
+
+from generator.assemble.spec import load_spec
+from generator.assemble.tables import TABLES
+from generator.config.document import parse
+from generator.config.renames import PLUGINS, RANDOMIZERS, TYPES, with_current_words
+from generator.core.errors import ConfigError
+
+OLD = """\
+template: street
+shared: {crowd: {choice: [few, many]}, gap: {given: crowd, few: 9, otherwise: 1}}
+randomizers:
+  - {type: along, name: parked, used: {given: crowd, few: false, otherwise: true}, rows: 2,
+     turned: true, scattered: false, at_least: 1, spare_m: 0.2, every: scene}
+  - {type: lighting, name: lamps, every: view, keep: true, panel_m: 0.5}
+  - {type: ceiling_lights, name: ceiling, rows: 2}
+sensors:
+  - {type: rgb_camera, name: color, lens: {model: published, camera: kitti_raw_02}}
+  - {type: lidar, name: top, motion: compensated}
+  - {type: watcher, name: log, watches: [collision]}
+"""
+
+NEW = """\
+template: street
+shared: {crowd: {choice: [few, many]}, gap: {switch: crowd, few: 9, default: 1}}
+randomizers:
+  - {type: lane_objects, name: parked, occupancy: {switch: crowd, few: false, default: true},
+     passes: 2, reversed: true, uniform_area: false, min_count: 1, min_clearance_m: 0.2,
+     stage: scene}
+  - {type: lighting, name: lamps, stage: view, keep_existing: true, width_m: 0.5}
+  - {type: ceiling_lights, name: ceiling, rows: 2}
+sensors:
+  - {type: rgb_camera, name: color, lens: {model: calibrated, camera: kitti_raw_02}}
+  - {type: lidar, name: top, motion_distortion: deskewed}
+  - {type: watcher, name: log, events: [collision]}
+"""
+
+
+def test_old_words_mean_what_the_new_ones_mean() -> None:
+    """The same document, word by word, and the order of its keys."""
+    with pytest.warns(FutureWarning):
+        current = with_current_words(parse(OLD, "old.yaml"))
+
+    assert current.plain() == parse(NEW, "new.yaml").plain()
+
+
+def test_the_warning_names_the_place_and_the_new_word() -> None:
+    """Each place once."""
+    with pytest.warns(FutureWarning) as caught:
+        with_current_words(parse(OLD, "old.yaml"))
+    messages = [str(warning.message) for warning in caught]
+
+    assert len(messages) == len(set(messages)) == 19
+    assert messages[0] == (
+        "old.yaml:2:46: shared.gap.given: 'given' is called 'switch' now; "
+        "the old name will be refused by the next release"
+    )
+    assert any(m.startswith("old.yaml:9:51: sensors[0].lens.model: 'published'") for m in messages)
+
+
+def test_current_words_warn_of_nothing() -> None:
+    """The document itself comes back."""
+    document = parse(NEW, "new.yaml")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert with_current_words(document) == document
+
+
+def test_the_plan_of_an_older_data_set_is_read_in_silence() -> None:
+    """Nobody is meant to edit it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        current = with_current_words(parse(OLD, "out/street/plan.json"))
+
+    assert current.plain() == parse(NEW, "new.yaml").plain()
+
+
+def test_old_and_new_word_side_by_side_are_refused() -> None:
+    """Which of them is meant cannot be known."""
+    text = "randomizers: [{type: ego_on_lane, name: e, spare_m: 1, min_clearance_m: 2}]"
+
+    with pytest.raises(ConfigError) as caught:
+        with_current_words(parse(text, "x.yaml"))
+
+    assert str(caught.value).startswith(
+        "x.yaml:1:44: randomizers[0].spare_m: is called 'min_clearance_m' now"
+    )
+
+
+@pytest.mark.filterwarnings("ignore::FutureWarning")
+def test_the_command_line_may_use_old_words_too(tmp_path: Path) -> None:
+    """They win over what the file says, as overrides do."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("extends: street.yaml\n")
+
+    spec = load_spec(str(path), overrides=("randomizers.people.rows=3",))
+
+    assert {r.name: r for r in spec.randomizers}["people"].passes == 3
+
+
+def test_every_new_word_is_one_of_its_plugin_and_no_old_one_is() -> None:
+    """The tables agree with the plug-ins."""
+    for (section, kind), renames in PLUGINS.items():
+        fields = TABLES[section.removesuffix("s")].load(kind).model_fields
+        assert set(renames.keys.values()) <= fields.keys()
+        assert not renames.keys.keys() & fields.keys()
+    for section, names in TYPES.items():
+        table = TABLES[section.removesuffix("s")]
+        assert set(names.values()) <= set(table)
+        assert not set(names) & set(table)
+    for kind in TABLES["randomizer"]:
+        fields = TABLES["randomizer"].load(kind).model_fields
+        assert set(RANDOMIZERS.values()) <= fields.keys()
+        assert not set(RANDOMIZERS) & fields.keys()
