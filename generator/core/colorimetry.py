@@ -7,14 +7,14 @@ within 1e-3).
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from generator.core.se3 import Array
 
-Real = TypeVar("Real", np.float32, np.float64)
+Real = TypeVar("Real", bound=np.floating[Any])
 
 REC709_LUMINANCE: Array = np.array([0.2126, 0.7152, 0.0722])
 """Luminances of the primaries, in units of white's."""
@@ -54,14 +54,22 @@ def luminance(rgb: NDArray[Real]) -> NDArray[Real]:
 
 def srgb_encode(linear: NDArray[Real]) -> NDArray[Real]:
     """The encoded values of linear ones, both in [0, 1]; shape and type stay."""
-    # The power is evaluated below the knee too, where it is not used: there it must not be NaN.
+    # Clamped, because the power is evaluated below the knee too, where it is not used.
     power = 1.055 * np.maximum(linear, _KNEE_LINEAR) ** (1.0 / 2.4) - 0.055
     encoded: NDArray[Real] = np.where(linear <= _KNEE_LINEAR, 12.92 * linear, power)
     return encoded
 
 
-def srgb_decode(encoded: NDArray[Real]) -> NDArray[Real]:
+@overload
+def srgb_decode(encoded: float) -> float: ...
+@overload
+def srgb_decode(encoded: NDArray[Real]) -> NDArray[Real]: ...
+def srgb_decode(encoded: float | NDArray[Real]) -> float | NDArray[Real]:
     """The linear values of encoded ones, both in [0, 1]; shape and type stay."""
+    if isinstance(encoded, float):
+        # By the C library: numpy's pow() of arrays depends on the processor in its last bit, and
+        # single colours are recorded with all their digits.
+        return encoded / 12.92 if encoded <= _KNEE_ENCODED else ((encoded + 0.055) / 1.055) ** 2.4
     power = ((np.maximum(encoded, 0.0) + 0.055) / 1.055) ** 2.4
     linear: NDArray[Real] = np.where(encoded <= _KNEE_ENCODED, encoded / 12.92, power)
     return linear

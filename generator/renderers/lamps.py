@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from generator.core.colorimetry import luminance
 from generator.core.se3 import Array
 from generator.renderers.kernels import lighting, records
 from generator.renderers.packing import PackedWorld
@@ -17,7 +18,6 @@ from generator.renderers.visibility import Seen
 
 _STRIDE_PX = 11
 _SPOT, _SUN, _RECTANGLE = 1, 2, 3
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Light that is taken for granted, so that lamps are not ranked by what they do in the dark [lx].
 _DIM_LUX = 0.05
 # A lamp also matters for what is turned away from it: its glow, its reflections.
@@ -73,7 +73,7 @@ def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Arr
     distance = np.sqrt(squared)
     direction = [along / distance for along in away]
     cosine = np.maximum(_dot(direction, list(normals.T)), _TURNED_AWAY)
-    lux: Array = float((lamp["power"] * _LUMINANCE).sum()) * cosine / squared
+    lux: Array = float(luminance(lamp["power"].astype(np.float64))) * cosine / squared
     if lamp["kind"] == _SPOT:
         down = -_dot(direction, [float(along) for along in lamp["direction"]])
         span = max(float(lamp["cos_inner"] - lamp["cos_outer"]), 1e-4)

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from generator.core.capture import Channel, Table
+from generator.core.colorimetry import luminance
 from generator.core.errors import ConfigError
 from generator.core.instants import RIG_AXES, at
 from generator.core.interfaces import Renderer
@@ -23,7 +24,6 @@ from generator.sensors.event_pixels import (
     Pixels,
     after_rest,
     logarithm_of,
-    luminance_of,
     noise_events,
     signal_events,
 )
@@ -138,7 +138,7 @@ class EventCamera(Mounted):
                 continue
             pose = then.device(self.name).T_world_device @ RIG_AXES.inverse()
             seen = renderer.render(then, Camera(self.name, pose, lens), CHANNELS)
-            luminances.append(luminance_of(seen.channels[Channel.RADIANCE]))
+            luminances.append(luminance(seen.channels[Channel.RADIANCE].astype(np.float64)))
             shown.append(seen.channels[Channel.INSTANCE])
             before = then
         return luminances, np.stack(shown)

@@ -30,7 +30,8 @@ def test_white_has_luminance_one() -> None:
 def test_white_is_d65() -> None:
     """Equal parts of the primaries have the tristimulus values of D65."""
     assert XYZ_FROM_REC709 @ np.ones(3) == pytest.approx(D65_XYZ, abs=1e-4)
-    assert REC709_FROM_XYZ @ D65_XYZ == pytest.approx(np.ones(3), abs=1e-3)
+    white = REC709_FROM_XYZ @ D65_XYZ
+    assert white == pytest.approx(np.ones(3), abs=1e-3)
 
 
 @pytest.mark.parametrize("channel", range(3))
@@ -67,10 +68,17 @@ def test_every_byte_survives_decoding_and_encoding(dtype: type[np.float32 | np.f
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_luminance_keeps_the_type_of_the_image(dtype: type[np.float32 | np.float64]) -> None:
     """Shape [h, w, 3] gives [h, w]; each channel has its own weight."""
-    image = np.eye(3, dtype=dtype)[None] * dtype(100.0)
+    image = np.eye(3, dtype=dtype)[None] * np.array(100.0, dtype)
 
     assert luminance(image).dtype == dtype
     assert luminance(image) == pytest.approx(np.array([[21.26, 71.52, 7.22]]), rel=1e-6)
+
+
+def test_a_single_value_is_decoded_as_in_an_image() -> None:
+    """Code 0.5 is 21.4 % of the light; both ends and the knee stay."""
+    assert srgb_decode(0.5) == pytest.approx(0.21404, abs=1e-5)
+    assert (srgb_decode(0.0), srgb_decode(1.0)) == (0.0, 1.0)
+    assert srgb_decode(0.04045) == pytest.approx(0.0031308, abs=1e-7)
 
 
 def test_constants_cannot_be_changed() -> None:

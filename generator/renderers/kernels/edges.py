@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.colorimetry import luminance
 from generator.renderers.kernels.records import View
 from generator.renderers.kernels.shade import Images
 
@@ -89,4 +90,4 @@ def most_alike(view: View, images: Images, x: int, y: int, source: int, normal: 
 @wp.func
 def tone_weight(exposed: wp.vec3):
     """Weight of a sample: bright ones count less, as they would after the tone curve."""
-    return 1.0 / (1.0 + 0.2126 * exposed[0] + 0.7152 * exposed[1] + 0.0722 * exposed[2])
+    return 1.0 / (1.0 + luminance(exposed))

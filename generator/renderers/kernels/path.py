@@ -14,6 +14,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.brdf import directional_albedo
+from generator.renderers.kernels.colorimetry import luminance
 from generator.renderers.kernels.dielectrics import (
     fresnel_dielectric,
     pane_reflectance,
@@ -31,7 +32,6 @@ from generator.renderers.kernels.path_bsdf import (
     Scattering,
     alpha_of,
     evaluate,
-    luminance,
     make_bsdf,
     make_interface,
     scatter,

@@ -15,6 +15,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.brdf import directional_albedo
+from generator.renderers.kernels.colorimetry import luminance
 from generator.renderers.kernels.dielectrics import fresnel_dielectric, refracted
 from generator.renderers.kernels.records import unit
 
@@ -70,12 +71,6 @@ class Scattering:
     l: wp.vec3  # noqa: E741
     weight: wp.vec3
     density: float
-
-
-@wp.func
-def luminance(c: wp.vec3):
-    """Of linear RGB, Rec. 709."""
-    return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
 
 
 @wp.func

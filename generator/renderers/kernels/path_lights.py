@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.colorimetry import luminance
 from generator.renderers.kernels.lighting import DISK, RECTANGLE, SPOT, SUN
 from generator.renderers.kernels.occlusion import frame_of
-from generator.renderers.kernels.path_bsdf import luminance
 from generator.renderers.kernels.records import Lamp, Sky, World, floor_int, greater
 from generator.renderers.kernels.sky import sky_irradiance
 
