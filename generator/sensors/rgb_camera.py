@@ -25,21 +25,21 @@ from generator.sensors.mounting import Mounted, known_rig
 from generator.sensors.shutters import ExposureTime, RollingShutter, shutter_of
 
 Image = Literal[
-    "rgb",
-    "depth",
-    "range",
-    "normals",
-    "instance",
-    "part",
-    "category",
-    "object_coordinates",
-    "disparity",
-    "disparity_visible",
-    "flow_forward",
-    "flow_backward",
-    "flow_occluded_forward",
-    "flow_occluded_backward",
-    "scene_flow",
+    Channel.RGB,
+    Channel.Z_DEPTH,
+    Channel.RANGE,
+    Channel.NORMALS,
+    Channel.INSTANCE,
+    Channel.PART,
+    Channel.CATEGORY,
+    Channel.OBJECT_COORDINATES,
+    Channel.DISPARITY,
+    Channel.DISPARITY_VISIBLE,
+    Channel.FLOW_FORWARD,
+    Channel.FLOW_BACKWARD,
+    Channel.FLOW_OCCLUDED_FORWARD,
+    Channel.FLOW_OCCLUDED_BACKWARD,
+    Channel.SCENE_FLOW,
 ]
 """Channels that can be written as images; see ``generator.core.capture.Channel``."""
 
@@ -84,7 +84,9 @@ class RgbCamera(Mounted):
     size_px: tuple[SidePx, SidePx] = (640, 480)
     hfov_deg: float = Field(60.0, ge=1, le=360)
     lens: LensConfig = Pinhole()
-    channels: tuple[Image, ...] = Field(("rgb", "depth", "instance", "category"), min_length=1)
+    channels: tuple[Image, ...] = Field(
+        (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY), min_length=1
+    )
     ev100: float | None = None
     exposure: ExposureTime | None = None
     rolling_shutter: RollingShutter | None = None
@@ -129,7 +131,7 @@ class RgbCamera(Mounted):
     @property
     def media(self) -> tuple[Channel, ...]:
         """Channels that are written as images, in a fixed order."""
-        return tuple(channel for channel in Channel if channel.value in self.channels)
+        return tuple(channel for channel in Channel if channel in self.channels)
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this camera in it, looking at the scene's focus; as it is if it was."""

@@ -23,7 +23,7 @@ from generator.renderers.kernels.dielectrics import (
 from generator.renderers.kernels.ground import coat_at, coated
 from generator.renderers.kernels.holes import OUT_OF_LINE
 from generator.renderers.kernels.layers import maps_at
-from generator.renderers.kernels.lighting import SUN
+from generator.renderers.kernels.lighting import is_panel
 from generator.renderers.kernels.look import Look, look_at_hit
 from generator.renderers.kernels.occlusion import frame_of
 from generator.renderers.kernels.path_bsdf import (
@@ -371,10 +371,10 @@ def light_asked(
     g = Glimpse()
     if choice.source == SKY:
         g = draw_sky(world.sky, table, u)
-    elif world.lamps[choice.source].kind <= SUN:
-        g = draw_ball(world.lamps[choice.source], o, u)
-    else:
+    elif is_panel(world.lamps[choice.source]):
         g = draw_panel(world.lamps[choice.source], o, u)
+    else:
+        g = draw_ball(world.lamps[choice.source], o, u)
     l = to_frame(g.direction, x, y, v.look.normal)  # noqa: E741
     if g.distance_m > 0.0 and l[2] > 0.0 and wp.dot(g.direction, v.flat) > 0.0:
         f, density = evaluate(s, l)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.colorimetry import luminance
-from generator.renderers.kernels.lighting import DISK, RECTANGLE, SPOT, SUN
+from generator.renderers.kernels.lighting import DISK, SPOT, SUN, is_panel
 from generator.renderers.kernels.occlusion import frame_of
 from generator.renderers.kernels.records import Lamp, Sky, World, floor_int, greater
 from generator.renderers.kernels.sky import sky_irradiance
@@ -104,7 +104,7 @@ def lamp_weight(lamp: Lamp, p: wp.vec3, n: wp.vec3):
         above = (wp.dot(n, to_lamp) + lamp.radius) * inverse
         if above > 0.0:
             weight = luminance(lamp.power) * (wp.min(above, 1.0) + 0.02) * (inverse * inverse)
-            if lamp.kind >= RECTANGLE:
+            if is_panel(lamp):
                 front = -wp.dot(to_lamp, lamp.direction) * inverse
                 weight = wp.where(front > 0.0, weight * (front + 0.05), 0.0)
             else:
@@ -213,7 +213,7 @@ def meet_lamp(lamp: Lamp, p: wp.vec3, d: wp.vec3):
             g.distance_m = AT_INFINITY
             g.density = 1.0 / (2.0 * wp.pi * cone_width(sine))
             g.radiance = ball_radiance(lamp, -lamp.direction)
-    elif lamp.kind >= RECTANGLE:
+    elif is_panel(lamp):
         front = -wp.dot(d, lamp.direction)
         if front > 1.0e-6:
             t = wp.dot(p - lamp.position_m, lamp.direction) / front
