@@ -326,10 +326,10 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     if tiny or not 0 < z <= style.far_m or box.corners()[:, 2].min() < NEAR_M:
         return dont_care(thing.box, k)
     instance = thing.instance
-    kind = official_type(instance) if style.types == "official" else _one_word(instance.category)
-    alpha_rad = _wrapped(box.heading_rad - math.atan2(x, z))
+    kind = official_type(instance) if style.types == "official" else _join_words(instance.category)
+    alpha_rad = _wrap_angle(box.heading_rad - math.atan2(x, z))
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
-    truncation, corners = thing.truncation, _inclusive(thing.box)
+    truncation, corners = thing.truncation, _format_corners(thing.box)
     if style.boxes == "projected":
         truncation, corners = projected_box(box, k)
     return " ".join(
@@ -337,18 +337,17 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
             kind,
             f"{truncation:.2f}",
             str(occlusion_level(thing.occlusion)),
-            _decimal(alpha_rad),
+            _format_decimal(alpha_rad),
             corners,
-            *map(_decimal, metric),
+            *map(_format_decimal, metric),
         )
     )
 
 
 def dont_care(box: BoxPx, camera: Intrinsics) -> str:
     """The row of a region without a label."""
-    return (
-        f"{DONT_CARE} -1 -1 -10 {_inclusive(_widened(box, camera))} -1 -1 -1 -1000 -1000 -1000 -10"
-    )
+    corners = _format_corners(_widen(box, camera))
+    return f"{DONT_CARE} -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
 
 
 def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
@@ -366,7 +365,7 @@ def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
 
 def official_type(instance: Instance) -> str:
     """The one of KITTI's eight types that an object is."""
-    kind = OFFICIAL_TYPES.get(_one_word(instance.category.lower()), "Misc")
+    kind = OFFICIAL_TYPES.get(_join_words(instance.category.lower()), "Misc")
     sits = kind == "Pedestrian" and dict(instance.attributes).get("pose") in SITTING
     return "Person_sitting" if sits else kind
 
@@ -401,27 +400,27 @@ def matrix_lines(rows: dict[str, Array]) -> str:
     )
 
 
-def _widened(box: BoxPx, camera: Intrinsics) -> BoxPx:
+def _widen(box: BoxPx, camera: Intrinsics) -> BoxPx:
     """At least two pixels wide and high, inside the image."""
     x_min = max(min(box.x_min, camera.width_px - 2), 0)
     y_min = max(min(box.y_min, camera.height_px - 2), 0)
     return BoxPx(x_min, y_min, max(box.x_max, x_min + 2), max(box.y_max, y_min + 2))
 
 
-def _inclusive(box: BoxPx) -> str:
+def _format_corners(box: BoxPx) -> str:
     return f"{box.x_min:.2f} {box.y_min:.2f} {box.x_max - 1:.2f} {box.y_max - 1:.2f}"
 
 
-def _decimal(value: float) -> str:
+def _format_decimal(value: float) -> str:
     # Micrometres: KITTI's own two decimals would be a fifth of a small object. No "-0.000000".
     return f"{round(value, 6) + 0.0:.6f}"
 
 
-def _wrapped(angle_rad: float) -> float:
+def _wrap_angle(angle_rad: float) -> float:
     return math.remainder(angle_rad, 2.0 * math.pi)
 
 
-def _one_word(name: str) -> str:
+def _join_words(name: str) -> str:
     return "_".join(name.split())
 
 

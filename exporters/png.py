@@ -48,13 +48,13 @@ def encode_png(pixels: NDArray[Any], row_filter: RowFilter, level: int) -> bytes
     header = struct.pack(
         ">IIBBBBB", width, height, bit_depth, _RGB if pixels.ndim == 3 else _GREY, 0, 0, 0
     )
-    data = deflate.zlib_compress(_filtered(pixels, row_filter), level)
+    data = deflate.zlib_compress(_filter_rows(pixels, row_filter), level)
     return b"".join(
         [SIGNATURE, *_chunk(b"IHDR", header), *_chunk(b"IDAT", data), *_chunk(b"IEND", b"")]
     )
 
 
-def _filtered(pixels: NDArray[Any], row_filter: RowFilter) -> UInt8:
+def _filter_rows(pixels: NDArray[Any], row_filter: RowFilter) -> UInt8:
     """Rows of bytes, most significant first, each behind the number of its filter."""
     big_endian = pixels.astype(pixels.dtype.newbyteorder(">"), copy=False)
     rows = np.ascontiguousarray(big_endian).reshape(pixels.shape[0], -1).view(np.uint8)

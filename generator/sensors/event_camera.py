@@ -11,7 +11,6 @@ from pydantic import Field
 
 from generator.core.capture import Channel, Table
 from generator.core.colorimetry import luminance
-from generator.core.errors import ConfigError
 from generator.core.instants import RIG_AXES, at
 from generator.core.interfaces import Renderer
 from generator.core.intrinsics import Intrinsics
@@ -27,7 +26,7 @@ from generator.sensors.event_pixels import (
     noise_events,
     signal_events,
 )
-from generator.sensors.mounting import Mounted, checked_rate, known_rig, window_s
+from generator.sensors.mounting import Mounted, checked_rate, known_camera, known_rig, window_s
 
 SidePx = Annotated[int, Field(ge=8, le=2048)]
 CHANNELS = frozenset({Channel.RADIANCE, Channel.INSTANCE})
@@ -73,13 +72,9 @@ class EventCamera(Mounted):
             ConfigError: the scene has no such rig or camera, or the rate does not fit.
         """
         checked_rate(self.name, self.rate_hz, scene.step_s)
-        known = [camera.name for camera in scene.cameras]
         rig = known_rig(scene, self.name, self.rig) if self.rig else ""
-        if not rig and self.camera not in known:
-            raise ConfigError(
-                f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
-                f" is {', '.join(known) or 'none'}"
-            )
+        if not rig:
+            known_camera(scene, self.name, self.camera)
         device = Device(
             self.name,
             self.modality,

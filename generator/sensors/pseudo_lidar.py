@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from generator.core.capture import POINT, Channel, PointCloud
-from generator.core.errors import ConfigError, did_you_mean
+from generator.core.errors import ConfigError
 from generator.core.interfaces import Renderer
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Lidar, Scene
 from generator.core.se3 import Vec3
 from generator.core.shutter import INSTANT
 from generator.core.streams import Rng
-from generator.sensors.mounting import Mounted, known_rig
+from generator.sensors.mounting import Mounted, known_camera, with_lidar
 
 CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
 
@@ -59,22 +59,13 @@ class PseudoLidar(Mounted):
             ConfigError: the scene has no such rig or camera, or no pixel is taken of its image.
         """
         lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.type)
-        if self.rig:
-            rig = known_rig(scene, self.name, self.rig)
-            lidar = replace(lidar, camera="", rig=rig)
-        known = {camera.name: camera.intrinsics for camera in scene.cameras}
-        if self.camera not in known:
-            raise ConfigError(
-                f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
-                f" is {', '.join(known) or 'none'}{did_you_mean(self.camera, known)}"
-            )
-        image = known[self.camera]
+        image = known_camera(scene, self.name, self.camera).intrinsics
         if self.stride_px > min(image.width_px, image.height_px):
             raise ConfigError(
                 f"sensor '{self.name}': stride_px {self.stride_px} is larger than the image of "
                 f"camera '{self.camera}', {image.width_px} x {image.height_px} px"
             )
-        return replace(scene, lidars=(*scene.lidars, lidar))
+        return with_lidar(scene, self, lidar)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng

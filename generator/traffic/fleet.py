@@ -155,7 +155,7 @@ def fleet_of(
             widths[name] = max(widths.get(name, 0.0), v.width_m)
     crossed = overlaps(graph, widths)
     walked = zones(graph, widths, crosswalks)
-    offset, low, high = _shared([v.route for v in vehicles], first, crossed)
+    offset, low, high = _shared_lanes([v.route for v in vehicles], first, crossed)
     return Fleet(
         tuple(vehicles),
         _drivers(vehicles),
@@ -258,7 +258,7 @@ def _zones(route: Route, walked: Mapping[str, tuple[Zone, ...]]) -> tuple[RouteZ
     )
 
 
-def _shared(
+def _shared_lanes(
     routes: Sequence[Route],
     first_m: Array,
     crossed: Mapping[tuple[str, str], Overlap],

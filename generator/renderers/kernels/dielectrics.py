@@ -10,6 +10,18 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Reflectance of water at normal incidence: ((n - 1) / (n + 1))^2 with n = 1.33, in visible light
+# and in the near infrared alike (Hale and Querry, "Optical constants of water", 1973).
+WATER_F0 = wp.constant(0.02)
+
+
+@wp.func
+def fresnel_schlick(f0: float, cosine: float):
+    """Reflectance by Schlick's fit to Fresnel's formulae, 1994; ``f0`` at normal incidence."""
+    grazing = 1.0 - cosine
+    squared = grazing * grazing
+    return f0 + (1.0 - f0) * squared * squared * grazing
+
 
 @wp.func
 def fresnel_dielectric(cosine: float, eta: float):

@@ -15,8 +15,10 @@ from generator.renderers.kernels.bundles import (
     reciprocals,
     with_ray,
 )
+from generator.renderers.kernels.dielectrics import WATER_F0, fresnel_schlick
 from generator.renderers.kernels.ground import Coat, coat_at, porosity_of
 from generator.renderers.kernels.holes import solid_hit
+from generator.renderers.kernels.ray_offsets import LASER_OFFSET_M, SHELTER_OFFSET_M
 from generator.renderers.kernels.rays import unsheltered
 from generator.renderers.kernels.records import (
     HOLES,
@@ -30,14 +32,11 @@ from generator.renderers.kernels.records import (
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 PI = wp.constant(3.14159265)
-WATER_F0 = wp.constant(0.02)
 # Fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral albedo of
 # snow", 1980: 0.9 to 0.75 for grains of 0.1 to 1 mm).
 SNOW = wp.constant(0.85)
 # Wet markings keep a quarter of what their beads send back (EN 1436, classes R and RW).
 DROWNED = wp.constant(0.75)
-# Rays that leave a surface start this far from it.
-LIFT_M = wp.constant(2.0e-3)
 # Faces of glass on the way of a ray, and what is behind them.
 FACES_MAX = wp.constant(9)
 # Two faces of glass that are nearer to each other are one pane.
@@ -285,14 +284,6 @@ def first_hit(
 
 
 @wp.func
-def fresnel(f0: float, cosine: float):
-    """Schlick, "An inexpensive BRDF model for physically-based rendering", 1994."""
-    grazing = 1.0 - cosine
-    squared = grazing * grazing
-    return f0 + (1.0 - f0) * squared * squared * grazing
-
-
-@wp.func
 def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_lidar: wp.vec3):
     """What weather has laid where a ray ends."""
     n = scan.R_world_lidar @ n_lidar
@@ -301,7 +292,7 @@ def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_
     p = scan.eye_m + scan.R_world_lidar @ (ray.origin_m + ray.direction * range_m)
     exposed = float(1.0)
     if n[2] > 0.1:
-        exposed = unsheltered(world, p + n * 0.02)
+        exposed = unsheltered(world, p + n * SHELTER_OFFSET_M)
     slant = wp.max(wp.abs(wp.dot(n_lidar, ray.direction)), 0.02)
     return coat_at(world, surface, p, n, exposed, scan.divergence_rad * range_m / slant)
 
@@ -318,7 +309,7 @@ def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: f
     """
     porous = porosity_of(world, surface)
     film = wp.max(coat.puddle, 0.5 * porous * coat.wet)
-    passes = 1.0 - film * fresnel(WATER_F0, cosine)
+    passes = 1.0 - film * fresnel_schlick(WATER_F0, cosine)
     kept = coat.mixable[0] * passes * passes
     bare = 1.0 - wp.min(coat.snow, 1.0)
     below = Infrared()
@@ -438,7 +429,7 @@ def look_through(
             hits[j] = wp.vec2i(-1, -1)
             ray = ray_number(scan, travel, axes, picked[j])
             begin_m = ray.origin_m
-            way_m = wp.max(first_m[picked[j]] - LIFT_M, 0.0)
+            way_m = wp.max(first_m[picked[j]] - LASER_OFFSET_M, 0.0)
             passed = float(1.0)
             for face in range(FACES_MAX):
                 if passed > 0.0:
@@ -447,7 +438,7 @@ def look_through(
                     if hit.body < 0:
                         passed = 0.0
                     else:
-                        way_m += hit.range_m + LIFT_M
+                        way_m += hit.range_m + LASER_OFFSET_M
                         n = normal_of(scan, world, travel, ray, hit)
                         cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
                         material = surface_index(world, wp.vec2i(hit.body, hit.face))
@@ -455,12 +446,12 @@ def look_through(
                         if face > 0:
                             # Each further pane is overwritten by what is behind it, if anything is.
                             hits[j] = wp.vec2i(hit.body, material)
-                            ranges_m[j] = way_m - LIFT_M
+                            ranges_m[j] = way_m - LASER_OFFSET_M
                             reflectances[j] = passed * returned(lights[material], cosine)
                         if clear == 0.0:
                             passed = 0.0
                         elif face == 0 or hit.range_m > PANE_M:
-                            kept = clear * (1.0 - fresnel(lights[material].mirror, cosine))
+                            kept = clear * (1.0 - fresnel_schlick(lights[material].mirror, cosine))
                             passed *= kept * kept
 
 
@@ -470,7 +461,7 @@ def mirrored(ray: Ray, n: wp.vec3, range_m: float):
     facing = wp.dot(n, ray.direction)
     ray.origin_m = ray.origin_m + ray.direction * range_m
     ray.direction = unit(ray.direction - n * (2.0 * facing))
-    ray.origin_m += ray.direction * LIFT_M - n * (wp.sign(facing) * LIFT_M)
+    ray.origin_m += ray.direction * LASER_OFFSET_M - n * (wp.sign(facing) * LASER_OFFSET_M)
     return ray
 
 
@@ -512,9 +503,9 @@ def look_in_mirrors(
             i = picked[j]
             ray = ray_number(scan, travel, axes, i)
             cosine = wp.min(wp.abs(wp.dot(normals[i], ray.direction)), 1.0)
-            kept = fresnel(lights[first_hits[i][1]].mirror, cosine)
+            kept = fresnel_schlick(lights[first_hits[i][1]].mirror, cosine)
             if waters[j] > 0.0:
-                kept = waters[j] * fresnel(WATER_F0, cosine)
+                kept = waters[j] * fresnel_schlick(WATER_F0, cosine)
             ray = mirrored(ray, normals[i], first_m[i])
             hit = first_hit(scan, world, travel, boxes, listed, ray, last, 0.0, True)
             last = hit.body
@@ -523,6 +514,6 @@ def look_in_mirrors(
                 n = normal_of(scan, world, travel, ray, hit)
                 material = surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[j] = wp.vec2i(hit.body, material)
-                ranges_m[j] = first_m[i] + LIFT_M + hit.range_m
+                ranges_m[j] = first_m[i] + LASER_OFFSET_M + hit.range_m
                 cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
                 reflectances[j] = kept * kept * returned(lights[material], cosine)

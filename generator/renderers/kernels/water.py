@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.dielectrics import WATER_F0, fresnel_schlick
 from generator.renderers.kernels.ground import (
     footprint,
     patches,
@@ -37,8 +38,6 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 # How far mirrored rays are followed.
 MIRRORED_M = wp.constant(1.0e3)
 
-# Fresnel reflectance of water at normal incidence.
-WATER_F0 = wp.constant(0.02)
 # Films smoother than this mirror like puddles.
 SHARP = wp.constant(0.02)
 # Slopes of a film on rough ground.
@@ -186,9 +185,7 @@ def mirrored_by(
     c = wp.max(-wp.dot(d, m), 0.02)
     r = d + m * (2.0 * c)
     r = unit(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
-    grazing = 1.0 - c
-    squared = grazing * grazing
-    fresnel = WATER_F0 + (1.0 - WATER_F0) * squared * squared * grazing
+    fresnel = fresnel_schlick(WATER_F0, c)
     seen = mirrored(view, world, images, radiance, origin, r, 0.02 + width) * fresnel
     return wp.vec4(seen[0], seen[1], seen[2], fresnel)
 
