@@ -128,9 +128,11 @@ def ray_of_beam(axis: wp.vec3, k: int, spread: float):
     """The axis of a beam, or one of six rays around it."""
     if k == 0:
         return axis
+    # Any axis that is not nearly parallel: the cross product must keep its digits.
     helper = wp.where(wp.abs(axis[2]) < 0.9, wp.vec3(0.0, 0.0, 1.0), wp.vec3(1.0, 0.0, 0.0))
     across = unit(wp.cross(helper, axis))
     up = wp.cross(axis, across)
+    # Six around one: the densest even pattern in a round beam.
     turn = float(k - 1) * (PI / 3.0)
     return unit(axis + (across * wp.cos(turn) + up * wp.sin(turn)) * spread)
 
@@ -146,6 +148,7 @@ def returned(light: Infrared, cosine: float):
     ways alike (Walter et al., "Microfacet models for refraction", 2007).
     A retro-reflector keeps its entrance angles to about 60 degrees (ASTM D4956).
     """
+    # The lobe divides by it; light within 0.06 degrees of the surface brings nothing back.
     c = wp.max(cosine, 1.0e-3)
     a2 = light.alpha * light.alpha
     c2 = c * c
@@ -174,6 +177,7 @@ class Nearest:
 @wp.func
 def mover_frame(travel: Travel, m: int, ray: Ray):
     """Directions of the lidar frame in the mesh frame of mover m when a ray leaves."""
+    # Mixed matrices are no rotations, by the square of the small turn between two keys.
     before = travel.B_mesh_lidar[m, ray.key]
     return before + (travel.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
 
@@ -230,6 +234,7 @@ def ray_number(scan: Scan, travel: Travel, axes: wp.array(dtype=wp.vec3), i: int
     ray.direction = ray_of_beam(axes[beam], i % scan.subrays, scan.spread)
     if travel.keys > 0:
         ray.origin_m = travel.origins_m[beam]
+        # The last pulse may leave at the last key: it belongs to the step before it.
         ray.key = wp.min(int(travel.phases[beam]), travel.keys - 2)
         ray.share = travel.phases[beam] - float(ray.key)
     return ray
@@ -274,6 +279,7 @@ def first_hit(
     for k in range(count):
         b = int(k)
         if listed.count >= 0:
+            # Bodies are listed by distance: none of the rest can be nearer.
             if boxes.enters_m[listed.row, k] - gone_m >= hit.range_m:
                 break
             b = boxes.listed[listed.row, k]
@@ -293,6 +299,7 @@ def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_
     exposed = float(1.0)
     if n[2] > 0.1:
         exposed = unsheltered(world, p + n * SHELTER_OFFSET_M)
+    # A beam's mark grows as 1 / cosine; fifty beams long is as good as any longer.
     slant = wp.max(wp.abs(wp.dot(n_lidar, ray.direction)), 0.02)
     return coat_at(world, surface, p, n, exposed, scan.divergence_rad * range_m / slant)
 
@@ -309,6 +316,7 @@ def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: f
     """
     porous = porosity_of(world, surface)
     film = wp.max(coat.puddle, 0.5 * porous * coat.wet)
+    # Twice through the surface of the water, and twice in ``kept``: in and out.
     passes = 1.0 - film * fresnel_schlick(WATER_F0, cosine)
     kept = coat.mixable[0] * passes * passes
     bare = 1.0 - wp.min(coat.snow, 1.0)

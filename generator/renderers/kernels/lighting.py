@@ -73,6 +73,7 @@ class Beam:
 def dipped_share(lamp: Lamp, d: wp.vec3):
     """Intensity of a dipped headlight in a direction, as a share of that at its brightest."""
     right = unit(wp.cross(lamp.direction, wp.vec3(0.0, 0.0, 1.0)))
+    # Slopes of what lies beside or behind the lamp are boundless: they end in the stray light.
     ahead = wp.max(wp.dot(d, lamp.direction), 1.0e-3)
     side = wp.dot(d, right) / ahead
     down = -wp.dot(d, wp.cross(right, lamp.direction)) / ahead
@@ -95,6 +96,7 @@ def beam_from(lamp: Lamp, p_world: wp.vec3):
         beam.spread = lamp.radius
         return beam
     to_lamp = lamp.position_m - p_world
+    # At the lamp's own surface the inverse square law ends.
     squared = wp.max(wp.dot(to_lamp, to_lamp), wp.max(lamp.radius * lamp.radius, 1.0e-6))
     inverse = 1.0 / wp.sqrt(squared)
     beam.direction = to_lamp * inverse
@@ -111,6 +113,7 @@ def beam_from(lamp: Lamp, p_world: wp.vec3):
     if lamp.kind == SPOT:
         cosine = -wp.dot(beam.direction, lamp.direction)
         span = wp.max(lamp.cos_inner - lamp.cos_outer, 1.0e-4)
+        # As generator.core.photometry counts it: symmetric in the cosine, so that half counts.
         fade = wp.clamp((cosine - lamp.cos_outer) / span, 0.0, 1.0)
         beam.normal_lux = beam.normal_lux * (fade * fade * (3.0 - 2.0 * fade))
         if lamp.cutoff > 0.0:
