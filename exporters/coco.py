@@ -160,12 +160,12 @@ class Coco(ExporterBase):
         folder = dataset_dir / "annotations"
         folder.mkdir(parents=True, exist_ok=True)
         for split in splits:
-            images = partial(_joined, fragments, f"{split}.images.jsonl")
-            rows = _joined(fragments, f"{split}.annotations.jsonl")
+            images = partial(_join_fragments, fragments, f"{split}.images.jsonl")
+            rows = _join_fragments(fragments, f"{split}.annotations.jsonl")
             header = _header(info, _categories(info))
             _write_dataset(folder / f"instances_{split}.json", header, images(), rows)
             for category_id, skeleton in skeletons.items():
-                lines = _joined(fragments, f"{split}.keypoints.{category_id}.jsonl")
+                lines = _join_fragments(fragments, f"{split}.keypoints.{category_id}.jsonl")
                 name = info.categories[category_id - 1]
                 path = folder / f"{'_'.join(name.split())}_keypoints_{split}.json"
                 header = _header(info, [_keypoint_category(category_id, name, skeleton)])
@@ -227,7 +227,7 @@ def motion_facts(motion: MotionTruth) -> dict[str, Any]:
     """How an object moves, by the frame along whose axes the numbers are."""
     frames = {"world": motion.world, "camera": motion.camera, "ego": motion.ego}
     facts: dict[str, Any] = {
-        name: {f.name: _rounded(getattr(twist, f.name)) for f in fields(Twist)}
+        name: {f.name: _round_values(getattr(twist, f.name)) for f in fields(Twist)}
         for name, twist in frames.items()
         if twist is not None
     }
@@ -316,7 +316,7 @@ def _named_points(points: Sequence[KeypointTruth]) -> dict[str, Any]:
     """As fragments hold them; what a category's points are is known when all shards are."""
     return {
         "points": [
-            [p.name, *(round(x, 3) for x in p.image_px), p.visibility, _rounded(p.position_m)]
+            [p.name, *(round(x, 3) for x in p.image_px), p.visibility, _round_values(p.position_m)]
             for p in points
         ]
     }
@@ -400,7 +400,7 @@ def _link_images(image: Mapping[str, Any], split: str, shard_dir: Path, dataset_
         link_or_copy(source, dataset_dir / target)
 
 
-def _joined(fragments: Sequence[Path], name: str) -> Iterator[str]:
+def _join_fragments(fragments: Sequence[Path], name: str) -> Iterator[str]:
     for fragment in fragments:
         yield from _lines(fragment / name)
 
@@ -419,16 +419,16 @@ def _xywh(box: BoxPx) -> list[int]:
 
 def _box3d(box: OrientedBox) -> dict[str, list[float]]:
     return {
-        "center_m": _rounded(box.T_frame_box.translation_m),
-        "size_m": _rounded(box.size_m),
-        "quaternion_wxyz": _rounded(box.T_frame_box.quaternion_wxyz),
+        "center_m": _round_values(box.T_frame_box.translation_m),
+        "size_m": _round_values(box.size_m),
+        "quaternion_wxyz": _round_values(box.T_frame_box.quaternion_wxyz),
     }
 
 
 def _rows(matrix: Array) -> list[list[float]]:
-    return [_rounded(row) for row in matrix.tolist()]
+    return [_round_values(row) for row in matrix.tolist()]
 
 
-def _rounded(values: Iterable[float]) -> list[float]:
+def _round_values(values: Iterable[float]) -> list[float]:
     # Adding 0.0 turns -0.0 into 0.0.
     return [round(value, DECIMALS) + 0.0 for value in values]

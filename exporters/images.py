@@ -34,15 +34,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from exporters.clouds import write_cloud
-from exporters.png import RowFilter, decode_grey16, encode_png
+from exporters.png import RowFilter, encode_png
 from exporters.tables import write_table
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError, SampleError, StorageError
+from generator.core.errors import ConfigError, SampleError
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.sample import Sample
 
@@ -215,22 +214,6 @@ def _signed_units(values: NDArray[np.floating], unit: float) -> UInt16:
     # NaN compares false.
     known = (np.abs(units) < SIGNED_ZERO).all(axis=-1, keepdims=True)
     return np.where(known, units + SIGNED_ZERO, 0.0).astype(np.uint16)
-
-
-def read_depth_units(path: Path, rows: slice = slice(None)) -> UInt16:
-    """The values of a depth image as it was written, uint16 [rows, width].
-
-    Raises:
-        StorageError: if the file is missing or no 16-bit grey image.
-    """
-    own = decode_grey16(path.read_bytes() if path.is_file() else b"", rows)
-    if own is not None:
-        return own
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None or image.dtype != np.uint16 or image.ndim != 2:
-        raise StorageError(f"{path}: expected a 16-bit grey PNG; make the data set again")
-    units: UInt16 = image[rows]
-    return units
 
 
 def link_or_copy(source: Path, target: Path) -> None:

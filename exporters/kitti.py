@@ -22,8 +22,8 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   become ``DontCare`` regions; so does what has no laser point, in rain or behind others.
 * **Truncation** is the share of that projection outside the image, or, of tight boxes, the share of
   the silhouette.
-* **Points** are those of the data set's laser scanner; without one they are thinned pixels of the
-  depth image, with reflectance 0 and no labels.
+* **Points** are those of the data set's laser scanner, or of its ``pseudo_lidar``; without either
+  there is no velodyne folder, which some readers ask for.
 * **Point labels** are not KITTI's; they keep its rule that an object is what lies in its box. A
   pulse that an object reflected has no row where noise, or the object's own way between the pulse
   and the instant of its box, took it more than 3 cm out of the box; what lies as deep inside has
@@ -48,13 +48,12 @@ from pydantic import Field
 
 from exporters.base import ExporterBase
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
-from exporters.images import depth_units, link_or_copy, read_depth_units
+from exporters.images import link_or_copy
 from exporters.sensors import laser_scanner, pinhole_camera, scanned
 from exporters.sequences import check_frame_names
-from exporters.upright import BORDER_M, UprightBox, boxed_members, upright_box
+from exporters.upright import UprightBox, boxed_members, upright_box
 from generator.core.boxes import BoxPx
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, ObjectTruth, Sample
@@ -81,17 +80,11 @@ SPLITS = ("train", "val", "test")
 
 DONT_CARE = "DontCare"
 
-LIDAR_HEIGHT_M = 0.30
-"""Of the virtual scanner above camera 0, axes parallel to the camera's."""
-R_CAMERA_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""Scanner axes (X forward, Y left, Z up) in the camera frame (X right, Y down, Z forward)."""
-T_CAMERA_THINNED = np.column_stack([R_CAMERA_LIDAR, [0.0, -LIDAR_HEIGHT_M, 0.0]])
-"""Pose of that scanner in the camera frame, [3, 4]."""
+T_CAMERA_FORWARD = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
+"""Calibration without a scanner, [3, 4]: scanner axes (X forward, Y left, Z up) at the camera."""
 
 NEAR_M = 0.05
 """Boxes that come nearer than this depth are not projected."""
-LIDAR_RANGE_M = 120.0
-"""Of Velodyne's HDL-64E, whose place the virtual scanner takes."""
 
 PARTLY_OCCLUDED = 0.1
 """Hidden share of the silhouette above which ``occluded`` is 1."""
@@ -113,11 +106,9 @@ class Kitti(ExporterBase):
     """What is farther than this along the optical axis becomes DontCare."""
     low_px: int = Field(10, ge=2)
     """What has fewer visible pixel rows than this becomes DontCare."""
-    velodyne_stride_px: int = Field(8, ge=0)
-    """Every how many pixels a depth pixel becomes a LiDAR point, where the data set has no laser
-    scanner; 0 = no velodyne folder."""
     lidar: str = ""
-    """Laser scanner whose points these are; empty = the first one by name, if there is one."""
+    """Sensor whose points these are, a ``lidar`` or ``pseudo_lidar``; empty = the first one by
+    name, if there is one."""
 
     @property
     def needs(self) -> frozenset[str]:
@@ -128,15 +119,11 @@ class Kitti(ExporterBase):
         """Refuse a data set that this format cannot hold.
 
         Raises:
-            ConfigError: no such camera, it is no pinhole or does not write the images that are
-                needed, or too many samples for six digits.
+            ConfigError: no such camera or lidar, the camera is no pinhole or does not write the
+                rgb channel, or too many samples for six digits.
         """
-        media = info.media[self._camera(info)]
-        if not self._lidar(info) and self.velodyne_stride_px and Channel.Z_DEPTH not in media:
-            raise ConfigError(
-                f"exporter 'kitti': sensor '{self._camera(info)}' does not write the depth channel "
-                "that velodyne/ is made from; add depth to its media or set velodyne_stride_px: 0"
-            )
+        self._camera(info)
+        self._lidar(info)
         check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -165,10 +152,6 @@ class Kitti(ExporterBase):
                 members, unseen = point_members(points, truth, self, T_camera_velo)
                 labels = point_labels(points, members, label_rows(truth, self, unseen))
                 _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
-            elif self.velodyne_stride_px and not lidar:
-                thinned = self._points(info, sample, shard_dir)
-                _write_bytes(folder / f"velodyne/{frame}.bin", thinned.astype("<f4").tobytes())
-                unseen = missed(thinned, truth, T_camera_velo, self.velodyne_stride_px)
             _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self, unseen))
             frames.append(f"{sample.index} {sample.split}\n")
         _write_text(folder / "frames.txt", "".join(frames))
@@ -199,23 +182,7 @@ class Kitti(ExporterBase):
         lidar = self._lidar(info)
         if lidar:
             return T_camera_lidar(sample, self._camera(info), lidar)[:3]
-        return T_CAMERA_THINNED
-
-    def _points(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> Array:
-        # The file's decimal grid, whether the array is still here or not: equal bytes both ways.
-        camera = self._camera(info)
-        reading = sample.capture.readings.get(camera)
-        stride_px = self.velodyne_stride_px
-        first_px = stride_px // 2
-        if reading is not None and Channel.Z_DEPTH in reading.channels:
-            z_m = reading.channels[Channel.Z_DEPTH][first_px::stride_px, first_px::stride_px]
-            units = depth_units(z_m, info.depth_scale_m)
-        else:
-            path = media_path(shard_dir, camera, Channel.Z_DEPTH, sample.index)
-            rows = slice(first_px, None, stride_px)
-            units = read_depth_units(path, rows)[:, first_px::stride_px]
-        z_depth_m = units * info.depth_scale_m
-        return lidar_points(sample.truth[camera].camera.intrinsics, z_depth_m, stride_px)
+        return T_CAMERA_FORWARD
 
     def _links(
         self, info: DatasetInfo, camera: str, shard_dir: Path, index: int
@@ -223,11 +190,9 @@ class Kitti(ExporterBase):
         """Files of one frame, each with its place under ``training``."""
         frame = _frame(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
-        lidar = self._lidar(info)
-        if scanned(shard_dir, lidar, index) or (self.velodyne_stride_px and not lidar):
-            names.append(f"velodyne/{frame}.bin")
-        if scanned(shard_dir, lidar, index):
-            names.append(f"velodyne_labels/{frame}.label")
+
+        if scanned(shard_dir, self._lidar(info), index):
+            names += [f"velodyne/{frame}.bin", f"velodyne_labels/{frame}.label"]
         links = [(shard_dir / self.type / name, name) for name in names]
         rgb = media_path(shard_dir, camera, Channel.RGB, index)
         links.append((rgb, f"image_2/{frame}.png"))
@@ -241,7 +206,7 @@ class Kitti(ExporterBase):
             name=info.name,
             camera=camera,
             scale=info.depth_scale_m,
-            points=self._readme_points(info),
+            points=_SCANNED.format(lidar=self._lidar(info)) if self._lidar(info) else "",
             boxes=_BOXES[self.boxes],
             truncated="3D box's projection" if self.boxes == "projected" else "silhouette",
             far=self.far_m,
@@ -249,11 +214,6 @@ class Kitti(ExporterBase):
             partly=PARTLY_OCCLUDED,
             largely=LARGELY_OCCLUDED,
         )
-
-    def _readme_points(self, info: DatasetInfo) -> str:
-        if self._lidar(info):
-            return _SCANNED.format(lidar=self._lidar(info))
-        return _THINNED.format(height=LIDAR_HEIGHT_M, stride=self.velodyne_stride_px)
 
 
 class LabelStyle(Protocol):
@@ -329,33 +289,6 @@ def point_members(
     return members, frozenset(labelled) - frozenset(np.unique(ids[members == ids]).tolist())
 
 
-def missed(
-    thinned: Array, truth: ImageTruth, T_camera_velo: Array, stride_px: int
-) -> frozenset[int]:
-    """Instances in whose box a thinned depth image has no point.
-
-    Args:
-        thinned: Its points in the scanner frame [n, 4].
-        truth: Of the image.
-        T_camera_velo: Points to the camera frame, [3, 4].
-        stride_px: Distance of the pixels; what shows many times its square is not looked at.
-    """
-    small = {
-        thing.instance.instance_id: thing.box3d_camera
-        for thing in truth.objects
-        if thing.visible_px < 16 * stride_px * stride_px
-    }
-    if not small:
-        return frozenset()
-    p_camera = np.einsum("ij,nj->ni", T_camera_velo[:, :3], thinned[:, :3], optimize=False)
-    p_camera += T_camera_velo[:, 3]
-    return frozenset(
-        number
-        for number, box in small.items()
-        if box is not None and not (upright_box(box).depths_m(p_camera) >= -BORDER_M).any()
-    )
-
-
 def point_labels(
     points: NDArray[np.void], members: NDArray[np.int64], rows: Sequence[tuple[str, int]]
 ) -> NDArray[np.uint32]:
@@ -393,10 +326,10 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     if tiny or not 0 < z <= style.far_m or box.corners()[:, 2].min() < NEAR_M:
         return dont_care(thing.box, k)
     instance = thing.instance
-    kind = official_type(instance) if style.types == "official" else _one_word(instance.category)
-    alpha_rad = _wrapped(box.heading_rad - math.atan2(x, z))
+    kind = official_type(instance) if style.types == "official" else _join_words(instance.category)
+    alpha_rad = _wrap_angle(box.heading_rad - math.atan2(x, z))
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
-    truncation, corners = thing.truncation, _inclusive(thing.box)
+    truncation, corners = thing.truncation, _format_corners(thing.box)
     if style.boxes == "projected":
         truncation, corners = projected_box(box, k)
     return " ".join(
@@ -404,18 +337,17 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
             kind,
             f"{truncation:.2f}",
             str(occlusion_level(thing.occlusion)),
-            _decimal(alpha_rad),
+            _format_decimal(alpha_rad),
             corners,
-            *map(_decimal, metric),
+            *map(_format_decimal, metric),
         )
     )
 
 
 def dont_care(box: BoxPx, camera: Intrinsics) -> str:
     """The row of a region without a label."""
-    return (
-        f"{DONT_CARE} -1 -1 -10 {_inclusive(_widened(box, camera))} -1 -1 -1 -1000 -1000 -1000 -10"
-    )
+    corners = _format_corners(_widen(box, camera))
+    return f"{DONT_CARE} -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
 
 
 def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
@@ -433,7 +365,7 @@ def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
 
 def official_type(instance: Instance) -> str:
     """The one of KITTI's eight types that an object is."""
-    kind = OFFICIAL_TYPES.get(_one_word(instance.category.lower()), "Misc")
+    kind = OFFICIAL_TYPES.get(_join_words(instance.category.lower()), "Misc")
     sits = kind == "Pedestrian" and dict(instance.attributes).get("pose") in SITTING
     return "Person_sitting" if sits else kind
 
@@ -443,7 +375,7 @@ def occlusion_level(occlusion: float) -> int:
     return int(occlusion > PARTLY_OCCLUDED) + int(occlusion > LARGELY_OCCLUDED)
 
 
-def calib_text(camera: Intrinsics, T_camera_velo: Array = T_CAMERA_THINNED) -> str:
+def calib_text(camera: Intrinsics, T_camera_velo: Array = T_CAMERA_FORWARD) -> str:
     """The seven lines of a calibration file, in the order in which readers count them."""
     return matrix_lines(calib_matrices(camera, T_camera_velo))
 
@@ -468,49 +400,27 @@ def matrix_lines(rows: dict[str, Array]) -> str:
     )
 
 
-def lidar_points(camera: Intrinsics, z_depth_m: NDArray[np.floating], stride_px: int) -> Array:
-    """Points of a thinned depth image in the scanner frame, row by row.
-
-    Args:
-        camera: Of the full image.
-        z_depth_m: Depth [m] of every ``stride_px``-th pixel, beginning with ``stride_px // 2``;
-            0 = nothing.
-        stride_px: Distance of the pixels.
-
-    Returns:
-        [n, 4]: x forward, y left, z up [m], reflectance 0.
-    """
-    rows, columns = np.nonzero(z_depth_m > 0)
-    z = z_depth_m[rows, columns]
-    centre_px = stride_px // 2 + 0.5
-    x = (columns * stride_px + centre_px - camera.cx_px) / camera.fx_px * z
-    y = (rows * stride_px + centre_px - camera.cy_px) / camera.fy_px * z
-    points = np.column_stack([z, -x, -y - LIDAR_HEIGHT_M, np.zeros_like(z)])
-    near: Array = points[np.sum(points * points, axis=1) < LIDAR_RANGE_M**2]
-    return near
-
-
-def _widened(box: BoxPx, camera: Intrinsics) -> BoxPx:
+def _widen(box: BoxPx, camera: Intrinsics) -> BoxPx:
     """At least two pixels wide and high, inside the image."""
     x_min = max(min(box.x_min, camera.width_px - 2), 0)
     y_min = max(min(box.y_min, camera.height_px - 2), 0)
     return BoxPx(x_min, y_min, max(box.x_max, x_min + 2), max(box.y_max, y_min + 2))
 
 
-def _inclusive(box: BoxPx) -> str:
+def _format_corners(box: BoxPx) -> str:
     return f"{box.x_min:.2f} {box.y_min:.2f} {box.x_max - 1:.2f} {box.y_max - 1:.2f}"
 
 
-def _decimal(value: float) -> str:
+def _format_decimal(value: float) -> str:
     # Micrometres: KITTI's own two decimals would be a fifth of a small object. No "-0.000000".
     return f"{round(value, 6) + 0.0:.6f}"
 
 
-def _wrapped(angle_rad: float) -> float:
+def _wrap_angle(angle_rad: float) -> float:
     return math.remainder(angle_rad, 2.0 * math.pi)
 
 
-def _one_word(name: str) -> str:
+def _join_words(name: str) -> str:
     return "_".join(name.split())
 
 
@@ -533,13 +443,11 @@ _BOXES = {
     "tight": "around the visible pixels",
 }
 _SCANNED = """\
-velodyne    Points of the laser scanner '{lidar}'; float32 x y z reflectance [0, 1].
+velodyne    Points of '{lidar}'; float32 x y z reflectance [0, 1].
 velodyne_labels  One uint32 per point: lower half the category id of what reflected it, upper half
             row in label_2, from 1; 0 = no row. Objects are what lies in their boxes: points that
-            range noise took more than 3 cm out have no row, and what is deeper inside has one."""
-_THINNED = """\
-velodyne    Points of the depth image, one per {stride} x {stride} pixels (0: not written), as seen
-            from {height:.2f} m above the camera; float32 x y z reflectance; reflectance is 0."""
+            range noise took more than 3 cm out have no row, and what is deeper inside has one.
+"""
 _README = """\
 {name}: KITTI object detection format, sensor '{camera}'
 
@@ -549,8 +457,7 @@ depth_2     z-depth, 16-bit: metres = value * {scale}; 0 = nothing or out of ran
             the data set keeps depth images.
 calib       P0 = P1 = P2 = P3, pixel centres at whole numbers; R0_rect = identity, so the rectified
             frame is the camera's: X right, Y down, Z forward. The virtual IMU is at the scanner.
-{points}
-label_2     type truncated occluded alpha left top right bottom h w l x y z rotation_y
+{points}label_2     type truncated occluded alpha left top right bottom h w l x y z rotation_y
             Things without a type of KITTI's (buses, motorcycles) are Misc; sitting people, by
             their attribute pose, are Person_sitting; scenery that is not annotated has no row.
             Boxes turn about the camera's y axis only: each is the smallest such box, headed like

@@ -48,46 +48,13 @@ def encode_png(pixels: NDArray[Any], row_filter: RowFilter, level: int) -> bytes
     header = struct.pack(
         ">IIBBBBB", width, height, bit_depth, _RGB if pixels.ndim == 3 else _GREY, 0, 0, 0
     )
-    data = deflate.zlib_compress(_filtered(pixels, row_filter), level)
+    data = deflate.zlib_compress(_filter_rows(pixels, row_filter), level)
     return b"".join(
         [SIGNATURE, *_chunk(b"IHDR", header), *_chunk(b"IDAT", data), *_chunk(b"IEND", b"")]
     )
 
 
-def decode_grey16(data: bytes, rows: slice) -> NDArray[np.uint16] | None:
-    """Some rows of a 16-bit grey image that ``encode_png`` wrote with ``RowFilter.SUB``.
-
-    Each row stands by itself then, so that few of them take little time.
-
-    Args:
-        data: The file.
-        rows: Which.
-
-    Returns:
-        uint16 [rows, width]; None if the file is another one.
-    """
-    kind = struct.pack(">II", 13, 0x49484452)  # IHDR
-    width, height, bit_depth, color = struct.unpack(">IIBB", data[16:26].ljust(10, b"\0"))
-    if data[:16] != SIGNATURE + kind or (bit_depth, color) != (16, _GREY):
-        return None
-    length, chunk = struct.unpack(">I4s", data[33:41].ljust(8, b"\0"))
-    if chunk != b"IDAT" or data[41 + length + 8 : 41 + length + 12] != b"IEND":
-        return None
-    stride = 1 + 2 * width
-    try:
-        lines = deflate.zlib_decompress(data[41 : 41 + length], height * stride)
-    except deflate.DeflateError:
-        return None
-    chosen = np.frombuffer(lines, np.uint8).reshape(height, stride)[rows]
-    if (chosen[:, 0] != RowFilter.SUB).any():
-        return None
-    steps = chosen[:, 1:].reshape(len(chosen), width, 2)
-    values = np.add.accumulate(steps, axis=1, dtype=np.uint8).astype(np.uint16)
-    decoded: NDArray[np.uint16] = values[..., 0] << np.uint16(8) | values[..., 1]
-    return decoded
-
-
-def _filtered(pixels: NDArray[Any], row_filter: RowFilter) -> UInt8:
+def _filter_rows(pixels: NDArray[Any], row_filter: RowFilter) -> UInt8:
     """Rows of bytes, most significant first, each behind the number of its filter."""
     big_endian = pixels.astype(pixels.dtype.newbyteorder(">"), copy=False)
     rows = np.ascontiguousarray(big_endian).reshape(pixels.shape[0], -1).view(np.uint8)

@@ -232,7 +232,7 @@ def _write_sequence(info: DatasetInfo, scans: Sequence[Frame], folder: Path) -> 
         target = folder / f"labels/{k:06d}.label"
         if single:
             labels = np.frombuffer(stem.with_suffix(".label").read_bytes(), "<u4")
-            write_bytes(target, _renumbered(labels, scan.row["scene"], numbers).tobytes())
+            write_bytes(target, _renumber(labels, scan.row["scene"], numbers).tobytes())
         else:
             link_or_copy(stem.with_suffix(".label"), target)
         pose = (T_first_world @ from_plain(SE3, scan.row["T_world_camera"])).rounded(9)
@@ -244,7 +244,7 @@ def _write_sequence(info: DatasetInfo, scans: Sequence[Frame], folder: Path) -> 
     write_text(folder / "scans.txt", "".join(f"{scan.index}\n" for scan in scans))
 
 
-def _renumbered(
+def _renumber(
     labels: NDArray[np.uint32], scene: int, numbers: dict[tuple[int, int], int]
 ) -> NDArray[np.uint32]:
     """Labels with instance ids that are unique in the sequence; ``numbers`` grows."""

@@ -29,7 +29,7 @@ def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
         return wanted
     raise ConfigError(
         f"exporter '{exporter}': camera '{wanted}' is no sensor that writes the rgb channel; "
-        f"expected one of: {_listed(known)}{did_you_mean(wanted, known)}"
+        f"expected one of: {_join_names(known)}{did_you_mean(wanted, known)}"
     )
 
 
@@ -68,7 +68,7 @@ def laser_scanner(info: DatasetInfo, wanted: str, exporter: str) -> str:
     if wanted and wanted not in info.lidars:
         raise ConfigError(
             f"exporter '{exporter}': there is no lidar '{wanted}'; expected one of: "
-            f"{_listed(info.lidars)}{did_you_mean(wanted, info.lidars)}"
+            f"{_join_names(info.lidars)}{did_you_mean(wanted, info.lidars)}"
         )
     return wanted or next(iter(info.lidars), "")
 
@@ -87,5 +87,5 @@ def instant_s(sample: Sample, sensor: str) -> float:
     return sample.scene.time_s
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return ", ".join(names) or "none"

@@ -145,7 +145,7 @@ def _sequences(
             yield current, np.concatenate(parts)
             parts = []
         current = sequence
-        parts.append(_numbered(read_rows(path, info.sensor(sensor)), index))
+        parts.append(_add_index(read_rows(path, info.sensor(sensor)), index))
     if parts:
         yield current, np.concatenate(parts)
 
@@ -157,7 +157,7 @@ def _readings(shard_dirs: Sequence[Path], sensor: str) -> Iterator[tuple[int, Pa
             yield int(path.stem), path
 
 
-def _numbered(rows: NDArray[np.void], index: int) -> NDArray[Any]:
+def _add_index(rows: NDArray[np.void], index: int) -> NDArray[Any]:
     """The rows with the index of their sample before every other column."""
     numbered: NDArray[Any] = np.zeros(len(rows), [(INDEX, "<u4"), *rows.dtype.descr])
     numbered[INDEX] = index

@@ -20,10 +20,10 @@ from generator.config.distributions import (
     UniformInteger,
 )
 from generator.core.errors import ConfigError, did_you_mean
-from generator.core.fixtures import PANELS, fixture_asset, with_fixture, without_lights
+from generator.core.fixtures import fixture_asset, with_fixture, without_lights
 from generator.core.interfaces import AssetIndex
 from generator.core.photometry import with_flux
-from generator.core.scene import Light, LightKind, Scene
+from generator.core.scene import PANEL_KINDS, Light, LightKind, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
@@ -84,7 +84,7 @@ class CeilingLights(RandomizerBase):
             return "disk"
         raise ConfigError(
             f"randomizers.{self.name}.kind: unknown panel '{drawn}'; expected one of "
-            f"{', '.join(PANELS)}{did_you_mean(drawn, PANELS)}"
+            f"{', '.join(PANEL_KINDS)}{did_you_mean(drawn, PANEL_KINDS)}"
         )
 
     def _panel(self, name: str, kind: LightKind, at_m: Vec3) -> Light:

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import colorsys
 
+import numpy as np
+
+from generator.core.colorimetry import REC709_FROM_XYZ, luminance, srgb_decode
 from generator.core.se3 import Vec3
-
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Weights of linear sRGB in CIE Y (ITU-R BT.709)."""
-
-
-def linear_of_srgb(value: float) -> float:
-    """The sRGB transfer function undone (IEC 61966-2-1)."""
-    return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)
 
 
 def linear_of_hsv(hue: float, saturation: float, value: float) -> Vec3:
     """Linear RGB of a colour given as a painter's hue, saturation and value in sRGB."""
     red, green, blue = colorsys.hsv_to_rgb(hue % 1.0, saturation, value)
     return (
-        round(linear_of_srgb(red), 6),
-        round(linear_of_srgb(green), 6),
-        round(linear_of_srgb(blue), 6),
+        round(srgb_decode(red), 6),
+        round(srgb_decode(green), 6),
+        round(srgb_decode(blue), 6),
     )
 
 
@@ -49,12 +44,6 @@ def linear_of_temperature(kelvin: float) -> Vec3:
     """Linear sRGB with luminance 1 of a black body; what the gamut lacks is clipped at 0."""
     x, y = chromaticity_of_temperature(kelvin)
     big_x, big_z = x / y, (1.0 - x - y) / y
-    # XYZ (D65) to linear sRGB, IEC 61966-2-1.
-    rgb = [
-        max(0.0, 3.2406 * big_x - 1.5372 - 0.4986 * big_z),
-        max(0.0, -0.9689 * big_x + 1.8758 + 0.0415 * big_z),
-        max(0.0, 0.0557 * big_x - 0.2040 + 1.0570 * big_z),
-    ]
-    luminance = sum(weight * part for weight, part in zip(LUMINANCE, rgb, strict=True))
-    red, green, blue = (round(part / luminance, 6) for part in rgb)
+    rgb = np.maximum((REC709_FROM_XYZ * (big_x, 1.0, big_z)).sum(axis=1), 0.0)
+    red, green, blue = (round(float(part / luminance(rgb)), 6) for part in rgb)
     return (red, green, blue)

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from generator.core.interfaces import AssetIndex
+from generator.core.obb import rectangles_overlap
 from generator.core.scene import Body
 from generator.core.se3 import SE3, Array, Vec3
 
@@ -39,10 +39,10 @@ class Footprint:
         return Footprint(self.x_m, self.y_m, half_x_m, half_y_m, self.yaw_rad)
 
     def row(self) -> tuple[float, ...]:
-        """Centre, half extents, cosine and sine of the direction, half diagonal."""
+        """Centre, cosine and sine of the direction, half extents, half diagonal."""
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         reach_m = math.hypot(self.half_x_m, self.half_y_m)
-        return (self.x_m, self.y_m, self.half_x_m, self.half_y_m, c, s, reach_m)
+        return (self.x_m, self.y_m, c, s, self.half_x_m, self.half_y_m, reach_m)
 
 
 @dataclass
@@ -60,14 +60,14 @@ class Ground:
         self._count += 1
 
     def is_free(self, footprint: Footprint) -> bool:
-        """Whether a rectangle overlaps nothing (separating axes; Gottschalk et al. 1996)."""
+        """Whether a rectangle overlaps nothing."""
         others = self._rows[: self._count]
         own = np.array(footprint.row())
         delta = others[:, :2] - own[:2]
         reach = others[:, 6] + own[6]
         dx, dy = delta.T
-        near = np.flatnonzero(dx * dx + dy * dy < reach * reach)
-        return not (near.size and _overlap(own, others[near], delta[near]).any())
+        near = others[dx * dx + dy * dy < reach * reach]
+        return not rectangles_overlap(own[:4], own[4:6], near[:, :4], near[:, 4:6]).any()
 
 
 def ground_of(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
@@ -76,22 +76,3 @@ def ground_of(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
     for body in bodies:
         ground.add(Footprint.of(body.T_world_body, assets.bounds_m(body.asset), body.scale))
     return ground
-
-
-def _overlap(own: Array, others: Array, delta: Array) -> NDArray[np.bool_]:
-    """Whether each of the others overlaps a rectangle; rows as ``Footprint.row`` gives them."""
-    c = own[4] * others[:, 4] + own[5] * others[:, 5]
-    s = own[4] * others[:, 5] - own[5] * others[:, 4]
-    c, s = np.abs(c), np.abs(s)
-    mine_x = delta[:, 0] * own[4] + delta[:, 1] * own[5]
-    mine_y = delta[:, 1] * own[4] - delta[:, 0] * own[5]
-    their_x = delta[:, 0] * others[:, 4] + delta[:, 1] * others[:, 5]
-    their_y = delta[:, 1] * others[:, 4] - delta[:, 0] * others[:, 5]
-    hx, hy = others[:, 2], others[:, 3]
-    overlap: NDArray[np.bool_] = (
-        (np.abs(mine_x) < own[2] + hx * c + hy * s)
-        & (np.abs(mine_y) < own[3] + hx * s + hy * c)
-        & (np.abs(their_x) < hx + own[2] * c + own[3] * s)
-        & (np.abs(their_y) < hy + own[2] * s + own[3] * c)
-    )
-    return overlap

@@ -23,7 +23,6 @@ from generator.config.distributions import (
 )
 from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
 from generator.core.fixtures import (
-    PANELS,
     fixture_asset,
     level_side,
     with_fixture,
@@ -31,7 +30,7 @@ from generator.core.fixtures import (
 )
 from generator.core.interfaces import AssetIndex
 from generator.core.photometry import intensity_of_flux, intensity_of_illuminance
-from generator.core.scene import Light, LightKind, Scene
+from generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
@@ -39,7 +38,6 @@ from randomizers.clearance import is_in_the_open, is_inside
 from randomizers.color_space import linear_of_temperature
 
 TRIES = 24
-KINDS: tuple[LightKind, ...] = ("sphere", "spot", "sun", "rectangle", "disk")
 MARGIN_M = 0.05
 """A lamp keeps this far from bodies."""
 
@@ -101,7 +99,7 @@ class Lighting(RandomizerBase):
         scene = scene if self.keep_existing else without_lights(scene)
         for k, share in enumerate(shares):
             light = self._light(scene, assets, rng, f"{self.name}/{k}", total * share / sum(shares))
-            if self.visible and light.kind in PANELS:
+            if self.visible and light.kind in PANEL_KINDS:
                 materials = assets.materials(fixture_asset(light))
                 scene, light = with_fixture(scene, light, materials)
             scene = replace(scene, lights=(*scene.lights, light))
@@ -123,7 +121,7 @@ class Lighting(RandomizerBase):
         light, reach_m = self._sized(light, rng)
         position = self._position(scene, assets, rng, reach_m + MARGIN_M)
         light = _aimed(light, position, scene.focus.center_m)
-        if light.kind not in PANELS:
+        if light.kind not in PANEL_KINDS:
             light = replace(light, cone_rad=round(math.radians(self.cone_deg.draw(rng)), 6))
         return self._bright(light, strength, math.dist(position, scene.focus.center_m))
 
@@ -138,11 +136,11 @@ class Lighting(RandomizerBase):
 
     def _kind(self, rng: Rng) -> LightKind:
         drawn = self.kind.draw(rng)
-        kind = next((known for known in KINDS if known == drawn), None)
+        kind = next((known for known in LIGHT_KINDS if known == drawn), None)
         if kind is None:
             raise ConfigError(
                 f"randomizers.{self.name}.kind: unknown light '{drawn}'; expected one of "
-                f"{', '.join(KINDS)}{did_you_mean(drawn, KINDS)}"
+                f"{', '.join(LIGHT_KINDS)}{did_you_mean(drawn, LIGHT_KINDS)}"
             )
         if kind == "sun" and self.luminous_flux_lm is not None:
             raise ConfigError(

@@ -18,6 +18,7 @@ from generator.config.distributions import (
     Scalar,
     Uniform,
 )
+from generator.core.colorimetry import luminance
 from generator.core.geometry import Keypoint, Material
 from generator.core.interfaces import AssetIndex
 from generator.core.photometry import intensity_of_flux
@@ -25,7 +26,7 @@ from generator.core.scene import Body, Light, Scene
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase, materials_of
-from randomizers.color_space import LUMINANCE, linear_of_temperature
+from randomizers.color_space import linear_of_temperature
 from randomizers.daylight import is_dark
 
 _WHITE_K = 3400.0
@@ -100,8 +101,8 @@ def balanced_color(temperature_k: float) -> Vec3:
     lamp = linear_of_temperature(temperature_k)
     white = linear_of_temperature(_WHITE_K)
     rgb = [part / reference**0.5 for part, reference in zip(lamp, white, strict=True)]
-    luminance = sum(weight * part for weight, part in zip(LUMINANCE, rgb, strict=True))
-    red, green, blue = (round(part / luminance, 6) for part in rgb)
+    relative = float(luminance(np.array(rgb)))
+    red, green, blue = (round(part / relative, 6) for part in rgb)
     return (red, green, blue)
 
 

@@ -9,14 +9,13 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from generator.core.fixtures import (
-    PANELS,
     fixture_asset,
     level_side,
     with_fixture,
 )
 from generator.core.interfaces import AssetIndex
 from generator.core.photometry import with_flux
-from generator.core.scene import Light, Scene
+from generator.core.scene import PANEL_KINDS, LampKind, Light, Scene
 from generator.core.se3 import Vec3
 from scene_templates.element import Element
 
@@ -38,7 +37,7 @@ class LightElement(Element):
     """
 
     type: Literal["light"] = "light"
-    kind: Literal["sphere", "spot", "rectangle", "disk"] = "sphere"
+    kind: LampKind = "sphere"
     position_m: tuple[float, float, float] = (0.5, -0.8, 2.2)
     direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
     intensity_cd: float = Field(800.0, ge=0)
@@ -76,7 +75,7 @@ class LightElement(Element):
             light = replace(light, size_m=self.size_m, side=level_side(light.direction))
         if self.luminous_flux_lm is not None:
             light = with_flux(light, self.luminous_flux_lm)
-        if self.visible and self.kind in PANELS:
+        if self.visible and self.kind in PANEL_KINDS:
             materials = assets.materials(fixture_asset(light))
             scene, light = with_fixture(scene, light, materials)
         return replace(scene, lights=(*scene.lights, light))

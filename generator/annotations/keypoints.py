@@ -51,7 +51,7 @@ class Keypoints(Strict):
         if reading.camera.shutter.rolls:
             p_seen, image_px = seen_points(scene, reading.camera, places_m, instance)
         found = tuple(
-            _found(reading, instance.instance_id, point, position_m, seen)
+            _locate(reading, instance.instance_id, point, position_m, seen)
             for point, position_m, *seen in zip(
                 instance.keypoints, p_camera, p_seen, image_px, strict=True
             )
@@ -59,7 +59,7 @@ class Keypoints(Strict):
         return replace(truth, keypoints=found)
 
 
-def _found(
+def _locate(
     reading: Reading, instance_id: int, point: Keypoint, p_camera: Array, seen: Sequence[Array]
 ) -> KeypointTruth:
     """One keypoint.

@@ -48,7 +48,7 @@ class Lanes(Strict):
         found = tuple(
             line
             for border in lane_borders(scene.lanes)
-            for line in self._projected(border, scene, reading)
+            for line in self._project_border(border, scene, reading)
         )
         return replace(truth, borders=found)
 
@@ -59,7 +59,7 @@ class Lanes(Strict):
         del assets
         return replace(truth, borders=lane_borders(scenes[""].lanes))
 
-    def _projected(
+    def _project_border(
         self, border: LaneBorder, scene: Scene, reading: Reading
     ) -> Iterator[BorderTruth]:
         """The stretches of a border that lie in the image."""

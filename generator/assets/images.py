@@ -10,6 +10,7 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.core.colorimetry import luminance
 from generator.core.errors import AssetError
 from generator.core.geometry import Float32, UInt8
 
@@ -153,7 +154,7 @@ def _mean_luminance(rgb: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> f
     """Mean over the sphere of the luminance (Rec. 709) of an equirectangular image."""
     height = rgb.shape[0]
     edges = np.array([math.cos(math.pi * k / height) for k in range(height + 1)])
-    rows = (rgb * np.array([0.2126, 0.7152, 0.0722])).sum(axis=2).mean(axis=1)
+    rows = luminance(rgb).mean(axis=1)
     return float((rows * 0.5 * (edges[:-1] - edges[1:])).sum())
 
 

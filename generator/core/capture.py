@@ -71,6 +71,10 @@ class Channel(str, Enum):
     FLOW_OCCLUDED_BACKWARD = "flow_occluded_backward"
     SCENE_FLOW = "scene_flow"
 
+    def __str__(self) -> str:
+        """The name in YAML and of folders."""
+        return self.value
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Silhouette:

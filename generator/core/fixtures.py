@@ -10,13 +10,11 @@ import numpy as np
 
 from generator.core.geometry import Material
 from generator.core.photometry import luminance_cd_m2
-from generator.core.scene import Body, Light, Scene
+from generator.core.scene import PANEL_KINDS, Body, Light, Scene
 from generator.core.se3 import SE3, Vec3
 
 GAP_M = 1e-3
 """A panel shines from this far before its fixture, which then does not shade it."""
-PANELS = ("rectangle", "disk")
-"""Kinds of light that are panels."""
 LAMP = "lamp"
 """Role of the slots of a fixture that shine."""
 
@@ -66,6 +64,6 @@ def with_fixture(scene: Scene, light: Light, materials: Sequence[Material]) -> t
 
 def without_lights(scene: Scene) -> Scene:
     """The scene without its lights, nor the fixtures of panels."""
-    fixtures = {light.body for light in scene.lights if light.kind in PANELS and light.body}
+    fixtures = {light.body for light in scene.lights if light.kind in PANEL_KINDS and light.body}
     bodies = tuple(b for b in scene.bodies if b.name not in fixtures or b.instance_id)
     return replace(scene, lights=(), bodies=bodies)

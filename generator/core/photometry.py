@@ -22,14 +22,16 @@ def intensity_of_flux(light: Light, flux_lm: float) -> float:
     Raises:
         ValueError: a sun has no flux.
     """
-    if light.kind == "sun":
-        raise ValueError("a sun has an illuminance, not a flux")
-    if light.kind == "sphere":
-        return flux_lm / (4.0 * math.pi)
-    if light.kind == "spot":
-        inner, outer = (1.0 - math.cos(share * light.cone_rad) for share in (light.even, 1.0))
-        return flux_lm / (math.pi * (inner + outer))
-    return flux_lm / math.pi
+    match light.kind:
+        case "sun":
+            raise ValueError("a sun has an illuminance, not a flux")
+        case "sphere":
+            return flux_lm / (4.0 * math.pi)
+        case "spot":
+            inner, outer = (1.0 - math.cos(share * light.cone_rad) for share in (light.even, 1.0))
+            return flux_lm / (math.pi * (inner + outer))
+        case "rectangle" | "disk":
+            return flux_lm / math.pi
 
 
 def intensity_of_illuminance(light: Light, lux: float, distance_m: float) -> float:
@@ -44,14 +46,17 @@ def intensity_of_illuminance(light: Light, lux: float, distance_m: float) -> flo
     configuration factors", 1982 (a disk and a rectangle before a parallel element).
     """
     squared_m2 = distance_m * distance_m
-    if light.kind == "disk":
-        return lux * (squared_m2 + light.radius_m * light.radius_m)
-    if light.kind == "rectangle":
-        a, b = (0.5 * side_m for side_m in light.size_m)
-        long, across = math.sqrt(squared_m2 + a * a), math.sqrt(squared_m2 + b * b)
-        per_luminance = 2.0 * (a / long * math.atan(b / long) + b / across * math.atan(a / across))
-        return lux * 4.0 * a * b / per_luminance
-    return lux * squared_m2
+    match light.kind:
+        case "disk":
+            return lux * (squared_m2 + light.radius_m * light.radius_m)
+        case "rectangle":
+            a, b = (0.5 * side_m for side_m in light.size_m)
+            long, across = math.sqrt(squared_m2 + a * a), math.sqrt(squared_m2 + b * b)
+            over_b, over_a = math.atan(b / long), math.atan(a / across)
+            per_luminance = 2.0 * (a / long * over_b + b / across * over_a)
+            return lux * 4.0 * a * b / per_luminance
+        case "sphere" | "spot" | "sun":
+            return lux * squared_m2
 
 
 def luminance_cd_m2(light: Light) -> float:
@@ -60,11 +65,13 @@ def luminance_cd_m2(light: Light) -> float:
     Raises:
         ValueError: the light is no panel.
     """
-    if light.kind == "rectangle":
-        return light.intensity_cd / (light.size_m[0] * light.size_m[1])
-    if light.kind == "disk":
-        return light.intensity_cd / (math.pi * light.radius_m * light.radius_m)
-    raise ValueError(f"a light of kind {light.kind} is no panel")
+    match light.kind:
+        case "rectangle":
+            return light.intensity_cd / (light.size_m[0] * light.size_m[1])
+        case "disk":
+            return light.intensity_cd / (math.pi * light.radius_m * light.radius_m)
+        case "sphere" | "spot" | "sun":
+            raise ValueError(f"a light of kind {light.kind} is no panel")
 
 
 def with_flux(light: Light, flux_lm: float) -> Light:

@@ -8,7 +8,7 @@ knows the element types.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol, TypeVar
+from typing import Literal, Protocol, TypeVar, get_args
 
 from generator.core.geometry import Keypoint, Material
 from generator.core.intrinsics import Intrinsics
@@ -19,7 +19,12 @@ from generator.core.shutter import INSTANT, Shutter
 SharedValue = str | float | int | bool
 Motion = Literal["static", "dynamic", "kinematic"]
 Placement = Literal["drop", "scatter", "grid", "stack", "along"]
-LightKind = Literal["sphere", "spot", "sun", "rectangle", "disk"]
+PanelKind = Literal["rectangle", "disk"]
+LampKind = Literal["sphere", "spot", PanelKind]
+LightKind = Literal["sphere", "spot", "sun", PanelKind]
+PANEL_KINDS: tuple[PanelKind, ...] = get_args(PanelKind)
+LIGHT_KINDS: tuple[LightKind, ...] = get_args(LightKind)
+"""On the device, a kind is its number in this list."""
 LaneKind = Literal[
     "driving", "parking", "bicycle", "sidewalk", "crosswalk", "verge", "furniture", "frontage"
 ]

@@ -196,8 +196,8 @@ class World:
             return int(
                 pybullet.createCollisionShapeArray(
                     shapeTypes=[pybullet.GEOM_BOX] * len(shape.boxes),
-                    halfExtents=[_scaled(half, scale) for _, half in shape.boxes],
-                    collisionFramePositions=[_scaled(center, scale) for center, _ in shape.boxes],
+                    halfExtents=[_scale(half, scale) for _, half in shape.boxes],
+                    collisionFramePositions=[_scale(center, scale) for center, _ in shape.boxes],
                     physicsClientId=self._client,
                 )
             )
@@ -222,6 +222,6 @@ def _bullet_pose(pose: SE3) -> tuple[Vec3, tuple[float, float, float, float]]:
     return pose.translation_m, (x, y, z, w)
 
 
-def _scaled(vector: Vec3, scale: float) -> Vec3:
+def _scale(vector: Vec3, scale: float) -> Vec3:
     x, y, z = vector
     return (x * scale, y * scale, z * scale)

@@ -67,7 +67,7 @@ class Drop:
                 break
             if any(self._homes[body.name] is None for body in loose):
                 return self._fell_off()
-        return self._fell_off() if loose else self._judged()
+        return self._fell_off() if loose else self._find_rejection()
 
     def _restart(self, body: Body, pull: float) -> None:
         """Put a body where it started, moved towards the middle of its surface by a share."""
@@ -178,7 +178,7 @@ class Drop:
         surfaces = self._surfaces[body.name]
         return not surfaces or is_supported(surfaces, *self._world.bounds_m(body.name))
 
-    def _judged(self) -> Rejection | None:
+    def _find_rejection(self) -> Rejection | None:
         deepest = min((gap_m for _, _, gap_m in self._world.contacts()), default=0.0)
         return self._overlapping() if deepest < -self._config.penetration_m_max else None
 

@@ -67,7 +67,7 @@ class BulletEngine:
         for body in _solids(scene):
             self._add(body, body in falling)
 
-        obeyed = self._obeyed(scene, fixed, _placed(scene, falling))
+        obeyed = self._solve_goals(scene, fixed, _resting_bodies(scene, falling))
         if isinstance(obeyed, Rejection):
             return Settled(scene, obeyed)
         surfaces = {body.name: surfaces_of(scene, body) for body in falling}
@@ -76,7 +76,7 @@ class BulletEngine:
         if rejection is not None:
             return Settled(scene, rejection)
         settled = self._frozen(scene, falling, tuple(stance for _, stance in obeyed))
-        moved = self._moved(settled, fixed, [body.name for body in falling], obeyed)
+        moved = self._add_arm_tracks(settled, fixed, [body.name for body in falling], obeyed)
         if isinstance(moved, Rejection):
             return Settled(scene, moved)
         return Settled(moved)
@@ -99,7 +99,7 @@ class BulletEngine:
             self._shapes[asset_id] = collision_shape(self._assets.convex_parts(asset_id))
         return self._shapes[asset_id]
 
-    def _obeyed(
+    def _solve_goals(
         self, scene: Scene, fixed: list[str], placed: list[str]
     ) -> list[tuple[Arm, Stance]] | Rejection:
         """Each arm and what it does; arms avoid those before them."""
@@ -118,7 +118,7 @@ class BulletEngine:
                 obstacles.append(articulation.goal.held)
         return obeyed
 
-    def _moved(
+    def _add_arm_tracks(
         self,
         scene: Scene,
         fixed: list[str],
@@ -195,7 +195,7 @@ def _solids(scene: Scene) -> list[Body]:
     return [b for b in scene.bodies if b.collides and not b.name.startswith(prefixes)]
 
 
-def _placed(scene: Scene, falling: list[Body]) -> list[str]:
+def _resting_bodies(scene: Scene, falling: list[Body]) -> list[str]:
     """Dynamic bodies that already lie about where they will rest: an arm must avoid them."""
     dropped = {group.name for group in scene.groups if group.placement == "drop"}
     return [body.name for body in falling if body.group not in dropped]

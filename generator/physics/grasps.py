@@ -52,7 +52,7 @@ class Hand:
         """The held body as upright as the hand allows, fingers closed; None if it does not fit."""
         up = max(_UPRIGHT_AXES, key=lambda axis: float(T_world_grasp.rotate(np.array(axis))[2]))
         if (held, up) not in self._known:
-            self._known[held, up] = self._closed(held, up)
+            self._known[held, up] = self._close_fingers(held, up)
         return self._known[held, up]
 
     def grasp_as_it_lies(self, held: str, T_grasp_held: SE3) -> Grasp | None:
@@ -60,13 +60,13 @@ class Hand:
 
         None if open fingers would cut into it, or if closed ones would touch it on one side only.
         """
-        self._spread(1.0)
+        self._pose_hand(1.0)
         self._world.place(held, T_grasp_held)
-        pose = self._centred(held, T_grasp_held)
+        pose = self._center_pose(held, T_grasp_held)
         if not self._clear(held, 1.0) or self._touches_palm(held):
             return None
         opening = self._narrowest(held)
-        self._spread(opening)
+        self._pose_hand(opening)
         gaps = [self._world.gap_m(self._body(f), held, _PAD_GAP_M) for f in self._fingers]
         if opening <= 0.0 or any(gap >= _PAD_GAP_M for gap in gaps):
             return None
@@ -74,12 +74,12 @@ class Hand:
 
     def palm_height_m(self) -> float:
         """How far behind the grasp frame's origin the hand without its fingers ends."""
-        self._spread(1.0)
+        self._pose_hand(1.0)
         return -self._palm_z_m() - _PALM_GAP_M
 
     def tip_depth_m(self) -> float:
         """How far before the grasp frame's origin the fingers end."""
-        self._spread(1.0)
+        self._pose_hand(1.0)
         return max(
             (float(self._world.bounds_m(self._body(f))[1][2]) for f in self._fingers), default=0.0
         )
@@ -87,13 +87,13 @@ class Hand:
     def _touches_palm(self, held: str) -> bool:
         return any(self._world.gap_m(self._body(link), held, 0.0) < 0.0 for link in self._palm)
 
-    def _closed(self, held: str, up: Vec3) -> Grasp | None:
+    def _close_fingers(self, held: str, up: Vec3) -> Grasp | None:
         self._world.place(held, SE3())
         low, high = self._world.bounds_m(held)
-        self._spread(1.0)
+        self._pose_hand(1.0)
         pose = _between_fingers(low, high, up, self._palm_z_m())
         self._world.place(held, pose)
-        pose = self._centred(held, pose)
+        pose = self._center_pose(held, pose)
         if not self._clear(held, 1.0):
             return None
         opening = self._narrowest(held)
@@ -109,7 +109,7 @@ class Hand:
             touching, free = (touching, middle) if self._clear(held, middle) else (middle, free)
         return free
 
-    def _centred(self, held: str, pose: SE3) -> SE3:
+    def _center_pose(self, held: str, pose: SE3) -> SE3:
         """The pose shifted along Y so that two opposite fingers are equally far."""
         if len(self._fingers) != 2:
             return pose
@@ -122,12 +122,12 @@ class Hand:
         return shifted
 
     def _clear(self, held: str, opening: float) -> bool:
-        self._spread(opening)
+        self._pose_hand(opening)
         return all(
             self._world.gap_m(self._body(link), held, limit_m=0.0) >= 0.0 for link in self._fingers
         )
 
-    def _spread(self, opening: float) -> None:
+    def _pose_hand(self, opening: float) -> None:
         """Put hand and fingers where the grasp frame is the world's."""
         gripper = self._gripper
         positions = all_positions(self._robot, self._arm_home, opening)

@@ -95,7 +95,7 @@ def solutions(chain: Chain, T_base_grasp: SE3) -> Iterator[tuple[float, ...]]:
     for number in range(_STARTS_MAX):
         found = solve(chain, T_base_grasp, _start(chain, number))
         if found is not None:
-            yield _completed(chain, found, chain.rest)
+            yield _complete_positions(chain, found, chain.rest)
 
 
 def neighbour(
@@ -110,7 +110,7 @@ def neighbour(
         share: Of the tolerances, that may be left.
     """
     found = solve(chain, T_base_grasp, [positions[index] for index in chain.indices], share)
-    return None if found is None else _completed(chain, found, positions)
+    return None if found is None else _complete_positions(chain, found, positions)
 
 
 def solve(
@@ -121,13 +121,15 @@ def solve(
     for _ in range(_ITERATIONS_MAX):
         pose, columns = _jacobian(chain, positions)
         error = _error(T_base_grasp, pose)
-        if _arrived(error, share):
+        if _is_reached(error, share):
             return tuple(positions)
         _step(chain.joints, positions, columns, error)
     return None
 
 
-def _completed(chain: Chain, found: Sequence[float], others: Sequence[float]) -> tuple[float, ...]:
+def _complete_positions(
+    chain: Chain, found: Sequence[float], others: Sequence[float]
+) -> tuple[float, ...]:
     """The arm's positions: those found, and for joints off the chain the others."""
     positions = list(others)
     for index, value in zip(chain.indices, found, strict=True):
@@ -201,7 +203,7 @@ def _error(target: SE3, pose: SE3) -> Row:
     ]
 
 
-def _arrived(error: Row, share: float) -> bool:
+def _is_reached(error: Row, share: float) -> bool:
     # Half the tolerance, so that rounding the positions cannot leave it.
     distance = math.sqrt(sum(e * e for e in error[:3]))
     angle = math.sqrt(sum(e * e for e in error[3:])) / _LENGTH_M_PER_RAD
@@ -214,7 +216,7 @@ def _step(joints: Sequence[Joint], positions: Row, columns: list[Row], error: Ro
     damping = 0.5 * sum(e * e for e in error) * 1e-2 + _DAMPING
     free = list(range(len(joints)))
     for _ in range(2):
-        change = _damped(([columns[k] for k in free]), error, damping)
+        change = _solve_damped(([columns[k] for k in free]), error, damping)
         largest = max((abs(c) for c in change), default=0.0)
         scale = min(1.0, _STEP_MAX / largest) if largest > 0.0 else 0.0
         wanted = {k: positions[k] + scale * c for k, c in zip(free, change, strict=True)}
@@ -235,7 +237,7 @@ def _pushes_out(joint: Joint, position: float, wanted: float) -> bool:
     )
 
 
-def _damped(columns: list[Row], error: Row, damping: float) -> Row:
+def _solve_damped(columns: list[Row], error: Row, damping: float) -> Row:
     """``J^T (J J^T + damping I)^-1 error``, by Cholesky's decomposition."""
     size = len(error)
     matrix = [[sum(c[i] * c[j] for c in columns) for j in range(i + 1)] for i in range(size)]

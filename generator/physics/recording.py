@@ -41,10 +41,10 @@ class Recording:
         for number, (leg, positions) in enumerate(knots, start):
             poses = link_poses(arm.robot, arm.articulation.T_world_base, positions)
             for link in parts:
-                self._put(f"{name}/{link}", number, poses[link])
+                self._add_knot(f"{name}/{link}", number, poses[link])
             if leg.held is not None:
                 pose = arm.grasp_pose(positions) @ leg.held.T_grasp_held
-                self._put(leg.held.body, number, pose)
+                self._add_knot(leg.held.body, number, pose)
         self._knot = start + len(knots) - 1
         self.joint_tracks[name] = JointTrack(
             STEP_S, tuple(positions for _, positions in knots), round(start * STEP_S, 6)
@@ -58,7 +58,7 @@ class Recording:
             if any(pose != poses[0] for pose in poses)
         )
 
-    def _put(self, body: str, number: int, pose: SE3) -> None:
+    def _add_knot(self, body: str, number: int, pose: SE3) -> None:
         """The pose of a body at a knot; since its last knot, or the one before, it has rested."""
         if body not in self._poses:
             rested = body in self._resting and number > 0

@@ -45,7 +45,7 @@ class Router:
             return []
         target = self._T_base_world @ T_world_grasp
         seeds = [
-            self._led(T_world_grasp, start),
+            self._follow_hand(T_world_grasp, start),
             *islice(solutions(self._chain, target), _SOLUTIONS_MAX),
         ]
         found: dict[Positions, None] = {}
@@ -113,7 +113,7 @@ class Router:
         ]
         yield [rounded_positions(home)]
 
-    def _led(self, T_world_grasp: SE3, start: Positions) -> list[float]:
+    def _follow_hand(self, T_world_grasp: SE3, start: Positions) -> list[float]:
         """Arm positions near a pose that a hand led there from a start ends with."""
         assert self._chain is not None
         way = Track("hand", 1.0, (self._arm.grasp_pose(start), T_world_grasp))

@@ -120,7 +120,7 @@ def scale_step(scale: float) -> int:
 
 def collision_shape(parts: ConvexParts) -> CollisionShape:
     """The shape of an asset's convex parts."""
-    measured = _measured(parts.parts_m)
+    measured = _measure(parts.parts_m)
     volumes_m3 = np.array([part.volume_m3 for part in measured])
     middles = np.stack([part.center_m for part in measured])
     # Parts that are all flat have no volume; then every part weighs the same.
@@ -152,7 +152,7 @@ class _Part:
     center_m: Array
 
 
-def _measured(parts_m: Sequence[Array]) -> list[_Part]:
+def _measure(parts_m: Sequence[Array]) -> list[_Part]:
     """Hulls of parts: all faces of all parts at once, for numpy's overhead is most of the work."""
     from scipy.spatial import ConvexHull, QhullError
 

@@ -89,7 +89,7 @@ class Way:
         legs: list[Leg] = []
         for number, goal in enumerate(self._arm.articulation.way, 1):
             self._restore()
-            found = self._pursued(goal)
+            found = self._plan_goal(goal)
             if isinstance(found, str):
                 return self._rejection(found, number)
             legs += [timed(leg, self._arm.robot, goal.speed) for leg in found]
@@ -97,12 +97,12 @@ class Way:
         self._restore()
         return legs
 
-    def _pursued(self, goal: ArmGoal) -> list[Leg] | str:
+    def _plan_goal(self, goal: ArmGoal) -> list[Leg] | str:
         """Legs to a goal, not yet timed, or why it cannot be had."""
         if goal.kind == "grasp":
-            return self._picked(goal)
+            return self._plan_pick(goal)
         if goal.kind == "place":
-            return self._placed(goal)
+            return self._plan_place(goal)
         hits: dict[str, None] = {}
         for end in self._ends(goal):
             route = self._route(end)
@@ -129,7 +129,7 @@ class Way:
 
     # Picking up.
 
-    def _picked(self, goal: ArmGoal) -> list[Leg] | str:
+    def _plan_pick(self, goal: ArmGoal) -> list[Leg] | str:
         """Legs that end with one of the objects lifted."""
         if self._hand is None or self._held is not None:
             return NOTHING_TO_GRASP
@@ -201,14 +201,14 @@ class Way:
 
     # Putting down.
 
-    def _placed(self, goal: ArmGoal) -> list[Leg] | str:
+    def _plan_place(self, goal: ArmGoal) -> list[Leg] | str:
         """Legs that end with the empty hand above what was put down."""
         held = self._held
         if held is None:
             return NOTHING_HELD
         hits: dict[str, None] = {}
         for T_world_rest, closed, above in self._spots(held, goal.pose_candidates):
-            legs = self._put(held, T_world_rest, closed, above)
+            legs = self._plan_release(held, T_world_rest, closed, above)
             if not isinstance(legs, str):
                 self.resting[held.body] = T_world_rest.rounded()
                 self._held = None
@@ -232,7 +232,7 @@ class Way:
             found.sort(key=lambda stop: self._effort_s(*stop[1:]))
             yield from found[:_PUTS_MAX]
 
-    def _put(
+    def _plan_release(
         self, held: Held, T_world_rest: SE3, closed: Positions, above: Positions
     ) -> list[Leg] | str:
         """Lower, open, leave; or what is hit."""

@@ -18,9 +18,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.core.colorimetry import luminance
 from generator.core.geometry import Float32
 from generator.core.se3 import Array, Vec3
-from generator.renderers.panoramas import LUMINANCE, luminance_of, texel_directions
+from generator.renderers.panoramas import texel_directions
 
 LAMPS_MAX = 3
 # Rows of the image in which parts are looked for.
@@ -66,7 +67,7 @@ def without_brightest(image: Float32) -> tuple[Float32, tuple[SkyLamp, ...]]:
     """
     if float(_searched(image).max()) <= _LEVELS[-1]:
         return image, ()
-    sphere = _Sphere(*texel_directions(image.shape[0]), luminance_of(image))
+    sphere = _Sphere(*texel_directions(image.shape[0]), luminance(image.astype(np.float64)))
     rest, found = image.astype(np.float64), []
     for level in _LEVELS:
         for part, floor in _parts(_searched(rest), level, sphere.luminance.shape):
@@ -98,7 +99,7 @@ def _searched(image: Array | Float32) -> Array:
     if height > _SEARCH_ROWS:
         size = (2 * _SEARCH_ROWS, _SEARCH_ROWS)
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    return luminance_of(image)
+    return luminance(image.astype(np.float64))
 
 
 def _parts(
@@ -145,16 +146,16 @@ def _joined(labels: NDArray[np.int32], count: int) -> list[int]:
 
 def _excess(image: Array, part: NDArray[np.bool_], floor: float) -> Array:
     """What a part is brighter than the floor, in its colours; 0 elsewhere. Shape of the image."""
-    luminance = luminance_of(image)
-    brighter = part & (luminance > floor)
-    share = np.where(brighter, 1.0 - floor / np.where(brighter, luminance, 1.0), 0.0)
+    bright = luminance(image.astype(np.float64))
+    brighter = part & (bright > floor)
+    share = np.where(brighter, 1.0 - floor / np.where(brighter, bright, 1.0), 0.0)
     excess: Array = image * share[..., None]
     return excess
 
 
 def _lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
     """The disc that sends the same flow of light to the scene."""
-    weights = luminance_of(excess) * sphere.solid
+    weights = luminance(excess) * sphere.solid
     flow = np.array([float((weights * sphere.directions[..., k]).sum()) for k in range(3)])
     towards = flow / math.sqrt(float((flow * flow).sum()))
     cosine = _cosine(towards, sphere)
@@ -179,4 +180,4 @@ def _cosine(towards: Vec3 | Array, sphere: _Sphere) -> Array:
 
 
 def _strength(lamp: SkyLamp) -> float:
-    return float((np.asarray(lamp.power) * LUMINANCE).sum())
+    return float(luminance(np.asarray(lamp.power)))

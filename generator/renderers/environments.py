@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 import warp as wp
 
+from generator.core.colorimetry import luminance
 from generator.core.geometry import Float32
 from generator.core.se3 import Array
 from generator.renderers.brightest import SkyLamp, without_brightest
 from generator.renderers.kernels.sky import prefilter, weigh_texels
-from generator.renderers.panoramas import luminance_of, texel_directions
+from generator.renderers.panoramas import texel_directions
 
 _GLOSSY_LEVELS = 4
 _GLOSSY_SIZE = 24
@@ -60,8 +61,8 @@ def _dimmed(image: Float32, light: Float32, rest: Float32) -> Float32:
     """The image as much darker as its shrunk copy ``light`` is in ``rest``."""
     if image.shape == rest.shape:
         return rest
-    before = luminance_of(light)
-    left = luminance_of(rest) / np.where(before > 0.0, before, 1.0)
+    before = luminance(light)
+    left = luminance(rest) / np.where(before > 0.0, before, 1.0)
     size = (image.shape[1], image.shape[0])
     part = cv2.resize(left.astype(np.float32), size, interpolation=cv2.INTER_NEAREST)
     dimmed: Float32 = image * part[..., None]

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from generator.core.colorimetry import luminance
 from generator.core.geometry import Float32
 from generator.core.se3 import Array
 
 _HEIGHT_MAX = 512
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]:
@@ -28,8 +28,7 @@ def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]
         of more than 512 rows have theirs taken together. If ``whole``, there is a share wherever
         there is light.
     """
-    luminance = np.einsum("hwc,c->hw", image.astype(np.float64), _LUMINANCE, optimize=False)
-    light = _mean_of_texels(np.maximum(luminance, 0.0))
+    light = _mean_of_texels(np.maximum(luminance(image.astype(np.float64)), 0.0))
     if len(light) > _HEIGHT_MAX:
         size = (2 * _HEIGHT_MAX, _HEIGHT_MAX)
         light = np.asarray(cv2.resize(light, size, interpolation=cv2.INTER_AREA), np.float64)

@@ -9,6 +9,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from generator.core.colorimetry import luminance
+from generator.core.scene import LIGHT_KINDS, PANEL_KINDS
 from generator.core.se3 import Array
 from generator.renderers.kernels import lighting, records
 from generator.renderers.packing import PackedWorld
@@ -16,8 +18,6 @@ from generator.renderers.stock import AssetStock
 from generator.renderers.visibility import Seen
 
 _STRIDE_PX = 11
-_SPOT, _SUN, _RECTANGLE = 1, 2, 3
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # Light that is taken for granted, so that lamps are not ranked by what they do in the dark [lx].
 _DIM_LUX = 0.05
 # A lamp also matters for what is turned away from it: its glow, its reflections.
@@ -58,14 +58,15 @@ def main_lamps(
     """
     lux = np.stack([_illuminance(lamp, points_m, normals) for lamp in lamps])
     shares = (lux / (_DIM_LUX + lux.sum(axis=0))).sum(axis=1)
-    shares = np.where(lamps["kind"] == _SUN, np.inf, shares)
+    shares = np.where(lamps["kind"] == LIGHT_KINDS.index("sun"), np.inf, shares)
     order = np.argsort(-shares, kind="stable")
     return np.sort(order[:lamps_max])
 
 
 def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Array:
     """Of one lamp at points [lx], without shadows."""
-    if lamp["kind"] == _SUN:
+    kind = LIGHT_KINDS[lamp["kind"]]
+    if kind == "sun":
         return np.zeros(len(points_m))
     # Axis by axis: reducing over a short last axis takes three times as long.
     away = [float(lamp["position_m"][k]) - points_m[:, k] for k in range(3)]
@@ -73,15 +74,15 @@ def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Arr
     distance = np.sqrt(squared)
     direction = [along / distance for along in away]
     cosine = np.maximum(_dot(direction, list(normals.T)), _TURNED_AWAY)
-    lux: Array = float((lamp["power"] * _LUMINANCE).sum()) * cosine / squared
-    if lamp["kind"] == _SPOT:
+    lux: Array = float(luminance(lamp["power"].astype(np.float64))) * cosine / squared
+    if kind == "spot":
         down = -_dot(direction, [float(along) for along in lamp["direction"]])
         span = max(float(lamp["cos_inner"] - lamp["cos_outer"]), 1e-4)
         fade = np.clip((down - lamp["cos_outer"]) / span, 0.0, 1.0)
         lux = lux * fade * fade * (3.0 - 2.0 * fade)
         if lamp["cutoff"] > 0.0:
             lux = lux * dipped_share(lamp, [-along for along in direction])
-    elif lamp["kind"] >= _RECTANGLE:
+    elif kind in PANEL_KINDS:
         lux = lux * np.maximum(-_dot(direction, [float(along) for along in lamp["direction"]]), 0.0)
     return lux
 

@@ -11,7 +11,16 @@ import warp as wp
 from numpy.typing import NDArray
 
 from generator.core.lens import LensModel
-from generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
+from generator.core.scene import (
+    LIGHT_KINDS,
+    PANEL_KINDS,
+    Body,
+    Camera,
+    Environment,
+    Light,
+    Scene,
+    Weather,
+)
 from generator.core.se3 import Array, rotations_of_unit
 from generator.renderers.environments import DeviceEnvironment
 from generator.renderers.kernels import records
@@ -28,7 +37,6 @@ _LENSES: dict[LensModel, int] = {
     "kannala_brandt": records.KANNALA_BRANDT,
     "equirectangular": records.EQUIRECTANGULAR,
 }
-_LAMP_KINDS = {"sphere": 0, "spot": 1, "sun": 2, "rectangle": 3, "disk": 4}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -326,7 +334,7 @@ def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
     values = np.zeros(len(lights), dtype=dtype_of(records.Lamp))
     for value, light in zip(values, lights, strict=True):
         strength = light.illuminance_lux if light.kind == "sun" else light.intensity_cd
-        value["kind"] = _LAMP_KINDS[light.kind]
+        value["kind"] = LIGHT_KINDS.index(light.kind)
         value["position_m"] = light.position_m
         value["direction"] = light.direction
         value["power"] = np.asarray(light.color) * strength
@@ -335,7 +343,7 @@ def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
         value["cos_outer"] = math.cos(light.cone_rad)
         value["cos_inner"] = math.cos(light.even * light.cone_rad)
         value["cutoff"] = light.cutoff
-        if light.kind in ("rectangle", "disk"):
+        if light.kind in PANEL_KINDS:
             _fill_panel(value, light)
     return values
 

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.core.geometry import Float32
 from generator.core.se3 import Array
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Weights of linear sRGB in luminance (ITU-R BT.709)."""
 
 
 def texel_directions(height: int) -> tuple[Array, Array]:
@@ -25,11 +21,3 @@ def texel_directions(height: int) -> tuple[Array, Array]:
     z = np.broadcast_to(np.cos(polar)[:, None], x.shape)
     solid = np.broadcast_to((edges[:-1] - edges[1:])[:, None] * 2.0 * np.pi / width, x.shape)
     return np.stack([x, y, z], axis=-1), solid
-
-
-def luminance_of(image: Array | Float32) -> Array:
-    """Luminance (Rec. 709) of linear RGB, shape [h, w] of [h, w, 3], float64."""
-    # Channel by channel: reducing over a short last axis takes three times as long.
-    parts = [image[..., k].astype(np.float64) * LUMINANCE[k] for k in range(3)]
-    total: Array = parts[0] + parts[1] + parts[2]
-    return total

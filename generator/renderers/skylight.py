@@ -7,13 +7,13 @@ import math
 import numpy as np
 import warp as wp
 
+from generator.core.colorimetry import luminance
 from generator.core.scene import Environment, Light, Scene
 from generator.core.se3 import Array
 from generator.renderers.brightest import SkyLamp
 from generator.renderers.kernels import records
 from generator.renderers.kernels.occlusion import see_out
 from generator.renderers.packing import PackedWorld, lamp_records, sky_record, with_own_record
-from generator.renderers.panoramas import LUMINANCE
 from generator.renderers.stock import AssetStock
 
 # Fainter parts of all the light at the focus throw shadows that nobody would miss.
@@ -55,21 +55,21 @@ def _sun(lamp: SkyLamp, environment: Environment) -> Light:
     x, y, z = lamp.towards
     c, s = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
     power = np.asarray(lamp.power)
-    luminance = float((power * LUMINANCE).sum())
-    red, green, blue = (float(v) for v in power / luminance)
+    relative = float(luminance(power))
+    red, green, blue = (float(v) for v in power / relative)
     return Light(
         "",
         "sun",
         direction=(s * y - c * x, -s * x - c * y, -z),
         color=(red, green, blue),
-        illuminance_lux=luminance * environment.luminance_cd_m2,
+        illuminance_lux=relative * environment.luminance_cd_m2,
         angular_radius_rad=lamp.angular_radius_rad,
     )
 
 
 def _matters(lamp: SkyLamp, scene: Scene) -> bool:
     """Whether a part of the panorama gives more than a little of the light at the focus."""
-    lux = float((np.asarray(lamp.power) * LUMINANCE).sum()) * scene.environment.luminance_cd_m2
+    lux = float(luminance(np.asarray(lamp.power))) * scene.environment.luminance_cd_m2
     others = sum(
         light.intensity_cd / max(math.dist(light.position_m, scene.focus.center_m) ** 2, 1e-4)
         for light in scene.lights

@@ -12,8 +12,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from generator.core.colorimetry import srgb_decode
 from generator.core.geometry import TextureData, UInt8
-from generator.core.se3 import Array
 from generator.renderers.kernels.records import Texture
 from generator.renderers.structs import record_of
 
@@ -105,11 +105,6 @@ def halved(image: Pixels) -> Pixels:
     return smaller.reshape(height, width, image.shape[2])
 
 
-def srgb_to_linear(values: Array) -> Array:
-    """IEC 61966-2-1, [0, 1] to [0, 1]."""
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-
-
 def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint32]]:
     """Texels per mip level, and all levels packed one after the other.
 
@@ -130,8 +125,7 @@ def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint
 @cache
 def _root_of() -> UInt8:
     """Square roots of linear values by sRGB values."""
-    linear_of = srgb_to_linear(np.arange(256) / 255.0)
-    return np.floor(np.sqrt(linear_of) * 255.0 + 0.5).astype(np.uint8)
+    return np.floor(np.sqrt(srgb_decode(np.arange(256) / 255.0)) * 255.0 + 0.5).astype(np.uint8)
 
 
 def _means(finest: Pixels) -> NDArray[np.uint32]:

@@ -10,11 +10,10 @@ from typing import Any
 
 import warp as wp
 
-from generator.core.scene import Weather
+from generator.core.scene import LIGHT_KINDS, Weather
 from generator.renderers.kernels import records, shade, water
 from generator.renderers.kernels import weather as kernels
 from generator.renderers.kernels.lattice import Lattice
-from generator.renderers.kernels.lighting import SUN
 from generator.renderers.packing import PackedWorld
 from generator.renderers.stock import AssetStock
 
@@ -116,7 +115,7 @@ def _glow(
     stride = int(kernels.GLOW_STRIDE)
     columns, rows = (-(-(size - 1) // stride) + 2 for size in (view.width, view.height))
     glow = stock.scratch("glow", columns * rows, wp.vec3)
-    if not (world.record.lamps.numpy()["kind"] != int(SUN)).any():
+    if not (world.record.lamps.numpy()["kind"] != LIGHT_KINDS.index("sun")).any():
         return 0, glow
     inputs = [*frame, columns]
     wp.launch(kernels.glow_at_points, columns * rows, inputs, [glow], device=stock.device)

@@ -126,7 +126,7 @@ def counts_at(columns: dict[str, Column], level: Difficulty) -> NDArray[np.bool_
 
 def _distance_edges(columns: dict[str, dict[str, Column]]) -> Column:
     """Steps of 1, 2 or 5 times a power of ten, about a dozen of them."""
-    known = [_known(c["distance_m"]) for c in columns.values()]
+    known = [_drop_missing(c["distance_m"]) for c in columns.values()]
     far_m = max((float(v.max()) for v in known if v.size), default=1.0)
     rough_m = max(far_m, 1e-3) / 12.0
     power = 10.0 ** np.floor(np.log10(rough_m))
@@ -137,7 +137,7 @@ def _distance_edges(columns: dict[str, dict[str, Column]]) -> Column:
 def _histogram(title: str, edges: Column, values: dict[str, Column]) -> Histogram:
     counted = {}
     for name, column in values.items():
-        known = np.clip(_known(column), edges[0], edges[-1])
+        known = np.clip(_drop_missing(column), edges[0], edges[-1])
         counted[name] = np.histogram(known, edges)[0]
     return Histogram(title, edges, counted)
 
@@ -188,12 +188,12 @@ def _hidden(found: Survey) -> Table:
     rows = []
     for name in found.categories:
         c = found.of_category(name)
-        level = _known(c["occlusion_level"])
+        level = _drop_missing(c["occlusion_level"])
         rows.append(
             (
                 name,
                 *(_share(level == k) for k in range(3)),
-                _share(_known(c["truncation"]) > TRUNCATED),
+                _share(_drop_missing(c["truncation"]) > TRUNCATED),
                 _quantiles(c["visible_fraction"], 2),
                 *(_share(counts_at(c, d)) if level.size else NOTHING for d in DIFFICULTIES),
             )
@@ -213,7 +213,7 @@ def _sizes(found: Survey) -> Table:
     rows = []
     for name in found.categories:
         c = found.of_category(name)
-        sizes = (_spread(c[f"{side}_m"]) for side in ("height", "width", "length"))
+        sizes = (_format_spread(c[f"{side}_m"]) for side in ("height", "width", "length"))
         rows.append((name, _quantiles(c["distance_m"], 1), *sizes))
     header = ("category", "distance m", "height m", "width m", "length m")
     return Table("Distance and size", header, tuple(rows), "Sizes: mean and standard deviation.")
@@ -251,24 +251,24 @@ def _beside_kitti(found: Survey) -> Table:
     return Table("Beside KITTI", header, tuple(rows), note)
 
 
-def _known(column: Column) -> Column:
+def _drop_missing(column: Column) -> Column:
     return column[np.isfinite(column)]
 
 
 def _number(column: Column, of: Callable[[Column], np.floating], digits: int) -> str:
-    known = _known(column)
+    known = _drop_missing(column)
     return f"{of(known):.{digits}f}" if known.size else NOTHING
 
 
 def _quantiles(column: Column, digits: int) -> str:
-    known = _known(column)
+    known = _drop_missing(column)
     if not known.size:
         return NOTHING
     return " / ".join(f"{v:.{digits}f}" for v in np.quantile(known, [0.05, 0.5, 0.95]))
 
 
-def _spread(column: Column) -> str:
-    known = _known(column)
+def _format_spread(column: Column) -> str:
+    known = _drop_missing(column)
     return f"{known.mean():.2f} ± {known.std():.2f}" if known.size else NOTHING
 
 

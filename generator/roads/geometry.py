@@ -144,7 +144,7 @@ class ReferenceLine:
         for k in np.unique(which):
             piece, here = self.pieces[k], which == k
             along = np.clip(s_m[here] - piece.s_m, 0.0, piece.curve.length_m)
-            poses[here] = _moved(piece, piece.curve.local(along))
+            poses[here] = _transform(piece, piece.curve.local(along))
         return poses
 
     def points(self, s_m: Array, t_m: Array) -> Array:
@@ -178,7 +178,7 @@ def _integral(of: Callable[[Array], Array], upper: Array, panels: int) -> Array:
     return total
 
 
-def _moved(start: Placed, poses: Array) -> Array:
+def _transform(start: Placed, poses: Array) -> Array:
     c, s = math.cos(start.heading_rad), math.sin(start.heading_rad)
     x, y, heading = poses.T
     return np.stack(

@@ -11,6 +11,7 @@ TABLE = PluginTable[Sensor](
         "rgb_camera": "generator.sensors.rgb_camera:RgbCamera",
         "depth_camera": "generator.sensors.depth_camera:DepthCamera",
         "lidar": "generator.sensors.lidar:LidarSensor",
+        "pseudo_lidar": "generator.sensors.pseudo_lidar:PseudoLidar",
         "imu": "generator.sensors.imu:Imu",
         "event_camera": "generator.sensors.event_camera:EventCamera",
         "gnss": "generator.sensors.gnss:Gnss",

@@ -1,8 +1,4 @@
-"""Boxes that move: whether they touch, how far ahead they are, how near.
-
-Boxes touch unless some axis separates them: one of their six, or of the nine across an edge of each
-(Gottschalk, Lin and Manocha, "OBBTree", SIGGRAPH 1996).
-"""
+"""Boxes that move: whether they touch, how far ahead they are, how near."""
 
 from __future__ import annotations
 
@@ -11,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from generator.core.motion import STILL, Track, Twist
+from generator.core.obb import boxes_touch
 from generator.core.scene import Instance, Scene
 from generator.core.se3 import SE3, Array
 
@@ -67,17 +64,7 @@ def things_of(scene: Scene) -> tuple[Thing, ...]:
 
 def touching(one: Thing, other: Thing, time_s: float) -> bool:
     """Whether two boxes have a point in common at one instant."""
-    a, b = one.box(time_s), other.box(time_s)
-    between = np.asarray(b.translation_m) - np.asarray(a.translation_m)
-    reach_m = one.radius_m + other.radius_m
-    if float(between @ between) > reach_m * reach_m:
-        return False
-    mine, its = a.rotation().T, b.rotation().T
-    axes = np.concatenate([mine, its, np.cross(mine[:, None], its[None]).reshape(9, 3)])
-    span_m = np.abs(axes @ mine.T) @ np.array(one.half_m)
-    span_m += np.abs(axes @ its.T) @ np.array(other.half_m)
-    # An edge parallel to an edge makes an axis of length 0, which separates nothing.
-    return bool(np.all(np.abs(axes @ between) <= span_m + 1e-12))
+    return boxes_touch(one.box(time_s), one.half_m, other.box(time_s), other.half_m)
 
 
 def distance_m(thing: Thing, point_m: Array, time_s: float) -> float:

@@ -28,16 +28,16 @@ IDEAL = ImagePipeline()
 OWN = frozenset({Channel.MEASURED_DEPTH, Channel.INFRARED})
 
 DepthImage = Literal[
-    "measured_depth",
-    "infrared",
-    "rgb",
-    "depth",
-    "range",
-    "normals",
-    "instance",
-    "part",
-    "category",
-    "object_coordinates",
+    Channel.MEASURED_DEPTH,
+    Channel.INFRARED,
+    Channel.RGB,
+    Channel.Z_DEPTH,
+    Channel.RANGE,
+    Channel.NORMALS,
+    Channel.INSTANCE,
+    Channel.PART,
+    Channel.CATEGORY,
+    Channel.OBJECT_COORDINATES,
 ]
 """Channels that can be written as images; all but the first two are the truth."""
 
@@ -60,7 +60,9 @@ class DepthCamera(Mounted):
     model: str | DepthModel = "kinect_v2"
     size_px: tuple[SidePx, SidePx] | None = None
     hfov_deg: float | None = Field(None, ge=1, le=150)
-    channels: tuple[DepthImage, ...] = Field(("measured_depth", "infrared", "depth"), min_length=1)
+    channels: tuple[DepthImage, ...] = Field(
+        (Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.Z_DEPTH), min_length=1
+    )
 
     @field_validator("model")
     @classmethod
@@ -76,7 +78,7 @@ class DepthCamera(Mounted):
     @property
     def media(self) -> tuple[Channel, ...]:
         """Channels that are written as images, in a fixed order."""
-        return tuple(channel for channel in Channel if channel.value in self.channels)
+        return tuple(channel for channel in Channel if channel in self.channels)
 
     def intrinsics(self) -> Intrinsics:
         """Nominal intrinsics."""

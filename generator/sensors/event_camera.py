@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from generator.core.capture import Channel, Table
-from generator.core.errors import ConfigError
+from generator.core.colorimetry import luminance
 from generator.core.instants import RIG_AXES, at
 from generator.core.interfaces import Renderer, SensorInfo
 from generator.core.intrinsics import Intrinsics
@@ -23,11 +23,10 @@ from generator.sensors.event_pixels import (
     Pixels,
     after_rest,
     logarithm_of,
-    luminance_of,
     noise_events,
     signal_events,
 )
-from generator.sensors.mounting import Mounted, checked_rate, known_rig, window_s
+from generator.sensors.mounting import Mounted, checked_rate, known_camera, known_rig, window_s
 
 SidePx = Annotated[int, Field(ge=8, le=2048)]
 KIND = "event_camera"
@@ -77,13 +76,9 @@ class EventCamera(Mounted):
             ConfigError: the scene has no such rig or camera, or the rate does not fit.
         """
         checked_rate(self.name, self.rate_hz, scene.step_s)
-        known = [camera.name for camera in scene.cameras]
         rig = known_rig(scene, self.name, self.rig) if self.rig else ""
-        if not rig and self.camera not in known:
-            raise ConfigError(
-                f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
-                f" is {', '.join(known) or 'none'}"
-            )
+        if not rig:
+            known_camera(scene, self.name, self.camera)
         device = Device(
             self.name,
             KIND,
@@ -142,7 +137,7 @@ class EventCamera(Mounted):
                 continue
             pose = then.device(self.name).T_world_device @ RIG_AXES.inverse()
             seen = renderer.render(then, Camera(self.name, pose, lens), CHANNELS)
-            luminances.append(luminance_of(seen.channels[Channel.RADIANCE]))
+            luminances.append(luminance(seen.channels[Channel.RADIANCE].astype(np.float64)))
             shown.append(seen.channels[Channel.INSTANCE])
             before = then
         return luminances, np.stack(shown)

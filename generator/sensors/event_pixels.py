@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.geometry import Float32
 from generator.core.se3 import Array
 from generator.core.streams import Rng
 
@@ -28,7 +27,6 @@ times as bright, the least at which a DVS128 works (Lichtsteiner et al. 2008).""
 THRESHOLD_MIN = 0.01
 BRIGHT_SHARE = 0.25
 """v2e: shot noise of the brightest pixels, in units of that in the dark."""
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -99,14 +97,6 @@ def order_of(
         digits = ((left >> shift) & 0xFFFF).astype(np.uint16)
         order = order[np.argsort(digits[order], kind="stable")]
     return order
-
-
-def luminance_of(radiance: Float32) -> Array:
-    """Luminance [cd/m^2] of linear RGB, [h, w]."""
-    luminance: Array = np.einsum(
-        "hwc,c->hw", radiance.astype(np.float64), LUMINANCE, optimize=False
-    )
-    return luminance
 
 
 def logarithm_of(luminance: Array) -> Array:

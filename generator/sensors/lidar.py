@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from pydantic import Field, WithJsonSchema, field_validator
 
 from generator.core.capture import POINT, Beams, Channel, PointCloud
-from generator.core.errors import ConfigError, did_you_mean
+from generator.core.errors import did_you_mean
 from generator.core.interfaces import Modality, Renderer, SensorInfo
 from generator.core.scene import Lidar, Scene, Weather
 from generator.core.streams import Rng
 from generator.sensors.air import dimmed, optical_depth, rain_noise_m, with_air
 from generator.sensors.lidars import lidar_model, model_names
-from generator.sensors.mounting import Mounted, known_rig
+from generator.sensors.mounting import Mounted, with_lidar
 from generator.sensors.returns import (
     LABELS,
     Float32,
@@ -123,16 +123,7 @@ class LidarSensor(Mounted):
         name = self.model if isinstance(self.model, str) else self.model.name
         sweep_s = round(1.0 / self.device.rotation_hz, 9)
         lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
-        if self.rig:
-            rig = known_rig(scene, self.name, self.rig)
-            return replace(scene, lidars=(*scene.lidars, replace(lidar, camera="", rig=rig)))
-        known = [camera.name for camera in scene.cameras]
-        if self.camera not in known:
-            raise ConfigError(
-                f"sensor '{self.name}': camera '{self.camera}' is no camera listed before it; there"
-                f" is {', '.join(known) or 'none'}"
-            )
-        return replace(scene, lidars=(*scene.lidars, lidar))
+        return with_lidar(scene, self, lidar)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng

@@ -15,7 +15,7 @@ from generator.core.errors import ConfigError, did_you_mean
 from generator.core.instants import RIG_AXES
 from generator.core.interfaces import AssetIndex, Modality, SensorInfo
 from generator.core.lens import LensModel
-from generator.core.scene import Device, Scene
+from generator.core.scene import Camera, Device, Lidar, Scene
 from generator.core.se3 import SE3, Array
 from generator.core.tables import TABLE_COLUMNS, TIME_DECIMALS
 
@@ -127,6 +127,39 @@ def known_rig(scene: Scene, sensor: str, rig: str) -> str:
             + did_you_mean(rig, known)
         )
     return rig
+
+
+def with_lidar(scene: Scene, sensor: Mounted, lidar: Lidar) -> Scene:
+    """The scene with a scanner on its sensor's rig, or else on that of its camera.
+
+    Args:
+        scene: With all sensors that are listed before this one.
+        sensor: Whose mounting it is.
+        lidar: Names the camera that it rides with where there is no rig.
+
+    Raises:
+        ConfigError: the scene has no such rig or camera.
+    """
+    if sensor.rig:
+        rig = known_rig(scene, lidar.name, sensor.rig)
+        return replace(scene, lidars=(*scene.lidars, replace(lidar, camera="", rig=rig)))
+    known_camera(scene, lidar.name, lidar.camera)
+    return replace(scene, lidars=(*scene.lidars, lidar))
+
+
+def known_camera(scene: Scene, sensor: str, camera: str) -> Camera:
+    """The camera of that name, if the scene has it.
+
+    Raises:
+        ConfigError: it has not.
+    """
+    known = {c.name: c for c in scene.cameras}
+    if camera not in known:
+        raise ConfigError(
+            f"sensor '{sensor}': camera '{camera}' is no camera listed before it; there"
+            f" is {', '.join(known) or 'none'}{did_you_mean(camera, known)}"
+        )
+    return known[camera]
 
 
 def refuse_buried(scene: Scene, name: str, assets: AssetIndex) -> None:

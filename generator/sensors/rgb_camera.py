@@ -26,21 +26,21 @@ from generator.sensors.camera.shutter import ExposureTime, RollingShutter, shutt
 from generator.sensors.mounting import Mounted, known_rig
 
 Image = Literal[
-    "rgb",
-    "depth",
-    "range",
-    "normals",
-    "instance",
-    "part",
-    "category",
-    "object_coordinates",
-    "disparity",
-    "disparity_visible",
-    "flow_forward",
-    "flow_backward",
-    "flow_occluded_forward",
-    "flow_occluded_backward",
-    "scene_flow",
+    Channel.RGB,
+    Channel.Z_DEPTH,
+    Channel.RANGE,
+    Channel.NORMALS,
+    Channel.INSTANCE,
+    Channel.PART,
+    Channel.CATEGORY,
+    Channel.OBJECT_COORDINATES,
+    Channel.DISPARITY,
+    Channel.DISPARITY_VISIBLE,
+    Channel.FLOW_FORWARD,
+    Channel.FLOW_BACKWARD,
+    Channel.FLOW_OCCLUDED_FORWARD,
+    Channel.FLOW_OCCLUDED_BACKWARD,
+    Channel.SCENE_FLOW,
 ]
 """Channels that can be written as images; see ``generator.core.capture.Channel``."""
 
@@ -85,7 +85,9 @@ class RgbCamera(Mounted):
     size_px: tuple[SidePx, SidePx] = (640, 480)
     hfov_deg: float = Field(60.0, ge=1, le=360)
     lens: LensConfig = Pinhole()
-    channels: tuple[Image, ...] = Field(("rgb", "depth", "instance", "category"), min_length=1)
+    channels: tuple[Image, ...] = Field(
+        (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY), min_length=1
+    )
     ev100: float | None = None
     exposure: ExposureTime | None = None
     rolling_shutter: RollingShutter | None = None
@@ -130,7 +132,7 @@ class RgbCamera(Mounted):
     @property
     def media(self) -> tuple[Channel, ...]:
         """Channels that are written as images, in a fixed order."""
-        return tuple(channel for channel in Channel if channel.value in self.channels)
+        return tuple(channel for channel in Channel if channel in self.channels)
 
     def describe(self) -> SensorInfo:
         """A camera with the channels that it writes."""

@@ -1,9 +1,10 @@
-"""Who is in whose place, and when: oriented boxes over time (Gottschalk et al. 1996)."""
+"""When moving boxes first overlap."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from generator.core.obb import rectangles_overlap
 from generator.core.se3 import Array
 
 
@@ -32,35 +33,12 @@ def first_overlap(
         near = np.flatnonzero(
             d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1] < (reach[i] + reach[j]) * (reach[i] + reach[j])
         )
-        hit = overlapping(moving[near, i], half_m[i], every[near, j], others[j])
+        hit = rectangles_overlap(moving[near, i], half_m[i], every[near, j], others[j])
         if hit.any():
             first = int(near[int(np.argmax(hit))])
             if found is None or first < found[0]:
                 found = (first, i, j)
     return found
-
-
-def overlapping(a: Array, half_a_m: Array, b: Array, half_b_m: Array) -> Array:
-    """Whether boxes overlap, pair by pair [k].
-
-    Args:
-        a: Centres and directions [k, 4].
-        half_a_m: Half extents [2], one for all.
-        b: Of the others, in the same order [k, 4].
-        half_b_m: [2].
-    """
-    dx, dy = b[:, 0] - a[:, 0], b[:, 1] - a[:, 1]
-    c = np.abs(a[:, 2] * b[:, 2] + a[:, 3] * b[:, 3])
-    s = np.abs(a[:, 2] * b[:, 3] - a[:, 3] * b[:, 2])
-    ax, ay = np.abs(dx * a[:, 2] + dy * a[:, 3]), np.abs(dy * a[:, 2] - dx * a[:, 3])
-    bx, by = np.abs(dx * b[:, 2] + dy * b[:, 3]), np.abs(dy * b[:, 2] - dx * b[:, 3])
-    hit: Array = (
-        (ax < half_a_m[0] + half_b_m[0] * c + half_b_m[1] * s)
-        & (ay < half_a_m[1] + half_b_m[0] * s + half_b_m[1] * c)
-        & (bx < half_b_m[0] + half_a_m[0] * c + half_a_m[1] * s)
-        & (by < half_b_m[1] + half_a_m[0] * s + half_a_m[1] * c)
-    )
-    return hit
 
 
 def _near_pairs(moving: Array, every: Array, reach_m: Array) -> list[tuple[int, int]]:

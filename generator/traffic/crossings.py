@@ -60,7 +60,7 @@ def overlaps(
         spare_m: Distance that vehicles keep at least.
     """
     names = [name for name in sorted(widths_m) if graph.lines[name].lane.junction]
-    sampled = {name: _sampled(graph.lines[name]) for name in names}
+    sampled = {name: _sample(graph.lines[name]) for name in names}
     found: dict[tuple[str, str], Overlap] = {}
     for k, one in enumerate(names):
         for other in names[k + 1 :]:
@@ -96,7 +96,7 @@ def heading(points: tuple[Vec3, ...], k: int) -> tuple[float, float]:
     return (x1 - x0) / length, (y1 - y0) / length
 
 
-def _sampled(line: LaneLine) -> tuple[Array, Array]:
+def _sample(line: LaneLine) -> tuple[Array, Array]:
     """Even stations [k] of a lane and the points [k, 2] there."""
     count = max(2, math.ceil(line.length_m / _STEP_M) + 1)
     at = np.linspace(0.0, line.length_m, count)
@@ -131,8 +131,8 @@ def _zone(line: LaneLine, crosswalk: LaneLine) -> Zone | None:
     lane = crosswalk.lane
     if abs(lane.center_m[0][2] - line.lane.center_m[0][2]) > 3.0:
         return None
-    at_a, a = _sampled(line)
-    at_b, b = _sampled(crosswalk)
+    at_a, a = _sample(line)
+    at_b, b = _sample(crosswalk)
     delta = a[:, None] - b[None]
     squared = delta[..., 0] * delta[..., 0] + delta[..., 1] * delta[..., 1]
     k, j = np.unravel_index(int(np.argmin(squared)), squared.shape)

@@ -96,7 +96,7 @@ class Driving:
             sum(entry.at_m < front - 0.5 for entry in entries)
             for entries, front in zip(self.fleet.entries, fronts.tolist(), strict=True)
         ]
-        self.speed_m_s = self._allowed(np.zeros(n))
+        self.speed_m_s = self._speed_limits(np.zeros(n))
 
     def settle(self, crossers: Sequence[Crosser]) -> None:
         """Lowers speeds at time 0 to what leaves room for easy braking."""
@@ -124,7 +124,7 @@ class Driving:
             interaction(drivers, v, gap, leader),
             interaction(self._at_lines, v, to_stop, np.zeros_like(v)),
         )
-        a = free_acceleration(drivers, v, self._allowed(v)) - taken
+        a = free_acceleration(drivers, v, self._speed_limits(v)) - taken
         a = np.maximum(np.minimum(a, drivers.acceleration_m_s2), -HARDEST_M_S2)
         after = np.maximum(v + a * step_s, 0.0)
         # Creeping on by millimetres is no driving: who is about to stand stands.
@@ -148,7 +148,7 @@ class Driving:
                     return False
         return True
 
-    def _allowed(self, speed_m_s: Array) -> Array:
+    def _speed_limits(self, speed_m_s: Array) -> Array:
         """What is allowed half a second ahead [n]."""
         ahead = self.station_m - self.fleet.first_m + 0.5 * speed_m_s
         last = self.fleet.allowed_m_s.shape[1] - 1
@@ -191,7 +191,7 @@ class Driving:
                 and leader_m_s is not None
                 and self._is_full(comer, float(gap_m[i]), float(leader_m_s[i]))
             )
-            if full or any(self._yields(comer, other) for other in comers) or self._taken(comer):
+            if full or any(self._yields(comer, other) for other in comers) or self._is_taken(comer):
                 stops[i] = min(stops[i], comer.entry.at_m)
             else:
                 self.entered[i] += 1
@@ -236,7 +236,7 @@ class Driving:
             return speed_m_s * speed_m_s <= 2.0 * CAN_STOP_M_S2 * max(left_m, 0.0)
         return state != "green"
 
-    def _taken(self, comer: _Comer) -> bool:
+    def _is_taken(self, comer: _Comer) -> bool:
         """Whether somebody is on, or has been let on, a lane that crosses or meets the own one."""
         for k, entries in enumerate(self.fleet.entries):
             if k == comer.number:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from generator.core.obb import rectangles_overlap
 from generator.core.se3 import Array
-from generator.traffic.collisions import overlapping
 from generator.traffic.crossings import Overlap, Zone, heading, overlaps, zones
 from generator.traffic.idm import Drivers
 from generator.traffic.routes import STATION_M, LaneGraph, Route, points_at
@@ -155,7 +155,7 @@ def fleet_of(
             widths[name] = max(widths.get(name, 0.0), v.width_m)
     crossed = overlaps(graph, widths)
     walked = zones(graph, widths, crosswalks)
-    offset, low, high = _shared([v.route for v in vehicles], first, crossed)
+    offset, low, high = _shared_lanes([v.route for v in vehicles], first, crossed)
     return Fleet(
         tuple(vehicles),
         _drivers(vehicles),
@@ -202,8 +202,7 @@ def _free_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> flo
         delta = swept[:, :2] - box[:2]
         apart = float(reach) + math.hypot(box[2], box[3])
         beside = np.flatnonzero(delta[:, 0] * delta[:, 0] + delta[:, 1] * delta[:, 1] < apart**2)
-        standing = np.broadcast_to(box[[0, 1, 4, 5]], (len(beside), 4))
-        hit = overlapping(swept[beside], half, standing, box[2:4])
+        hit = rectangles_overlap(swept[beside], half, box[[0, 1, 4, 5]], box[2:4])
         if hit.any():
             met_m = STATION_M * float(beside[int(np.argmax(hit))]) - CLEAR_M
             free_m = min(free_m, vehicle.station_m + vehicle.front_m + met_m)
@@ -259,7 +258,7 @@ def _zones(route: Route, walked: Mapping[str, tuple[Zone, ...]]) -> tuple[RouteZ
     )
 
 
-def _shared(
+def _shared_lanes(
     routes: Sequence[Route],
     first_m: Array,
     crossed: Mapping[tuple[str, str], Overlap],

@@ -192,7 +192,7 @@ def drawn_path(
         goal = whole.length_m if forward else 0.0
         _along(line, walks, whole, at_m, goal)
         passages.append(Passage(lane, 0.0, line.length_m, forward, whole.length_m))
-        place = _landed(line, walks, lane, forward, rng)
+        place = _leave_crosswalk(line, walks, lane, forward, rng)
     else:
         place = (lane, at_m, forward)
     while place is not None and line.length_m < length_m:
@@ -218,7 +218,7 @@ def _onward(
         gone = join.at_m - at_m if forward else at_m - join.at_m
         if 0.5 < gone < left_m and float(rng.uniform()) < crossing:
             _along(line, walks, here, at_m, join.at_m)
-            return _crossed(line, walks, join, passages, rng)
+            return _cross_road(line, walks, join, passages, rng)
     if left_m < (here.length_m - at_m if forward else at_m):
         _along(line, walks, here, at_m, at_m + left_m if forward else at_m - left_m)
         return None
@@ -233,7 +233,7 @@ def _onward(
     return after, 0.0 if forward else walks.sidewalks.lines[after].length_m, forward
 
 
-def _crossed(
+def _cross_road(
     line: _Line, walks: Walks, join: Join, passages: list[Passage], rng: Rng
 ) -> tuple[str, float, bool] | None:
     """Adds the way to a crosswalk and over it."""
@@ -244,10 +244,10 @@ def _crossed(
     from_m = line.length_m
     _along(line, walks, whole, start, whole.length_m - start)
     passages.append(Passage(join.crosswalk, from_m, line.length_m, join.begins, whole.length_m))
-    return _landed(line, walks, join.crosswalk, join.begins, rng)
+    return _leave_crosswalk(line, walks, join.crosswalk, join.begins, rng)
 
 
-def _landed(
+def _leave_crosswalk(
     line: _Line, walks: Walks, crosswalk: str, forward: bool, rng: Rng
 ) -> tuple[str, float, bool] | None:
     """Adds the way from a crosswalk's end to the sidewalk there; either way on is as likely."""
@@ -304,7 +304,7 @@ def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
     blocked = np.flatnonzero(right[k] > left[k])
     if len(blocked):
         end_m = min(end_m, max(GRID_M * float(blocked[0]) - 1.0, 0.0))
-    low, high = _eased(right[k]), -_eased(-left[k])
+    low, high = _ease(right[k]), -_ease(-left[k])
     low, high = np.minimum(low, np.maximum(high, right[k])), np.maximum(high, right[k])
     return Path(
         np.stack([np.interp(grid, at, points[:, c]) for c in range(3)], axis=1),
@@ -315,7 +315,7 @@ def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
     )
 
 
-def _eased(least_m: Array) -> Array:
+def _ease(least_m: Array) -> Array:
     """Least distances to the left that rise and fall along a path as people step aside."""
     eased: Array = least_m.copy()
     for k in range(1, len(eased)):

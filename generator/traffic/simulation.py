@@ -124,11 +124,11 @@ def _poses(fleet: Fleet, station_m: Array) -> tuple[Array, Array, Array]:
     """Rear axles [t, n, 3], directions [t, n, 2] and rises [t, n] of vehicles at stations."""
     along = (station_m - fleet.first_m) / STATION_M
     xy, ahead = fleet.courses.poses(along)
-    low, high = _interpolated(fleet.height_m, along)
+    low, high = _interpolate(fleet.height_m, along)
     return np.concatenate([xy, low[..., None]], axis=2), ahead, high - low
 
 
-def _interpolated(values: Array, along: Array) -> tuple[Array, Array]:
+def _interpolate(values: Array, along: Array) -> tuple[Array, Array]:
     """Two values per station [n, m, 2], between stations [t, n]."""
     k: NDArray[np.int64] = np.clip(along.astype(np.int64), 0, values.shape[1] - 2)
     f = np.clip(along - k, 0.0, 1.0)[..., None]

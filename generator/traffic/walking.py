@@ -143,7 +143,7 @@ class Walking:
         rows = np.arange(len(self.walkers))
         k = np.minimum(((self.at_m + AHEAD_M) / GRID_M).astype(np.int64), self._lines.shape[1] - 3)
         along = unit(self._lines[rows, k + 1, :2] - self._lines[rows, k, :2])
-        target = self._lines[rows, k, :2] + self.off_m[:, None] * _left(along)
+        target = self._lines[rows, k, :2] + self.off_m[:, None] * _left_normals(along)
         # Between grid points, so that a walk is even.
         target += (self.at_m + AHEAD_M - GRID_M * k)[:, None] * along
         to = target - self.xy_m
@@ -175,7 +175,7 @@ class Walking:
         self.at_m = self.at_m + gone * np.clip(1.5 - 0.5 * away / AHEAD_M, 0.0, 1.5)
         share = np.minimum(1.0, TURN_PER_S * step_s) * (gone > 0.0)
         cosine = self.ahead[:, 0] * way[:, 0] + self.ahead[:, 1] * way[:, 1]
-        aim = np.where(cosine[:, None] < -0.9, _left(self.ahead), way)
+        aim = np.where(cosine[:, None] < -0.9, _left_normals(self.ahead), way)
         self.ahead = unit(self.ahead + share[:, None] * (aim - self.ahead))
         k = np.minimum((self.at_m / GRID_M).astype(np.int64), self._lines.shape[1] - 2)
         f = self.at_m / GRID_M - k
@@ -269,7 +269,7 @@ def _within_reach(boxes: Array, lines: Array) -> Array:
     return kept
 
 
-def _left(vectors: Array) -> Array:
+def _left_normals(vectors: Array) -> Array:
     return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
 
 

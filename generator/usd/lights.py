@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from generator.core.colorimetry import luminance
 from generator.core.errors import AssetError
 from generator.core.photometry import luminance_cd_m2
 from generator.core.scene import Environment, Light
@@ -218,11 +219,11 @@ def _pose(light: Light) -> SE3:
 def _color_and_strength(lux: Any) -> tuple[Vec3, float]:
     """Colour of luminance 1 (Rec. 709), and the intensity that goes with it."""
     red, green, blue = (float(c) for c in lux.GetColorAttr().Get())
-    luminance = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    relative = float(luminance(np.array([red, green, blue])))
     strength = float(lux.GetIntensityAttr().Get()) * 2.0 ** float(lux.GetExposureAttr().Get())
-    if luminance == 0.0:
+    if relative == 0.0:
         return (1.0, 1.0, 1.0), 0.0
-    return (red / luminance, green / luminance, blue / luminance), strength * luminance
+    return (red / relative, green / relative, blue / relative), strength * relative
 
 
 def _disc_m2(radius_m: float) -> float:

@@ -75,7 +75,7 @@ def read_look(prim: Any, mesh: Any, place: str) -> SurfaceLook:
 
     material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
     if not material:
-        return replace(PLAIN, material=_displayed(mesh))
+        return replace(PLAIN, material=_display_material(mesh))
     surface = material.ComputeSurfaceSource()[0]
     where = f"{place}: material {material.GetPath()}"
     kind = surface.GetIdAttr().Get() if surface else None
@@ -238,7 +238,7 @@ def _coordinates(image: Any) -> tuple[str, Array]:
     return str(_source(node, "varname")[0] or "st"), matrix
 
 
-def _displayed(mesh: Any) -> Material:
+def _display_material(mesh: Any) -> Material:
     from pxr import UsdGeom
 
     colors = UsdGeom.Gprim(mesh).GetDisplayColorAttr().Get()

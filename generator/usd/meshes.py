@@ -132,7 +132,7 @@ def _normals(mesh: Any, topology: _Topology) -> Array | None:
         given = mesh.GetNormalsAttr().Get(Usd.TimeCode.EarliestTime())
         if not given:
             return None
-        values = _spread(
+        values = _expand_to_corners(
             np.array(given, dtype=np.float64), mesh.GetNormalsInterpolation(), topology
         )
     if values is None or values.shape[1] != 3:
@@ -151,10 +151,10 @@ def _per_corner(prim: Any, name: str, topology: _Topology) -> Array | None:
     values = np.array(primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()), dtype=np.float64)
     if values.ndim != 2:
         return None
-    return _spread(values, primvar.GetInterpolation(), topology)
+    return _expand_to_corners(values, primvar.GetInterpolation(), topology)
 
 
-def _spread(values: Array, interpolation: str, topology: _Topology) -> Array | None:
+def _expand_to_corners(values: Array, interpolation: str, topology: _Topology) -> Array | None:
     """Values per constant, polygon, point or corner as values per corner; None if too few."""
     from pxr import UsdGeom
 

@@ -14,9 +14,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from exporters.images import depth_units, link_or_copy, png, read_depth_units, write_media
+from exporters.images import depth_units, link_or_copy, png, write_media
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError, SampleError, StorageError
+from generator.core.errors import ConfigError, SampleError
 from generator.core.interfaces import media_path
 
 H, W = 37, 53
@@ -91,9 +91,8 @@ def test_depth_is_written_in_units_of_the_scale(channel: Channel) -> None:
 def test_depth_survives_the_file_to_half_a_unit(tmp_path: Path) -> None:
     """0.1 mm units: never more than 0.05 mm away, and equal to what the pure function says."""
     depth_m = np.random.default_rng(2).uniform(0.3, 6.5, (H, W)).astype(np.float32)
-    (tmp_path / "depth.png").write_bytes(png(Channel.Z_DEPTH, depth_m, 0.0001))
 
-    units = read_depth_units(tmp_path / "depth.png")
+    _, units = read(png(Channel.Z_DEPTH, depth_m, 0.0001))
 
     assert np.abs(units * 0.0001 - depth_m).max() <= 0.00005 + 1e-9
     np.testing.assert_array_equal(units, depth_units(depth_m, 0.0001))
@@ -159,15 +158,6 @@ def test_every_channel_of_the_media_is_written_to_its_path(world: Any, tmp_path:
     assert found == sorted(media_path(tmp_path, "color", c, 4) for c in info.media["color"])
     _, ids = read(media_path(tmp_path, "color", Channel.INSTANCE, 4).read_bytes())
     np.testing.assert_array_equal(ids, sample.capture.readings["color"].channels[Channel.INSTANCE])
-
-
-def test_a_missing_depth_image_is_named(tmp_path: Path) -> None:
-    """And so is one of another kind."""
-    (tmp_path / "rgb.png").write_bytes(png(Channel.RGB, np.zeros((4, 4, 3), np.uint8), 1.0))
-
-    for name in ("none.png", "rgb.png"):
-        with pytest.raises(StorageError, match=name):
-            read_depth_units(tmp_path / name)
 
 
 def test_a_link_shares_the_file_where_links_are_possible(tmp_path: Path) -> None:

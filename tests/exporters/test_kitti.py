@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from exporters.kitti import (
     Kitti,
     calib_text,
     label_row,
-    missed,
     occlusion_level,
     official_type,
     upright_box,
@@ -218,7 +216,6 @@ def test_every_frame_has_every_file(dataset: Path) -> None:
     for kind, ending in (
         ("image_2", "png"),
         ("depth_2", "png"),
-        ("velodyne", "bin"),
         ("label_2", "txt"),
         ("calib", "txt"),
     ):
@@ -303,69 +300,32 @@ def test_official_types_are_used_and_others_are_misc(dataset: Path) -> None:
     ]
 
 
-def test_lidar_points_are_the_depth_image_seen_from_above_the_camera(dataset: Path) -> None:
-    """P2 R0 Tr x lands on the middle of every eighth pixel, with that pixel's depth."""
-    calib = devkit_calib(dataset / "training/calib/000001.txt")
-    points = np.fromfile(dataset / "training/velodyne/000001.bin", "<f4").reshape(-1, 4)
-    with Image.open(dataset / "training/depth_2/000001.png") as image:
-        depth_m = np.asarray(image) * 0.001
-
-    rectified = np.c_[points[:, :3], np.ones(len(points))] @ calib["Tr_velo_to_cam"].T
-    projected = np.c_[rectified, np.ones(len(points))] @ calib["P2"].T
-    uv = projected[:, :2] / projected[:, 2:]
-
-    columns, rows = np.rint(uv).astype(int).T
-    np.testing.assert_allclose(uv, np.c_[columns, rows], atol=1e-3)
-    assert set(columns) <= set(range(4, 160, 8))
-    assert set(rows) <= set(range(4, 120, 8))
-    np.testing.assert_allclose(rectified[:, 2], depth_m[rows, columns], atol=1e-5)
-    assert len(points) == np.count_nonzero(depth_m[4::8, 4::8])
-    assert (points[:, 3] == 0).all()
-
-
-def test_lidar_points_of_a_box_lie_in_its_label(world: Any, tmp_path: Path) -> None:
-    """The points around the unhidden pedestrian of frame 0 are on its box, to rounding."""
-    exporter = Kitti(velodyne_stride_px=2)
-    dataset = world.export(exporter, world.info(7), world.samples[:1], tmp_path)
-    row = (dataset / "training/label_2/000000.txt").read_text().splitlines()[1]
-    points = np.fromfile(dataset / "training/velodyne/000000.bin", "<f4").reshape(-1, 4)
-    camera = np.c_[-points[:, 1], -points[:, 2] - 0.3, points[:, 0]]
-    corners = devkit_corners(row)
-    centre, ry = corners.mean(axis=0), float(row.split(" ")[14])
-    near = camera[np.linalg.norm(camera[:, [0, 2]] - centre[[0, 2]], axis=1) < 0.7]
-    near = near[near[:, 1] < corners[:, 1].max() - 0.05]
-
-    along = (near - centre) @ (math.cos(ry), 0, -math.sin(ry))
-    across = (near - centre) @ (math.sin(ry), 0, math.cos(ry))
-
-    assert len(near) > 30
-    assert (np.abs(along) <= 0.25 + 0.01).all()
-    assert (np.abs(across) <= 0.30 + 0.01).all()
-
-
 def test_images_in_memory_or_on_disk_give_the_same_bytes(world: Any, tmp_path: Path) -> None:
-    """The runner may drop arrays once images are written; labels must not notice."""
-    kept = world.export(Kitti(), world.info(7), world.samples, tmp_path / "kept", keep_arrays=True)
-    dropped = world.export(Kitti(), world.info(7), world.samples, tmp_path / "dropped")
+    """The runner may drop arrays once images and points are written; labels must not notice."""
+    info = world.info(7, lidars=("top",))
+    kept = world.export(Kitti(), info, world.samples, tmp_path / "kept", keep_arrays=True)
+    dropped = world.export(Kitti(), info, world.samples, tmp_path / "dropped")
 
-    for path in sorted(kept.rglob("*.bin")):
+    for path in sorted(p for p in (kept / "training").rglob("*") if p.is_file()):
         assert path.read_bytes() == (dropped / path.relative_to(kept)).read_bytes()
 
 
-def test_without_a_scanner_no_depth_is_needed(world: Any, tmp_path: Path) -> None:
-    """velodyne_stride_px 0 leaves the folder out; so does a data set without depth depth_2."""
+def test_without_a_scanner_there_are_no_points(world: Any, tmp_path: Path) -> None:
+    """No velodyne folder; the calibration holds the axes of one at the camera's centre."""
     info = world.info(7, media={"color": (Channel.RGB,)})
 
-    folder = world.export(Kitti(velodyne_stride_px=0), info, world.samples, tmp_path)
+    folder = world.export(Kitti(), info, world.samples, tmp_path)
 
     kinds = {p.name for p in (folder / "training").iterdir()}
     assert kinds == {"image_2", "label_2", "calib"}
+    velo_to_cam = devkit_calib(folder / "training/calib/000000.txt")["Tr_velo_to_cam"]
+    np.testing.assert_array_equal(velo_to_cam, [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]])
 
 
 @pytest.mark.parametrize(
     ("exporter", "changes", "message"),
     [
-        (Kitti(), {"media": {"color": (Channel.RGB,)}}, "'color' does not write the depth channel"),
+        (Kitti(lidar="tpo"), {"lidars": ("top",)}, "no lidar 'tpo'.*did you mean 'top'"),
         (
             Kitti(camera="colour"),
             {},
@@ -386,20 +346,3 @@ def test_what_kitti_cannot_hold_is_refused_before_rendering(
     """One message, naming the option to change."""
     with pytest.raises(ConfigError, match=message):
         exporter.check(world.info(changes.pop("n", 7), **changes))
-
-
-def test_what_a_thinned_depth_image_misses_is_not_labelled(world: Any) -> None:
-    """Few pixels and no point in its box: a detector of points could not know; else it is."""
-    truth = next(iter(world.samples[0].truth.values()))
-    thing = next(t for t in truth.objects if not label_row(t, truth, Kitti()).startswith("Dont"))
-    small = replace(truth, objects=(replace(thing, visible_px=20),))
-    number = thing.instance.instance_id
-    assert thing.box3d_camera is not None
-    x, y, z = thing.box3d_camera.T_frame_box.translation_m
-    T_camera_velo = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]])
-    inside, away = np.array([[z, -x, -y, 0.0]]), np.array([[z + 50.0, -x, -y, 0.0]])
-
-    assert missed(away, small, T_camera_velo, 4) == {number}
-    assert missed(inside, small, T_camera_velo, 4) == frozenset()
-    large = replace(truth, objects=(replace(thing, visible_px=9000),))
-    assert missed(away, large, T_camera_velo, 4) == frozenset()

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from exporters.png import SIGNATURE, RowFilter, decode_grey16, encode_png
+from exporters.png import SIGNATURE, RowFilter, encode_png
 
 
 def noise(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
@@ -33,35 +33,6 @@ def test_opencv_reads_back_every_value(
     read = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
     assert read.dtype == dtype
     np.testing.assert_array_equal(read[..., ::-1] if len(shape) == 3 else read, pixels)
-
-
-@pytest.mark.parametrize("rows", [slice(None), slice(2, None, 4), slice(5, 5)])
-@pytest.mark.parametrize("shape", [(33, 64), (7, 5), (1, 1), (480, 640)])
-def test_rows_are_read_back_as_opencv_reads_them(shape: tuple[int, ...], rows: slice) -> None:
-    """All of them, some, or none."""
-    data = encode_png(noise(shape, np.uint16), RowFilter.SUB, 1)
-    read = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    own = decode_grey16(data, rows)
-    assert own is not None
-    assert own.dtype == np.uint16
-    np.testing.assert_array_equal(own, read[rows])
-
-
-def test_other_files_are_left_to_other_readers() -> None:
-    """Other filters, depths and colours, other encoders, torn files, and no file at all."""
-    grey = noise((16, 16), np.uint16)
-    own = encode_png(grey, RowFilter.SUB, 1)
-    others = [
-        encode_png(grey, RowFilter.UP, 1),
-        encode_png(noise((16, 16), np.uint8), RowFilter.SUB, 1),
-        encode_png(noise((16, 16, 3), np.uint16), RowFilter.SUB, 1),
-        cv2.imencode(".png", np.stack([grey] * 3, axis=-1))[1].tobytes(),
-        own[: len(own) // 2],
-        own[:60] + bytes(8) + own[68:],
-        b"",
-    ]
-    for data in others:
-        assert decode_grey16(data, slice(None)) is None
 
 
 def test_pillow_verifies_every_checksum() -> None:

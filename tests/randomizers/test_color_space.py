@@ -7,7 +7,6 @@ import pytest
 from randomizers.color_space import (
     chromaticity_of_temperature,
     linear_of_hsv,
-    linear_of_srgb,
     linear_of_temperature,
 )
 
@@ -54,13 +53,6 @@ def test_candles_are_red_and_skies_are_blue() -> None:
 
     assert candle[0] > candle[1] > candle[2] >= 0.0
     assert sky[2] > sky[1] > sky[0] > 0.0
-
-
-def test_srgb_is_undone_by_its_standard() -> None:
-    """IEC 61966-2-1: code 0.5 is 21.4 % of the light; both ends and the knee stay."""
-    assert linear_of_srgb(0.5) == pytest.approx(0.21404, abs=1e-5)
-    assert (linear_of_srgb(0.0), linear_of_srgb(1.0)) == (0.0, 1.0)
-    assert linear_of_srgb(0.04045) == pytest.approx(0.0031308, abs=1e-7)
 
 
 def test_hue_turns_through_the_primaries() -> None:

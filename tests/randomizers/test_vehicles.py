@@ -11,10 +11,10 @@ import pytest
 from scipy.stats import chisquare
 
 from generator.config.distributions import Constant
+from generator.core.colorimetry import luminance
 from generator.core.geometry import Material
 from generator.core.scene import Body, Instance, Light, ObjectGroup, Scene
 from generator.core.se3 import SE3
-from randomizers.color_space import LUMINANCE
 from randomizers.daylight import Daylight, with_daylight
 from randomizers.vehicle_lights import VehicleLights
 from randomizers.vehicle_paint import ON_ROADS, PAINTS, VehiclePaint
@@ -137,7 +137,7 @@ def test_lights_glow_by_role_and_are_labelled() -> None:
 
     assert glowing == {"brakelight", "indicator_left"}
     emission = np.array(slots(scene.bodies[0])["brakelight"].emission_cd_m2)
-    assert emission @ LUMINANCE == pytest.approx(9000.0, rel=0.01)
+    assert float(luminance(emission)) == pytest.approx(9000.0, rel=0.01)
     assert dict(scene.instances[0].attributes) == {
         "brake_lights": "on",
         "head_lights": "off",

@@ -23,7 +23,6 @@ from generator.sensors.event_pixels import (
     Events,
     after_rest,
     logarithm_of,
-    luminance_of,
     noise_events,
     order_of,
 )
@@ -207,13 +206,6 @@ def test_darkness_hides_contrast() -> None:
     for luminance, expected in ((1e4, 1.0), (1.0, 0.997), (DARK_CD_M2, math.log((1 + ratio) / 2))):
         change = np.diff(logarithm_of(np.array([luminance, ratio * luminance])))[0]
         assert change == pytest.approx(expected, abs=1e-3)
-
-
-def test_luminance_of_linear_colours_is_that_of_rec_709() -> None:
-    """Green is most of it."""
-    colours = np.array([[[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [2.0, 2.0, 2.0]]], np.float32)
-
-    assert np.allclose(luminance_of(colours), [[0.2126, 0.7152, 0.0722, 2.0]])
 
 
 def test_it_may_share_the_place_of_a_camera() -> None:

@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 from generator.assets.procedural.draw import between, pick, rng_of
 from generator.assets.procedural.materials import linear
 from generator.assets.procedural.noise import fbm, smoothstep, uniform
+from generator.core.colorimetry import luminance
 from generator.core.geometry import Float32
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
 
 Array = NDArray[np.float64]
-
-# Rec. 709 luminance of linear RGB.
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def neutral(seed: int) -> Float32:
@@ -168,10 +166,8 @@ def normalised(image: Array | Float32) -> Float32:
     rows = image.shape[0]
     edges = np.cos(math.pi * np.arange(rows + 1) / rows)
     weight = (edges[:-1] - edges[1:]) / 2.0
-    # Channel by channel: reducing over the short last axis takes five times as long.
-    red, green, blue = (image[..., k] * float(_LUMINANCE[k]) for k in range(3))
-    luminance = (red + green + blue).mean(axis=1, dtype=np.float64)
-    scaled: Float32 = (image / float((luminance * weight).sum())).astype(np.float32)
+    per_row = luminance(image).mean(axis=1, dtype=np.float64)
+    scaled: Float32 = (image / float((per_row * weight).sum())).astype(np.float32)
     return scaled
 
 
@@ -243,7 +239,7 @@ def _over_ground(sky: Array, d: Array, rng: Rng) -> Array:
     soil = np.array(linear(pick(("#8c8a84", "#7d7f73", "#94866f", "#8b9094"), rng)))
     # What lights the ground is the sky and a sun that is not in it: whiter than the sky.
     mean = sky[: sky.shape[0] // 2].mean(axis=(0, 1))
-    upper = 0.35 * mean + 0.65 * float((mean * _LUMINANCE).sum())
+    upper = 0.35 * mean + 0.65 * float(luminance(mean))
     ground = soil * upper * (1.0 - 0.25 * smoothstep(0.0, -1.0, d[..., 2:]))
     mixed: Array = sky * above + ground * (1 - above)
     return mixed

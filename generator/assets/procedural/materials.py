@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from generator.assets.procedural.draw import between, pick
+from generator.core.colorimetry import srgb_decode
 from generator.core.geometry import Material
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
@@ -62,7 +63,7 @@ WOODS = ("#c79a6b", "#a8743f", "#7d5230", "#e0c196", "#5b3a24")
 
 def linear(code: str) -> Vec3:
     """Linear RGB of an sRGB colour ``#rrggbb`` (IEC 61966-2-1)."""
-    r, g, b = (_decoded(int(code[i : i + 2], 16) / 255.0) for i in (1, 3, 5))
+    r, g, b = (srgb_decode(int(code[i : i + 2], 16) / 255.0) for i in (1, 3, 5))
     return (r, g, b)
 
 
@@ -129,7 +130,3 @@ def patterned(
     return Material(
         base_color=color, roughness=roughness, texture=texture_id, texture_scale_m=scale_m
     )
-
-
-def _decoded(value: float) -> float:
-    return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from generator.assets.soup import Soup
+from generator.core.colorimetry import srgb_decode
 from generator.core.se3 import Vec3
 
 MAX_FACES = 5_000_000
@@ -68,5 +69,4 @@ def roughness_of_shininess(exponent: float) -> float:
 
 def _linear(c: float) -> float:
     # Rounded, because pow() may differ in the last bit between C libraries.
-    linear = c / 12.92 if c <= 0.04045 else math.pow((c + 0.055) / 1.055, 2.4)
-    return round(linear, 6)
+    return round(srgb_decode(float(c)), 6)

@@ -15,6 +15,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from generator.core.colorimetry import luminance
 from generator.core.se3 import Vec3
 
 SOLAR_ILLUMINANCE_LUX = 127_500.0
@@ -40,7 +43,6 @@ _WAVELENGTHS_UM = (0.610, 0.550, 0.465)
 _SOLAR_COLOR = (1.07, 0.985, 0.90)
 # 0.35 cm of ozone, which takes 0.1 per cm at 555 nm (Preetham 1999, A.1).
 _OZONE_DEPTH = 0.035
-_LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
 def air_mass(altitude_rad: float) -> float:
@@ -71,8 +73,8 @@ def sun_color(altitude_rad: float, turbidity: float = CLEAR_TURBIDITY) -> Vec3:
     for wavelength_um, outside in zip(_WAVELENGTHS_UM, _SOLAR_COLOR, strict=True):
         rayleigh = math.exp(-0.008735 * wavelength_um**-4.08 * mass)
         rgb.append(outside * rayleigh * math.exp(-aerosol * wavelength_um**-1.3 * mass))
-    luminance = sum(weight * part for weight, part in zip(_LUMINANCE, rgb, strict=True))
-    red, green, blue = (round(part / luminance, 6) for part in rgb)
+    relative = float(luminance(np.array(rgb)))
+    red, green, blue = (round(part / relative, 6) for part in rgb)
     return (red, green, blue)
 
 

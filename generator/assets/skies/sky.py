@@ -20,6 +20,7 @@ from generator.assets.procedural.environments import directions, normalised
 from generator.assets.procedural.noise import smoothstep
 from generator.assets.skies import daylight
 from generator.assets.skies.clouds import cloud_layer
+from generator.core.colorimetry import REC709_FROM_XYZ, REC709_LUMINANCE, luminance
 from generator.core.geometry import Float32
 
 Array = NDArray[np.float64]
@@ -31,11 +32,6 @@ _ROWS = 512
 _MEAN_ROWS = 64
 # Less light than this share of the rest is not computed.
 _NEGLIGIBLE = 1e-3
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-# XYZ (D65) to linear sRGB, IEC 61966-2-1.
-_RGB_OF_XYZ = np.array(
-    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
-)
 # Perez coefficients A to E as [factor on turbidity, constant]: luminance, x, y (Preetham, A.2).
 _PEREZ_LUMINANCE = (
     (0.1787, -1.4630), (-0.3554, 0.4275), (-0.0227, 5.3251), (0.1206, -2.5771), (-0.0670, 0.3703),
@@ -127,7 +123,7 @@ def mean_luminance_cd_m2(model: SkyModel) -> float:
     """Mean over the whole sphere: what ``Environment.luminance_cd_m2`` has to be."""
     image = luminance_cd_m2(model, _MEAN_ROWS)
     weights = _row_weights(_MEAN_ROWS)
-    rows = np.einsum("hwc,c->h", image, _LUMINANCE, optimize=False) / image.shape[1]
+    rows = np.einsum("hwc,c->h", image, REC709_LUMINANCE, optimize=False) / image.shape[1]
     return float((rows * weights).sum())
 
 
@@ -185,11 +181,11 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float =
     y = float((_ZENITH_Y * terms).sum()) * relative(_PEREZ_Y)
     luminance = relative(_PEREZ_LUMINANCE)
     xyz = np.stack([x / y, np.ones_like(x), (1.0 - x - y) / y], axis=-1)
-    rgb = np.maximum(np.einsum("hwc,kc->hwk", xyz, _RGB_OF_XYZ, optimize=False), 0.02)
+    rgb = np.maximum(np.einsum("hwc,kc->hwk", xyz, REC709_FROM_XYZ, optimize=False), 0.02)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
     high = pale * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
     rgb += np.exp(-rows_up / 0.22)[..., None] * high * (_HORIZON - rgb)
-    rgb /= np.einsum("hwc,c->hw", rgb, _LUMINANCE, optimize=False)[..., None]
+    rgb /= np.einsum("hwc,c->hw", rgb, REC709_LUMINANCE, optimize=False)[..., None]
     sky_rgb: Array = rgb * luminance[..., None]
     return sky_rgb
 
@@ -293,7 +289,7 @@ def _land(image: Float32, d: Array, model: SkyModel) -> Float32:
 
 def _scaled(image: Image, lux: float) -> Image:
     """A sky, or its half, that gives that illuminance on level ground."""
-    scaled: Image = image * image.dtype.type(lux / float((_level_light(image) * _LUMINANCE).sum()))
+    scaled: Image = image * image.dtype.type(lux / float(luminance(_level_light(image))))
     return scaled
 
 

@@ -47,6 +47,7 @@ def directional_albedo(table: wp.array(dtype=wp.vec2, ndim=2), roughness: float,
         table: The factors over [0, 1] x [0, 1], ends included, roughness by row.
     """
     last = float(table.shape[0] - 1)
+    # The last cell ends at 1: a whisker less keeps its right neighbour inside the table.
     x = wp.min(n_v * last, last - 0.001)
     y = wp.min(roughness * last, last - 0.001)
     x0 = int(x)
@@ -69,13 +70,17 @@ def make_brdf(
 ):
     """The surface at a point with its view-dependent constants."""
     s = Brdf()
+    # Alpha 0.002: in narrower lobes n_h^2 (alpha^2 - 1) + 1 has no digits left at the peak.
     s.roughness = wp.clamp(roughness, 0.045, 1.0)
+    # Interpolated normals may turn away from the viewer; Smith's term divides by this.
     s.n_v = wp.max(n_v, 1.0e-3)
+    # Burley 2012: specular 0.5 is 4 %, the reflectance of most plastics (index 1.5).
     dielectric = 0.08 * specular * (1.0 - metallic)
     s.f0 = wp.vec3(dielectric, dielectric, dielectric) + albedo * metallic
     # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
     s.f90 = wp.min(50.0 * wp.max(s.f0[0], wp.max(s.f0[1], s.f0[2])), 1.0)
     part = directional_albedo(table, s.roughness, s.n_v)
+    # Turquin 2019: what single scattering loses of white light, by what it keeps.
     loss = 1.0 / wp.max(part[0] + part[1], 0.05) - 1.0
     s.boost = wp.vec3(1.0, 1.0, 1.0) + s.f0 * loss
     s.gloss = wp.cw_mul(s.f0 * part[0] + wp.vec3(s.f90, s.f90, s.f90) * part[1], s.boost)
@@ -95,11 +100,14 @@ def specular_lobe(s: Brdf, n: wp.vec3, v: wp.vec3, l: wp.vec3, n_l: float, widen
     n_h = wp.min(wp.dot(n, h), 1.0)
     alpha = s.roughness * s.roughness
     wide = wp.min(alpha + widening, 1.0)
+    # Karis 2013: the peak falls by (alpha / wide)^2, so that a wider lobe has no more energy.
     a2 = alpha * alpha
     q = n_h * n_h * (a2 - 1.0) + 1.0
+    # Hammon 2017: Smith's height-correlated masking, without its two square roots.
     g = 2.0 * n_l * s.n_v * (1.0 - alpha) + (n_l + s.n_v) * alpha
     lobe = 0.5 * a2 * a2 / (wp.pi * q * q * wide * wide * wp.max(g, 1.0e-4))
     c = 1.0 - wp.max(wp.dot(v, h), 0.0)
+    # Schlick 1994, with F90 in place of 1.
     c2 = c * c
     c5 = c2 * c2 * c
     f = s.f0 * (1.0 - c5) + wp.vec3(s.f90, s.f90, s.f90) * c5

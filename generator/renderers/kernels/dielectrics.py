@@ -10,6 +10,18 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Reflectance of water at normal incidence: ((n - 1) / (n + 1))^2 with n = 1.33, in visible light
+# and in the near infrared alike (Hale and Querry, "Optical constants of water", 1973).
+WATER_F0 = wp.constant(0.02)
+
+
+@wp.func
+def fresnel_schlick(f0: float, cosine: float):
+    """Reflectance by Schlick's fit to Fresnel's formulae, 1994; ``f0`` at normal incidence."""
+    grazing = 1.0 - cosine
+    squared = grazing * grazing
+    return f0 + (1.0 - f0) * squared * squared * grazing
+
 
 @wp.func
 def fresnel_dielectric(cosine: float, eta: float):
@@ -20,11 +32,13 @@ def fresnel_dielectric(cosine: float, eta: float):
         eta: Refractive index behind the border over that before it.
     """
     reflectance = float(1.0)
+    # Snell's law; above 1 there is no direction behind: total reflection.
     sine2 = (1.0 - cosine * cosine) / (eta * eta)
     if sine2 < 1.0:
         behind = wp.sqrt(1.0 - sine2)
         across = (cosine - eta * behind) / (cosine + eta * behind)
         along = (eta * cosine - behind) / (eta * cosine + behind)
+        # Unpolarised light is half of each polarisation.
         reflectance = 0.5 * (across * across + along * along)
     return reflectance
 
@@ -54,6 +68,7 @@ def pane_reflectance(f: float, tint: wp.vec3):
         f: Of one face.
         tint: What one way through it leaves.
     """
+    # In, off the back face, out: the first term; each further pair of reflections adds f^2 t^2.
     part = (1.0 - f) * (1.0 - f) * f
     return wp.vec3(
         f + part * tint[0] * tint[0] / (1.0 - f * f * tint[0] * tint[0] + 1.0e-6),
@@ -65,6 +80,7 @@ def pane_reflectance(f: float, tint: wp.vec3):
 @wp.func
 def pane_transmittance(f: float, tint: wp.vec3):
     """Transmittance of a thin pane; arguments as for pane_reflectance."""
+    # The same series for what leaves by the back face.
     part = (1.0 - f) * (1.0 - f)
     return wp.vec3(
         part * tint[0] / (1.0 - f * f * tint[0] * tint[0] + 1.0e-6),

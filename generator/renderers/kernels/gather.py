@@ -130,6 +130,7 @@ def tilt_of(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3
     if wp.dot(towards, towards) > 0.0:
         tilt.towards = unit(towards)
         tilt.half = unit(tilt.towards + v)
+        # At grazing light the ratio of cosines would be boundless.
         tilt.before = wp.max(wp.dot(n, tilt.towards), 0.1)
         tilt.n_h = wp.dot(n, tilt.half)
         tilt.lamps = lamps
@@ -147,7 +148,9 @@ def on_bump(tilt: Tilt, roughness: float, m: wp.vec3):
     alpha = roughness * roughness
     narrow = 1.0 - alpha * alpha
     m_h = wp.dot(m, tilt.half)
+    # Ratio of two GGX densities is the square of this; alpha^2 cancels.
     lobe = (1.0 - tilt.n_h * tilt.n_h * narrow) / wp.max(1.0 - m_h * m_h * narrow, 1.0e-4)
+    # Bounded: several lamps have no one direction, and one bump would gleam.
     diffuse = 1.0 + tilt.lamps * (wp.min(after / tilt.before, 3.0) - 1.0)
     return wp.vec2(diffuse, 1.0 + tilt.shine * (wp.min(lobe * lobe, 8.0) - 1.0))
 
@@ -250,6 +253,7 @@ def one_face(view: View, images: Images, face: wp.vec2i, x0: int, x1: int, y0: i
 @wp.func
 def quad_sampler(world: World, texture: int, quad: Quad, patch: Patch, footprint_m: float):
     """The sampler of a cell whose pixels are that wide at its depth."""
+    # Footprints are ellipses: the level that suits the geometric mean of both axes.
     slant = wp.max(wp.dot(quad.normal, quad.to_viewer), 0.05)
     return sampler_of(world, texture, wp.log2(footprint_m * patch.texels_per_m / wp.sqrt(slant)))
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.ray_offsets import OFFSET_M, OFFSET_PER_DISTANCE
 from generator.renderers.kernels.records import (
     View,
     World,
@@ -72,9 +73,7 @@ def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d
     shift += n1 * (u * wp.min(0.0, wp.dot(p - p1, n1)))
     shift += n2 * (v * wp.min(0.0, wp.dot(p - p2, n2)))
     flat = unit(wp.cross(p1 - p0, p2 - p0)) * side
-    # Half a millimetre per metre: less than half a pixel, and at a few metres above the markings
-    # and covers that float millimetres over a road, beneath whose rims a camera looks.
-    lift_m = 2.0e-5 + 5.0e-4 * wp.length(d_world)
+    lift_m = OFFSET_M + OFFSET_PER_DISTANCE * wp.length(d_world)
     return p_world + world.bodies[b].R_world_mesh @ (flat * lift_m - shift * world.bodies[b].scale)
 
 

@@ -30,6 +30,7 @@ from generator.renderers.kernels.ground import coat_at, coated, footprint
 from generator.renderers.kernels.holes import OUT_OF_LINE, uv_at
 from generator.renderers.kernels.lattice import ray_origin
 from generator.renderers.kernels.look import Look, look_at_hit
+from generator.renderers.kernels.ray_offsets import passed_origin
 from generator.renderers.kernels.rays import FARTHEST, first_met
 from generator.renderers.kernels.records import (
     HOLES,
@@ -221,12 +222,6 @@ def curvature(world: World, hit: wp.vec2i):
 
 
 @wp.func
-def beyond(p: wp.vec3, d: wp.vec3, eye_m: wp.vec3):
-    """Where a ray goes on behind a surface that it has met."""
-    return p + d * (3.0e-5 + 2.0e-6 * (wp.length(p - eye_m) + wp.length(p)))
-
-
-@wp.func
 def above(r: wp.vec3, n: wp.vec3):
     """A direction lifted over a surface that bumps have turned it into."""
     return unit(r + n * wp.max(0.02 - wp.dot(r, n), 0.0))
@@ -389,7 +384,7 @@ def seen_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
                 total += wp.cw_mul(ray.share, own) * opacity
             if clear > 0.0 or opacity < 1.0:
                 ray = gone_on(world, ray, m, look, clear, opacity)
-                ray.origin = beyond(p, ray.d, view.eye_m)
+                ray.origin = passed_origin(p, ray.d, view.eye_m)
                 surfaces += 1
                 going = surfaces < SURFACES_MAX and wp.max(ray.share) > 0.002
                 if not going:
@@ -572,7 +567,7 @@ def ray_of(
         elif world.surfaces[surface].thin != 0:
             # Part of the ray behind the pane.
             ray.share = wp.vec3(0.0)
-        ray.origin = beyond(p, ray.d, view.eye_m)
+        ray.origin = passed_origin(p, ray.d, view.eye_m)
     return ray
 
 

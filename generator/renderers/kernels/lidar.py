@@ -15,8 +15,10 @@ from generator.renderers.kernels.bundles import (
     reciprocals,
     with_ray,
 )
+from generator.renderers.kernels.dielectrics import WATER_F0, fresnel_schlick
 from generator.renderers.kernels.ground import Coat, coat_at, porosity_of
 from generator.renderers.kernels.holes import solid_hit
+from generator.renderers.kernels.ray_offsets import LASER_OFFSET_M, SHELTER_OFFSET_M
 from generator.renderers.kernels.rays import unsheltered
 from generator.renderers.kernels.records import (
     HOLES,
@@ -30,14 +32,11 @@ from generator.renderers.kernels.records import (
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 PI = wp.constant(3.14159265)
-WATER_F0 = wp.constant(0.02)
 # Fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral albedo of
 # snow", 1980: 0.9 to 0.75 for grains of 0.1 to 1 mm).
 SNOW = wp.constant(0.85)
 # Wet markings keep a quarter of what their beads send back (EN 1436, classes R and RW).
 DROWNED = wp.constant(0.75)
-# Rays that leave a surface start this far from it.
-LIFT_M = wp.constant(2.0e-3)
 # Faces of glass on the way of a ray, and what is behind them.
 FACES_MAX = wp.constant(9)
 # Two faces of glass that are nearer to each other are one pane.
@@ -129,9 +128,11 @@ def ray_of_beam(axis: wp.vec3, k: int, spread: float):
     """The axis of a beam, or one of six rays around it."""
     if k == 0:
         return axis
+    # Any axis that is not nearly parallel: the cross product must keep its digits.
     helper = wp.where(wp.abs(axis[2]) < 0.9, wp.vec3(0.0, 0.0, 1.0), wp.vec3(1.0, 0.0, 0.0))
     across = unit(wp.cross(helper, axis))
     up = wp.cross(axis, across)
+    # Six around one: the densest even pattern in a round beam.
     turn = float(k - 1) * (PI / 3.0)
     return unit(axis + (across * wp.cos(turn) + up * wp.sin(turn)) * spread)
 
@@ -147,6 +148,7 @@ def returned(light: Infrared, cosine: float):
     ways alike (Walter et al., "Microfacet models for refraction", 2007).
     A retro-reflector keeps its entrance angles to about 60 degrees (ASTM D4956).
     """
+    # The lobe divides by it; light within 0.06 degrees of the surface brings nothing back.
     c = wp.max(cosine, 1.0e-3)
     a2 = light.alpha * light.alpha
     c2 = c * c
@@ -175,6 +177,7 @@ class Nearest:
 @wp.func
 def mover_frame(travel: Travel, m: int, ray: Ray):
     """Directions of the lidar frame in the mesh frame of mover m when a ray leaves."""
+    # Mixed matrices are no rotations, by the square of the small turn between two keys.
     before = travel.B_mesh_lidar[m, ray.key]
     return before + (travel.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
 
@@ -231,6 +234,7 @@ def ray_number(scan: Scan, travel: Travel, axes: wp.array(dtype=wp.vec3), i: int
     ray.direction = ray_of_beam(axes[beam], i % scan.subrays, scan.spread)
     if travel.keys > 0:
         ray.origin_m = travel.origins_m[beam]
+        # The last pulse may leave at the last key: it belongs to the step before it.
         ray.key = wp.min(int(travel.phases[beam]), travel.keys - 2)
         ray.share = travel.phases[beam] - float(ray.key)
     return ray
@@ -275,6 +279,7 @@ def first_hit(
     for k in range(count):
         b = int(k)
         if listed.count >= 0:
+            # Bodies are listed by distance: none of the rest can be nearer.
             if boxes.enters_m[listed.row, k] - gone_m >= hit.range_m:
                 break
             b = boxes.listed[listed.row, k]
@@ -282,14 +287,6 @@ def first_hit(
             if ray_enters(boxes, b, eye_m, inverse, hit.range_m):
                 hit = nearer(world, travel, b, ray, hit, offset)
     return hit
-
-
-@wp.func
-def fresnel(f0: float, cosine: float):
-    """Schlick, "An inexpensive BRDF model for physically-based rendering", 1994."""
-    grazing = 1.0 - cosine
-    squared = grazing * grazing
-    return f0 + (1.0 - f0) * squared * squared * grazing
 
 
 @wp.func
@@ -301,7 +298,8 @@ def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_
     p = scan.eye_m + scan.R_world_lidar @ (ray.origin_m + ray.direction * range_m)
     exposed = float(1.0)
     if n[2] > 0.1:
-        exposed = unsheltered(world, p + n * 0.02)
+        exposed = unsheltered(world, p + n * SHELTER_OFFSET_M)
+    # A beam's mark grows as 1 / cosine; fifty beams long is as good as any longer.
     slant = wp.max(wp.abs(wp.dot(n_lidar, ray.direction)), 0.02)
     return coat_at(world, surface, p, n, exposed, scan.divergence_rad * range_m / slant)
 
@@ -318,7 +316,8 @@ def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: f
     """
     porous = porosity_of(world, surface)
     film = wp.max(coat.puddle, 0.5 * porous * coat.wet)
-    passes = 1.0 - film * fresnel(WATER_F0, cosine)
+    # Twice through the surface of the water, and twice in ``kept``: in and out.
+    passes = 1.0 - film * fresnel_schlick(WATER_F0, cosine)
     kept = coat.mixable[0] * passes * passes
     bare = 1.0 - wp.min(coat.snow, 1.0)
     below = Infrared()
@@ -438,7 +437,7 @@ def look_through(
             hits[j] = wp.vec2i(-1, -1)
             ray = ray_number(scan, travel, axes, picked[j])
             begin_m = ray.origin_m
-            way_m = wp.max(first_m[picked[j]] - LIFT_M, 0.0)
+            way_m = wp.max(first_m[picked[j]] - LASER_OFFSET_M, 0.0)
             passed = float(1.0)
             for face in range(FACES_MAX):
                 if passed > 0.0:
@@ -447,7 +446,7 @@ def look_through(
                     if hit.body < 0:
                         passed = 0.0
                     else:
-                        way_m += hit.range_m + LIFT_M
+                        way_m += hit.range_m + LASER_OFFSET_M
                         n = normal_of(scan, world, travel, ray, hit)
                         cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
                         material = surface_index(world, wp.vec2i(hit.body, hit.face))
@@ -455,12 +454,12 @@ def look_through(
                         if face > 0:
                             # Each further pane is overwritten by what is behind it, if anything is.
                             hits[j] = wp.vec2i(hit.body, material)
-                            ranges_m[j] = way_m - LIFT_M
+                            ranges_m[j] = way_m - LASER_OFFSET_M
                             reflectances[j] = passed * returned(lights[material], cosine)
                         if clear == 0.0:
                             passed = 0.0
                         elif face == 0 or hit.range_m > PANE_M:
-                            kept = clear * (1.0 - fresnel(lights[material].mirror, cosine))
+                            kept = clear * (1.0 - fresnel_schlick(lights[material].mirror, cosine))
                             passed *= kept * kept
 
 
@@ -470,7 +469,7 @@ def mirrored(ray: Ray, n: wp.vec3, range_m: float):
     facing = wp.dot(n, ray.direction)
     ray.origin_m = ray.origin_m + ray.direction * range_m
     ray.direction = unit(ray.direction - n * (2.0 * facing))
-    ray.origin_m += ray.direction * LIFT_M - n * (wp.sign(facing) * LIFT_M)
+    ray.origin_m += ray.direction * LASER_OFFSET_M - n * (wp.sign(facing) * LASER_OFFSET_M)
     return ray
 
 
@@ -512,9 +511,9 @@ def look_in_mirrors(
             i = picked[j]
             ray = ray_number(scan, travel, axes, i)
             cosine = wp.min(wp.abs(wp.dot(normals[i], ray.direction)), 1.0)
-            kept = fresnel(lights[first_hits[i][1]].mirror, cosine)
+            kept = fresnel_schlick(lights[first_hits[i][1]].mirror, cosine)
             if waters[j] > 0.0:
-                kept = waters[j] * fresnel(WATER_F0, cosine)
+                kept = waters[j] * fresnel_schlick(WATER_F0, cosine)
             ray = mirrored(ray, normals[i], first_m[i])
             hit = first_hit(scan, world, travel, boxes, listed, ray, last, 0.0, True)
             last = hit.body
@@ -523,6 +522,6 @@ def look_in_mirrors(
                 n = normal_of(scan, world, travel, ray, hit)
                 material = surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[j] = wp.vec2i(hit.body, material)
-                ranges_m[j] = first_m[i] + LIFT_M + hit.range_m
+                ranges_m[j] = first_m[i] + LASER_OFFSET_M + hit.range_m
                 cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
                 reflectances[j] = kept * kept * returned(lights[material], cosine)

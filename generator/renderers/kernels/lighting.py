@@ -12,15 +12,15 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.core.scene import LIGHT_KINDS
 from generator.renderers.kernels.records import Lamp, unit
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-SPHERE = wp.constant(0)
-SPOT = wp.constant(1)
-SUN = wp.constant(2)
-RECTANGLE = wp.constant(3)
-DISK = wp.constant(4)
+SPOT = wp.constant(LIGHT_KINDS.index("spot"))
+SUN = wp.constant(LIGHT_KINDS.index("sun"))
+RECTANGLE = wp.constant(LIGHT_KINDS.index("rectangle"))
+DISK = wp.constant(LIGHT_KINDS.index("disk"))
 
 # A dipped beam, in slopes against its axis: where it is brightest, how fast it fades sideways and
 # downwards, over what height it ends at the cut-off, how steeply and how far that rises on the side
@@ -45,6 +45,12 @@ DISK_CORNERS = wp.constant(16)
 DISK_REACH = wp.constant(1.0130016)
 
 
+@wp.func
+def is_panel(lamp: Lamp):
+    """Whether a lamp shines from a flat front, to one side only."""
+    return lamp.kind == RECTANGLE or lamp.kind == DISK  # noqa: PLR1714
+
+
 @wp.struct
 class Beam:
     """What one lamp sends to a point.
@@ -67,6 +73,7 @@ class Beam:
 def dipped_share(lamp: Lamp, d: wp.vec3):
     """Intensity of a dipped headlight in a direction, as a share of that at its brightest."""
     right = unit(wp.cross(lamp.direction, wp.vec3(0.0, 0.0, 1.0)))
+    # Slopes of what lies beside or behind the lamp are boundless: they end in the stray light.
     ahead = wp.max(wp.dot(d, lamp.direction), 1.0e-3)
     side = wp.dot(d, right) / ahead
     down = -wp.dot(d, wp.cross(right, lamp.direction)) / ahead
@@ -89,12 +96,13 @@ def beam_from(lamp: Lamp, p_world: wp.vec3):
         beam.spread = lamp.radius
         return beam
     to_lamp = lamp.position_m - p_world
+    # At the lamp's own surface the inverse square law ends.
     squared = wp.max(wp.dot(to_lamp, to_lamp), wp.max(lamp.radius * lamp.radius, 1.0e-6))
     inverse = 1.0 / wp.sqrt(squared)
     beam.direction = to_lamp * inverse
     beam.distance_m = squared * inverse
     beam.spread = lamp.radius * inverse
-    if lamp.kind >= RECTANGLE:
+    if is_panel(lamp):
         flow = flow_from_panel(lamp, p_world)
         share = wp.length(flow)
         if share > 0.0:
@@ -105,6 +113,7 @@ def beam_from(lamp: Lamp, p_world: wp.vec3):
     if lamp.kind == SPOT:
         cosine = -wp.dot(beam.direction, lamp.direction)
         span = wp.max(lamp.cos_inner - lamp.cos_outer, 1.0e-4)
+        # As generator.core.photometry counts it: symmetric in the cosine, so that half counts.
         fade = wp.clamp((cosine - lamp.cos_outer) / span, 0.0, 1.0)
         beam.normal_lux = beam.normal_lux * (fade * fade * (3.0 - 2.0 * fade))
         if lamp.cutoff > 0.0:
@@ -195,7 +204,7 @@ def facing(lamp: Lamp, beam: Beam, p_world: wp.vec3, n: wp.vec3):
     disks are polygons then, right to a thousandth of what all of the disk gives.
     """
     cosine = wp.dot(n, beam.direction)
-    if lamp.kind < RECTANGLE:
+    if not is_panel(lamp):
         if lamp.kind == SUN and lamp.radius > WIDE_SUN and wp.abs(cosine) < lamp.radius:
             sine2 = lamp.radius * lamp.radius
             cosine = setting_ball(cosine, sine2 / (1.0 + sine2))
@@ -212,7 +221,7 @@ def facing(lamp: Lamp, beam: Beam, p_world: wp.vec3, n: wp.vec3):
 def risen(lamp: Lamp, beam: Beam, n: wp.vec3):
     """About what share of a wide lamp is over the horizon."""
     share = float(1.0)
-    if lamp.kind >= RECTANGLE or (lamp.kind == SUN and lamp.radius > WIDE_SUN):
+    if is_panel(lamp) or (lamp.kind == SUN and lamp.radius > WIDE_SUN):
         share = wp.clamp(0.5 + 0.5 * wp.dot(n, beam.direction) / beam.spread, 0.0, 1.0)
     return share
 
@@ -274,7 +283,7 @@ def towards_mirror(lamp: Lamp, beam: Beam, p_world: wp.vec3, mirrored: wp.vec3, 
 
     Where the lobe of width ``alpha`` is much wider than the lamp this is the lamp's centre.
     """
-    if lamp.kind >= RECTANGLE:
+    if is_panel(lamp):
         return mirrored_panel(lamp, p_world, mirrored, alpha)
     spread = beam.spread - 0.2 * alpha
     if spread <= 0.0:
@@ -316,7 +325,7 @@ def widening(lamp: Lamp, beam: Beam, alpha: float):
     their axes by what is seen of those.
     """
     wider = 0.5 * beam.spread
-    if lamp.kind >= RECTANGLE:
+    if is_panel(lamp):
         part = wp.where(lamp.kind == DISK, 0.5, 0.5642) / beam.distance_m
         a = wp.dot(lamp.along, beam.direction)
         b = wp.dot(lamp.across, beam.direction)

@@ -14,7 +14,9 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.brdf import directional_albedo
+from generator.renderers.kernels.colorimetry import luminance
 from generator.renderers.kernels.dielectrics import (
+    WATER_F0,
     fresnel_dielectric,
     pane_reflectance,
     pane_transmittance,
@@ -22,7 +24,7 @@ from generator.renderers.kernels.dielectrics import (
 from generator.renderers.kernels.ground import coat_at, coated
 from generator.renderers.kernels.holes import OUT_OF_LINE
 from generator.renderers.kernels.layers import maps_at
-from generator.renderers.kernels.lighting import SUN
+from generator.renderers.kernels.lighting import is_panel
 from generator.renderers.kernels.look import Look, look_at_hit
 from generator.renderers.kernels.occlusion import frame_of
 from generator.renderers.kernels.path_bsdf import (
@@ -31,7 +33,6 @@ from generator.renderers.kernels.path_bsdf import (
     Scattering,
     alpha_of,
     evaluate,
-    luminance,
     make_bsdf,
     make_interface,
     scatter,
@@ -62,6 +63,7 @@ from generator.renderers.kernels.path_random import (
     random_pair,
 )
 from generator.renderers.kernels.raster import Z_NEAR_M
+from generator.renderers.kernels.ray_offsets import offset_origin
 from generator.renderers.kernels.rays import Met, cut, first_met, path_along, unsheltered
 from generator.renderers.kernels.records import (
     HOLES,
@@ -87,8 +89,6 @@ PASSAGES_MAX = wp.constant(64)
 # with this much: dark things are seen as well as bright ones. Measured: half the variance, for the
 # same time, of going on with probability of what is left.
 WORTH = wp.constant(0.25)
-# Water on surfaces.
-WATER_F0 = wp.constant(0.02)
 # Rougher panes scatter what they let through.
 CLEAR_ROUGHNESS = wp.constant(0.1)
 # Probability at least of what an interface reflects, and of what it lets through.
@@ -172,13 +172,6 @@ class Anchor:
 
 
 @wp.func
-def lifted(p: wp.vec3, n: wp.vec3):
-    """A ray's origin off a surface, on the side of a normal."""
-    size = wp.abs(p[0]) + wp.abs(p[1]) + wp.abs(p[2])
-    return p + n * (2.0e-5 + 1.0e-6 * size)
-
-
-@wp.func
 def vertex_of(world: World, hit: Met, d: wp.vec3, width_m: float):
     """The surface at a hit, dry and bare."""
     b = hit.at[0]
@@ -235,7 +228,7 @@ def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
     """A surface as the weather leaves it; ``n`` is its normal without bumps."""
     exposed = float(1.0)
     if n[2] > 0.1:
-        exposed = unsheltered(world, lifted(v.p, v.flat))
+        exposed = unsheltered(world, offset_origin(v.p, v.flat))
     coat = coat_at(world, v.surface, v.p, n, exposed, width_m)
     v.look = coated(world, v.surface, v.look, coat, n)
     bare = 1.0 - wp.min(coat.snow, 1.0)
@@ -302,7 +295,7 @@ def light_through_panes(world: World, o: wp.vec3, d: wp.vec3, distance_m: float)
             if lets_straight(world, surface_index(world, hit.at)):
                 v = vertex_of(world, hit, d, 0.0)
                 leaves = pane_leaves(world, v, d)
-                origin = lifted(v.p, -v.flat)
+                origin = offset_origin(v.p, -v.flat)
             through = wp.cw_mul(through, leaves)
             passages += 1
             rest_m -= hit.t
@@ -371,10 +364,10 @@ def light_asked(
     g = Glimpse()
     if choice.source == SKY:
         g = draw_sky(world.sky, table, u)
-    elif world.lamps[choice.source].kind <= SUN:
-        g = draw_ball(world.lamps[choice.source], o, u)
-    else:
+    elif is_panel(world.lamps[choice.source]):
         g = draw_panel(world.lamps[choice.source], o, u)
+    else:
+        g = draw_ball(world.lamps[choice.source], o, u)
     l = to_frame(g.direction, x, y, v.look.normal)  # noqa: E741
     if g.distance_m > 0.0 and l[2] > 0.0 and wp.dot(g.direction, v.flat) > 0.0:
         f, density = evaluate(s, l)
@@ -529,7 +522,7 @@ def step_from(
     step = Step()
     step.density = -1.0
     step.straight = dealt.kind == STRAIGHT
-    step.o = lifted(v.p, -v.flat)
+    step.o = offset_origin(v.p, -v.flat)
     step.d = d
     step.weight = dealt.weight
     if step.straight:
@@ -549,7 +542,7 @@ def step_from(
     if sent.l[2] <= 0.0:
         side = -v.flat
         step.weight = wp.cw_mul(sent.weight, dealt.weight)
-    o = lifted(v.p, v.flat)
+    o = offset_origin(v.p, v.flat)
     # Inside glass nothing is asked: what is outside is seen by going there.
     if dealt.kind == OPAQUE or (dealt.kind == SOLID and v.outside):
         choice = choose_source(world, table, o, n, choices[1])
@@ -558,7 +551,7 @@ def step_from(
         if choice.part > 0.0 and budget.lights != 2:
             u = random_pair(key, pair + 3, sample)
             step.light = light_asked(world, table, budget, dealt.bsdf, v, o, x, y, choice, u)
-    step.o = lifted(v.p, side)
+    step.o = offset_origin(v.p, side)
     step.d = x * sent.l[0] + y * sent.l[1] + n * sent.l[2]
     if wp.dot(step.d, side) <= 0.0:
         step.weight = wp.vec3(0.0)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import warp as wp
 
 from generator.renderers.kernels.brdf import directional_albedo
+from generator.renderers.kernels.colorimetry import luminance
 from generator.renderers.kernels.dielectrics import fresnel_dielectric, refracted
 from generator.renderers.kernels.records import unit
 
@@ -22,6 +23,7 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 # Smoother surfaces than this are taken for this: alpha 0.002, as in ``brdf``.
 SMOOTHEST = wp.constant(0.045)
+# Lacquers have indices about 1.5: ((n - 1) / (n + 1))^2.
 COAT_F0 = wp.constant(0.04)
 
 
@@ -73,12 +75,6 @@ class Scattering:
 
 
 @wp.func
-def luminance(c: wp.vec3):
-    """Of linear RGB, Rec. 709."""
-    return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
-
-
-@wp.func
 def alpha_of(roughness: float):
     """Width of a lobe."""
     r = wp.clamp(roughness, SMOOTHEST, 1.0)
@@ -119,14 +115,17 @@ def make_bsdf(
     s = Bsdf()
     s.v = v
     s.alpha = alpha_of(roughness)
+    # Burley 2012: specular 0.5 is 4 %.
     dielectric = 0.08 * specular * (1.0 - metallic)
     s.f0 = one * dielectric + albedo * metallic
     # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
     s.f90 = wp.min(50.0 * wp.max(s.f0), 1.0)
     part = directional_albedo(table, wp.sqrt(s.alpha), n_v)
+    # Turquin 2019; the floor is for entries of the table near 0.
     s.scale = one + s.f0 * (1.0 / wp.max(part[0] + part[1], 0.05) - 1.0)
     gloss = wp.cw_mul(s.f0 * part[0] + one * (s.f90 * part[1]), s.scale)
     s.diffuse = wp.cw_mul(one - gloss, albedo) * (1.0 - metallic)
+    # Layers are drawn as often as they send light on, as the eye counts it.
     shine = luminance(gloss)
     if coat > 0.0:
         s.coat_f0 = coat_f0
@@ -194,6 +193,7 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
     diffuse = n_l * (1.0 / wp.pi)
     f = s.diffuse * diffuse
     density = diffuse * (1.0 - s.p_coat - s.p_shine)
+    # Matte surfaces are the most common: they skip the half vector.
     if s.p_shine == 0.0 and s.coat == 0.0:
         return f, density
     h = unit(s.v + l)
@@ -203,6 +203,7 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
         root = slope(s.alpha, n_v)
         reflected = reflectance(s, v_h)
         p = s.p_shine
+        # At an interface the lot between both ways is Fresnel's, facet by facet.
         if s.ior > 0.0:
             p = reflected[0]
         f += reflected * (lobe * n_l / (n_l * root + n_v * slope(s.alpha, n_l)))
@@ -221,18 +222,22 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
 @wp.func
 def visible_facet(v: wp.vec3, alpha: float, u: wp.vec2):
     """A facet's normal, drawn as often as it is seen from ``v``."""
+    # Heitz 2018: stretched by alpha, a GGX surface is a hemisphere.
     w = unit(wp.vec3(v[0] * alpha, v[1] * alpha, v[2]))
+    # Dupuy and Benyoub 2023: a spherical cap of directions gives the visible normals.
     z = (1.0 - u[1]) * (1.0 + w[2]) - w[2]
     r = wp.sqrt(wp.max(1.0 - z * z, 0.0))
     angle = 2.0 * wp.pi * u[0]
     x = r * wp.cos(angle) + w[0]
     y = r * wp.sin(angle) + w[1]
+    # And back. Rounding may leave Z a little below 0, where no facet faces out.
     return unit(wp.vec3(x * alpha, y * alpha, wp.max(z + w[2], 0.0)))
 
 
 @wp.func
 def around_normal(u: wp.vec2):
     """A direction, drawn in proportion to its cosine."""
+    # Malley: evenly on a disk, lifted to the hemisphere, is in proportion to the cosine.
     r = wp.sqrt(u[0])
     angle = 2.0 * wp.pi * u[1]
     return wp.vec3(r * wp.cos(angle), r * wp.sin(angle), wp.sqrt(1.0 - u[0]))
@@ -289,6 +294,7 @@ def scatter_glass(s: Bsdf, lot: float, u: wp.vec2):
         out.density = -1.0
         n_l = -out.l[2]
         if n_l > 0.0:
+            # Over the density of visible facets, all of Walter's BTDF cancels but Smith's G1 of l.
             passed = 2.0 * n_l / (n_l + slope(s.alpha, n_l))
             out.weight = wp.vec3(passed, passed, passed)
     return out

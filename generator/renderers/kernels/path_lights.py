@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import warp as wp
 
-from generator.renderers.kernels.lighting import DISK, RECTANGLE, SPOT, SUN
+from generator.renderers.kernels.colorimetry import luminance
+from generator.renderers.kernels.lighting import DISK, SPOT, SUN, is_panel
 from generator.renderers.kernels.occlusion import frame_of
-from generator.renderers.kernels.path_bsdf import luminance
 from generator.renderers.kernels.records import Lamp, Sky, World, floor_int, greater
 from generator.renderers.kernels.sky import sky_irradiance
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Farther than any scene reaches.
 AT_INFINITY = wp.constant(1.0e6)
 # Share of the mean light that no surface is taken to see less of: coefficients are blurred.
 SKY_FLOOR = wp.constant(0.1)
@@ -62,6 +63,7 @@ def spot_fade(lamp: Lamp, away: wp.vec3):
     """What is left of a spot's light in a unit direction away from it; 1 for a sphere."""
     fade = float(1.0)
     if lamp.kind == SPOT:
+        # A spot that is even to its rim has no span: it ends within a ten-thousandth.
         span = wp.max(lamp.cos_inner - lamp.cos_outer, 1.0e-4)
         t = wp.clamp((wp.dot(away, lamp.direction) - lamp.cos_outer) / span, 0.0, 1.0)
         fade = t * t * (3.0 - 2.0 * t)
@@ -71,12 +73,14 @@ def spot_fade(lamp: Lamp, away: wp.vec3):
 @wp.func
 def ball_radius(lamp: Lamp):
     """Radius of a lamp [m]; points are taken for small balls."""
+    # A solid angle of zero could not be drawn from.
     return greater(lamp.radius, 1.0e-3)
 
 
 @wp.func
 def cone_width(squared: float):
     """One minus the cosine of a cone's half angle, from its sine squared."""
+    # 1 - sqrt(1 - s) would cancel for small s; this is the same without a difference.
     return squared / (1.0 + wp.sqrt(1.0 - squared))
 
 
@@ -103,8 +107,9 @@ def lamp_weight(lamp: Lamp, p: wp.vec3, n: wp.vec3):
         inverse = 1.0 / wp.sqrt(squared)
         above = (wp.dot(n, to_lamp) + lamp.radius) * inverse
         if above > 0.0:
+            # Never near zero where there is light: what is drawn too rarely is noise.
             weight = luminance(lamp.power) * (wp.min(above, 1.0) + 0.02) * (inverse * inverse)
-            if lamp.kind >= RECTANGLE:
+            if is_panel(lamp):
                 front = -wp.dot(to_lamp, lamp.direction) * inverse
                 weight = wp.where(front > 0.0, weight * (front + 0.05), 0.0)
             else:
@@ -125,6 +130,7 @@ def sky_weight(sky: Sky, table: SkyTable, n: wp.vec3):
 @wp.func
 def in_cone(axis: wp.vec3, sine_squared: float, u: wp.vec2):
     """A direction, drawn evenly from a cone; with one minus its cosine to the axis."""
+    # Even in solid angle is even in the cosine (Shirley, Wang and Zimmerman 1996).
     low = u[0] * cone_width(sine_squared)
     x, y = frame_of(axis)
     r = wp.sqrt(wp.max(low * (2.0 - low), 0.0))
@@ -143,8 +149,10 @@ def draw_ball(lamp: Lamp, p: wp.vec3, u: wp.vec2):
     if lamp.kind != SUN:
         to_lamp = lamp.position_m - p
         squared = wp.dot(to_lamp, to_lamp)
+        # A point at the very centre of a lamp has no axis; any will do.
         axis = to_lamp * (1.0 / wp.sqrt(wp.max(squared, 1.0e-12)))
     sine = ball_sine(lamp, squared)
+    # Inside a ball it fills all directions: it is left to paths that meet it.
     if sine < 1.0:
         direction, low = in_cone(axis, sine, u)
         g.direction = direction
@@ -213,7 +221,7 @@ def meet_lamp(lamp: Lamp, p: wp.vec3, d: wp.vec3):
             g.distance_m = AT_INFINITY
             g.density = 1.0 / (2.0 * wp.pi * cone_width(sine))
             g.radiance = ball_radiance(lamp, -lamp.direction)
-    elif lamp.kind >= RECTANGLE:
+    elif is_panel(lamp):
         front = -wp.dot(d, lamp.direction)
         if front > 1.0e-6:
             t = wp.dot(p - lamp.position_m, lamp.direction) / front

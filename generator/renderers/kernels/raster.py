@@ -15,10 +15,12 @@ from generator.renderers.kernels.records import View, World
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# What is nearer is clipped; 1/z stays below 100.
 Z_NEAR_M = wp.constant(0.01)
 # Vertices farther than this from the principal point are clipped, so that snapped coordinates
 # stay below 2^24 and edge products below 2^50. Float32 still resolves 1/256 px there.
 GUARD_PX = wp.constant(32768.0)
+# No snapped coordinate is as low: they stay below 2^24.
 UNSNAPPED = wp.constant(wp.int32(-(2**31)))
 
 Polygon = wp.types.matrix(shape=(9, 3), dtype=wp.float32)
@@ -73,6 +75,7 @@ def snapped(view: View, p: wp.vec3):
     """Image coordinates of a camera-frame point in units of 1/256 px."""
     x = p[0] / p[2] * view.fx + view.cx
     y = p[1] / p[2] * view.fy + view.cy
+    # Floor, not round: halves go one way on both sides of zero.
     return wp.vec2i(int(wp.floor(x * 256.0 + 0.5)), int(wp.floor(y * 256.0 + 0.5)))
 
 
@@ -121,6 +124,7 @@ def project_vertices(
 @wp.func
 def first_centre(fixed: int):
     """First pixel whose centre is at or after a snapped coordinate."""
+    # A centre is at 256 i + 128: the shift rounds (fixed - 128) up.
     return (fixed + 127) >> 8
 
 
@@ -159,6 +163,7 @@ def edges_of(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window):
         return edges
     area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
     area -= wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
+    # Seen edge-on, or smaller than the grid: it covers no centre.
     if area == wp.int64(0):
         return edges
     x = ((edges.x_first + window.x0) << 8) + 128
@@ -181,6 +186,7 @@ def span_start(e: wp.int64, dx: wp.int64, first: int):
     start = first
     if e < wp.int64(0):
         if dx > wp.int64(0):
+            # Rounded up; the limit keeps 64 bits from overflowing the step's 32.
             start = wp.max(first, int(wp.min((dx - e - wp.int64(1)) / dx, wp.int64(1 << 30))))
         else:
             start = 1 << 30
@@ -203,6 +209,7 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
     z_low = wp.min(p0[2], wp.min(p1[2], p2[2]))
     z_high = wp.max(p0[2], wp.max(p1[2], p2[2]))
     plane.low = 1.0 / z_high
+    # Snapping moves edges by 1/512 px: depth outside the triangle is held to its corners'.
     plane.high = 1.0 / wp.max(z_low, 0.5 * Z_NEAR_M)
     n = wp.cross(p1 - p0, p2 - p0)
     d = wp.dot(n, p0)
@@ -210,6 +217,7 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
         # Seen edge-on: covered pixels are an accident of snapping, any depth in between will do.
         plane.c = plane.low
         return plane
+    # 1/z is linear in the image: n . (x, y, 1) / (n . p0) for rays (x, y, 1).
     n = n / d
     plane.dx = n[0] * view.inverse_fx
     plane.dy = n[1] * view.inverse_fy
@@ -237,6 +245,7 @@ def draw_nearest(
     for y in range(e.y_first, e.y_last + 1):
         first = int(0)
         last = count
+        # Short rows are tested pixel by pixel: that is quicker than the divisions.
         if count > 8:
             first = span_start(a, e.a.dx, span_start(b, e.b.dx, span_start(c, e.c.dx, 0)))
             last = span_end(a, e.a.dx, span_end(b, e.b.dx, span_end(c, e.c.dx, count)))
@@ -248,6 +257,7 @@ def draw_nearest(
         # While: Warp's ranges take longer than what is done in them.
         x = int(e.x_first + first)
         while x <= e.x_first + last:
+            # One sign test for three edges: the sign bit of the union is set if any is.
             if (a_here | b_here | c_here) >= wp.int64(0):
                 w = wp.clamp(row + float(x) * plane.dx, plane.low, plane.high)
                 if w > nearness[pixel]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from generator.renderers.kernels.dielectrics import WATER_F0, fresnel_schlick
 from generator.renderers.kernels.ground import (
     footprint,
     patches,
@@ -37,12 +38,11 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 # How far mirrored rays are followed.
 MIRRORED_M = wp.constant(1.0e3)
 
-# Fresnel reflectance of water at normal incidence.
-WATER_F0 = wp.constant(0.02)
 # Films smoother than this mirror like puddles.
 SHARP = wp.constant(0.02)
 # Slopes of a film on rough ground.
 FILM_SLOPE = wp.constant(0.16)
+# pi (3 - sqrt(5)): turned by it, points of a spiral cover a disk evenly (Vogel 1979).
 GOLDEN_ANGLE = wp.constant(2.39996323)
 # Points nearer to each other than this share their shelter.
 BESIDE_M = wp.constant(0.12)
@@ -86,6 +86,7 @@ def water_at(
     world: World, surface: int, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float
 ):
     """How much of a point is a mirror of water, and how rough that mirror is."""
+    # Water runs off what is steeper than 60 degrees.
     if n[2] < 0.5:
         return wp.vec2(0.0)
     porous = porosity_of(world, surface)
@@ -102,6 +103,7 @@ def mean_color(world: World, surface: int):
     color = world.surfaces[surface].base_color
     texture = world.surfaces[surface].texture
     if texture >= 0:
+        # Past the last level of any texture: its mean.
         coarsest = sampler_of(world, texture, 30.0)
         color = wp.cw_mul(color, texel_at(world, texture, coarsest, 0.5, 0.5, False).albedo)
     return color
@@ -113,6 +115,7 @@ def mirrored_sky(world: World, d: wp.vec3, width: float):
     c = sky_rest(world.sky, d)
     for j in range(world.lamps.shape[0]):
         if world.lamps[j].kind == SUN:
+            # Gaussian over the angle: 1 - cos is half its square; width and sun add in squares.
             away = wp.max(1.0 - wp.dot(d, -world.lamps[j].direction), 0.0)
             spread = 0.5 * (width * width + world.lamps[j].radius * world.lamps[j].radius)
             c += world.lamps[j].power * (wp.exp(-away / spread) / (2.0 * wp.pi * spread))
@@ -183,12 +186,12 @@ def mirrored_by(
 ):
     """What a facet of water with normal m mirrors [cd/m^2], reflected, and its reflectance."""
     d = unit(p - view.eye_m)
+    # Facets that face away would mirror from below; grazing ones stay at one degree.
     c = wp.max(-wp.dot(d, m), 0.02)
     r = d + m * (2.0 * c)
+    # What a tilted facet mirrors downwards would be the ground it lies on.
     r = unit(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
-    grazing = 1.0 - c
-    squared = grazing * grazing
-    fresnel = WATER_F0 + (1.0 - WATER_F0) * squared * squared * grazing
+    fresnel = fresnel_schlick(WATER_F0, c)
     seen = mirrored(view, world, images, radiance, origin, r, 0.02 + width) * fresnel
     return wp.vec4(seen[0], seen[1], seen[2], fresnel)
 
@@ -217,6 +220,7 @@ def mirror_in_films(
     n = lattice.normal[k]
     size_m = footprint(view, p, n, float(lattice.stride))
     wet = water_at(world, lattice.surface[k], p, n, world.ground.exposed[k], size_m)
+    # Less than a percent of a mirror is not worth its ray.
     if wet[0] < 0.01:
         return
     water[k] = wet
@@ -225,6 +229,7 @@ def mirror_in_films(
     x = k % lattice.width
     y = k / lattice.width
     place = float(((x % 8) * 24 + (y % 8) * 19) % 64) + 0.5
+    # The root spreads points evenly over the disk of slopes, as Vogel's spiral has it.
     slope = wp.max(wet[1], 0.25 * FILM_SLOPE) * wp.sqrt(place / 64.0)
     tilt = wp.vec3(wp.cos(GOLDEN_ANGLE * place), wp.sin(GOLDEN_ANGLE * place), 0.0) * slope
     seen = mirrored_by(
@@ -306,6 +311,7 @@ def around_pixel(
     for k in range(4):
         q, w = corner_of(lattice, cell, k)
         if lattice.body[q] >= 0 and wp.abs(images.z_m[lattice.pixel[q]] - z) < 0.1 * z:
+            # A pixel on a lattice point still takes a trace of its neighbours, if that point fails.
             w += 1.0e-4
             around.exposed += world.ground.exposed[q] * w
             if lattice.surface[q] == surface:

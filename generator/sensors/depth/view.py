@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.core.capture import Beams, Channel
+from generator.core.colorimetry import luminance
 from generator.core.geometry import Float32
 from generator.core.interfaces import Renderer
 from generator.core.scene import Camera, Lidar, Scene
 from generator.core.se3 import SE3
 from generator.core.streams import Rng
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-"""Of linear sRGB."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -93,9 +91,7 @@ class View:
     def luminance_cd_m2(self, right_m: float) -> Float32:
         """What the surrounding light makes of the scene, float32 [h, w]."""
         seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.RADIANCE}))
-        radiance = seen.channels[Channel.RADIANCE]
-        luminance = np.einsum("hwc,c->hw", radiance, LUMINANCE, optimize=False)
-        return np.asarray(luminance, np.float32)
+        return luminance(np.asarray(seen.channels[Channel.RADIANCE], np.float32))
 
 
 def smooth_noise(rng: Rng, shape: tuple[int, int], sigma_px: float) -> Float32:
