@@ -40,6 +40,8 @@ from randomizers.color_space import linear_of_temperature
 
 TRIES = 24
 KINDS: tuple[LightKind, ...] = ("sphere", "spot", "sun", "rectangle", "disk")
+COUNT_MAX = 64
+"""Shading time grows with every light."""
 MARGIN_M = 0.05
 """A lamp keeps this far from bodies."""
 
@@ -66,7 +68,7 @@ class Lighting(RandomizerBase):
     """
 
     type: Literal["lighting"] = "lighting"
-    count: Count = UniformInteger(1, 3)
+    count: Annotated[Count, Bounds(0, COUNT_MAX)] = UniformInteger(1, 3)
     kind: Name = Constant("sphere")
     illuminance_lux: NonNegative = LogUniform(250.0, 1200.0)
     luminous_flux_lm: NonNegative | None = Field(None)

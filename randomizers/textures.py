@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Flag, Positive, Probability, Uniform
+from generator.config.distributions import Chance, Positive, Probability, Uniform
 from generator.core.geometry import Material
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Scene
@@ -20,14 +20,14 @@ class Textures(LookRandomizer):
 
     Attributes:
         textures: Families or tags of textures: wood, marble, fabric.
-        probability: Whether a target is covered at all.
+        probability: That a target is covered; 1 = every one, 0.3 = about three in ten.
         scale_m: Length of one repeat of the texture.
         slots: Numbers of the material slots to cover; empty = all.
     """
 
     type: Literal["textures"] = "textures"
     textures: tuple[str, ...] = Field(min_length=1)
-    probability: Flag = Probability(0.5)
+    probability: Chance = Probability(1.0)
     scale_m: Positive = Uniform(0.15, 0.6)
     slots: tuple[int, ...] = ()
 

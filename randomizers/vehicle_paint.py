@@ -9,6 +9,7 @@ from pydantic import Field
 
 from generator.assets.vehicles.plates import SEEDS, with_seed
 from generator.config.distributions import (
+    Chance,
     Constant,
     Flag,
     LogUniform,
@@ -68,7 +69,7 @@ class VehiclePaint(LookRandomizer):
     Attributes:
         weights: How often a colour is drawn: white, black, grey, silver, blue, red, green, brown,
             yellow, orange.
-        probability: Whether a vehicle is painted anew at all.
+        probability: That a vehicle is painted anew; the others keep their model's paint.
         roughness: Of the clear coat: 0.1 waxed, 0.3 weathered.
         metallic: Whether the paint has flakes of metal; white never has.
         dirt: Share of dust in every colour of the vehicle.
@@ -79,7 +80,7 @@ class VehiclePaint(LookRandomizer):
 
     type: Literal["vehicle_paint"] = "vehicle_paint"
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field(ON_ROADS)
-    probability: Flag = Probability(0.85)
+    probability: Chance = Probability(0.85)
     roughness: UnitInterval = LogUniform(0.1, 0.3)
     metallic: Flag = Probability(0.6)
     dirt: UnitInterval = Uniform(0.0, 0.25)

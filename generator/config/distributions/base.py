@@ -86,6 +86,7 @@ class Kind(Generic[T]):
         read_key: The same for a key of a mapping, which is always text.
         schema: JSON Schema of a constant.
         example: A constant, as plain data.
+        of_number: Name of the distribution that a plain number stands for, if it is no constant.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Kind(Generic[T]):
     read_key: Callable[[str], T]
     schema: Mapping[str, Any]
     example: Any
+    of_number: str = ""
 
 
 class Distribution(ABC, Generic[T_co]):
@@ -162,6 +164,8 @@ def read(value: Any, kind: Kind[T]) -> Distribution[T]:
             return distribution(value).from_yaml(None, kind)
         if did_you_mean(value, known):
             raise _unknown(value, kind)
+    if kind.of_number and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return distribution(kind.of_number).from_yaml(value, kind)
     return distribution("constant").from_yaml(value, kind)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic_core import PydanticCustomError, core_schema
@@ -200,14 +200,17 @@ def _read_name(value: Any) -> str:
     return value
 
 
-def _read_flag(value: Any) -> bool:
+def _read_flag(value: Any, expected: str = "true, false or {probability: p}") -> bool:
     if not isinstance(value, bool):
         hint = {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(str(value).lower())
         raise Malformed(
-            f"expected true, false or {{probability: p}}, got {shown(value)}"
-            f"{f' (did you mean {hint}?)' if hint else ''}"
+            f"expected {expected}, got {shown(value)}{f' (did you mean {hint}?)' if hint else ''}"
         )
     return value
+
+
+def _read_chance(value: Any) -> bool:
+    return _read_flag(value, CHANCE.expected)
 
 
 def _as_key(kind_read: Any) -> Any:
@@ -240,6 +243,14 @@ WHOLE_NUMBER = Kind(
 )
 NAME = Kind("name", "a name", _read_name, _read_name, {"type": "string"}, "example")
 FLAG = Kind("flag", "true or false", _read_flag, _as_key(_read_flag), {"type": "boolean"}, True)
+CHANCE = replace(
+    FLAG,
+    expected="a probability in [0, 1], true or false",
+    read=_read_chance,
+    schema={"anyOf": [{"type": "number", "minimum": 0, "maximum": 1}, FLAG.schema]},
+    example=0.5,
+    of_number="probability",
+)
 ROTATION = Kind(
     "rotation",
     "a rotation [w, x, y, z]",
@@ -259,6 +270,8 @@ Name = Annotated[Distribution[str], FieldOf(NAME)]
 """A name, or a distribution over names."""
 Flag = Annotated[Numeric[bool], FieldOf(FLAG)]
 """True, false, or a distribution over both."""
+Chance = Annotated[Numeric[bool], FieldOf(CHANCE)]
+"""A Flag whose plain number is the probability of true."""
 Rotation = Annotated[Distribution[Quaternion], FieldOf(ROTATION)]
 """A unit quaternion (scalar first), or a distribution over rotations."""
 Direction = Annotated[Distribution[Vec3], FieldOf(DIRECTION)]
