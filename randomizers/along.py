@@ -83,6 +83,10 @@ class Along(RandomizerBase):
     junctions: bool = False
     scattered: bool = False
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raises ConfigError if there is no such group, or it lacks a category of the weights."""
+        self._find_group(scene, assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with the group's members exchanged.
 
@@ -90,9 +94,8 @@ class Along(RandomizerBase):
             ConfigError: things and gaps are so short that a lane has room for too many.
             LayoutRejected: there is no room for the things to be scattered, or too little.
         """
-        group = find_group(scene, self.group or self.name, f"randomizers.{self.name}.group")
+        group, wheel = self._find_group(scene, assets)
         scene = remove_members(scene, group.name)
-        wheel = make_wheel(group, assets, self.weights, f"randomizers.{self.name}.weights")
         lines = self._select_lanes(scene, group)
         roads = {lane.road for lane in scene.lanes}
         ground = ground_of(
@@ -110,6 +113,12 @@ class Along(RandomizerBase):
             wanted = self.count.draw(rng)
             members = [members[k] for k in sorted(rng.permutation(len(members))[:wanted].tolist())]
         return add_members(scene, group, members, assets)
+
+    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, Wheel]:
+        """The group, and the weighted categories of its assets."""
+        field = f"randomizers.{self.name}"
+        group = find_group(scene, self.group or self.name, f"{field}.group")
+        return group, make_wheel(group, assets, self.weights, f"{field}.weights")
 
     def _select_lanes(self, scene: Scene, group: ObjectGroup) -> list[LaneLine]:
         """The lanes of the kinds and roads that are wanted."""

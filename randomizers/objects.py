@@ -17,10 +17,10 @@ from generator.config.distributions import (
 )
 from generator.core.interfaces import AssetIndex
 from generator.core.members import Member, add_members, remove_members
-from generator.core.scene import Scene
+from generator.core.scene import ObjectGroup, Scene
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
-from randomizers.groups import draw_asset, find_group, make_wheel
+from randomizers.groups import Wheel, draw_asset, find_group, make_wheel
 from randomizers.placing import Item, floors_of, half_extents_m, layout
 
 COUNT_MAX = 500
@@ -49,12 +49,15 @@ class Objects(RandomizerBase):
     upright: Flag = Probability(0.6)
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field({})
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raises ConfigError if there is no such group, or it lacks a category of the weights."""
+        self._find_group(scene, assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with the group's objects exchanged."""
-        group = find_group(scene, self.group or self.name, f"randomizers.{self.name}.group")
+        group, wheel = self._find_group(scene, assets)
         scene = remove_members(scene, group.name)
         count = self.count.draw(rng)
-        wheel = make_wheel(group, assets, self.weights, f"randomizers.{self.name}.weights")
         chosen = [assets.get(draw_asset(wheel, rng)) for _ in range(count)]
         scales = [round(self.scale.draw(rng), 4) for _ in range(count)]
         upright = [self.upright.draw(rng) for _ in range(count)]
@@ -74,3 +77,9 @@ class Objects(RandomizerBase):
             for asset, scale, pose in zip(chosen, scales, poses, strict=True)
         ]
         return add_members(scene, group, members, assets)
+
+    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, Wheel]:
+        """The group, and the weighted categories of its assets."""
+        field = f"randomizers.{self.name}"
+        group = find_group(scene, self.group or self.name, f"{field}.group")
+        return group, make_wheel(group, assets, self.weights, f"{field}.weights")

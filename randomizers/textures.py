@@ -31,9 +31,14 @@ class Textures(LookRandomizer):
     scale_m: Positive = Uniform(0.15, 0.6)
     slots: tuple[int, ...] = ()
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raises ConfigError if there is no texture of a name."""
+        del scene
+        self._options(assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """One texture per body."""
-        options = textures_named(assets, self.textures, f"randomizers.{self.name}.textures")
+        options = self._options(assets)
         covered = []
         for body in self.chosen(scene):
             if not self.probability.draw(rng):
@@ -57,3 +62,7 @@ class Textures(LookRandomizer):
                 changed = replace(changed, materials=mixed)
             covered.append(changed)
         return scene.with_bodies(*covered)
+
+    def _options(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the textures it draws from."""
+        return textures_named(assets, self.textures, f"randomizers.{self.name}.textures")
