@@ -58,7 +58,7 @@ class Materials(LookRandomizer):
         for body in self.chosen(scene):
             if not self.probability.draw(rng):
                 continue
-            changes = self._drawn(rng)
+            changes = self._draw_changes(rng)
 
             def finish(material: Material, changes: dict[str, Any] = changes) -> Material:
                 return replace(material, **changes)
@@ -66,7 +66,7 @@ class Materials(LookRandomizer):
             finished.append(with_materials(body, assets, finish))
         return scene.with_bodies(*finished)
 
-    def _drawn(self, rng: Rng) -> dict[str, Any]:
+    def _draw_changes(self, rng: Rng) -> dict[str, Any]:
         """The fields of a material that change. What is not asked for draws nothing."""
         changes: dict[str, Any] = {
             "roughness": round(self.roughness.draw(rng), 4),

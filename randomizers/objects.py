@@ -21,7 +21,7 @@ from generator.core.scene import ObjectGroup, Scene
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
 from randomizers.groups import Wheel, draw_asset, find_group, make_wheel
-from randomizers.placing import Item, floors_of, half_extents_m, layout
+from randomizers.placing import Item, find_floors, half_extents_m, layout
 
 COUNT_MAX = 500
 """As many as the template's ``objects`` element may have."""
@@ -65,7 +65,7 @@ class Objects(RandomizerBase):
             Item(half_extents_m(*assets.bounds_m(asset.asset_id), scale), asset.stackable)
             for asset, scale in zip(chosen, scales, strict=True)
         ]
-        poses = layout(group, items, floors_of(scene, group, assets), rng, upright)
+        poses = layout(group, items, find_floors(scene, group, assets), rng, upright)
         members = [
             Member(
                 asset.asset_id,
