@@ -34,6 +34,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,7 +42,7 @@ from exporters.clouds import write_cloud
 from exporters.png import RowFilter, encode_png
 from exporters.tables import write_table
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError, SampleError
+from generator.core.errors import ConfigError, SampleError, StorageError
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.sample import Sample
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -15,31 +14,28 @@ from generator.config.distributions import (
     Count,
     Flag,
     NonNegative,
-    Positive,
     Scalar,
     Uniform,
 )
-from generator.core.errors import LayoutRejected, Rejection
+from generator.core.errors import ConfigError, LayoutRejected, Rejection
 from generator.core.interfaces import AssetIndex
 from generator.core.lanes import LaneLine, standing_on_lane
-from generator.core.scene import Body, Instance, LaneKind, ObjectGroup, Scene
+from generator.core.members import Member, add_members, remove_members
+from generator.core.scene import LaneKind, ObjectGroup, Scene
 from generator.core.se3 import SE3, Vec3
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
 from randomizers.footprints import Footprint, Ground, ground_of
-from randomizers.groups import Wheel, drawn_asset, free_ids, group_named, wheel_of, without_members
+from randomizers.groups import Wheel, draw_asset, find_group, make_wheel
 
+COUNT_MAX = 2000
+"""As many as the template's ``along`` element may have."""
+PER_LANE_MAX = 20_000
+"""Places in one row of a lane: a parked car every 50 cm for 10 km."""
+SCALE = Bounds(0.001, 1000.0)
+"""Factors that leave things an extent: scales are rounded to four decimals."""
 SCATTER_TRIES = 20
 """Free places are tried this often for each thing that is scattered."""
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Something that has found its place."""
-
-    asset: str
-    scale: float
-    T_world_body: SE3
 
 
 class Along(RandomizerBase):
@@ -76,42 +72,39 @@ class Along(RandomizerBase):
     gap_m: NonNegative = Uniform(3.0, 30.0)
     passes: int = Field(1, ge=1, le=8)
     occupancy: Flag = Constant(True)
-    count: Count | None = None
-    min_count: int = Field(0, ge=0)
+    count: Annotated[Count, Bounds(0, COUNT_MAX)] | None = None
+    min_count: int = Field(0, ge=0, le=COUNT_MAX)
     lateral: Annotated[Scalar, Bounds(-1, 1)] = Constant(0.0)
     yaw_deg: Scalar = Constant(0.0)
     reversed: Flag = Constant(False)
-    scale: Positive = Constant(1.0)
+    scale: Annotated[Scalar, SCALE] = Constant(1.0)
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field({})
     min_clearance_m: float = Field(0.15, ge=0)
     junctions: bool = False
     uniform_area: bool = False
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raises ConfigError if there is no such group, or it lacks a category of the weights."""
+        self._find_group(scene, assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with the group's members exchanged.
 
         Raises:
-            LayoutRejected: there is no room for what is to be scattered, or too little.
+            ConfigError: things and gaps are so short that a lane has room for too many.
+            LayoutRejected: there is no room for the things to be scattered, or too little.
         """
-        group = group_named(scene, self.group or self.name, f"randomizers.{self.name}.group")
-        scene = without_members(scene, group.name)
-        wheel = wheel_of(group, assets, self.weights, f"randomizers.{self.name}.weights")
-        kinds = self.lanes or group.lanes
-        lines = [
-            LaneLine(lane)
-            for lane in scene.lanes
-            if lane.kind in kinds
-            and (self.junctions or not lane.junction)
-            and (not self.roads or lane.road in self.roads)
-        ]
+        group, wheel = self._find_group(scene, assets)
+        scene = remove_members(scene, group.name)
+        lines = self._select_lanes(scene, group)
         roads = {lane.road for lane in scene.lanes}
         ground = ground_of(
             (b for b in scene.bodies if b.instance_id and b.name.partition("/")[0] not in roads),
             assets,
         )
-        walk = self._strewn if self.uniform_area else self._walked
-        places = list(walk(lines, group, wheel, ground, assets, rng))
-        if len(places) < self.min_count:
+        fill = self._scatter if self.uniform_area else self._fill_rows
+        members = list(fill(lines, group, wheel, ground, assets, rng))
+        if len(members) < self.min_count:
             remedy = (
                 "a smaller min_count, gap_m or min_clearance_m, or longer roads "
                 f"(randomizers.{self.name})"
@@ -119,10 +112,27 @@ class Along(RandomizerBase):
             raise LayoutRejected(Rejection("too few free places along lanes", remedy))
         if self.count is not None:
             wanted = self.count.draw(rng)
-            places = [places[k] for k in sorted(rng.permutation(len(places))[:wanted].tolist())]
-        return _with_members(scene, group, places, assets)
+            members = [members[k] for k in sorted(rng.permutation(len(members))[:wanted].tolist())]
+        return add_members(scene, group, members, assets)
 
-    def _walked(
+    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, Wheel]:
+        """The group, and the weighted categories of its assets."""
+        field = f"randomizers.{self.name}"
+        group = find_group(scene, self.group or self.name, f"{field}.group")
+        return group, make_wheel(group, assets, self.weights, f"{field}.weights")
+
+    def _select_lanes(self, scene: Scene, group: ObjectGroup) -> list[LaneLine]:
+        """The lanes of the kinds and roads that are wanted."""
+        kinds = self.lanes or group.lanes
+        return [
+            LaneLine(lane)
+            for lane in scene.lanes
+            if lane.kind in kinds
+            and (self.junctions or not lane.junction)
+            and (not self.roads or lane.road in self.roads)
+        ]
+
+    def _fill_rows(
         self,
         lines: list[LaneLine],
         group: ObjectGroup,
@@ -130,12 +140,12 @@ class Along(RandomizerBase):
         ground: Ground,
         assets: AssetIndex,
         rng: Rng,
-    ) -> Iterator[Place]:
+    ) -> Iterator[Member]:
         """Things and gaps in turn along every lane, once per pass."""
         for line in lines * self.passes:
             at_m = float(rng.uniform()) * self.gap_m.draw(rng)
-            while True:
-                asset, scale, bounds_m = self._thing(wheel, assets, rng)
+            for _ in range(PER_LANE_MAX):
+                asset, scale, bounds_m = self._draw_thing(wheel, assets, rng)
                 length_m, width_m = _extent_m(bounds_m, group.facing)
                 room_m = max(0.0, 0.5 * (line.lane.width_m - width_m))
                 left_m = room_m * self.lateral.draw(rng)
@@ -148,13 +158,17 @@ class Along(RandomizerBase):
                     place = line.pose(at_m + 0.5 * length_m, left_m)
                     pose = standing_on_lane(place, line.lane, bounds_m, group.facing, turn)
                     pose = pose.rounded()
-                    footprint = Footprint.of(pose, bounds_m)
-                    if ground.is_free(footprint.grown(self.min_clearance_m)):
-                        ground.add(footprint)
-                        yield Place(asset, scale, pose)
+                    if self._occupy(ground, pose, bounds_m):
+                        yield Member(asset, pose, scale, collides=False)
                 at_m += length_m + self.gap_m.draw(rng)
+            else:
+                raise ConfigError(
+                    f"randomizers.{self.name}.gap_m: things and gaps are so short that a lane of "
+                    f"{line.length_m:.1f} m has more than {PER_LANE_MAX:,} places; expected a "
+                    "larger gap_m or scale"
+                )
 
-    def _strewn(
+    def _scatter(
         self,
         lines: list[LaneLine],
         group: ObjectGroup,
@@ -162,7 +176,7 @@ class Along(RandomizerBase):
         ground: Ground,
         assets: AssetIndex,
         rng: Rng,
-    ) -> Iterator[Place]:
+    ) -> Iterator[Member]:
         """Things anywhere over the lanes' area."""
         del group
         points = [point for line in lines for point in line.lane.center_m]
@@ -170,24 +184,30 @@ class Along(RandomizerBase):
         high = [max(point[k] for point in points) for k in range(3)]
         for _ in range(self.count.draw(rng) if self.count is not None else 10):
             for _ in range(SCATTER_TRIES):
-                asset, scale, bounds_m = self._thing(wheel, assets, rng)
+                asset, scale, bounds_m = self._draw_thing(wheel, assets, rng)
                 x, y = (float(rng.uniform(low[k], high[k])) for k in range(2))
-                turned = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
-                pose = (turned @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
-                footprint = Footprint.of(pose, bounds_m)
-                if ground.is_free(footprint.grown(self.min_clearance_m)):
-                    ground.add(footprint)
-                    yield Place(asset, scale, pose)
+                stand = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
+                pose = (stand @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
+                if self._occupy(ground, pose, bounds_m):
+                    yield Member(asset, pose, scale, collides=False)
                     break
             else:
                 remedy = f"a smaller count or min_clearance_m (randomizers.{self.name})"
                 raise LayoutRejected(Rejection("no room left between the lanes' things", remedy))
 
-    def _thing(
+    def _occupy(self, ground: Ground, pose: SE3, bounds_m: tuple[Vec3, Vec3]) -> bool:
+        """Take the ground under a thing if it is free; whether it was."""
+        footprint = Footprint.of(pose, bounds_m)
+        if not ground.is_free(footprint.grown(self.min_clearance_m)):
+            return False
+        ground.add(footprint)
+        return True
+
+    def _draw_thing(
         self, wheel: Wheel, assets: AssetIndex, rng: Rng
     ) -> tuple[str, float, tuple[Vec3, Vec3]]:
         """An asset, its scale, and its bounds."""
-        asset = drawn_asset(wheel, rng)
+        asset = draw_asset(wheel, rng)
         scale = round(self.scale.draw(rng), 4)
         (x0, y0, z0), (x1, y1, z1) = assets.bounds_m(asset)
         return asset, scale, (
@@ -200,31 +220,3 @@ def _extent_m(bounds_m: tuple[Vec3, Vec3], facing: str) -> tuple[float, float]:
     """Extent along and across the lane."""
     x, y = bounds_m[1][0] - bounds_m[0][0], bounds_m[1][1] - bounds_m[0][1]
     return (x, y) if facing == "along" else (y, x)
-
-
-def _with_members(
-    scene: Scene, group: ObjectGroup, places: list[Place], assets: AssetIndex
-) -> Scene:
-    ids = free_ids(scene, len(places))
-    bodies, instances = [], []
-    for k, (place, instance_id) in enumerate(zip(places, ids, strict=True)):
-        name = f"{group.name}/{k}"
-        category = assets.get(place.asset).category
-        body = Body(
-            name,
-            place.asset,
-            place.T_world_body,
-            place.scale,
-            instance_id=instance_id,
-            group=group.name,
-            collides=False,
-        )
-        bodies.append(body)
-        instances.append(
-            Instance(instance_id, name, category, 0, place.asset, annotated=group.annotated)
-        )
-    return replace(
-        scene,
-        bodies=(*scene.bodies, *bodies),
-        instances=(*scene.instances, *instances),
-    )

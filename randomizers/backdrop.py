@@ -41,15 +41,28 @@ class Backdrop(RandomizerBase):
     saturation: UnitInterval = Uniform(0.0, 0.35)
     value: UnitInterval = Uniform(0.55, 0.95)
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raises ConfigError if there is no texture of a name."""
+        del scene
+        self._options(assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Every background body redecorated."""
-        field = f"randomizers.{self.name}"
-        floors = textures_named(assets, self.floor, f"{field}.floor")
-        walls = textures_named(assets, self.walls, f"{field}.walls")
+        floors, walls = self._options(assets)
         background = [b for b in scene.bodies if b.instance_id == 0]
-        return scene.with_bodies(*(self._redone(b, assets, floors, walls, rng) for b in background))
+        return scene.with_bodies(
+            *(self._redecorate(b, assets, floors, walls, rng) for b in background)
+        )
 
-    def _redone(
+    def _options(self, assets: AssetIndex) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Ids of the textures of floors and of walls."""
+        field = f"randomizers.{self.name}"
+        return (
+            textures_named(assets, self.floor, f"{field}.floor"),
+            textures_named(assets, self.walls, f"{field}.walls"),
+        )
+
+    def _redecorate(
         self,
         body: Body,
         assets: AssetIndex,

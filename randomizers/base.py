@@ -41,6 +41,14 @@ class RandomizerBase(Strict):
         del assets
         return ()
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Compare the names in its fields with a nominal scene and the library, before a run.
+
+        Raises:
+            ConfigError: a name stands for nothing; the text begins with
+                ``randomizers.<name>.<field>: ``.
+        """
+
     @abstractmethod
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """A new scene; the given one stays as it is."""

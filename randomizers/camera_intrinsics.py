@@ -86,14 +86,14 @@ class CameraIntrinsics(RandomizerBase):
                 hfov_rad = math.radians(hfov_deg)
                 drawn = Intrinsics.from_hfov(before.width_px, before.height_px, hfov_rad, lens)
         except ValueError as error:
-            raise self._rejected() from error
+            raise self._rejection() from error
         drawn = replace(
             drawn,
             cx_px=round(drawn.cx_px + offset_x, 4),
             cy_px=round(drawn.cy_px + offset_y, 4),
         )
         if drawn.folds_over():
-            raise self._rejected()
+            raise self._rejection()
         return replace(camera, intrinsics=drawn)
 
     def _lens(self, before: Lens, rng: Rng) -> Lens:
@@ -121,7 +121,7 @@ class CameraIntrinsics(RandomizerBase):
                 f"pinhole of camera '{camera.name}'; expected at most {PINHOLE_MAX_DEG:g}"
             )
 
-    def _rejected(self) -> LayoutRejected:
+    def _rejection(self) -> LayoutRejected:
         return LayoutRejected(
             Rejection(
                 "the lens that was drawn folds over inside the image",

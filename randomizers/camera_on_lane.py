@@ -92,7 +92,7 @@ class CameraOnLane(RandomizerBase):
         for _ in range(TRIES):
             pose = self._drawn(lines, ground, scene, assets, rng)
             if pose is not None:
-                cameras = tuple(c if c.rig else _moved(c, pose[1]) for c in scene.cameras)
+                cameras = tuple(c if c.rig else _move_camera(c, pose[1]) for c in scene.cameras)
                 lit = replace(scene, cameras=cameras)
                 return self._with_beams(lit, pose[0], self.beam_cd.draw(rng))
         remedy = f"other lanes, a smaller free_m, or less traffic (randomizers.{self.name})"
@@ -103,7 +103,7 @@ class CameraOnLane(RandomizerBase):
     ) -> tuple[SE3, SE3] | None:
         """``T_world_rig`` on the ground and ``T_world_camera``; None where something stands."""
         weights = [line.length_m for line in lines]
-        line = lines[_weighted(weights, float(rng.uniform()))]
+        line = lines[_pick_by_weight(weights, float(rng.uniform()))]
         turned = self.reversed.draw(rng)
         ahead_m = min(self.ahead_m, 0.5 * line.length_m)
         low, high = (ahead_m, line.length_m) if turned else (0.0, line.length_m - ahead_m)
@@ -141,7 +141,7 @@ class CameraOnLane(RandomizerBase):
         return replace(scene, lights=(*scene.lights, *beams))
 
 
-def _weighted(weights: list[float], draw: float) -> int:
+def _pick_by_weight(weights: list[float], draw: float) -> int:
     """Index of one of several, in proportion to its weight."""
     left = draw * sum(weights)
     for k, weight in enumerate(weights):
@@ -151,5 +151,5 @@ def _weighted(weights: list[float], draw: float) -> int:
     return len(weights) - 1
 
 
-def _moved(camera: Camera, T_world_camera: SE3) -> Camera:
+def _move_camera(camera: Camera, T_world_camera: SE3) -> Camera:
     return replace(camera, T_world_camera=T_world_camera.rounded())

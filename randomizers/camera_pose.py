@@ -52,14 +52,14 @@ class CameraPose(RandomizerBase):
                 f"expected one of {', '.join(known) or 'none'}{did_you_mean(self.camera, known)}"
             )
         cameras = tuple(
-            self._moved(camera, scene, assets, rng)
+            self._move_camera(camera, scene, assets, rng)
             if camera.name in known and self.camera in ("", camera.name)
             else camera
             for camera in scene.cameras
         )
         return replace(scene, cameras=cameras)
 
-    def _moved(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
+    def _move_camera(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
         x, y, z = scene.focus.center_m
         for _ in range(TRIES):
             distance_m = self.distance_m.draw(rng)

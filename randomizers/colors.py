@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from generator.config.distributions import Flag, Probability, Uniform, UnitInterval
+from generator.config.distributions import Chance, Probability, Uniform, UnitInterval
 from generator.core.geometry import Material
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Scene
@@ -18,12 +18,12 @@ class Colors(LookRandomizer):
     """Paints objects in a drawn colour; what is printed stays as it is.
 
     Attributes:
-        probability: Whether an object is painted at all.
+        probability: That an object is painted; 1 = every one, 0.3 = about three in ten.
         hue, saturation, value: Of the paint, as painters count them (HSV in sRGB).
     """
 
     type: Literal["colors"] = "colors"
-    probability: Flag = Probability(0.5)
+    probability: Chance = Probability(1.0)
     hue: UnitInterval = Uniform(0.0, 1.0)
     saturation: UnitInterval = Uniform(0.1, 0.9)
     value: UnitInterval = Uniform(0.25, 0.95)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from generator.config.distributions import Count, UniformInteger
-from randomizers.objects import Objects
+from generator.config.distributions import Bounds, Count, UniformInteger
+from randomizers.objects import COUNT_MAX, Objects
 
 
 class Distractors(Objects):
@@ -20,4 +20,4 @@ class Distractors(Objects):
 
     type: Literal["distractors"] = "distractors"  # type: ignore[assignment]
     name: str = "distractors"
-    count: Count = UniformInteger(0, 4)
+    count: Annotated[Count, Bounds(0, COUNT_MAX)] = UniformInteger(0, 4)

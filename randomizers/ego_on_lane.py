@@ -55,7 +55,7 @@ class EgoOnLane(RandomizerBase):
             ConfigError: there is no such vehicle or lane, or the route is none.
             LayoutRejected: no free place was found.
         """
-        body = ego_of(scene, self.ego, f"randomizers.{self.name}.ego")
+        body = find_ego(scene, self.ego, f"randomizers.{self.name}.ego")
         lines = self._lines(scene)
         axles = axles_of(assets, body.asset, body.scale)
         roads = {lane.road for lane in scene.lanes}
@@ -78,7 +78,7 @@ class EgoOnLane(RandomizerBase):
             pose = (line.pose(at_m, left_m) @ axles.T_body_rear.inverse()).rounded()
             footprint = Footprint.of(pose, assets.bounds_m(body.asset), body.scale)
             if ground.is_free(footprint.grown(self.min_clearance_m)):
-                return scene.with_bodies(_moved(body, pose))
+                return scene.with_bodies(_move_body(body, pose))
         remedy = f"other roads, a smaller ahead_m or min_clearance_m (randomizers.{self.name})"
         raise LayoutRejected(Rejection("no free place for the ego vehicle", remedy))
 
@@ -102,7 +102,7 @@ class EgoOnLane(RandomizerBase):
         return lines
 
 
-def ego_of(scene: Scene, name: str, field: str) -> Body:
+def find_ego(scene: Scene, name: str, field: str) -> Body:
     """The body of an ego vehicle.
 
     Raises:
@@ -117,5 +117,5 @@ def ego_of(scene: Scene, name: str, field: str) -> Body:
     return scene.body(scene.rig(name).body)
 
 
-def _moved(body: Body, pose: SE3) -> Body:
+def _move_body(body: Body, pose: SE3) -> Body:
     return replace(body, T_world_body=pose)

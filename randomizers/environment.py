@@ -36,6 +36,11 @@ class EnvironmentLight(RandomizerBase):
         """The images it draws from."""
         return self._options(assets)
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raises ConfigError if there is no environment of these names."""
+        del scene
+        self._options(assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene in another light."""
         environment = Environment(

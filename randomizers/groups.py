@@ -1,9 +1,8 @@
-"""Groups of a template: which assets they draw, and how their members are exchanged."""
+"""Object groups of a template, and the assets that randomizers draw for them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from generator.core.errors import ConfigError, did_you_mean
 from generator.core.interfaces import AssetIndex
@@ -15,7 +14,7 @@ Wheel = tuple[tuple[float, tuple[str, ...]], ...]
 """Weight and assets of every category that may be drawn."""
 
 
-def group_named(scene: Scene, name: str, field: str) -> ObjectGroup:
+def find_group(scene: Scene, name: str, field: str) -> ObjectGroup:
     """The object group of that name. Raises ConfigError if there is none."""
     for group in scene.groups:
         if group.name == name:
@@ -27,10 +26,10 @@ def group_named(scene: Scene, name: str, field: str) -> ObjectGroup:
     )
 
 
-def wheel_of(
+def make_wheel(
     group: ObjectGroup, assets: AssetIndex, weights: Mapping[str, float], field: str
 ) -> Wheel:
-    """What a group draws from: first a category, then one of its assets.
+    """The weighted categories of a group, and the assets of each.
 
     Args:
         group: Whose assets.
@@ -57,7 +56,7 @@ def wheel_of(
     return kept
 
 
-def drawn_asset(wheel: Wheel, rng: Rng) -> str:
+def draw_asset(wheel: Wheel, rng: Rng) -> str:
     """An asset of a category that is drawn in proportion to its weight."""
     draw = float(rng.uniform()) * sum(weight for weight, _ in wheel)
     for weight, ids in wheel:
@@ -65,19 +64,3 @@ def drawn_asset(wheel: Wheel, rng: Rng) -> str:
         if draw < 0.0:
             return pick(ids, rng)
     return pick(wheel[-1][1], rng)
-
-
-def without_members(scene: Scene, group: str) -> Scene:
-    """The scene without the members of a group."""
-    gone = {body.instance_id for body in scene.bodies if body.group == group}
-    return replace(
-        scene,
-        bodies=tuple(body for body in scene.bodies if body.group != group),
-        instances=tuple(i for i in scene.instances if i.instance_id not in gone),
-    )
-
-
-def free_ids(scene: Scene, count: int) -> list[int]:
-    """The smallest instance ids that nothing has."""
-    taken = {instance.instance_id for instance in scene.instances}
-    return [k for k in range(1, len(taken) + count + 1) if k not in taken][:count]

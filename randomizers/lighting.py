@@ -38,6 +38,8 @@ from randomizers.clearance import is_in_the_open, is_inside
 from randomizers.color_space import linear_of_temperature
 
 TRIES = 24
+COUNT_MAX = 64
+"""Shading time grows with every light."""
 MARGIN_M = 0.05
 """A lamp keeps this far from bodies."""
 
@@ -64,7 +66,7 @@ class Lighting(RandomizerBase):
     """
 
     type: Literal["lighting"] = "lighting"
-    count: Count = UniformInteger(1, 3)
+    count: Annotated[Count, Bounds(0, COUNT_MAX)] = UniformInteger(1, 3)
     kind: Name = Constant("sphere")
     illuminance_lux: NonNegative = LogUniform(250.0, 1200.0)
     luminous_flux_lm: NonNegative | None = Field(None)
@@ -114,18 +116,18 @@ class Lighting(RandomizerBase):
             up = self._direction(rng)
             return replace(
                 light,
-                direction=_rounded((-up[0], -up[1], -up[2])),
+                direction=_round_vector((-up[0], -up[1], -up[2])),
                 illuminance_lux=round(strength, 4),
                 angular_radius_rad=round(math.radians(self.angular_radius_deg.draw(rng)), 6),
             )
-        light, reach_m = self._sized(light, rng)
+        light, reach_m = self._draw_size(light, rng)
         position = self._position(scene, assets, rng, reach_m + MARGIN_M)
-        light = _aimed(light, position, scene.focus.center_m)
+        light = _aim(light, position, scene.focus.center_m)
         if light.kind not in PANEL_KINDS:
             light = replace(light, cone_rad=round(math.radians(self.cone_deg.draw(rng)), 6))
-        return self._bright(light, strength, math.dist(position, scene.focus.center_m))
+        return self._set_intensity(light, strength, math.dist(position, scene.focus.center_m))
 
-    def _sized(self, light: Light, rng: Rng) -> tuple[Light, float]:
+    def _draw_size(self, light: Light, rng: Rng) -> tuple[Light, float]:
         """The light with its size, and how far it reaches from its centre."""
         if light.kind != "rectangle":
             radius_m = round(self.radius_m.draw(rng), 4)
@@ -149,7 +151,7 @@ class Lighting(RandomizerBase):
             )
         return kind
 
-    def _bright(self, light: Light, strength: float, distance_m: float) -> Light:
+    def _set_intensity(self, light: Light, strength: float, distance_m: float) -> Light:
         """The light with its share of what all give at the focus, or send out."""
         if self.luminous_flux_lm is None:
             intensity_cd = intensity_of_illuminance(light, strength, distance_m)
@@ -170,7 +172,7 @@ class Lighting(RandomizerBase):
             distance_m = self.distance_m.draw(rng)
             for shortened in (1.0, 0.85, 0.7, 0.55):
                 d = shortened * distance_m
-                position = _rounded((x + d * dx, y + d * dy, z + d * dz))
+                position = _round_vector((x + d * dx, y + d * dy, z + d * dz))
                 if is_inside(position, *scene.interior_m):
                     if is_in_the_open(position, scene, assets, margin_m):
                         return position
@@ -183,14 +185,14 @@ class Lighting(RandomizerBase):
         )
 
 
-def _aimed(light: Light, position_m: Vec3, target_m: Vec3) -> Light:
+def _aim(light: Light, position_m: Vec3, target_m: Vec3) -> Light:
     """The light at a place, turned to another; rectangles stand level."""
     away = [p - t for p, t in zip(position_m, target_m, strict=True)]
     distance_m = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
-    direction = _rounded((-away[0] / distance_m, -away[1] / distance_m, -away[2] / distance_m))
+    direction = _round_vector((-away[0] / distance_m, -away[1] / distance_m, -away[2] / distance_m))
     side = level_side(direction) if light.kind == "rectangle" else light.side
     return replace(light, position_m=position_m, direction=direction, side=side)
 
 
-def _rounded(vector: Vec3) -> Vec3:
+def _round_vector(vector: Vec3) -> Vec3:
     return (round(vector[0], 6), round(vector[1], 6), round(vector[2], 6))

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from generator.config.distributions import (
     Bounds,
+    Chance,
     Constant,
     Flag,
     Probability,
@@ -25,7 +26,7 @@ class Materials(LookRandomizer):
     """Draws roughness, metallic and specular of objects, and makes some coated or clear.
 
     Attributes:
-        probability: Whether an object is changed at all.
+        probability: That an object is changed; 1 = every one, 0.3 = about three in ten.
         roughness: 0 is a mirror, 1 is chalk.
         metallic: Whether the object is of metal.
         specular: Reflectance of what is no metal; 0.5 is 4 % at normal incidence.
@@ -39,7 +40,7 @@ class Materials(LookRandomizer):
     """
 
     type: Literal["materials"] = "materials"
-    probability: Flag = Probability(0.6)
+    probability: Chance = Probability(1.0)
     roughness: UnitInterval = Uniform(0.15, 0.9)
     metallic: Flag = Probability(0.1)
     specular: UnitInterval = Uniform(0.3, 0.7)
@@ -57,7 +58,7 @@ class Materials(LookRandomizer):
         for body in self.chosen(scene):
             if not self.probability.draw(rng):
                 continue
-            changes = self._drawn(rng)
+            changes = self._draw_changes(rng)
 
             def finish(material: Material, changes: dict[str, Any] = changes) -> Material:
                 return replace(material, **changes)
@@ -65,7 +66,7 @@ class Materials(LookRandomizer):
             finished.append(with_materials(body, assets, finish))
         return scene.with_bodies(*finished)
 
-    def _drawn(self, rng: Rng) -> dict[str, Any]:
+    def _draw_changes(self, rng: Rng) -> dict[str, Any]:
         """The fields of a material that change. What is not asked for draws nothing."""
         changes: dict[str, Any] = {
             "roughness": round(self.roughness.draw(rng), 4),

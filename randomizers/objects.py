@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Constant, Count, Flag, Positive, Probability
-from generator.config.distributions import UniformInteger as Whole
+from generator.config.distributions import (
+    Bounds,
+    Constant,
+    Count,
+    Flag,
+    Probability,
+    Scalar,
+    UniformInteger,
+)
 from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Instance, Scene
+from generator.core.members import Member, add_members, remove_members
+from generator.core.scene import ObjectGroup, Scene
 from generator.core.streams import Rng
 from randomizers.base import RandomizerBase
-from randomizers.groups import drawn_asset, free_ids, group_named, wheel_of, without_members
-from randomizers.placing import Item, floors_of, half_extents_m, layout
+from randomizers.groups import Wheel, draw_asset, find_group, make_wheel
+from randomizers.placing import Item, find_floors, half_extents_m, layout
+
+COUNT_MAX = 500
+"""As many as the template's ``objects`` element may have."""
 
 
 class Objects(RandomizerBase):
@@ -34,48 +44,42 @@ class Objects(RandomizerBase):
     type: Literal["objects"] = "objects"
     stage: Literal["scene"] = "scene"
     group: str = ""
-    count: Count = Whole(4, 10)
-    scale: Positive = Constant(1.0)
+    count: Annotated[Count, Bounds(0, COUNT_MAX)] = UniformInteger(4, 10)
+    scale: Annotated[Scalar, Bounds(0.001, 1000.0)] = Constant(1.0)
     upright: Flag = Probability(0.6)
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field({})
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raises ConfigError if there is no such group, or it lacks a category of the weights."""
+        self._find_group(scene, assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with the group's objects exchanged."""
-        group = group_named(scene, self.group or self.name, f"randomizers.{self.name}.group")
-        scene = without_members(scene, group.name)
+        group, wheel = self._find_group(scene, assets)
+        scene = remove_members(scene, group.name)
         count = self.count.draw(rng)
-        wheel = wheel_of(group, assets, self.weights, f"randomizers.{self.name}.weights")
-        chosen = [assets.get(drawn_asset(wheel, rng)) for _ in range(count)]
+        chosen = [assets.get(draw_asset(wheel, rng)) for _ in range(count)]
         scales = [round(self.scale.draw(rng), 4) for _ in range(count)]
         upright = [self.upright.draw(rng) for _ in range(count)]
         items = [
             Item(half_extents_m(*assets.bounds_m(asset.asset_id), scale), asset.stackable)
             for asset, scale in zip(chosen, scales, strict=True)
         ]
-        poses = layout(group, items, floors_of(scene, group, assets), rng, upright)
-        ids = free_ids(scene, count)
-        bodies = tuple(
-            Body(
-                name=f"{group.name}/{k}",
-                asset=asset.asset_id,
-                T_world_body=pose.rounded(),
-                scale=scale,
-                instance_id=ids[k],
-                group=group.name,
+        poses = layout(group, items, find_floors(scene, group, assets), rng, upright)
+        members = [
+            Member(
+                asset.asset_id,
+                pose.rounded(),
+                scale,
                 motion="dynamic",
                 mass_kg=round(asset.mass_kg * scale**3, 6),
             )
-            for k, (asset, scale, pose) in enumerate(zip(chosen, scales, poses, strict=True))
-        )
-        instances = tuple(
-            Instance(
-                body.instance_id,
-                body.name,
-                asset.category,
-                0,
-                asset.asset_id,
-                annotated=group.annotated,
-            )
-            for body, asset in zip(bodies, chosen, strict=True)
-        )
-        return replace(scene, bodies=scene.bodies + bodies, instances=scene.instances + instances)
+            for asset, scale, pose in zip(chosen, scales, poses, strict=True)
+        ]
+        return add_members(scene, group, members, assets)
+
+    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, Wheel]:
+        """The group, and the weighted categories of its assets."""
+        field = f"randomizers.{self.name}"
+        group = find_group(scene, self.group or self.name, f"{field}.group")
+        return group, make_wheel(group, assets, self.weights, f"{field}.weights")

@@ -37,9 +37,9 @@ class PhysicsProperties(RandomizerBase):
         """The scene with other dynamic bodies."""
         del assets
         dynamic = [body for body in scene.bodies if body.motion == "dynamic"]
-        return scene.with_bodies(*(self._redrawn(body, rng) for body in dynamic))
+        return scene.with_bodies(*(self._draw_properties(body, rng) for body in dynamic))
 
-    def _redrawn(self, body: Body, rng: Rng) -> Body:
+    def _draw_properties(self, body: Body, rng: Rng) -> Body:
         return replace(
             body,
             mass_kg=round(body.mass_kg * self.mass_factor.draw(rng), 6),

@@ -76,7 +76,7 @@ class Floor:
         return float(rng.uniform(-room_x, room_x)), float(rng.uniform(-room_y, room_y))
 
 
-def floors_of(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Floor]:
+def find_floors(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Floor]:
     """The surfaces of a group, with what already lies on them."""
     floors = []
     for name in group.surfaces:
@@ -84,7 +84,7 @@ def floors_of(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Floo
         T_surface_world = surface.T_world_surface.inverse()
         floor = Floor(surface)
         for x, y, radius_m in group.keep_out:
-            here = _moved(T_surface_world, (x, y, surface.T_world_surface.translation_m[2]))
+            here = _transform(T_surface_world, (x, y, surface.T_world_surface.translation_m[2]))
             floor.closed.append((here[0], here[1], radius_m))
         for body in scene.bodies:
             if body.motion == "dynamic":
@@ -108,24 +108,24 @@ def layout(
         LayoutRejected: there is no place.
     """
     if group.placement == "stack":
-        return _stacks(group, items, floors, rng)
+        return _stack(group, items, floors, rng)
     if group.placement == "grid":
-        return _grid(group, items, floors, rng)
+        return _arrange_in_grid(group, items, floors, rng)
     if group.placement == "scatter":
-        return _scattered(group, items, floors, rng)
+        return _scatter(group, items, floors, rng)
     return [
-        _dropped(group, item, floors[_drawn_floor(floors, item, rng)], rng, stands)
+        _drop(group, item, floors[_draw_floor(floors, item, rng)], rng, stands)
         for item, stands in zip(items, upright, strict=True)
     ]
 
 
-def _dropped(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:
+def _drop(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:
     """Above a free place if one is found soon, else above what lies there."""
     clearance_m = floor.surface.clearance_m
     upright = upright or 2 * item.reach_m + DROP_M[1] > clearance_m
     radius_m = item.radius_m if upright else item.reach_m
     half_height_m = item.half_m[2] if upright else item.reach_m
-    place = _lowest_place(floor, radius_m, rng)
+    place = _find_lowest_place(floor, radius_m, rng)
     if place is None:
         raise LayoutRejected(_no_place(group))
     x, y, top_m = place
@@ -138,7 +138,7 @@ def _dropped(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bo
     return floor.surface.T_world_surface @ SE3((x, y, z)) @ turn
 
 
-def _lowest_place(floor: Floor, radius_m: float, rng: Rng) -> Vec3 | None:
+def _find_lowest_place(floor: Floor, radius_m: float, rng: Rng) -> Vec3 | None:
     """``(x, y, height)`` of the first bare place of some, else of that with the least below it.
 
     None if something stands at all of them.
@@ -156,23 +156,21 @@ def _lowest_place(floor: Floor, radius_m: float, rng: Rng) -> Vec3 | None:
     return lowest
 
 
-def _scattered(
-    group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng
-) -> list[SE3]:
+def _scatter(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
     """Standing apart from everything else; the widest choose first."""
     poses: dict[int, SE3] = {}
     for k in sorted(range(len(items)), key=lambda k: (-items[k].radius_m, k)):
-        floor, x, y = _bare_place(group, items[k], floors, rng)
-        poses[k] = _standing(items[k], floor, (x, y, 0.0), _yaw(rng))
+        floor, x, y = _find_bare_place(group, items[k], floors, rng)
+        poses[k] = _stand(items[k], floor, (x, y, 0.0), _yaw(rng))
     return [poses[k] for k in range(len(items))]
 
 
-def _bare_place(
+def _find_bare_place(
     group: ObjectGroup, item: Item, floors: list[Floor], rng: Rng
 ) -> tuple[Floor, float, float]:
     """A surface, and a point on it around which there is room for an upright item."""
     for _ in range(SCATTER_TRIES):
-        floor = floors[_drawn_floor(floors, item, rng)]
+        floor = floors[_draw_floor(floors, item, rng)]
         x, y = floor.place(rng, item.radius_m)
         bare = floor.top_under(x, y, item.radius_m) == 0.0
         if bare and not floor.is_closed(x, y, item.radius_m):
@@ -180,7 +178,9 @@ def _bare_place(
     raise LayoutRejected(_no_place(group))
 
 
-def _grid(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+def _arrange_in_grid(
+    group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng
+) -> list[SE3]:
     """In rows, surface after surface, turned by quarters."""
     poses = []
     share = -(-len(items) // len(floors))
@@ -191,7 +191,7 @@ def _grid(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: R
             raise LayoutRejected(_no_place(group))
         for item, (x, y) in zip(here, cells, strict=False):
             quarter = SE3.about_z(0.5 * math.pi * int(rng.integers(4)))
-            poses.append(_standing(item, floor, (x, y, 0.0), quarter))
+            poses.append(_stand(item, floor, (x, y, 0.0), quarter))
     return poses
 
 
@@ -220,7 +220,7 @@ def _cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]]:
     return []
 
 
-def _stacks(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+def _stack(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
     """In towers of two to four, the widest lowest; what is not flat stands alone."""
     poses: dict[int, SE3] = {}
     flat = [k for k, item in enumerate(items) if item.stackable]
@@ -229,18 +229,18 @@ def _stacks(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng:
     while flat:
         height = min(int(rng.integers(2, 5)), len(flat))
         tower, flat = flat[:height], flat[height:]
-        floor, x, y = _bare_place(group, items[tower[0]], floors, rng)
+        floor, x, y = _find_bare_place(group, items[tower[0]], floors, rng)
         z = 0.0
         for k in tower:
-            poses[k] = _standing(items[k], floor, (x, y, z), _yaw(rng))
+            poses[k] = _stand(items[k], floor, (x, y, z), _yaw(rng))
             z += 2 * items[k].half_m[2]
     for k in alone:
-        floor, x, y = _bare_place(group, items[k], floors, rng)
-        poses[k] = _standing(items[k], floor, (x, y, 0.0), _yaw(rng))
+        floor, x, y = _find_bare_place(group, items[k], floors, rng)
+        poses[k] = _stand(items[k], floor, (x, y, 0.0), _yaw(rng))
     return [poses[k] for k in range(len(items))]
 
 
-def _standing(item: Item, floor: Floor, place: Vec3, turn: SE3) -> SE3:
+def _stand(item: Item, floor: Floor, place: Vec3, turn: SE3) -> SE3:
     """Upright on a point of the surface's frame."""
     x, y, z = place
     top_m = z + 2 * item.half_m[2]
@@ -251,7 +251,7 @@ def _standing(item: Item, floor: Floor, place: Vec3, turn: SE3) -> SE3:
     return floor.surface.T_world_surface @ center @ turn
 
 
-def _drawn_floor(floors: list[Floor], item: Item, rng: Rng) -> int:
+def _draw_floor(floors: list[Floor], item: Item, rng: Rng) -> int:
     """One of the surfaces that the item fits under, by area."""
     areas = [
         f.surface.size_m[0] * f.surface.size_m[1]
@@ -275,7 +275,7 @@ def _cylinder(
 ) -> tuple[float, float, float, float]:
     low, high = assets.bounds_m(body.asset)
     item = Item(half_extents_m(low, high, body.scale))
-    x, y, z = _moved(T_surface_world, body.T_world_body.translation_m)
+    x, y, z = _transform(T_surface_world, body.T_world_body.translation_m)
     return (x, y, item.reach_m, z + item.reach_m)
 
 
@@ -292,7 +292,7 @@ def _yaw(rng: Rng) -> SE3:
     return SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)))
 
 
-def _moved(pose: SE3, point: Vec3) -> Vec3:
+def _transform(pose: SE3, point: Vec3) -> Vec3:
     return (pose @ SE3(point)).translation_m
 
 

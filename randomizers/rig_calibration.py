@@ -52,17 +52,19 @@ class RigCalibration(RandomizerBase):
             replace(
                 scene,
                 cameras=tuple(
-                    replace(c, T_rig_camera=self._moved(c.T_rig_camera, rng))
+                    replace(c, T_rig_camera=self._perturb(c.T_rig_camera, rng))
                     if c.rig in rigs
                     else c
                     for c in scene.cameras
                 ),
                 lidars=tuple(
-                    replace(s, T_rig_lidar=self._moved(s.T_rig_lidar, rng)) if s.rig in rigs else s
+                    replace(s, T_rig_lidar=self._perturb(s.T_rig_lidar, rng))
+                    if s.rig in rigs
+                    else s
                     for s in scene.lidars
                 ),
                 devices=tuple(
-                    replace(d, T_rig_device=self._moved(d.T_rig_device, rng))
+                    replace(d, T_rig_device=self._perturb(d.T_rig_device, rng))
                     if d.rig in rigs
                     else d
                     for d in scene.devices
@@ -70,7 +72,7 @@ class RigCalibration(RandomizerBase):
             )
         )
 
-    def _moved(self, T_rig_sensor: SE3, rng: Rng) -> SE3:
+    def _perturb(self, T_rig_sensor: SE3, rng: Rng) -> SE3:
         """The pose after an offset and three turns, each about an axis of the sensor."""
         x, y, z = (self.offset_m.draw(rng) for _ in range(3))
         half = [0.5 * math.radians(self.turn_deg.draw(rng)) for _ in range(3)]

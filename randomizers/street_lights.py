@@ -82,9 +82,9 @@ class StreetLights(RandomizerBase):
                     _lamp(f"{self.name}/{body.name}/{n}", body, lamp, flux_lm, color, cone_rad)
                     for n, lamp in enumerate(lamps)
                 )
-                body = _glowing(body, assets, LAMP, glow)  # noqa: PLW2901
+                body = _light_up(body, assets, LAMP, glow)  # noqa: PLW2901
             if WINDOW in roles and self.windows.draw(rng):
-                body = _glowing(body, assets, WINDOW, self._window(rng))  # noqa: PLW2901
+                body = _light_up(body, assets, WINDOW, self._window(rng))  # noqa: PLW2901
             bodies.append(body)
         return replace(scene, bodies=tuple(bodies), lights=tuple(lights))
 
@@ -129,14 +129,14 @@ def _lamp(
     )
 
 
-def _glowing(body: Body, assets: AssetIndex, role: str, emission_cd_m2: Vec3) -> Body:
+def _light_up(body: Body, assets: AssetIndex, role: str, emission_cd_m2: Vec3) -> Body:
     """The body with every slot of that role lit."""
 
-    def lit(material: Material) -> Material:
+    def set_emission(material: Material) -> Material:
         return replace(material, emission_cd_m2=emission_cd_m2)
 
     slots = materials_of(body, assets)
-    return replace(body, materials=tuple(lit(m) if m.role == role else m for m in slots))
+    return replace(body, materials=tuple(set_emission(m) if m.role == role else m for m in slots))
 
 
 def _times(color: Vec3, luminance_cd_m2: float) -> Vec3:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Flag, Positive, Probability, Uniform
+from generator.config.distributions import Chance, Positive, Probability, Uniform
 from generator.core.geometry import Material
 from generator.core.interfaces import AssetIndex
 from generator.core.scene import Scene
@@ -20,20 +20,25 @@ class Textures(LookRandomizer):
 
     Attributes:
         textures: Families or tags of textures: wood, marble, fabric.
-        probability: Whether a target is covered at all.
+        probability: That a target is covered; 1 = every one, 0.3 = about three in ten.
         scale_m: Length of one repeat of the texture.
         slots: Numbers of the material slots to cover; empty = all.
     """
 
     type: Literal["textures"] = "textures"
     textures: tuple[str, ...] = Field(min_length=1)
-    probability: Flag = Probability(0.5)
+    probability: Chance = Probability(1.0)
     scale_m: Positive = Uniform(0.15, 0.6)
     slots: tuple[int, ...] = ()
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raises ConfigError if there is no texture of a name."""
+        del scene
+        self._options(assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """One texture per body."""
-        options = textures_named(assets, self.textures, f"randomizers.{self.name}.textures")
+        options = self._options(assets)
         covered = []
         for body in self.chosen(scene):
             if not self.probability.draw(rng):
@@ -57,3 +62,7 @@ class Textures(LookRandomizer):
                 changed = replace(changed, materials=mixed)
             covered.append(changed)
         return scene.with_bodies(*covered)
+
+    def _options(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the textures it draws from."""
+        return textures_named(assets, self.textures, f"randomizers.{self.name}.textures")

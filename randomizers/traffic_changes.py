@@ -21,7 +21,7 @@ from generator.traffic.signals import Approach
 from generator.traffic.simulation import STEP_S
 from generator.traffic.walking import stride_m
 from randomizers.base import materials_of
-from randomizers.traffic_lights import Signal, shown
+from randomizers.traffic_lights import Signal, show_state
 from randomizers.vehicle_lights import AMBER, RED, times, with_glow
 
 BRAKES_M_S2 = 0.7
@@ -62,7 +62,7 @@ def lamp_states(
         blink: Share of a blink that is over at time 0.
     """
     brakes = (acceleration_m_s2 < -BRAKES_M_S2) | (speed_m_s < STANDS_M_S)
-    held = _held(brakes, round(BRAKES_S / STEP_S))
+    held = _hold(brakes, round(BRAKES_S / STEP_S))
     turns = ["none"] * len(station_m)
     for entry in entries:
         if abs(entry.turn) < TURNS:
@@ -105,7 +105,7 @@ def signal_changes(
     made = []
     for time_s in (0.0, *approach.cycle.switches_s(approach.axis, until_s)):
         state = approach.state(time_s)
-        lit: tuple[Material, ...] = shown(signal.body, assets, state, lens_cd_m2).materials
+        lit: tuple[Material, ...] = show_state(signal.body, assets, state, lens_cd_m2).materials
         facts = (("state", state),)
         made.append(Change(time_s, signal.body.name, "", lit, facts))
     return made
@@ -184,7 +184,7 @@ def with_first_changes(scene: Scene, changes: Iterable[Change]) -> Scene:
     return replace(scene, bodies=bodies, instances=instances)
 
 
-def _held(on: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+def _hold(on: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
     """True for at least some steps once it is."""
     held: NDArray[np.bool_] = on.copy()
     for k in range(1, steps):

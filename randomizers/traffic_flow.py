@@ -33,7 +33,7 @@ from randomizers.traffic_changes import (
     signal_changes,
     with_first_changes,
 )
-from randomizers.traffic_lights import COLORS, Signal, has_lenses, junctions_of, signal_of
+from randomizers.traffic_lights import COLORS, Signal, group_junctions, has_lenses, read_signal
 from randomizers.traffic_members import (
     DRIVERS,
     Driver,
@@ -41,11 +41,11 @@ from randomizers.traffic_members import (
     OnRoad,
     Standing,
     ahead_of,
-    approaches_of,
     cycles_axes,
-    drivers_of,
-    people_of,
-    standing_of,
+    find_approaches,
+    find_drivers,
+    find_obstacles,
+    find_pedestrians,
     with_cycles,
 )
 
@@ -124,12 +124,12 @@ class TrafficFlow(RandomizerBase):
         """
         streets = Streets.of(scene)
         signals = self._signals(scene, assets, rng) if self.signals else []
-        approaches = approaches_of(streets.driving, streets.crosswalks, signals)
-        drivers = drivers_of(scene, streets.driving, assets)
-        people = people_of(scene, streets.sidewalks, streets.crosswalks, assets)
+        approaches = find_approaches(streets.driving, streets.crosswalks, signals)
+        drivers = find_drivers(scene, streets.driving, assets)
+        people = find_pedestrians(scene, streets.sidewalks, streets.crosswalks, assets)
         taking_part = [m.body for m in drivers] + [m.body for m in people]
-        standing = standing_of(scene, taking_part, assets)
-        planned = self._planned(drivers, standing, streets)
+        standing = find_obstacles(scene, taking_part, assets)
+        planned = self._plan_routes(drivers, standing, streets)
         fleet = self._fleet(drivers, streets, planned, standing.boxes, rng)
         walks = walks_of(streets.sidewalks, streets.crosswalks, standing.boxes)
         walkers = self._walkers(people, walks, rng)
@@ -141,21 +141,21 @@ class TrafficFlow(RandomizerBase):
             *self._lamp_changes(fleet, drivers, motion, assets, rng),
             *_gait(people, motion, assets, rng),
         ]
-        return _moving(scene, tracks, changes)
+        return _set_in_motion(scene, tracks, changes)
 
     def _signals(self, scene: Scene, assets: AssetIndex, rng: Rng) -> list[tuple[Signal, Approach]]:
         """All traffic lights with cycles that are drawn per junction."""
         roles = frozenset(COLORS)
-        lights = [signal_of(body) for body in scene.bodies if has_lenses(body, assets, roles)]
+        lights = [read_signal(body) for body in scene.bodies if has_lenses(body, assets, roles)]
         junctions = []
-        for junction in junctions_of(lights, JUNCTION_M):
+        for junction in group_junctions(lights, JUNCTION_M):
             green_s, all_red_s = self.green_s.draw(rng), self.all_red_s.draw(rng)
             cycle = Cycle(max(cycles_axes(junction)) + 1, round(green_s, 2), round(all_red_s, 2))
             offset_s = round(float(rng.uniform()) * cycle.length_s, 2)
             junctions.append((junction, replace(cycle, offset_s=offset_s)))
         return with_cycles(junctions)
 
-    def _planned(
+    def _plan_routes(
         self, drivers: Sequence[OnRoad], standing: Standing, streets: Streets
     ) -> dict[str, tuple[str, ...]]:
         """Lanes of the routes that were given, by the vehicles' names."""
@@ -360,7 +360,7 @@ def _check(
     raise LayoutRejected(Rejection(f"{one} and {other} meet in traffic", remedy))
 
 
-def _moving(
+def _set_in_motion(
     scene: Scene, tracks: Sequence[tuple[Body, Track | None]], changes: Sequence[Change]
 ) -> Scene:
     """The scene at time 0 with all that will happen."""

@@ -65,17 +65,19 @@ class TrafficLights(RandomizerBase):
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with every lens lit or dark, and its state among the labels' attributes."""
-        signals = [signal_of(body) for body in scene.bodies if has_lenses(body, assets, self.ROLES)]
+        signals = [
+            read_signal(body) for body in scene.bodies if has_lenses(body, assets, self.ROLES)
+        ]
         bodies: list[Body] = []
         states: dict[int, str] = {}
-        for junction in junctions_of(signals, self.junction_m.draw(rng)):
+        for junction in group_junctions(signals, self.junction_m.draw(rng)):
             state, luminance = self._state(rng), round(self.luminance_cd_m2.draw(rng), 2)
             for signal in junction:
                 own = state if runs_along(junction[0], signal) else _crossing(state)
-                bodies.append(shown(signal.body, assets, own, luminance))
+                bodies.append(show_state(signal.body, assets, own, luminance))
                 states[signal.body.instance_id] = own
         instances = tuple(
-            told(instance, states[instance.instance_id])
+            label_state(instance, states[instance.instance_id])
             if instance.instance_id in states
             else instance
             for instance in scene.instances
@@ -97,7 +99,7 @@ def _crossing(state: str) -> str:
     return "green" if state == "red" else "red"
 
 
-def junctions_of(signals: Sequence[Signal], radius_m: float) -> Iterator[list[Signal]]:
+def group_junctions(signals: Sequence[Signal], radius_m: float) -> Iterator[list[Signal]]:
     """Signals in groups that are linked by distances below ``radius_m``, in order."""
     waiting = list(signals)
     while waiting:
@@ -117,7 +119,7 @@ def runs_along(first: Signal, other: Signal) -> bool:
     return abs(ax * bx + ay * by) >= abs(ax * by - ay * bx)
 
 
-def signal_of(body: Body) -> Signal:
+def read_signal(body: Body) -> Signal:
     """A body as a signal: its front is towards the traffic that it is for."""
     x, y, _ = body.T_world_body.rotation()[:, 0].tolist()
     return Signal(body, body.T_world_body.translation_m, (x, y))
@@ -128,20 +130,20 @@ def has_lenses(body: Body, assets: AssetIndex, roles: frozenset[str]) -> bool:
     return any(material.role in roles for material in materials_of(body, assets))
 
 
-def shown(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: float) -> Body:
+def show_state(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: float) -> Body:
     """The body with the lenses of a state lit and all others dark."""
 
-    def lit(material: Material) -> Material:
+    def set_emission(material: Material) -> Material:
         if material.role not in COLORS:
             return material
         level = luminance_cd_m2 if material.role in LIT[state] else 0.0
         r, g, b = (round(level * channel, 2) for channel in COLORS[material.role])
         return replace(material, emission_cd_m2=(r, g, b))
 
-    return replace(body, materials=tuple(lit(m) for m in materials_of(body, assets)))
+    return replace(body, materials=tuple(set_emission(m) for m in materials_of(body, assets)))
 
 
-def told(instance: Instance, state: str) -> Instance:
+def label_state(instance: Instance, state: str) -> Instance:
     """The instance with its state among its attributes; for people: stop or walk."""
     if instance.subcategory == "pedestrian":
         state = "walk" if state == "green" else "stop"

@@ -76,7 +76,7 @@ class OnFoot:
     walks: bool
 
 
-def drivers_of(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnRoad]:
+def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnRoad]:
     """Vehicles on driving lanes, in order: members of groups, and what carries a rig.
 
     What stands across a lane or against it takes no part.
@@ -103,7 +103,7 @@ def drivers_of(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnRoa
     return found
 
 
-def people_of(
+def find_pedestrians(
     scene: Scene, sidewalks: LaneGraph, crosswalks: LaneGraph, assets: AssetIndex
 ) -> list[OnFoot]:
     """People of the scene's groups, in order, on the sidewalk or crosswalk nearest to them."""
@@ -154,7 +154,7 @@ class Standing:
         return self.names[int(np.argmax(inside))] if inside.any() else ""
 
 
-def standing_of(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex) -> Standing:
+def find_obstacles(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex) -> Standing:
     """Everything that has an instance, but roads and those who take part."""
     moving = {body.name for body in taking_part}
     roads = {lane.road for lane in scene.lanes}
@@ -176,7 +176,7 @@ def standing_of(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex) -
     return Standing(tuple(names), tuple(categories), np.array(rows).reshape(-1, 6))
 
 
-def approaches_of(
+def find_approaches(
     graph: LaneGraph, crosswalks: LaneGraph, signals: Sequence[tuple[Signal, Approach]]
 ) -> dict[str, Approach]:
     """The signals that lanes into junctions, and crosswalks there, obey, by the lanes' names."""

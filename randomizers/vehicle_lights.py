@@ -73,7 +73,7 @@ class VehicleLights(LookRandomizer):
         return replace(
             scene.with_bodies(*bodies),
             lights=tuple(lights),
-            instances=tuple(_labelled(i, states.get(i.instance_id, ())) for i in scene.instances),
+            instances=tuple(_label(i, states.get(i.instance_id, ())) for i in scene.instances),
         )
 
     def _glow(self, on: bool, braking: bool, side: str, rng: Rng) -> dict[str, Vec3]:
@@ -101,10 +101,10 @@ class VehicleLights(LookRandomizer):
 def with_glow(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
     """The body with the emission of some roles exchanged."""
 
-    def lit(material: Material) -> Material:
+    def set_emission(material: Material) -> Material:
         return replace(material, emission_cd_m2=glow.get(material.role, material.emission_cd_m2))
 
-    return replace(body, materials=tuple(lit(m) for m in materials_of(body, assets)))
+    return replace(body, materials=tuple(set_emission(m) for m in materials_of(body, assets)))
 
 
 def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
@@ -137,7 +137,7 @@ def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Li
     return lights
 
 
-def _labelled(instance: Instance, states: tuple[tuple[str, str], ...]) -> Instance:
+def _label(instance: Instance, states: tuple[tuple[str, str], ...]) -> Instance:
     attributes = {**dict(instance.attributes), **dict(states)}
     return replace(instance, attributes=tuple(sorted(attributes.items())))
 

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from generator.assets.vehicles.plates import SEEDS, with_seed
 from generator.config.distributions import (
+    Chance,
     Constant,
     Flag,
     LogUniform,
@@ -68,7 +69,7 @@ class VehiclePaint(LookRandomizer):
     Attributes:
         weights: How often a colour is drawn: white, black, grey, silver, blue, red, green, brown,
             yellow, orange.
-        probability: Whether a vehicle is painted anew at all.
+        probability: That a vehicle is painted anew; the others keep their model's paint.
         roughness: Of the clear coat: 0.1 waxed, 0.3 weathered.
         metallic: Whether the paint has flakes of metal; white never has.
         dirt: Share of dust in every colour of the vehicle.
@@ -79,7 +80,7 @@ class VehiclePaint(LookRandomizer):
 
     type: Literal["vehicle_paint"] = "vehicle_paint"
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field(ON_ROADS)
-    probability: Flag = Probability(0.85)
+    probability: Chance = Probability(0.85)
     roughness: UnitInterval = LogUniform(0.1, 0.3)
     metallic: Flag = Probability(0.6)
     dirt: UnitInterval = Uniform(0.0, 0.25)
@@ -101,9 +102,9 @@ class VehiclePaint(LookRandomizer):
         for body in self.chosen(scene):
             paint = self._paint(rng)
             anew, dirt = self.probability.draw(rng), self.dirt.draw(rng)
-            painted.append(_finished(body, assets, paint if anew else None, dirt))
+            painted.append(_finish(body, assets, paint if anew else None, dirt))
         if self.plates:
-            painted = [_registered(body, int(rng.integers(SEEDS))) for body in painted]
+            painted = [_change_plates(body, int(rng.integers(SEEDS))) for body in painted]
         return scene.with_bodies(*painted)
 
     def _paint(self, rng: Rng) -> Material:
@@ -131,10 +132,10 @@ class VehiclePaint(LookRandomizer):
         return replace(material, roughness=_PIGMENT, coat=coat, coat_roughness=worn)
 
 
-def _finished(body: Body, assets: AssetIndex, paint: Material | None, dirt: float) -> Body:
+def _finish(body: Body, assets: AssetIndex, paint: Material | None, dirt: float) -> Body:
     """The body painted (unless None) and with dust on it."""
 
-    def finished(material: Material) -> Material:
+    def finish(material: Material) -> Material:
         if paint is not None and material.role == PAINT and not material.printed:
             material = replace(
                 material,
@@ -146,13 +147,13 @@ def _finished(body: Body, assets: AssetIndex, paint: Material | None, dirt: floa
                 coat_roughness=paint.coat_roughness,
                 texture="",
             )
-        return _dusty(material, dirt) if material.role in _SOILED else material
+        return _soil(material, dirt) if material.role in _SOILED else material
 
     slots = materials_of(body, assets)
-    return replace(body, materials=tuple(finished(material) for material in slots))
+    return replace(body, materials=tuple(finish(material) for material in slots))
 
 
-def _registered(body: Body, seed: int) -> Body:
+def _change_plates(body: Body, seed: int) -> Body:
     """The body with another licence plate, where it has one."""
     return replace(
         body,
@@ -160,7 +161,7 @@ def _registered(body: Body, seed: int) -> Body:
     )
 
 
-def _dusty(material: Material, dirt: float) -> Material:
+def _soil(material: Material, dirt: float) -> Material:
     """A surface under a thin layer of dust: towards its colour, and duller."""
     share = 0.35 * dirt if material.role == "glass" else dirt
     red, green, blue = (

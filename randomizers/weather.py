@@ -82,10 +82,10 @@ class Weather(RandomizerBase):
         preset = PRESETS[self.preset.draw(rng)]
         condition = preset.condition
         light = Daylight(
-            _drawn(self.sun_altitude_deg, preset.sun_altitude_deg, rng),
+            _draw(self.sun_altitude_deg, preset.sun_altitude_deg, rng),
             self.sun_azimuth_deg.draw(rng),
-            _drawn(self.cloudiness, condition.cloudiness, rng),
-            _drawn(self.turbidity, condition.turbidity, rng),
+            _draw(self.cloudiness, condition.cloudiness, rng),
+            _draw(self.turbidity, condition.turbidity, rng),
             cloud_seed(rng),
         )
         values: dict[str, Any] = {"seed": int(rng.integers(_PATTERNS))}
@@ -99,7 +99,7 @@ class Weather(RandomizerBase):
 
     @field_validator("preset")
     @classmethod
-    def _known(cls, preset: Name) -> Name:
+    def _check_preset(cls, preset: Name) -> Name:
         """Refuse names that stand for nothing."""
         for name in preset.outcomes():
             if name not in PRESETS:
@@ -112,5 +112,5 @@ class Weather(RandomizerBase):
         return preset
 
 
-def _drawn(given: Scalar | None, usual: Range, rng: Rng) -> float:
+def _draw(given: Scalar | None, usual: Range, rng: Rng) -> float:
     return (given or Uniform(*usual)).draw(rng)

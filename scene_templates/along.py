@@ -10,9 +10,9 @@ from pydantic import Field
 from generator.core.errors import ConfigError
 from generator.core.interfaces import AssetIndex
 from generator.core.lanes import LaneLine, standing_on_lane
-from generator.core.scene import Body, Instance, LaneKind, ObjectGroup, Scene
-from generator.core.se3 import SE3
-from scene_templates.element import Element, next_instance_id
+from generator.core.members import Member, add_members
+from generator.core.scene import LaneKind, ObjectGroup, Scene
+from scene_templates.element import Element
 from scene_templates.objects import AssetChoice
 
 
@@ -60,34 +60,18 @@ class Along(Element):
         )
         scene = replace(scene, groups=(*scene.groups, group))
         total_m = sum(line.length_m for line in lines)
+        members = []
         for number in range(self.count):
-            line, at_m = _place(lines, total_m * (number + 0.5) / self.count)
+            line, at_m = _locate(lines, total_m * (number + 0.5) / self.count)
             asset = group.assets[(number * len(group.assets)) // self.count]
             bounds_m = assets.bounds_m(asset)
             pose = standing_on_lane(line.pose(at_m), line.lane, bounds_m, self.facing)
-            scene = self._with_member(scene, assets, number, asset, pose)
-        return scene
-
-    def _with_member(
-        self, scene: Scene, assets: AssetIndex, number: int, asset: str, T_world_body: SE3
-    ) -> Scene:
-        instance_id = next_instance_id(scene)
-        body = Body(
-            name=f"{self.name}/{number}",
-            asset=asset,
-            T_world_body=T_world_body.rounded(),
-            instance_id=instance_id,
-            group=self.name,
-            collides=False,
-        )
-        instance = Instance(
-            instance_id, body.name, assets.get(asset).category, 0, asset, annotated=self.annotate
-        )
-        return replace(scene, bodies=(*scene.bodies, body), instances=(*scene.instances, instance))
+            members.append(Member(asset, pose.rounded(), collides=False))
+        return add_members(scene, group, members, assets)
 
 
-def _place(lines: list[LaneLine], at_m: float) -> tuple[LaneLine, float]:
-    """The line and the place on it at an arc length along all lines together."""
+def _locate(lines: list[LaneLine], at_m: float) -> tuple[LaneLine, float]:
+    """The line, and the arc length on it, at an arc length along all lines together."""
     for line in lines[:-1]:
         if at_m < line.length_m:
             return line, at_m

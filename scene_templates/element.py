@@ -12,6 +12,7 @@ from generator.assets.ids import AssetId, ParameterValue
 from generator.config.strict import Strict
 from generator.core.errors import ConfigError, did_you_mean
 from generator.core.interfaces import AssetIndex
+from generator.core.members import free_instance_ids
 from generator.core.scene import Body, Instance, Scene, Surface
 from generator.core.se3 import SE3, Vec3
 
@@ -86,8 +87,8 @@ def parametric(family: str, **parameters: ParameterValue) -> str:
 
 
 def next_instance_id(scene: Scene) -> int:
-    """The smallest id above all that are taken."""
-    return max((i.instance_id for i in scene.instances), default=0) + 1
+    """The smallest instance id that is free."""
+    return free_instance_ids(scene, 1)[0]
 
 
 def with_static(

@@ -12,15 +12,10 @@ from generator.config.strict import Strict
 from generator.core.errors import ConfigError
 from generator.core.geometry import Asset
 from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Instance, ObjectGroup, Placement, Scene, Surface
+from generator.core.members import Member, add_members
+from generator.core.scene import ObjectGroup, Placement, Scene, Surface
 from generator.core.se3 import SE3, Vec3
-from scene_templates.element import (
-    Element,
-    extent_m,
-    next_instance_id,
-    standing,
-    surfaces_of,
-)
+from scene_templates.element import Element, extent_m, standing, surfaces_of
 from scene_templates.rows import LAYERS, in_rows, standing_discs
 
 
@@ -129,9 +124,12 @@ class Objects(Element):
             here = range(self.count)[number * share : (number + 1) * share]
             chosen = [self._nominal(group, k, surface, assets) for k in here]
             points = self._points(chosen, surface, group, assets)
-            for k, asset, point in zip(here, chosen, points, strict=True):
-                stand = surface.T_world_surface @ SE3(point)
-                scene = self._with_object(scene, assets, k, asset, standing(assets, asset, stand))
+            members = []
+            for asset, point in zip(chosen, points, strict=True):
+                pose = standing(assets, asset, surface.T_world_surface @ SE3(point)).rounded()
+                mass_kg = assets.get(asset).mass_kg
+                members.append(Member(asset, pose, motion="dynamic", mass_kg=mass_kg))
+            scene = add_members(scene, group, members, assets, first=here.start)
         return scene
 
     def _nominal(
@@ -168,23 +166,3 @@ class Objects(Element):
                 "expected fewer objects or a larger surface"
             )
         return points
-
-    def _with_object(
-        self, scene: Scene, assets: AssetIndex, number: int, asset: str, T_world_body: SE3
-    ) -> Scene:
-        """One more object, with an instance of its own."""
-        entry = assets.get(asset)
-        instance_id = next_instance_id(scene)
-        body = Body(
-            name=f"{self.name}/{number}",
-            asset=asset,
-            T_world_body=T_world_body.rounded(),
-            instance_id=instance_id,
-            group=self.name,
-            motion="dynamic",
-            mass_kg=entry.mass_kg,
-        )
-        instance = Instance(
-            instance_id, body.name, entry.category, 0, asset, annotated=self.annotate
-        )
-        return replace(scene, bodies=(*scene.bodies, body), instances=(*scene.instances, instance))

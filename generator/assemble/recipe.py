@@ -9,6 +9,7 @@ from functools import cached_property, lru_cache, partial
 import cv2
 
 from generator.annotations.truth import complete_truth, frame_truth
+from generator.assemble.references import check_references
 from generator.assemble.spec import SceneConfig, Spec
 from generator.assemble.tables import ANNOTATIONS, default_plugin
 from generator.assets.library import Library, open_library
@@ -63,9 +64,15 @@ class PipelineFactory:
 
     @cached_property
     def nominal(self) -> tuple[Scene, ...]:
-        """Nominal scenes that between them hold whatever a scene may hold."""
+        """Nominal scenes that between them hold whatever a scene may hold.
+
+        Raises:
+            ConfigError: a randomizer names what neither they nor the assets have.
+        """
         library = open_library(self.spec.asset_folders)
-        return tuple(nominal_scene(self.spec, config, library) for config in self.spec.probes)
+        scenes = tuple(nominal_scene(self.spec, config, library) for config in self.spec.probes)
+        check_references(self.spec, scenes, library)
+        return scenes
 
     @cached_property
     def categories(self) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ from generator.config.distributions import (
     Uniform,
     UniformInteger,
     bounded,
+    fields,
 )
 from generator.config.document import parse
 from generator.config.problems import Problems
@@ -370,6 +371,78 @@ def test_mistakes_in_rotations_directions_and_positions_are_told(text: str, fact
     validate(parse(text, "x.yaml"), Fields, problems)
 
     assert [problem.fact for problem in problems.sorted()] == [fact]
+
+
+FAULTS = [
+    ("scalar: {normal: {self: 1}}", "1:19",
+     "unknown key 'self' of normal; expected mean, stddev, clip"),
+    ("scalar: {normal: {mean: true, stddev: 1}}", "1:25", "expected a number, got true"),
+    ("scalar: {normal: {mean: 0, stddev: 1, clip: }}", "1:45",
+     "clip needs two numbers [low, high], got nothing"),
+    ("scalar: {normal: {mean: 0, stddev: 1, clip: [0, x]}}", "1:49",
+     "expected a number, got 'x'"),
+    ("scalar: {normal: 1}", "1:18", "normal needs a mapping with mean, stddev, clip, got 1"),
+    ("count: {uniform_integer: [1, 2.5]}", "1:30", "expected a whole number, got 2.5"),
+    ("count: {uniform_integer: [1]}", "1:26",
+     "uniform_integer needs two whole numbers [low, high], got [1]"),
+    ("rotation: {about_z: [0, 1, 2]}", "1:21",
+     "about_z needs two numbers [low, high], got [0, 1, 2]"),
+    ("rotation: {euler_deg: [0, 1, a]}", "1:30", "expected a number, got 'a'"),
+    ("direction: {cap: {axis: [0, 0, 1], half_angle_deg: 181}}", "1:52",
+     "cap needs half_angle_deg in [0, 180], got 181"),
+    ("position: {box: [[0, 0, 0], [1, a, 1]]}", "1:33", "expected a number, got 'a'"),
+    ("position: {shell: {center_m: [0, 0, 0], radius_m: [2, 1]}}", "1:51",
+     "shell radius_m needs low <= high, got [2, 1]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "place", "fact"), FAULTS, ids=[text for text, _, _ in FAULTS])
+def test_faults_inside_a_distribution_are_told_with_their_place(
+    text: str, place: str, fact: str
+) -> None:
+    """The column of the part that is wrong, at any depth."""
+    problems = Problems()
+
+    validate(parse(text, "x.yaml"), Fields, problems)
+
+    (problem,) = problems.sorted()
+    assert (str(problem.position), problem.fact) == (f"x.yaml:{place}", fact)
+
+
+def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its YAML form, messages and JSON Schema follow from its fields."""
+    from generator.config.distributions import base
+
+    @base.parameters
+    class Triangular(Numeric[float], name="triangular", kinds=("number",)):
+        """Rises to a peak and falls again."""
+
+        peak: float
+        reach: float = 1.0
+
+        def draw(self, rng: Rng) -> float:
+            """One value."""
+            return self.peak + self.reach * (rng.random() - rng.random())
+
+        def mean(self) -> float:
+            """The peak."""
+            return self.peak
+
+        def support(self) -> tuple[float, float]:
+            """Both ends."""
+            return self.peak - self.reach, self.peak + self.reach
+
+    monkeypatch.setattr(base, "names_of", lambda kind: ("triangular",))
+    monkeypatch.setattr(base, "distribution", lambda name: Triangular)
+    kind = fields.NUMBER
+
+    assert base.read({"triangular": {"peak": 2}}, kind) == Triangular(2.0)
+    assert Triangular(2.0).to_yaml() == {"triangular": {"peak": 2.0, "reach": 1.0}}
+    assert Triangular.schema({})["required"] == ["peak"]
+    with pytest.raises(Malformed, match="triangular needs 'peak'"):
+        base.read({"triangular": {"reach": 2}}, kind)
 
 
 def test_reprs_show_how_to_make_the_value() -> None:

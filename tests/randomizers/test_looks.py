@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from generator.config.distributions import Constant, Probability, Uniform
+from generator.config.document import parse
+from generator.config.problems import Problems
+from generator.config.validation import validate
 from generator.core.errors import ConfigError
 from generator.core.geometry import Material
 from generator.core.scene import Body, Instance, ObjectGroup, Scene
+from randomizers import TABLE
 from randomizers.backdrop import Backdrop
 from randomizers.base import RandomizerBase
 from randomizers.colors import Colors
@@ -169,6 +175,49 @@ def test_textures_are_drawn_from_families_and_tags() -> None:
     families = {body.materials[0].texture.partition("?")[0] for body in now.bodies if body.group}
 
     assert families == {"texture/plaster", "texture/concrete", "texture/wood_planks"}
+
+
+@pytest.mark.parametrize("kind", [Colors, Materials, Textures])
+def test_a_listed_randomizer_changes_every_target_unless_told_otherwise(kind: Any) -> None:
+    """The default of ``probability`` is 1."""
+    fields = {"textures": ["wood"]} if kind is Textures else {}
+    randomizer = kind.model_validate_json(json.dumps({"name": "r", **fields}))
+    scene = scene_with(*["brick"] * 40)
+
+    assert len(changed(scene, after(randomizer, scene))) == 40
+
+
+@pytest.mark.parametrize("kind", ["colors", "materials", "textures", "vehicle_paint"])
+@pytest.mark.parametrize(
+    ("written", "mean"),
+    [("0", 0), ("1", 1), ("0.0", 0), ("1.0", 1), ("0.3", 0.3), ("true", 1), ("false", 0),
+     ("{probability: 1}", 1), ("{probability: 1.0}", 1), ("{probability: 0}", 0)],
+)  # fmt: skip
+def test_a_probability_is_a_number_or_a_flag(kind: str, written: str, mean: float) -> None:
+    """Whole or not, both ends included."""
+    problems = Problems()
+    textures = "textures: [wood], " if kind == "textures" else ""
+    text = f"{{name: r, {textures}probability: {written}}}"
+    randomizer = validate(parse(text, "x.yaml"), TABLE.load(kind), problems)
+    problems.raise_if_any()
+
+    assert randomizer.probability.mean() == mean
+    assert isinstance(randomizer.probability.draw(rng_of()), bool)
+
+
+@pytest.mark.parametrize(
+    ("written", "fact"),
+    [("1.5", "probability needs a number in [0, 1], got 1.5"),
+     ("-1", "probability needs a number in [0, 1], got -1"),
+     ("yes", "expected a probability in [0, 1], true or false, got 'yes' (did you mean true?)")],
+)  # fmt: skip
+def test_an_impossible_probability_is_told_with_its_place(written: str, fact: str) -> None:
+    """The column is that of the value."""
+    problems = Problems()
+    validate(parse(f"{{name: r, probability: {written}}}", "x.yaml"), Colors, problems)
+
+    (problem,) = problems.sorted()
+    assert (str(problem.position), problem.fact) == ("x.yaml:1:24", fact)
 
 
 def test_unknown_texture_is_named() -> None:

@@ -2,7 +2,7 @@
 
 ``roughness: 0.5`` or ``roughness: {uniform: [0.1, 0.9]}``. In Python the same types are frozen
 values: ``Uniform(0.1, 0.9).draw(rng)``. Models declare fields as ``Scalar``, ``Count``, ``Name``,
-``Flag``, ``Rotation``, ``Direction`` or ``Position``.
+``Flag``, ``Chance``, ``Rotation``, ``Direction`` or ``Position``.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from generator.config.distributions.base import DISTRIBUTIONS, Distribution, Mal
 from generator.config.distributions.discrete import Choice, Constant, Probability, Sequence
 from generator.config.distributions.fields import (
     Bounds,
+    Chance,
     Count,
     Direction,
     Flag,
@@ -41,6 +42,7 @@ __all__ = [
     "Bounds",
     "Box",
     "Cap",
+    "Chance",
     "Choice",
     "Constant",
     "Count",

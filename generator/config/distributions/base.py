@@ -1,24 +1,28 @@
-"""What a parameter may be: the noun, the kinds of value, and the table of distributions.
+"""Distributions as values: the base class, the table, and the reader of their YAML form.
 
-A new distribution is one class and one line in ``DISTRIBUTIONS``.
+A new distribution is one class with typed fields and one line in ``DISTRIBUTIONS``. Its fields
+give its constructor, its YAML form, its messages and its JSON Schema.
 """
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from dataclasses import dataclass, field
+from functools import cache, wraps
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, cast
+
+from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass as pydantic_dataclass
+from typing_extensions import dataclass_transform
 
 from generator.config.scalars import abbreviated, number, shown
 from generator.core.errors import did_you_mean
 from generator.core.plugins import PluginTable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from pydantic.fields import FieldInfo
+    from pydantic_core import ErrorDetails
 
     from generator.core.streams import Rng
 
@@ -49,10 +53,10 @@ DISTRIBUTIONS: PluginTable[Distribution[Any]] = PluginTable(
 
 
 class Malformed(ValueError):
-    """A value that is no distribution, and where in it the fault lies.
+    """A value that is no distribution, and the place of the fault in it.
 
     Attributes:
-        fact: What is wrong and what was expected.
+        fact: The fault and the expectation.
         path: Keys and indices from the value of the field down to the fault.
         at_key: The last key of the path is at fault, not its value.
     """
@@ -66,26 +70,18 @@ class Malformed(ValueError):
         self.at_key = at_key
 
 
-@contextmanager
-def inside(*path: str | int) -> Iterator[None]:
-    """Whatever is malformed within lies below ``path``."""
-    try:
-        yield
-    except Malformed as error:
-        raise Malformed(error.fact, (*path, *error.path), at_key=error.at_key) from None
-
-
 @dataclass(frozen=True, eq=False)
 class Kind(Generic[T]):
-    """What a field's values are.
+    """The values of a field.
 
     Attributes:
-        name: What distributions declare in ``kinds``.
-        expected: How messages name a constant of it: ``a number``.
-        read: The value a plain constant stands for; raises Malformed.
+        name: Distributions list it in ``kinds``.
+        expected: A constant of it in messages: ``a number``.
+        read: The value of a plain constant; raises Malformed.
         read_key: The same for a key of a mapping, which is always text.
         schema: JSON Schema of a constant.
         example: A constant, as plain data.
+        of_number: Name of the distribution that a plain number stands for, if it is no constant.
     """
 
     name: str
@@ -94,18 +90,36 @@ class Kind(Generic[T]):
     read_key: Callable[[str], T]
     schema: Mapping[str, Any]
     example: Any
+    of_number: str = ""
 
 
 class Distribution(ABC, Generic[T_co]):
     """A parameter that is drawn anew for each scene or view.
 
-    Frozen and comparable. In YAML it is a mapping with one key, its name. One that needs no
-    argument can also be written as that name alone.
+    Frozen and comparable. In YAML it is a mapping with one key, its name; the value of that key,
+    the argument, follows from its fields: nothing without fields, the value of a single field, a
+    list of all fields in order if ``needs`` says so, else a mapping of fields.
+
+    Attributes:
+        name: Its key in YAML.
+        kinds: Names of the kinds of values that it can give.
+        bare: The name alone is enough.
+        needs: Words for a list of all fields, if that is the argument.
     """
 
-    name: ClassVar[str]
-    kinds: ClassVar[frozenset[str]]
+    name: ClassVar[str] = ""
+    kinds: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[str] = ""
     bare: ClassVar[bool] = False
+    __pydantic_fields__: ClassVar[dict[str, FieldInfo]]
+
+    def __init_subclass__(
+        cls, *, name: str = "", kinds: tuple[str, ...] = (), needs: str = "", bare: bool = False
+    ) -> None:
+        """Attributes of the class are keywords of its definition; others are inherited."""
+        super().__init_subclass__()
+        cls.name, cls.kinds = name or cls.name, kinds or cls.kinds
+        cls.needs, cls.bare = needs or cls.needs, bare or cls.bare
 
     @abstractmethod
     def draw(self, rng: Rng) -> T_co:
@@ -116,22 +130,61 @@ class Distribution(ABC, Generic[T_co]):
         return ()
 
     @classmethod
-    @abstractmethod
     def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Distribution[Any]:
         """The distribution that ``{name: argument}`` stands for. Raises Malformed."""
+        del kind
+        make: Callable[..., Distribution[Any]] = cls
+        names = cls.field_names()
+        if argument is None and cls.bare:
+            return make()
+        if not names:
+            raise Malformed(
+                f"{cls.name} takes no argument, got {shown(argument)}; write {cls.name} alone"
+            )
+        if cls.needs:
+            return make(*_require_items(argument, len(names), f"{cls.name} needs {cls.needs}"))
+        if len(names) == 1:
+            return make(argument)
+        if not isinstance(argument, Mapping):
+            listed = ", ".join(names.values())
+            raise Malformed(f"{cls.name} needs a mapping with {listed}, got {shown(argument)}")
+        return make(**argument)
 
-    @abstractmethod
     def argument(self) -> Any:
-        """What ``from_yaml`` reads back."""
+        """Plain data that ``from_yaml`` reads back."""
+        values = {key: to_plain(getattr(self, name)) for name, key in self.field_names().items()}
+        if self.needs:
+            return list(values.values())
+        if len(values) == 1:
+            return next(iter(values.values()))
+        return {key: value for key, value in values.items() if value is not None}
 
     def to_yaml(self) -> Any:
         """Plain data that reads back as this distribution."""
-        return {self.name: self.argument()}
+        return {self.name: self.argument()} if self.field_names() else self.name
 
     @classmethod
-    @abstractmethod
     def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:
         """JSON Schema of the argument; ``constant`` is the schema of one value of the field."""
+        del constant
+        whole = _without_titles(TypeAdapter(cls).json_schema())
+        parts: list[dict[str, Any]] = list(whole.get("properties", {}).values())
+        nothing = {"type": "null"}
+        if not parts:
+            return nothing
+        if cls.needs:
+            count = len(parts)
+            lengths = {"minItems": count, "maxItems": count, "description": cls.needs}
+            return {"type": "array", "items": parts[0], **lengths}
+        if len(parts) == 1:
+            return {"anyOf": [parts[0], nothing]} if cls.bare else parts[0]
+        kept = ("type", "properties", "required", "additionalProperties")
+        return {key: whole[key] for key in kept}
+
+    @classmethod
+    def field_names(cls) -> dict[str, str]:
+        """Attributes, and their keys in YAML."""
+        return {name: info.alias or name for name, info in cls.__pydantic_fields__.items()}
 
 
 class Numeric(Distribution[T_co]):
@@ -144,6 +197,56 @@ class Numeric(Distribution[T_co]):
     @abstractmethod
     def support(self) -> tuple[float, float]:
         """Smallest and largest value that can be drawn."""
+
+
+CONFIG = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+D = TypeVar("D", bound=Distribution[Any])
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field, Field))
+def parameters(cls: type[D]) -> type[D]:
+    """Make a distribution a frozen dataclass whose fields pydantic validates.
+
+    Its constructor raises Malformed.
+    """
+    made = cast("type[D]", pydantic_dataclass(frozen=True, config=CONFIG)(cls))
+    validate: Callable[..., None] = made.__init__
+
+    @wraps(validate)
+    def init(self: D, /, *arguments: Any, **named: Any) -> None:
+        try:
+            validate(self, *arguments, **named)
+        except ValidationError as error:
+            raise _malformed(error, made) from None
+
+    # Assigned this way because type checkers take constructors for immutable.
+    setattr(made, "__init__", init)  # noqa: B010
+    return made
+
+
+def reader(annotation: Any) -> Callable[[Any], Any]:
+    """A function that validates a plain value as a type, and raises Malformed."""
+    adapter: TypeAdapter[Any] = TypeAdapter(annotation, config=CONFIG)
+
+    def read_value(value: Any) -> Any:
+        try:
+            return adapter.validate_python(value)
+        except ValidationError as error:
+            raise _malformed(error) from None
+
+    return read_value
+
+
+def sized(count: int, expectation: str) -> BeforeValidator:
+    """Accept a list of ``count`` items only; ``expectation`` begins the message."""
+    return BeforeValidator(lambda value: tuple(_require_items(value, count, expectation)))
+
+
+Vector = Annotated[tuple[float, float, float], sized(3, "expected three numbers [x, y, z]")]
+"""Three finite numbers."""
+
+read_number = reader(float)
 
 
 def read(value: Any, kind: Kind[T]) -> Distribution[T]:
@@ -162,6 +265,8 @@ def read(value: Any, kind: Kind[T]) -> Distribution[T]:
             return distribution(value).from_yaml(None, kind)
         if did_you_mean(value, known):
             raise _unknown(value, kind)
+    if kind.of_number and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return distribution(kind.of_number).from_yaml(value, kind)
     return distribution("constant").from_yaml(value, kind)
 
 
@@ -175,8 +280,15 @@ def _read_mapping(value: Mapping[str, Any], kind: Kind[T]) -> Distribution[T]:
     ((name, argument),) = value.items()
     if name not in known:
         raise _unknown(name, kind, (name,))
-    with inside(name):
+    try:
         return distribution(name).from_yaml(argument, kind)
+    except Malformed as error:
+        raise below(error, name) from None
+
+
+def below(error: Malformed, *path: str | int) -> Malformed:
+    """The same fault, seen from further up."""
+    return Malformed(error.fact, (*path, *error.path), at_key=error.at_key)
 
 
 def _unknown(name: str, kind: Kind[Any], path: tuple[str, ...] = ()) -> Malformed:
@@ -211,69 +323,10 @@ def names_of(kind: str) -> tuple[str, ...]:
     return tuple(name for name in ordered if kind in distribution(name).kinds)
 
 
-def read_number(value: Any) -> float:
-    """A finite number; Malformed if it is anything else."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise Malformed(f"expected a number, got {shown(value)}")
-    if not math.isfinite(value):
-        raise Malformed(f"expected a finite number, got {value}")
-    return float(value)
-
-
-def read_whole_number(value: Any) -> int:
-    """A whole number; Malformed if it is anything else."""
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise Malformed(f"expected a whole number, got {shown(value)}")
-    return value
-
-
-def read_range(value: Any, name: str, item: Callable[[Any], T]) -> tuple[T, T]:
-    """Two values ``[low, high]``; their order is the distribution's business."""
-    if not isinstance(value, (list, tuple)) or len(value) != 2:
-        raise Malformed(f"{name} needs two numbers [low, high], got {shown(value)}")
-    with inside(0):
-        low = item(value[0])
-    with inside(1):
-        high = item(value[1])
-    return low, high
-
-
-def read_vector(value: Any, what: str = "three numbers [x, y, z]") -> tuple[float, float, float]:
-    """Three finite numbers."""
-    if not isinstance(value, (list, tuple)) or len(value) != 3:
-        raise Malformed(f"expected {what}, got {shown(value)}")
-    parts: list[float] = []
-    for i, item in enumerate(value):
-        with inside(i):
-            parts.append(read_number(item))
-    return parts[0], parts[1], parts[2]
-
-
-def read_fields(
-    value: Any, name: str, required: tuple[str, ...], optional: tuple[str, ...] = ()
-) -> Mapping[str, Any]:
-    """A mapping that has all required keys and no others than the optional ones."""
-    known = (*required, *optional)
-    if not isinstance(value, Mapping):
-        raise Malformed(f"{name} needs a mapping with {', '.join(known)}, got {shown(value)}")
-    for key in value:
-        if key not in known:
-            raise Malformed(
-                f"unknown key {shown(key)} of {name}; expected {', '.join(known)}"
-                f"{did_you_mean(key, known)}",
-                (key,),
-                at_key=True,
-            )
-    for key in required:
-        if key not in value:
-            raise Malformed(f"{name} needs '{key}'")
-    return value
-
-
-def in_order(name: str, low: float, high: float) -> None:
-    """Malformed unless ``low <= high``."""
+def require_order(name: str, low: float, high: float, *path: str) -> None:
+    """Raise Malformed, at a path, unless ``low <= high``."""
     if not low <= high:
-        raise Malformed(f"{name} needs low <= high, got [{number(low)}, {number(high)}]")
+        raise Malformed(f"{name} needs low <= high, got [{number(low)}, {number(high)}]", path)
 
 
 def stable(value: float) -> float:
@@ -283,3 +336,55 @@ def stable(value: float) -> float:
     grid they agree.
     """
     return float(f"{value:.12g}")
+
+
+def to_plain(value: Any) -> Any:
+    """A value with lists instead of tuples, as YAML has them."""
+    return [to_plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+def _require_items(value: Any, count: int, expectation: str) -> list[Any] | tuple[Any, ...]:
+    if not isinstance(value, (list, tuple)) or len(value) != count:
+        raise Malformed(f"{expectation}, got {shown(value)}")
+    return value
+
+
+def _malformed(error: ValidationError, cls: type[Distribution[Any]] | None = None) -> Malformed:
+    """The first fault that pydantic found, unknown keys before all others."""
+    unknown_key = "unexpected_keyword_argument"
+    details = error.errors(include_url=False)
+    detail = min(details, key=lambda detail: detail["type"] != unknown_key)
+    path = detail["loc"]
+    if cls is not None and len(cls.field_names()) == 1:
+        path = path[1:]
+    cause = detail.get("ctx", {}).get("error")
+    if isinstance(cause, Malformed):
+        return below(cause, *path)
+    if cls is not None and detail["type"] == unknown_key:
+        known = list(cls.field_names().values())
+        key = str(path[-1])
+        return Malformed(
+            f"unknown key {shown(key)} of {cls.name}; expected {', '.join(known)}"
+            f"{did_you_mean(key, known)}",
+            path,
+            at_key=True,
+        )
+    if cls is not None and detail["type"] == "missing":
+        return Malformed(f"{cls.name} needs '{path[-1]}'")
+    return Malformed(_wrong_number(detail), path)
+
+
+def _wrong_number(detail: ErrorDetails) -> str:
+    if detail["type"] == "finite_number":
+        return f"expected a finite number, got {detail['input']}"
+    expected = "a whole number" if detail["type"].startswith("int") else "a number"
+    return f"expected {expected}, got {shown(detail['input'])}"
+
+
+def _without_titles(schema: Any) -> Any:
+    """A JSON Schema of pydantic's without the titles and defaults that it adds."""
+    if isinstance(schema, list):
+        return [_without_titles(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {k: _without_titles(v) for k, v in schema.items() if k not in ("title", "default")}

@@ -7,34 +7,33 @@ from collections.abc import Mapping
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, cast
+
+from pydantic import Field
 
 from generator.config.distributions.base import (
     Kind,
     Malformed,
     Numeric,
     T_co,
-    inside,
+    below,
+    parameters,
     read_number,
+    to_plain,
 )
 from generator.config.scalars import flow, number, shown
 
 if TYPE_CHECKING:
     from generator.core.streams import Rng
 
-EVERY_KIND = frozenset(
-    {"number", "whole number", "name", "flag", "rotation", "direction", "position"}
-)
+EVERY_KIND = ("number", "whole number", "name", "flag", "rotation", "direction", "position")
 
 
 @dataclass(frozen=True)
-class Constant(Numeric[T_co]):
+class Constant(Numeric[T_co], name="constant", kinds=EVERY_KIND):
     """Always the same value. A plain value in YAML means this."""
 
     value: T_co
-
-    name: ClassVar[str] = "constant"
-    kinds: ClassVar[frozenset[str]] = EVERY_KIND
 
     def draw(self, rng: Rng) -> T_co:  # noqa: ARG002
         """The value; uses no random number."""
@@ -57,13 +56,9 @@ class Constant(Numeric[T_co]):
         """Read a value of the field."""
         return cls(kind.read(argument))
 
-    def argument(self) -> Any:
-        """The value."""
-        return _plain(self.value)
-
     def to_yaml(self) -> Any:
         """The value itself: constants need no name."""
-        return _plain(self.value)
+        return to_plain(self.value)
 
     @classmethod
     def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:
@@ -72,20 +67,17 @@ class Constant(Numeric[T_co]):
 
 
 @dataclass(frozen=True, init=False, repr=False)
-class Choice(Numeric[T_co]):
+class Choice(Numeric[T_co], name="choice", kinds=EVERY_KIND):
     """One of the given values, equally likely or in proportion to weights.
 
     Attributes:
-        values: What can be drawn.
+        values: All values, those without weight included.
         weights: Relative frequency of each value, >= 0; they need not add up to 1.
     """
 
     values: tuple[T_co, ...]
     weights: tuple[float, ...]
     _cumulative: tuple[float, ...] = field(compare=False)
-
-    name: ClassVar[str] = "choice"
-    kinds: ClassVar[frozenset[str]] = EVERY_KIND
 
     def __init__(self, values: Items[T_co] | Mapping[T_co, float]) -> None:
         """Accept a sequence (equal weights) or ``{value: weight}``, whose order means nothing."""
@@ -94,7 +86,7 @@ class Choice(Numeric[T_co]):
             # Documents that are kept have their keys sorted: draws must not depend on it.
             values = dict(sorted(values.items(), key=lambda item: shown(item[0])))
         weights = values.values() if isinstance(values, Mapping) else [1.0] * len(values)
-        object.__setattr__(self, "values", tuple(_plain_frozen(v) for v in values))
+        object.__setattr__(self, "values", _freeze(values))
         object.__setattr__(self, "weights", tuple(read_number(w) for w in weights))
         object.__setattr__(self, "_cumulative", tuple(accumulate(self.weights)))
         if not self.values:
@@ -122,8 +114,7 @@ class Choice(Numeric[T_co]):
 
     def support(self) -> tuple[float, float]:
         """Smallest and largest value that has weight."""
-        numbers = [_as_number(v) for v in self.outcomes()]
-        return min(numbers), max(numbers)
+        return _extremes(self.outcomes())
 
     def outcomes(self) -> tuple[T_co, ...]:
         """The values that have weight."""
@@ -132,22 +123,28 @@ class Choice(Numeric[T_co]):
     @classmethod
     def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Choice[Any]:
         """Read a list of values, or ``{value: weight}``."""
-        if isinstance(argument, Mapping):
-            weighted: dict[Any, float] = {}
-            for key, weight in argument.items():
-                with inside(key):
-                    weighted[kind.read_key(key)] = read_number(weight)
-            return cls(weighted)
-        return cls(_read_items(argument, cls.name, kind))
+        if not isinstance(argument, Mapping):
+            return cls(_read_items(argument, cls.name, kind))
+        weighted: dict[Any, float] = {}
+        for key, weight in argument.items():
+            try:
+                weighted[kind.read_key(key)] = read_number(weight)
+            except Malformed as error:
+                raise below(error, key) from None
+        return cls(weighted)
 
     def argument(self) -> Any:
         """A list of values; a mapping where weights differ."""
         if len(set(self.weights)) == 1:
-            return [_plain(v) for v in self.values]
+            return to_plain(self.values)
         return {
             v if isinstance(v, str) else flow(v): w
             for v, w in zip(self.values, self.weights, strict=True)
         }
+
+    def to_yaml(self) -> Any:
+        """Plain data that reads back as this distribution."""
+        return {self.name: self.argument()}
 
     def __repr__(self) -> str:
         """As it is constructed."""
@@ -172,17 +169,14 @@ class Choice(Numeric[T_co]):
 
 
 @dataclass(frozen=True)
-class Sequence(Numeric[T_co]):
+class Sequence(Numeric[T_co], name="sequence", kinds=EVERY_KIND):
     """The given values in turn, by the number of the scene or sample; uses no random number."""
 
     values: tuple[T_co, ...]
 
-    name: ClassVar[str] = "sequence"
-    kinds: ClassVar[frozenset[str]] = EVERY_KIND
-
     def __post_init__(self) -> None:
         """Refuse an empty list."""
-        object.__setattr__(self, "values", tuple(_plain_frozen(v) for v in self.values))
+        object.__setattr__(self, "values", _freeze(self.values))
         if not self.values:
             raise Malformed("sequence needs at least one value")
 
@@ -196,8 +190,7 @@ class Sequence(Numeric[T_co]):
 
     def support(self) -> tuple[float, float]:
         """Smallest and largest value."""
-        numbers = [_as_number(v) for v in self.values]
-        return min(numbers), max(numbers)
+        return _extremes(self.values)
 
     def outcomes(self) -> tuple[T_co, ...]:
         """All values."""
@@ -208,9 +201,9 @@ class Sequence(Numeric[T_co]):
         """Read a list of values."""
         return cls(tuple(_read_items(argument, cls.name, kind)))
 
-    def argument(self) -> list[Any]:
-        """A list of values."""
-        return [_plain(v) for v in self.values]
+    def to_yaml(self) -> Any:
+        """Plain data that reads back as this distribution."""
+        return {self.name: to_plain(self.values)}
 
     @classmethod
     def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:
@@ -218,18 +211,14 @@ class Sequence(Numeric[T_co]):
         return {"type": "array", "items": dict(constant), "minItems": 1}
 
 
-@dataclass(frozen=True)
-class Probability(Numeric[bool]):
+@parameters
+class Probability(Numeric[bool], name="probability", kinds=("flag",)):
     """True with the given probability, else false."""
 
-    p: float
-
-    name: ClassVar[str] = "probability"
-    kinds: ClassVar[frozenset[str]] = frozenset({"flag"})
+    p: float = Field(json_schema_extra={"minimum": 0, "maximum": 1})
 
     def __post_init__(self) -> None:
-        """Refuse what is no probability."""
-        object.__setattr__(self, "p", read_number(self.p))
+        """Refuse numbers that are no probability."""
         if not 0 <= self.p <= 1:
             raise Malformed(f"probability needs a number in [0, 1], got {number(self.p)}")
 
@@ -246,40 +235,29 @@ class Probability(Numeric[bool]):
         return float(self.p == 1), float(self.p > 0)
 
     def outcomes(self) -> tuple[bool, ...]:
-        """What can be drawn."""
+        """The values that can be drawn."""
         return tuple(v for v, share in ((False, 1 - self.p), (True, self.p)) if share > 0)
-
-    @classmethod
-    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Probability:  # noqa: ARG003
-        """Read one number."""
-        return cls(read_number(argument))
-
-    def argument(self) -> float:
-        """The probability."""
-        return self.p
-
-    @classmethod
-    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
-        """A number in [0, 1]."""
-        return {"type": "number", "minimum": 0, "maximum": 1}
 
 
 def _read_items(argument: Any, name: str, kind: Kind[Any]) -> list[Any]:
     if not isinstance(argument, (list, tuple)):
         raise Malformed(f"{name} needs a list of values, got {shown(argument)}")
     items = []
-    for i, item in enumerate(argument):
-        with inside(i):
+    for number_, item in enumerate(argument):
+        try:
             items.append(kind.read(item))
+        except Malformed as error:
+            raise below(error, number_) from None
     return items
 
 
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
+def _freeze(values: Any) -> tuple[Any, ...]:
+    return tuple(tuple(value) if isinstance(value, list) else value for value in values)
 
 
-def _plain_frozen(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+def _extremes(values: Items[object]) -> tuple[float, float]:
+    numbers = [_as_number(value) for value in values]
+    return min(numbers), max(numbers)
 
 
 def _as_number(value: object) -> float:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
+from pydantic import TypeAdapter
 from pydantic_core import PydanticCustomError, core_schema
 
 from generator.config.distributions.base import (
@@ -14,14 +15,14 @@ from generator.config.distributions.base import (
     Kind,
     Malformed,
     Numeric,
+    Vector,
     distribution,
     names_of,
     read,
     read_number,
-    read_vector,
-    read_whole_number,
+    reader,
 )
-from generator.config.distributions.space import read_direction, read_quaternion
+from generator.config.distributions.space import UnitQuaternion, UnitVector
 from generator.config.scalars import number, resolve, shown
 from generator.core.se3 import Quaternion, Vec3
 
@@ -173,41 +174,34 @@ def json_schema_of(kind: Kind[Any]) -> dict[str, Any]:
     return {"anyOf": [{**kind.schema, "description": kind.expected}, distributions]}
 
 
-def _read_scalar(value: Any) -> float:
-    if isinstance(value, (list, tuple)) and len(value) == 2:
-        raise Malformed(
-            f"expected a number or a distribution, got {shown(value)}"
-            f" (did you mean {{uniform: {shown(value)}}}?)"
-        )
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise Malformed(f"expected a number or a distribution, got {shown(value)}")
-    return read_number(value)
+def _plain(
+    expected: str, types: tuple[type, ...], hint: Callable[[Any], str]
+) -> Callable[[Any], Any]:
+    """A reader of plain values of some types; ``hint`` tells what else may have been meant."""
+
+    def read_plain(value: Any) -> Any:
+        if type(value) not in types:
+            raise Malformed(f"expected {expected}, got {shown(value)}{hint(value)}")
+        return read_number(value) if float in types else value
+
+    return read_plain
 
 
-def _read_count(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        hint = ""
-        if isinstance(value, (list, tuple)) and len(value) == 2:
-            hint = f" (did you mean {{uniform_integer: {shown(value)}}}?)"
-        raise Malformed(f"expected a whole number or a distribution, got {shown(value)}{hint}")
-    return read_whole_number(value)
+def _range_hint(name: str) -> Callable[[Any], str]:
+    def hint(value: Any) -> str:
+        is_range = isinstance(value, (list, tuple)) and len(value) == 2
+        return f" (did you mean {{{name}: {shown(value)}}}?)" if is_range else ""
+
+    return hint
 
 
-def _read_name(value: Any) -> str:
-    if not isinstance(value, str):
-        hint = "; put it in quotes" if isinstance(value, (bool, int, float)) else ""
-        raise Malformed(f"expected a name or a distribution, got {shown(value)}{hint}")
-    return value
+def _quote_hint(value: Any) -> str:
+    return "; put it in quotes" if isinstance(value, (bool, int, float)) else ""
 
 
-def _read_flag(value: Any) -> bool:
-    if not isinstance(value, bool):
-        hint = {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(str(value).lower())
-        raise Malformed(
-            f"expected true, false or {{probability: p}}, got {shown(value)}"
-            f"{f' (did you mean {hint}?)' if hint else ''}"
-        )
-    return value
+def _flag_hint(value: Any) -> str:
+    meant = {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(str(value).lower())
+    return f" (did you mean {meant}?)" if meant else ""
 
 
 def _as_key(kind_read: Any) -> Any:
@@ -225,14 +219,17 @@ def _no_key(text: str) -> Any:
     raise Malformed(f"weights by value need a number or a name, got {shown(text)}; use a list")
 
 
-_VECTOR: Mapping[str, Any] = {
-    "type": "array",
-    "items": {"type": "number"},
-    "minItems": 3,
-    "maxItems": 3,
-}
+def _spatial(name: str, expected: str, annotation: Any, example: list[float]) -> Kind[Any]:
+    """A kind whose constants are lists of numbers."""
+    schema = TypeAdapter(annotation).json_schema()
+    return Kind(name, expected, reader(annotation), _no_key, schema, example)
 
-_QUATERNION: Mapping[str, Any] = {**_VECTOR, "minItems": 4, "maxItems": 4}
+
+_read_scalar = _plain("a number or a distribution", (int, float), _range_hint("uniform"))
+_read_count = _plain("a whole number or a distribution", (int,), _range_hint("uniform_integer"))
+_read_name = _plain("a name or a distribution", (str,), _quote_hint)
+_read_flag = _plain("true, false or {probability: p}", (bool,), _flag_hint)
+_read_chance = _plain("a probability in [0, 1], true or false", (bool,), _flag_hint)
 
 NUMBER = Kind("number", "a number", _read_scalar, _as_key(_read_scalar), {"type": "number"}, 1)
 WHOLE_NUMBER = Kind(
@@ -240,16 +237,17 @@ WHOLE_NUMBER = Kind(
 )
 NAME = Kind("name", "a name", _read_name, _read_name, {"type": "string"}, "example")
 FLAG = Kind("flag", "true or false", _read_flag, _as_key(_read_flag), {"type": "boolean"}, True)
-ROTATION = Kind(
-    "rotation",
-    "a rotation [w, x, y, z]",
-    read_quaternion,
-    _no_key,
-    _QUATERNION,
-    [1, 0, 0, 0],
+CHANCE = replace(
+    FLAG,
+    expected="a probability in [0, 1], true or false",
+    read=_read_chance,
+    schema={"anyOf": [{"type": "number", "minimum": 0, "maximum": 1}, FLAG.schema]},
+    example=0.5,
+    of_number="probability",
 )
-DIRECTION = Kind("direction", "a direction [x, y, z]", read_direction, _no_key, _VECTOR, [0, 0, 1])
-POSITION = Kind("position", "a position [x, y, z]", read_vector, _no_key, _VECTOR, [0, 0, 1])
+ROTATION = _spatial("rotation", "a rotation [w, x, y, z]", UnitQuaternion, [1, 0, 0, 0])
+DIRECTION = _spatial("direction", "a direction [x, y, z]", UnitVector, [0, 0, 1])
+POSITION = _spatial("position", "a position [x, y, z]", Vector, [0, 0, 1])
 
 Scalar = Annotated[Numeric[float], FieldOf(NUMBER)]
 """A number, or a distribution over numbers."""
@@ -259,6 +257,8 @@ Name = Annotated[Distribution[str], FieldOf(NAME)]
 """A name, or a distribution over names."""
 Flag = Annotated[Numeric[bool], FieldOf(FLAG)]
 """True, false, or a distribution over both."""
+Chance = Annotated[Numeric[bool], FieldOf(CHANCE)]
+"""A Flag whose plain number is the probability of true."""
 Rotation = Annotated[Distribution[Quaternion], FieldOf(ROTATION)]
 """A unit quaternion (scalar first), or a distribution over rotations."""
 Direction = Annotated[Distribution[Vec3], FieldOf(DIRECTION)]

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field, WithJsonSchema
 
 from generator.config.distributions.base import (
-    Kind,
     Malformed,
     Numeric,
-    in_order,
-    inside,
-    read_fields,
-    read_number,
-    read_range,
-    read_whole_number,
+    parameters,
+    require_order,
+    sized,
     stable,
 )
 from generator.config.scalars import number
@@ -28,23 +24,20 @@ if TYPE_CHECKING:
 _STANDARD = NormalDist()
 _LEAST_PROBABILITY = 1e-280
 """Of a clip range: what is smaller could be rounded to nothing while drawing."""
-_RANGE_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+_PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+_Above0 = Annotated[float, WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
 
 
-@dataclass(frozen=True)
-class Uniform(Numeric[float]):
+@parameters
+class Uniform(Numeric[float], name="uniform", kinds=("number",), needs="two numbers [low, high]"):
     """Every number between low and high is equally likely."""
 
     low: float
     high: float
 
-    name: ClassVar[str] = "uniform"
-    kinds: ClassVar[frozenset[str]] = frozenset({"number"})
-
     def __post_init__(self) -> None:
         """Refuse a reversed range."""
-        _set_finite(self, "low", "high")
-        in_order(self.name, self.low, self.high)
+        require_order(self.name, self.low, self.high)
         if math.isinf(self.high - self.low):
             raise Malformed(f"uniform needs a finite range, got {self.argument()}")
 
@@ -60,40 +53,27 @@ class Uniform(Numeric[float]):
         """Smallest and largest value."""
         return self.low, self.high
 
-    @classmethod
-    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Uniform:  # noqa: ARG003
-        """Read ``[low, high]``."""
-        return cls(*read_range(argument, cls.name, read_number))
 
-    def argument(self) -> list[float]:
-        """``[low, high]``."""
-        return [self.low, self.high]
-
-    @classmethod
-    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
-        """Two numbers."""
-        return {**_RANGE_SCHEMA, "description": "[low, high]"}
-
-
-@dataclass(frozen=True)
-class LogUniform(Numeric[float]):
+@parameters
+class LogUniform(
+    Numeric[float],
+    name="log_uniform",
+    kinds=("number",),
+    needs="two numbers [low, high], both above 0",
+):
     """Every ratio is equally likely: 1 to 2 as often as 10 to 20. For scales and intensities."""
 
-    low: float
-    high: float
-
-    name: ClassVar[str] = "log_uniform"
-    kinds: ClassVar[frozenset[str]] = frozenset({"number"})
+    low: _Above0
+    high: _Above0
 
     def __post_init__(self) -> None:
         """Refuse a reversed range and one that touches zero."""
-        _set_finite(self, "low", "high")
         if not self.low > 0 or not self.high > 0:
             raise Malformed(
                 f"log_uniform needs low > 0 and high > 0, "
                 f"got [{number(self.low)}, {number(self.high)}]"
             )
-        in_order(self.name, self.low, self.high)
+        require_order(self.name, self.low, self.high)
 
     def draw(self, rng: Rng) -> float:
         """One value."""
@@ -113,24 +93,9 @@ class LogUniform(Numeric[float]):
         """Smallest and largest value."""
         return self.low, self.high
 
-    @classmethod
-    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> LogUniform:  # noqa: ARG003
-        """Read ``[low, high]``."""
-        return cls(*read_range(argument, cls.name, read_number))
 
-    def argument(self) -> list[float]:
-        """``[low, high]``."""
-        return [self.low, self.high]
-
-    @classmethod
-    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
-        """Two positive numbers."""
-        items = {"type": "number", "exclusiveMinimum": 0}
-        return {**_RANGE_SCHEMA, "items": items, "description": "[low, high], both above 0"}
-
-
-@dataclass(frozen=True, init=False)
-class Normal(Numeric[float]):
+@parameters
+class Normal(Numeric[float], name="normal", kinds=("number",)):
     """Gaussian; with ``clip`` it is truncated: values outside are not drawn, none pile up.
 
     Drawn by inverting the cumulative distribution, so that each value costs exactly one random
@@ -141,27 +106,23 @@ class Normal(Numeric[float]):
         clip: ``(low, high)``, or None.
     """
 
-    center: float
-    stddev: float
-    clip: tuple[float, float] | None
+    center: float = Field(alias="mean")
+    stddev: float = Field(json_schema_extra={"minimum": 0})
+    clip: Annotated[
+        tuple[float, float] | None,
+        sized(2, "clip needs two numbers [low, high]"),
+        WithJsonSchema({**_PAIR, "description": "[low, high]: truncated to it"}),
+    ] = None
 
-    name: ClassVar[str] = "normal"
-    kinds: ClassVar[frozenset[str]] = frozenset({"number"})
-
-    def __init__(self, mean: float, stddev: float, clip: tuple[float, float] | None = None) -> None:
+    def __post_init__(self) -> None:
         """Refuse a negative deviation, and a clip range that holds no probability."""
-        object.__setattr__(self, "center", read_number(mean))
-        object.__setattr__(self, "stddev", read_number(stddev))
-        object.__setattr__(self, "clip", clip)
         if self.stddev < 0:
             raise Malformed(f"normal needs stddev >= 0, got {number(self.stddev)}")
-        if clip is not None:
-            low, high = (read_number(v) for v in clip)
-            object.__setattr__(self, "clip", (low, high))
-            self._refuse_empty(low, high)
+        if self.clip is not None:
+            self._refuse_empty(*self.clip)
 
     def _refuse_empty(self, low: float, high: float) -> None:
-        in_order("normal clip", low, high)
+        require_order("normal clip", low, high)
         if low < high and self.stddev > 0:
             below, above, _ = self._tail()
             empty = not above - below > _LEAST_PROBABILITY
@@ -212,55 +173,22 @@ class Normal(Numeric[float]):
             return _cumulative(-b), _cumulative(-a), -1
         return _cumulative(a), _cumulative(b), 1
 
-    @classmethod
-    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Normal:  # noqa: ARG003
-        """Read ``{mean, stddev, clip}``; clip may be missing."""
-        fields = read_fields(argument, cls.name, ("mean", "stddev"), ("clip",))
-        with inside("mean"):
-            mean = read_number(fields["mean"])
-        with inside("stddev"):
-            stddev = read_number(fields["stddev"])
-        clip = None
-        if "clip" in fields:
-            with inside("clip"):
-                clip = read_range(fields["clip"], "clip", read_number)
-        return cls(mean, stddev, clip)
 
-    def argument(self) -> dict[str, Any]:
-        """``{mean, stddev, clip}``."""
-        clip = {} if self.clip is None else {"clip": list(self.clip)}
-        return {"mean": self.center, "stddev": self.stddev, **clip}
-
-    @classmethod
-    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
-        """A mapping of three."""
-        return {
-            "type": "object",
-            "properties": {
-                "mean": {"type": "number"},
-                "stddev": {"type": "number", "minimum": 0},
-                "clip": {**_RANGE_SCHEMA, "description": "[low, high]: truncated to it"},
-            },
-            "required": ["mean", "stddev"],
-            "additionalProperties": False,
-        }
-
-
-@dataclass(frozen=True)
-class UniformInteger(Numeric[int]):
+@parameters
+class UniformInteger(
+    Numeric[int],
+    name="uniform_integer",
+    kinds=("number", "whole number"),
+    needs="two whole numbers [low, high]",
+):
     """Every whole number from low to high, both included, is equally likely."""
 
     low: int
     high: int
 
-    name: ClassVar[str] = "uniform_integer"
-    kinds: ClassVar[frozenset[str]] = frozenset({"number", "whole number"})
-
     def __post_init__(self) -> None:
         """Refuse a reversed range."""
-        read_whole_number(self.low)
-        read_whole_number(self.high)
-        in_order(self.name, self.low, self.high)
+        require_order(self.name, self.low, self.high)
 
     def draw(self, rng: Rng) -> int:
         """One value."""
@@ -274,27 +202,7 @@ class UniformInteger(Numeric[int]):
         """Smallest and largest value."""
         return self.low, self.high
 
-    @classmethod
-    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> UniformInteger:  # noqa: ARG003
-        """Read ``[low, high]``."""
-        return cls(*read_range(argument, cls.name, read_whole_number))
-
-    def argument(self) -> list[int]:
-        """``[low, high]``."""
-        return [self.low, self.high]
-
-    @classmethod
-    def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:  # noqa: ARG003
-        """Two whole numbers."""
-        items = {"type": "integer"}
-        return {**_RANGE_SCHEMA, "items": items, "description": "[low, high], both included"}
-
 
 def _cumulative(z: float) -> float:
     """Standard normal cumulative distribution, with all its digits in the lower tail."""
     return 0.5 * math.erfc(-z / math.sqrt(2.0))
-
-
-def _set_finite(distribution: Numeric[Any], *names: str) -> None:
-    for name in names:
-        object.__setattr__(distribution, name, read_number(getattr(distribution, name)))

@@ -1,0 +1,83 @@
+"""Members of object groups: how they enter a scene, leave it, and get their instance ids."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from generator.core.interfaces import AssetIndex
+from generator.core.scene import Body, Instance, Motion, ObjectGroup, Scene
+from generator.core.se3 import SE3
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One thing of a group, before it has a name and an instance id.
+
+    Attributes:
+        asset: Mesh asset id.
+        scale: Uniform factor on the mesh.
+        collides: Whether physics sees it.
+    """
+
+    asset: str
+    T_world_body: SE3
+    scale: float = 1.0
+    motion: Motion = "static"
+    collides: bool = True
+    mass_kg: float = 0.0
+
+
+def add_members(
+    scene: Scene, group: ObjectGroup, members: Sequence[Member], assets: AssetIndex, first: int = 0
+) -> Scene:
+    """The scene with a body ``group/k`` and an instance for every member.
+
+    Args:
+        scene: Where they are added.
+        group: The group they belong to.
+        members: In order.
+        assets: The library, which knows their categories.
+        first: Number ``k`` of the first one.
+    """
+    ids = free_instance_ids(scene, len(members))
+    bodies = []
+    instances = []
+    for number, (member, instance_id) in enumerate(zip(members, ids, strict=True), first):
+        body = Body(
+            name=f"{group.name}/{number}",
+            asset=member.asset,
+            T_world_body=member.T_world_body,
+            scale=member.scale,
+            instance_id=instance_id,
+            group=group.name,
+            motion=member.motion,
+            collides=member.collides,
+            mass_kg=member.mass_kg,
+        )
+        category = assets.get(member.asset).category
+        bodies.append(body)
+        instances.append(
+            Instance(instance_id, body.name, category, 0, member.asset, annotated=group.annotated)
+        )
+    return replace(
+        scene,
+        bodies=(*scene.bodies, *bodies),
+        instances=(*scene.instances, *instances),
+    )
+
+
+def remove_members(scene: Scene, group: str) -> Scene:
+    """The scene without the members of the group of that name."""
+    removed = {body.instance_id for body in scene.bodies if body.group == group}
+    return replace(
+        scene,
+        bodies=tuple(body for body in scene.bodies if body.group != group),
+        instances=tuple(i for i in scene.instances if i.instance_id not in removed),
+    )
+
+
+def free_instance_ids(scene: Scene, count: int) -> list[int]:
+    """The smallest instance ids that nothing in the scene has, in ascending order."""
+    taken = {instance.instance_id for instance in scene.instances}
+    return [k for k in range(1, len(taken) + count + 1) if k not in taken][:count]

@@ -1,0 +1,79 @@
+"""Names in randomizers that stand for nothing are refused before a run, with their place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from generator.assemble.recipe import PipelineFactory
+from generator.assemble.spec import load_spec
+from generator.core.errors import ConfigError
+
+HEAD = (
+    "template: tabletop\n"
+    "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}]\n"
+    "randomizers:\n"
+)
+
+
+def refusal(folder: Path, *lines: str) -> str:
+    """The message of a configuration with these randomizers."""
+    path = folder / "mine.yaml"
+    path.write_text(HEAD + "".join(f"  - {line}\n" for line in lines))
+    factory = PipelineFactory(load_spec(str(path)), n=1)
+    with pytest.raises(ConfigError) as caught:
+        assert factory.nominal
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "place", "fact"),
+    [
+        (
+            "{type: textures, name: t, textures: [wod]}",
+            "mine.yaml:4:41: randomizers[0].textures",
+            "there is no texture 'wod'",
+        ),
+        (
+            "{type: backdrop, name: room, walls: [plastre]}",
+            "mine.yaml:4:41: randomizers[0].walls",
+            "there is no texture 'plastre'",
+        ),
+        (
+            "{type: environment, name: e, images: [studoi]}",
+            "mine.yaml:4:42: randomizers[0].images",
+            "no environment is studoi",
+        ),
+        (
+            "{type: objects, name: cluter}",
+            "mine.yaml:4:5: randomizers[0].group",
+            "no object group 'cluter'",
+        ),
+        (
+            "{type: objects, name: clutter, weights: {mugg: 2}}",
+            "mine.yaml:4:45: randomizers[0].weights",
+            "no category 'mugg'",
+        ),
+    ],
+)
+def test_an_unknown_name_is_refused_with_its_place_before_anything_runs(
+    tmp_path: Path, line: str, place: str, fact: str
+) -> None:
+    """File, line, column and field; the known names."""
+    message = refusal(tmp_path, line)
+
+    assert place in message
+    assert fact in message
+    assert "expected one of" in message
+
+
+def test_all_unknown_names_are_told_at_once(tmp_path: Path) -> None:
+    """One problem per randomizer, in the order of the file."""
+    message = refusal(
+        tmp_path,
+        "{type: textures, name: t, textures: [wod]}",
+        "{type: objects, name: cluter}",
+    )
+
+    assert message.index("mine.yaml:4:") < message.index("mine.yaml:5:")
