@@ -142,7 +142,10 @@ class GripperEntry(Strict):
     grasp_offset_m: float
     """From the link's origin to the point between the finger tips, along the link's Z."""
     finger_joints: tuple[str, ...]
+    """Joints that close the hand; those that mimic one of them need not be listed."""
     stroke_m: Annotated[float, Field(gt=0.0)]
+    open_at: Literal["lower", "upper"] = "upper"
+    """Limit of the finger joints at which the hand is open (Robotiq's: lower)."""
 
 
 class RobotEntry(Origin):

@@ -170,6 +170,8 @@ class Joint:
         lower, upper: Limits [rad or m].
         mimic: Name of the joint this one follows, or empty.
         speed_max: Limit of its speed [rad/s or m/s]; 0 = unknown.
+        mimic_multiplier, mimic_offset: A joint that follows another is at
+            ``multiplier * position + offset`` of that one [rad or m].
     """
 
     name: str
@@ -182,6 +184,8 @@ class Joint:
     upper: float
     mimic: str = ""
     speed_max: float = 0.0
+    mimic_multiplier: float = 1.0
+    mimic_offset: float = 0.0
 
     @property
     def movable(self) -> bool:
@@ -197,14 +201,16 @@ class Gripper:
         link: Link whose frame carries the grasp frame.
         T_link_grasp: Grasp frame: origin between the finger tips, Z out of the hand,
             Y the direction in which the fingers open.
-        finger_joints: Joints that open the gripper, with equal positions.
+        finger_joints: Joints that open the gripper, each over its whole range.
         stroke_m: Distance between the fingers when fully open; 0 is closed.
+        open_at: Limit of the finger joints at which the gripper is fully open.
     """
 
     link: str
     T_link_grasp: SE3
     finger_joints: tuple[str, ...]
     stroke_m: float
+    open_at: Literal["lower", "upper"] = "upper"
 
 
 @dataclass(frozen=True, slots=True)

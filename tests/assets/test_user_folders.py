@@ -12,6 +12,8 @@ from PIL import Image
 from generator.assets.library import open_library
 from generator.assets.primitives import box
 from generator.core.errors import AssetError, ConfigError
+from generator.core.kinematics import link_poses
+from generator.core.se3 import SE3
 
 ARM = """<robot name="arm">
   <link name="base"><visual><geometry><box size="0.2 0.2 0.1"/></geometry>
@@ -177,3 +179,56 @@ def test_textures_and_panoramas_can_be_listed(folder: Path, tmp_path: Path) -> N
     assert radiance[-1, 0] == pytest.approx([0.5] * 3, rel=0.01)
     with pytest.raises(AssetError, match="no texture"):
         library.texture("user/sky")
+
+
+HAND = """<robot name="hand">
+  <link name="palm"/>
+  <link name="left"><visual><geometry><box size="0.02 0.02 0.1"/></geometry></visual></link>
+  <link name="right"><visual><geometry><box size="0.02 0.02 0.1"/></geometry></visual></link>
+  <joint name="finger" type="revolute"><parent link="palm"/><child link="left"/>
+    <axis xyz="0 0 1"/><limit lower="0" upper="0.8"/></joint>
+  <joint name="knuckle" type="revolute"><parent link="palm"/><child link="right"/>
+    <axis xyz="0 0 1"/><limit lower="-0.9" upper="0.9"/>
+    <mimic joint="finger" multiplier="-1" offset="0.1"/></joint>
+</robot>"""
+HAND_INDEX = "robots: [{id: hand, file: hand.urdf, home: {%s}}]\n"
+
+
+def test_a_joint_that_mimics_another_has_its_multiplier_and_offset(
+    folder: Path, tmp_path: Path
+) -> None:
+    """At home 0.3 the follower is at -1 * 0.3 + 0.1 = -0.2, and its link is turned so far."""
+    (folder / "hand.urdf").write_text(HAND)
+    (folder / "assets.yaml").write_text(HAND_INDEX % "finger: 0.3")
+    robot = open_library([folder], cache_dir=tmp_path / "cache").robot("user/hand")
+    assert robot.home == pytest.approx((0.3, -0.2))
+    poses = link_poses(robot, SE3(), robot.home)
+    assert poses["right"].quaternion_wxyz == pytest.approx((0.99500417, 0.0, 0.0, -0.09983342))
+
+
+def test_a_follower_cannot_be_told_to_stand_elsewhere(folder: Path, tmp_path: Path) -> None:
+    """Home positions that contradict the URDF are refused."""
+    (folder / "hand.urdf").write_text(HAND)
+    (folder / "assets.yaml").write_text(HAND_INDEX % "finger: 0.3, knuckle: 0.3")
+    with pytest.raises(AssetError, match=r"'knuckle', which mimics 'finger' and is at -0\.2"):
+        open_library([folder], cache_dir=tmp_path / "cache").robot("user/hand")
+
+
+@pytest.mark.parametrize(
+    ("mimic", "fault"),
+    [
+        ('joint="fingr"', r"hand\.urdf:7:3: .*'knuckle' mimics 'fingr'.*did you mean 'finger'"),
+        ('joint="knuckle"', r"hand\.urdf:7:3: .*'knuckle' mimics itself"),
+        ('joint="finger" multiplier="x"', r"hand\.urdf:7:3: .*could not convert .*'x'"),
+        ('joint="finger" offset="nan"', r"hand\.urdf:7:3: .*'nan' is not a number"),
+    ],
+)
+def test_a_wrong_mimic_is_refused_with_its_place(
+    folder: Path, tmp_path: Path, mimic: str, fault: str
+) -> None:
+    """File, line and column of the joint."""
+    changed = HAND.replace('joint="finger" multiplier="-1" offset="0.1"', mimic)
+    (folder / "hand.urdf").write_text(changed)
+    (folder / "assets.yaml").write_text(HAND_INDEX % "")
+    with pytest.raises(AssetError, match=fault):
+        open_library([folder], cache_dir=tmp_path / "cache").robot("user/hand")
