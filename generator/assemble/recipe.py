@@ -12,8 +12,9 @@ from generator.annotations.truth import AnyAnnotator, complete_truth, frame_trut
 from generator.assemble.spec import Layout, Spec
 from generator.assemble.tables import TABLES
 from generator.assets.library import Library, open_library
+from generator.config.places import place_of_text
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError
+from generator.core.errors import ConfigError, UnknownAsset
 from generator.core.interfaces import AssetIndex, DatasetInfo, Exporter, GeometryExporter, Renderer
 from generator.core.scene import Scene, SharedValue
 from generator.core.streams import Streams
@@ -166,7 +167,13 @@ def blueprints(spec: Spec, assets: AssetIndex) -> Callable[[Streams], Blueprint]
 
 def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
     """The template's scene with every sensor mounted."""
-    scene = build(spec.head.template or spec.name, layout.elements, assets)
+    try:
+        scene = build(spec.head.template or spec.name, layout.elements, assets)
+    except UnknownAsset as error:
+        place = place_of_text(spec.document, error.asset_id)
+        if place is None:
+            raise
+        raise UnknownAsset(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
     scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
     for sensor in spec.sensors:
         scene = sensor.mount(scene)

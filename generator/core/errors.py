@@ -3,6 +3,7 @@
 GenDataError                        1  should not be raised itself
 +-- ConfigError                     2  configuration or usage
 +-- AssetError                      3  a mesh, texture or robot cannot be used
+|   +-- UnknownAsset                3  an id names none
 +-- StorageError                    4  disk full, no permission, foreign folder; resumable
 +-- DeterminismError                5  the same shard came out with other bytes
 +-- SampleError                     6  a sample cannot be made
@@ -35,6 +36,18 @@ class AssetError(GenDataError):
     """An asset is missing, unreadable or unfit."""
 
     exit_code = 3
+
+
+class UnknownAsset(AssetError):
+    """An id names no asset.
+
+    Attributes:
+        asset_id: As the user wrote it.
+    """
+
+    def __init__(self, message: str, asset_id: str = "") -> None:
+        self.asset_id = asset_id
+        super().__init__(message)
 
 
 class StorageError(GenDataError):

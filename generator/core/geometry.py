@@ -160,6 +160,21 @@ class Keypoint:
 
 
 @dataclass(frozen=True, slots=True)
+class Symmetry:
+    """A turn about an axis that leaves an object as it looks.
+
+    Attributes:
+        axis: Unit vector in the asset's frame.
+        fold: Number of equal turns in a circle; 0 = every angle.
+        offset_m: A point that the axis goes through, in the asset's frame.
+    """
+
+    axis: Vec3
+    fold: int = 0
+    offset_m: Vec3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Joint:
     """One joint of a robot; the child link's frame is the joint frame (as in URDF).
 
@@ -255,6 +270,7 @@ class Asset:
         stackable: Flat above and below: may be stacked.
         subcategory: A finer name than the category (``hatchback``, ``child``); may be empty.
         attributes: Further facts that labels carry, ``(name, value)``, sorted by name.
+        symmetries: Turns that leave the object as it looks; empty where none is known.
     """
 
     asset_id: str
@@ -269,3 +285,4 @@ class Asset:
     stackable: bool = False
     subcategory: str = ""
     attributes: tuple[tuple[str, str], ...] = ()
+    symmetries: tuple[Symmetry, ...] = ()
