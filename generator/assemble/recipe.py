@@ -13,8 +13,9 @@ from generator.assemble.references import check_references
 from generator.assemble.spec import SceneConfig, Spec
 from generator.assemble.tables import ANNOTATIONS, default_plugin
 from generator.assets.library import Library, open_library
+from generator.config.places import place_of_text
 from generator.core.capture import Channel
-from generator.core.errors import ConfigError
+from generator.core.errors import ConfigError, UnknownAsset
 from generator.core.interfaces import (
     AnyAnnotator,
     AssetIndex,
@@ -179,7 +180,13 @@ def nominal_scene(spec: Spec, config: SceneConfig, assets: AssetIndex) -> Scene:
     Raises:
         ConfigError: an element or a sensor has no place in it.
     """
-    scene = build(spec.head.template or spec.name, config.elements, assets)
+    try:
+        scene = build(spec.head.template or spec.name, config.elements, assets)
+    except UnknownAsset as error:
+        place = place_of_text(spec.document, error.asset_id)
+        if place is None:
+            raise
+        raise UnknownAsset(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
     scene = replace(scene, shared=config.shared, step_s=spec.head.step_s)
     for sensor in config.sensors:
         scene = sensor.mount(scene)

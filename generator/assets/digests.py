@@ -1,22 +1,29 @@
-"""Content hashes of assets' files, remembered as long as no file's size or time changes."""
+"""Content hashes of assets' files, remembered until a file may have changed."""
 
 from __future__ import annotations
 
+import time
 from hashlib import sha256
+from os import stat_result
 from typing import Any
 
 from generator.assets.cache import DiskCache
 from generator.assets.folder import Folder
-from generator.assets.references import files_of
+from generator.assets.references import references_of
 
 _NAME = "digests.json"
+_MISSING = ""
+_TICK_NS = 2_000_000_000
+"""No file system's clock is coarser (FAT's counts two seconds)."""
 
 
 class Digests:
     """``{file: sha256}`` of everything that an asset consists of.
 
-    Hashing a thousand small meshes takes a second; looking at their sizes and times takes a tenth
-    of it.
+    A digest is trusted while the file's inode, size, modification and change times are those that
+    it had when it was hashed. Programs can set the modification time, so the change time counts,
+    which they cannot. A file that was changed within a tick of the clock before it was hashed may
+    have changed once more in that tick: it is hashed again.
     """
 
     def __init__(self, cache: DiskCache) -> None:
@@ -33,17 +40,15 @@ class Digests:
         if self._known is None:
             self._known = self._cache.load_json(_NAME)
         name = str(folder.root / relative)
-        known = self._known.get(name)
-        if isinstance(known, list) and known and all(_unchanged(folder, row) for row in known):
-            return {row[0]: row[3] for row in known}
-        rows: list[list[Any]] = []
-        for file in files_of(folder, relative):
-            status = folder.path(file).stat()
-            digest = sha256(folder.read(file)).hexdigest()
-            rows.append([file, status.st_size, status.st_mtime_ns, digest])
-        self._known[name] = rows
-        self._changed = True
-        return {row[0]: row[3] for row in rows}
+        rows = self._known.get(name)
+        if not (isinstance(rows, list) and rows and all(_is_current(folder, r) for r in rows)):
+            rows = [
+                _hash(folder, file) if exists else [file, [], _MISSING]
+                for file, exists in references_of(folder, relative).items()
+            ]
+            self._known[name] = rows
+            self._changed = True
+        return {file: digest for file, _, digest in rows if digest != _MISSING}
 
     def save(self) -> None:
         """Write down what was learnt, if anything."""
@@ -53,9 +58,36 @@ class Digests:
             self._changed = False
 
 
-def _unchanged(folder: Folder, row: Any) -> bool:
+def _hash(folder: Folder, file: str) -> list[Any]:
+    """Name, state and digest of a file. The state is read first: changes later than that count."""
+    state, now_ns = _state(folder.path(file).stat()), _now_ns()
+    if max(state[3:]) > now_ns - _TICK_NS:
+        state = []
+    return [file, state, sha256(folder.read(file)).hexdigest()]
+
+
+def _is_current(folder: Folder, row: Any) -> bool:
+    """Whether a row's digest is still that of its file."""
     try:
-        status = (folder.root / row[0]).stat()
-        return bool(row == [row[0], status.st_size, status.st_mtime_ns, str(row[3])])
-    except (OSError, TypeError, IndexError):
+        file, state, digest = row
+        if digest == _MISSING:
+            return not folder.exists(file)
+        return bool(state == _state((folder.root / file).stat())) and isinstance(digest, str)
+    except (OSError, TypeError, ValueError):
         return False
+
+
+def _state(status: stat_result) -> list[int]:
+    """Device, inode, size [bytes], modification and change time [ns] of a file."""
+    return [
+        status.st_dev,
+        status.st_ino,
+        status.st_size,
+        status.st_mtime_ns,
+        status.st_ctime_ns,
+    ]
+
+
+def _now_ns() -> int:
+    """Time [ns] by the clock that files' times are taken from."""
+    return time.time_ns()

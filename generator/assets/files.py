@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,10 +17,10 @@ from generator.assets.cache import FORMAT, Arrays, DiskCache, Store, content_key
 from generator.assets.catalogue import (
     ROAD_SUFFIX,
     Entry,
-    ImageEntry,
     Listed,
     MeshEntry,
     RobotEntry,
+    TextureEntry,
     listed,
     read_index,
     user_folder,
@@ -35,7 +37,7 @@ from generator.assets.robots import robot_model
 from generator.assets.stages import is_stage, stage_model
 from generator.assets.urdf import Urdf, read_urdf
 from generator.core.errors import AssetError
-from generator.core.geometry import Asset, Float32, RobotModel, TextureData, UInt8
+from generator.core.geometry import Asset, Float32, RobotModel, Symmetry, TextureData, UInt8
 from generator.core.scene import Lane, StageModel
 
 _BUILT_IN = Path(__file__).with_name("pybullet.yaml")
@@ -66,6 +68,10 @@ class Files:
     def names(self) -> Iterator[str]:
         """Every id."""
         yield from self._all()
+
+    def user_counts(self) -> Counter[str]:
+        """Number of assets in the user's folders, by kind."""
+        return Counter(one.kind for one in self._all().values() if one.root in self._user_roots)
 
     def __contains__(self, asset_id: str) -> bool:
         """Whether an asset, a robot's link or a stage's piece has that id."""
@@ -150,9 +156,9 @@ class Files:
         one = part[0] if part else self._all()[owner]
         folder = Folder(one.root)
         if not name:
-            if one.kind != "texture":
+            if not isinstance(one.entry, TextureEntry):
                 raise AssetError(f"asset '{owner}': is no texture but one of kind {one.kind}")
-            name = one.entry.file
+            name = one.entry.texture_name()
         maps = maps_named(name)
         if maps is not None:
             return composed(maps, lambda image: self._image(owner, one, folder, image, alpha=True))
@@ -228,7 +234,7 @@ class Files:
         return Asset(
             asset_id=one.asset_id,
             kind=one.kind,
-            category="" if isinstance(entry, ImageEntry) else entry.category,
+            category=one.category(),
             tags=one.tags(),
             licence=one.origin.licence,
             author=one.origin.author,
@@ -240,6 +246,7 @@ class Files:
             attributes=tuple(sorted(entry.attributes.items()))
             if isinstance(entry, MeshEntry)
             else (),
+            symmetries=_symmetries(entry),
         )
 
     def _key(self, one: Listed) -> str:
@@ -250,7 +257,9 @@ class Files:
                     "format": FORMAT,
                     "version": VERSION,
                     "id": one.asset_id,
-                    "entry": one.entry.model_dump(exclude={"licence", "author", "source"}),
+                    "entry": one.entry.model_dump(
+                        exclude={"licence", "author", "source"}, exclude_defaults=True
+                    ),
                     "files": self._files(one),
                 }
             )
@@ -260,10 +269,11 @@ class Files:
         """Digests of an asset's files as they were when it was first asked for."""
         if one.asset_id not in self._hashed:
             folder = Folder(one.root)
-            files = self._digests.of(folder, one.entry.file)
-            collision = one.entry.collision if isinstance(one.entry, MeshEntry) else ""
-            more = self._digests.of(folder, collision) if collision else {}
-            self._hashed[one.asset_id] = {**files, **more}
+            self._hashed[one.asset_id] = {
+                name: digest
+                for file in one.entry.files()
+                for name, digest in self._digests.of(folder, file).items()
+            }
         return self._hashed[one.asset_id]
 
     def _check_unchanged(self, one: Listed, folder: Folder) -> None:
@@ -272,6 +282,16 @@ class Files:
         for name, digest in folder.digests.items():
             if known.get(name, digest) != digest:
                 raise AssetError(f"{folder.root / name}: changed while it was read; start again")
+
+
+def _symmetries(entry: Entry) -> tuple[Symmetry, ...]:
+    found = []
+    for symmetry in entry.symmetries if isinstance(entry, MeshEntry) else ():
+        x, y, z = symmetry.direction()
+        length = math.sqrt(x * x + y * y + z * z)
+        axis = (x / length, y / length, z / length)
+        found.append(Symmetry(axis, symmetry.fold or 0, symmetry.offset_m))
+    return tuple(found)
 
 
 def _is_road_network(entry: Entry) -> bool:

@@ -29,10 +29,17 @@ from generator.assets.soup import Float64, Int64, Slot, Soup, joined
 from generator.assets.urdf import Shape, Urdf, read_urdf
 from generator.core.errors import AssetError
 from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, UInt8
-from generator.core.se3 import SE3
+from generator.core.se3 import SE3, Vec3
 
 VERSION = 5
 """Raised whenever the same files would come out as other geometry."""
+SIZE_TOLERANCE = 0.05
+"""Share of the longest edge by which the edges of a mesh may differ from those that are stated."""
+_AXES = {
+    "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
+    "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
+}  # fmt: skip
+_DEFAULT_FRONT = {"x": "-z", "y": "x", "z": "x"}
 _WHITEST = 0.85
 """Files say 1 for white; no matt surface reflects more than fresh snow does (about 0.85)."""
 
@@ -94,7 +101,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     matrix = upright(entry)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
-    soup = _with_regions(soup.transformed(_scaling(scale, shift)), entry.regions)
+    soup = _with_regions(soup.transformed(_scaling(scale, shift)), entry.regions, place, asset_id)
     mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
     if collides:
         solid = joined(collides).transformed(matrix).transformed(_scaling(scale, shift))
@@ -233,7 +240,8 @@ def _finished(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str
         else:
             material = replace(material, base_color=_possible(material))
         if finish is not None:
-            material = _with_finish(material, finish)
+            material = _with_finish(material, finish, owner)
+            _check_placeable(material, finish, soup, f"{place}: material '{slot.name}'")
         slots.append(replace(slot, material=material))
     return replace(soup, slots=tuple(slots))
 
@@ -246,7 +254,15 @@ def _finish_of(name: str, finishes: Mapping[str, Finish]) -> Finish | None:
     return finishes[max(fitting, key=len)] if fitting else None
 
 
-def _with_regions(soup: Soup, regions: Sequence[Region]) -> Soup:
+def _check_placeable(material: Material, finish: Finish, soup: Soup, place: str) -> None:
+    """Raise AssetError if nothing says where a finish's images lie on the surface."""
+    if finish.maps is not None and soup.uvs is None and not material.texture_scale_m:
+        raise AssetError(
+            f"{place} has maps, but the file has no texture coordinates; give texture_scale_m"
+        )
+
+
+def _with_regions(soup: Soup, regions: Sequence[Region], place: str, owner: str) -> Soup:
     """The soup with a slot of its own for the triangles of each region."""
     for region in regions:
         centers = soup.corners.mean(axis=1)
@@ -254,7 +270,8 @@ def _with_regions(soup: Soup, regions: Sequence[Region]) -> Soup:
         for k, slot in enumerate(soup.slots):
             chosen = inside & (soup.face_slots == k)
             if fnmatchcase(slot.name, region.material) and chosen.any():
-                material = _with_finish(slot.material, region.finish)
+                material = _with_finish(slot.material, region.finish, owner)
+                _check_placeable(material, region.finish, soup, f"{place}: region of '{slot.name}'")
                 soup = replace(
                     soup,
                     face_slots=np.where(chosen, len(soup.slots), soup.face_slots),
@@ -263,12 +280,21 @@ def _with_regions(soup: Soup, regions: Sequence[Region]) -> Soup:
     return soup
 
 
-def _with_finish(material: Material, finish: Finish) -> Material:
+def _with_finish(material: Material, finish: Finish, owner: str) -> Material:
     """What the finish says, and of the file what it leaves.
 
     A finish with a colour stands for a surface of its own: what is behind the file's is not seen.
     """
-    changes = {k: v for k, v in finish.model_dump().items() if v is not None}
+    changes = {k: v for k, v in finish.model_dump(exclude={"maps"}).items() if v is not None}
+    maps = finish.maps
+    if maps is not None:
+        changes["texture"] = f"{owner}#{maps.name()}"
+        changes.setdefault("texture_scale_m", 0.0)
+        if maps.color:
+            changes.setdefault("base_color", (1.0, 1.0, 1.0))
+        for factor, image in (("roughness", maps.roughness), ("metallic", maps.metallic)):
+            if maps.orm or image:
+                changes.setdefault(factor, 1.0)
     if "base_color" in changes:
         changes = {"opacity": 1.0, "transmission": 0.0, **changes}
     if changes.pop("textured", None) is False:
@@ -313,9 +339,9 @@ def _pixels(uvs: Float64, shape: tuple[int, ...]) -> tuple[Int64, Int64]:
 
 def upright(entry: MeshEntry) -> Float64:
     """Affine map that turns the file's axes to Z up and the front to +X."""
-    suffix = entry.file.lower().rpartition(".")[2]
-    up = entry.up or ("y" if suffix in ("glb", "gltf") else "z")
-    axes = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]) if up == "y" else np.eye(3)
+    up = np.array(_AXES[entry.up_axis()])
+    front = np.array(_AXES[entry.front or _DEFAULT_FRONT[entry.up_axis()]])
+    axes = np.stack([front, np.cross(up, front), up]) + 0.0
     yaw = math.radians(entry.yaw_deg)
     c, s = round(math.cos(yaw), 12), round(math.sin(yaw), 12)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -334,16 +360,31 @@ def scale_and_shift(soup: Soup, entry: MeshEntry, place: str) -> tuple[float, Fl
         raise AssetError(f"{place}: holds vertices that are not finite; export it again")
     points = soup.corners.reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
-    scale = entry.scale
+    scale = entry.metres_per_unit()
     if entry.size_m is not None:
-        extent = float((high - low).max())
-        if not extent > 0.0:
-            raise AssetError(f"{place}: has no extent; export it again")
-        scale = entry.size_m / extent
+        scale = _scale_to_size(high - low, entry.size_m, place)
     anchor = 0.5 * (low + high)
     if entry.origin == "floor":
         anchor[2] = low[2]
     return scale, -scale * anchor
+
+
+def _scale_to_size(extents: Float64, size_m: float | Vec3, place: str) -> float:
+    """Metres per unit that give a bounding box its longest edge, or its three edges."""
+    extent = float(extents.max())
+    if not extent > 0.0:
+        raise AssetError(f"{place}: has no extent; export it again")
+    if not isinstance(size_m, tuple):
+        return size_m / extent
+    scale = max(size_m) / extent
+    edges = " x ".join(f"{edge:.4g}" for edge in scale * extents)
+    for edge, wanted in zip(scale * extents, size_m, strict=True):
+        if abs(edge - wanted) > SIZE_TOLERANCE * max(size_m):
+            raise AssetError(
+                f"{place}: its edges are {edges} m at that length, not "
+                f"{' x '.join(f'{edge:g}' for edge in size_m)} m; correct size_m, up or front"
+            )
+    return scale
 
 
 def _scaling(scale: float, shift: Float64) -> Float64:

@@ -12,7 +12,7 @@ from generator.assets.generated import Generated
 from generator.assets.ids import parse
 from generator.assets.importer import Imported
 from generator.assets.paths import packs_dir
-from generator.core.errors import AssetError, did_you_mean
+from generator.core.errors import AssetError, UnknownAsset, did_you_mean
 from generator.core.geometry import (
     Asset,
     ConvexParts,
@@ -164,10 +164,21 @@ class Library:
             return True
         if asset_id in self._files:
             return False
+        raise UnknownAsset(f"asset '{asset_id[:120]}': {self._nearest(asset_id[:120])}", asset_id)
+
+    def _nearest(self, asset_id: str) -> str:
+        """The assets whose ids are like one that does not exist, and those that the user has."""
         known = [*self._generated.names(), *self._files.names()]
-        raise AssetError(
-            f"asset '{asset_id[:120]}': there is none{did_you_mean(asset_id[:120], known)}"
+        ours = [name for name in known if name.startswith("user/")]
+        near = did_you_mean(f"user/{asset_id.removeprefix('user/')}", ours) or did_you_mean(
+            asset_id, known
         )
+        counts = self._files.user_counts()
+        if near or not (counts or asset_id.startswith("user/")):
+            return f"there is none{near}"
+        held = ", ".join(f"{count} {kind}s" for kind, count in sorted(counts.items())) or "nothing"
+        some = f": {', '.join(ours[:3])}{', ...' if len(ours) > 3 else ''}" if ours else ""
+        return f"there is none; your asset folders hold {held}{some}"
 
 
 def default_cache_dir() -> Path:

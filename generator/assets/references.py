@@ -14,8 +14,9 @@ from generator.assets.urdf import read_urdf
 from generator.core.errors import AssetError
 from generator.usd.reading import SUFFIXES, layer_references
 
-_MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", re.MULTILINE)
-_MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]+(?:.*[ \t])?(\S+?)[ \t\r]*$", re.MULTILINE)
+# Each takes the rest of its line whole: patterns that divide it need quadratic time.
+_MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
+_MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]([^\n]*)", re.MULTILINE)
 _MAX_FILES = 2000
 
 
@@ -25,13 +26,24 @@ def files_of(folder: Folder, relative: str) -> tuple[str, ...]:
     Raises:
         AssetError: if the file itself is missing, or an unreadable URDF.
     """
-    found: set[str] = set()
+    return tuple(name for name, exists in references_of(folder, relative).items() if exists)
+
+
+def references_of(folder: Folder, relative: str) -> dict[str, bool]:
+    """The file and everything it refers to, sorted by name, with whether it exists.
+
+    Raises:
+        AssetError: if the file itself is missing, or an unreadable URDF.
+    """
+    found: dict[str, bool] = {}
     pending = [relative]
     while pending:
         name = pending.pop()
-        if name in found or (name != relative and not folder.exists(name)):
+        if name in found:
             continue
-        found.add(name)
+        found[name] = name == relative or folder.exists(name)
+        if not found[name]:
+            continue
         if len(found) > _MAX_FILES:
             raise AssetError(
                 f"{folder.root / relative}: refers to more than {_MAX_FILES} files; split it"
@@ -40,7 +52,7 @@ def files_of(folder: Folder, relative: str) -> tuple[str, ...]:
             # A reference that leaves the folder is the reader's to refuse, if it needs it.
             with contextlib.suppress(AssetError):
                 pending.append(folder.refer(name, reference))
-    return tuple(sorted(found))
+    return dict(sorted(found.items()))
 
 
 def _references(folder: Folder, name: str) -> Iterator[str]:
@@ -49,9 +61,13 @@ def _references(folder: Folder, name: str) -> Iterator[str]:
         depth = len(PurePosixPath(name).parent.parts)
         yield from ("../" * depth + file for file in read_urdf(folder, name).files())
     elif suffix in (".obj", ".mtl"):
-        pattern = _MTLLIB if suffix == ".obj" else _MAP
-        for reference in pattern.findall(folder.read(name)):
-            yield reference.decode("utf-8", errors="replace")
+        data = folder.read(name)
+        if suffix == ".obj":
+            references = [rest.strip() for rest in _MTLLIB.findall(data)]
+        else:
+            # Options stand before the file's name.
+            references = [rest.split()[-1] for rest in _MAP.findall(data) if rest.strip()]
+        yield from (reference.decode("utf-8", errors="replace") for reference in references)
     elif suffix == ".gltf":
         yield from (unquote(uri) for uri in _uris(folder.read(name)))
     elif suffix in SUFFIXES:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from generator.assets.catalogue import RobotEntry
 from generator.assets.urdf import Urdf
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import Gripper, Joint, RobotModel
+from generator.core.kinematics import POSITION_DECIMALS, finger_links, positions_of
 from generator.core.se3 import SE3
+
+_SLACK = 10.0**-POSITION_DECIMALS
+"""Positions that differ by less are the same [rad or m]."""
 
 
 def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> RobotModel:
@@ -17,15 +23,16 @@ def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> Rob
             its joint's limits.
     """
     _check_names(urdf, entry, place)
-    return RobotModel(
+    robot = RobotModel(
         links=tuple(urdf.links),
         joints=urdf.joints,
         visuals={n: f"{robot_id}/{n}" for n, link in urdf.links.items() if link.visuals},
         collisions={n: f"{robot_id}/{n}" for n, link in urdf.links.items() if link.collisions},
-        home=tuple(_home(joint, entry, place) for joint in urdf.joints if joint.movable),
+        home=_home(urdf, entry, place),
         gripper=_gripper(entry),
-        no_collide=frozenset(_may_touch(urdf, entry)),
+        no_collide=frozenset(),
     )
+    return replace(robot, no_collide=frozenset(_touching_pairs(robot) | set(entry.touching)))
 
 
 def _check_names(urdf: Urdf, entry: RobotEntry, place: str) -> None:
@@ -47,15 +54,33 @@ def _check_names(urdf: Urdf, entry: RobotEntry, place: str) -> None:
                 )
 
 
-def _home(joint: Joint, entry: RobotEntry, place: str) -> float:
-    default = 0.0 if joint.lower <= 0.0 <= joint.upper else 0.5 * (joint.lower + joint.upper)
-    position = entry.home.get(joint.name, default)
-    if not joint.lower <= position <= joint.upper:
-        raise AssetError(
-            f"{place}: home position {position} of joint '{joint.name}' is not within "
-            f"[{joint.lower}, {joint.upper}]; correct the entry '{entry.id}' of the asset index"
-        )
-    return position
+def _home(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, ...]:
+    """A position per movable joint; joints that mimic others follow them.
+
+    Raises:
+        AssetError: if a position is beyond its joint's limits, or the entry gives a position to a
+            joint that follows another and is elsewhere then.
+    """
+    movable = [joint for joint in urdf.joints if joint.movable]
+    given = {j.name: entry.home.get(j.name, _default_position(j)) for j in movable if not j.mimic}
+    positions = positions_of(urdf.joints, given)
+    for joint, position in zip(movable, positions, strict=True):
+        correct = f"correct the entry '{entry.id}' of the asset index"
+        if not joint.lower - _SLACK <= position <= joint.upper + _SLACK:
+            raise AssetError(
+                f"{place}: home position {position} of joint '{joint.name}' is not within "
+                f"[{joint.lower}, {joint.upper}]; {correct}"
+            )
+        if abs(entry.home.get(joint.name, position) - position) > _SLACK:
+            raise AssetError(
+                f"{place}: home position {entry.home[joint.name]} of joint '{joint.name}', which "
+                f"mimics '{joint.mimic}' and is at {position:g} then; {correct}"
+            )
+    return positions
+
+
+def _default_position(joint: Joint) -> float:
+    return 0.0 if joint.lower <= 0.0 <= joint.upper else 0.5 * (joint.lower + joint.upper)
 
 
 def _gripper(entry: RobotEntry) -> Gripper | None:
@@ -66,14 +91,15 @@ def _gripper(entry: RobotEntry) -> Gripper | None:
         T_link_grasp=SE3((0.0, 0.0, entry.gripper.grasp_offset_m)),
         finger_joints=entry.gripper.finger_joints,
         stroke_m=entry.gripper.stroke_m,
+        open_at=entry.gripper.open_at,
     )
 
 
-def _may_touch(urdf: Urdf, entry: RobotEntry) -> set[tuple[str, str]]:
-    """Links of one rigid piece, links of pieces that a joint connects, fingers, and the entry's."""
-    piece = {next(iter(urdf.links)): 0}
+def _touching_pairs(robot: RobotModel) -> set[tuple[str, str]]:
+    """Pairs of links in one rigid piece, in pieces that a joint connects, and in the fingers."""
+    piece = {robot.links[0]: 0}
     connected: set[tuple[int, int]] = set()
-    for joint in urdf.joints:
+    for joint in robot.joints:
         above = piece[joint.parent]
         piece[joint.child] = len(piece) if joint.movable else above
         connected |= {(above, piece[joint.child]), (piece[joint.child], above)}
@@ -84,7 +110,6 @@ def _may_touch(urdf: Urdf, entry: RobotEntry) -> set[tuple[str, str]]:
         for b in names[k + 1 :]
         if piece[a] == piece[b] or (piece[a], piece[b]) in connected
     }
-    finger_joints = entry.gripper.finger_joints if entry.gripper else ()
-    fingers = [joint.child for joint in urdf.joints if joint.name in finger_joints]
-    pairs |= {(a, b) for k, a in enumerate(fingers) for b in fingers[k + 1 :]}
-    return pairs | set(entry.touching)
+    # The bars of a linkage overlap where pins join them.
+    fingers = finger_links(robot)
+    return pairs | {(a, b) for k, a in enumerate(fingers) for b in fingers[k + 1 :]}

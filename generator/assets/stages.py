@@ -50,10 +50,11 @@ def stage_model(folder: Folder, entry: MeshEntry, asset_id: str) -> StageModel:
                 )
             )
         lights, cameras = file.stage.lights(), file.stage.cameras()
+    scale = entry.metres_per_unit()
     return StageModel(
         tuple(pieces),
-        tuple(_placed(light, T_model_stage, entry.scale) for light in lights),
-        tuple((name, _scaled(T_model_stage @ pose, entry.scale)) for name, pose in cameras),
+        tuple(_placed(light, T_model_stage, scale) for light in lights),
+        tuple((name, _scaled(T_model_stage @ pose, scale)) for name, pose in cameras),
     )
 
 

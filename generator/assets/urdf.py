@@ -15,7 +15,8 @@ from xml.etree.ElementTree import Element
 from generator.assets.folder import Folder
 from generator.core.errors import AssetError
 from generator.core.geometry import Joint
-from generator.core.markup import parsed_xml
+from generator.core.kinematics import leader_of
+from generator.core.markup import parsed_xml, place_of
 from generator.core.se3 import SE3, Vec3
 
 _MAX_ELEMENTS = 50_000
@@ -86,21 +87,27 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
     """
     place = str(folder.root / relative)
     root = parsed_xml(folder.read(relative), place, "robot", "a URDF", _MAX_ELEMENTS)
+    at = root
     try:
         colors = dict(_named_colors(root))
-        links = {
-            name: Link(
-                name,
-                tuple(_shapes(folder, relative, element, "visual", colors)),
-                tuple(_shapes(folder, relative, element, "collision", colors)),
+        links: dict[str, Link] = {}
+        for name, at in _distinct(root, "link"):
+            shapes = (
+                tuple(_shapes(folder, relative, at, tag, colors)) for tag in ("visual", "collision")
             )
-            for name, element in _distinct(root, "link")
-        }
-        joints = [_joint(element) for _, element in _distinct(root, "joint")]
+            links[name] = Link(name, *shapes)
+        elements = [element for _, element in _distinct(root, "joint")]
+        joints = []
+        for at in elements:
+            joints.append(_joint(at))
+        for k, joint in enumerate(joints):
+            at = elements[k]
+            leader_of(joint, joints)
+        at = root
         return _ordered(links, joints)
     except (ValueError, KeyError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else error
-        raise AssetError(f"{place}: malformed URDF ({reason}); correct it") from None
+        raise AssetError(f"{place}{place_of(at)}: malformed URDF ({reason}); correct it") from None
 
 
 def _distinct(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
@@ -198,8 +205,10 @@ def _joint(element: Element) -> Joint:
         axis=(1.0, 0.0, 0.0) if kind == "fixed" or axis is None else _unit(axis.attrib["xyz"]),
         lower=lower,
         upper=upper,
-        mimic="" if mimic is None else mimic.attrib["joint"],
+        mimic="" if mimic is None or kind == "fixed" else mimic.attrib["joint"],
         speed_max=0.0 if limit is None else abs(float(limit.get("velocity", 0.0))),
+        mimic_multiplier=1.0 if mimic is None else _number(mimic.get("multiplier", "1")),
+        mimic_offset=0.0 if mimic is None else _number(mimic.get("offset", "0")),
     )
 
 
@@ -229,9 +238,6 @@ def _ordered(links: dict[str, Link], joints: list[Joint]) -> Urdf:
         pending += reversed(by_parent.get(joint.child, []))
     if len(order) != len(links):
         raise ValueError("its joints form a loop")
-    for joint in joints:
-        if joint.mimic and joint.mimic not in {j.name for j in joints}:
-            raise ValueError(f"joint '{joint.name[:40]}' follows a joint that does not exist")
     return Urdf({name: links[name] for name in order}, tuple(ordered_joints))
 
 
@@ -261,6 +267,10 @@ def _unit(text: str) -> Vec3:
     return (x / length, y / length, z / length)
 
 
+def _number(text: str) -> float:
+    return _numbers(text, 1)[0]
+
+
 def _vector(text: str) -> Vec3:
     x, y, z = _numbers(text, 3)
     return (x, y, z)
@@ -269,5 +279,5 @@ def _vector(text: str) -> Vec3:
 def _numbers(text: str, count: int) -> tuple[float, ...]:
     numbers = tuple(float(word) for word in text.split())
     if len(numbers) != count or not all(math.isfinite(n) for n in numbers):
-        raise ValueError(f"'{text[:40]}' is not {count} numbers")
+        raise ValueError(f"'{text[:40]}' is not {'a number' if count == 1 else f'{count} numbers'}")
     return numbers

@@ -1,24 +1,30 @@
-"""``gen-data assets``: packs of assets that are fetched once and then simply there."""
+"""``gen-data assets``: packs of assets that are fetched once, and the user's own folders."""
 
 from __future__ import annotations
 
+import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from generator.core.errors import ConfigError
+from generator.core.errors import AssetError, ConfigError
 
 if TYPE_CHECKING:
+    from generator.assets.checking import Finding
+    from generator.assets.library import Library
     from generator.core.geometry import Asset
 
+FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
+TILE_PX = 256
 _EVERY = "all"
 
 
 @click.group()
 def assets() -> None:
-    """Install, list, verify and remove packs of assets; show what the library holds."""
+    """Install, list, verify and remove packs of assets; show the library; check own folders."""
 
 
 @assets.command()
@@ -56,10 +62,14 @@ def install(names: tuple[str, ...], archive: Path | None, again: bool) -> None:
 
 @assets.command("list")
 @click.argument("tags", nargs=-1)
-def list_(tags: tuple[str, ...]) -> None:
-    """List all packs; with TAGS, the objects, robots and environments that carry all of them."""
-    if tags:
-        _list_assets(tags)
+@click.option("--folder", "folders", multiple=True, type=FOLDER, help="A folder of your assets.")
+def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
+    """List all packs; with TAGS or --folder, the assets that carry all tags.
+
+    A folder alone lists what it holds.
+    """
+    if tags or folders:
+        _list_assets(tags or ("user",), folders)
         return
     from generator.assets.packs import installed
     from generator.assets.paths import packs_dir
@@ -79,11 +89,12 @@ def list_(tags: tuple[str, ...]) -> None:
 
 @assets.command()
 @click.argument("asset_id", metavar="ID")
-def show(asset_id: str) -> None:
+@click.option("--folder", "folders", multiple=True, type=FOLDER, help="A folder of your assets.")
+def show(asset_id: str, folders: tuple[Path, ...]) -> None:
     """Show an asset of the library: category, tags, licence, author, size."""
     from generator.assets.library import open_library
 
-    library = open_library()
+    library = open_library(folders)
     asset = library.get(asset_id)
     for name, value in _facts(asset).items():
         click.echo(f"{name:<12} {value}")
@@ -98,6 +109,35 @@ def show(asset_id: str) -> None:
     click.echo(f"{'materials':<12} {len(mesh.materials)}, roles: {', '.join(roles) or 'none'}")
     points = ", ".join(point.name for point in library.keypoints(asset_id))
     click.echo(f"{'keypoints':<12} {points or 'none'}")
+
+
+@assets.command()
+@click.argument("folder", type=FOLDER)
+@click.option("--sheet", type=click.Path(path_type=Path), help="Write pictures of all to this PNG.")
+def check(folder: Path, sheet: Path | None) -> None:
+    """Use every asset of your FOLDER once: what it is taken for, and what is wrong with it."""
+    from generator.assets.checking import check_folder
+    from generator.assets.library import open_library
+
+    library = open_library([folder])
+    findings = tuple(check_folder(folder, library))
+    _print_findings(findings)
+    if sheet is not None:
+        _write_thumbnails(library, tuple(f.asset_id for f in findings if not f.error), sheet)
+    unusable = [finding for finding in findings if finding.error]
+    if unusable:
+        raise AssetError(f"{folder}: {len(unusable)} of {len(findings)} assets cannot be used")
+    click.echo(f"{folder}: {len(findings)} assets, all can be used")
+
+
+@assets.command()
+def schema() -> None:
+    """Print the JSON Schema of assets.yaml, for completion in editors."""
+    from generator.assets.catalogue import Index
+    from generator.config.schema import json_schema
+
+    described = {"$schema": "https://json-schema.org/draft/2020-12/schema", **json_schema(Index)}
+    click.echo(json.dumps(described, indent=2, sort_keys=True))
 
 
 @assets.command()
@@ -146,13 +186,52 @@ def _prepare(pack: str) -> None:
     click.echo(f"{pack}: prepared in {time.perf_counter() - started_s:.0f} s")
 
 
-def _list_assets(tags: tuple[str, ...]) -> None:
+def _list_assets(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
     from generator.assets.library import open_library
 
-    library = open_library()
-    for kind in ("object", "robot", "environment"):
+    library = open_library(folders)
+    for kind in ("object", "robot", "texture", "environment"):
         for asset in library.find(tags, kind):
             click.echo(f"{asset.asset_id}  {asset.category}  [{' '.join(asset.tags)}]")
+
+
+def _print_findings(findings: Sequence[Finding]) -> None:
+    """A table, and below it what is wrong in full."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table("id", "kind", "category", "triangles", "size [m]", "unit", "up", "state")
+    for one in findings:
+        size = " x ".join(f"{edge:.3g}" for edge in one.size_m) if one.size_m else ""
+        state = "cannot be used" if one.error else "doubtful" if one.warnings else "ok"
+        cells = (one.asset_id, one.kind, one.category, str(one.triangles or ""), size, one.unit)
+        table.add_row(*(Text(cell) for cell in (*cells, one.up, state)))
+    # Wide enough for a log file; a terminal has its own width.
+    console = Console()
+    Console(width=None if console.is_terminal else 160).print(table)
+    for one in findings:
+        for problem in (one.error, *one.warnings):
+            if problem:
+                click.echo(f"{one.asset_id}: {problem}")
+
+
+def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) -> None:
+    """Pictures of assets with their ids below, on one PNG."""
+    from generator.preview.sheet import Tile, arranged, pictures, write_sheet
+    from generator.preview.thumbnails import thumbnail
+    from generator.renderers.settings import RenderSettings
+    from generator.renderers.warp import WarpRenderer
+
+    if not asset_ids:
+        return
+    renderer = WarpRenderer(library, "auto", RenderSettings())
+    shown = (
+        Tile(asset_id, thumbnail(library.get(asset_id), library, renderer, TILE_PX))
+        for asset_id in asset_ids
+    )
+    write_sheet(arranged(pictures(shown, TILE_PX, captions=True), 0), path)
+    click.echo(f"{path}: {len(asset_ids)} pictures")
 
 
 def _facts(asset: Asset) -> dict[str, str]:
@@ -163,6 +242,10 @@ def _facts(asset: Asset) -> dict[str, str]:
         "subcategory": asset.subcategory,
         "attributes": ", ".join(f"{name}={value}" for name, value in asset.attributes),
         "tags": " ".join(asset.tags),
+        "symmetries": ", ".join(
+            f"{symmetry.fold or 'every angle'} about {symmetry.axis}"
+            for symmetry in asset.symmetries
+        ),
         "mass_kg": f"{asset.mass_kg:g}" if asset.mass_kg else "",
         "licence": asset.licence,
         "author": asset.author,

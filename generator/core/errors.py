@@ -5,6 +5,7 @@ GenDataError                        1  should not be raised itself
 |   +-- UnknownNameError            2  a name that the data set does not have; also a KeyError
 |   +-- SampleIndexError            2  an index beyond the data set; also an IndexError
 +-- AssetError                      3  a mesh, texture or robot cannot be used
+|   +-- UnknownAsset                3  an id names none
 +-- StorageError                    4  disk full, no permission, foreign folder; resumable
 +-- DeterminismError                5  the same shard came out with other bytes
 +-- SampleError                     6  a sample cannot be made
@@ -52,6 +53,18 @@ class AssetError(GenDataError):
     """An asset is missing, unreadable or unfit."""
 
     exit_code = 3
+
+
+class UnknownAsset(AssetError):
+    """An id names no asset.
+
+    Attributes:
+        asset_id: As the user wrote it.
+    """
+
+    def __init__(self, message: str, asset_id: str = "") -> None:
+        self.asset_id = asset_id
+        super().__init__(message)
 
 
 class StorageError(GenDataError):

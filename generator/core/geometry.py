@@ -160,6 +160,21 @@ class Keypoint:
 
 
 @dataclass(frozen=True, slots=True)
+class Symmetry:
+    """A turn about an axis that leaves an object as it looks.
+
+    Attributes:
+        axis: Unit vector in the asset's frame.
+        fold: Number of equal turns in a circle; 0 = every angle.
+        offset_m: A point that the axis goes through, in the asset's frame.
+    """
+
+    axis: Vec3
+    fold: int = 0
+    offset_m: Vec3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Joint:
     """One joint of a robot; the child link's frame is the joint frame (as in URDF).
 
@@ -170,6 +185,8 @@ class Joint:
         lower, upper: Limits [rad or m].
         mimic: Name of the joint this one follows, or empty.
         speed_max: Limit of its speed [rad/s or m/s]; 0 = unknown.
+        mimic_multiplier, mimic_offset: A joint that follows another is at
+            ``multiplier * position + offset`` of that one [rad or m].
     """
 
     name: str
@@ -182,6 +199,8 @@ class Joint:
     upper: float
     mimic: str = ""
     speed_max: float = 0.0
+    mimic_multiplier: float = 1.0
+    mimic_offset: float = 0.0
 
     @property
     def movable(self) -> bool:
@@ -197,14 +216,16 @@ class Gripper:
         link: Link whose frame carries the grasp frame.
         T_link_grasp: Grasp frame: origin between the finger tips, Z out of the hand,
             Y the direction in which the fingers open.
-        finger_joints: Joints that open the gripper, with equal positions.
+        finger_joints: Joints that open the gripper, each over its whole range.
         stroke_m: Distance between the fingers when fully open; 0 is closed.
+        open_at: Limit of the finger joints at which the gripper is fully open.
     """
 
     link: str
     T_link_grasp: SE3
     finger_joints: tuple[str, ...]
     stroke_m: float
+    open_at: Literal["lower", "upper"] = "upper"
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,6 +270,7 @@ class Asset:
         stackable: Flat above and below: may be stacked.
         subcategory: A finer name than the category (``hatchback``, ``child``); may be empty.
         attributes: Further facts that labels carry, ``(name, value)``, sorted by name.
+        symmetries: Turns that leave the object as it looks; empty where none is known.
     """
 
     asset_id: str
@@ -263,3 +285,4 @@ class Asset:
     stackable: bool = False
     subcategory: str = ""
     attributes: tuple[tuple[str, str], ...] = ()
+    symmetries: tuple[Symmetry, ...] = ()

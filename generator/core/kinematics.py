@@ -6,9 +6,10 @@ Only ``+ - * / sqrt`` and the C library's sine and cosine, on plain floats.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from generator.core.geometry import Joint, RobotModel
+from generator.core.errors import did_you_mean
+from generator.core.geometry import Gripper, Joint, RobotModel
 from generator.core.scene import Articulation, Body
 from generator.core.se3 import SE3
 
@@ -76,9 +77,101 @@ def rounded_positions(positions: Sequence[float]) -> tuple[float, ...]:
 
 
 def is_arm_joint(joint: Joint, robot: RobotModel) -> bool:
-    """Whether a goal gives a position for it: no finger, follows nobody."""
-    fingers = robot.gripper.finger_joints if robot.gripper else ()
-    return joint.movable and not joint.mimic and joint.name not in fingers
+    """Whether a goal gives a position for it: neither a finger nor one that follows another."""
+    return joint.movable and not joint.mimic and joint.name not in _finger_names(robot)
+
+
+def leader_of(joint: Joint, joints: Sequence[Joint]) -> tuple[Joint, float, float]:
+    """The joint that decides a joint's position, through any number of ``mimic`` steps.
+
+    Args:
+        joint: Any joint.
+        joints: All joints of its robot.
+
+    Returns:
+        Leader, multiplier and offset: ``position = multiplier * leader's position + offset``
+        [rad or m]. A joint that follows none is its own leader, with 1 and 0.
+
+    Raises:
+        ValueError: if a joint that is followed does not exist or is fixed, or if joints follow
+            one another in a circle.
+    """
+    named = {other.name: other for other in joints} if joint.mimic else {}
+    leader, multiplier, offset = joint, 1.0, 0.0
+    for _ in joints:
+        if not leader.mimic:
+            return leader, multiplier, offset
+        followed = named.get(leader.mimic)
+        if followed is None:
+            near = did_you_mean(leader.mimic, named)
+            raise ValueError(
+                f"joint '{leader.name}' mimics '{leader.mimic}', which does not exist{near}"
+            )
+        if not followed.movable:
+            raise ValueError(f"joint '{leader.name}' mimics '{followed.name}', which is fixed")
+        offset += multiplier * leader.mimic_offset
+        multiplier *= leader.mimic_multiplier
+        leader = followed
+    raise ValueError(f"joint '{joint.name}' mimics itself through '{joint.mimic}'")
+
+
+def position_limits(joint: Joint, robot: RobotModel) -> tuple[float, float]:
+    """Positions of a joint at which it and all that follow it are within their limits.
+
+    Args:
+        joint: One that follows no other.
+        robot: Its robot.
+
+    Returns:
+        Lowest and highest position [rad or m]; the lowest is above the highest where no position
+        suits all. A continuous joint that none follows has -pi and pi.
+    """
+    low, high = (-math.pi, math.pi) if joint.kind == "continuous" else (joint.lower, joint.upper)
+    for other in robot.movable:
+        if other.mimic and other.kind != "continuous":
+            leader, multiplier, offset = leader_of(other, robot.joints)
+            if leader == joint and multiplier != 0.0:
+                ends = ((other.lower - offset) / multiplier, (other.upper - offset) / multiplier)
+                low, high = max(low, min(ends)), min(high, max(ends))
+    return low, high
+
+
+def positions_of(joints: Sequence[Joint], given: Mapping[str, float]) -> tuple[float, ...]:
+    """Positions of all movable joints, those that follow others included, in their order.
+
+    Args:
+        joints: All joints of a robot.
+        given: Position of every movable joint that follows no other, by name [rad or m].
+    """
+    positions = []
+    for joint in (j for j in joints if j.movable):
+        leader, multiplier, offset = leader_of(joint, joints)
+        positions.append(multiplier * given[leader.name] + offset)
+    return tuple(positions)
+
+
+def finger_position(joint: Joint, gripper: Gripper, opening: float) -> float:
+    """Position of a finger joint [rad or m] at an opening of its gripper in [0, 1]."""
+    share = opening if gripper.open_at == "upper" else 1.0 - opening
+    return joint.lower + share * (joint.upper - joint.lower)
+
+
+def gripper_opening(robot: RobotModel, positions: Sequence[float]) -> float:
+    """Opening of the gripper in [0, 1]; 0 without one.
+
+    Args:
+        robot: Its model.
+        positions: One per movable joint, in the model's order [rad or m].
+    """
+    for joint, position in zip(robot.movable, positions, strict=True):
+        if (
+            robot.gripper
+            and joint.name in robot.gripper.finger_joints
+            and joint.upper > joint.lower
+        ):
+            share = (position - joint.lower) / (joint.upper - joint.lower)
+            return share if robot.gripper.open_at == "upper" else 1.0 - share
+    return 0.0
 
 
 def all_positions(
@@ -91,18 +184,14 @@ def all_positions(
         arm_positions: One per arm joint, in order [rad or m].
         opening: Of the gripper, in [0, 1].
     """
-    fingers = robot.gripper.finger_joints if robot.gripper else ()
     remaining = iter(arm_positions)
-    positions: dict[str, float] = {}
+    given: dict[str, float] = {}
     for joint in robot.movable:
-        if joint.name in fingers:
-            positions[joint.name] = joint.lower + opening * (joint.upper - joint.lower)
-        elif is_arm_joint(joint, robot):
-            positions[joint.name] = next(remaining)
-    for joint in robot.movable:
-        if joint.name not in positions:
-            positions[joint.name] = positions.get(joint.mimic, 0.0)
-    return rounded_positions([positions[joint.name] for joint in robot.movable])
+        if is_arm_joint(joint, robot):
+            given[joint.name] = next(remaining)
+        elif robot.gripper and not joint.mimic:
+            given[joint.name] = finger_position(joint, robot.gripper, opening)
+    return rounded_positions(positions_of(robot.joints, given))
 
 
 def within_limits(robot: RobotModel, positions: Sequence[float]) -> bool:
@@ -125,8 +214,14 @@ def rigid_group(robot: RobotModel, link: str) -> frozenset[str]:
 def finger_links(robot: RobotModel) -> tuple[str, ...]:
     """Links that move with the gripper's joints, in order; empty without a gripper."""
     moving: dict[str, None] = {}
-    fingers = robot.gripper.finger_joints if robot.gripper else ()
+    fingers = _finger_names(robot)
     for joint in robot.joints:
-        if joint.name in fingers or joint.parent in moving:
+        driven = joint.movable and leader_of(joint, robot.joints)[0].name in fingers
+        if driven or joint.name in fingers or joint.parent in moving:
             moving[joint.child] = None
     return tuple(moving)
+
+
+def _finger_names(robot: RobotModel) -> tuple[str, ...]:
+    """Names of the joints that open the gripper; empty without one."""
+    return robot.gripper.finger_joints if robot.gripper else ()

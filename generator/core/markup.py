@@ -11,6 +11,18 @@ from generator.core.errors import AssetError
 MAX_DEPTH = 64
 
 
+class PlacedElement(Element):
+    """An element that knows where it begins in its file, counted from 1."""
+
+    line: int
+    column: int
+
+
+def place_of(element: Element) -> str:
+    """``:line:column`` of an element that ``parsed_xml`` made; empty for any other."""
+    return f":{element.line}:{element.column}" if isinstance(element, PlacedElement) else ""
+
+
 def parsed_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: int) -> Element:
     """The root element of a document.
 
@@ -24,7 +36,7 @@ def parsed_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: 
     Raises:
         AssetError: if it is malformed, too large or deep, or declares a document type.
     """
-    builder = TreeBuilder()
+    builder = TreeBuilder(element_factory=PlacedElement)
     parser = expat.ParserCreate()
     depth = count = 0
 
@@ -33,7 +45,9 @@ def parsed_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: 
         depth, count = depth + 1, count + 1
         if depth > MAX_DEPTH or count > max_elements:
             raise ValueError(f"more than {MAX_DEPTH} levels or {max_elements} elements")
-        builder.start(tag, attributes)
+        element = builder.start(tag, attributes)
+        assert isinstance(element, PlacedElement)
+        element.line, element.column = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1
 
     def end(tag: str) -> None:
         nonlocal depth

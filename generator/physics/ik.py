@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from generator.core.geometry import Gripper, Joint, RobotModel
-from generator.core.kinematics import is_arm_joint, joint_motion
+from generator.core.kinematics import is_arm_joint, joint_motion, leader_of, position_limits
 from generator.core.se3 import SE3, Vec3, rotate_by_quaternion
 
 POSITION_TOLERANCE_M = 1e-3
@@ -35,19 +35,25 @@ Row = list[float]
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """The arm joints from a robot's base to its grasp frame, fixed ones folded in.
+    """The joints from a robot's base to its grasp frame that arm joints move, others folded in.
 
     Attributes:
-        joints: Base first.
+        joints: Base first, those that mimic an arm joint included.
         offsets: Pose of each joint frame in the previous joint's child at position 0.
+        drives: Per joint which of the solved joints moves it, with which multiplier and offset.
         T_last_grasp: Grasp frame in the last joint's child link.
-        indices: Position of each joint among the robot's arm joints.
+        solved: The arm joints whose positions are sought.
+        limits: Lowest and highest position of each of them [rad or m].
+        indices: Position of each of them among the robot's arm joints.
         rest: A position per arm joint of the robot, used for those off the chain.
     """
 
     joints: tuple[Joint, ...]
     offsets: tuple[SE3, ...]
+    drives: tuple[tuple[int, float, float], ...]
     T_last_grasp: SE3
+    solved: tuple[Joint, ...]
+    limits: tuple[tuple[float, float], ...]
     indices: tuple[int, ...]
     rest: tuple[float, ...]
 
@@ -68,19 +74,25 @@ def chain_of(robot: RobotModel, gripper: Gripper) -> Chain:
         path.insert(0, by_child[link])
         link = by_child[link].parent
     arm = [joint for joint in robot.movable if is_arm_joint(joint, robot)]
-    joints, offsets, pending = [], [], SE3()
+    joints, offsets, driven, pending = [], [], [], SE3()
     for joint in path:
         pending = pending @ joint.T_parent_joint
-        if joint in arm:
+        leader, multiplier, offset = leader_of(joint, robot.joints)
+        if leader in arm:
             joints.append(joint)
             offsets.append(pending)
+            driven.append((leader, multiplier, offset))
             pending = SE3()
     homes = dict(zip((j.name for j in robot.movable), robot.home, strict=True))
+    solved = tuple(dict.fromkeys(leader for leader, _, _ in driven))
     return Chain(
         joints=tuple(joints),
         offsets=tuple(offsets),
+        drives=tuple((solved.index(leader), m, offset) for leader, m, offset in driven),
         T_last_grasp=pending @ gripper.T_link_grasp,
-        indices=tuple(arm.index(joint) for joint in joints),
+        solved=solved,
+        limits=tuple(position_limits(joint, robot) for joint in solved),
+        indices=tuple(arm.index(joint) for joint in solved),
         rest=tuple(homes[joint.name] for joint in arm),
     )
 
@@ -116,14 +128,14 @@ def neighbour(
 def solve(
     chain: Chain, T_base_grasp: SE3, start: Sequence[float], share: float = 1.0
 ) -> tuple[float, ...] | None:
-    """Positions of the chain's joints within limits, or None where the descent does not arrive."""
+    """Positions of the solved joints within limits, or None where the descent does not arrive."""
     positions = list(start)
     for _ in range(_ITERATIONS_MAX):
         pose, columns = _jacobian(chain, positions)
         error = _error(T_base_grasp, pose)
         if _is_reached(error, share):
             return tuple(positions)
-        _step(chain.joints, positions, columns, error)
+        _step(chain, positions, columns, error)
     return None
 
 
@@ -141,12 +153,11 @@ def _start(chain: Chain, number: int) -> list[float]:
     """Home, then the middle and an even, never repeating spread over the middle of all ranges."""
     if number == 0:
         return [chain.rest[index] for index in chain.indices]
-    ratio = _spread_ratio(len(chain.joints))
+    ratio = _spread_ratio(len(chain.solved))
     start, power = [], 1.0
-    for joint in chain.joints:
+    for lower, upper in chain.limits:
         power /= ratio
         fraction = (0.5 + (number - 1) * power) % 1.0
-        lower, upper = _limits(joint)
         start.append(lower + (0.15 + 0.7 * fraction) * (upper - lower))
     return start
 
@@ -160,28 +171,30 @@ def _spread_ratio(dimensions: int) -> float:
     return low
 
 
-def _limits(joint: Joint) -> tuple[float, float]:
-    return (-math.pi, math.pi) if joint.kind == "continuous" else (joint.lower, joint.upper)
-
-
 def _jacobian(chain: Chain, positions: Sequence[float]) -> tuple[SE3, list[Row]]:
-    """``T_base_grasp``, and per joint the motion of that frame: three linear, three angular."""
+    """``T_base_grasp``, and its motion per solved joint: three linear parts, three angular."""
     pose = SE3()
     frames: list[tuple[Vec3, Vec3]] = []
-    for joint, offset, position in zip(chain.joints, chain.offsets, positions, strict=True):
-        pose = pose @ offset
+    for joint, frame, drive in zip(chain.joints, chain.offsets, chain.drives, strict=True):
+        pose = pose @ frame
         frames.append((pose.translation_m, rotate_by_quaternion(pose.quaternion_wxyz, joint.axis)))
-        pose = pose @ joint_motion(joint, position)
+        index, multiplier, offset = drive
+        pose = pose @ joint_motion(joint, multiplier * positions[index] + offset)
     pose = pose @ chain.T_last_grasp
     px, py, pz = pose.translation_m
-    columns = []
-    for joint, ((ox, oy, oz), (ax, ay, az)) in zip(chain.joints, frames, strict=True):
+    columns = [[0.0] * 6 for _ in chain.solved]
+    for joint, drive, (origin, (ax, ay, az)) in zip(
+        chain.joints, chain.drives, frames, strict=True
+    ):
         if joint.kind == "prismatic":
-            columns.append([ax, ay, az, 0.0, 0.0, 0.0])
-            continue
-        x, y, z = px - ox, py - oy, pz - oz
-        weighted = [_LENGTH_M_PER_RAD * a for a in (ax, ay, az)]
-        columns.append([ay * z - az * y, az * x - ax * z, ax * y - ay * x, *weighted])
+            motion = [ax, ay, az, 0.0, 0.0, 0.0]
+        else:
+            x, y, z = px - origin[0], py - origin[1], pz - origin[2]
+            weighted = [_LENGTH_M_PER_RAD * a for a in (ax, ay, az)]
+            motion = [ay * z - az * y, az * x - ax * z, ax * y - ay * x, *weighted]
+        column = columns[drive[0]]
+        for k, change in enumerate(motion):
+            column[k] += drive[1] * change
     return pose, columns
 
 
@@ -211,30 +224,31 @@ def _is_reached(error: Row, share: float) -> bool:
     return distance < half * POSITION_TOLERANCE_M and angle < half * ANGLE_TOLERANCE_RAD
 
 
-def _step(joints: Sequence[Joint], positions: Row, columns: list[Row], error: Row) -> None:
+def _step(chain: Chain, positions: Row, columns: list[Row], error: Row) -> None:
     """One damped step within the limits; joints that would leave theirs stand still."""
     damping = 0.5 * sum(e * e for e in error) * 1e-2 + _DAMPING
-    free = list(range(len(joints)))
+    free = list(range(len(chain.solved)))
     for _ in range(2):
         change = _solve_damped(([columns[k] for k in free]), error, damping)
         largest = max((abs(c) for c in change), default=0.0)
         scale = min(1.0, _STEP_MAX / largest) if largest > 0.0 else 0.0
         wanted = {k: positions[k] + scale * c for k, c in zip(free, change, strict=True)}
-        pinned = [k for k in free if _pushes_out(joints[k], positions[k], wanted[k])]
+        pinned = [k for k in free if _pushes_out(chain, k, positions[k], wanted[k])]
         if not pinned:
             break
         free = [k for k in free if k not in pinned]
     for k, value in wanted.items():
-        lower, upper = _limits(joints[k])
-        positions[k] = value if joints[k].kind == "continuous" else min(max(value, lower), upper)
+        lower, upper = chain.limits[k]
+        endless = chain.solved[k].kind == "continuous"
+        positions[k] = value if endless else min(max(value, lower), upper)
 
 
-def _pushes_out(joint: Joint, position: float, wanted: float) -> bool:
-    if joint.kind == "continuous":
+def _pushes_out(chain: Chain, k: int, position: float, wanted: float) -> bool:
+    """Whether a step takes the k-th solved joint further out of its limits."""
+    if chain.solved[k].kind == "continuous":
         return False
-    return (position <= joint.lower and wanted < position) or (
-        position >= joint.upper and wanted > position
-    )
+    lower, upper = chain.limits[k]
+    return (position <= lower and wanted < position) or (position >= upper and wanted > position)
 
 
 def _solve_damped(columns: list[Row], error: Row, damping: float) -> Row:

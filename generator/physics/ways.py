@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from generator.core.errors import Rejection
-from generator.core.kinematics import all_positions, within_limits
+from generator.core.kinematics import all_positions, gripper_opening, within_limits
 from generator.core.scene import ArmGoal, Surface
 from generator.core.se3 import SE3
 from generator.physics.bullet import World
@@ -298,7 +298,7 @@ class Way:
         self._world.place(body, SE3())
         bottom = float(self._world.bounds_m(body)[0][2])
         T_grasp_held = self._arm.grasp_pose(stance.positions).inverse() @ stance.T_world_held
-        opening = _opening(self._arm, stance.positions)
+        opening = gripper_opening(self._arm.robot, stance.positions)
         return Held(body, T_grasp_held, SE3((0.0, 0.0, -bottom)), opening)
 
     def _restore(self) -> None:
@@ -324,12 +324,3 @@ def _what_hits(hits: Mapping[str, None], otherwise: str) -> str:
     if named:
         return f"hits {named[0]}" if named[0] == "itself" else f"hits '{named[0]}'"
     return CANNOT_REACH if hits else otherwise
-
-
-def _opening(arm: Arm, positions: Positions) -> float:
-    """Opening of the gripper at these positions, in [0, 1]."""
-    fingers = arm.robot.gripper.finger_joints if arm.robot.gripper else ()
-    for joint, position in zip(arm.robot.movable, positions, strict=True):
-        if joint.name in fingers and joint.upper > joint.lower:
-            return (position - joint.lower) / (joint.upper - joint.lower)
-    return 0.0

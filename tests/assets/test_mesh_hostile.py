@@ -7,6 +7,7 @@ import os
 import re
 import struct
 import time
+import tracemalloc
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +19,8 @@ import pytest
 from generator.assets.catalogue import Index, MeshEntry, listed
 from generator.assets.folder import Folder
 from generator.assets.library import open_library
+from generator.assets.readers import read_mesh
+from generator.assets.soup import Soup
 from generator.core.errors import AssetError
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
@@ -410,3 +413,27 @@ def test_a_series_writes_numbers_with_three_digits() -> None:
     entry = MeshEntry(id="a/000", file="x/000/000.obj", category="c", count=12)
     names = [(one.asset_id, one.entry.file) for one in listed(Index(assets=(entry,)), Path())]
     assert names[11] == ("a/011", "x/011/011.obj")
+
+
+def test_reading_takes_no_more_memory_than_the_file(tmp_path: Path) -> None:
+    """A small file under a small limit of memory."""
+    (tmp_path / "a.obj").write_bytes(b"v 0 0 0\n" * 100)
+    tracemalloc.start()
+    try:
+        data = Folder(tmp_path).read("a.obj")
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(data) == 800
+    assert peak < 1_000_000
+
+
+def test_an_stl_with_too_many_triangles_is_refused_before_it_is_decoded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its header says how many there are."""
+    (tmp_path / "a.stl").write_bytes(stl(4, 4))
+    monkeypatch.setattr("generator.assets.readers.source.MAX_FACES", 3)
+    monkeypatch.setattr(Soup, "of", lambda *_: pytest.fail("decoded"))
+    with pytest.raises(AssetError, match="4 triangles, at most 3"):
+        read_mesh(Folder(tmp_path), "a.stl")

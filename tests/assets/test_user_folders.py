@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 import trimesh
 from PIL import Image
 
+from generator.assets import discovery
+from generator.assets.catalogue import MeshEntry
+from generator.assets.importer import upright
 from generator.assets.library import open_library
 from generator.assets.primitives import box
-from generator.core.errors import AssetError, ConfigError
+from generator.core.errors import AssetError, ConfigError, UnknownAsset
+from generator.core.geometry import Symmetry
+from generator.core.kinematics import link_poses
+from generator.core.se3 import SE3
 
 ARM = """<robot name="arm">
   <link name="base"><visual><geometry><box size="0.2 0.2 0.1"/></geometry>
@@ -60,7 +69,7 @@ def test_an_index_says_what_files_are(folder: Path, tmp_path: Path) -> None:
     asset = library.get("user/crate")
     assert (asset.category, asset.mass_kg, asset.stackable) == ("wooden crate", 2.5, True)
     assert (asset.licence, asset.author, asset.source) == ("CC0-1.0", "Else", "workshop")
-    assert asset.tags == ("graspable", "wooden_crate")
+    assert asset.tags == ("graspable", "user", "wooden_crate")
     low, high = library.bounds_m("user/crate")
     # 40 x 60 x 20 with Y up: the longest edge, 60, stands and is 0.3 m.
     assert low == pytest.approx((-0.1, -0.05, 0.0), abs=1e-6)
@@ -78,7 +87,7 @@ def test_a_folder_without_an_index_offers_every_mesh(folder: Path, tmp_path: Pat
     library = open_library([folder], cache_dir=tmp_path / "cache")
     assert library.get("user/nut").category == "props"
     bolt = library.get("user/bolts/m8_long")
-    assert (bolt.category, bolt.tags) == ("bolts", ("bolts",))
+    assert (bolt.category, bolt.tags) == ("bolts", ("bolts", "user"))
     assert library.bounds_m(bolt.asset_id)[1] == pytest.approx((0.005, 0.005, 0.025))
 
 
@@ -177,3 +186,271 @@ def test_textures_and_panoramas_can_be_listed(folder: Path, tmp_path: Path) -> N
     assert radiance[-1, 0] == pytest.approx([0.5] * 3, rel=0.01)
     with pytest.raises(AssetError, match="no texture"):
         library.texture("user/sky")
+
+
+HAND = """<robot name="hand">
+  <link name="palm"/>
+  <link name="left"><visual><geometry><box size="0.02 0.02 0.1"/></geometry></visual></link>
+  <link name="right"><visual><geometry><box size="0.02 0.02 0.1"/></geometry></visual></link>
+  <joint name="finger" type="revolute"><parent link="palm"/><child link="left"/>
+    <axis xyz="0 0 1"/><limit lower="0" upper="0.8"/></joint>
+  <joint name="knuckle" type="revolute"><parent link="palm"/><child link="right"/>
+    <axis xyz="0 0 1"/><limit lower="-0.9" upper="0.9"/>
+    <mimic joint="finger" multiplier="-1" offset="0.1"/></joint>
+</robot>"""
+HAND_INDEX = "robots: [{id: hand, file: hand.urdf, home: {%s}}]\n"
+
+
+def test_a_joint_that_mimics_another_has_its_multiplier_and_offset(
+    folder: Path, tmp_path: Path
+) -> None:
+    """At home 0.3 the follower is at -1 * 0.3 + 0.1 = -0.2, and its link is turned so far."""
+    (folder / "hand.urdf").write_text(HAND)
+    (folder / "assets.yaml").write_text(HAND_INDEX % "finger: 0.3")
+    robot = open_library([folder], cache_dir=tmp_path / "cache").robot("user/hand")
+    assert robot.home == pytest.approx((0.3, -0.2))
+    poses = link_poses(robot, SE3(), robot.home)
+    assert poses["right"].quaternion_wxyz == pytest.approx((0.99500417, 0.0, 0.0, -0.09983342))
+
+
+def test_a_follower_cannot_be_told_to_stand_elsewhere(folder: Path, tmp_path: Path) -> None:
+    """Home positions that contradict the URDF are refused."""
+    (folder / "hand.urdf").write_text(HAND)
+    (folder / "assets.yaml").write_text(HAND_INDEX % "finger: 0.3, knuckle: 0.3")
+    with pytest.raises(AssetError, match=r"'knuckle', which mimics 'finger' and is at -0\.2"):
+        open_library([folder], cache_dir=tmp_path / "cache").robot("user/hand")
+
+
+@pytest.mark.parametrize(
+    ("mimic", "fault"),
+    [
+        ('joint="fingr"', r"hand\.urdf:7:3: .*'knuckle' mimics 'fingr'.*did you mean 'finger'"),
+        ('joint="knuckle"', r"hand\.urdf:7:3: .*'knuckle' mimics itself"),
+        ('joint="finger" multiplier="x"', r"hand\.urdf:7:3: .*could not convert .*'x'"),
+        ('joint="finger" offset="nan"', r"hand\.urdf:7:3: .*'nan' is not a number"),
+    ],
+)
+def test_a_wrong_mimic_is_refused_with_its_place(
+    folder: Path, tmp_path: Path, mimic: str, fault: str
+) -> None:
+    """File, line and column of the joint."""
+    changed = HAND.replace('joint="finger" multiplier="-1" offset="0.1"', mimic)
+    (folder / "hand.urdf").write_text(changed)
+    (folder / "assets.yaml").write_text(HAND_INDEX % "")
+    with pytest.raises(AssetError, match=fault):
+        open_library([folder], cache_dir=tmp_path / "cache").robot("user/hand")
+
+
+def sized(folder: Path, tmp_path: Path, entry: str, name: str = "a.obj") -> tuple[float, ...]:
+    """Edges of the asset that an index entry makes of a box of 1 x 2 x 3 units."""
+    write_box(folder / name, (1.0, 2.0, 3.0))
+    (folder / "assets.yaml").write_text(f"assets: [{{id: a, file: {name}, {entry}}}]\n")
+    low, high = open_library([folder], cache_dir=tmp_path / "cache").bounds_m("user/a")
+    return tuple(b - a for a, b in zip(low, high, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("entry", "size"),
+    [
+        ("unit: cm", (0.01, 0.02, 0.03)),
+        ("unit: in", (0.0254, 0.0508, 0.0762)),
+        ("size_m: [0.1, 0.2, 0.3]", (0.1, 0.2, 0.3)),
+        ("size_m: 0.6, up: y", (0.2, 0.6, 0.4)),
+        ("size_m: 0.6, up: x", (0.6, 0.4, 0.2)),
+        ("front: y", (2.0, 1.0, 3.0)),
+        ("front: -z, up: y", (3.0, 1.0, 2.0)),
+    ],
+)
+def test_units_edges_and_axes(
+    folder: Path, tmp_path: Path, entry: str, size: tuple[float, ...]
+) -> None:
+    """By hand for a box of 1 x 2 x 3: what points up stands, what points to the front lies on X."""
+    assert sized(folder, tmp_path, entry) == pytest.approx(size, rel=1e-6)
+
+
+@pytest.mark.parametrize(("up", "front"), [("z", "-y"), ("y", "z"), ("y", "-x"), ("x", "y")])
+def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
+    """As a turn: nothing is mirrored."""
+    names = {"x": (1.0, 0, 0), "y": (0, 1.0, 0), "z": (0, 0, 1.0), "-x": (-1.0, 0, 0),
+             "-y": (0, -1.0, 0), "-z": (0, 0, -1.0)}  # fmt: skip
+    turn = upright(MeshEntry.model_validate({"file": "a.obj", "up": up, "front": front}))[:, :3]
+    assert turn @ names[up] == pytest.approx((0, 0, 1))
+    assert turn @ names[front] == pytest.approx((1, 0, 0))
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("entry", "fault"),
+    [
+        ("size_m: 1, unit: mm", "size_m or unit, not both"),
+        ("scale: 2, unit: mm", "scale or unit, not both"),
+        ("front: x, yaw_deg: 90", "front or yaw_deg, not both"),
+        ("front: -z", "front is -z, but z points up"),
+        ("unit: yards", "unit"),
+        ("symmetries: [{axis: [0, 0, 0]}]", "an axis of some length"),
+        ("symmetries: [{axis: z, fold: 1}]", "fold"),
+        ("materials: {'*': {maps: {}}}", "expected an image"),
+        ("materials: {'*': {maps: {orm: a.png, metallic: b.png}}}", "not both"),
+    ],
+)
+def test_a_contradiction_is_refused_with_its_place(
+    folder: Path, tmp_path: Path, entry: str, fault: str
+) -> None:
+    """File, line and column, as everywhere in the configuration."""
+    with pytest.raises(ConfigError, match=rf"(?s)assets\.yaml:1:\d+: assets\[0\].*{fault}"):
+        sized(folder, tmp_path, entry)
+
+
+def test_edges_that_do_not_fit_the_file_are_refused(folder: Path, tmp_path: Path) -> None:
+    """They show that an axis is wrong."""
+    with pytest.raises(AssetError, match=r"0\.1 x 0\.2 x 0\.3 m .*not 0\.1 x 0\.3 x 0\.2 m"):
+        sized(folder, tmp_path, "size_m: [0.1, 0.3, 0.2]")
+
+
+def test_a_pattern_stands_for_every_file_that_matches(folder: Path, tmp_path: Path) -> None:
+    """Ids and categories follow from paths; the rest of the entry holds for all."""
+    for name in ("bolts/m8.stl", "bolts/long/m10.stl", "nuts/m8.stl", "nut.stl", ".git/x.stl"):
+        write_box(folder / name, (10.0, 10.0, 20.0))
+    (folder / "assets.yaml").write_text(
+        "assets:\n  - {file: bolts/**/*.stl, unit: mm, tags: [metal]}\n"
+        "  - {file: n*/m?.stl, category: nut, unit: cm}\n"
+    )
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    (nut,) = library.find({"nut", "user"})
+    assert (nut.asset_id, nut.tags) == ("user/nuts/m8", ("nut", "user"))
+    bolts = {asset.asset_id: asset.category for asset in library.find({"metal"})}
+    assert bolts == {"user/bolts/m8": "bolts", "user/bolts/long/m10": "long"}
+    assert library.bounds_m("user/bolts/m8")[1] == pytest.approx((0.005, 0.005, 0.01))
+    assert "user/nut" not in library.find(())
+
+
+@pytest.mark.parametrize(
+    ("entry", "fault"),
+    [
+        (
+            "{id: a, file: cap.stl}",
+            r"2:19: assets\[0\]\.file: 'cap\.stl': no such file .*'cup\.stl'",
+        ),
+        ("{file: '*.obj'}", r"2:12: assets\[0\]\.file: '\*\.obj': matches no file; .* 1 \.stl"),
+        (
+            "{id: a, file: cup.stl, materials: {x: {maps: {color: w.png}}}}",
+            r"2:58: assets\[0\]\.materials\.x\.maps\.color: 'w\.png': no such file",
+        ),
+    ],
+)
+def test_a_missing_file_is_told_with_its_place(
+    folder: Path, tmp_path: Path, entry: str, fault: str
+) -> None:
+    """With the nearest name, or what the folder has."""
+    write_box(folder / "cup.stl", (0.1, 0.1, 0.1))
+    (folder / "assets.yaml").write_text(f"assets:\n  - {entry}\n")
+    with pytest.raises(ConfigError, match=rf"assets\.yaml:{fault}"):
+        open_library([folder], cache_dir=tmp_path / "cache").get("user/a")
+
+
+def test_symmetries_and_keypoints_belong_to_the_asset(folder: Path, tmp_path: Path) -> None:
+    """A square box: quarter turns about Z, and every angle about a slanted axis of length 1."""
+    write_box(folder / "a.stl", (0.1, 0.1, 0.2))
+    (folder / "assets.yaml").write_text(
+        "assets:\n  - file: a.stl\n    symmetries: [{axis: z, fold: 4}, {axis: [0, 3, 4]}]\n"
+        "    keypoints: [{name: lid, position_m: [0, 0, 0.1]}]\n"
+    )
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    assert library.get("user/a").symmetries == (
+        Symmetry((0.0, 0.0, 1.0), 4),
+        Symmetry((0.0, 0.6, 0.8), 0),
+    )
+    assert library.keypoints("user/a")[0].name == "lid"
+
+
+def test_images_of_a_folder_cover_a_mesh_and_make_textures(folder: Path, tmp_path: Path) -> None:
+    """Occlusion, roughness and metallic are red, green and blue of one image."""
+    write_box(folder / "a.stl", (0.1, 0.1, 0.2))
+    for name, color in (("color", (200, 100, 50)), ("orm", (10, 20, 30)), ("n", (128, 128, 255))):
+        Image.fromarray(np.full((4, 4, 3), color, np.uint8)).save(folder / f"{name}.png")
+    maps = "{color: color.png, orm: orm.png, normal: n.png}"
+    (folder / "assets.yaml").write_text(
+        f"assets: [{{file: a.stl, materials: {{'*': {{maps: {maps}, texture_scale_m: 0.2}}}}}}]\n"
+        f"textures: [{{id: steel, maps: {maps}}}]\n"
+    )
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    (material,) = library.materials("user/a")
+    assert (material.base_color, material.roughness, material.metallic) == ((1, 1, 1), 1, 1)
+    assert material.texture_scale_m == 0.2
+    for texture_id in (material.texture, "user/steel"):
+        images = library.texture(texture_id)
+        assert images.albedo[0, 0].tolist() == [200, 100, 50]
+        assert images.normal is not None
+        assert [
+            image[0, 0]
+            for image in (images.occlusion, images.roughness, images.metallic)
+            if image is not None
+        ] == [10, 20, 30]
+    digest = library.get("user/a").sha256
+    Image.fromarray(np.full((4, 4, 3), 7, np.uint8)).save(folder / "orm.png")
+    assert open_library([folder], cache_dir=tmp_path / "cache").get("user/a").sha256 != digest
+
+
+def test_images_need_to_be_placed(folder: Path, tmp_path: Path) -> None:
+    """An STL has no texture coordinates."""
+    Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(folder / "w.png")
+    with pytest.raises(AssetError, match="no texture coordinates; give texture_scale_m"):
+        sized(folder, tmp_path, "materials: {'*': {maps: {color: w.png}}}", "a.stl")
+
+
+def test_a_panorama_needs_no_index(folder: Path, tmp_path: Path) -> None:
+    """As a mesh does not."""
+    import cv2
+
+    cv2.imwrite(str(folder / "hall.hdr"), np.full((8, 16, 3), 2.0, np.float32))
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    assert "user/hall" in [asset.asset_id for asset in library.find({"user"}, "environment")]
+
+
+def test_an_unknown_id_tells_what_the_folders_hold(folder: Path, tmp_path: Path) -> None:
+    """The nearest id, with and without ``user/``; else a count by kind, and some ids."""
+    for name in ("cup", "plate"):
+        write_box(folder / f"{name}.stl", (0.1, 0.1, 0.1))
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    with pytest.raises(UnknownAsset, match="did you mean 'user/plate'"):
+        library.get("user/plates")
+    with pytest.raises(UnknownAsset, match="did you mean 'user/plate'"):
+        library.get("plaate")
+    with pytest.raises(UnknownAsset, match="hold 2 objects: user/cup, user/plate"):
+        library.get("user/something_else")
+
+
+def test_a_tree_that_is_no_folder_of_assets_is_refused(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every entry counts, not only meshes."""
+    for k in range(6):
+        (folder / f"{k}.txt").write_text("")
+    monkeypatch.setattr(discovery, "MAX_ENTRIES", 5)
+    with pytest.raises(AssetError, match="more than 5 files and folders"):
+        open_library([folder], cache_dir=tmp_path / "cache").find({"user"})
+
+
+def test_proc_is_refused_without_a_traceback(tmp_path: Path) -> None:
+    """It is endless, changes while it is read, and holds what cannot be read."""
+    with pytest.raises(AssetError, match=r"/proc"):
+        open_library([Path("/proc")], cache_dir=tmp_path / "cache").find({"user"})
+
+
+def test_a_folder_that_cannot_be_read_is_named(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the system says why."""
+    error = PermissionError(13, "Permission denied", str(folder / "locked"))
+    monkeypatch.setattr(os, "scandir", raising(error))
+    with pytest.raises(AssetError, match=r"locked: Permission denied; a folder of assets"):
+        discovery.files_below(folder)
+
+
+def raising(error: Exception) -> Callable[..., NoReturn]:
+    """A function that raises."""
+
+    def fail(*_: object) -> NoReturn:
+        raise error
+
+    return fail

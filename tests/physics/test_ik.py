@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
+from generator.core.geometry import Gripper, Joint, RobotModel
 from generator.core.kinematics import all_positions, is_arm_joint, link_poses, within_limits
 from generator.core.se3 import SE3
 from generator.physics.ik import Chain, chain_of, solutions
@@ -59,3 +61,43 @@ def test_the_solution_next_to_home_comes_first() -> None:
     home = ROBOT.home[:7]
 
     assert next(solutions(CHAIN, grasp_pose(home))) == home
+
+
+def levelled_arm() -> RobotModel:
+    """Two arms of 0.5 m in a plane, and a hand that the linkage keeps level.
+
+    As in a palletizer: ``q_hand = -q_shoulder - q_elbow`` cannot be said by one mimic, so that the
+    elbow mimics the shoulder, ``-2 q + 0.2``, and the hand the elbow, ``0.5 q_elbow - 0.1``: the
+    hand is at ``-q``.
+    """
+
+    def joint(number: int, x_m: float, mimic: str, multiplier: float, offset: float) -> Joint:
+        return Joint(
+            f"j{number}", "revolute", f"l{number}", f"l{number + 1}", SE3((x_m, 0.0, 0.0)),
+            (0.0, 0.0, 1.0), -3.0, 3.0, mimic,
+            mimic_multiplier=multiplier, mimic_offset=offset,
+        )  # fmt: skip
+
+    slide = Joint("slide", "prismatic", "l3", "l4", SE3((0.2, 0.0, 0.0)), (1.0, 0.0, 0.0), 0.0, 0.4)
+    joints = (
+        joint(0, 0.0, "", 1.0, 0.0),
+        joint(1, 0.5, "j0", -2.0, 0.2),
+        joint(2, 0.5, "j1", 0.5, -0.1),
+        slide,
+    )
+    links = tuple(f"l{k}" for k in range(5))
+    gripper = Gripper("l4", SE3(), (), 0.08)
+    return RobotModel(links, joints, {}, {}, (0.0, 0.2, 0.0, 0.0), gripper, frozenset())
+
+
+def test_joints_that_mimic_move_with_their_leaders() -> None:
+    """By hand at shoulder 0.7, slide 0.3: angles 0.7, 0.7 - 1.2 = -0.5, then -0.5 - 0.7 = -1.2."""
+    robot = levelled_arm()
+    assert robot.gripper is not None
+    x = 0.5 * math.cos(0.7) + 0.5 * math.cos(-0.5) + (0.2 + 0.3) * math.cos(-1.2)
+    y = 0.5 * math.sin(0.7) + 0.5 * math.sin(-0.5) + (0.2 + 0.3) * math.sin(-1.2)
+
+    found = next(solutions(chain_of(robot, robot.gripper), SE3.about_z(-1.2, (x, y, 0.0))))
+
+    assert found == pytest.approx((0.7, 0.3), abs=5e-3)
+    assert all_positions(robot, found, 1.0)[1:3] == pytest.approx((-1.2, -0.7), abs=1e-2)

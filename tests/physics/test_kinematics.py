@@ -9,11 +9,14 @@ import numpy as np
 import pybullet
 import pytest
 
+from generator.core.geometry import Gripper, Joint, RobotModel
 from generator.core.kinematics import (
     all_positions,
     finger_links,
+    gripper_opening,
     link_bodies,
     link_poses,
+    position_limits,
     rigid_group,
     rounded_positions,
     within_limits,
@@ -111,3 +114,75 @@ def test_positions_are_rounded_to_six_decimals_without_negative_zero() -> None:
 
     assert rounded == (3.141593, 0.0)
     assert math.copysign(1.0, rounded[1]) == 1.0
+
+
+def linkage(*followers: Joint) -> RobotModel:
+    """A hand whose joint ``finger`` [0, 0.8] turns about Z, and joints that follow it."""
+    finger = turning("finger", "left", lower=0.0, upper=0.8)
+    joints = (finger, *followers)
+    links = ("base", *(joint.child for joint in joints))
+    gripper = Gripper("base", SE3(), ("finger",), 0.085, open_at="lower")
+    return RobotModel(links, joints, {}, {}, (0.0,) * len(joints), gripper, frozenset())
+
+
+def turning(
+    name: str, child: str, mimic: str = "", multiplier: float = 1.0, offset: float = 0.0,
+    *, lower: float = -3.0, upper: float = 3.0,
+) -> Joint:  # fmt: skip
+    """A joint of the base that turns about Z."""
+    return Joint(
+        name, "revolute", "base", child, SE3(), (0.0, 0.0, 1.0), lower, upper, mimic,
+        mimic_multiplier=multiplier, mimic_offset=offset,
+    )  # fmt: skip
+
+
+def test_a_joint_follows_with_its_multiplier_and_offset() -> None:
+    """As a Robotiq hand: half closed, 0.4, the other side is at -1 * 0.4 + 0.1 = -0.3."""
+    hand = linkage(turning("knuckle", "right", "finger", -1.0, 0.1))
+
+    assert all_positions(hand, (), opening=0.5) == (0.4, -0.3)
+
+
+def test_a_joint_may_follow_one_that_follows() -> None:
+    """2 * (-q + 0.1) - 0.05 = -2 q + 0.15: at 0.8, closed, -1.45; in any order."""
+    knuckle = turning("knuckle", "right", "finger", -1.0, 0.1)
+    tip = turning("tip", "tip", "knuckle", 2.0, -0.05)
+
+    assert all_positions(linkage(knuckle, tip), (), opening=0.0) == (0.8, -0.7, -1.45)
+    assert all_positions(linkage(tip, knuckle), (), opening=0.0) == (0.8, -1.45, -0.7)
+
+
+def test_a_leader_stays_where_its_followers_are_within_their_limits() -> None:
+    """-q + 0.1 within [-0.5, 0.05] leaves q within [0.05, 0.6]."""
+    hand = linkage(turning("knuckle", "right", "finger", -1.0, 0.1, lower=-0.5, upper=0.05))
+
+    assert position_limits(hand.joints[0], hand) == pytest.approx((0.05, 0.6))
+
+
+def test_links_that_follow_a_finger_are_fingers() -> None:
+    """A joint that the gripper does not list moves with it all the same."""
+    hand = linkage(turning("knuckle", "right", "finger", -1.0), turning("wrist", "palm"))
+
+    assert finger_links(hand) == ("left", "right")
+
+
+@pytest.mark.parametrize("opening", [0.0, 0.25, 1.0])
+def test_the_opening_is_read_back_from_positions(opening: float) -> None:
+    """Whichever limit is the open one."""
+    for robot, arm in ((panda(), HOME[:7]), (linkage(), ())):
+        positions = all_positions(robot, arm, opening)
+        assert gripper_opening(robot, positions) == pytest.approx(opening, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("followers", "fault"),
+    [
+        ([turning("a", "x", "fingr")], r"'a' mimics 'fingr', which does not exist.*'finger'"),
+        ([turning("a", "x", "a")], "'a' mimics itself through 'a'"),
+        ([turning("a", "x", "b"), turning("b", "y", "a")], "'a' mimics itself through 'b'"),
+    ],
+)
+def test_followers_without_a_leader_are_refused(followers: list[Joint], fault: str) -> None:
+    """Unknown joints, and circles of any length."""
+    with pytest.raises(ValueError, match=fault):
+        all_positions(linkage(*followers), (), opening=0.5)

@@ -9,7 +9,7 @@ from generator.assets.folder import Folder
 from generator.assets.readers.gltf import read_gltf
 from generator.assets.readers.obj import read_obj
 from generator.assets.readers.ply import read_ply
-from generator.assets.readers.source import MAX_FACES, Source
+from generator.assets.readers.source import Source, check_face_count
 from generator.assets.readers.stl import read_stl
 from generator.assets.readers.usd import read_usd
 from generator.core.errors import AssetError, did_you_mean
@@ -51,6 +51,5 @@ def read_mesh(folder: Folder, relative: str, *, materials: bool = True) -> Sourc
     source = _READERS[suffix](folder, relative, materials)
     if not len(source.soup):
         raise AssetError(f"{path}: holds no triangles; export it again with its faces")
-    if len(source.soup) > MAX_FACES:
-        raise AssetError(f"{path}: {len(source.soup)} triangles, at most {MAX_FACES}; decimate it")
+    check_face_count(len(source.soup), str(path))
     return source

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from generator.assets.soup import Soup
 from generator.core.colorimetry import srgb_decode
+from generator.core.errors import AssetError
 from generator.core.se3 import Vec3
 
 MAX_FACES = 5_000_000
@@ -27,6 +28,12 @@ class Source:
 
     soup: Soup
     images: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def check_face_count(count: int, place: str) -> None:
+    """Raise AssetError if a file has more triangles than are read."""
+    if count > MAX_FACES:
+        raise AssetError(f"{place}: {count} triangles, at most {MAX_FACES}; decimate it")
 
 
 def fraction(value: object, name: str) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from generator.assets.folder import Folder
-from generator.assets.readers.source import Source
+from generator.assets.readers.source import Source, check_face_count
 from generator.assets.soup import Float64, Soup
 from generator.core.errors import AssetError
 
@@ -23,6 +23,7 @@ def read_stl(folder: Folder, relative: str, _materials: bool) -> Source:
     # Binary files may also begin with "solid": only the size tells for certain.
     count = int.from_bytes(data[80:_HEADER_BYTES], "little")
     if len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + _RECORD.itemsize * count:
+        check_face_count(count, str(folder.root / relative))
         records = np.frombuffer(data, dtype=_RECORD, offset=_HEADER_BYTES)
         return Source(Soup.of(records["corners"].astype(np.float64)))
     corners = _ascii(data) if data.lstrip()[:5].lower() == b"solid" else None

@@ -1,0 +1,135 @@
+"""Whether the assets of a user's folder can be used, and what they are taken for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from generator.assets.catalogue import METRES_PER_UNIT, Listed, MeshEntry, user_folder
+from generator.assets.library import Library
+from generator.core.errors import AssetError
+from generator.core.kinematics import link_poses
+from generator.core.se3 import SE3, Vec3
+
+_SMALLEST_M, _LARGEST_M = 0.001, 20.0
+"""Longest edges beyond which the unit is doubtful."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One asset of a folder.
+
+    Attributes:
+        category: Empty for images.
+        triangles: 0 for images.
+        size_m: Edges of its bounding box, of a robot at home; None for images.
+        unit: How the file's numbers become metres; empty for images.
+        up: Axis of the file that points up; empty where the file says so itself.
+        error: Why it cannot be used; empty if it can.
+        warnings: What is doubtful.
+    """
+
+    asset_id: str
+    kind: str
+    category: str
+    triangles: int = 0
+    size_m: Vec3 | None = None
+    unit: str = ""
+    up: str = ""
+    error: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+def check_folder(root: Path, library: Library) -> Iterator[Finding]:
+    """Use every asset of a folder once.
+
+    Args:
+        root: A user's folder.
+        library: A library that has it among its folders.
+
+    Raises:
+        AssetError: if the folder cannot be read.
+        ConfigError: if its index is wrong.
+    """
+    for one in user_folder(root):
+        try:
+            yield _inspect(one, library)
+        except AssetError as error:
+            yield Finding(one.asset_id, one.kind, one.category(), error=str(error))
+
+
+def _inspect(one: Listed, library: Library) -> Finding:
+    """What an asset is. Raises AssetError if it cannot be used."""
+    origin = () if one.origin.licence not in ("", "unknown") else ("no licence is given",)
+    if one.kind == "texture":
+        library.texture(one.asset_id)
+        return Finding(one.asset_id, one.kind, "", warnings=origin)
+    if one.kind == "environment":
+        library.environment(one.asset_id)
+        return Finding(one.asset_id, one.kind, "", warnings=origin)
+    triangles, low, high = (_robot if one.kind == "robot" else _object)(one, library)
+    size_m = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
+    return Finding(
+        one.asset_id, one.kind, one.category(), triangles, size_m, _unit(one), _up(one),
+        warnings=(*_doubts(one, max(size_m)), *origin),
+    )  # fmt: skip
+
+
+def _object(one: Listed, library: Library) -> tuple[int, Vec3, Vec3]:
+    """Number of triangles and bounding box of an object that can be seen and collide."""
+    library.convex_parts(one.asset_id)
+    return (len(library.mesh(one.asset_id).faces), *library.bounds_m(one.asset_id))
+
+
+def _robot(one: Listed, library: Library) -> tuple[int, Vec3, Vec3]:
+    """Number of triangles and bounding box of a robot at home."""
+    robot = library.robot(one.asset_id)
+    poses = link_poses(robot, SE3(), robot.home)
+    for asset_id in robot.collisions.values():
+        library.convex_parts(asset_id)
+    if not robot.visuals:
+        raise AssetError(f"asset '{one.asset_id}': no link shows anything; give one a <visual>")
+    meshes = {link: library.mesh(asset_id) for link, asset_id in robot.visuals.items()}
+    points = np.concatenate(
+        [poses[k].apply(mesh.vertices_m.astype(np.float64)) for k, mesh in meshes.items()]
+    )
+    x, y, z = (float(v) for v in points.min(axis=0))
+    far_x, far_y, far_z = (float(v) for v in points.max(axis=0))
+    triangles = sum(len(mesh.faces) for mesh in meshes.values())
+    return triangles, (x, y, z), (far_x, far_y, far_z)
+
+
+def _unit(one: Listed) -> str:
+    """How an entry says that numbers become metres."""
+    entry = one.entry
+    if not isinstance(entry, MeshEntry):
+        return "m"
+    if entry.size_m is not None:
+        return "size_m"
+    if entry.scale != 1.0:
+        return f"{entry.scale:g} m"
+    return entry.unit or "m (assumed)"
+
+
+def _up(one: Listed) -> str:
+    """Axis that an entry, or a convention of the format, says to be up."""
+    entry = one.entry
+    if not isinstance(entry, MeshEntry):
+        return "z"
+    if entry.up is None and Path(entry.file).suffix.lower().startswith(".usd"):
+        return ""
+    return entry.up or f"{entry.up_axis()} (assumed)"
+
+
+def _doubts(one: Listed, longest_m: float) -> Iterator[str]:
+    """Signs of a wrong unit."""
+    if not isinstance(one.entry, MeshEntry) or one.entry.file.lower().endswith(".xodr"):
+        return
+    if longest_m > _LARGEST_M and _unit(one) == "m (assumed)":
+        options = (f"{u} ({METRES_PER_UNIT[u] * longest_m:.4g} m)" for u in ("mm", "cm", "in"))
+        yield f"{longest_m:.4g} m long; its unit may be {', '.join(options)}"
+    elif longest_m < _SMALLEST_M:
+        yield f"{longest_m:.2g} m long; is its unit right?"

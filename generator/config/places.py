@@ -1,0 +1,28 @@
+"""Where a document says something: from a text to its field and position."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from generator.config.document import Node
+from generator.config.problems import FieldPath, Position, dotted
+
+
+def place_of_text(document: Node, text: str) -> tuple[Position, str] | None:
+    """Position and field of the first scalar with that text; None if there is none."""
+    for path, node in _scalars(document, ()):
+        if text in (node.text, node.content):
+            return node.position, dotted(path)
+    return None
+
+
+def _scalars(node: Node, path: FieldPath) -> Iterator[tuple[FieldPath, Node]]:
+    """Every scalar below a node with its path, in the order of the source."""
+    if isinstance(node.content, Mapping):
+        for key, child in node.content.items():
+            yield from _scalars(child, (*path, key))
+    elif isinstance(node.content, tuple):
+        for number, child in enumerate(node.content):
+            yield from _scalars(child, (*path, number))
+    else:
+        yield path, node

@@ -1,0 +1,88 @@
+"""Small pictures of single assets."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from generator.core.capture import Channel
+from generator.core.geometry import Asset
+from generator.core.interfaces import AssetLibrary, Renderer
+from generator.core.intrinsics import Intrinsics
+from generator.core.kinematics import link_bodies
+from generator.core.scene import Articulation, Body, Camera, Environment, Light, Scene
+from generator.core.se3 import SE3, look_at
+from generator.preview.overlay import Image
+
+_HALF_FIELD_RAD = math.radians(15.0)
+_AZIMUTH_RAD, _ELEVATION_RAD = math.radians(35.0), math.radians(25.0)
+_MARGIN = 1.1
+
+
+def thumbnail(asset: Asset, library: AssetLibrary, renderer: Renderer, size_px: int) -> Image:
+    """An asset, uint8 [size_px, size_px, 3]: images as they are, all else seen from its front.
+
+    Raises:
+        AssetError: if it cannot be read.
+    """
+    if asset.kind == "texture":
+        return _fitted(library.texture(asset.asset_id).albedo, size_px)
+    if asset.kind == "environment":
+        radiance = library.environment(asset.asset_id)
+        shown = np.power(radiance / (1.0 + radiance), 1.0 / 2.2)
+        return _fitted((255.0 * shown).astype(np.uint8), size_px)
+    scene = Scene(
+        "thumbnail",
+        _bodies(asset, library),
+        lights=(Light("key", "sun", direction=(-0.36, -0.48, -0.8), illuminance_lux=600.0),),
+        environment=Environment(luminance_cd_m2=120.0, visible=False),
+    )
+    reading = renderer.render(scene, _camera(scene, library, size_px), frozenset({Channel.RGB}))
+    return np.asarray(reading.channels[Channel.RGB], np.uint8)
+
+
+def _bodies(asset: Asset, library: AssetLibrary) -> tuple[Body, ...]:
+    """What shows an object, or a robot at home."""
+    if asset.kind != "robot":
+        return (Body("object", asset.asset_id),)
+    robot = library.robot(asset.asset_id)
+    return link_bodies(Articulation("robot", asset.asset_id, 1, SE3(), robot.home), robot, ())
+
+
+def _camera(scene: Scene, library: AssetLibrary, size_px: int) -> Camera:
+    """A camera that shows all bodies, from the front, the left and above."""
+    corners = np.concatenate([_corners(body, library) for body in scene.bodies])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    x, y, z = (float(v) for v in 0.5 * (low + high))
+    radius_m = max(0.5 * math.dist(low, high), 1e-4)
+    distance_m = _MARGIN * radius_m / math.sin(_HALF_FIELD_RAD)
+    level_m = distance_m * math.cos(_ELEVATION_RAD)
+    eye_m = (
+        x + level_m * math.cos(_AZIMUTH_RAD),
+        y + level_m * math.sin(_AZIMUTH_RAD),
+        z + distance_m * math.sin(_ELEVATION_RAD),
+    )
+    focal_px = 0.5 * size_px / math.tan(_HALF_FIELD_RAD)
+    lens = Intrinsics(size_px, size_px, focal_px, focal_px, 0.5 * size_px, 0.5 * size_px)
+    return Camera("thumbnail", look_at(eye_m, (x, y, z)), lens, ev100=7.5)
+
+
+def _corners(body: Body, library: AssetLibrary) -> NDArray[np.float64]:
+    """Corners of a body's bounding box in the world [m], [8, 3]."""
+    bounds = library.bounds_m(body.asset)
+    box = np.array([[bounds[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+    return body.T_world_body.apply(box)
+
+
+def _fitted(image: Image, size_px: int) -> Image:
+    """An image at most ``size_px`` wide and high, in the middle of a grey square."""
+    scale = size_px / max(image.shape[:2])
+    height, width = (max(1, round(scale * side)) for side in image.shape[:2])
+    small = cv2.resize(np.ascontiguousarray(image), (width, height), interpolation=cv2.INTER_AREA)
+    square: Image = np.full((size_px, size_px, 3), 24, np.uint8)
+    y, x = (size_px - height) // 2, (size_px - width) // 2
+    square[y : y + height, x : x + width] = small
+    return square

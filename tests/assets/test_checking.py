@@ -1,0 +1,106 @@
+"""A folder is checked asset by asset."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from generator.assets.checking import Finding, check_folder
+from generator.assets.library import open_library
+from generator.cli.assets import assets
+from generator.core.errors import AssetError
+from tests.assets.test_user_folders import ARM, write_box
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A bolt in millimetres, a broken mesh, a crate, an arm."""
+    root = tmp_path / "props"
+    write_box(root / "bolt.stl", (8.0, 8.0, 40.0))
+    write_box(root / "crate.glb", (0.4, 0.6, 0.3))
+    (root / "broken.obj").write_text("v 0 0 0\n")
+    (root / "arm.urdf").write_text(ARM)
+    (root / "assets.yaml").write_text(
+        "licence: CC0-1.0\nrobots: [{id: arm, file: arm.urdf}]\nassets:\n"
+        "  - {file: bolt.stl}\n  - {file: broken.obj}\n  - {file: crate.glb, licence: MIT}\n"
+    )
+    return root
+
+
+def test_every_asset_is_found_out_about(folder: Path, tmp_path: Path) -> None:
+    """One that is broken does not hide the others."""
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    found = {finding.asset_id: finding for finding in check_folder(folder, library)}
+    assert list(found) == ["user/bolt", "user/broken", "user/crate", "user/arm"]
+    assert found["user/crate"] == Finding(
+        "user/crate", "object", "props", 12, found["user/crate"].size_m, "m (assumed)",
+        "y (assumed)",
+    )  # fmt: skip
+    # Y of a glTF points up.
+    assert found["user/crate"].size_m == pytest.approx((0.4, 0.3, 0.6))
+    assert "holds no triangles" in found["user/broken"].error
+    assert found["user/bolt"].warnings == (
+        "40 m long; its unit may be mm (0.04 m), cm (0.4 m), in (1.016 m)",
+    )
+    assert found["user/arm"].error == ""
+
+
+def test_a_robot_is_measured_at_home(folder: Path, tmp_path: Path) -> None:
+    """By hand: the shoulder at 1 rad tips 0.4 m of arm and a ball of radius 0.05 m over."""
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    (arm,) = (f for f in check_folder(folder, library) if f.kind == "robot")
+    assert arm.size_m is not None
+    # From the box's corner at -0.1 to the ball's side; from its bottom at -0.05 to the cylinder's
+    # upper edge or the ball's top.
+    ball_x, ball_z = 0.4 * np.sin(1.0), 0.05 + 0.4 * np.cos(1.0)
+    assert arm.size_m[0] == pytest.approx(0.1 + ball_x + 0.05, abs=0.002)
+    assert arm.size_m[2] == pytest.approx(0.05 + ball_z + 0.05, abs=0.002)
+
+
+def test_the_command_fails_if_an_asset_cannot_be_used(folder: Path) -> None:
+    """And tells which, and why."""
+    result = CliRunner().invoke(assets, ["check", str(folder)])
+    assert isinstance(result.exception, AssetError)
+    assert "1 of 4 assets cannot be used" in str(result.exception)
+    assert "user/broken: " in result.output
+    (folder / "broken.obj").unlink()
+    (folder / "assets.yaml").write_text("licence: CC0-1.0\nassets: [{file: crate.glb}]\n")
+    result = CliRunner().invoke(assets, ["check", str(folder)], catch_exceptions=False)
+    assert result.exit_code == 0
+    assert "1 assets, all can be used" in result.output
+
+
+def test_pictures_show_every_asset(folder: Path, tmp_path: Path) -> None:
+    """Each tile has something brighter than its background, and something of it is seen."""
+    (folder / "assets.yaml").write_text("assets: [{file: crate.glb}]\n")
+    sheet = tmp_path / "sheet.png"
+    CliRunner().invoke(
+        assets, ["check", str(folder), "--sheet", str(sheet)], catch_exceptions=False
+    )
+    image = cv2.imread(str(sheet))
+    assert image is not None
+    tile = image[4:260, 4:260]
+    # The box fills the middle, and a margin stays around it.
+    assert tile[100:156, 100:156].min() > 40
+    assert tile[:8].max() < 30
+
+
+def test_a_folder_is_listed(folder: Path) -> None:
+    """All that it holds, or what carries a tag."""
+    listed = CliRunner().invoke(assets, ["list", "--folder", str(folder)], catch_exceptions=False)
+    assert {line.split()[0] for line in listed.output.splitlines()} == {
+        "user/arm", "user/bolt", "user/broken", "user/crate",
+    }  # fmt: skip
+
+
+def test_the_schema_describes_the_index() -> None:
+    """With the sections of the document."""
+    printed = CliRunner().invoke(assets, ["schema"], catch_exceptions=False)
+    described = json.loads(printed.output)
+    assert {"assets", "robots", "textures", "environments"} <= set(described["properties"])
+    assert "SymmetryEntry" in described["$defs"]
