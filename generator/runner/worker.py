@@ -22,6 +22,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from generator.core.child_processes import end_with_parent
 from generator.core.errors import GenDataError
 from generator.runner.events import Failed, Ready, SampleDone, ShardDone
 from generator.runner.unforeseen import unforeseen
@@ -29,8 +30,6 @@ from generator.runner.unforeseen import unforeseen
 if TYPE_CHECKING:
     from generator.core.sample import Sample
     from generator.runner.shard import Job, MadeShard, PipelineLike
-
-PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 
 
 def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
@@ -42,7 +41,7 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
         job_fd: A file that holds a pickled Job.
         parent_pid: The process ends with that one.
     """
-    _die_with(parent_pid)
+    end_with_parent(parent_pid)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -154,12 +153,3 @@ def _give_memory_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
-
-
-def _die_with(parent_pid: int) -> None:
-    """Make the kernel kill this process when its parent ends, for whatever reason."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent_pid:
-        # The parent ended before the call above.
-        os._exit(1)

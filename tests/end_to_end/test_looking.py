@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
+import urllib.request
 from pathlib import Path
 
 import numpy as np
+import psutil
+import pytest
 from PIL import Image
 
-from tests.end_to_end.running import SMALL, gen_data
+from tests.end_to_end.running import SMALL, command, environment, gen_data
 
 
 def test_contact_sheet_of_a_dataset_has_one_tile_per_sample(dataset: Path, tmp_path: Path) -> None:
@@ -81,3 +85,40 @@ def test_a_report_counts_the_annotations_of_a_dataset(dataset: Path, tmp_path: P
     row = next(line.split() for line in done.stdout.splitlines() if line.split()[:1] == ["all"])
     assert row[1:3] == [str(images), str(objects)]
     assert "Occlusion and truncation" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGKILL])
+def test_a_preview_for_browsers_listens_on_this_machine_only(
+    tmp_path: Path, signal_number: signal.Signals
+) -> None:
+    """The page is served, every socket is on loopback, and none is left after the end."""
+    options = ("tabletop.yaml", "--n", "1", "--web", *SMALL)
+    with subprocess.Popen(
+        command("preview", *options), cwd=tmp_path, env=environment(), text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        url = process.stdout.readline().split()[1]
+        family = [psutil.Process(process.pid), *psutil.Process(process.pid).children(True)]
+        hosts = {
+            connection.laddr.ip
+            for member in family
+            for connection in member.net_connections("inet")
+            if connection.status == psutil.CONN_LISTEN
+        }
+        with urllib.request.urlopen(url) as page:
+            served = page.read()
+        process.send_signal(signal_number)
+
+    assert hosts == {"127.0.0.1"}
+    assert b"<html" in served.lower()
+    psutil.wait_procs(family, timeout=60)
+    assert not any(member.is_running() for member in family)
+
+
+def test_an_address_of_another_machine_is_refused(tmp_path: Path) -> None:
+    """192.0.2.1 is reserved for documentation (RFC 5737): no machine has it."""
+    done = gen_data("preview", "tabletop.yaml", "--web", "--host", "192.0.2.1", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "--host 192.0.2.1" in done.stderr and "expected an IPv4 address" in done.stderr
