@@ -3,26 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, entry_points, version
 
 from generator import __version__
 from generator.assemble.recipe import PipelineFactory
+from generator.assemble.tables import TABLES
 from generator.assets.library import open_library
 from generator.assets.packs import TAG, installed
 from generator.assets.paths import packs_dir
+from generator.config.distributions.base import DISTRIBUTIONS
 from generator.core.geometry import Asset
 from generator.core.scene import Scene
 from generator.runner.plan import Plan
 from randomizers.base import RandomizerBase
 
-BYTES_DEPEND_ON = (
-    "numpy",
-    "opencv-python-headless",
-    "pybullet",
-    "pycocotools",
-    "warp-lang",
-)
-"""Packages whose release can change the bytes of a data set."""
+BYTES_DEPEND_ON = {
+    "OpenEXR": "OpenEXR",
+    "PIL": "pillow",
+    "cv2": "opencv-python-headless",
+    "deflate": "deflate",
+    "fast_simplification": "fast-simplification",
+    "numpy": "numpy",
+    "pxr": "usd-core",
+    "pybullet": "pybullet",
+    "pycocotools": "pycocotools",
+    "pyoidn": "pyoidn",
+    "scipy": "scipy",
+    "trimesh": "trimesh",
+    "warp": "warp-lang",
+}
+"""Packages whose release can change the bytes of a data set, by the module that is imported.
+
+``tests/architecture/test_identity.py`` fails for an imported library that is neither here nor
+known to change nothing.
+"""
 
 
 def plan_of(factory: PipelineFactory) -> Plan:
@@ -37,7 +51,8 @@ def plan_of(factory: PipelineFactory) -> Plan:
         shard_size=spec.head.shard_size,
         versions={
             "gen-data": __version__,
-            **{name: _release(name) for name in BYTES_DEPEND_ON},
+            **{name: _release(name) for name in BYTES_DEPEND_ON.values()},
+            **_plug_ins(),
             **_packs(assets),
         },
         assets={asset.asset_id: asset.sha256 for asset in assets},
@@ -72,6 +87,16 @@ def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
         for asset_id in randomizer.may_draw(library)
     }
     return tuple(library.get(asset_id) for asset_id in sorted(ids | drawn))
+
+
+def _plug_ins() -> dict[str, str]:
+    """Releases of installed packages that add to a table of plug-ins."""
+    return {
+        f"plug-in {plug_in.dist.name}": plug_in.dist.version
+        for table in (*TABLES.values(), DISTRIBUTIONS)
+        for plug_in in entry_points(group=f"gen_data.{table.kind}")
+        if plug_in.dist is not None
+    }
 
 
 def _packs(assets: tuple[Asset, ...]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -15,7 +16,7 @@ import psutil
 import pytest
 from PIL import Image
 
-from tests.end_to_end.running import SMALL, command, environment, gen_data
+from tests.end_to_end.running import ROOT, SMALL, command, environment, gen_data
 
 
 def test_contact_sheet_of_a_dataset_has_one_tile_per_sample(dataset: Path, tmp_path: Path) -> None:
@@ -71,6 +72,42 @@ def test_doctor_finds_this_machine_fit(tmp_path: Path) -> None:
 
     assert done.returncode == 0, done.stdout + done.stderr
     assert "FAIL" not in done.stdout
+
+
+BROKEN_MODULES = {
+    "OpenEXR": ("raise ImportError('libIlm.so.9: cannot open shared object file')", "openexr", 6),
+    "rerun": ("import os, signal; os.kill(os.getpid(), signal.SIGILL)", "preview", 6),
+    "pycocotools": ("", "coco", 6),
+    "pyoidn": ("raise OSError('libOpenImageDevice.so: wrong ELF class')", "denoiser", 0),
+}
+"""Modules that cannot be used: their text, the check that finds them, the exit code."""
+
+
+@pytest.mark.parametrize("module", BROKEN_MODULES)
+def test_doctor_finds_an_engine_that_cannot_be_used(
+    tmp_path: Path, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One line with the cause and one with the remedy; extras are optional, engines are not."""
+    text, check, exit_code = BROKEN_MODULES[module]
+    (tmp_path / f"{module}.py").write_text(text)
+    # Only the checks: a sample takes long, and is tried above.
+    program = (
+        "from generator.cli import doctor, main\n"
+        f"doctor.CHECKS = tuple(c for c in doctor.CHECKS if c.name == {check!r})\n"
+        "main.main()\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(tmp_path), str(ROOT))))
+
+    done = subprocess.run(
+        [sys.executable, "-c", program, "doctor"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+    assert done.returncode == exit_code, done.stdout + done.stderr
+    verdict, remedy = done.stdout.splitlines()
+    assert verdict.split()[:2] == ["optional" if exit_code == 0 else "FAIL", check]
+    assert "pip install" in remedy
+    assert "Traceback" not in done.stderr
 
 
 def test_a_report_counts_the_annotations_of_a_dataset(dataset: Path, tmp_path: Path) -> None:
