@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from generator.core.errors import DeterminismError, StorageError
+from generator.core.errors import ConfigError, DeterminismError, StorageError
 from generator.runner.files import (
     make_folder,
     move_durably,
@@ -146,7 +146,7 @@ class LocalStore:
         """Own the folder; the lock dies with the process, however that dies.
 
         Raises:
-            StorageError: another process has it; names host and pid.
+            ConfigError: another process has it; names host and pid.
         """
         with self.errors():
             make_folder(self.run_dir)
@@ -301,7 +301,7 @@ class LocalStore:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             owner = os.read(descriptor, 4096).decode(errors="replace").strip() or "(starting)"
-            raise StorageError(
+            raise ConfigError(
                 f"{self.root}: another run is writing here: {owner}. "
                 "Wait for it, stop it, or choose another folder with --out."
             ) from None
