@@ -1,10 +1,45 @@
-"""What holds for every test."""
+"""What holds for every test.
+
+With ``GEN_DATA_CI`` set, a skipped test is a failed one: what skips everywhere tests nothing.
+"""
 
 from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Generator
+from typing import Any
+
+import pytest
 
 # Packs that happen to be installed on this machine must not change what tests see; processes that
 # tests start inherit it. Set before anything asks, hence not in a fixture.
 os.environ["GEN_DATA_ASSETS"] = tempfile.mkdtemp(prefix="gen-data-no-packs-")
+
+SKIPS_ALLOWED_IN_CI = (
+    "root may write everywhere",  # CI runs as root in some places
+    "mounting a small file system needs root",  # and as a user without mount(2) in others
+    "numpy's type hints are older and vaguer on Python 3.10",  # CI has 3.11
+)
+"""Reasons that depend on where CI runs, and not on what ``.ci/run`` installs."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Turn skips of single tests into failures."""
+    return _skips_fail((yield))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Turn skips of whole modules into failures."""
+    return _skips_fail((yield))
+
+
+def _skips_fail(report: pytest.TestReport | pytest.CollectReport) -> Any:
+    reason = str(report.longrepr[2]) if isinstance(report.longrepr, tuple) else ""
+    allowed = any(text in reason for text in SKIPS_ALLOWED_IN_CI)
+    if os.environ.get("GEN_DATA_CI") and report.skipped and not allowed:
+        report.outcome = "failed"
+        report.longrepr = f"{reason} (with GEN_DATA_CI a skip fails: see tests/conftest.py)"
+    return report

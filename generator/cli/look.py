@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,6 +35,12 @@ WRITTEN = "written"
     help="What decides the colour of laser points.",
 )
 @click.option("--web", is_flag=True, help="Serve to a browser instead of the desktop viewer.")
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="With --web: the address to listen on; 0.0.0.0 shows the scene to the whole network.",
+)
 @configuration_options
 def preview(
     source: str,
@@ -42,6 +49,7 @@ def preview(
     save: Path | None,
     points: PointColors,
     web: bool,
+    host: str,
     seed: int | None,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
@@ -52,7 +60,8 @@ def preview(
     samples are made again from its plan.
     """
     from generator.assemble.recipe import open_pipeline
-    from generator.preview.recording import save_recording, show_samples
+    from generator.preview.recording import save_recording, send_samples
+    from generator.preview.viewer import open_window, serve_web
 
     spec = Choice(source, seed, overrides, without).spec()
     with open_pipeline(spec) as pipeline:
@@ -62,10 +71,13 @@ def preview(
             save_recording(save, samples, pipeline.assets, info=info, points=points)
             click.echo(f"{save}: {n} samples; open it with: rerun {save}")
             return
-        where = show_samples(samples, pipeline.assets, info=info, points=points, web=web)
+        viewer = serve_web(host) if web else open_window()
         if web:
-            click.echo(f"serving {where}; open http://localhost:9090 (Ctrl-C ends)")
-            click.pause("press any key to end ...")
+            click.echo(f"open {viewer.web_url} (Ctrl-C ends)")
+        send_samples(viewer.stream_url, samples, pipeline.assets, info=info, points=points)
+        if web:
+            with suppress(KeyboardInterrupt):
+                viewer.process.wait()
 
 
 @click.command("contact-sheet")

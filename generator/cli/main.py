@@ -39,7 +39,7 @@ class LateCommands(click.Group):
         "verify": "generator.cli.inform:verify",
         "describe": "generator.cli.inform:describe",
         "schema": "generator.cli.inform:schema",
-        "doctor": "generator.cli.inform:doctor",
+        "doctor": "generator.cli.doctor:doctor",
     }
     summaries = {  # noqa: RUF012
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
@@ -49,7 +49,7 @@ class LateCommands(click.Group):
         "verify": "Check a data set against its manifest.",
         "describe": "Explain a plug-in: what it does, its fields, an example.",
         "schema": "Print the JSON Schema of configurations.",
-        "doctor": "Check this machine: renderer, physics, cache, disk.",
+        "doctor": "Check this machine: load and try every engine.",
     }
 
     def list_commands(self, ctx: click.Context) -> list[str]:

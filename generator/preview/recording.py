@@ -236,29 +236,19 @@ def save_recording(
     stream.disconnect()
 
 
-def show_samples(
+def send_samples(
+    url: str,
     samples: Iterable[Sample],
     assets: AssetLibrary,
     *,
     info: DatasetInfo,
     points: PointColors = "class",
-    web: bool,
-) -> str:
-    """Show samples in the desktop viewer, or serve them to a browser.
-
-    Returns:
-        Where the viewer is: a URL for the web viewer, else an empty string.
-    """
+) -> None:
+    """Send samples to the viewer at ``url``, one by one as they are made."""
     stream = rr.RecordingStream(APPLICATION)
-    where = ""
-    if web:
-        where = stream.serve_grpc()
-        rr.serve_web_viewer(open_browser=False, connect_to=where)
-    else:
-        stream.spawn()
+    stream.connect_grpc(url)
     _record_all(Recorder(stream, assets, info, points), samples)
     stream.flush()
-    return where
 
 
 def _record_all(recorder: Recorder, samples: Iterable[Sample]) -> None:

@@ -1,4 +1,4 @@
-"""What workers tell the supervisor, and what it tells them: plain, picklable data."""
+"""Events from workers to the supervisor and actions of the supervisor: plain, picklable data."""
 
 from __future__ import annotations
 

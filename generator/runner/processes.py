@@ -1,22 +1,25 @@
-"""Worker processes: carries out what the supervisor decides, and tells it what happened.
+"""Worker processes: carries out the supervisor's actions and reports events to it.
 
-``multiprocessing.Pool`` waits for ever after a worker is killed, and one kill breaks every future
-of a ``ProcessPoolExecutor``; here a process is a pipe, an exit code, and nothing shared.
+Nothing here may block the supervisor, or Ctrl-C would be ignored and a batch job would burn its
+whole allocation. ``multiprocessing`` blocks: its ``Process.start`` writes the task into a pipe and
+waits until the new process reads it, which a process killed at birth never does;
+``multiprocessing.Pool`` waits for ever after a worker is killed; one kill breaks every future of a
+``ProcessPoolExecutor``. Here the job is a file in memory that workers inherit, and a process is a
+socket and an exit code.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import pickle
 import signal
+import subprocess
+import sys
 import time
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 
 from generator.core.errors import GenDataError
@@ -34,46 +37,77 @@ from generator.runner.events import (
 from generator.runner.interruption import Interruption
 from generator.runner.shard import Job
 from generator.runner.supervisor import Supervisor
-from generator.runner.worker import worker_main
 
 TICK_S = 0.5
-JOIN_S = 5.0
+ENDING_TICK_S = 0.02
+JOIN_S = 3.0
+"""How long to wait for killed processes. A process that the kernel cannot end, as on dead storage,
+must not keep the run; its parent-death signal is pending."""
+
+START_WORKER = (
+    "import sys; sys.path[:] = sys.argv[5:]; "
+    "from generator.runner.worker import main; main(*map(int, sys.argv[1:5]))"
+)
+"""The module search path is this process's: a plug-in that is found here is found there."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Child:
-    process: SpawnProcess
+    process: subprocess.Popen[bytes]
     connection: Connection
+    connected: bool = True
+
+    def messages(self) -> Iterator[Event]:
+        """Receive everything the worker has sent; drop a message torn by its death."""
+        try:
+            while self.connected and self.connection.poll():
+                yield self.connection.recv()
+        except (EOFError, OSError):
+            self.connected = False
 
 
-class Crew:
-    """The worker processes of one run. A context manager: leaves no process behind."""
+class WorkerPool:
+    """The worker processes of one run. A context manager: leaves no process behind.
 
-    def __init__(self, job: Job) -> None:
-        # Compressed it fits into a pipe: a spawn need not wait for the process to read it.
-        self._payload = zlib.compress(pickle.dumps(job))
-        self._logs = job.store.run_dir
-        self._context = multiprocessing.get_context("spawn")
+    Args:
+        job: The work.
+        logs: Folder for what workers print, one file per worker.
+    """
+
+    def __init__(self, job: Job, logs: Path) -> None:
+        self._job_fd = os.memfd_create("gen-data job")
+        with open(self._job_fd, "wb", closefd=False) as file:
+            pickle.dump(job, file)
+        self._logs = logs
         self._children: dict[int, _Child] = {}
-        self._out_of_memory_kills = _out_of_memory_kills()
+        self._out_of_memory_kills = _count_out_of_memory_kills()
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> WorkerPool:
         """Begin with no process."""
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Kill what still runs."""
+        """Kill the remaining processes and wait for their end, for a bounded time."""
         for child in self._children.values():
             child.process.kill()
-        for number in list(self._children):
-            self._bury(number)
+        deadline_s = time.monotonic() + JOIN_S
+        for child in self._children.values():
+            with suppress(subprocess.TimeoutExpired):
+                child.process.wait(max(0.0, deadline_s - time.monotonic()))
+            child.connection.close()
+        self._children.clear()
+        os.close(self._job_fd)
 
-    def carry_out(self, action: Action) -> None:
-        """Do one thing the supervisor wants; what is meant for a dead process is dropped."""
+    def execute(self, action: Action) -> None:
+        """Carry out one action; actions on a process that has ended do nothing.
+
+        Raises:
+            OSError: No process can be started, or its log cannot be opened.
+        """
         if isinstance(action, Spawn):
-            self._spawn(action.worker)
+            self._children[action.worker] = self._spawn(action.worker)
         elif isinstance(action, (Assign, Dismiss)) and action.worker in self._children:
-            # A worker that has just died shows up as Exited.
+            # The end of a worker arrives as Exited.
             with suppress(BrokenPipeError, ConnectionResetError):
                 shard = action.shard if isinstance(action, Assign) else None
                 self._children[action.worker].connection.send(shard)
@@ -81,50 +115,38 @@ class Crew:
             self._children[action.worker].process.kill()
 
     def events(self, wake_fd: int, timeout_s: float) -> Iterator[Event]:
-        """What happened since the last call; waits for something, or for the time to pass."""
-        sources: list[Connection | int] = [wake_fd]
-        for child in self._children.values():
-            sources += [child.connection, child.process.sentinel]
-        ready = set(wait(sources, timeout_s))
+        """Wait for an event, ``wake_fd`` or the timeout; yield all events since the last call."""
+        connections = [c.connection for c in self._children.values() if c.connected]
+        some_end = len(connections) < len(self._children)
+        wait([wake_fd, *connections], ENDING_TICK_S if some_end else timeout_s)
         for number, child in sorted(self._children.items()):
-            gone = child.process.sentinel in ready
-            if gone or child.connection in ready:
-                # Its last words come before its end.
-                yield from _messages(child.connection)
-            if gone:
-                yield self._exited(number)
+            # In this order: messages that precede the end are not lost.
+            exit_code = child.process.poll()
+            yield from child.messages()
+            if exit_code is not None:
+                yield self._on_exit(number, exit_code)
         yield Tick()
 
-    def _spawn(self, number: int) -> None:
-        ours, theirs = self._context.Pipe(duplex=True)
-        log = self._logs / f"worker-{number}.log"
-        process = self._context.Process(
-            target=worker_main,
-            args=(number, theirs, os.getpid(), self._payload, log),
-            name=f"gen-data worker {number}",
-        )
-        with _interrupts_blocked():
-            process.start()
-        theirs.close()
-        self._children[number] = _Child(process, ours)
+    def _spawn(self, number: int) -> _Child:
+        ours, theirs = Pipe(duplex=True)
+        arguments = (number, theirs.fileno(), self._job_fd, os.getpid())
+        log_path = self._logs / f"worker-{number}.log"
+        with theirs, log_path.open("wb") as log, _interrupts_blocked():
+            process = subprocess.Popen(
+                [sys.executable, "-c", START_WORKER, *map(str, arguments), *sys.path],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                pass_fds=(theirs.fileno(), self._job_fd),
+            )
+        return _Child(process, ours)
 
-    def _exited(self, number: int) -> Exited:
-        exit_code = self._bury(number)
-        kills = _out_of_memory_kills()
-        starved = exit_code == -signal.SIGKILL and kills > self._out_of_memory_kills
+    def _on_exit(self, number: int, exit_code: int) -> Exited:
+        self._children.pop(number).connection.close()
+        kills = _count_out_of_memory_kills()
+        out_of_memory = exit_code == -signal.SIGKILL and kills > self._out_of_memory_kills
         self._out_of_memory_kills = kills
-        return Exited(number, exit_code, starved)
-
-    def _bury(self, number: int) -> int:
-        child = self._children.pop(number)
-        child.process.join(JOIN_S)
-        exit_code = child.process.exitcode
-        child.connection.close()
-        if exit_code is None:
-            # Unkillable: in the kernel, on dead storage. Its parent-death signal is pending.
-            return -signal.SIGKILL
-        child.process.close()
-        return exit_code
+        return Exited(number, exit_code, out_of_memory)
 
 
 def drive(
@@ -136,41 +158,36 @@ def drive(
 ) -> None:
     """Run the supervisor with real processes until it is finished.
 
-    ``observe`` sees every event and action; an error that it returns aborts the run.
+    ``observe`` receives every event and action; an error that it returns aborts the run. Returns
+    ``JOIN_S`` after an interruption at the latest, even if a process cannot be killed.
+
+    Raises:
+        StorageError: A worker's log cannot be opened, or the system refuses another process.
     """
-    with Crew(job) as crew:
-        _do(supervisor.start(clock()), crew, observe)
-        while not supervisor.finished:
-            for event in crew.events(interruption.wake_fd, TICK_S):
+    deadline_s = float("inf")
+
+    def execute(actions: list[Action]) -> None:
+        for action in actions:
+            observe(action)
+            with job.store.errors():
+                pool.execute(action)
+
+    with WorkerPool(job, job.store.run_dir) as pool:
+        execute(supervisor.start(clock()))
+        while not supervisor.finished and clock() < deadline_s:
+            for event in pool.events(interruption.wake_fd, TICK_S):
                 objection = observe(event)
-                _do(supervisor.handle(event, clock()), crew, observe)
+                execute(supervisor.handle(event, clock()))
                 if objection is not None:
-                    _do(supervisor.handle(Abort(objection), clock()), crew, observe)
+                    execute(supervisor.handle(Abort(objection), clock()))
             if interruption.pending:
-                stop = Abort(interruption.take())
-                _do(supervisor.handle(stop, clock()), crew, observe)
-
-
-def _do(
-    actions: list[Action], crew: Crew, observe: Callable[[Event | Action], GenDataError | None]
-) -> None:
-    for action in actions:
-        observe(action)
-        crew.carry_out(action)
-
-
-def _messages(connection: Connection) -> Iterator[Event]:
-    """Everything a worker has sent; a message torn by its death is dropped."""
-    try:
-        while connection.poll():
-            yield connection.recv()
-    except (EOFError, OSError):
-        return
+                deadline_s = clock() + JOIN_S
+                execute(supervisor.handle(Abort(interruption.take()), clock()))
 
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """A child inherits the mask: Ctrl-C, sent to all, cannot hit it before it ignores it."""
+    """Block SIGINT: a new process inherits the mask until it ignores Ctrl-C by itself."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -178,8 +195,8 @@ def _interrupts_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _out_of_memory_kills() -> int:
-    """Processes that the kernel has killed for want of memory since boot; 0 if it does not say."""
+def _count_out_of_memory_kills() -> int:
+    """Count the processes that the kernel killed for lack of memory since boot; 0 if unknown."""
     try:
         lines = Path("/proc/vmstat").read_text().splitlines()
     except OSError:

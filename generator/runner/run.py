@@ -72,7 +72,8 @@ def run(  # noqa: PLR0913  (the front door: each argument is a question only the
         settings: How to work; None = the defaults.
 
     Raises:
-        StorageError: the folder is another data set's, in use, or cannot be written.
+        StorageError: the folder is another data set's, or cannot be written.
+        ConfigError: another run is writing there.
         SampleError: a sample cannot be made; WorkerLost, if trying kills the process.
         DeterminismError: a shard came out differently the second time.
         Interrupted: Ctrl-C or SIGTERM; committed shards stay.

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from generator.core.errors import DeterminismError, StorageError
+from generator.core.errors import ConfigError, DeterminismError, StorageError
 from generator.runner.files import (
     make_folder,
     move_durably,
@@ -100,7 +100,8 @@ class LocalStore:
         return self.root / SHARDS_NAME
 
     @property
-    def _scratch_root(self) -> Path:
+    def scratch_root(self) -> Path:
+        """Unfinished and temporary files; cleared before and after a run."""
         return self.run_dir / "tmp"
 
     def shard_dir(self, shard: int) -> Path:
@@ -145,7 +146,7 @@ class LocalStore:
         """Own the folder; the lock dies with the process, however that dies.
 
         Raises:
-            StorageError: another process has it; names host and pid.
+            ConfigError: another process has it; names host and pid.
         """
         with self.errors():
             make_folder(self.run_dir)
@@ -166,10 +167,10 @@ class LocalStore:
         """
         with self.errors():
             self.clear_scratch()
-            make_folder(self._scratch_root)
+            make_folder(self.scratch_root)
             path = self.root / PLAN_NAME
             if not path.exists() or path.read_bytes() != plan_bytes(plan):
-                write_plan(plan, self.root, self._scratch_root)
+                write_plan(plan, self.root, self.scratch_root)
             make_folder(self._shards_dir)
             if self.manifest_path.exists():
                 self.manifest_path.unlink()
@@ -177,22 +178,22 @@ class LocalStore:
 
     def clear_scratch(self) -> None:
         """Remove unfinished files. The folder moves away first, so that no late writer finds it."""
-        if self._scratch_root.exists():
+        if self.scratch_root.exists():
             doomed = self.run_dir / "tmp-doomed"
             shutil.rmtree(doomed, ignore_errors=True)
-            self._scratch_root.rename(doomed)
+            self.scratch_root.rename(doomed)
             shutil.rmtree(doomed, ignore_errors=True)
 
     def scratch_dir(self) -> Path:
         """A new empty folder for unfinished files, on the data set's own file system."""
         for number in range(SCRATCH_FOLDERS_MAX):
-            folder = self._scratch_root / f"{os.getpid()}-{number}"
+            folder = self.scratch_root / f"{os.getpid()}-{number}"
             try:
                 folder.mkdir()
             except FileExistsError:
                 continue
             return folder
-        raise StorageError(f"{self._scratch_root}: {SCRATCH_FOLDERS_MAX} unfinished folders")
+        raise StorageError(f"{self.scratch_root}: {SCRATCH_FOLDERS_MAX} unfinished folders")
 
     def commit(self, folder: Path, record: ShardRecord) -> None:
         """Publish a finished shard: files, then folder, then record, each synced before the next.
@@ -210,7 +211,7 @@ class LocalStore:
         # A folder without a record is what a kill between the two steps below leaves.
         self.quarantine(record.shard)
         move_durably(folder, self.shard_dir(record.shard))
-        write_durably(self.record_path(record.shard), record.to_bytes(), self._scratch_root)
+        write_durably(self.record_path(record.shard), record.to_bytes(), self.scratch_root)
 
     def record(self, shard: int) -> ShardRecord | None:
         """The record of a shard, or None if it is missing or damaged."""
@@ -300,7 +301,7 @@ class LocalStore:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             owner = os.read(descriptor, 4096).decode(errors="replace").strip() or "(starting)"
-            raise StorageError(
+            raise ConfigError(
                 f"{self.root}: another run is writing here: {owner}. "
                 "Wait for it, stop it, or choose another folder with --out."
             ) from None

@@ -32,15 +32,15 @@ from generator.runner.events import (
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Bounds on what the supervisor puts up with.
+    """Limits on silence, deaths and memory of workers.
 
     Attributes:
-        silence_s: A worker that says nothing for so long hangs and is killed. Covers the start of
-            its engines, too.
-        farewell_s: How long a dismissed worker may take to end.
-        shard_attempts: Deaths on one shard before it is given up.
-        lost_shards: Shards given up before the whole run is; the others are still made until then.
-        failed_starts: Deaths in a row before a worker was ever ready, before the run is given up.
+        silence_s: A worker that sends nothing for this long counts as hung and is killed. Covers
+            the start of its engines, too.
+        farewell_s: Time for a dismissed worker to end.
+        shard_attempts: Deaths on one shard until it is abandoned.
+        lost_shards: Abandoned shards until the run is; the others are still made until then.
+        failed_starts: Consecutive deaths during start until the run is abandoned.
         rss_bytes: Memory at which a worker is replaced after its shard; None = never.
     """
 
@@ -53,7 +53,7 @@ class Limits:
 
 
 class State(Enum):
-    """What a worker is doing."""
+    """State of a worker."""
 
     STARTING = "starting"
     IDLE = "idle"
@@ -80,7 +80,7 @@ class Supervisor:
         describe_sample: The command that makes one sample alone; for messages.
         error: The first error that ends the run, or None.
         given_up: Shards that killed their workers too often.
-        deaths: Processes that ended when nobody wanted them to.
+        deaths: Processes that ended unexpectedly.
     """
 
     shards: Sequence[int]
@@ -115,11 +115,11 @@ class Supervisor:
         return len(self.shards) - self._cursor + len(self._again)
 
     def start(self, now_s: float) -> list[Action]:
-        """The first actions."""
+        """Return the first actions."""
         return self._dispatch(now_s)
 
     def handle(self, event: Event, now_s: float) -> list[Action]:
-        """What to do about an event. Events of processes that are gone are ignored."""
+        """Return the actions that an event calls for; ignore events of ended processes."""
         actions = self._react(event, now_s)
         return actions + self._dispatch(now_s)
 
@@ -133,7 +133,7 @@ class Supervisor:
             return []
         worker.heard_s = now_s
         if isinstance(event, Exited):
-            return self._bury(event, self._alive.pop(event.worker))
+            return self._on_exit(event, self._alive.pop(event.worker))
         if isinstance(event, Failed):
             return self._report(event.error, worker)
         if isinstance(event, SampleDone):
@@ -146,7 +146,7 @@ class Supervisor:
         return []
 
     def _dispatch(self, now_s: float) -> list[Action]:
-        """Give idle workers shards, start missing workers, send superfluous ones home."""
+        """Give idle workers shards, start missing workers, dismiss superfluous ones."""
         actions: list[Action] = []
         for number, worker in self._of(State.IDLE):
             if self._draining or self._waiting == 0:
@@ -156,7 +156,7 @@ class Supervisor:
             actions.append(Assign(number, worker.shard))
         open_shards = 0 if self._draining else self._waiting + len(self._of(State.BUSY))
         if open_shards == 0:
-            return actions + self._send_home(now_s)
+            return actions + self._dismiss_idle(now_s)
         staff = sum(worker.state is not State.LEAVING for worker in self._alive.values())
         for _ in range(min(self.workers, open_shards) - staff):
             actions.append(Spawn(self._next_number))
@@ -164,7 +164,7 @@ class Supervisor:
             self._next_number += 1
         return actions
 
-    def _send_home(self, now_s: float) -> list[Action]:
+    def _dismiss_idle(self, now_s: float) -> list[Action]:
         actions: list[Action] = []
         for number, worker in self._of(State.IDLE):
             worker.state, worker.heard_s = State.LEAVING, now_s
@@ -215,7 +215,7 @@ class Supervisor:
         self._draining = True
         return []
 
-    def _bury(self, event: Exited, worker: _Worker) -> list[Action]:
+    def _on_exit(self, event: Exited, worker: _Worker) -> list[Action]:
         if worker.state is State.LEAVING:
             return []
         self.deaths += 1
@@ -228,7 +228,12 @@ class Supervisor:
         if worker.state is State.STARTING:
             self._failed_starts += 1
             if self._failed_starts >= self.limits.failed_starts:
-                self._drain(WorkerLost(f"worker processes end while they start: {cause}"))
+                self._drain(
+                    WorkerLost(
+                        f"worker processes end while they start: {cause}; "
+                        f"see run/worker-{event.worker}.log in the output folder"
+                    )
+                )
         return [Note(f"worker {event.worker} {cause} while {worker.state.value}")]
 
     def _shard_died(self, number: int, worker: _Worker, cause: str) -> list[Action]:
@@ -269,7 +274,7 @@ class Supervisor:
 
 
 def describe_exit(event: Exited) -> str:
-    """How a process ended, in words."""
+    """Say how a process ended."""
     if event.exit_code >= 0:
         return f"exited with status {event.exit_code}"
     number = -event.exit_code

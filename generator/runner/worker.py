@@ -15,13 +15,14 @@ import pickle
 import resource
 import signal
 import sys
+import tempfile
 import traceback
-import zlib
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from generator.core.child_processes import end_with_parent
 from generator.core.errors import GenDataError
 from generator.runner.events import Failed, Ready, SampleDone, ShardDone
 from generator.runner.unforeseen import unforeseen
@@ -30,36 +31,49 @@ if TYPE_CHECKING:
     from generator.core.sample import Sample
     from generator.runner.shard import Job, MadeShard, PipelineLike
 
-PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 
-
-def worker_main(
-    number: int, connection: Connection, parent_pid: int, payload: bytes, log: Path
-) -> None:
-    """Entry of the process. None on the connection ends it.
+def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
+    """Entry of the process; ends when the connection brings None or closes.
 
     Args:
         number: Of the worker.
-        connection: Shards come in, events go out.
+        connection_fd: A socket: shards come in, events go out.
+        job_fd: A file that holds a pickled Job.
         parent_pid: The process ends with that one.
-        payload: A Job, pickled and compressed.
-        log: Takes what the process prints.
     """
-    _die_with(parent_pid)
+    end_with_parent(parent_pid)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    _redirect_output(log)
+    faulthandler.enable()
+    connection = Connection(connection_fd)
     try:
-        _work(number, connection, pickle.loads(zlib.decompress(payload)))
-    except (EOFError, BrokenPipeError):
-        # The supervisor is gone, and with it whoever would read a report.
+        job = _load_job(job_fd)
+        _keep_temporary_files_in(job.store.scratch_root)
+        _make_shards(number, connection, job)
+    except (EOFError, ConnectionError):
+        # The supervisor is gone: nobody would read a report.
         sys.exit(1)
     except Exception as error:
         traceback.print_exc()
-        with suppress(BrokenPipeError):
+        with suppress(ConnectionError):
             connection.send(Failed(number, sendable(error)))
         sys.exit(1)
+
+
+def _load_job(descriptor: int) -> Job:
+    # All workers share the descriptor's position, hence pread.
+    job: Job = pickle.loads(os.pread(descriptor, os.fstat(descriptor).st_size, 0))
+    os.close(descriptor)
+    return job
+
+
+def _keep_temporary_files_in(folder: Path) -> None:
+    """Let ``tempfile`` use a folder of the run, which outlives no run, even of killed workers.
+
+    The alias is short and plain whatever the folder is called: Bullet cuts long paths off.
+    """
+    tempfile.tempdir = f"/proc/self/fd/{os.open(folder, os.O_RDONLY | os.O_DIRECTORY)}"
 
 
 def sendable(error: Exception) -> GenDataError:
@@ -84,10 +98,10 @@ def _ancestor_of_message(kind: type[GenDataError]) -> type[GenDataError]:
     )
 
 
-def _work(number: int, connection: Connection, job: Job) -> None:
+def _make_shards(number: int, connection: Connection, job: Job) -> None:
     with job.make_pipeline() as pipeline:
-        # What is there now stays to the end, and between shards is early enough to look at the
-        # rest: looking all the time takes a fiftieth of the run.
+        # Objects that exist now stay to the end. Collecting the rest between shards is early
+        # enough: automatic collection takes 2 % of the run.
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -111,7 +125,7 @@ def _make(
 
 
 def done_event(number: int, made: MadeShard) -> ShardDone:
-    """What the supervisor is told about a shard that worker ``number`` made."""
+    """Summarise a shard that worker ``number`` made, for the supervisor."""
     record = made.record
     return ShardDone(
         number,
@@ -139,21 +153,3 @@ def _give_memory_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
-
-
-def _die_with(parent_pid: int) -> None:
-    """Have the kernel kill this process when its parent ends, however that ends."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent_pid:
-        # The parent ended before the kernel was asked.
-        os._exit(1)
-
-
-def _redirect_output(log: Path) -> None:
-    """Send what libraries print, and the stack of a crash, to a file of the run folder."""
-    descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
-    os.dup2(descriptor, 1)
-    os.dup2(descriptor, 2)
-    os.close(descriptor)
-    faulthandler.enable()

@@ -263,12 +263,12 @@ def test_nasty_documents_are_refused_at_once_with_a_message(case: str) -> None:
     """No traceback, no crash, no waiting: one ConfigError with a place."""
     text, fact = NASTY[case]
 
-    begun = time.perf_counter()
+    begun = time.process_time()
     message = message_of(text)
 
     assert fact in message
     assert message.startswith("x.yaml:")
-    assert time.perf_counter() - begun < 5.0
+    assert time.process_time() - begun < 5.0
 
 
 @pytest.mark.parametrize(
@@ -303,11 +303,11 @@ def test_a_large_document_is_read_in_a_second() -> None:
     """45,000 values in one file."""
     text = "a:\n" + "  - {x: 1.5, y: [1, 2]}\n" * 6_000
 
-    begun = time.perf_counter()
+    begun = time.process_time()
     document = parse(text, "x.yaml")
 
     assert len(document.plain()["a"]) == 6_000
-    assert time.perf_counter() - begun < 10.0
+    assert time.process_time() - begun < 10.0
 
 
 # --- files

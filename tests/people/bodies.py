@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import pytest
 
 from generator.assets.people.body import Body, load
 from generator.assets.people.families import pack_file
 from generator.assets.people.simple import simple_body
 
+VARIABLE = "GEN_DATA_TEST_ASSETS"
+"""Names a folder with the people pack, installed for these tests alone:
+``GEN_DATA_ASSETS=FOLDER gen-data assets install people``."""
+PACK_FILE = Path(os.environ.get(VARIABLE, "missing"), "packs", "people", pack_file().name)
+
 NEEDS_PACK = pytest.mark.skipif(
-    not pack_file().is_file(), reason="the people pack is not installed"
+    not PACK_FILE.is_file(), reason=f"{VARIABLE} names no folder with the people pack"
 )
 KINDS = [
     pytest.param("simple", id="simple"),
@@ -19,4 +27,4 @@ KINDS = [
 
 def body_of(kind: str) -> Body:
     """The body of a kind."""
-    return simple_body() if kind == "simple" else load(pack_file())
+    return simple_body() if kind == "simple" else load(PACK_FILE)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import signal
+import tempfile
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -41,6 +44,7 @@ class Trouble:
         hangs_once_at: The process stops making progress the first time.
         rejected_at, wrong_at, bug_at: It raises SceneRejected, SampleError, or ValueError.
         start_fails: The pipeline's process dies before it is ready.
+        ballast: Makes the description of the work larger.
     """
 
     killed_at: int = -1
@@ -52,6 +56,7 @@ class Trouble:
     start_fails: bool = False
     marker: str = ""
     delay_s: float = 0.0
+    ballast: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -86,11 +91,12 @@ class LinesExporter:
 
 @dataclass(frozen=True)
 class FakePipeline:
-    """Samples of 8 x 6 pixels, drawn from the index alone."""
+    """Samples of 8 x 6 pixels, drawn from the index alone; its engine has temporary files."""
 
     n: int
     trouble: Trouble
     exporters: Mapping[str, Exporter] = field(default_factory=lambda: {"lines": LinesExporter()})
+    _closing: ExitStack = field(default_factory=ExitStack)
 
     @property
     def info(self) -> DatasetInfo:
@@ -100,12 +106,15 @@ class FakePipeline:
 
     def __enter__(self) -> FakePipeline:
         """Die, if that is the trouble."""
+        folder = tempfile.mkdtemp(prefix="gen-data-engine-")
         if self.trouble.start_fails:
             os.kill(os.getpid(), signal.SIGKILL)
+        self._closing.callback(shutil.rmtree, folder)
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Nothing to close."""
+        """Remove the engine's files."""
+        self._closing.close()
 
     def sample(self, index: int) -> Sample:
         """Sample number ``index``, or the trouble it is in."""

@@ -1,10 +1,13 @@
-"""A fake data set made by a process of its own: ``python -m tests.runner.fake_run OUT WORKERS``.
+"""A fake data set made by a process of its own.
+
+``python -m tests.runner.fake_run OUT WORKERS DELAY_S [BALLAST_BYTES]``
 
 Tests kill it. Exit codes and message are those of the command line.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -18,8 +21,11 @@ DELAY_S = 0.04
 def main() -> int:
     """Run, and report like the command line does."""
     out, workers, delay_s = Path(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
+    # Random bytes do not compress: the job is at least as large as they are.
+    ballast = os.urandom(int(sys.argv[4])) if len(sys.argv) > 4 else b""
+    trouble = Trouble(delay_s=delay_s, ballast=ballast)
     try:
-        make(out, N, SHARD_SIZE, workers=workers, trouble=Trouble(delay_s=delay_s))
+        make(out, N, SHARD_SIZE, workers=workers, trouble=trouble)
     except GenDataError as error:
         print(error, file=sys.stderr)
         return error.exit_code

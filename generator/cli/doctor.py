@@ -1,0 +1,261 @@
+"""``gen-data doctor``: try every engine on this machine.
+
+Each check loads a library and uses it once, in a process of its own: a library that crashes, as
+on a processor it was not built for, is one failed check.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import platform
+import shutil
+import subprocess
+import tempfile
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import click
+
+from generator import __version__
+from generator.core.errors import GenDataError, SampleError
+from generator.core.quiet import silenced
+
+REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing to try.
+
+    Attributes:
+        name: What is tried, a word.
+        attempt: Tries it; returns a short finding, raises anything when it does not work.
+        remedy: What a user can do about a failure.
+        required: Whether a failure is a fault of the installation.
+    """
+
+    name: str
+    attempt: Callable[[], str]
+    remedy: str
+    required: bool = True
+
+
+@click.command()
+def doctor() -> None:
+    """Check this machine: load and try every engine; make one sample.
+
+    Exit code 6 if anything fails that gen-data cannot work without.
+    """
+    failed = [check.name for check in CHECKS if not _passes(check) and check.required]
+    if failed:
+        raise SampleError(f"doctor: {', '.join(failed)} failed; see above")
+
+
+def _passes(check: Check) -> bool:
+    started_s = time.perf_counter()
+    works, finding = _attempt_in_process(check)
+    if works:
+        click.echo(f"ok        {check.name:<9} {finding} ({time.perf_counter() - started_s:.1f} s)")
+    else:
+        verdict = "FAIL    " if check.required else "optional"
+        click.echo(f"{verdict}  {check.name:<9} {finding}\n{'':<20}{check.remedy}")
+    return works
+
+
+def _attempt_in_process(check: Check) -> tuple[bool, str]:
+    """Return whether a check works, and its finding or its error."""
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_report, args=(check, sender))
+    process.start()
+    sender.close()
+    try:
+        works, finding = receiver.recv()
+    except EOFError:
+        process.join()
+        return False, f"its process ended with exit code {process.exitcode}"
+    process.join()
+    return works, finding
+
+
+def _report(check: Check, sender: Connection) -> None:
+    try:
+        with silenced():
+            finding = check.attempt()
+        sender.send((True, finding))
+    except GenDataError as error:
+        sender.send((False, str(error)))
+    except Exception as error:
+        sender.send((False, f"{type(error).__name__}: {error}"))
+
+
+def _expect(condition: bool, fact: str) -> None:
+    if not condition:
+        raise SampleError(fact)
+
+
+def _try_python() -> str:
+    import numpy as np
+
+    _expect(float(np.arange(5.0).sum()) == 10.0, "NumPy cannot add")
+    ours = f"gen-data {__version__}"
+    return f"{ours}, Python {platform.python_version()}, NumPy {np.__version__}"
+
+
+def _try_cache() -> str:
+    from generator.assets.library import default_cache_dir
+
+    folder = default_cache_dir()
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(b"ok")
+    return f"{folder}, {shutil.disk_usage(folder).free / 1e9:.1f} GB free"
+
+
+def _try_renderer() -> str:
+    import warp as wp
+
+    from generator.renderers.device import open_device
+
+    device = open_device("auto")
+    total = float(wp.full(1000, 2.0, dtype=float, device=device).numpy().sum())
+    _expect(total == 2000.0, f"{device}: an array of 1,000 twos has the sum {total}")
+    return f"Warp {version('warp-lang')} on {device}"
+
+
+def _try_physics() -> str:
+    import pybullet
+
+    client = pybullet.connect(pybullet.DIRECT)
+    pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
+    shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, 0.1, physicsClientId=client)
+    ball = pybullet.createMultiBody(1.0, shape, -1, [0.0, 0.0, 1.0], physicsClientId=client)
+    pybullet.stepSimulation(physicsClientId=client)
+    (_, _, height_m), _ = pybullet.getBasePositionAndOrientation(ball, physicsClientId=client)
+    _expect(height_m < 1.0, "a ball does not fall")
+    return f"PyBullet {version('pybullet')}"
+
+
+def _try_meshes() -> str:
+    import fast_simplification
+    import numpy as np
+    import trimesh
+    from scipy.spatial import ConvexHull
+
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    _expect(len(ConvexHull(sphere.vertices).vertices) == 162, "the hull of a sphere is wrong")
+    _, faces = fast_simplification.simplify(
+        np.asarray(sphere.vertices, np.float32), np.asarray(sphere.faces), 0.5
+    )
+    _expect(len(faces) <= 160, "a sphere is not simplified")
+    return f"SciPy {version('scipy')}, trimesh {version('trimesh')}"
+
+
+def _try_images() -> str:
+    import cv2
+    import deflate
+    import numpy as np
+    from PIL import Image
+
+    grey = np.full((16, 16), 128, np.uint8)
+    packed = deflate.zlib_compress(grey.tobytes(), 6)
+    _expect(zlib.decompress(packed) == grey.tobytes(), "libdeflate writes what zlib cannot read")
+    coded = cv2.imencode(".jpg", grey)[1]
+    read = cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE)
+    _expect(read is not None and np.array_equal(read, grey), "OpenCV does not read what it wrote")
+    _expect(Image.fromarray(grey).resize((4, 4)).size == (4, 4), "Pillow does not resize")
+    return f"OpenCV {version('opencv-python-headless')}, libdeflate {version('deflate')}"
+
+
+def _try_openexr() -> str:
+    import numpy as np
+    import OpenEXR
+
+    with tempfile.TemporaryDirectory(prefix="gen-data-doctor-") as folder:
+        path = str(Path(folder, "probe.exr"))
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"RGB": np.ones((2, 2, 3), np.float32)}).write(path)
+        read = OpenEXR.File(path).channels()["RGB"].pixels
+    _expect(float(read.sum()) == 12.0, "OpenEXR does not read what it wrote")
+    return f"OpenEXR {version('OpenEXR')}"
+
+
+def _try_coco() -> str:
+    import numpy as np
+    from pycocotools import mask
+
+    coded = mask.encode(np.asfortranarray(np.ones((4, 5), np.uint8)))
+    _expect(int(mask.area(coded)) == 20, "the area of a mask is wrong")
+    return f"pycocotools {version('pycocotools')}"
+
+
+def _try_usd() -> str:
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.Xform.Define(stage, "/world")
+    _expect("world" in stage.GetRootLayer().ExportToString(), "a stage loses its prim")
+    return f"OpenUSD {version('usd-core')}"
+
+
+def _try_preview() -> str:
+    import rerun as rr
+    import rerun_cli
+
+    stream = rr.RecordingStream("gen-data doctor")
+    recording = stream.memory_recording()
+    stream.log("point", rr.Points3D([[0.0, 0.0, 0.0]]))
+    _expect(recording.num_msgs() > 0, "a recording stays empty")
+    viewer = Path(rerun_cli.__file__).with_name("rerun")
+    subprocess.run([str(viewer), "--version"], capture_output=True, check=True)
+    return f"Rerun {version('rerun-sdk')}"
+
+
+def _try_sample() -> str:
+    """One small sample of the shipped tabletop, through every stage."""
+    from generator.assemble.recipe import open_pipeline
+    from generator.assemble.spec import load_spec
+
+    spec = load_spec("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
+    with open_pipeline(spec) as pipeline:
+        sample = pipeline.sample(0)
+    labelled = sum(len(truth.objects) for truth in sample.truth.values())
+    return f"{labelled} objects labelled, {sample.attempts} layout attempt(s)"
+
+
+def _try_denoiser() -> str:
+    import pyoidn
+
+    with pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU):
+        return f"Open Image Denoise {version('pyoidn')}"
+
+
+def _try_packs() -> str:
+    from generator.assets.packs import installed
+    from generator.assets.paths import packs_dir
+
+    records = installed(packs_dir())
+    _expect(bool(records), f"none installed in {packs_dir()}")
+    return ", ".join(f"{record.name} {record.version}" for record in records)
+
+
+CHECKS = (
+    Check("python", _try_python, REINSTALL.format("gen-data numpy")),
+    Check("cache", _try_cache, "make the folder writable, or point XDG_CACHE_HOME elsewhere"),
+    Check("renderer", _try_renderer, REINSTALL.format("warp-lang")),
+    Check("physics", _try_physics, REINSTALL.format("pybullet")),
+    Check("meshes", _try_meshes, REINSTALL.format("scipy trimesh fast-simplification")),
+    Check("images", _try_images, REINSTALL.format("opencv-python-headless deflate pillow")),
+    Check("openexr", _try_openexr, REINSTALL.format("OpenEXR")),
+    Check("coco", _try_coco, REINSTALL.format("pycocotools")),
+    Check("usd", _try_usd, REINSTALL.format("usd-core")),
+    Check("preview", _try_preview, REINSTALL.format("rerun-sdk")),
+    Check("sample", _try_sample, "if the checks above pass, delete ~/.cache/warp and try again"),
+    Check("denoiser", _try_denoiser, "pip install 'gen-data[denoise]'", required=False),
+    Check("packs", _try_packs, "gen-data assets list shows what there is", required=False),
+)

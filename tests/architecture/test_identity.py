@@ -1,0 +1,85 @@
+"""No library that can change a byte of a data set is missing from the data set's identity."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from importlib.metadata import EntryPoint, PackageNotFoundError, version
+from pathlib import Path
+
+import pytest
+
+from generator.assemble.recipe import PipelineFactory
+from generator.assemble.spec import load_spec
+from generator.runner import identity
+from generator.runner.identity import BYTES_DEPEND_ON, plan_of
+from tests.architecture.test_rules import OURS, ROOT, python_files
+
+BYTES_DO_NOT_DEPEND_ON = {
+    "click": "parses the command line",
+    "platformdirs": "names the folders of caches",
+    "pydantic": "checks values; the checked configuration is part of the plan",
+    "pydantic_core": "the same",
+    "rerun": "shows samples",
+    "rerun_cli": "shows samples",
+    "rich": "draws progress on the terminal",
+    "yaml": "reads text; the configuration that it gives is part of the plan",
+}
+"""Imported libraries that are not part of the identity, and why."""
+
+
+def imported_libraries(path: Path) -> set[str]:
+    """Top-level names of the third-party modules that a module imports, anywhere in it."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module)
+    ours = {*OURS, "configs"}
+    return {name.partition(".")[0] for name in names} - ours - sys.stdlib_module_names
+
+
+def test_every_library_is_in_the_identity_or_cannot_change_bytes() -> None:
+    """An import of a library that neither table names fails here."""
+    imported = set().union(*map(imported_libraries, python_files(*OURS)))
+
+    assert imported == {*BYTES_DEPEND_ON, *BYTES_DO_NOT_DEPEND_ON}
+    assert not {*BYTES_DEPEND_ON} & {*BYTES_DO_NOT_DEPEND_ON}
+
+
+def test_every_library_of_the_identity_is_a_declared_dependency() -> None:
+    """The table maps names of modules to names of distributions, as in pyproject.toml."""
+    declared = re.findall(r'^  "([\w-]+)[<>=]', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    declared += re.findall(r'"([\w-]+)>=', (ROOT / "pyproject.toml").read_text())
+
+    assert set(BYTES_DEPEND_ON.values()) <= {*declared}
+
+
+def test_a_plan_names_the_release_of_every_library() -> None:
+    """So that ``pip install -U deflate`` in the middle of a data set is refused."""
+    versions = plan_of(PipelineFactory(load_spec("tabletop.yaml"), n=1)).versions
+
+    for package in BYTES_DEPEND_ON.values():
+        try:
+            assert versions[package] == version(package)
+        except PackageNotFoundError:
+            assert versions[package] == "absent"
+
+
+def test_a_plan_names_the_releases_of_plug_ins(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever adds randomizers or exporters changes bytes, too."""
+
+    class Distribution:
+        name, version = "gen-data-confetti", "1.2"
+
+    plug_in = EntryPoint("confetti", "confetti:Confetti", "gen_data.randomizer")
+    vars(plug_in)["dist"] = Distribution
+    monkeypatch.setattr(
+        identity, "entry_points", lambda group: (plug_in,) if group == plug_in.group else ()
+    )
+
+    versions = plan_of(PipelineFactory(load_spec("tabletop.yaml"), n=1)).versions
+
+    assert versions["plug-in gen-data-confetti"] == "1.2"

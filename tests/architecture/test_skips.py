@@ -1,0 +1,49 @@
+"""In CI a skipped test is a failed one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.architecture.test_rules import ROOT
+
+CASES = """
+import pytest
+
+def test_skips() -> None:
+    pytest.skip("a library is missing")
+
+@pytest.mark.skipif(True, reason="root may write everywhere")
+def test_may_skip() -> None:
+    pass
+"""
+MODULE = "import pytest\npytest.importorskip('missing_library')"
+
+
+@pytest.mark.parametrize(
+    ("text", "ci", "result"),
+    [
+        (CASES, "", "2 skipped"),
+        (CASES, "1", "1 failed, 1 skipped"),
+        (MODULE, "", "1 skipped"),
+        (MODULE, "1", "1 error"),
+    ],
+)
+def test_a_skip_fails_in_ci_unless_its_reason_is_allowed(
+    tmp_path: Path, text: str, ci: str, result: str
+) -> None:
+    """Skips of tests and of modules; without GEN_DATA_CI, skips stay skips."""
+    (tmp_path / "test_it.py").write_text(text)
+
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-c", os.devnull, "-p", "tests.conftest",
+         "-p", "no:cacheprovider", "-p", "no:dash", str(tmp_path)],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+        env={**os.environ, "GEN_DATA_CI": ci, "PYTEST_ADDOPTS": ""},
+    )  # fmt: skip
+
+    assert done.stdout.splitlines()[-1].startswith(result), done.stdout
