@@ -153,13 +153,13 @@ def _values(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDA
         case Channel.Z_DEPTH | Channel.RANGE | Channel.MEASURED_DEPTH:
             return np.where(pixels > 0, pixels * depth_scale_m, np.inf).astype(np.float32)
         case Channel.DISPARITY | Channel.DISPARITY_VISIBLE:
-            return (pixels / 256.0).astype(np.float32)
+            return np.asarray(pixels / 256.0, np.float32)
         case Channel.FLOW_FORWARD | Channel.FLOW_BACKWARD:
             return _signed_values(pixels, 1.0 / FLOW_UNITS_PER_PX)[..., :2]
         case Channel.SCENE_FLOW:
             return _signed_values(pixels, depth_scale_m)
         case Channel.FLOW_OCCLUDED_FORWARD | Channel.FLOW_OCCLUDED_BACKWARD:
-            return (pixels > 0).astype(np.uint8)
+            return np.asarray(pixels > 0, np.uint8)
         case Channel.NORMALS:
             unit = np.where(pixels == NO_NORMAL, 0.0, pixels / 127.5 - 1.0)
             length = np.linalg.norm(unit, axis=-1, keepdims=True)
@@ -167,7 +167,7 @@ def _values(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDA
                 np.float32
             )
         case Channel.OBJECT_COORDINATES:
-            return (pixels / 65_535.0).astype(np.float32)
+            return np.asarray(pixels / 65_535.0, np.float32)
         case _:
             return pixels
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from importlib.metadata import EntryPoint, PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-
-import pytest
 
 from generator.assemble.recipe import PipelineFactory
 from generator.assemble.spec import load_spec
-from generator.runner import identity
 from generator.runner.identity import BYTES_DEPEND_ON, plan_of
 from tests.architecture.test_rules import OURS, ROOT, python_files
 
@@ -66,20 +63,3 @@ def test_a_plan_names_the_release_of_every_library() -> None:
             assert versions[package] == version(package)
         except PackageNotFoundError:
             assert versions[package] == "absent"
-
-
-def test_a_plan_names_the_releases_of_plug_ins(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever adds randomizers or exporters changes bytes, too."""
-
-    class Distribution:
-        name, version = "gen-data-confetti", "1.2"
-
-    plug_in = EntryPoint("confetti", "confetti:Confetti", "gen_data.randomizer")
-    vars(plug_in)["dist"] = Distribution
-    monkeypatch.setattr(
-        identity, "entry_points", lambda group: (plug_in,) if group == plug_in.group else ()
-    )
-
-    versions = plan_of(PipelineFactory(load_spec("tabletop.yaml"), n=1)).versions
-
-    assert versions["plug-in gen-data-confetti"] == "1.2"
