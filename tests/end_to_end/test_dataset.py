@@ -160,10 +160,8 @@ def test_a_flipped_bit_is_repaired_on_request(dataset: Path, tmp_path: Path) -> 
     damaged = tmp_path / "one/shards/000001/color/rgb/000000007.png"
     damaged.write_bytes(damaged.read_bytes()[:-1] + b"\0")
 
-    done = gen_data(
-        *MAIN_JOB, "--workers", "1", "--out", "one", "--repair", cwd=tmp_path
-    )  # fmt: skip
+    done = gen_data(*MAIN_JOB, "--workers", "1", "--out", "one", "--repair", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
     assert digest(tmp_path / "one") == digest(dataset)
-    assert (tmp_path / "one/run/quarantine/1-000001/color/rgb" / damaged.name).exists()
+    assert (tmp_path / "one/run/quarantine/0-000001/color/rgb" / damaged.name).exists()
