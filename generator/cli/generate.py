@@ -24,11 +24,15 @@ from generator.assemble.recipe import PipelineFactory
 from generator.cli.options import Choice
 from generator.core.errors import ConfigError
 from generator.runner.identity import licences_text, plan_of
-from generator.runner.run import RunProgress, Summary, run
+from generator.runner.run import RunProgress, Settings, Summary, run
 
 
-def generate(choice: Choice, n: int, *, out: Path | None, workers: int | None) -> None:
-    """Make samples 0 to n - 1, or what is missing of them, and print a summary.
+def generate(
+    choice: Choice, n: int, *, out: Path | None, workers: int | None, repair: bool = False
+) -> None:
+    """Make samples 0 to n - 1, or the missing ones, and print a summary.
+
+    ``repair`` hashes all files that are there and makes damaged shards again.
 
     Raises:
         GenDataError: of the kind that fits; see ``generator.core.errors``.
@@ -51,6 +55,7 @@ def generate(choice: Choice, n: int, *, out: Path | None, workers: int | None) -
             progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
             licences=partial(licences_text, factory),
+            settings=Settings(full_check=repair),
         )
     _print_summary(console, folder, summary)
 

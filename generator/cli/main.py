@@ -95,6 +95,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
     "--out", "-o", type=click.Path(path_type=Path), help="Folder [default: out/<config>]."
 )
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
+@click.option("--repair", is_flag=True, help="Hash what is there; make damaged shards again.")
 @configuration_options
 @click.pass_context
 def cli(
@@ -104,6 +105,7 @@ def cli(
     out: Path | None,
     seed: int | None,
     workers: int | None,
+    repair: bool,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
@@ -123,7 +125,7 @@ def cli(
     from generator.cli.generate import generate
 
     choice = Choice(config, seed, overrides, without)
-    generate(choice, n, out=out, workers=workers)
+    generate(choice, n, out=out, workers=workers, repair=repair)
 
 
 def main() -> None:

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import warp as wp
 
+from generator.core.child_processes import end_with_parent
 from generator.renderers import kernels
 
 EVERY_FRAME = (
@@ -59,7 +60,7 @@ def load_kernels(device_name: str, names: Sequence[str]) -> None:
 def _compiled(device: str, cores: int) -> bool:
     """Deal the modules out to as many processes as there are cores; whether all succeeded."""
     shares = [EVERY_FRAME[k::cores] for k in range(min(cores, len(EVERY_FRAME)))]
-    here = [sys.executable, "-m", __name__, device]
+    here = [sys.executable, "-m", __name__, str(os.getpid()), device]
     running = [subprocess.Popen([*here, *share], stdout=subprocess.DEVNULL) for share in shares]
     codes = [process.wait() for process in running]
     return not any(codes)
@@ -74,4 +75,5 @@ def _digest() -> str:
 
 
 if __name__ == "__main__":
-    load_kernels(sys.argv[1], sys.argv[2:])
+    end_with_parent(int(sys.argv[1]))
+    load_kernels(sys.argv[2], sys.argv[3:])

@@ -138,9 +138,20 @@ def storage_error(error: OSError, folder: Path, resume_command: str) -> StorageE
         free = f"{free_bytes(folder):,} bytes free"
     except OSError:
         free = "free space unknown"
-    lines = [f"{path}: {error.strerror or error} ({name}); {free}."]
-    if resume_command:
-        lines.append(
-            f"  What is finished stays. After the cause is gone, go on with:\n    {resume_command}"
-        )
-    return StorageError("\n".join(lines))
+    message = f"{path}: {error.strerror or error} ({name}); {free}."
+    if not resume_command:
+        return StorageError(message)
+    advice = (
+        "What is finished stays. After the cause is gone, go on with"
+        if _is_folder(folder)
+        else "Nothing was written. Choose another folder with --out, or after the cause is gone try"
+    )
+    return StorageError(f"{message}\n  {advice}:\n    {resume_command}")
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:
+        # A name that is too long, or a loop of links.
+        return False

@@ -81,7 +81,8 @@ def load_plan(folder: Path) -> Plan:
         raise StorageError(f"{path}: missing; {folder} is not a gen-data data set") from None
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise StorageError(
-            f"{path}: not a plan of this version of gen-data ({error}); choose another folder"
+            f"{path}: damaged, or written by another version of gen-data ({error}); nothing was "
+            "changed. Restore the file from a copy, or choose another folder with --out"
         ) from None
 
 

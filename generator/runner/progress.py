@@ -75,7 +75,10 @@ class Summary:
         """Names and values, for a table."""
         if self.already_complete:
             return [
-                ("samples", f"{self.samples} (all there: nothing to do)"),
+                (
+                    "samples",
+                    f"{self.samples} (all there, nothing to do; --repair compares every byte)",
+                ),
                 ("id", self.dataset_id[:16]),
             ]
         rows = [
@@ -96,7 +99,7 @@ class Summary:
         return [*rows, ("id", self.dataset_id[:16])]
 
 
-class Meter:
+class RunMonitor:
     """Counts events, reports progress, appends to ``run/log.jsonl``, and watches the disk."""
 
     def __init__(
@@ -210,9 +213,16 @@ class Meter:
             return None
         return StorageError(
             f"{self._store.root}: the other {self._total - samples} samples need about "
-            f"{rest / 1e6:,.0f} MB and {free / 1e6:,.0f} MB are free; stopped before the disk is "
+            f"{_format_bytes(rest)} and {_format_bytes(free)} are free; stopped before the disk is "
             f"full.\n  After making room, go on with:\n    {self._store.resume_command}"
         )
+
+
+def _format_bytes(size: float) -> str:
+    for factor, unit in ((1e9, "GB"), (1e6, "MB")):
+        if size >= factor:
+            return f"{size / factor:.1f} {unit}"
+    return f"{size / 1e3:.1f} kB"
 
 
 def _with_note(text: str, number: int, what: str) -> str:

@@ -15,7 +15,7 @@ from generator.runner.finalize import LicencesOf, finalize
 from generator.runner.interruption import Interruption
 from generator.runner.plan import Plan
 from generator.runner.processes import drive
-from generator.runner.progress import Meter, RunProgress, Summary
+from generator.runner.progress import RunMonitor, RunProgress, Summary
 from generator.runner.shard import EnteredPipeline, Job, MediaWriter, make_shard, write_images
 from generator.runner.store import FolderState, LocalStore, Scan
 from generator.runner.supervisor import Limits, Supervisor
@@ -107,25 +107,25 @@ class _Run:
                     return self._nothing_to_do()
             store.prepare(plan)
             scan = store.scan(plan, self.settings.full_check)
-        meter = Meter(store, scan, plan.n, self.progress)
-        meter.show("samples")
+        monitor = RunMonitor(store, scan, plan.n, self.progress)
+        monitor.show("samples")
         try:
-            self._make(scan, meter)
+            self._make(scan, monitor)
             with self.interruption.immediate():
-                meter.show("merging")
+                monitor.show("merging")
                 dataset_id = finalize(plan, store, self.job.make_pipeline(), licences)
         finally:
             # On a faulty disk this may fail as well; the next run begins with it.
             with suppress(OSError):
                 store.clear_scratch()
-        return self._summary(dataset_id, scan, meter)
+        return self._summary(dataset_id, scan, monitor)
 
-    def _make(self, scan: Scan, meter: Meter) -> None:
+    def _make(self, scan: Scan, monitor: RunMonitor) -> None:
         if not scan.missing:
             return
         if self.workers == 0:
             with self.interruption.immediate():
-                self._make_here(scan, meter)
+                self._make_here(scan, monitor)
             return
         supervisor = Supervisor(
             shards=scan.missing,
@@ -134,20 +134,20 @@ class _Run:
             describe_sample=self.job.store.reproduce_command,
             limits=self.settings.limits,
         )
-        drive(self.job, supervisor, self.interruption, meter.observe)
-        meter.worker_deaths = supervisor.deaths
+        drive(self.job, supervisor, self.interruption, monitor.observe)
+        monitor.worker_deaths = supervisor.deaths
         if supervisor.error is not None:
             raise supervisor.error
 
-    def _make_here(self, scan: Scan, meter: Meter) -> None:
+    def _make_here(self, scan: Scan, monitor: RunMonitor) -> None:
         with self.job.make_pipeline() as pipeline:
             for shard in scan.missing:
 
                 def on_sample(sample: Sample, shard: int = shard) -> None:
-                    meter.observe(SampleDone(IN_PROCESS, shard, sample.index, sample.timings_s))
+                    monitor.observe(SampleDone(IN_PROCESS, shard, sample.index, sample.timings_s))
 
                 made = make_shard(self.job, pipeline, shard, on_sample)
-                objection: GenDataError | None = meter.observe(done_event(IN_PROCESS, made))
+                objection: GenDataError | None = monitor.observe(done_event(IN_PROCESS, made))
                 if objection is not None:
                     raise objection
 
@@ -168,17 +168,17 @@ class _Run:
             already_complete=True,
         )
 
-    def _summary(self, dataset_id: str, scan: Scan, meter: Meter) -> Summary:
+    def _summary(self, dataset_id: str, scan: Scan, monitor: RunMonitor) -> Summary:
         summary = Summary(
             dataset_id=dataset_id,
             samples=self.job.plan.n,
-            made=meter.made,
-            seconds=meter.seconds,
-            rejections=meter.rejections,
-            bytes=scan.bytes + meter.bytes,
-            cpu_s=meter.mean_cpu_s(),
-            worker_deaths=meter.worker_deaths,
-            rss_bytes_max=meter.rss_bytes_max,
+            made=monitor.made,
+            seconds=monitor.seconds,
+            rejections=monitor.rejections,
+            bytes=scan.bytes + monitor.bytes,
+            cpu_s=monitor.mean_cpu_s(),
+            worker_deaths=monitor.worker_deaths,
+            rss_bytes_max=monitor.rss_bytes_max,
         )
-        meter.log({"summary": summary})
+        monitor.log({"summary": summary})
         return summary

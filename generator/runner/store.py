@@ -46,6 +46,7 @@ SUMS_NAME = "SHA256SUMS"
 LICENCES_NAME = "LICENSES-ASSETS.md"
 RUN_NAME = "run"
 SHARDS_NAME = "shards"
+REMEDY = "choose another folder with --out"
 SCRATCH_FOLDERS_MAX = 1_000_000
 
 
@@ -127,9 +128,10 @@ class LocalStore:
             StorageError: the folder belongs to something else, or to another plan.
         """
         if not self.root.exists():
+            self._refuse_impossible_place()
             return FolderState.NEW
         if not self.root.is_dir():
-            raise StorageError(f"{self.root}: is not a folder; choose another one with --out")
+            raise StorageError(f"{self.root}: is not a folder; {REMEDY}")
         names = {path.name for path in self.root.iterdir()}
         if PLAN_NAME in names:
             self._refuse_another(plan)
@@ -284,6 +286,14 @@ class LocalStore:
             f"{', '.join(paths[:3]) or 'its record'}{' ...' if len(paths) > 3 else ''}.\n"
             f"  Compare {self.shard_dir(committed.shard)} with {kept}"
         )
+
+    def _refuse_impossible_place(self) -> None:
+        for path in (self.root, *self.root.parents):
+            if path.is_symlink() and not path.exists():
+                target = path.readlink()
+                raise StorageError(f"{path}: links to {target}, which does not exist; {REMEDY}")
+            if path.exists() and not path.is_dir():
+                raise StorageError(f"{path}: is not a folder; {REMEDY}")
 
     def _refuse_another(self, plan: Plan) -> None:
         differences = compare(load_plan(self.root), plan)

@@ -1,4 +1,4 @@
-"""Errors nobody foresaw, made presentable: place, fact, command to reproduce, end of the trace."""
+"""Unexpected errors as messages: place, fact, command to reproduce, end of the trace."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from generator.core.errors import GenDataError, SampleError
 
 TRACE_LINES = 12
+CACHE_DAMAGE = ("Failed to find forward kernel", "Failed to load CPU module")
+"""Texts of Warp's errors when a compiled kernel on disk is not as it was written."""
 
 
 @contextmanager
@@ -33,6 +35,11 @@ def unforeseen(error: Exception, place: str, command: str = "") -> SampleError:
     trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
     lines = [f"{place}: {type(error).__name__}: {error}"]
     lines += [f"  {line}" for line in trace.rstrip().splitlines()[-TRACE_LINES:]]
+    if any(text in str(error) for text in CACHE_DAMAGE):
+        lines.append(
+            "  Warp's cache of compiled kernels is damaged: delete its folder, "
+            "~/.cache/warp or $WARP_CACHE_PATH, and repeat the command"
+        )
     if command:
         lines.append(f"  Reproduce: {command}")
     return SampleError("\n".join(lines))

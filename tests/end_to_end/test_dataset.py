@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -155,3 +156,16 @@ def test_licences_name_what_was_used_and_nothing_else(dataset: Path) -> None:
     listed = {name for row in rows for name in row.split("|")[4].strip().split(", ")}
 
     assert listed == {asset.partition("#")[0].partition("?")[0] for asset in used}
+
+
+def test_a_flipped_bit_is_repaired_on_request(dataset: Path, tmp_path: Path) -> None:
+    """The same size, another byte: only hashing finds it; ``--repair`` makes the shard again."""
+    shutil.copytree(dataset, tmp_path / "one")
+    damaged = tmp_path / "one/shards/000001/color/rgb/000000007.png"
+    damaged.write_bytes(damaged.read_bytes()[:-1] + b"\0")
+
+    done = gen_data(*MAIN_JOB, "--workers", "1", "--out", "one", "--repair", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert digest(tmp_path / "one") == digest(dataset)
+    assert (tmp_path / "one/run/quarantine/0-000001/color/rgb" / damaged.name).exists()

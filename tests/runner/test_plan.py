@@ -76,5 +76,5 @@ def test_what_is_no_plan_is_refused_by_name(tmp_path: Path, text: str) -> None:
     """Any damage to plan.json is one StorageError that names the file."""
     (tmp_path / "plan.json").write_text(text)
 
-    with pytest.raises(StorageError, match=r"plan\.json: not a plan"):
+    with pytest.raises(StorageError, match=r"plan\.json: damaged"):
         load_plan(tmp_path)

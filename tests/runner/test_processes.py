@@ -262,6 +262,15 @@ class Stubborn(SceneRejected):
         return (Stubborn, ("one argument too many",))
 
 
+@pytest.mark.parametrize(
+    "text", ["Failed to find forward kernel 'grow_tree'", "Failed to load CPU module 'm'"]
+)
+def test_a_damaged_kernel_cache_is_named_with_its_remedy(text: str) -> None:
+    """Warp says what it missed; a user needs to know what to delete."""
+    assert "delete its folder, ~/.cache/warp" in str(sendable(RuntimeError(text)))
+    assert "~/.cache/warp" not in str(sendable(RuntimeError("something else")))
+
+
 def test_an_error_that_cannot_travel_arrives_as_its_nearest_relative() -> None:
     """Kind and text survive; only the class of the plug-in is lost."""
     arrived = sendable(Stubborn())

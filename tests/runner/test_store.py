@@ -230,14 +230,6 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
         make(tmp_path / "out")
 
 
-def test_a_missing_parent_that_cannot_be_made_names_path_and_errno(tmp_path: Path) -> None:
-    """A file where a parent folder should be."""
-    (tmp_path / "file").write_text("a file")
-
-    with pytest.raises(StorageError, match=r"file.*\(E(NOTDIR|EXIST)\)"):
-        make(tmp_path / "file" / "out")
-
-
 def test_an_empty_folder_and_a_killed_start_are_new(tmp_path: Path) -> None:
     """The lock may be there before the plan is."""
     (tmp_path / "out" / "run").mkdir(parents=True)
@@ -563,3 +555,25 @@ def test_tree_sizes_reports_links_as_irregular(tmp_path: Path) -> None:
     (tmp_path / "c").symlink_to(tmp_path, target_is_directory=True)
 
     assert files.tree_sizes(tmp_path) == {"a": 3, "b": files.IRREGULAR, "c": files.IRREGULAR}
+
+
+@pytest.mark.parametrize(
+    ("place", "fact"),
+    [
+        ("file/below", r"/file: is not a folder"),
+        ("file", r"/file: is not a folder"),
+        ("link", r"/link: links to nowhere, which does not exist"),
+        ("link/below", r"/link: links to nowhere, which does not exist"),
+        ("n" * 300, r"File name too long"),
+    ],
+)
+def test_a_place_where_no_folder_can_be_is_named(tmp_path: Path, place: str, fact: str) -> None:
+    """With the remedy that helps: repeating the command does not, and nothing is finished."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "link").symlink_to("nowhere")
+
+    with pytest.raises(StorageError, match=fact) as caught:
+        make(tmp_path / place)
+
+    assert "choose another folder with --out" in str(caught.value).lower()
+    assert "finished" not in str(caught.value)

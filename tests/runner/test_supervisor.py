@@ -41,7 +41,7 @@ def samples_of(shard: int) -> range:
     return range(shard * SHARD_SIZE, (shard + 1) * SHARD_SIZE)
 
 
-def supervisor(shards: int, workers: int, **limits: float) -> Supervisor:
+def make_supervisor(shards: int, workers: int, **limits: float) -> Supervisor:
     """One that makes ``shards`` shards of four samples."""
     return Supervisor(
         shards=range(shards),
@@ -54,47 +54,47 @@ def supervisor(shards: int, workers: int, **limits: float) -> Supervisor:
 
 def test_no_more_processes_than_shards_are_started() -> None:
     """Two shards need two of eight workers."""
-    assert supervisor(shards=2, workers=8).start(0.0) == [Spawn(0), Spawn(1)]
+    assert make_supervisor(shards=2, workers=8).start(0.0) == [Spawn(0), Spawn(1)]
 
 
 def test_a_ready_worker_gets_the_first_shard_and_goes_home_after_the_last() -> None:
     """One worker, one shard: assign, dismiss, finished when it is gone."""
-    boss = supervisor(shards=1, workers=1)
+    supervisor = make_supervisor(shards=1, workers=1)
 
-    boss.start(0.0)
+    supervisor.start(0.0)
 
-    assert boss.handle(Ready(0), 1.0) == [Assign(0, 0)]
-    assert boss.handle(ShardDone(0, 0, 4, 100, 0), 2.0) == [Dismiss(0)]
-    assert not boss.finished
-    assert boss.handle(Exited(0, 0), 3.0) == []
-    assert boss.finished
-    assert boss.error is None
+    assert supervisor.handle(Ready(0), 1.0) == [Assign(0, 0)]
+    assert supervisor.handle(ShardDone(0, 0, 4, 100, 0), 2.0) == [Dismiss(0)]
+    assert not supervisor.finished
+    assert supervisor.handle(Exited(0, 0), 3.0) == []
+    assert supervisor.finished
+    assert supervisor.error is None
 
 
 def test_a_dead_workers_shard_goes_to_the_next_one() -> None:
     """The replacement gets the same shard, before any new one."""
-    boss = supervisor(shards=3, workers=1)
-    boss.start(0.0)
-    boss.handle(Ready(0), 1.0)
+    supervisor = make_supervisor(shards=3, workers=1)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 1.0)
 
-    after_death = boss.handle(Exited(0, -9), 2.0)
+    after_death = supervisor.handle(Exited(0, -9), 2.0)
 
     assert Spawn(1) in after_death
-    assert boss.handle(Ready(1), 3.0) == [Assign(1, 0)]
+    assert supervisor.handle(Ready(1), 3.0) == [Assign(1, 0)]
 
 
 def test_a_shard_that_kills_three_workers_is_given_up_and_named() -> None:
     """The message has shard, sample in flight, signal and the command for that sample."""
-    boss = supervisor(shards=1, workers=1)
-    boss.start(0.0)
+    supervisor = make_supervisor(shards=1, workers=1)
+    supervisor.start(0.0)
     for number in range(3):
-        boss.handle(Ready(number), 1.0)
-        boss.handle(SampleDone(number, 0, 0), 1.5)
-        boss.handle(Exited(number, -11), 2.0)
+        supervisor.handle(Ready(number), 1.0)
+        supervisor.handle(SampleDone(number, 0, 0), 1.5)
+        supervisor.handle(Exited(number, -11), 2.0)
 
-    assert boss.finished
-    assert isinstance(boss.error, WorkerLost)
-    assert str(boss.error) == (
+    assert supervisor.finished
+    assert isinstance(supervisor.error, WorkerLost)
+    assert str(supervisor.error) == (
         "shard 0: its worker process died 3 times, at last in sample 1: "
         "killed by signal 11 (SIGSEGV).\n  Reproduce: make-alone 1"
     )
@@ -102,88 +102,88 @@ def test_a_shard_that_kills_three_workers_is_given_up_and_named() -> None:
 
 def test_a_silent_worker_is_killed_and_its_shard_made_by_another() -> None:
     """After the limit and not before; waiting for work is no silence."""
-    boss = supervisor(shards=1, workers=1, silence_s=30.0)
-    boss.start(0.0)
-    boss.handle(Ready(0), 10.0)
+    supervisor = make_supervisor(shards=1, workers=1, silence_s=30.0)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 10.0)
 
-    assert boss.handle(Tick(), 40.0) == []
-    assert Kill(0) in boss.handle(Tick(), 40.1)
-    assert Kill(0) not in boss.handle(Tick(), 50.0)
-    assert Spawn(1) in boss.handle(Exited(0, -9), 51.0)
+    assert supervisor.handle(Tick(), 40.0) == []
+    assert Kill(0) in supervisor.handle(Tick(), 40.1)
+    assert Kill(0) not in supervisor.handle(Tick(), 50.0)
+    assert Spawn(1) in supervisor.handle(Exited(0, -9), 51.0)
 
 
 def test_a_shard_finished_just_before_the_kill_is_not_made_again() -> None:
     """The commit counts, and the doomed worker gets no new shard."""
-    boss = supervisor(shards=2, workers=1, silence_s=30.0)
-    boss.start(0.0)
-    boss.handle(Ready(0), 0.0)
-    boss.handle(Tick(), 31.0)
+    supervisor = make_supervisor(shards=2, workers=1, silence_s=30.0)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 0.0)
+    supervisor.handle(Tick(), 31.0)
 
-    late = boss.handle(ShardDone(0, 0, 4, 100, 0), 31.1)
+    late = supervisor.handle(ShardDone(0, 0, 4, 100, 0), 31.1)
 
     assert [a for a in late if isinstance(a, Assign)] == []
-    boss.handle(Exited(0, -9), 31.2)
-    assert boss.handle(Ready(1), 32.0) == [Assign(1, 1)]
+    supervisor.handle(Exited(0, -9), 31.2)
+    assert supervisor.handle(Ready(1), 32.0) == [Assign(1, 1)]
 
 
 def test_a_rejected_scene_lets_the_others_finish_their_shard() -> None:
     """No new shard is handed out; the error is kept; committed work is not thrown away."""
-    boss = supervisor(shards=9, workers=2)
-    boss.start(0.0)
-    boss.handle(Ready(0), 1.0)
-    boss.handle(Ready(1), 1.0)
+    supervisor = make_supervisor(shards=9, workers=2)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 1.0)
+    supervisor.handle(Ready(1), 1.0)
     error = SceneRejected(3, ())
 
-    assert boss.handle(Failed(0, error), 2.0) == []
-    assert boss.handle(Exited(0, 1), 2.1) == []
-    assert boss.handle(ShardDone(1, 1, 4, 100, 0), 3.0) == [Dismiss(1)]
-    boss.handle(Exited(1, 0), 3.1)
-    assert boss.finished
-    assert boss.error is error
+    assert supervisor.handle(Failed(0, error), 2.0) == []
+    assert supervisor.handle(Exited(0, 1), 2.1) == []
+    assert supervisor.handle(ShardDone(1, 1, 4, 100, 0), 3.0) == [Dismiss(1)]
+    supervisor.handle(Exited(1, 0), 3.1)
+    assert supervisor.finished
+    assert supervisor.error is error
 
 
 def test_a_storage_fault_stops_all_at_once() -> None:
     """The others would only meet the same full disk."""
-    boss = supervisor(shards=9, workers=2)
-    boss.start(0.0)
-    boss.handle(Ready(0), 1.0)
-    boss.handle(Ready(1), 1.0)
+    supervisor = make_supervisor(shards=9, workers=2)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 1.0)
+    supervisor.handle(Ready(1), 1.0)
 
-    assert Kill(1) in boss.handle(Failed(0, StorageError("disk full")), 2.0)
+    assert Kill(1) in supervisor.handle(Failed(0, StorageError("disk full")), 2.0)
 
 
 def test_processes_that_never_start_end_the_run() -> None:
     """Three deaths in a row before the first Ready; no endless respawning."""
-    boss = supervisor(shards=9, workers=1)
-    boss.start(0.0)
+    supervisor = make_supervisor(shards=9, workers=1)
+    supervisor.start(0.0)
 
     for number in range(3):
-        boss.handle(Exited(number, 1), 1.0)
+        supervisor.handle(Exited(number, 1), 1.0)
 
-    assert boss.finished
-    assert isinstance(boss.error, WorkerLost)
-    assert "while they start: exited with status 1" in str(boss.error)
+    assert supervisor.finished
+    assert isinstance(supervisor.error, WorkerLost)
+    assert "while they start: exited with status 1" in str(supervisor.error)
 
 
 def test_out_of_memory_continues_with_fewer_workers() -> None:
     """Two workers, one killed by the kernel: one goes on alone."""
-    boss = supervisor(shards=9, workers=2)
-    boss.start(0.0)
-    boss.handle(Ready(0), 1.0)
-    boss.handle(Ready(1), 1.0)
+    supervisor = make_supervisor(shards=9, workers=2)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 1.0)
+    supervisor.handle(Ready(1), 1.0)
 
-    actions = boss.handle(Exited(0, -9, out_of_memory=True), 2.0)
+    actions = supervisor.handle(Exited(0, -9, out_of_memory=True), 2.0)
 
     assert not any(isinstance(a, Spawn) for a in actions)
 
 
 def test_a_worker_that_grew_too_large_is_replaced_between_shards() -> None:
     """Dismissed after its shard, and a new one is started."""
-    boss = supervisor(shards=9, workers=1, rss_bytes=1000)
-    boss.start(0.0)
-    boss.handle(Ready(0), 1.0)
+    supervisor = make_supervisor(shards=9, workers=1, rss_bytes=1000)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 1.0)
 
-    actions = boss.handle(ShardDone(0, 0, 4, 100, 0, rss_bytes=1001), 2.0)
+    actions = supervisor.handle(ShardDone(0, 0, 4, 100, 0, rss_bytes=1001), 2.0)
 
     assert Dismiss(0) in actions
     assert Spawn(1) in actions
@@ -191,14 +191,14 @@ def test_a_worker_that_grew_too_large_is_replaced_between_shards() -> None:
 
 def test_an_abort_kills_every_process() -> None:
     """Ctrl-C: busy, idle and starting workers alike."""
-    boss = supervisor(shards=9, workers=3)
-    boss.start(0.0)
-    boss.handle(Ready(0), 1.0)
+    supervisor = make_supervisor(shards=9, workers=3)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 1.0)
 
-    actions = boss.handle(Abort(Interrupted("stop")), 2.0)
+    actions = supervisor.handle(Abort(Interrupted("stop")), 2.0)
 
     assert actions == [Kill(0), Kill(1), Kill(2)]
-    assert not boss.finished
+    assert not supervisor.finished
 
 
 @dataclass
@@ -232,17 +232,17 @@ class Simulation:
         self.rng = random.Random(self.seed)
         self.now_s = 0.0
         self.alive: dict[int, VirtualWorker] = {}
-        self.boss = supervisor(
+        self.supervisor = make_supervisor(
             self.shards, self.workers, silence_s=60.0, shard_attempts=3, lost_shards=99
         )
 
     def run(self, steps_max: int = 20_000) -> GenDataError | None:
         """Until the supervisor is finished; the bound makes a livelock a failure."""
-        self._carry_out(self.boss.start(self.now_s))
+        self._carry_out(self.supervisor.start(self.now_s))
         for _ in range(steps_max):
-            if self.boss.finished:
+            if self.supervisor.finished:
                 assert not self.alive
-                return self.boss.error
+                return self.supervisor.error
             self._step()
         raise AssertionError(f"seed {self.seed}: not finished after {steps_max} steps")
 
@@ -293,7 +293,7 @@ class Simulation:
         return ShardDone(number, shard, SHARD_SIZE, 100, 0)
 
     def _tell(self, event: Event) -> None:
-        self._carry_out(self.boss.handle(event, self.now_s))
+        self._carry_out(self.supervisor.handle(event, self.now_s))
 
     def _carry_out(self, actions: list[Action]) -> None:
         for action in actions:
@@ -326,9 +326,9 @@ def test_random_deaths_and_hangs_lose_no_shard(first_seed: int) -> None:
 
         error = simulation.run()
 
-        if simulation.boss.given_up or error is None:
+        if simulation.supervisor.given_up or error is None:
             missing = set(range(simulation.shards)) - set(simulation.committed)
-            assert missing == set(simulation.boss.given_up) - set(simulation.committed)
+            assert missing == set(simulation.supervisor.given_up) - set(simulation.committed)
         assert max(simulation.attempts.values()) <= 3
 
 
@@ -350,18 +350,18 @@ def test_an_error_or_an_abort_at_any_time_ends_the_run() -> None:
         failing = Simulation(seed, fail_at_sample=seed % 48, death_rate=0.0)
         assert isinstance(failing.run(), AssetError)
         stopped = Simulation(seed, abort_at_s=seed % 20, death_rate=0.0)
-        assert stopped.run() is None or isinstance(stopped.boss.error, Interrupted)
+        assert stopped.run() is None or isinstance(stopped.supervisor.error, Interrupted)
 
 
 def test_a_failed_start_is_survived_when_the_next_succeeds() -> None:
     """Only deaths in a row count."""
-    boss = supervisor(shards=9, workers=1)
-    boss.start(0.0)
-    boss.handle(Exited(0, 1), 1.0)
-    boss.handle(Exited(1, 1), 1.0)
-    boss.handle(Ready(2), 1.0)
-    boss.handle(Exited(2, 1), 1.0)
-    boss.handle(Exited(3, 1), 1.0)
+    supervisor = make_supervisor(shards=9, workers=1)
+    supervisor.start(0.0)
+    supervisor.handle(Exited(0, 1), 1.0)
+    supervisor.handle(Exited(1, 1), 1.0)
+    supervisor.handle(Ready(2), 1.0)
+    supervisor.handle(Exited(2, 1), 1.0)
+    supervisor.handle(Exited(3, 1), 1.0)
 
-    assert boss.error is None
-    assert not boss.finished
+    assert supervisor.error is None
+    assert not supervisor.finished
