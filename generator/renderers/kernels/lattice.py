@@ -113,6 +113,7 @@ def sample_lattice(
 def agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: float):
     """Whether two points lie on one stretch of surface; 0 or the cosine between normals."""
     cosine = wp.dot(n, m)
+    # Normals within 26 degrees, and in each other's tangent plane: one stretch of surface.
     if cosine < 0.9 or wp.abs(wp.dot(n, q - p)) > tolerance_m:
         cosine = 0.0
     return cosine
