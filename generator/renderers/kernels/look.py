@@ -8,6 +8,7 @@ from generator.renderers.kernels.holes import projected
 from generator.renderers.kernels.records import (
     World,
     corners_of,
+    first_weight,
     unit,
     vertex_at,
 )
@@ -39,8 +40,7 @@ def mesh_mapped(
     uv0 = world.geometries[g].uvs[corner[0]]
     d1 = world.geometries[g].uvs[corner[1]] - uv0
     d2 = world.geometries[g].uvs[corner[2]] - uv0
-    # Hits on a back face carry their first weight plus 2.
-    u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
+    u = first_weight(weight)
     uv = uv0 + d1 * u + d2 * weight[1]
     p = vertex_at(world, g, corner[0])
     scale = world.bodies[b].scale

@@ -9,6 +9,7 @@ from generator.renderers.kernels.records import (
     View,
     World,
     corners_of,
+    first_weight,
     normal_at,
     pixel_direction,
     unit,
@@ -225,7 +226,7 @@ def range_of(world: World, hit: wp.vec2i, weight: wp.vec2):
 @wp.func
 def mesh_point(world: World, hit: wp.vec2i, weight: wp.vec2):
     """The point of a (body, face) with stored barycentric weights, in the mesh frame."""
-    u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
+    u = first_weight(weight)
     v = weight[1]
     g = world.bodies[hit[0]].geometry
     corner = corners_of(world, g, hit[1])
