@@ -50,7 +50,7 @@ from exporters.base import ExporterBase
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.sensors import laser_scanner, pinhole_camera, scanned
-from exporters.sequences import check_frame_names
+from exporters.sequences import check_frame_names, write_bytes, write_text
 from exporters.upright import UprightBox, boxed_members, upright_box
 from generator.core.boxes import BoxPx
 from generator.core.capture import Channel
@@ -144,17 +144,17 @@ class Kitti(ExporterBase):
             unseen: frozenset[int] = frozenset()
             T_camera_velo = self._velodyne_pose(info, sample)
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
-            _write_text(folder / f"calib/{frame}.txt", calib)
+            write_text(folder / f"calib/{frame}.txt", calib)
             lidar = self._lidar(info)
             if scanned(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
-                _write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
+                write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
                 members, unseen = point_members(points, truth, self, T_camera_velo)
                 labels = point_labels(points, members, label_rows(truth, self, unseen))
-                _write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
-            _write_text(folder / f"label_2/{frame}.txt", label_text(truth, self, unseen))
+                write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
+            write_text(folder / f"label_2/{frame}.txt", label_text(truth, self, unseen))
             frames.append(f"{sample.index} {sample.split}\n")
-        _write_text(folder / "frames.txt", "".join(frames))
+        write_text(folder / "frames.txt", "".join(frames))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link all files of the shards into one tree and list the frames of each split."""
@@ -168,8 +168,8 @@ class Kitti(ExporterBase):
                     link_or_copy(source, dataset_dir / "training" / target)
         for split, frames in frames_of.items():
             listing = "".join(f"{frame}\n" for frame in frames)
-            _write_text(dataset_dir / "ImageSets" / f"{split}.txt", listing)
-        _write_text(dataset_dir / "README.txt", self._readme(info, camera))
+            write_text(dataset_dir / "ImageSets" / f"{split}.txt", listing)
+        write_text(dataset_dir / "README.txt", self._readme(info, camera))
 
     def _camera(self, info: DatasetInfo) -> str:
         return pinhole_camera(info, self.camera, self.type)
@@ -426,16 +426,6 @@ def _join_words(name: str) -> str:
 
 def _frame(index: int) -> str:
     return f"{index:06d}"
-
-
-def _write_bytes(path: Path, data: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(data)
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 _BOXES = {

@@ -152,6 +152,7 @@ def list_bodies(boxes: Boxes, row: int, bundle: Bundle, reach_m: float):
 @wp.func
 def reciprocals(way: wp.vec3):
     """One over each coordinate; a grain in the place of zero."""
+    # 0 / 0 would be NaN where a ray lies in a box's face; this is as good as infinity.
     x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
     y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
     z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])

@@ -38,6 +38,7 @@ def scattered(x: int, y: int, seed: int):
     state = (key + wp.uint32(seed)) * wp.uint32(747796405) + wp.uint32(1442695041)
     word = ((state >> ((state >> wp.uint32(28)) + wp.uint32(4))) ^ state) * wp.uint32(277803737)
     word = (word >> wp.uint32(22)) ^ word
+    # 24 bits: as many as single precision holds, so that 1 is never reached.
     return float(word >> wp.uint32(8)) * (1.0 / 16777216.0)
 
 
@@ -48,6 +49,7 @@ def lumps(x: float, y: float, seed: int):
     j = floor_int(y)
     u = x - float(i)
     v = y - float(j)
+    # Without a slope at the lattice's lines, where creases would show.
     u = u * u * (3.0 - 2.0 * u)
     v = v * v * (3.0 - 2.0 * v)
     low = scattered(i, j, seed) * (1.0 - u) + scattered(i + 1, j, seed) * u
@@ -79,6 +81,7 @@ def porosity_of(world: World, surface: int):
 def footprint(view: View, p: wp.vec3, n: wp.vec3, pixels: float):
     """Length on a surface of as many pixels, along the way to the viewer [m]."""
     to_eye = view.eye_m - p
+    # At the horizon footprints are boundless; fifty pixels long is blurred enough.
     slant = wp.max(wp.abs(wp.dot(unit(to_eye), n)), 0.02)
     return pixels * view.pixel_rad * wp.length(to_eye) / slant
 
@@ -93,6 +96,7 @@ def widened(footprint_m: float, size_m: float):
 def puddle_at(world: World, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float):
     """How much of a point lies under standing water, in the mean over a footprint."""
     depth = float(0.0)
+    # Water stands on what slopes by less than ten degrees.
     if world.ground.puddles > 0.0 and n[2] > 0.985:
         level = patches(p[0], p[1], 5.0, world.ground.seed)
         wide = widened(footprint_m, 5.0)
@@ -106,6 +110,7 @@ def puddle_at(world: World, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m:
 def snow_rise(world: World, p: wp.vec3, n: wp.vec3, footprint_m: float):
     """Where a point is between the edge of snow, 0, and full cover, 1; more within [-2, 3]."""
     rise = float(-2.0)
+    # Nothing holds on what is steeper than 78 degrees.
     if world.ground.snow_cover > 0.0 and n[2] > 0.2:
         level = patches(p[0], p[1], 3.0, world.ground.seed + 16)
         # On slopes it holds where there is most.

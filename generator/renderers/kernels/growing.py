@@ -54,6 +54,7 @@ def half_area(low: wp.vec3, high: wp.vec3):
 @wp.func
 def middle(boxes: Boxes, i: int):
     """Twice the centre of a box."""
+    # Only its order matters: halving it would be a rounding for nothing.
     return boxes.lows[i] + boxes.highs[i]
 
 
@@ -104,6 +105,7 @@ def cut_along(
         count += boxes.bin_counts[k]
         boxes.costs[k] = FARTHEST
         if count > 0:
+            # Surface area heuristic: faces are met a leaf at a time, so leaves count, not faces.
             boxes.costs[k] = half_area(low, high) * float((count + leaf - 1) / leaf)
         k -= 1
     best = float(FARTHEST)

@@ -13,8 +13,10 @@ from generator.renderers.kernels.records import (
     View,
     World,
     corners_of,
+    first_weight,
     normal_at,
     pixel_direction,
+    seen_inside,
     surface_index,
     unit,
     vertex_at,
@@ -61,8 +63,8 @@ def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d
     p0 = vertex_at(world, g, corner[0])
     p1 = vertex_at(world, g, corner[1])
     p2 = vertex_at(world, g, corner[2])
-    side = wp.where(weight[0] > 1.5, -1.0, 1.0)
-    u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
+    side = wp.where(seen_inside(weight), -1.0, 1.0)
+    u = first_weight(weight)
     v = weight[1]
     w = 1.0 - u - v
     p = p0 * w + p1 * u + p2 * v
@@ -113,6 +115,7 @@ def sample_lattice(
 def agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: float):
     """Whether two points lie on one stretch of surface; 0 or the cosine between normals."""
     cosine = wp.dot(n, m)
+    # Normals within 26 degrees, and in each other's tangent plane: one stretch of surface.
     if cosine < 0.9 or wp.abs(wp.dot(n, q - p)) > tolerance_m:
         cosine = 0.0
     return cosine

@@ -38,10 +38,12 @@ from generator.renderers.kernels.records import (
     View,
     World,
     corners_of,
+    first_weight,
     flat_normal,
     normal_at,
     pixel_direction,
     pixel_width,
+    seen_inside,
     surface_index,
     unit,
     vertex_at,
@@ -147,7 +149,7 @@ def maps_at(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprin
     t = world.surfaces[surface].texture
     if t >= 0:
         if world.textures[t].has_shares + world.textures[t].has_glow > 0:
-            u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
+            u = first_weight(weight)
             weights = wp.vec3(1.0 - u - weight[1], u, weight[1])
             uv = uv_at(world, surface, hit[0], hit[1], weights)
             texels = texels_per_m2(world, surface, hit) * footprint_m * footprint_m
@@ -548,7 +550,7 @@ def ray_of(
         ray.d = above(d - m * (2.0 * wp.dot(m, d)), n)
         ray.origin = ray_origin(world, hit, weight, p, way)
         ray.mirrored = 1
-        side = wp.where(weight[0] > 1.5, -1.0, 1.0)
+        side = wp.where(seen_inside(weight), -1.0, 1.0)
         ray.spread += 2.0 * side * curvature(world, hit) * width_m
     else:
         ray.share = wp.vec3(layers.straight)
@@ -558,9 +560,9 @@ def ray_of(
                 ray.share += wp.vec3(layers.straight)
             else:
                 ior = world.surfaces[surface].ior
-                eta = wp.where(weight[0] > 1.5, 1.0 / ior, ior)
+                eta = wp.where(seen_inside(weight), 1.0 / ior, ior)
                 bent = refracted(d, layers.n, eta)
-                side = wp.where(weight[0] > 1.5, -1.0, 1.0)
+                side = wp.where(seen_inside(weight), -1.0, 1.0)
                 ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, hit) * width_m
                 if wp.dot(bent, bent) > 0.0:
                     ray.d = bent

@@ -8,6 +8,7 @@ from generator.renderers.kernels.holes import projected
 from generator.renderers.kernels.records import (
     World,
     corners_of,
+    first_weight,
     unit,
     vertex_at,
 )
@@ -39,7 +40,7 @@ def mesh_mapped(
     uv0 = world.geometries[g].uvs[corner[0]]
     d1 = world.geometries[g].uvs[corner[1]] - uv0
     d2 = world.geometries[g].uvs[corner[2]] - uv0
-    u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
+    u = first_weight(weight)
     uv = uv0 + d1 * u + d2 * weight[1]
     p = vertex_at(world, g, corner[0])
     scale = world.bodies[b].scale
@@ -48,17 +49,20 @@ def mesh_mapped(
     area_uv = d1[0] * d2[1] - d1[1] * d2[0]
     area_m2 = wp.length(wp.cross(e1, e2))
     size = float(world.textures[texture].width * world.textures[texture].height)
+    # Area of a pixel's footprint in texels; the level halves sides, hence half the logarithm.
     texels = wp.abs(area_uv) * size * footprint_m * footprint_m / wp.max(area_m2, 1.0e-12)
     level = 0.5 * wp.log2(wp.max(texels, 1.0e-6))
     bumpy = world.textures[texture].has_bumps != 0
     texel = texel_at(world, texture, sampler_of(world, texture, level), uv[0], uv[1], bumpy)
     look.albedo = wp.cw_mul(look.albedo, texel.albedo)
     look.roughness *= texel.roughness
+    # Without an area in the texture there are no tangents: the normal stays.
     if bumpy and area_uv != 0.0:
         bump = texel.bump
         tangent = world.bodies[b].R_world_mesh @ ((e1 * d2[1] - e2 * d1[1]) / area_uv)
         bitangent = world.bodies[b].R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) / area_uv)
         n = look.normal
+        # Gram and Schmidt: interpolated normals are not those of the flat face.
         tangent = unit(tangent - n * wp.dot(n, tangent))
         bitangent = unit(bitangent - n * wp.dot(n, bitangent))
         look.normal = unit(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
@@ -76,6 +80,7 @@ def tilted(bump: wp.vec3, axis: int, n: wp.vec3):
         offset = wp.vec3(0.0, bump[0], bump[1])
     elif axis == 1:
         offset = wp.vec3(bump[0], 0.0, bump[1])
+    # A texture may tilt a normal by 84 degrees at most: no side of it may face away.
     return n * wp.max(bump[2], 0.1) + offset
 
 
@@ -104,6 +109,7 @@ def box_mapped(
     roughness = float(0.0)
     m = wp.vec3(0.0)
     for axis in range(3):
+        # Less than one step of 8 bits: not worth a look into the texture.
         if w[axis] > 0.004:
             uv = projected(p, axis)
             texel = texel_at(world, texture, sampler, uv[0], uv[1], bumpy)

@@ -52,6 +52,7 @@ def frame_of(z: wp.vec3):
 
     Source: Duff et al., "Building an orthonormal basis, revisited", JCGT 2017.
     """
+    # The sign keeps the denominator between 1 and 2: no direction is singular.
     sign = wp.where(z[2] >= 0.0, 1.0, -1.0)
     a = -1.0 / (sign + z[2])
     b = z[0] * z[1] * a
@@ -82,6 +83,7 @@ def way_to_lamp(lamp: Lamp, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
             radius = lamp.radius * SUN_DISTANCE_M
         x, y = frame_of(unit(to_lamp))
         off = (x * part[0] + y * part[1]) * radius
+    # What is below the horizon sends nothing: its ray is spent on the opposite part.
     if wp.dot(to_lamp + off, n) < 0.0:
         off = -off
     return to_lamp + off

@@ -318,7 +318,10 @@ def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float)
         if g.distance_m > a.way_m and g.distance_m < end_m:
             part = float(1.0)
             if a.density >= 0.0 and budget.lights != 2:
+                # Density of the other technique: source by its share of all weights, then
+                # direction.
                 asked = g.density * lamp_weight(world.lamps[j], a.p, a.n) / wp.max(a.total, 1.0e-20)
+                # Where only the asking is on trial (1), what is met counts for nothing.
                 part = preferred(a.density, asked) * float(budget.lights >> 1)
             light += g.radiance * part
             shown = wp.max(shown, world.lamps[j].shown)
@@ -369,12 +372,14 @@ def light_asked(
     else:
         g = draw_ball(world.lamps[choice.source], o, u)
     l = to_frame(g.direction, x, y, v.look.normal)  # noqa: E741
+    # Above both horizons: light must not leak through a face by its shading normal.
     if g.distance_m > 0.0 and l[2] > 0.0 and wp.dot(g.direction, v.flat) > 0.0:
         f, density = evaluate(s, l)
         asked = g.density * choice.part
         f = wp.cw_mul(f, g.radiance)
         if asked > 0.0 and wp.max(f) > 0.0:
             part = float(1.0)
+            # Alone, the technique has all the light and needs no weight.
             if budget.lights == 3:
                 part = preferred(asked, density)
             through = light_through(world, o, g.direction, g.distance_m, budget.clear)
@@ -427,9 +432,11 @@ def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
         out.bsdf = make_interface(w, alpha, 0.0)
         out.bsdf.f0 = wp.vec3(1.0, 1.0, 1.0)
         out.bsdf.f90 = 1.0
+        # Over the probability of the lot, so that the mean over lots is right.
         out.weight = on * (1.0 / (1.0 - p))
         # All that rough facets hide is scattered on.
         part = directional_albedo(world.lobes, wp.sqrt(alpha), w[2])
+        # A pane of F0 1 would lose what single scattering loses: it is given back.
         boost = 1.0 / (part[0] + part[1])
         out.bsdf.scale = back * (boost / p)
         if lot < p:
@@ -459,6 +466,7 @@ def deal(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample:
             out.kind = STRAIGHT
             out.weight = wp.vec3(1.0, 1.0, 1.0)
             return out
+        # What is left of a lot below a bound is a fresh one on [0, 1): no second draw is due.
         lot = lot / v.opacity
     if lot < v.clear:
         return deal_glass(world, v, w, lot / v.clear)
@@ -517,6 +525,7 @@ def step_from(
     n = v.look.normal
     x, y = frame_of(n)
     w = to_frame(-d, x, y, n)
+    # Bumps may turn a normal away from where the path comes from; the model needs Z > 0.
     w = wp.vec3(w[0], w[1], wp.max(w[2], 1.0e-3))
     dealt = deal(world, v, w, key, pair, sample)
     step = Step()
@@ -535,6 +544,7 @@ def step_from(
     else:
         sent = scatter(dealt.bsdf, choices[0], u)
     if dealt.kind == ROUGH_PANE:
+        # A rough pane scatters on as it would reflect, mirrored in its plane.
         sent.l = wp.vec3(sent.l[0], sent.l[1], -sent.l[2])
         sent.density = -1.0
     step.weight = sent.weight
@@ -553,6 +563,7 @@ def step_from(
             step.light = light_asked(world, table, budget, dealt.bsdf, v, o, x, y, choice, u)
     step.o = offset_origin(v.p, side)
     step.d = x * sent.l[0] + y * sent.l[1] + n * sent.l[2]
+    # A shading normal has sent it into the face: that light is lost, as in a groove.
     if wp.dot(step.d, side) <= 0.0:
         step.weight = wp.vec3(0.0)
     return step
@@ -587,6 +598,7 @@ def path_light(
     a = Anchor()
     a.p = view.eye_m
     a.density = -1.0
+    # Where the rasterised image begins: both tiers show the same.
     a.way_m = Z_NEAR_M * length
     o = view.eye_m + d * a.way_m
     # Samples share the pixel: each stands for a part of it.
@@ -601,8 +613,10 @@ def path_light(
     while going:
         going = False
         hit = first_met(world, o, d, AT_INFINITY, HOLES)
+        # Farther than suns, which are at infinity and would else lie behind the end.
         end_m = a.way_m + wp.where(hit.at[0] < 0, 2.0 * AT_INFINITY, hit.t)
         shown = int(0)
+        # Cameras do not see lamps without a body, as in the other tier.
         if bounces > 0:
             met, shown = lamps_met(world, budget, a, d, end_m)
             light += wp.cw_mul(through, met)
@@ -632,10 +646,13 @@ def path_light(
                         # A direction stands for those around it that are not drawn.
                         spread = wp.sqrt(1.0 / (a.density * float(budget.whole)))
                         cone = wp.max(cone, wp.min(spread, 0.5))
+                    # Relative to the first surface: dark ones are followed as far as bright ones.
                     worth = wp.where(bounces == 1, WORTH * wp.max(through), worth)
                     keep = wp.max(through) / wp.max(worth, 1.0e-20)
                     if going and keep < 1.0:
                         going = random_number(key, pair, sample) < keep
+                        # Survivors stand for those that have died (Russian roulette): the mean
+                        # stays.
                         through = through * (1.0 / keep)
     return light
 

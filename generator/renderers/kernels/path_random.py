@@ -98,7 +98,9 @@ def random_pair(key: wp.uint32, dimension: int, sample: wp.uint32):
             a (0, m, 2)-net.
     """
     seed = mixed_bits(key ^ (wp.uint32(dimension) * wp.uint32(0x5851F42D)))
+    # Each pair of one path goes through the samples in an order of its own.
     index = reversed_bits(scrambled(reversed_bits(sample), seed))
+    # Arbitrary odd numbers: they only have to differ, so that no two streams are alike.
     first = scrambled(index, mixed_bits(seed ^ wp.uint32(0x2511E9B3)))
     second = scrambled(pascal(index), mixed_bits(seed ^ wp.uint32(0x63D83595)))
     return wp.vec2(unit_float(reversed_bits(first)), unit_float(reversed_bits(second)))

@@ -345,6 +345,22 @@ def greater_of(a: wp.vec3, b: wp.vec3):
 
 
 @wp.func
+def first_weight(weight: wp.vec2):
+    """Barycentric weight of a face's second corner, from what images of weights hold.
+
+    They have 2 added to it where the inside of the face is seen: see ``seen_inside``.
+    """
+    return wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
+
+
+@wp.func
+def seen_inside(weight: wp.vec2):
+    """Whether the inside of a face is seen, from what images of weights hold."""
+    # Half-way between the largest weight, 1, and the smallest with 2 added to it.
+    return weight[0] > 1.5
+
+
+@wp.func
 def floor_int(x: float):
     """The largest integer <= x; ``wp.floor`` is a library call on the plainest processors."""
     i = int(x)

@@ -63,6 +63,7 @@ class Light:
 @wp.func
 def part_of(a: wp.vec3, b: wp.vec3):
     """How much of b is a, over all channels."""
+    # The floor is for black: nothing is a part of nothing.
     return (a[0] + a[1] + a[2]) / wp.max(b[0] + b[1] + b[2], 1.0e-20)
 
 
@@ -104,6 +105,8 @@ def light_of_lamps(
             n_l = facing(world.lamps[j], beam, p_world, n)
             if n_l > 0.0:
                 l = towards_mirror(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
+                # A wide lamp's brightest point may be set while the lamp still lights: see
+                # ``risen``.
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
                 wider = widening(world.lamps[j], beam, alpha)
                 lobe = specular_lobe(brdf, n, v, l, n_s, wider)
@@ -359,6 +362,7 @@ def sky_of_body(lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q:
 def nearness(dx: float, dy: float):
     """Weight of a lattice point, by its distance in cells."""
     squared = dx * dx + dy * dy
+    # Fourth powers of the distance: the nearest point counts, without a seam where it changes.
     return 1.0 / (0.05 + squared * squared)
 
 
@@ -369,6 +373,7 @@ def related(view: View, images: Images, lattice: Lattice, i: int, p: wp.vec3, q:
     if same:
         n = images.normals[i]
         tolerance_m = 2.0 * surface_tolerance(view, p)
+        # 37 degrees: round things have such neighbours, edges of boxes do not.
         same = wp.dot(n, lattice.normal[q]) > 0.8
         same = same and wp.abs(wp.dot(n, lattice.p_m[q] - p)) < tolerance_m
     return same
@@ -384,6 +389,7 @@ def seen_part(
     cast = int(0)
     if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
         for k in range(wp.where(beam.spread < SMALL_SPREAD, 1, parts.shape[0])):
+            # Penumbras are rare: where the first two rays agree, the rest would too.
             if k < 2 or (seen > 0.0 and seen < float(cast)):
                 cast += 1
                 if not blocked(world, path_along(origin, way_to_lamp(lamp, origin, n, parts[k]))):
@@ -402,7 +408,9 @@ def seen_sky(
     total = float(0.0)
     for k in range(disc.shape[0]):
         c = disc[k]
+        # Points of the disk lifted to the hemisphere: in proportion to the cosine.
         up = wp.sqrt(1.0 - wp.dot(c, c))
         t = free_path(world, path_along(origin, (x * c[0] + y * c[1] + n * up) * radius_m))
+        # Near things hide the sky fully; at the radius their shade has faded with no slope.
         total += t * (2.0 - t)
     return total / float(disc.shape[0])

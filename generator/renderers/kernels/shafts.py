@@ -108,6 +108,7 @@ def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     shaft.flat = tile.flat
     shaft.normal = wp.transpose(world.bodies[b].R_world_mesh) @ tile.normal
     height_m = tile.height_m + 1.0e-4 - wp.dot(world.bodies[b].t_world_mesh, tile.normal)
+    # In the mesh's own frame, where boxes and planes need no transform each.
     shaft.height = height_m * shrink
     return shaft
 

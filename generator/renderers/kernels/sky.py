@@ -51,12 +51,15 @@ def panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
     d = unit(direction)
     height = image.shape[0]
     width = image.shape[1]
+    # Row 0 is the zenith and columns run clockwise from -X; texel centres are at halves.
     x = (0.5 - wp.atan2(d[1], d[0]) * (0.5 / wp.pi)) * float(width) - 0.5
+    # Clamped: rounding of a unit vector may leave 1 + 1e-7, whose arc cosine is NaN.
     y = wp.acos(wp.clamp(d[2], -1.0, 1.0)) / wp.pi * float(height) - 0.5
     x0 = floor_int(x)
     y0 = floor_int(y)
     fx = x - float(x0)
     fy = y - float(y0)
+    # Around the horizon columns wrap; rows end at the poles.
     xa = (x0 + width) % width
     xb = (x0 + 1 + width) % width
     ya = wp.clamp(y0, 0, height - 1)
@@ -69,9 +72,12 @@ def panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
 @wp.func
 def octahedral(d: wp.vec3):
     """Direction to the square [-1, 1] x [-1, 1]."""
+    # Onto the octahedron |x| + |y| + |z| = 1 (Meyer et al., "On floating-point normal vectors",
+    # 2010).
     s = 1.0 / (wp.abs(d[0]) + wp.abs(d[1]) + wp.abs(d[2]))
     x = d[0] * s
     y = d[1] * s
+    # The lower half is folded outwards over the diagonals.
     if d[2] < 0.0:
         fold_x = (1.0 - wp.abs(y)) * wp.where(x >= 0.0, 1.0, -1.0)
         y = (1.0 - wp.abs(x)) * wp.where(y >= 0.0, 1.0, -1.0)
@@ -116,6 +122,7 @@ def sky_reflection(sky: Sky, d_world: wp.vec3, roughness: float):
 @wp.func
 def octahedral_direction(x: float, y: float):
     """The inverse of ``octahedral``, unit length."""
+    # On the octahedron; negative in the folded corners, the lower half.
     z = 1.0 - wp.abs(x) - wp.abs(y)
     if z < 0.0:
         fold_x = (1.0 - wp.abs(y)) * wp.where(x >= 0.0, 1.0, -1.0)

@@ -9,6 +9,7 @@ from generator.renderers.kernels.records import (
     View,
     World,
     corners_of,
+    first_weight,
     normal_at,
     pixel_direction,
     unit,
@@ -80,6 +81,7 @@ def seen_normal(n: wp.vec3, d_world: wp.vec3):
     m = unit(n)
     over = wp.dot(m, d_world)
     if over > 0.0:
+        # A thousandth beyond the edge: exactly on it, rounding would decide.
         m = unit(m - d_world * (over * 1.001 / wp.dot(d_world, d_world)))
     return m
 
@@ -118,6 +120,8 @@ def resolve(
             while same:
                 d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
                 det = wp.dot(d, facet.across)
+                # Seen edge-on, by an accident of snapping; the branch below mends depth and
+                # weights.
                 inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
                 u = wp.dot(d, facet.along_u) * inverse
                 v = wp.dot(d, facet.along_v) * inverse
@@ -165,6 +169,7 @@ def label_z_depths(view: View, ranges_m: wp.array(dtype=float), z_m: wp.array(dt
     """Distance along the optical axis; inf for what is not before the camera."""
     i = wp.tid()
     z = ranges_m[i] * view.directions[i][2]
+    # NaN, where the lens shows nothing, compares false and is nothing too.
     if not z > 0.0:
         z = wp.inf
     z_m[i] = z
@@ -221,7 +226,7 @@ def range_of(world: World, hit: wp.vec2i, weight: wp.vec2):
 @wp.func
 def mesh_point(world: World, hit: wp.vec2i, weight: wp.vec2):
     """The point of a (body, face) with stored barycentric weights, in the mesh frame."""
-    u = wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
+    u = first_weight(weight)
     v = weight[1]
     g = world.bodies[hit[0]].geometry
     corner = corners_of(world, g, hit[1])
