@@ -21,6 +21,8 @@ from generator.core.cache import Sized
 from generator.core.errors import AssetError, did_you_mean
 from generator.core.geometry import Asset, Float32, TextureData
 
+VERSION = 2
+"""Raised whenever what all families are made with gives other geometry."""
 _MAX_SEED = 2**31 - 1
 _PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
 
@@ -150,7 +152,11 @@ class Generated:
         arguments = _arguments(asset_id, family)
         parameters = {name: shown(value) for name, value in arguments.items()}
         return content_key(
-            {"family": asset_id.name, "version": family.version, "parameters": parameters}
+            {
+                "family": asset_id.name,
+                "version": [VERSION, family.version],
+                "parameters": parameters,
+            }
         )
 
 
