@@ -22,6 +22,8 @@ from generator.core.errors import AssetError, ConfigError, did_you_mean
 from generator.core.geometry import Asset, Float32, TextureData
 from generator.core.plugins import loaded, package_of, third_party
 
+VERSION = 2
+"""Raised whenever what all families are made with gives other geometry."""
 _MAX_SEED = 2**31 - 1
 _PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
 
@@ -158,7 +160,11 @@ class Generated:
     def _key(self, asset_id: AssetId, family: AnyFamily) -> str:
         arguments = _arguments(asset_id, family)
         parameters = {name: shown(value) for name, value in arguments.items()}
-        content = {"family": asset_id.name, "version": family.version, "parameters": parameters}
+        content = {
+            "family": asset_id.name,
+            "version": [VERSION, family.version],
+            "parameters": parameters,
+        }
         if asset_id.name in self._packages:
             # Another release of a package, or another package, may use the same version number.
             content["package"] = self._packages[asset_id.name]

@@ -10,9 +10,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from generator.assets.catalogue import Index
 from generator.assets.checking import Finding, check_folder
 from generator.assets.library import open_library
 from generator.cli.assets import assets
+from generator.config.document import parse
+from generator.config.problems import Problems
+from generator.config.validation import validate
 from generator.core.errors import AssetError
 from tests.assets.test_user_folders import ARM, write_box
 
@@ -104,3 +108,15 @@ def test_the_schema_describes_the_index() -> None:
     described = json.loads(printed.output)
     assert {"assets", "robots", "textures", "environments"} <= set(described["properties"])
     assert "SymmetryEntry" in described["$defs"]
+
+
+def test_the_page_on_assets_shows_a_valid_index() -> None:
+    """Its largest example, as a user would copy it."""
+    page = Path(__file__).parents[2] / "docs/assets.md"
+    examples = page.read_text(encoding="utf-8").split("```yaml\n")[1:]
+    text = max((example.partition("```")[0] for example in examples), key=len)
+    problems = Problems()
+    index = validate(parse(text, str(page)), Index, problems)
+    problems.raise_if_any()
+    assert index is not None
+    assert len(index.assets) == 3

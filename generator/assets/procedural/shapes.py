@@ -373,91 +373,40 @@ def _cap(loops: Sequence[Array], z: float, slot: int) -> Patch:
 
 
 def triangulated(outline: Array, holes: Sequence[Array] = ()) -> Array:
-    """Triangles, shape [n, 3, 2], of a counter-clockwise polygon with clockwise holes.
+    """Triangles, shape [n, 3, 2], of a counter-clockwise polygon with holes.
 
-    Ear clipping with bridges: Eberly, "Triangulation by ear clipping", 2002. Exact on the given
-    points, so that walls and caps weld.
+    Their corners are the given points, all of them, so that walls and caps weld.
+
+    Raises:
+        ValueError: if the polygon crosses itself, or a hole lies outside its outline.
     """
-    loop = list(range(len(outline)))
-    points = np.concatenate([outline, *holes]) if holes else outline
-    start = len(outline)
-    spans = []
-    for hole in holes:
-        spans.append(list(range(start, start + len(hole))))
-        start += len(hole)
-    for span in sorted(spans, key=lambda s: -float(points[s, 0].max())):
-        loop = _bridged(points, loop, span)
-    triangles: Array = points[np.array(_ears(points, loop))]
+    import mapbox_earcut
+
+    points = np.concatenate([outline, *holes]).astype(np.float64)
+    ends = np.cumsum([len(outline), *(len(hole) for hole in holes)], dtype=np.uint32)
+    corners = mapbox_earcut.triangulate_float64(points, ends).reshape(-1, 3)
+    triangles: Array = points[corners]
+    areas = _areas(*np.moveaxis(triangles, 1, 0))
+    expected = abs(_enclosed(outline)) - sum(abs(_enclosed(hole)) for hole in holes)
+    # Polygons that are none are cut up all the same: their triangles overlap or leave gaps.
+    if abs(np.abs(areas).sum() - expected) > 1e-9 * abs(_enclosed(outline)):
+        raise ValueError("the polygon crosses itself, or a hole lies outside its outline")
+    triangles[areas < 0.0] = triangles[areas < 0.0][:, ::-1]
     return triangles
 
 
-def _bridged(points: Array, loop: list[int], hole: list[int]) -> list[int]:
-    """One loop of both, joined where the hole's rightmost point sees the loop."""
-    k = int(np.argmax(points[hole, 0]))
-    hole = hole[k:] + hole[:k]
-    tip = points[hole[0]]
-    edges = [(points[a], points[b]) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
-    for i in np.argsort(((points[loop] - tip) ** 2).sum(axis=1), kind="stable").tolist():
-        before, target, after = (points[loop[(i + k) % len(loop)]] for k in (-1, 0, 1))
-        if (
-            target[0] >= tip[0]
-            and _opens_towards(before, target, after, tip)
-            and not any(_cross(tip, target, a, b) for a, b in edges)
-        ):
-            return loop[: i + 1] + hole + [hole[0]] + loop[i:]
-    raise ValueError("a hole of the polygon lies outside its outline")
-
-
-def _opens_towards(before: Array, corner: Array, after: Array, p: Array) -> bool:
-    """Whether the inside of a counter-clockwise corner faces ``p``.
-
-    A corner that a bridge has doubled faces only one of the two sides of its bridge. O'Rourke,
-    "Computational Geometry in C", 1998, section 1.5.
-    """
-    if _side(corner, after, before) >= 0.0:
-        return _side(corner, p, before) > 0.0 and _side(p, corner, after) > 0.0
-    return not (_side(corner, p, after) >= 0.0 and _side(p, corner, before) >= 0.0)
-
-
-def _cross(a: Array, b: Array, c: Array, d: Array) -> bool:
-    """Whether the open segments a-b and c-d cross."""
-    return (_side(a, b, c) * _side(a, b, d) < -1e-24) and (_side(c, d, a) * _side(c, d, b) < -1e-24)
-
-
-def _side(a: Array, b: Array, p: Array) -> float:
-    return float((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]))
-
-
-def _ears(points: Array, loop: list[int]) -> list[tuple[int, int, int]]:
-    triangles = []
-    loop = list(loop)
-    while len(loop) > 3:
-        i = _best_ear(points, loop)
-        triangles.append((loop[i - 1], loop[i], loop[(i + 1) % len(loop)]))
-        del loop[i]
-    return [*triangles, (loop[0], loop[1], loop[2])]
-
-
-def _best_ear(points: Array, loop: list[int]) -> int:
-    """The convex corner with no other point inside whose triangle is the least thin."""
-    p = points[loop]
-    before, after = np.roll(p, 1, axis=0), np.roll(p, -1, axis=0)
-    area = _areas(before, p, after)
-    sides = [((a - b) ** 2).sum(axis=1) for a, b in ((before, p), (p, after), (after, before))]
-    shape = area / np.maximum(sides[0] + sides[1] + sides[2], 1e-300)
-    for i in np.argsort(-np.round(shape, 9), kind="stable"):
-        a, b, c = before[i], p[i], after[i]
-        inside = (_areas(a, b, p) > 1e-15) & (_areas(b, c, p) > 1e-15) & (_areas(c, a, p) > 1e-15)
-        if shape[i] > 0 and not inside.any():
-            return int(i)
-    raise ValueError("the polygon crosses itself")
-
-
 def _areas(a: Array, b: Array, c: Array) -> Array:
+    """Twice the signed areas of triangles."""
     doubled: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
         c[..., 0] - a[..., 0]
     )
     return doubled
+
+
+def _enclosed(loop: Array) -> float:
+    """Twice the signed area inside a loop of points."""
+    after = np.roll(loop, -1, axis=0)
+    return float((loop[:, 0] * after[:, 1] - loop[:, 1] * after[:, 0]).sum())
 
 
 def _arc(a: Array, corner: Array, b: Array, half: float, steps: int) -> list[Point2]:

@@ -1,0 +1,45 @@
+"""Assets that a configuration names and the library lacks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from generator.assemble.recipe import open_pipeline
+from generator.assemble.spec import load_spec
+from generator.core.errors import UnknownAsset
+
+
+@pytest.mark.parametrize("wrong", ["../../../etc/passwd", "pybullet/teddie", "muug?seed=3"])
+def test_an_unknown_asset_is_told_where_the_configuration_names_it(
+    tmp_path: Path, wrong: str
+) -> None:
+    """File, line, column and field: the third line's list begins in column 26."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "template: tabletop\n"
+        "elements:\n"
+        f"  clutter: {{assets: {{ids: [{wrong}]}}}}\n"
+        "sensors: [{type: rgb_camera, name: color}]\n"
+    )
+    with pytest.raises(UnknownAsset) as told, open_pipeline(load_spec(str(path))):
+        pass
+    assert str(told.value).startswith(f"{path}:3:28: elements")
+    assert f"asset '{wrong}': there is none" in str(told.value)
+
+
+def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: Path) -> None:
+    """The folders count by kind."""
+    (tmp_path / "props").mkdir()
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        f"template: tabletop\nassets: {{folders: [{tmp_path / 'props'}]}}\n"
+        "elements: {clutter: {assets: {ids: [user/cup]}}}\n"
+        "sensors: [{type: rgb_camera, name: color}]\n"
+    )
+    with (
+        pytest.raises(UnknownAsset, match="your asset folders hold nothing"),
+        open_pipeline(load_spec(str(path))),
+    ):
+        pass
