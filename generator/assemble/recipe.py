@@ -117,6 +117,7 @@ def recipe_of(
         ),
         frame_truth=partial(frame_truth, annotators=annotators, assets=library),
         split_shares=spec.split_shares,
+        split_assignment=spec.head.splits.assign,
         layout_attempts_max=spec.head.physics.layout_attempts_max,
         exporters=_exporters(spec, info, library),
         strides=_strides(info),

@@ -40,6 +40,7 @@ from generator.core.plugins import PluginTable
 from generator.core.scene import SharedValue
 from generator.core.streams import Streams
 from generator.physics import PhysicsConfig
+from generator.pipeline.splits import Assignment
 
 SHARD_SIZE = 20
 """Small enough that few samples are redone after a crash and that all workers stay busy."""
@@ -55,6 +56,11 @@ class Splits(Strict):
     train: float = Field(0.8, ge=0, le=1)
     val: float = Field(0.1, ge=0, le=1)
     test: float = Field(0.1, ge=0, le=1)
+    assign: Assignment = Field(
+        "random",
+        description="random: every scene draws its split; round_robin: splits take turns, so that "
+        "small data sets have scenes in all of them.",
+    )
 
     @model_validator(mode="after")
     def _sums_to_one(self) -> Splits:

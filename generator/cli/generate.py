@@ -23,6 +23,7 @@ from rich.table import Table
 from generator.assemble.recipe import PipelineFactory
 from generator.cli.options import Choice
 from generator.core.errors import ConfigError
+from generator.pipeline.splits import warn_of_empty_splits
 from generator.runner.identity import licences_text, plan_of
 from generator.runner.run import RunProgress, Settings, Summary, run
 
@@ -43,6 +44,8 @@ def generate(
     if workers < 0:
         raise ConfigError(f"--workers: {workers}; expected at least 1, or 0 to run in this process")
     spec = choice.spec()
+    scenes = -(-n // (spec.head.views_per_scene * spec.head.steps_per_scene))
+    warn_of_empty_splits(scenes, spec.split_shares, spec.head.splits.assign, spec.head.seed)
     factory = PipelineFactory(spec, n)
     folder = out if out is not None else Path("out") / spec.name
     console = Console(stderr=True)

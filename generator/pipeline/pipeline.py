@@ -28,6 +28,7 @@ from generator.core.scene import Scene
 from generator.core.streams import Streams
 from generator.pipeline.freeze import Timeline, frozen_scene
 from generator.pipeline.scans import with_lidar_points
+from generator.pipeline.splits import Assignment, split_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,6 +51,7 @@ class Recipe:
         frame_truth: Annotates a sample as a whole, given the scene at the sample's instant by
             ``""`` and at each laser scanner's by its name; None if there is nothing to say.
         split_shares: ``{split: share}`` in order; shares sum to 1.
+        split_assignment: How scenes are assigned to splits.
         layout_attempts_max: Bound on the attempts at one scene.
         strides: Steps from one reading of a sensor to the next, by name, where that is not one.
     """
@@ -63,6 +65,7 @@ class Recipe:
     exporters: Mapping[str, Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
     frame_truth: Callable[[Mapping[str, Scene]], FrameTruth | None] | None = None
+    split_assignment: Assignment = "random"
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,12 +231,9 @@ class Pipeline:
 
     def split(self, scene_index: int) -> str:
         """The split that all views of a scene belong to."""
-        draw = Streams(self.info.seed, scene_index).rng("split").uniform()
-        for name, share in self.recipe.split_shares.items():
-            if draw < share:
-                return name
-            draw -= share
-        return next(reversed(list(self.recipe.split_shares)))
+        recipe = self.recipe
+        shares, assignment = recipe.split_shares, recipe.split_assignment
+        return split_of(scene_index, shares, assignment, self.info.seed)
 
     def _accept(self, scene_index: int) -> AcceptedScene:
         assert self._physics is not None, "use the pipeline as a context manager"

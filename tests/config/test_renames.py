@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -119,3 +121,24 @@ def test_every_new_word_is_one_of_its_plugin_and_no_old_one_is() -> None:
         fields = TABLES["randomizer"].load(kind).model_fields
         assert set(RANDOMIZERS.values()) <= fields.keys()
         assert not set(RANDOMIZERS) & fields.keys()
+
+
+def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> None:
+    """On standard error, before anything else; no source line of Python's."""
+    path = tmp_path / "mine.yaml"
+    path.write_text("extends: street.yaml\nrandomizers: [{type: along, name: x, sped: 1}]\n")
+
+    done = subprocess.run(
+        [sys.executable, "-m", "generator.cli", "--config", str(path), "--n", "1"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    lines = done.stderr.splitlines()
+
+    assert done.returncode == 2
+    assert lines[0].startswith(
+        f"gen-data: warning: {path}:2:22: randomizers[0].type: 'along' is called 'lane_objects'"
+    )
+    assert lines[1].startswith(f"gen-data: {path}:2:38: randomizers[13].sped: unknown key")

@@ -71,7 +71,7 @@ def nominal_scene() -> Scene:
         scene,
         bodies=(*scene.bodies, lamp, signal, wagon, ego),
         instances=(*scene.instances, labelled, carrier),
-        rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "along/0")),
+        rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "lane_objects/0")),
         cameras=cameras,
         lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
         lanes=lanes,

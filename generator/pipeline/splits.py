@@ -1,0 +1,72 @@
+"""Which split a scene belongs to."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Literal
+
+from generator.core.errors import ConfigWarning
+from generator.core.streams import Streams
+
+Assignment = Literal["random", "round_robin"]
+"""``random``: every scene draws its split. ``round_robin``: splits take turns by their shares."""
+
+_FIRST_BLOCK = 1024
+
+
+def split_of(
+    scene_index: int, shares: Mapping[str, float], assignment: Assignment, seed: int
+) -> str:
+    """The split of a scene; it does not depend on how many scenes there are.
+
+    Args:
+        scene_index: From 0.
+        shares: ``{split: share}`` in order; shares sum to 1.
+        assignment: How scenes are assigned.
+        seed: Of the data set.
+    """
+    if assignment == "round_robin":
+        count = _FIRST_BLOCK
+        while count <= scene_index:
+            count *= 2
+        return _turns(tuple(shares.items()), count)[scene_index]
+    draw = Streams(seed, scene_index).rng("split").uniform()
+    for name, share in shares.items():
+        if draw < share:
+            return name
+        draw -= share
+    return next(reversed(list(shares)))
+
+
+def warn_of_empty_splits(
+    scene_count: int, shares: Mapping[str, float], assignment: Assignment, seed: int
+) -> None:
+    """A ConfigWarning if a split that has a share has no scene."""
+    used: set[str] = set()
+    for scene_index in range(scene_count):
+        used.add(split_of(scene_index, shares, assignment, seed))
+        if len(used) == len(shares):
+            return
+    empty = " and ".join(name for name in shares if name not in used)
+    remedy = "" if assignment == "round_robin" else ", splits.assign: round_robin"
+    message = (
+        f"splits: {scene_count} {'scene leaves' if scene_count == 1 else 'scenes leave'} {empty} "
+        f"empty; expected more scenes{remedy}, or other shares"
+    )
+    warnings.warn(message, ConfigWarning, stacklevel=2)
+
+
+@lru_cache(maxsize=8)
+def _turns(shares: tuple[tuple[str, float], ...], count: int) -> tuple[str, ...]:
+    """The splits of the first scenes: each goes to the split that is furthest behind its share."""
+    made = dict.fromkeys((name for name, _ in shares), 0)
+    turns = []
+    for number in range(1, count + 1):
+        # Rounded, so that equal shares tie in spite of floating point; the first one wins.
+        behind = {name: round(share * number - made[name], 9) for name, share in shares}
+        name = max(behind, key=lambda split: behind[split])
+        made[name] += 1
+        turns.append(name)
+    return tuple(turns)

@@ -1,0 +1,82 @@
+"""Scenes are assigned to splits at random, or in turns."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+
+import pytest
+
+from generator.assemble.spec import load_spec
+from generator.core.errors import ConfigWarning
+from generator.pipeline.splits import Assignment, split_of, warn_of_empty_splits
+
+SHARES = {"train": 0.8, "val": 0.1, "test": 0.1}
+
+
+def turns(count: int, shares: dict[str, float]) -> list[str]:
+    """Splits of the first scenes, in turns."""
+    return [split_of(k, shares, "round_robin", 7) for k in range(count)]
+
+
+@pytest.mark.parametrize(
+    "shares", [SHARES, {"train": 0.7, "val": 0.2, "test": 0.1}, {"train": 1 / 3, "val": 2 / 3}]
+)
+def test_splits_in_turns_never_stray_from_their_shares_by_a_whole_scene(
+    shares: dict[str, float],
+) -> None:
+    """The quota property of apportionment, for every number of scenes up to 300."""
+    taken = turns(300, shares)
+    for n in range(1, 301):
+        counts = Counter(taken[:n])
+        assert all(abs(counts[name] - share * n) < 1.0 for name, share in shares.items())
+
+
+def test_every_split_has_a_scene_as_soon_as_there_are_about_ten() -> None:
+    """One of ten is the share of the smallest."""
+    assert set(turns(10, SHARES)) == set(SHARES)
+
+
+def test_turns_of_later_scenes_continue_those_of_earlier_ones() -> None:
+    """More scenes change no scene's split, however many there are."""
+    taken = turns(5000, SHARES)
+
+    assert taken[:3] == turns(3, SHARES)
+    assert taken[4000:4010] == taken[:10]  # 4000 scenes fill whole rounds of ten
+
+
+def test_random_assignment_is_that_of_earlier_releases() -> None:
+    """Golden: data sets keep their splits."""
+    drawn = "".join(split_of(k, SHARES, "random", 7)[1] for k in range(24))
+
+    assert drawn == "rrrrrrrrrerrrrerrrarrrrr"
+
+
+@pytest.mark.parametrize(
+    ("count", "assignment", "message"),
+    [
+        (1, "round_robin", "splits: 1 scene leaves val and test empty; expected more scenes, or"),
+        (2, "random", "expected more scenes, splits.assign: round_robin, or other shares"),
+    ],
+)
+def test_an_empty_split_is_warned_of_with_a_remedy(
+    count: int, assignment: Assignment, message: str
+) -> None:
+    """Before anything runs."""
+    with pytest.warns(ConfigWarning, match=message):
+        warn_of_empty_splits(count, SHARES, assignment, 7)
+
+
+def test_no_warning_where_every_split_has_a_scene() -> None:
+    """Or where a split has no share."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_empty_splits(10, SHARES, "round_robin", 7)
+        warn_of_empty_splits(1, {"train": 1.0}, "random", 7)
+
+
+def test_a_configuration_says_how_scenes_are_assigned() -> None:
+    """At random, unless it says otherwise."""
+    assert load_spec("tabletop").head.splits.assign == "random"
+    spec = load_spec("tabletop", overrides=("splits.assign=round_robin",))
+    assert spec.head.splits.assign == "round_robin"
