@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 
 from generator.core.capture import Channel, Reading
 from generator.core.geometry import Material
@@ -16,7 +17,14 @@ from generator.core.se3 import SE3, look_at
 from generator.renderers.device import open_device
 from generator.renderers.lamps import main_lamps
 from generator.renderers.packing import pack_world
-from generator.renderers.precipitation import poisson, rain, snow, traces, usual_exposure_s
+from generator.renderers.precipitation import (
+    light_level_ev100,
+    poisson,
+    rain,
+    snow,
+    traces,
+    usual_exposure_s,
+)
 from generator.renderers.settings import RenderSettings
 from generator.renderers.stock import AssetStock
 from generator.renderers.warp import WarpRenderer
@@ -269,6 +277,23 @@ def test_exposure_time_follows_the_light() -> None:
     assert usual_exposure_s(9.0) == pytest.approx(4.0 / 512.0)
     assert usual_exposure_s(15.0) == pytest.approx(1.0 / 500.0)
     assert usual_exposure_s(0.0) == pytest.approx(1.0 / 40.0)
+
+
+def test_streaks_without_an_exposure_time_follow_the_median_luminance() -> None:
+    """Middle grey at 0.18 of saturation, 1.2 * 2^EV; a fixed EV wins, and black counts for nothing.
+
+    Whatever part of the picture is far brighter: 0.216 * 2^6 cd/m^2 is EV 6.
+    """
+    level = np.full((900, 3), 0.216 * 2.0**6, np.float32)
+    level[:200] = 1e5
+    level[200:600] = 0.0
+    level[600:] = 0.216 * 2.0**6
+    radiance = wp.array(np.roll(level, 37, axis=0), dtype=wp.vec3, device="cpu")
+
+    assert light_level_ev100(radiance, None) == pytest.approx(6.0, abs=0.05)
+    assert light_level_ev100(radiance, 11.0) == 11.0
+    black = wp.zeros(900, dtype=wp.vec3, device="cpu")
+    assert usual_exposure_s(light_level_ev100(black, None)) == pytest.approx(1.0 / 40.0)
 
 
 def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:
