@@ -1,4 +1,4 @@
-"""Spec: a whole configuration, read, merged with its template, and validated."""
+"""Config: a whole configuration, read, merged with its template, and validated."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class AssetFolders(Strict):
     folders: tuple[str, ...] = Field((), description="Folders of OBJ, GLB, PLY, STL or URDF files.")
 
 
-class Head(Strict):
+class GeneralSettings(Strict):
     """A configuration without its plug-ins."""
 
     seed: int = Field(0, ge=0, lt=2**63, description="Seed of the data set; 0 is a seed.")
@@ -118,13 +118,13 @@ PLUGIN_LISTS: Mapping[str, PluginTable[Any]] = {
 
 
 @dataclass(frozen=True)
-class Spec:
+class Config:
     """A validated configuration; picklable.
 
     Attributes:
         name: Of the configuration; names the default output folder.
         resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
-            the same Spec again.
+            the same Config again.
         render: Settings of the renderer.
         sensors, exporters: Plug-ins, in order.
         annotations: Annotators by name, in order.
@@ -135,7 +135,7 @@ class Spec:
 
     name: str
     resolved: Mapping[str, Any]
-    head: Head
+    general: GeneralSettings
     render: RendererSettings
     sensors: tuple[Sensor, ...]
     annotations: Mapping[str, AnyAnnotator]
@@ -178,23 +178,23 @@ class Spec:
     @property
     def asset_folders(self) -> tuple[Path, ...]:
         """Where the user keeps assets."""
-        return tuple(Path(folder).expanduser() for folder in self.head.assets.folders)
+        return tuple(Path(folder).expanduser() for folder in self.general.assets.folders)
 
     @property
     def split_shares(self) -> dict[str, float]:
         """Share of each split that has one, in order."""
-        splits = self.head.splits
+        splits = self.general.splits
         shares = {"train": splits.train, "val": splits.val, "test": splits.test}
         return {name: share for name, share in shares.items() if share > 0}
 
 
-def load_spec(
+def load_config(
     source: str,
     *,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Spec:
+) -> Config:
     """The configuration of that path or shipped name.
 
     Raises:
@@ -208,17 +208,17 @@ def load_spec(
     return _spec(document, Path(source).stem)
 
 
-def spec_of_source(
+def config_of_source(
     source: str,
     *,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Spec:
-    """Like ``load_spec``; a data set's folder stands for the configuration it was made with."""
+) -> Config:
+    """Like ``load_config``; a data set's folder stands for the configuration it was made with."""
     plan = Path(source) / "plan.json"
     if not plan.is_file():
-        return load_spec(source, seed=seed, overrides=overrides, without=without)
+        return load_config(source, seed=seed, overrides=overrides, without=without)
     try:
         kept = json.loads(plan.read_bytes())
         text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
@@ -228,7 +228,7 @@ def spec_of_source(
     return _spec(resolved_document(document, seed=seed, overrides=overrides, without=without), name)
 
 
-def _spec(document: Node, name: str) -> Spec:
+def _spec(document: Node, name: str) -> Config:
     assert isinstance(document.content, Mapping)
     problems = Problems()
     apart = {*PLUGIN_LISTS, "annotations", "shared", "render"}
@@ -237,7 +237,7 @@ def _spec(document: Node, name: str) -> Spec:
         {key: node for key, node in document.content.items() if key not in apart},
         document.key_positions,
     )
-    head = validate(head_node, Head, problems)
+    head = validate(head_node, GeneralSettings, problems)
     for key, node in document.content.items():
         if key not in ("shared", *VARYING) and refers(node):
             problems.add(node.position, key, f"shared values serve {' and '.join(VARYING)} only")
@@ -251,7 +251,7 @@ def _spec(document: Node, name: str) -> Spec:
     problems.raise_if_any()
     assert head is not None
     assert render is not None
-    return Spec(
+    return Config(
         name,
         document.plain(),
         head,

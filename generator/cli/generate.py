@@ -38,9 +38,9 @@ def generate(choice: Choice, n: int, *, out: Path | None, workers: int | None) -
     workers = _core_count() if workers is None else workers
     if workers < 0:
         raise ConfigError(f"--workers: {workers}; expected at least 1, or 0 to run in this process")
-    spec = choice.spec()
-    factory = PipelineFactory(spec, n)
-    folder = out if out is not None else Path("out") / spec.name
+    config = choice.config()
+    factory = PipelineFactory(config, n)
+    folder = out if out is not None else Path("out") / config.name
     console = Console(stderr=True)
     with _progress_bar(console, n) as show:
         summary = run(

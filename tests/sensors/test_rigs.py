@@ -21,7 +21,7 @@ from generator.core.scene import Body, Lane, Rig, Scene
 from generator.core.se3 import SE3
 from generator.pipeline import Pipeline
 from generator.pipeline.freeze import Timeline
-from generator.pipeline.pipeline import Recipe
+from generator.pipeline.pipeline import PipelineConfig
 from generator.sensors.lidar import LidarSensor
 from generator.sensors.mounting import stride
 from generator.sensors.rgb_camera import RgbCamera
@@ -169,7 +169,7 @@ def sampled(
             ("top", Modality.LIDAR),
         )
     )
-    made = Recipe(
+    made = PipelineConfig(
         open_scene=lambda streams: (scene, ()),
         sensors=(Watching("early"), Watching("late"), Watching("top", lidar=True)),  # type: ignore[arg-type]
         channels=frozenset(),
