@@ -171,6 +171,7 @@ class Pipeline:
         capture, truth = self._captured(timeline, time_s, streams, timings)
         with _timed(timings, "annotate"):
             swept = {name: timeline.at(c.time_s) for name, c in capture.clouds.items()}
+            seen = {name: timeline.at(r.time_s) for name, r in capture.readings.items()}
             described = self.config.frame_truth
             frame = described({"": scene, **swept}) if described is not None else None
         return Sample(
@@ -186,6 +187,7 @@ class Pipeline:
             timings_s=timings,
             cameras=self.info.cameras,
             frame=frame,
+            instants={n: s for n, s in {**swept, **seen}.items() if s is not scene},
         )
 
     def _captured(
