@@ -27,7 +27,6 @@ from exporters.images import link_or_copy
 from exporters.sensors import scanned
 from generator.core.boxes import OrientedBox
 from generator.core.errors import ConfigError
-from generator.core.instants import at
 from generator.core.interfaces import DatasetInfo
 from generator.core.sample import Sample
 from generator.core.scene import Instance
@@ -150,8 +149,7 @@ def pcd_bytes(points: NDArray[np.void]) -> bytes:
 
 def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
     """Boxes of all annotated things in a laser scanner's frame at its sweep, by instance id."""
-    cloud = sample.capture.clouds.get(lidar)
-    scene = at(sample.scene, cloud.time_s) if cloud is not None else sample.scene
+    scene = sample.scene_of(lidar)
     T_lidar_world = scanner_of(sample, lidar).T_world_lidar.inverse()
     things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     boxes = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from generator.assemble.spec import Spec
+    from generator.assemble.spec import Config
 
 ConfigLike = str | PathLike[str] | Mapping[str, Any]
 """A file, a shipped name, the folder of a data set, or a dictionary of the same content."""
@@ -21,18 +21,18 @@ def load_config(
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Spec:
+) -> Config:
     """The validated configuration.
 
     Raises:
         ConfigError: the message names everything that is wrong, with its place.
     """
-    from generator.assemble.spec import spec_of_source, spec_of_text
+    from generator.assemble.spec import config_of_source, config_of_text
 
     choice: dict[str, Any] = {"seed": seed, "overrides": overrides, "without": without}
     if isinstance(config, Mapping):
-        return spec_of_text(_yaml_text(config), "<config>", **choice)
-    return spec_of_source(fspath(config), **choice)
+        return config_of_text(_yaml_text(config), "<config>", **choice)
+    return config_of_source(fspath(config), **choice)
 
 
 def _yaml_text(config: Mapping[str, Any]) -> str:

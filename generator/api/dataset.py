@@ -203,7 +203,7 @@ class GeneratedSamples:
     @property
     def config(self) -> Mapping[str, Any]:
         """The resolved configuration."""
-        return self._make_pipeline.spec.resolved
+        return self._make_pipeline.config.resolved
 
     def close(self) -> None:
         """Stop the engines."""

@@ -1,4 +1,4 @@
-"""From a Spec to a running Pipeline."""
+"""From a Config to a running Pipeline."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import cv2
 
 from generator.annotations.truth import complete_truth, frame_truth
 from generator.assemble.references import check_references
-from generator.assemble.spec import SceneConfig, Spec
+from generator.assemble.spec import Config, SceneConfig
 from generator.assemble.tables import ANNOTATIONS, default_plugin
 from generator.assets.library import Library, open_library
 from generator.config.places import place_of_text
@@ -29,7 +29,7 @@ from generator.core.interfaces import (
 from generator.core.scene import Scene, SharedValue
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import Recipe, SceneSource
+from generator.pipeline.pipeline import PipelineConfig, SceneSource
 from generator.sensors.mounting import refuse_buried, stride, within_steps
 from scene_templates.builder import build
 
@@ -45,7 +45,7 @@ class PipelineFactory:
         extra_channels: Channels to render beyond what sensors and annotators need.
     """
 
-    spec: Spec
+    config: Config
     n: int
     extra_channels: frozenset[Channel] = frozenset()
 
@@ -53,14 +53,14 @@ class PipelineFactory:
         """A pipeline, to be used as a context manager."""
         # One process, one core: workers fill the others.
         cv2.setNumThreads(1)
-        spec = self.spec
-        library = open_library(spec.asset_folders)
-        recipe = recipe_of(spec, library, self.n, self.categories, self.extra_channels)
+        config = self.config
+        library = open_library(config.asset_folders)
+        resolved = pipeline_config(config, library, self.n, self.categories, self.extra_channels)
         return Pipeline(
-            recipe,
+            resolved,
             library,
-            open_physics=partial(open_engine, library, spec.head.physics),
-            open_renderer=partial(spec.render.open, library),
+            open_physics=partial(open_engine, library, config.general.physics),
+            open_renderer=partial(config.render.open, library),
         )
 
     @cached_property
@@ -70,15 +70,15 @@ class PipelineFactory:
         Raises:
             ConfigError: a randomizer names what neither they nor the assets have.
         """
-        library = open_library(self.spec.asset_folders)
-        scenes = tuple(nominal_scene(self.spec, config, library) for config in self.spec.probes)
-        check_references(self.spec, scenes, library)
+        library = open_library(self.config.asset_folders)
+        scenes = tuple(nominal_scene(self.config, scene, library) for scene in self.config.probes)
+        check_references(self.config, scenes, library)
         return scenes
 
     @cached_property
     def categories(self) -> tuple[str, ...]:
         """Sorted names of all categories that a sample may contain."""
-        return categories_of(self.nominal, open_library(self.spec.asset_folders))
+        return categories_of(self.nominal, open_library(self.config.asset_folders))
 
     def __getstate__(self) -> dict[str, object]:
         """Other processes are told the categories, which take a second to find out."""
@@ -87,68 +87,69 @@ class PipelineFactory:
         return {**told, "categories": categories}
 
 
-def open_pipeline(spec: Spec, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
+def open_pipeline(config: Config, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
     """A pipeline to look at samples with, outside any data set."""
-    return PipelineFactory(spec, n=1, extra_channels=extra_channels)()
+    return PipelineFactory(config, n=1, extra_channels=extra_channels)()
 
 
-def recipe_of(
-    spec: Spec,
+def pipeline_config(
+    config: Config,
     library: Library,
     n: int,
     categories: tuple[str, ...],
     extra_channels: frozenset[Channel],
-) -> Recipe:
+) -> PipelineConfig:
     """Everything that samples depend on, resolved.
 
     Raises:
         ConfigError: when parts do not fit together, such as an exporter whose images no sensor
             writes.
     """
-    _check_durations(spec)
-    annotators = annotators_of(spec)
-    info = dataset_info(spec, n, categories)
-    return Recipe(
+    _check_durations(config)
+    annotators = annotators_of(config)
+    info = dataset_info(config, n, categories)
+    return PipelineConfig(
         info=info,
-        open_scene=scene_source(spec, library),
+        open_scene=scene_source(config, library),
         channels=frozenset().union(*(a.channels for a in annotators), extra_channels),
         image_truth=partial(
-            complete_truth, annotators=annotators, thresholds=spec.head.labels, assets=library
+            complete_truth, annotators=annotators, thresholds=config.general.labels, assets=library
         ),
         frame_truth=partial(frame_truth, annotators=annotators, assets=library),
-        split_shares=spec.split_shares,
-        split_assignment=spec.head.splits.assign,
-        layout_attempts_max=spec.head.physics.layout_attempts_max,
-        exporters=_exporters(spec, info, library),
+        split_shares=config.split_shares,
+        split_assignment=config.general.splits.assign,
+        layout_attempts_max=config.general.physics.layout_attempts_max,
+        exporters=_exporters(config, info, library),
         strides=_strides(info),
     )
 
 
-def dataset_info(spec: Spec, n: int, categories: tuple[str, ...]) -> DatasetInfo:
+def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> DatasetInfo:
     """Facts about the data set of a configuration."""
     return DatasetInfo(
-        name=spec.name,
-        seed=spec.head.seed,
+        name=config.name,
+        seed=config.general.seed,
         n=n,
-        views_per_scene=spec.head.views_per_scene,
+        views_per_scene=config.general.views_per_scene,
         categories=categories,
-        sensors=tuple(sorted((s.describe() for s in spec.sensors), key=lambda s: s.name)),
-        depth_scale_m=spec.head.depth_scale_m,
-        steps_per_scene=spec.head.steps_per_scene,
-        step_s=spec.head.step_s,
+        sensors=tuple(sorted((s.describe() for s in config.sensors), key=lambda s: s.name)),
+        depth_scale_m=config.general.depth_scale_m,
+        steps_per_scene=config.general.steps_per_scene,
+        step_s=config.general.step_s,
     )
 
 
-def _check_durations(spec: Spec) -> None:
+def _check_durations(config: Config) -> None:
     """Raises ConfigError if a sequence is longer than the motion in it."""
-    lasts_s = (spec.head.steps_per_scene - 1) * spec.head.step_s
-    for config in spec.probes:
-        for randomizer in config.randomizers:
+    steps, step_s = config.general.steps_per_scene, config.general.step_s
+    lasts_s = (steps - 1) * step_s
+    for scene in config.probes:
+        for randomizer in scene.randomizers:
             duration_s = randomizer.motion_duration_s
             if duration_s is not None and duration_s < lasts_s - 1e-9:
                 raise ConfigError(
                     f"randomizers.{randomizer.name}.duration_s: {duration_s:g} s is shorter than "
-                    f"the sequences, {spec.head.steps_per_scene} steps of {spec.head.step_s:g} s; "
+                    f"the sequences, {steps} steps of {step_s:g} s; "
                     f"expected at least {lasts_s:g}"
                 )
 
@@ -162,34 +163,35 @@ def _strides(info: DatasetInfo) -> dict[str, int]:
     }
 
 
-def scene_source(spec: Spec, assets: AssetIndex) -> SceneSource:
+def scene_source(config: Config, assets: AssetIndex) -> SceneSource:
     """The nominal scene and the randomizers of given streams; the last few are remembered."""
 
     @lru_cache(maxsize=NOMINAL_SCENES_KEPT)
     def made(
         shared: tuple[tuple[str, SharedValue], ...],
     ) -> tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]:
-        config = spec.scene_config(shared)
-        return nominal_scene(spec, config, assets), config.randomizers, config.sensors
+        of_scene = config.scene_config(shared)
+        nominal = nominal_scene(config, of_scene, assets)
+        return nominal, of_scene.randomizers, of_scene.sensors
 
-    return lambda streams: made(spec.shared(streams))
+    return lambda streams: made(config.shared(streams))
 
 
-def nominal_scene(spec: Spec, config: SceneConfig, assets: AssetIndex) -> Scene:
+def nominal_scene(config: Config, of_scene: SceneConfig, assets: AssetIndex) -> Scene:
     """The template's scene with every sensor mounted.
 
     Raises:
         ConfigError: an element or a sensor has no place in it.
     """
     try:
-        scene = build(spec.head.template or spec.name, config.elements, assets)
+        scene = build(config.general.template or config.name, of_scene.elements, assets)
     except UnknownAsset as error:
-        place = place_of_text(spec.document, error.asset_id)
+        place = place_of_text(config.document, error.asset_id)
         if place is None:
             raise
         raise UnknownAsset(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
-    scene = replace(scene, shared=config.shared, step_s=spec.head.step_s)
-    for sensor in config.sensors:
+    scene = replace(scene, shared=of_scene.shared, step_s=config.general.step_s)
+    for sensor in of_scene.sensors:
         scene = sensor.mount(scene)
         info = sensor.describe()
         _check_mounted(scene, info)
@@ -225,18 +227,18 @@ def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...
     return tuple(sorted(placed | possible))
 
 
-def annotators_of(spec: Spec) -> Sequence[AnyAnnotator]:
+def annotators_of(config: Config) -> Sequence[AnyAnnotator]:
     """The configuration's, then those that exporters need besides."""
-    annotators = dict(spec.annotations)
-    for exporter in spec.exporters:
+    annotators = dict(config.annotations)
+    for exporter in config.exporters:
         for name in sorted(exporter.needs - annotators.keys()):
             annotators[name] = default_plugin(ANNOTATIONS, name)
     return list(annotators.values())
 
 
-def _exporters(spec: Spec, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
+def _exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
     exporters: dict[str, Exporter] = {}
-    for exporter in spec.exporters:
+    for exporter in config.exporters:
         if exporter.type in exporters:
             raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
         exporter.check(info)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from generator.assemble.spec import Spec
+from generator.assemble.spec import Config
 from generator.config.document import Node
 from generator.config.problems import Position, Problems
 from generator.core.errors import ConfigError
@@ -13,7 +13,7 @@ from generator.core.scene import Scene
 from randomizers.base import RandomizerBase
 
 
-def check_references(spec: Spec, scenes: Sequence[Scene], assets: AssetIndex) -> None:
+def check_references(spec: Config, scenes: Sequence[Scene], assets: AssetIndex) -> None:
     """Refuse randomizers whose fields name a group, category or texture that does not exist.
 
     Args:

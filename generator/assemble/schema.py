@@ -5,7 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from generator.assemble.inheritance import ALL, NAMED
-from generator.assemble.spec import CONSTANT, DEFAULT_RENDERER, PLUGIN_LISTS, VARYING, Head
+from generator.assemble.spec import (
+    CONSTANT,
+    DEFAULT_RENDERER,
+    PLUGIN_LISTS,
+    VARYING,
+    GeneralSettings,
+)
 from generator.assemble.tables import ANNOTATIONS, RENDERERS
 from generator.config.schema import json_schema, with_shared_values
 from generator.config.strict import Strict
@@ -23,7 +29,7 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 def config_schema() -> dict[str, Any]:
     """Schema of a whole configuration, every plug-in of every table included."""
     definitions: dict[str, Any] = {}
-    schema = _hoisted(json_schema(Head), definitions)
+    schema = _hoisted(json_schema(GeneralSettings), definitions)
     properties = schema["properties"]
     for key, table in PLUGIN_LISTS.items():
         properties[key] = {

@@ -1,4 +1,4 @@
-"""Spec: a whole configuration, read, merged with its template, and validated."""
+"""Config: a whole configuration, read, merged with its template, and validated."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class AssetFolders(Strict):
     folders: tuple[str, ...] = Field((), description="Folders of OBJ, GLB, PLY, STL or URDF files.")
 
 
-class Head(Strict):
+class GeneralSettings(Strict):
     """A configuration without its plug-ins."""
 
     seed: int = Field(0, ge=0, lt=2**63, description="Seed of the data set; 0 is a seed.")
@@ -151,13 +151,13 @@ scene.
 
 
 @dataclass(frozen=True)
-class Spec:
+class Config:
     """A validated configuration; picklable.
 
     Attributes:
         name: Of the configuration; names the default output folder.
         resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
-            the same Spec again.
+            the same Config again.
         render: Settings of the renderer.
         exporters: Plug-ins, in order.
         annotations: Annotators by name, in order.
@@ -168,7 +168,7 @@ class Spec:
 
     name: str
     resolved: Mapping[str, Any]
-    head: Head
+    general: GeneralSettings
     render: RendererSettings
     annotations: Mapping[str, AnyAnnotator]
     exporters: tuple[Exporter, ...]
@@ -225,18 +225,18 @@ class Spec:
     @property
     def split_shares(self) -> dict[str, float]:
         """Share of each split that has one, in order."""
-        splits = self.head.splits
+        splits = self.general.splits
         shares = {"train": splits.train, "val": splits.val, "test": splits.test}
         return {name: share for name, share in shares.items() if share > 0}
 
 
-def load_spec(
+def load_config(
     source: str,
     *,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Spec:
+) -> Config:
     """The configuration of that path or shipped name.
 
     Raises:
@@ -247,37 +247,39 @@ def load_spec(
     document = resolved_document(
         config_document(source), seed=seed, overrides=overrides, without=without
     )
-    return _spec(document, Path(source).stem)
+    return _config(document, Path(source).stem)
 
 
-def spec_of_source(
+def config_of_source(
     source: str,
     *,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Spec:
-    """Like ``load_spec``; a data set's folder stands for the configuration it was made with."""
+) -> Config:
+    """Like ``load_config``; a data set's folder stands for the configuration it was made with."""
     plan = Path(source) / "plan.json"
     if not plan.is_file():
-        return load_spec(source, seed=seed, overrides=overrides, without=without)
+        return load_config(source, seed=seed, overrides=overrides, without=without)
     try:
         kept = json.loads(plan.read_bytes())
         text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
     document = parse(text, str(plan))
-    return _spec(resolved_document(document, seed=seed, overrides=overrides, without=without), name)
+    return _config(
+        resolved_document(document, seed=seed, overrides=overrides, without=without), name
+    )
 
 
-def spec_of_text(
+def config_of_text(
     text: str,
     name: str,
     *,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Spec:
+) -> Config:
     """The configuration in a YAML text; ``name`` is what messages call it.
 
     Raises:
@@ -285,10 +287,10 @@ def spec_of_text(
     """
     document = parse(text, name)
     document = resolved_document(document, seed=seed, overrides=overrides, without=without)
-    return _spec(document, name.strip("<>"))
+    return _config(document, name.strip("<>"))
 
 
-def _spec(document: Node, name: str) -> Spec:
+def _config(document: Node, name: str) -> Config:
     assert isinstance(document.content, Mapping)
     problems = Problems()
     apart = {*PLUGIN_LISTS, "annotations", "shared", "render"}
@@ -297,7 +299,7 @@ def _spec(document: Node, name: str) -> Spec:
         {key: node for key, node in document.content.items() if key not in apart},
         document.key_positions,
     )
-    head = validate(head_node, Head, problems)
+    head = validate(head_node, GeneralSettings, problems)
     for key, node in document.content.items():
         if key not in ("shared", *VARYING) and refers(node):
             fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
@@ -313,7 +315,7 @@ def _spec(document: Node, name: str) -> Spec:
     problems.raise_if_any()
     assert head is not None
     assert render is not None
-    spec = Spec(
+    config = Config(
         name,
         document.plain(),
         head,
@@ -323,8 +325,8 @@ def _spec(document: Node, name: str) -> Spec:
         probes_,
         document,
     )
-    _ = spec.asset_folders  # A folder that is missing is refused before anything runs.
-    return spec
+    _ = config.asset_folders  # A folder that is missing is refused before anything runs.
+    return config
 
 
 def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:

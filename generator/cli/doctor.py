@@ -219,9 +219,9 @@ def _try_preview() -> str:
 def _try_sample() -> str:
     """One small sample of the shipped tabletop, through every stage."""
     from generator.assemble.recipe import open_pipeline
-    from generator.assemble.spec import load_spec
+    from generator.assemble.spec import load_config
 
-    spec = load_spec("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
+    spec = load_config("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
     with open_pipeline(spec) as pipeline:
         sample = pipeline.sample(0)
     labelled = sum(len(truth.objects) for truth in sample.truth.values())

@@ -63,8 +63,8 @@ def preview(
     from generator.preview.recording import save_recording, send_samples
     from generator.preview.viewer import open_window, serve_web
 
-    spec = Choice(source, seed, overrides, without).spec()
-    with open_pipeline(spec) as pipeline:
+    config = Choice(source, seed, overrides, without).config()
+    with open_pipeline(config) as pipeline:
         samples = _samples(pipeline.sample, first, n)
         info = pipeline.info
         if save is not None:
@@ -131,8 +131,8 @@ def contact_sheet(
     wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))
     images: list[Image] = []
     for source in sources:
-        spec = Choice(source, seed, overrides, without).spec()
-        with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
+        config = Choice(source, seed, overrides, without).config()
+        with open_pipeline(config, extra_channels=frozenset(wanted)) as pipeline:
             samples = _samples(pipeline.sample, first, n, step)
             info = pipeline.info
             shown = info.media if own else dict.fromkeys(info.cameras, wanted)

@@ -209,6 +209,7 @@ class Sample:
         timings_s: Seconds of CPU by stage. Never written to a data file.
         cameras: Sorted names of all cameras of the data set, also of those that do not read at
             this step; empty = those that do.
+        instants: The world at the readings of sensors that do not read at the sample's instant.
     """
 
     index: int
@@ -223,6 +224,11 @@ class Sample:
     step_index: int = 0
     cameras: tuple[str, ...] = ()
     frame: FrameTruth | None = None
+    instants: Mapping[str, Scene] = field(default_factory=dict)
+
+    def scene_of(self, sensor: str) -> Scene:
+        """The world when a sensor read; at the sample's instant where it did not."""
+        return self.instants.get(sensor, self.scene)
 
     def image_id(self, sensor: str) -> int:
         """Number of one image of the sample, from 1, unique in the data set."""

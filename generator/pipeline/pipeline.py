@@ -40,7 +40,7 @@ pure function."""
 
 
 @dataclass(frozen=True, eq=False)
-class Recipe:
+class PipelineConfig:
     """What a pipeline does, as data and pure functions.
 
     Attributes:
@@ -98,7 +98,7 @@ class DrawnView:
 
 
 class Pipeline:
-    """Owns the engines; ``sample(index)`` depends on nothing but the recipe and the index.
+    """Owns the engines; ``sample(index)`` depends on nothing but the config and the index.
 
     The last accepted scene and view are kept, because the next index is usually another view or
     the next instant of them: an optimisation, never a state.
@@ -106,12 +106,12 @@ class Pipeline:
 
     def __init__(
         self,
-        recipe: Recipe,
+        config: PipelineConfig,
         assets: AssetLibrary,
         open_physics: Callable[[], PhysicsEngine],
         open_renderer: Callable[[], Renderer],
     ) -> None:
-        self.recipe = recipe
+        self.config = config
         self.assets = assets
         self._open_physics = open_physics
         self._open_renderer = open_renderer
@@ -119,13 +119,13 @@ class Pipeline:
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
         self._view: DrawnView | None = None
-        self._offsets_s = {s.name: s.time_offset_s for s in recipe.info.sensors}
-        self._category_ids = {name: i for i, name in enumerate(recipe.info.categories, 1)}
+        self._offsets_s = {s.name: s.time_offset_s for s in config.info.sensors}
+        self._category_ids = {name: i for i, name in enumerate(config.info.categories, 1)}
 
     @property
     def info(self) -> DatasetInfo:
         """The data set as its exporters see it."""
-        return self.recipe.info
+        return self.config.info
 
     @cached_property
     def renderer(self) -> Renderer:
@@ -135,7 +135,7 @@ class Pipeline:
     @property
     def exporters(self) -> Mapping[str, Exporter]:
         """Exporters by name."""
-        return self.recipe.exporters
+        return self.config.exporters
 
     def __enter__(self) -> Pipeline:
         """Start the engines."""
@@ -176,7 +176,8 @@ class Pipeline:
         capture, truth = self._captured(timeline, time_s, accepted.sensors, streams, timings)
         with _timed(timings, "annotate"):
             swept = {name: timeline.at(c.time_s) for name, c in capture.clouds.items()}
-            described = self.recipe.frame_truth
+            seen = {name: timeline.at(r.time_s) for name, r in capture.readings.items()}
+            described = self.config.frame_truth
             frame = described({"": scene, **swept}) if described is not None else None
         return Sample(
             index=index,
@@ -191,6 +192,7 @@ class Pipeline:
             timings_s=timings,
             cameras=self.info.cameras,
             frame=frame,
+            instants={n: s for n, s in {**swept, **seen}.items() if s is not scene},
         )
 
     def _captured(
@@ -207,19 +209,19 @@ class Pipeline:
         tables: dict[str, Table] = {}
         truth: dict[str, ImageTruth] = {}
         for sensor in sensors:
-            if streams.step % self.recipe.strides.get(sensor.name, 1):
+            if streams.step % self.config.strides.get(sensor.name, 1):
                 continue
             rng = streams.rng(f"sensor/{sensor.name}")
             scene = timeline.at(time_s + self._offsets_s[sensor.name])
             with _timed(timings_s, "render"):
-                seen = sensor.capture(scene, self.renderer, self.recipe.channels, rng)
+                seen = sensor.capture(scene, self.renderer, self.config.channels, rng)
             if isinstance(seen, PointCloud):
                 clouds[sensor.name] = seen
             elif isinstance(seen, Table):
                 tables[sensor.name] = seen
             else:
                 with _timed(timings_s, "annotate"):
-                    truth[sensor.name] = self.recipe.image_truth(timeline.at(seen.time_s), seen)
+                    truth[sensor.name] = self.config.image_truth(timeline.at(seen.time_s), seen)
                 readings[sensor.name] = seen
         return Capture(readings, clouds, tables), truth
 
@@ -231,19 +233,18 @@ class Pipeline:
 
     def split(self, scene_index: int) -> str:
         """The split that all views of a scene belong to."""
-        recipe = self.recipe
-        shares, assignment = recipe.split_shares, recipe.split_assignment
+        shares, assignment = self.config.split_shares, self.config.split_assignment
         return split_of(scene_index, shares, assignment, self.info.seed)
 
     def _accept(self, scene_index: int) -> AcceptedScene:
         assert self._physics is not None, "use the pipeline as a context manager"
         timings: dict[str, float] = {}
         rejections: list[Rejection] = []
-        for attempt in range(self.recipe.layout_attempts_max):
+        for attempt in range(self.config.layout_attempts_max):
             streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
             try:
                 with _timed(timings, "randomize"):
-                    nominal, randomizers, sensors = self.recipe.open_scene(streams)
+                    nominal, randomizers, sensors = self.config.open_scene(streams)
                     scene = self._randomized(nominal, randomizers, Stage.BUILD, streams)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
@@ -270,7 +271,7 @@ class Pipeline:
         """A view that cannot be drawn is tried again."""
         number = accepted.index * self.info.views_per_scene + view_index
         rejections: list[Rejection] = []
-        for attempt in range(self.recipe.layout_attempts_max):
+        for attempt in range(self.config.layout_attempts_max):
             streams = Streams(
                 self.info.seed, accepted.index, view=view_index, attempt=attempt, index=number
             )

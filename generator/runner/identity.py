@@ -39,19 +39,19 @@ known to change nothing.
 
 def plan_of(factory: PipelineFactory) -> Plan:
     """The identity of the data set that a factory makes."""
-    spec = factory.spec
+    config = factory.config
     assets = possible_assets(factory)
     return Plan(
-        config=spec.resolved,
-        name=spec.name,
-        seed=spec.head.seed,
+        config=config.resolved,
+        name=config.name,
+        seed=config.general.seed,
         n=factory.n,
-        shard_size=spec.head.shard_size,
+        shard_size=config.general.shard_size,
         versions={
             "gen-data": __version__,
             **{name: _release(name) for name in BYTES_DEPEND_ON.values()},
             **_packs(assets),
-            **third_party_packages((*spec.plugins(), *annotators_of(spec))),
+            **third_party_packages((*config.plugins(), *annotators_of(config))),
         },
         assets={asset.asset_id: asset.sha256 for asset in assets},
     )
@@ -59,7 +59,7 @@ def plan_of(factory: PipelineFactory) -> Plan:
 
 def licences_text(factory: PipelineFactory, used: Sequence[str]) -> str:
     """Markdown table of the assets with these ids, grouped by where they come from."""
-    library = open_library(factory.spec.asset_folders)
+    library = open_library(factory.config.asset_folders)
     groups: dict[tuple[str, str, str], list[str]] = {}
     for asset in (library.get(asset_id) for asset_id in used):
         family = asset.asset_id.partition("?")[0]
@@ -75,12 +75,12 @@ def licences_text(factory: PipelineFactory, used: Sequence[str]) -> str:
 
 def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
     """Every object, robot and panorama that a sample may contain, sorted by id."""
-    library = open_library(factory.spec.asset_folders)
+    library = open_library(factory.config.asset_folders)
     ids = {asset_id for scene in factory.nominal for asset_id in _ids(scene)}
     drawn = {
         asset_id
-        for config in factory.spec.probes
-        for randomizer in config.randomizers
+        for scene in factory.config.probes
+        for randomizer in scene.randomizers
         for asset_id in randomizer.possible_assets(library)
     }
     return tuple(library.get(asset_id) for asset_id in sorted(ids | drawn))

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.runner.identity import BYTES_DEPEND_ON, plan_of
 from tests.architecture.test_rules import OURS, ROOT, python_files
 
@@ -56,7 +56,7 @@ def test_every_library_of_the_identity_is_a_declared_dependency() -> None:
 
 def test_a_plan_names_the_release_of_every_library() -> None:
     """So that ``pip install -U deflate`` in the middle of a data set is refused."""
-    versions = plan_of(PipelineFactory(load_spec("tabletop.yaml"), n=1)).versions
+    versions = plan_of(PipelineFactory(load_config("tabletop.yaml"), n=1)).versions
 
     for package in BYTES_DEPEND_ON.values():
         try:

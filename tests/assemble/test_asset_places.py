@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.errors import UnknownAsset
 
 
@@ -23,7 +23,7 @@ def test_an_unknown_asset_is_told_where_the_configuration_names_it(
         f"  clutter: {{assets: {{ids: [{wrong}]}}}}\n"
         "sensors: [{type: rgb_camera, name: color}]\n"
     )
-    with pytest.raises(UnknownAsset) as told, open_pipeline(load_spec(str(path))):
+    with pytest.raises(UnknownAsset) as told, open_pipeline(load_config(str(path))):
         pass
     assert str(told.value).startswith(f"{path}:3:28: elements")
     assert f"asset '{wrong}': there is none" in str(told.value)
@@ -40,6 +40,6 @@ def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: P
     )
     with (
         pytest.raises(UnknownAsset, match="your asset folders hold nothing"),
-        open_pipeline(load_spec(str(path))),
+        open_pipeline(load_config(str(path))),
     ):
         pass

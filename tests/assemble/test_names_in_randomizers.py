@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.errors import ConfigError
 
 HEAD = (
@@ -21,7 +21,7 @@ def refusal(folder: Path, *lines: str) -> str:
     """The message of a configuration with these randomizers."""
     path = folder / "mine.yaml"
     path.write_text(HEAD + "".join(f"  - {line}\n" for line in lines))
-    factory = PipelineFactory(load_spec(str(path)), n=1)
+    factory = PipelineFactory(load_config(str(path)), n=1)
     with pytest.raises(ConfigError) as caught:
         assert factory.nominal
     return str(caught.value)

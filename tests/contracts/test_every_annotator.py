@@ -20,7 +20,7 @@ from stranger.annotation import Distance
 from generator.annotations import TABLE
 from generator.annotations.truth import Thresholds, complete_truth, frame_truth
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.capture import Channel, Reading
 from generator.core.errors import ConfigError
 from generator.core.interfaces import Annotator, AnyAnnotator, AssetLibrary, ImageAnnotator
@@ -54,7 +54,7 @@ class World:
 def world() -> World:
     """A street in motion, with vehicles, people, lanes, a rig and a camera on it."""
     channels = frozenset(c for name in ANNOTATORS for c in made(name).channels)
-    with open_pipeline(load_spec(CONFIG, overrides=SMALL), channels) as pipeline:
+    with open_pipeline(load_config(CONFIG, overrides=SMALL), channels) as pipeline:
         sample = pipeline.sample(1)
         (reading,) = sample.capture.readings.values()
         return World(sample.scene, reading, pipeline.assets)

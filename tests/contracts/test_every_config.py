@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import configs
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.interfaces import Modality, Sensor
 from generator.runner.verify import verify
 from tests.end_to_end.running import gen_data
@@ -20,7 +20,7 @@ CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
 
 def reduced(name: str) -> list[str]:
     """Options that make one sample of a configuration quick."""
-    spec = load_spec(name)
+    spec = load_config(name)
     texts = ["shard_size=1"]
     if "tier" in spec.resolved["render"]:
         texts.append("render.samples=1")
@@ -45,7 +45,7 @@ def test_one_sample_is_rendered_exported_and_verified(name: str, tmp_path: Path)
     options = ("--n", "1", "--workers", "1", "--out", "out", *reduced(name))
     made = gen_data("--config", name, *options, cwd=tmp_path)
     assert made.returncode == 0, made.stdout + made.stderr
-    spec = load_spec(name)
+    spec = load_config(name)
 
     verify(tmp_path / "out", full=True)
     for exporter in spec.exporters:

@@ -81,9 +81,9 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
     program = (
         "import sys, numpy as np\n"
         "from generator.assemble.recipe import open_pipeline\n"
-        "from generator.assemble.spec import spec_of_source\n"
+        "from generator.assemble.spec import config_of_source\n"
         "from generator.core.capture import Channel\n"
-        f"with open_pipeline(spec_of_source({str(dataset)!r})) as pipeline:\n"
+        f"with open_pipeline(config_of_source({str(dataset)!r})) as pipeline:\n"
         "    reading = pipeline.sample(7).capture.readings['color']\n"
         "np.savez('alone.npz', rgb=reading.channels[Channel.RGB],\n"
         "         instance=reading.channels[Channel.INSTANCE])\n"
@@ -103,16 +103,16 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
 def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
     """The Scene in scenes.jsonl is the whole provenance: no randomizer, no physics needed."""
     from generator.assemble.recipe import PipelineFactory
-    from generator.assemble.spec import spec_of_source
+    from generator.assemble.spec import config_of_source
     from generator.core.capture import Channel
     from generator.core.streams import Streams
     from generator.runner.provenance import kept_scenes
 
     kept = list(kept_scenes(dataset / "shards" / "000002" / "scenes.jsonl"))[3]
     scene = kept.scene
-    spec = spec_of_source(str(dataset))
-    pipeline = PipelineFactory(spec, n=15)()
-    (camera,) = (sensor for sensor in spec.sensors if sensor.name == "color")
+    config = config_of_source(str(dataset))
+    pipeline = PipelineFactory(config, n=15)()
+    (camera,) = (sensor for sensor in config.sensors if sensor.name == "color")
     stream = Streams(seed=0, scene=0).rng("color")
 
     reading = camera.capture(scene, pipeline.renderer, frozenset({Channel.RGB}), stream)

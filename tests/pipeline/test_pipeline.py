@@ -20,7 +20,7 @@ from generator.core.scene import Articulation, Body, Camera, Instance, Scene
 from generator.core.se3 import SE3
 from generator.pipeline import Pipeline
 from generator.pipeline.freeze import frozen_scene
-from generator.pipeline.pipeline import Recipe
+from generator.pipeline.pipeline import PipelineConfig
 
 CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(8, 6, 1.0))
 
@@ -113,7 +113,7 @@ def pipeline(
 ) -> Pipeline:
     """A pipeline of test doubles."""
     sensor = OneCamera()
-    recipe = Recipe(
+    recipe = PipelineConfig(
         open_scene=lambda streams: (sensor.mount(Scene("test")), randomizers, (sensor,)),
         channels=frozenset(),
         image_truth=lambda scene, reading: ImageTruth(reading.camera, ()),

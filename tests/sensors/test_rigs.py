@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from generator.assets.library import open_library
-from generator.core.capture import POINT, Capture, PointCloud, Reading
+from generator.core.capture import POINT, PointCloud, Reading
 from generator.core.errors import ConfigError
 from generator.core.instants import at, with_placed_sensors
 from generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
 from generator.core.motion import Change, Track
-from generator.core.sample import FrameTruth, ImageTruth
+from generator.core.sample import FrameTruth, ImageTruth, Sample
 from generator.core.scene import Body, Lane, Rig, Scene
 from generator.core.se3 import SE3
 from generator.pipeline import Pipeline
 from generator.pipeline.freeze import Timeline
-from generator.pipeline.pipeline import Recipe
+from generator.pipeline.pipeline import PipelineConfig
 from generator.sensors.lidar import LidarSensor
 from generator.sensors.mounting import stride
 from generator.sensors.rgb_camera import RgbCamera
@@ -143,7 +143,7 @@ def sampled(
     index: int,
     offsets_s: Mapping[str, float] = {},
     **recipe: Any,
-) -> tuple[Capture, dict[str, float], dict[str, float]]:
+) -> tuple[Sample, dict[str, float], dict[str, float]]:
     """What a camera and a scanner return, and the times that truth was asked for."""
     annotated: dict[str, float] = {}
     swept: dict[str, float] = {}
@@ -170,7 +170,7 @@ def sampled(
         )
     )
     watching = (Watching("early"), Watching("late"), Watching("top", lidar=True))
-    made = Recipe(
+    made = PipelineConfig(
         open_scene=lambda streams: (scene, (), watching),  # type: ignore[arg-type]
         channels=frozenset(),
         image_truth=image_truth,
@@ -183,13 +183,18 @@ def sampled(
     )
     pipeline = Pipeline(made, open_library(()), AtRest, lambda: None)  # type: ignore[arg-type]
     with pipeline:
-        return pipeline.sample(index).capture, annotated, swept
+        return pipeline.sample(index), annotated, swept
 
 
 def test_sensors_read_at_their_own_offsets_and_labels_are_of_then() -> None:
     """At step 2 (0.2 s): one camera 0.05 s earlier, the scanner 0.025 s later; 4 m/s along +Y."""
-    capture, annotated, swept = sampled(2, offsets_s={"early": -0.05, "top": 0.025})
+    sample, annotated, swept = sampled(2, offsets_s={"early": -0.05, "top": 0.025})
+    capture = sample.capture
 
+    instants_s = {name: scene.time_s for name, scene in sample.instants.items()}
+    assert instants_s == pytest.approx({"early": 0.15, "top": 0.225})
+    assert sample.scene_of("top").body("ego").T_world_body.translation_m[1] == pytest.approx(5.9)
+    assert sample.scene_of("late") is sample.scene
     assert annotated == pytest.approx({"early": 0.15, "late": 0.2})
     assert swept == pytest.approx({"": 0.2, "top": 0.225})
     assert capture.readings["early"].time_s == pytest.approx(0.15)
@@ -225,8 +230,8 @@ def test_slower_sensors_are_missing_from_the_steps_between() -> None:
     """The scanner reads at every second step, the late camera at every third."""
     strides = {"top": 2, "late": 3}
     present = [
-        sorted([*capture.readings, *capture.clouds])
-        for capture, _, _ in (sampled(index, strides=strides) for index in range(4))
+        sorted([*sample.capture.readings, *sample.capture.clouds])
+        for sample, _, _ in (sampled(index, strides=strides) for index in range(4))
     ]
 
     assert present == [["early", "late", "top"], ["early"], ["early", "top"], ["early", "late"]]

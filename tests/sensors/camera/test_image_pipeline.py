@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.config.renaming import RenamedKeyWarning
 from generator.core.capture import Channel, Reading
 from generator.core.errors import ConfigError
@@ -184,7 +184,7 @@ def test_former_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_path: P
     )
 
     with pytest.warns(RenamedKeyWarning) as warned:
-        (camera,) = load_spec(own).sensors
+        (camera,) = load_config(own).sensors
 
     pipeline = camera.image_pipeline
     assert pipeline.glare.mean() == 0.02
@@ -200,7 +200,7 @@ def test_a_former_key_beside_its_new_name_is_unknown(tmp_path: Path) -> None:
     """No value is dropped without a word."""
     own = written(tmp_path, "sensors:\n  - {type: rgb_camera, formation: {}, image_pipeline: {}}\n")
     with pytest.raises(ConfigError, match=r"own\.yaml:3:24: .*unknown key 'formation'"):
-        load_spec(own)
+        load_config(own)
 
 
 @pytest.mark.parametrize("key", ["tone", "glare", "exposure_compensation_ev"])
@@ -211,7 +211,7 @@ def test_properties_of_cameras_are_refused_under_render(tmp_path: Path, key: str
     )
 
     with pytest.raises(ConfigError) as refused:
-        load_spec(own)
+        load_config(own)
 
     first = str(refused.value).splitlines()[0]
     assert f"own.yaml:4:3: render.{key}: " in first
