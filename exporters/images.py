@@ -163,9 +163,8 @@ def _values(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDA
         case Channel.NORMALS:
             unit = np.where(pixels == NO_NORMAL, 0.0, pixels / 127.5 - 1.0)
             length = np.linalg.norm(unit, axis=-1, keepdims=True)
-            return np.divide(unit, length, out=np.zeros_like(unit), where=length > 0.0).astype(
-                np.float32
-            )
+            np.divide(unit, length, out=unit, where=length > 0.0)
+            return np.asarray(unit, np.float32)
         case Channel.OBJECT_COORDINATES:
             return np.asarray(pixels / 65_535.0, np.float32)
         case _:
