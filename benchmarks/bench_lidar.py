@@ -17,7 +17,7 @@ from dataclasses import replace
 from benchmarks.bench_render import timed_launches
 from benchmarks.runs import machine
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.capture import Beams, PointCloud
 from generator.core.motion import Track
 from generator.core.scene import Body, Rig, Scene
@@ -71,7 +71,7 @@ def main() -> None:
     model = lidar_model(arguments.model)
     sweep = sweep_of(model, 0.0)
     beams = Beams(sweep.directions, 0.0, 1, model.range_m[1], order=sweep.order)
-    spec = load_spec("kitti_rig.yaml", overrides=["sensors[0].size_px=[64, 32]"])
+    spec = load_config("kitti_rig.yaml", overrides=["sensors[0].size_px=[64, 32]"])
     print(f"{machine()}; {arguments.model}, {len(sweep.ring)} pulses")
     with open_pipeline(spec) as pipeline:
         for index in range(0, 5 * arguments.samples, 5):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 
 from benchmarks.runs import described, machine, measured_run
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 
 
 def main() -> None:
@@ -22,7 +22,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     print(f"{machine()}, {arguments.workers} workers, {arguments.n} frames")
-    spec = load_spec(arguments.rig, seed=1)
+    spec = load_config(arguments.rig, seed=1)
     summary = measured_run(spec, arguments.n, arguments.workers)
     print(f"{spec.name}: {described(summary)}")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 
 from benchmarks.runs import described, machine, measured_run
-from generator.assemble.spec import Spec, load_spec
+from generator.assemble.spec import Config, load_config
 
 OVERRIDES = (
     "views_per_scene=5",
@@ -22,10 +22,10 @@ OVERRIDES = (
 )
 
 
-def spec_of(weather: str) -> Spec:
+def spec_of(weather: str) -> Config:
     """The benchmark's street: 30 vehicles and 40 people; ``weather`` empty = as configured."""
     given = (f"shared.weather={weather}",) if weather else ()
-    return load_spec("street.yaml", seed=1, overrides=(*OVERRIDES, *given))
+    return load_config("street.yaml", seed=1, overrides=(*OVERRIDES, *given))
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.runs import described, machine, measured_run
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import Spec, load_spec
+from generator.assemble.spec import Config, load_config
 
 OVERRIDES = (
     "randomizers.clutter.count=10",
@@ -37,15 +37,15 @@ EVERYTHING = (
 )
 
 
-def spec_of(views_per_scene: int) -> Spec:
+def spec_of(views_per_scene: int) -> Config:
     """The benchmark's scene."""
     overrides = (*OVERRIDES, f"views_per_scene={views_per_scene}")
-    return load_spec("tabletop.yaml", seed=1, overrides=overrides)
+    return load_config("tabletop.yaml", seed=1, overrides=overrides)
 
 
-def everything() -> Spec:
+def everything() -> Config:
     """The tabletop with every effect of the realtime tier."""
-    return load_spec("tabletop.yaml", seed=1, overrides=EVERYTHING)
+    return load_config("tabletop.yaml", seed=1, overrides=EVERYTHING)
 
 
 def first_sample_s() -> float:

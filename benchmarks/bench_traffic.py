@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from benchmarks.runs import machine
-from generator.assemble.recipe import blueprints
-from generator.assemble.spec import load_spec
+from generator.assemble.recipe import scene_source
+from generator.assemble.spec import load_config
 from generator.assets.library import Library, open_library
 from generator.core.errors import LayoutRejected
 from generator.core.scene import Scene
@@ -28,18 +28,17 @@ FULL = {"traffic": ("gap_m=3", "count=29"), "people": ("gap_m=2", "count=40")}
 
 def full_street(library: Library, seed: int) -> tuple[Scene, TrafficFlow]:
     """A street with 30 vehicles, the ego vehicle among them, and 40 people, before it moves."""
-    spec = load_spec("street_sequence.yaml", seed=seed)
+    spec = load_config("street_sequence.yaml", seed=seed)
     names = [randomizer.name for randomizer in spec.randomizers]
     overrides = [
         f"randomizers[{names.index(group)}].{text}"
         for group, texts in FULL.items()
         for text in texts
     ]
-    spec = load_spec("street_sequence.yaml", seed=seed, overrides=overrides)
+    spec = load_config("street_sequence.yaml", seed=seed, overrides=overrides)
     streams = Streams(seed, 0)
-    plan = blueprints(spec, library)(streams)
-    scene = plan.nominal
-    for randomizer in plan.randomizers:
+    scene, randomizers = scene_source(spec, library)(streams)
+    for randomizer in randomizers:
         if isinstance(randomizer, TrafficFlow):
             return scene, randomizer.model_copy(update={"duration_s": 5.0})
         scene = randomizer(scene, library, streams.rng(f"randomizer/{randomizer.name}"))

@@ -8,12 +8,12 @@ from functools import partial
 from pathlib import Path
 
 from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import Spec
+from generator.assemble.spec import Config
 from generator.runner.identity import licences_text, plan_of
 from generator.runner.run import Summary, run
 
 
-def measured_run(spec: Spec, n: int, workers: int) -> Summary:
+def measured_run(spec: Config, n: int, workers: int) -> Summary:
     """A whole run into a temporary folder."""
     factory = PipelineFactory(spec, n)
     with tempfile.TemporaryDirectory() as folder:

@@ -6,9 +6,10 @@ the end, merges all shards into the format's own layout; images are hard-linked,
 
 from __future__ import annotations
 
+from generator.core.interfaces import Exporter
 from generator.core.plugins import PluginTable
 
-TABLE = PluginTable(
+TABLE = PluginTable[Exporter](
     "exporter",
     {
         "birdseye": "exporters.birdseye:Birdseye",
@@ -23,4 +24,5 @@ TABLE = PluginTable(
         "tables": "exporters.tables:Tables",
         "usd": "exporters.usd:Usd",
     },
+    (Exporter,),
 )

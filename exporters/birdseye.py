@@ -36,9 +36,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from exporters.base import ExporterBase
 from exporters.images import link_or_copy
 from exporters.png import RowFilter, encode_png
-from generator.config.strict import Strict
 from generator.core.capture import Channel
 from generator.core.interfaces import DatasetInfo
 from generator.core.lanes import LaneBorder
@@ -55,7 +55,7 @@ MARGIN = 1.2
 DECIMALS = 4
 
 
-class Birdseye(Strict):
+class Birdseye(ExporterBase):
     """Bird's-eye layers, lanes and boxes around the ego, for map and BEV perception."""
 
     type: Literal["birdseye"] = "birdseye"
@@ -72,7 +72,7 @@ class Birdseye(Strict):
         """Write the layers of each sample, and a line about it and each of its images."""
         folder = shard_dir / self.type
         frames: list[str] = []
-        images: dict[str, list[str]] = {sensor: [] for sensor in info.sensors}
+        images: dict[str, list[str]] = {sensor: [] for sensor in info.cameras}
         for sample in samples:
             truth = sample.frame
             assert truth is not None, "bev_map is in `needs`"
@@ -82,7 +82,7 @@ class Birdseye(Strict):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(encode_png(mask * np.uint8(255), RowFilter.UP, 2))
             frames.append(canonical_json(_frame(sample, truth, truth.birdseye)) + "\n")
-            for sensor in (s for s in info.sensors if s in sample.truth):
+            for sensor in (s for s in info.cameras if s in sample.truth):
                 images[sensor].append(canonical_json(_image(sample, sensor)) + "\n")
         _write_lines(folder / FRAMES, frames)
         for sensor, lines in images.items():
@@ -95,7 +95,7 @@ class Birdseye(Strict):
             for layer in sorted((folder / "layers").iterdir()):
                 for path in sorted(layer.iterdir()):
                     link_or_copy(path, dataset_dir / layer.name / path.name)
-        for name in (FRAMES, *(f"{LANES}/{sensor}.jsonl" for sensor in info.sensors)):
+        for name in (FRAMES, *(f"{LANES}/{sensor}.jsonl" for sensor in info.cameras)):
             _write_lines(dataset_dir / name, ((f / name).read_text("utf-8") for f in folders))
 
 

@@ -66,11 +66,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
+from exporters.base import ExporterBase
 from exporters.images import link_or_copy
 from exporters.rle import encoded
 from exporters.sensors import instant_s, rgb_cameras
 from exporters.sequences import sequence_of
-from generator.config.strict import Strict
 from generator.core.boxes import BoxPx, OrientedBox
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
@@ -96,7 +96,7 @@ DECIMALS = 9
 """Of metres, matrices and shares: far below what anyone can measure, and short to write."""
 
 
-class Coco(Strict):
+class Coco(ExporterBase):
     """COCO instances, one JSON file per split; images of all sensors with the rgb channel."""
 
     type: Literal["coco"] = "coco"
@@ -118,7 +118,7 @@ class Coco(Strict):
         """
         if not rgb_cameras(info):
             raise ConfigError(
-                f"exporter '{self.type}': no sensor of {', '.join(info.sensors)} writes the rgb "
+                f"exporter '{self.type}': no sensor of {', '.join(info.cameras)} writes the rgb "
                 "channel; add an rgb_camera"
             )
 

@@ -87,7 +87,7 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
         ConfigError: if a channel is no image.
         SampleError: if a depth is negative or NaN.
     """
-    for sensor in info.sensors:
+    for sensor in info.cameras:
         reading = sample.capture.readings.get(sensor)
         if reading is None:
             continue

@@ -46,12 +46,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from exporters.base import ExporterBase
 from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
 from exporters.images import depth_units, link_or_copy, read_depth_units
 from exporters.sensors import laser_scanner, pinhole_camera, scanned
 from exporters.sequences import check_frame_names
 from exporters.upright import BORDER_M, UprightBox, boxed_members, upright_box
-from generator.config.strict import Strict
 from generator.core.boxes import BoxPx
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
@@ -99,7 +99,7 @@ LARGELY_OCCLUDED = 0.5
 """Hidden share of the silhouette above which ``occluded`` is 2."""
 
 
-class Kitti(Strict):
+class Kitti(ExporterBase):
     """KITTI object detection: the images of one camera, with labels in its frame."""
 
     type: Literal["kitti"] = "kitti"

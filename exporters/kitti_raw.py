@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from exporters.base import ExporterBase
 from exporters.clouds import read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.oxts import COLUMNS, motion_of, navigation_mount, oxts_row
@@ -55,7 +56,6 @@ from exporters.sequences import (
     write_text,
 )
 from exporters.tracklets import frame_boxes, tracklets_text
-from generator.config.strict import Strict
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
@@ -87,7 +87,7 @@ def _a_day(text: str) -> str:
     return text
 
 
-class KittiRaw(Strict):
+class KittiRaw(ExporterBase):
     """KITTI raw data: cameras, laser scanner, navigation and tracklets of every sequence."""
 
     type: Literal["kitti_raw"] = "kitti_raw"

@@ -30,6 +30,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
+from exporters.base import ExporterBase
 from exporters.images import link_or_copy
 from exporters.kitti_raw import cameras_text
 from exporters.png import RowFilter, encode_png
@@ -44,7 +45,6 @@ from exporters.sequences import (
     write_frames,
     write_text,
 )
-from generator.config.strict import Strict
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
 from generator.core.interfaces import DatasetInfo, media_path
@@ -57,7 +57,7 @@ LABELS = {Channel.DISPARITY: "disp_occ_0", Channel.DISPARITY_VISIBLE: "disp_noc_
 FLOWS = (Channel.FLOW_FORWARD, Channel.FLOW_OCCLUDED_FORWARD)
 
 
-class KittiStereo(Strict):
+class KittiStereo(ExporterBase):
     """KITTI's stereo benchmark: pairs of colour images, and the left one's disparities."""
 
     type: Literal["kitti_stereo"] = "kitti_stereo"

@@ -27,6 +27,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from exporters.base import ExporterBase
 from exporters.clouds import read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.kitti import label_rows
@@ -47,7 +48,6 @@ from exporters.sequences import (
     write_frames,
     write_text,
 )
-from generator.config.strict import Strict
 from generator.core.capture import Channel
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.sample import ObjectTruth, Sample
@@ -59,7 +59,7 @@ SLIGHTLY_TRUNCATED, LARGELY_TRUNCATED = 0.15, 0.5
 """Shares outside the image above which ``truncated`` is 1 and 2: KITTI's easy and hard limits."""
 
 
-class KittiTracking(Strict):
+class KittiTracking(ExporterBase):
     """KITTI tracking: images, labels, scans and navigation of every sequence."""
 
     type: Literal["kitti_tracking"] = "kitti_tracking"

@@ -22,6 +22,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from exporters.base import ExporterBase
 from exporters.images import link_or_copy
 from exporters.sensors import rgb_camera
 from exporters.sequences import (
@@ -33,7 +34,6 @@ from exporters.sequences import (
     write_frames,
     write_text,
 )
-from generator.config.strict import Strict
 from generator.core.capture import Channel
 from generator.core.interfaces import DatasetInfo, media_path
 from generator.core.sample import ImageTruth, ObjectTruth, Sample
@@ -61,7 +61,7 @@ SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""
 
 
-class MotChallenge(Strict):
+class MotChallenge(ExporterBase):
     """MOTChallenge: images and tracks of every sequence of one camera."""
 
     type: Literal["motchallenge"] = "motchallenge"

@@ -21,13 +21,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.base import ExporterBase
 from exporters.clouds import read_points, scanner_of
 from exporters.images import link_or_copy
 from exporters.sensors import scanned
-from generator.config.strict import Strict
 from generator.core.boxes import OrientedBox
 from generator.core.errors import ConfigError
-from generator.core.instants import at
 from generator.core.interfaces import DatasetInfo
 from generator.core.sample import Sample
 from generator.core.scene import Instance
@@ -53,7 +52,7 @@ PLY_TYPES = {"<f4": "float", "<u2": "uint16", "|u1": "uint8"}
 PCD_TYPES = {"<f4": ("4", "F"), "<u2": ("2", "U"), "|u1": ("1", "U")}
 
 
-class PointClouds(Strict):
+class PointClouds(ExporterBase):
     """PLY or PCD files of every laser scan."""
 
     type: Literal["pointclouds"] = "pointclouds"
@@ -150,8 +149,7 @@ def pcd_bytes(points: NDArray[np.void]) -> bytes:
 
 def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
     """Boxes of all annotated things in a laser scanner's frame at its sweep, by instance id."""
-    cloud = sample.capture.clouds.get(lidar)
-    scene = at(sample.scene, cloud.time_s) if cloud is not None else sample.scene
+    scene = sample.scene_of(lidar)
     T_lidar_world = scanner_of(sample, lidar).T_world_lidar.inverse()
     things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     boxes = []

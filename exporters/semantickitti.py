@@ -31,6 +31,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.base import ExporterBase
 from exporters.clouds import read_points, xyzi_bytes
 from exporters.images import link_or_copy
 from exporters.kitti import calib_matrices, matrix_lines
@@ -48,7 +49,6 @@ from exporters.sequences import (
     write_frames,
     write_text,
 )
-from generator.config.strict import Strict
 from generator.core.errors import ConfigError
 from generator.core.geometry import SURFACES
 from generator.core.interfaces import DatasetInfo
@@ -111,7 +111,7 @@ SWEEP_S = 0.1
 INSTANCES_MAX = 65_535
 
 
-class SemanticKitti(Strict):
+class SemanticKitti(ExporterBase):
     """SemanticKITTI: the scans of one laser scanner with a label per point."""
 
     type: Literal["semantickitti"] = "semantickitti"
@@ -133,19 +133,19 @@ class SemanticKitti(Strict):
         """
         for field, name, known in (
             ("lidar", self.lidar, info.lidars),
-            ("camera", self.camera, info.sensors),
+            ("camera", self.camera, info.cameras),
         ):
             if not known or (name and name not in known):
                 raise ConfigError(
                     f"exporter 'semantickitti': there is no {field} '{name}'; "
                     f"sensors of that kind: {', '.join(known) or 'none'}"
                 )
-        check_pinholes(info, [self.camera or info.sensors[0]], self.type)
+        check_pinholes(info, [self.camera or info.cameras[0]], self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write points and labels of each sample, and a line about its scan."""
         self.check(info)
-        lidar, camera = self.lidar or info.lidars[0], self.camera or info.sensors[0]
+        lidar, camera = self.lidar or info.lidars[0], self.camera or info.cameras[0]
         folder = shard_dir / self.type
         rows = []
         for sample in samples:

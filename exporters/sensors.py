@@ -13,7 +13,7 @@ from generator.core.sample import Sample
 
 def rgb_cameras(info: DatasetInfo) -> tuple[str, ...]:
     """Names of the cameras that write the rgb channel, sorted."""
-    return tuple(s for s in info.sensors if Channel.RGB in info.media[s])
+    return tuple(s for s in info.cameras if Channel.RGB in info.media[s])
 
 
 def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
@@ -40,7 +40,7 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
         ConfigError: naming the first camera that is no pinhole.
     """
     for camera in cameras:
-        model = info.lenses.get(camera, "pinhole")
+        model = info.sensor(camera).lens
         if model != "pinhole":
             raise ConfigError(
                 f"exporter '{exporter}': camera '{camera}' has a lens of the model '{model}', but "

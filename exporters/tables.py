@@ -22,18 +22,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.config.strict import Strict
+from exporters.base import ExporterBase
 from generator.core.capture import Table
 from generator.core.errors import ConfigError, StorageError
-from generator.core.interfaces import DatasetInfo, table_path
+from generator.core.interfaces import DatasetInfo, SensorInfo, table_path
 from generator.core.sample import Sample
 from generator.core.serial import canonical_json
-from generator.core.tables import TABLE_COLUMNS, table_dtype
+from generator.core.tables import TABLE_COLUMNS, columns_dtype
 
 INDEX = "sample"
 
 
-class Tables(Strict):
+class Tables(ExporterBase):
     """Rows of every device that is no camera and no laser scanner, one file per sequence.
 
     Attributes:
@@ -42,11 +42,6 @@ class Tables(Strict):
 
     type: Literal["tables"] = "tables"
     format: Literal["csv", "npy"] = "csv"
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
-        return frozenset()
 
     def check(self, info: DatasetInfo) -> None:
         """Refuse a data set without such a device.
@@ -64,7 +59,7 @@ class Tables(Strict):
         """Write where each device was when it read; its rows are in the shard already."""
         self.check(info)
         kept = list(samples)
-        for sensor in sorted(info.devices):
+        for sensor in info.devices:
             folder = shard_dir / self.type / sensor
             folder.mkdir(parents=True, exist_ok=True)
             read = [s for s in kept if table_path(shard_dir, sensor, s.index).exists()]
@@ -77,13 +72,13 @@ class Tables(Strict):
         (dataset_dir / "columns.json").write_text(
             canonical_json(_columns(info)) + "\n", encoding="utf-8", newline="\n"
         )
-        for sensor, kind in sorted(info.devices.items()):
+        for sensor in info.devices:
             folder = dataset_dir / sensor
             folder.mkdir(parents=True, exist_ok=True)
             poses = (d / self.type / sensor / "poses.jsonl" for d in shard_dirs)
             lines = "".join(path.read_text("utf-8") for path in poses)
             (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
-            for sequence, rows in _sequences(info, shard_dirs, sensor, kind):
+            for sequence, rows in _sequences(info, shard_dirs, sensor):
                 path = folder / f"{sequence:06d}.{self.format}"
                 path.write_bytes({"csv": csv_bytes, "npy": npy_bytes}[self.format](rows))
 
@@ -95,7 +90,7 @@ def write_table(table: Table, shard_dir: Path, index: int) -> None:
     path.write_bytes(npy_bytes(table.rows))
 
 
-def read_rows(path: Path, kind: str) -> NDArray[np.void]:
+def read_rows(path: Path, device: SensorInfo) -> NDArray[np.void]:
     """Rows of one reading as they were written.
 
     Raises:
@@ -105,8 +100,10 @@ def read_rows(path: Path, kind: str) -> NDArray[np.void]:
         rows: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:
         raise StorageError(f"{path}: cannot be read ({error}); make the data set again") from error
-    if rows.dtype != table_dtype(kind):
-        raise StorageError(f"{path}: holds no rows of kind '{kind}'; make the data set again")
+    if rows.dtype != columns_dtype(device.columns):
+        raise StorageError(
+            f"{path}: holds no rows of kind '{device.kind}'; make the data set again"
+        )
     return rows
 
 
@@ -137,7 +134,7 @@ def _spelling(kind: np.dtype[Any]) -> Any:
 
 
 def _sequences(
-    info: DatasetInfo, shard_dirs: Sequence[Path], sensor: str, kind: str
+    info: DatasetInfo, shard_dirs: Sequence[Path], sensor: str
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Number and rows of every sequence that the device read in, in order."""
     parts: list[NDArray[Any]] = []
@@ -148,7 +145,7 @@ def _sequences(
             yield current, np.concatenate(parts)
             parts = []
         current = sequence
-        parts.append(_numbered(read_rows(path, kind), index))
+        parts.append(_numbered(read_rows(path, info.sensor(sensor)), index))
     if parts:
         yield current, np.concatenate(parts)
 
@@ -172,8 +169,8 @@ def _numbered(rows: NDArray[np.void], index: int) -> NDArray[Any]:
 def _columns(info: DatasetInfo) -> dict[str, Any]:
     first = {"name": INDEX, "type": "<u4", "meaning": "index of the sample"}
     return {
-        sensor: {"kind": kind, "columns": [first, *TABLE_COLUMNS[kind]]}
-        for sensor, kind in sorted(info.devices.items())
+        sensor: {"kind": kind, "columns": [first, *info.sensor(sensor).columns]}
+        for sensor, kind in info.devices.items()
     }
 
 

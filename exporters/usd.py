@@ -28,10 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
+from exporters.base import ExporterBase
 from exporters.images import link_or_copy
 from exporters.png import RowFilter, encode_png
 from exporters.sequences import write_bytes, write_text
-from generator.config.strict import Strict
 from generator.core.geometry import TextureData
 from generator.core.instants import at
 from generator.core.interfaces import AssetLibrary, DatasetInfo
@@ -44,7 +44,7 @@ from generator.usd.stage import Files, write_stage
 STAGES = "stages.jsonl"
 
 
-class Usd(Strict):
+class Usd(ExporterBase):
     """One OpenUSD stage per view, with meshes, materials, lights, cameras and labels.
 
     Attributes:
@@ -55,14 +55,6 @@ class Usd(Strict):
     format: Literal["usdc", "usda"] = "usdc"
 
     _assets: AssetLibrary | None = PrivateAttr(None)
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
-        return frozenset()
-
-    def check(self, info: DatasetInfo) -> None:
-        """Every data set has what it takes."""
 
     def with_assets(self, assets: AssetLibrary) -> Usd:
         """The exporter that takes meshes, textures and skies from a library."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from generator.core.interfaces import Randomizer
 from generator.core.plugins import PluginTable
 
-TABLE = PluginTable(
+TABLE = PluginTable[Randomizer](
     "randomizer",
     {
         "lane_objects": "randomizers.along:Along",
@@ -34,4 +35,5 @@ TABLE = PluginTable(
         "weather": "randomizers.weather:Weather",
         "traffic_lights": "randomizers.traffic_lights:TrafficLights",
     },
+    (Randomizer,),
 )

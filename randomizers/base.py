@@ -31,8 +31,13 @@ class RandomizerBase(Strict):
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     stage: Literal["scene", "view"] = "scene"
 
-    def may_draw(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the assets that only it may bring into a scene: they belong to the data set."""
+    @property
+    def motion_duration_s(self) -> float | None:
+        """How long the motion that it draws lasts, from time 0 [s]; None if it draws none."""
+        return None
+
+    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the assets that only it may bring into a scene; they are part of the plan."""
         del assets
         return ()
 

@@ -32,7 +32,7 @@ class EnvironmentLight(RandomizerBase):
     yaw_deg: Scalar = Uniform(0.0, 360.0)
     visible: bool = Field(True)
 
-    def may_draw(self, assets: AssetIndex) -> tuple[str, ...]:
+    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """The images it draws from."""
         return self._options(assets)
 

@@ -110,6 +110,11 @@ class TrafficFlow(RandomizerBase):
     brakelight_cd_m2: Positive = Uniform(6000.0, 15_000.0)
     indicator_cd_m2: Positive = Uniform(15_000.0, 40_000.0)
 
+    @property
+    def motion_duration_s(self) -> float:
+        """The motion ends there."""
+        return self.duration_s
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene with tracks and changes, as it is at time 0.
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from generator.core.interfaces import Element
 from generator.core.plugins import PluginTable
 
-TABLE = PluginTable(
+TABLE = PluginTable[Element](
     "element",
     {
         "lane_objects": "scene_templates.along:Along",
@@ -27,4 +28,5 @@ TABLE = PluginTable(
         "surface": "scene_templates.surface:SurfaceElement",
         "usd_stage": "scene_templates.usd_stage:UsdStage",
     },
+    (Element,),
 )

@@ -8,11 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex
+from generator.core.interfaces import AssetIndex, Element
 from generator.core.scene import Lane, Light, Region, Scene, Surface
 from generator.core.se3 import Vec3
-from scene_templates.element import Element
-from scene_templates.objects import Objects
 
 CONTENT_HEIGHT_M = 0.25
 """Height over a surface that counts as what is looked at."""
@@ -35,7 +33,7 @@ def build(name: str, elements: Sequence[Element], assets: AssetIndex) -> Scene:
     """
     _check_names(elements)
     scene = Scene(template=name)
-    for element in sorted(elements, key=lambda element: isinstance(element, Objects)):
+    for element in sorted(elements, key=lambda element: element.follows_others):
         scene = element.add(scene, assets)
     if not scene.lights:
         scene = replace(scene, lights=(DEFAULT_LIGHT,))

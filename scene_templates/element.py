@@ -27,6 +27,11 @@ class Element(Strict):
 
     name: str = Field(pattern=NAME_PATTERN)
 
+    @property
+    def follows_others(self) -> bool:
+        """Whether it is added after the elements that do not."""
+        return False
+
     @abstractmethod
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """The scene with this element in it, at its nominal place. Draws nothing.

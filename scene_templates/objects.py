@@ -105,6 +105,11 @@ class Objects(Element):
     placement: Placement = "drop"
     annotate: bool = True
 
+    @property
+    def follows_others(self) -> bool:
+        """Objects keep clear of everything that stands on their surfaces."""
+        return True
+
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """The group, and its objects in rows on its surfaces, clear of what stands there."""
         surfaces = surfaces_of(scene, self.on, f"elements.{self.name}.on")

@@ -6,9 +6,15 @@ about, its methods say (``generator.core.interfaces``).
 
 from __future__ import annotations
 
+from generator.core.interfaces import (
+    Annotator,
+    AnyAnnotator,
+    FrameAnnotator,
+    ImageAnnotator,
+)
 from generator.core.plugins import PluginTable
 
-TABLE = PluginTable(
+TABLE = PluginTable[AnyAnnotator](
     "annotation",
     {
         "amodal_masks": "generator.annotations.amodal_masks:AmodalMasks",
@@ -25,4 +31,5 @@ TABLE = PluginTable(
         "semantic_masks": "generator.annotations.semantic_masks:SemanticMasks",
         "visibility": "generator.annotations.visibility:Visibility",
     },
+    (Annotator, ImageAnnotator, FrameAnnotator),
 )

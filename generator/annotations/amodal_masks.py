@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from generator.annotations.pixels import silhouette_box, silhouette_crop, silhouette_of
+from generator.config.strict import Strict
 from generator.core.boxes import tight_box
 from generator.core.capture import Channel, Reading, Silhouette
 from generator.core.sample import MaskPx, ObjectTruth
 from generator.core.scene import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class AmodalMasks:
+class AmodalMasks(Strict):
     """The instance's pixels as if nothing stood before it; masks of instances may overlap."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
+    type: Literal["amodal_masks"] = "amodal_masks"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``amodal_mask``, clipped to the image and tight; [0, 0] if nothing is inside."""

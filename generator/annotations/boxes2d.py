@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
 from generator.annotations.pixels import silhouette_box, silhouette_of
+from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.sample import ObjectTruth
 from generator.core.scene import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class Boxes2d:
+class Boxes2d(Strict):
     """Tight boxes [px]: ``box`` of what is visible, ``amodal_box`` of the silhouette.
 
     The amodal box counts hidden parts and parts outside the image; None for an instance that is
@@ -20,6 +20,7 @@ class Boxes2d:
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
+    type: Literal["boxes2d"] = "boxes2d"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``amodal_box``; ``box`` is part of every truth."""

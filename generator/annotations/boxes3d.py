@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
+from generator.config.strict import Strict
 from generator.core.boxes import OrientedBox
 from generator.core.capture import Channel, Reading
 from generator.core.interfaces import AssetLibrary
@@ -14,11 +15,11 @@ from generator.core.scene import Instance, Scene
 from generator.core.se3 import SE3
 
 
-@dataclass(frozen=True, slots=True)
-class Boxes3d:
+class Boxes3d(Strict):
     """The instance's tight box along its own axes, in the world and in sensors' frames."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
+    type: Literal["boxes3d"] = "boxes3d"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``box3d_world`` and ``box3d_camera``."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.geometry import Keypoint
 from generator.core.rows import seen_points
@@ -20,8 +21,7 @@ LEAST_COSINE = 1.0 / 3.0
 """Of the angle under which a surface is seen: below it, depth counts as if it were this."""
 
 
-@dataclass(frozen=True, slots=True)
-class Keypoints:
+class Keypoints(Strict):
     """Points of instances that have them: image and camera coordinates, and COCO's visibility.
 
     0 = not in the image (nor in the lens's field), 1 = in the image and hidden, by other things or
@@ -36,6 +36,7 @@ class Keypoints:
     channels: ClassVar[frozenset[Channel]] = frozenset(
         {Channel.INSTANCE, Channel.RANGE, Channel.NORMALS}
     )
+    type: Literal["keypoints"] = "keypoints"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``keypoints``, in the instance's order; empty for one that has none."""

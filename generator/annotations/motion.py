@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
+from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.instants import ego_rig
 from generator.core.sample import MotionTruth, ObjectTruth
 from generator.core.scene import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class Motion:
+class Motion(Strict):
     """Velocity, acceleration and angular velocity along the world's, camera's and ego's axes.
 
     They are those of the object over the ground; whoever wants them against a moving camera
@@ -20,6 +20,7 @@ class Motion:
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
+    type: Literal["motion"] = "motion"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``motion``."""

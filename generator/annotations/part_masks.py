@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from generator.annotations.pixels import crop, visible_mask
+from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.errors import SampleError
 from generator.core.sample import ObjectTruth
 from generator.core.scene import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class PartMasks:
+class PartMasks(Strict):
     """How many pixels show each part; the masks themselves are the part image.
 
     Pixels with part id 0 belong to the instance as a whole and to none of its parts.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.PART})
+    type: Literal["part_masks"] = "part_masks"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``part_px`` for an instance with parts, every part named; else None.

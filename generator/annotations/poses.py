@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
+from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.sample import ObjectTruth
 from generator.core.scene import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class Poses:
+class Poses(Strict):
     """Pose of the instance frame in the camera frame (X right, Y down, Z forward)."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
+    type: Literal["poses"] = "poses"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``T_camera_object``."""

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from generator.annotations.pixels import crop, visible_mask
+from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.errors import SampleError
 from generator.core.sample import ObjectTruth
 from generator.core.scene import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class SemanticMasks:
+class SemanticMasks(Strict):
     """The category id of every pixel, written as an image; nothing is added to single objects."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.CATEGORY})
+    type: Literal["semantic_masks"] = "semantic_masks"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """The truth as it is, once the category image is known to agree with it.

@@ -12,11 +12,15 @@ from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.errors import ConfigError
 from generator.core.instants import ego_rig, rig_twist
-from generator.core.interfaces import Annotator, AssetLibrary, FrameAnnotator, ImageAnnotator
+from generator.core.interfaces import (
+    Annotator,
+    AnyAnnotator,
+    AssetLibrary,
+    FrameAnnotator,
+    ImageAnnotator,
+)
 from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth
 from generator.core.scene import Scene
-
-AnyAnnotator = Annotator | ImageAnnotator | FrameAnnotator
 
 
 class Thresholds(Strict):

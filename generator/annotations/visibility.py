@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from generator.annotations.pixels import silhouette_box, silhouette_crop, silhouette_of
+from generator.config.strict import Strict
 from generator.core.capture import Channel, Reading
 from generator.core.sample import ObjectTruth
 from generator.core.scene import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class Visibility:
+class Visibility(Strict):
     """Three shares in [0, 1], all ratios of pixel counts.
 
     ``visible_fraction`` is BOP's ``visib_fract``: the silhouette it refers to is counted outside
@@ -23,6 +23,7 @@ class Visibility:
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
+    type: Literal["visibility"] = "visibility"
 
     def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``visible_fraction``, ``occlusion`` and ``truncation``."""

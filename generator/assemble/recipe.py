@@ -1,32 +1,35 @@
-"""From a Spec to a running Pipeline."""
+"""From a Config to a running Pipeline."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
 import cv2
 
-from generator.annotations.truth import AnyAnnotator, complete_truth, frame_truth
-from generator.assemble.spec import Layout, Spec
-from generator.assemble.tables import TABLES
+from generator.annotations.truth import complete_truth, frame_truth
+from generator.assemble.spec import Config, SceneConfig
+from generator.assemble.tables import ANNOTATIONS, default_plugin
 from generator.assets.library import Library, open_library
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex, DatasetInfo, Exporter, GeometryExporter, Renderer
+from generator.core.interfaces import (
+    AnyAnnotator,
+    AssetIndex,
+    DatasetInfo,
+    Exporter,
+    Modality,
+    SensorInfo,
+)
 from generator.core.scene import Scene, SharedValue
-from generator.core.streams import Streams
 from generator.physics import open_engine
 from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.pipeline.pipeline import PipelineConfig, SceneParts, SceneSource
 from generator.sensors.mounting import refuse_buried, stride, within_steps
 from scene_templates.builder import build
 
-BLUEPRINTS_KEPT = 32
-IMAGING = ("camera", "lidar")
-LOOKING = (*IMAGING, "event_camera")
-"""Modalities that see nothing from inside the body that carries them."""
+NOMINAL_SCENES_KEPT = 32
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class PipelineFactory:
         extra_channels: Channels to render beyond what sensors and annotators need.
     """
 
-    spec: Spec
+    config: Config
     n: int
     extra_channels: frozenset[Channel] = frozenset()
 
@@ -46,26 +49,26 @@ class PipelineFactory:
         """A pipeline, to be used as a context manager."""
         # One process, one core: workers fill the others.
         cv2.setNumThreads(1)
-        spec = self.spec
-        library = open_library(spec.asset_folders)
-        recipe = recipe_of(spec, library, self.n, self.categories, self.extra_channels)
+        config = self.config
+        library = open_library(config.asset_folders)
+        resolved = pipeline_config(config, library, self.n, self.categories, self.extra_channels)
         return Pipeline(
-            recipe,
+            resolved,
             library,
-            open_physics=partial(open_engine, library, spec.head.physics),
-            open_renderer=partial(_renderer, spec, library),
+            open_physics=partial(open_engine, library, config.general.physics),
+            open_renderer=partial(config.render.open, library),
         )
 
     @cached_property
     def nominal(self) -> tuple[Scene, ...]:
         """Nominal scenes that between them hold whatever a scene may hold."""
-        library = open_library(self.spec.asset_folders)
-        return tuple(nominal_scene(self.spec, layout, library) for layout in self.spec.probes)
+        library = open_library(self.config.asset_folders)
+        return tuple(nominal_scene(self.config, scene, library) for scene in self.config.probes)
 
     @cached_property
     def categories(self) -> tuple[str, ...]:
         """Sorted names of all categories that a sample may contain."""
-        return categories_of(self.nominal, open_library(self.spec.asset_folders))
+        return categories_of(self.nominal, open_library(self.config.asset_folders))
 
     def __getstate__(self) -> dict[str, object]:
         """Other processes are told the categories, which take a second to find out."""
@@ -74,114 +77,123 @@ class PipelineFactory:
         return {**told, "categories": categories}
 
 
-def open_pipeline(spec: Spec, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
+def open_pipeline(config: Config, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
     """A pipeline to look at samples with, outside any data set."""
-    return PipelineFactory(spec, n=1, extra_channels=extra_channels)()
+    return PipelineFactory(config, n=1, extra_channels=extra_channels)()
 
 
-def recipe_of(
-    spec: Spec,
+def pipeline_config(
+    config: Config,
     library: Library,
     n: int,
     categories: tuple[str, ...],
     extra_channels: frozenset[Channel],
-) -> Recipe:
+) -> PipelineConfig:
     """Everything that samples depend on, resolved.
 
     Raises:
         ConfigError: when parts do not fit together, such as an exporter whose images no sensor
             writes.
     """
-    _check_durations(spec)
-    annotators = _annotators(spec)
-    info = DatasetInfo(
-        name=spec.name,
-        seed=spec.head.seed,
-        n=n,
-        views_per_scene=spec.head.views_per_scene,
-        categories=categories,
-        sensors=tuple(sorted(s.name for s in spec.sensors if s.modality == "camera")),
-        lidars=tuple(sorted(s.name for s in spec.sensors if s.modality == "lidar")),
-        media={s.name: tuple(s.media) for s in spec.sensors if s.modality == "camera"},
-        depth_scale_m=spec.head.depth_scale_m,
-        devices={s.name: s.modality for s in spec.sensors if s.modality not in IMAGING},
-        steps_per_scene=spec.head.steps_per_scene,
-        step_s=spec.head.step_s,
-        lenses={s.name: s.intrinsics().lens.model for s in spec.sensors if s.modality == "camera"},
-    )
-    exporters = _exporters(spec, info, library)
-    needed = frozenset().union(*(a.channels for a in annotators), extra_channels)
-    return Recipe(
-        seed=spec.head.seed,
-        views_per_scene=spec.head.views_per_scene,
-        blueprint=blueprints(spec, library),
-        channels=needed,
+    _check_durations(config)
+    annotators = annotators_of(config)
+    info = dataset_info(config, n, categories)
+    return PipelineConfig(
+        info=info,
+        open_scene=scene_source(config, library),
+        channels=frozenset().union(*(a.channels for a in annotators), extra_channels),
         image_truth=partial(
-            complete_truth, annotators=annotators, thresholds=spec.head.labels, assets=library
+            complete_truth, annotators=annotators, thresholds=config.general.labels, assets=library
         ),
         frame_truth=partial(frame_truth, annotators=annotators, assets=library),
-        split_shares=spec.split_shares,
-        split_assignment=spec.head.splits.assign,
-        layout_attempts_max=spec.head.physics.layout_attempts_max,
-        info=info,
-        exporters=exporters,
-        strides=_strides(spec),
-        offsets_s={s.name: s.time_offset_s for s in spec.sensors if s.time_offset_s},
+        split_shares=config.split_shares,
+        split_assignment=config.general.splits.assign,
+        layout_attempts_max=config.general.physics.layout_attempts_max,
+        exporters=_exporters(config, info, library),
+        strides=_strides(info),
     )
 
 
-def _check_durations(spec: Spec) -> None:
-    """Raises ConfigError if a sequence goes on after what moves in it has come to its end."""
-    lasts_s = (spec.head.steps_per_scene - 1) * spec.head.step_s
-    for layout in spec.probes:
-        for randomizer in layout.randomizers:
-            duration_s = getattr(randomizer, "duration_s", None)
-            if isinstance(duration_s, float) and duration_s < lasts_s - 1e-9:
+def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> DatasetInfo:
+    """Facts about the data set of a configuration."""
+    return DatasetInfo(
+        name=config.name,
+        seed=config.general.seed,
+        n=n,
+        views_per_scene=config.general.views_per_scene,
+        categories=categories,
+        sensors=tuple(sorted((s.describe() for s in config.sensors), key=lambda s: s.name)),
+        depth_scale_m=config.general.depth_scale_m,
+        steps_per_scene=config.general.steps_per_scene,
+        step_s=config.general.step_s,
+    )
+
+
+def _check_durations(config: Config) -> None:
+    """Raises ConfigError if a sequence is longer than the motion in it."""
+    steps, step_s = config.general.steps_per_scene, config.general.step_s
+    lasts_s = (steps - 1) * step_s
+    for scene in config.probes:
+        for randomizer in scene.randomizers:
+            duration_s = randomizer.motion_duration_s
+            if duration_s is not None and duration_s < lasts_s - 1e-9:
                 raise ConfigError(
                     f"randomizers.{randomizer.name}.duration_s: {duration_s:g} s is shorter than "
-                    f"the sequences, {spec.head.steps_per_scene} steps of {spec.head.step_s:g} s; "
+                    f"the sequences, {steps} steps of {step_s:g} s; "
                     f"expected at least {lasts_s:g}"
                 )
 
 
-def _strides(spec: Spec) -> dict[str, int]:
-    """Every how many steps a sensor reads; devices may also read several times in one."""
+def _strides(info: DatasetInfo) -> dict[str, int]:
+    """Steps from one reading of a sensor to the next; devices may read several times per step."""
     return {
-        s.name: stride(s.name, s.rate_hz, spec.head.step_s)
-        for s in spec.sensors
-        if s.modality in IMAGING or not within_steps(s.rate_hz, spec.head.step_s)
+        s.name: stride(s.name, s.rate_hz, info.step_s)
+        for s in info.sensors
+        if s.modality is not Modality.DEVICE or not within_steps(s.rate_hz, info.step_s)
     }
 
 
-def blueprints(spec: Spec, assets: AssetIndex) -> Callable[[Streams], Blueprint]:
-    """The function that tells what one scene is made from; it remembers the last few."""
+def scene_source(config: Config, assets: AssetIndex) -> SceneSource:
+    """The nominal scene and the randomizers of given streams; the last few are remembered."""
 
-    @lru_cache(maxsize=BLUEPRINTS_KEPT)
-    def made(shared: tuple[tuple[str, SharedValue], ...]) -> Blueprint:
-        layout = spec.layout(shared)
-        scene = nominal_scene(spec, layout, assets)
-        return Blueprint(scene, layout.randomizers, layout.sensors)
+    @lru_cache(maxsize=NOMINAL_SCENES_KEPT)
+    def made(shared: tuple[tuple[str, SharedValue], ...]) -> SceneParts:
+        of_scene = config.scene_config(shared)
+        scene = nominal_scene(config, of_scene, assets)
+        return scene, of_scene.randomizers, of_scene.sensors
 
-    return lambda streams: made(spec.shared(streams))
+    return lambda streams: made(config.shared(streams))
 
 
-def nominal_scene(spec: Spec, layout: Layout, assets: AssetIndex) -> Scene:
-    """The template's scene with every sensor mounted."""
-    scene = build(spec.head.template or spec.name, layout.elements, assets)
-    scene = replace(scene, shared=layout.shared, step_s=spec.head.step_s)
-    for sensor in layout.sensors:
+def nominal_scene(config: Config, of_scene: SceneConfig, assets: AssetIndex) -> Scene:
+    """The template's scene with every sensor mounted.
+
+    Raises:
+        ConfigError: an element or a sensor has no place in it.
+    """
+    scene = build(config.general.template or config.name, of_scene.elements, assets)
+    scene = replace(scene, shared=of_scene.shared, step_s=config.general.step_s)
+    for sensor in of_scene.sensors:
         scene = sensor.mount(scene)
-        if sensor.modality in LOOKING:
-            refuse_buried(scene, sensor.name, sensor, assets)
+        info = sensor.describe()
+        _check_mounted(scene, info)
+        if info.needs_clear_view:
+            refuse_buried(scene, info.name, assets)
     return scene
 
 
-def _renderer(spec: Spec, library: Library) -> Renderer:
-    render = spec.head.render
-    renderer: Renderer = TABLES["renderer"].load(render.renderer)(
-        library, render.device, render.settings
-    )
-    return renderer
+def _check_mounted(scene: Scene, info: SensorInfo) -> None:
+    """Raises ConfigError if a plug-in's ``mount`` and ``describe`` contradict each other."""
+    mounted = {
+        Modality.CAMERA: [camera.name for camera in scene.cameras],
+        Modality.LIDAR: [lidar.name for lidar in scene.lidars],
+        Modality.DEVICE: [device.name for device in scene.devices],
+    }
+    if info.name not in mounted[info.modality]:
+        raise ConfigError(
+            f"sensor '{info.name}': describe() names a {info.modality.value}, but mount() adds no"
+            f" {info.modality.value} of this name to the scene"
+        )
 
 
 def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...]:
@@ -197,23 +209,20 @@ def categories_of(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...
     return tuple(sorted(placed | possible))
 
 
-def _annotators(spec: Spec) -> Sequence[AnyAnnotator]:
-    """Those that were asked for, then those that exporters read besides."""
-    annotators = dict(spec.annotations)
-    for exporter in spec.exporters:
+def annotators_of(config: Config) -> Sequence[AnyAnnotator]:
+    """The configuration's, then those that exporters need besides."""
+    annotators = dict(config.annotations)
+    for exporter in config.exporters:
         for name in sorted(exporter.needs - annotators.keys()):
-            annotators[name] = TABLES["annotation"].load(name)()
+            annotators[name] = default_plugin(ANNOTATIONS, name)
     return list(annotators.values())
 
 
-def _exporters(spec: Spec, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
+def _exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
     exporters: dict[str, Exporter] = {}
-    for exporter in spec.exporters:
-        name = exporter.type
-        if name in exporters:
-            raise ConfigError(f"exporters: '{name}' is listed twice")
+    for exporter in config.exporters:
+        if exporter.type in exporters:
+            raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
         exporter.check(info)
-        exporters[name] = (
-            exporter.with_assets(library) if isinstance(exporter, GeometryExporter) else exporter
-        )
+        exporters[exporter.type] = exporter.with_assets(library)
     return exporters

@@ -5,10 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from generator.assemble.inheritance import ALL, NAMED
-from generator.assemble.spec import CONSTANT, PLUGIN_LISTS, VARYING, Head
-from generator.assemble.tables import TABLES
+from generator.assemble.spec import (
+    CONSTANT,
+    DEFAULT_RENDERER,
+    PLUGIN_LISTS,
+    VARYING,
+    GeneralSettings,
+)
+from generator.assemble.tables import ANNOTATIONS, RENDERERS
 from generator.config.schema import json_schema, with_shared_values
 from generator.config.strict import Strict
+from generator.core.plugins import PluginTable
 
 INHERITED = {
     "type": "object",
@@ -22,15 +29,17 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 def config_schema() -> dict[str, Any]:
     """Schema of a whole configuration, every plug-in of every table included."""
     definitions: dict[str, Any] = {}
-    schema = _hoisted(json_schema(Head), definitions)
+    schema = _hoisted(json_schema(GeneralSettings), definitions)
     properties = schema["properties"]
-    for key, kind in PLUGIN_LISTS.items():
+    for key, table in PLUGIN_LISTS.items():
         properties[key] = {
             "type": "array",
-            "items": {
-                "oneOf": [INHERITED, *(_plugin(kind, name, definitions) for name in TABLES[kind])]
-            },
+            "items": {"oneOf": [INHERITED, *(_plugin(table, name, definitions) for name in table)]},
         }
+    properties["render"] = {
+        "description": "How images are made.",
+        "anyOf": [_plugin(RENDERERS, name, definitions) for name in RENDERERS],
+    }
     # A configuration overrides its template's elements by name; a template lists them.
     properties["elements"] = {
         "description": "Overrides by element name, or the whole list of elements.",
@@ -53,7 +62,7 @@ def config_schema() -> dict[str, Any]:
     }
     properties["annotations"] = {
         "type": "array",
-        "items": {"oneOf": [{"enum": list(TABLES["annotation"])}, *_parametric(definitions)]},
+        "items": {"oneOf": [{"enum": list(ANNOTATIONS)}, *_parametric(definitions)]},
         "description": "What is computed about every object, image and sample.",
     }
     return {
@@ -66,23 +75,29 @@ def config_schema() -> dict[str, Any]:
 
 def _parametric(definitions: dict[str, Any]) -> list[dict[str, str]]:
     """Annotators that have parameters, which may be written as mappings."""
-    table = TABLES["annotation"]
     return [
-        _plugin("annotation", name, definitions)
-        for name in table
-        if issubclass(table.load(name), Strict)
+        _plugin(ANNOTATIONS, name, definitions)
+        for name in ANNOTATIONS
+        if _model(ANNOTATIONS, name).model_fields.keys() - {ANNOTATIONS.tag}
     ]
 
 
-def _plugin(kind: str, name: str, definitions: dict[str, Any]) -> dict[str, str]:
-    schema = json_schema(TABLES[kind].load(name))
-    if f"{kind}s" in VARYING:
-        schema = with_shared_values(schema, CONSTANT[f"{kind}s"])
+def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> dict[str, str]:
+    schema = json_schema(_model(table, name))
+    for key, varying in VARYING.items():
+        if table is varying:
+            schema = with_shared_values(schema, CONSTANT.get(key, ()))
     schema = _hoisted(schema, definitions)
-    # ``type`` chooses the plug-in, so it has to be written even where a default exists.
-    schema["required"] = sorted({"type", *schema.get("required", ())})
-    definitions[f"{kind}.{name}"] = schema
-    return {"$ref": f"#/$defs/{kind}.{name}"}
+    if (table, name) != (RENDERERS, DEFAULT_RENDERER):
+        # The tag chooses the plug-in, so it has to be written even where its field has a default.
+        schema["required"] = sorted({table.tag, *schema.get("required", ())})
+    definitions[f"{table.kind}.{name}"] = schema
+    return {"$ref": f"#/$defs/{table.kind}.{name}"}
+
+
+def _model(table: PluginTable[Any], name: str) -> type[Strict]:
+    model: type[Strict] = table.load(name)
+    return model
 
 
 def _hoisted(schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:

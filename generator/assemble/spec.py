@@ -1,18 +1,26 @@
-"""Spec: a whole configuration, read, merged with its template, and validated."""
+"""Config: a whole configuration, read, merged with its template, and validated."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Protocol, TypeVar
 
 from pydantic import Field, model_validator
 
 from generator.annotations.truth import Thresholds
 from generator.assemble.documents import config_document, resolved_document
-from generator.assemble.tables import TABLES
+from generator.assemble.tables import (
+    ANNOTATIONS,
+    ELEMENTS,
+    EXPORTERS,
+    RANDOMIZERS,
+    RENDERERS,
+    SENSORS,
+    make_plugin,
+)
 from generator.config.document import Node, parse
 from generator.config.paths import find_path
 from generator.config.problems import Problems
@@ -20,31 +28,26 @@ from generator.config.shared import drawn, probes, refers, resolved, varying_pla
 from generator.config.strict import Strict
 from generator.config.validation import validate
 from generator.core.errors import ConfigError, did_you_mean
+from generator.core.interfaces import (
+    AnyAnnotator,
+    Element,
+    Exporter,
+    Randomizer,
+    RendererSettings,
+    Sensor,
+)
+from generator.core.plugins import PluginTable
 from generator.core.scene import SharedValue
 from generator.core.streams import Streams
 from generator.physics import PhysicsConfig
 from generator.pipeline.splits import Assignment
-from generator.renderers.settings import RenderSettings
 
 SHARD_SIZE = 20
 """Small enough that few samples are redone after a crash and that all workers stay busy."""
 
+DEFAULT_RENDERER = "warp"
 
-class Render(RenderSettings):
-    """How images are made, and on what."""
-
-    device: str = Field(
-        "auto",
-        pattern=r"^(auto|cpu|cuda(:[0-9]+)?)$",
-        description="auto, cpu or cuda:N; auto takes a CUDA GPU where there is one.",
-    )
-
-    renderer: Literal["warp"] = Field("warp", description="Which renderer makes the images.")
-
-    @property
-    def settings(self) -> RenderSettings:
-        """What the renderer itself needs to know."""
-        return RenderSettings(**self.model_dump(exclude={"device", "renderer"}))
+P = TypeVar("P")
 
 
 class Splits(Strict):
@@ -73,7 +76,7 @@ class AssetFolders(Strict):
     folders: tuple[str, ...] = Field((), description="Folders of OBJ, GLB, PLY, STL or URDF files.")
 
 
-class Head(Strict):
+class GeneralSettings(Strict):
     """A configuration without its plug-ins."""
 
     seed: int = Field(0, ge=0, lt=2**63, description="Seed of the data set; 0 is a seed.")
@@ -91,7 +94,6 @@ class Head(Strict):
         0.0001, gt=0, le=1, description="Metres per unit of 16-bit depth images."
     )
     template: str = Field("", description="Name of a scene template.")
-    render: Render = Render()
     physics: PhysicsConfig = PhysicsConfig()
     labels: Thresholds = Thresholds()
     splits: Splits = Splits()
@@ -99,30 +101,27 @@ class Head(Strict):
 
 
 @dataclass(frozen=True)
-class Layout:
-    """What one scene is built and drawn from: the configuration with its shared values filled in.
+class SceneConfig:
+    """The part of a configuration that one scene is built and drawn from, shared values filled in.
 
     Attributes:
         shared: Names and values, sorted by name.
     """
 
     shared: tuple[tuple[str, SharedValue], ...]
-    elements: tuple[Any, ...]
-    randomizers: tuple[Any, ...]
-    sensors: tuple[Any, ...]
+    elements: tuple[Element, ...]
+    randomizers: tuple[Randomizer, ...]
+    sensors: tuple[Sensor, ...]
 
 
-PLUGIN_LISTS = {
-    "elements": "element",
-    "randomizers": "randomizer",
-    "sensors": "sensor",
-    "exporters": "exporter",
+VARYING: Mapping[str, PluginTable[Any]] = {
+    "elements": ELEMENTS,
+    "randomizers": RANDOMIZERS,
+    "sensors": SENSORS,
 }
-"""Lists of a configuration and the kind of plug-in they hold."""
+"""Lists that may depend on shared values, and the plug-ins they hold."""
 
-CONSTANT = {
-    "elements": ("type", "name"),
-    "randomizers": ("type", "name"),
+CONSTANT: Mapping[str, tuple[str, ...]] = {
     "sensors": (
         "type",
         "name",
@@ -136,51 +135,58 @@ CONSTANT = {
         "lens.model",
     ),
 }
-"""Lists that may depend on shared values, and the fields of their items that may not.
+"""Fields that may not: what all samples of a data set have in common, such as image sizes."""
 
-What all samples of a data set have in common, such as the size of its images, is no matter of a
-scene.
-"""
-
-VARYING = tuple(CONSTANT)
+PLUGIN_LISTS: Mapping[str, PluginTable[Any]] = {**VARYING, "exporters": EXPORTERS}
+"""Lists of plug-ins with a ``type``."""
 
 
 @dataclass(frozen=True)
-class Spec:
+class Config:
     """A validated configuration; picklable.
 
     Attributes:
         name: Of the configuration; names the default output folder.
         resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
-            the same Spec again.
+            the same Config again.
+        render: Settings of the renderer.
         exporters: Plug-ins, in order.
         annotations: Annotators by name, in order.
-        probes: Layouts that between them show what scenes can be; one where nothing is shared.
-        document: The merged document; layouts are made from it.
+        probes: Configurations of scenes that between them show what scenes can be; one where
+            nothing is shared.
+        document: The merged document; configurations of scenes are made from it.
     """
 
     name: str
     resolved: Mapping[str, Any]
-    head: Head
-    annotations: Mapping[str, Any]
-    exporters: tuple[Any, ...]
-    probes: tuple[Layout, ...]
+    general: GeneralSettings
+    render: RendererSettings
+    annotations: Mapping[str, AnyAnnotator]
+    exporters: tuple[Exporter, ...]
+    probes: tuple[SceneConfig, ...]
     document: Node = field(compare=False)
 
     @property
-    def elements(self) -> tuple[Any, ...]:
+    def elements(self) -> tuple[Element, ...]:
         """The template elements of the first scene."""
         return self.probes[0].elements
 
     @property
-    def randomizers(self) -> tuple[Any, ...]:
+    def randomizers(self) -> tuple[Randomizer, ...]:
         """The randomizers of the first scene."""
         return self.probes[0].randomizers
 
     @property
-    def sensors(self) -> tuple[Any, ...]:
+    def sensors(self) -> tuple[Sensor, ...]:
         """The sensors of the first scene; those of others differ in parameters only."""
         return self.probes[0].sensors
+
+    def plugins(self) -> Iterator[object]:
+        """Every plug-in that it is made of."""
+        yield self.render
+        yield from (*self.annotations.values(), *self.exporters)
+        for config in self.probes:
+            yield from (*config.elements, *config.randomizers, *config.sensors)
 
     def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
         """The shared values of one scene, sorted by name."""
@@ -189,13 +195,13 @@ class Spec:
             return ()
         return tuple(sorted(drawn(section, streams).items()))
 
-    def layout(self, shared: tuple[tuple[str, SharedValue], ...]) -> Layout:
-        """What a scene with these shared values is built and drawn from.
+    def scene_config(self, shared: tuple[tuple[str, SharedValue], ...]) -> SceneConfig:
+        """The configuration of a scene with these shared values.
 
         Raises:
             ConfigError: they make something invalid.
         """
-        return _layout(self.document, dict(shared)) if shared else self.probes[0]
+        return _scene_config(self.document, dict(shared)) if shared else self.probes[0]
 
     @property
     def asset_folders(self) -> tuple[Path, ...]:
@@ -210,18 +216,18 @@ class Spec:
     @property
     def split_shares(self) -> dict[str, float]:
         """Share of each split that has one, in order."""
-        splits = self.head.splits
+        splits = self.general.splits
         shares = {"train": splits.train, "val": splits.val, "test": splits.test}
         return {name: share for name, share in shares.items() if share > 0}
 
 
-def load_spec(
+def load_config(
     source: str,
     *,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Spec:
+) -> Config:
     """The configuration of that path or shipped name.
 
     Raises:
@@ -235,17 +241,17 @@ def load_spec(
     return _spec(document, Path(source).stem)
 
 
-def spec_of_source(
+def config_of_source(
     source: str,
     *,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Spec:
-    """Like ``load_spec``; a data set's folder stands for the configuration it was made with."""
+) -> Config:
+    """Like ``load_config``; a data set's folder stands for the configuration it was made with."""
     plan = Path(source) / "plan.json"
     if not plan.is_file():
-        return load_spec(source, seed=seed, overrides=overrides, without=without)
+        return load_config(source, seed=seed, overrides=overrides, without=without)
     try:
         kept = json.loads(plan.read_bytes())
         text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
@@ -255,25 +261,22 @@ def spec_of_source(
     return _spec(resolved_document(document, seed=seed, overrides=overrides, without=without), name)
 
 
-def _spec(document: Node, name: str) -> Spec:
+def _spec(document: Node, name: str) -> Config:
     assert isinstance(document.content, Mapping)
     problems = Problems()
-    apart = {*PLUGIN_LISTS, "annotations", "shared"}
+    apart = {*PLUGIN_LISTS, "annotations", "shared", "render"}
     head_node = Node(
         document.position,
         {key: node for key, node in document.content.items() if key not in apart},
         document.key_positions,
     )
-    head = validate(head_node, Head, problems)
+    head = validate(head_node, GeneralSettings, problems)
     for key, node in document.content.items():
         if key not in ("shared", *VARYING) and refers(node):
             fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
             problems.add(node.position, key, fact)
-    plugins = {
-        key: _plugins(document.content[key], key, kind, problems)
-        for key, kind in PLUGIN_LISTS.items()
-        if key not in VARYING
-    }
+    render = _renderer_settings(document.content["render"], problems)
+    exporters = _plugins(document.content["exporters"], "exporters", EXPORTERS, problems)
     annotations = _annotations(document.content["annotations"], problems)
     if not document.content["sensors"].content and not len(problems):
         problems.add(document.position, "sensors", "at least one sensor is needed")
@@ -282,17 +285,19 @@ def _spec(document: Node, name: str) -> Spec:
     probes_ = _probed(document, head.seed if head else 0, problems)
     problems.raise_if_any()
     assert head is not None
-    spec = Spec(
+    assert render is not None
+    config = Config(
         name,
         document.plain(),
         head,
-        annotations=annotations,
-        probes=probes_,
-        document=document,
-        **plugins,
+        render,
+        annotations,
+        tuple(exporter for exporter in exporters if exporter is not None),
+        probes_,
+        document,
     )
-    _ = spec.asset_folders  # A folder that is missing is refused before anything runs.
-    return spec
+    _ = config.asset_folders  # A folder that is missing is refused before anything runs.
+    return config
 
 
 def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
@@ -310,99 +315,121 @@ def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
     problems.raise_if_any()
 
 
-def _probed(document: Node, seed: int, problems: Problems) -> tuple[Layout, ...]:
-    """Layouts of everything that shared values can be, each once; faults are told once each."""
+def _probed(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, ...]:
+    """Configurations of all that shared values can be, each once; each fault is reported once."""
     section = document.get("shared")
     every = list(probes(section, seed)) if section is not None and section.content else [{}]
-    layouts: list[Layout] = []
+    configs: list[SceneConfig] = []
     for shared in every:
         found = Problems()
-        layout = _layout_or_problems(document, shared, found)
+        config = _scene_config_or_problems(document, shared, found)
         if len(found):
             problems.extend(found)
             break
-        if layout not in layouts:
-            layouts.append(layout)
-    return tuple(layouts)
+        if config not in configs:
+            configs.append(config)
+    return tuple(configs)
 
 
-def _layout(document: Node, shared: Mapping[str, SharedValue]) -> Layout:
+def _scene_config(document: Node, shared: Mapping[str, SharedValue]) -> SceneConfig:
     problems = Problems()
-    layout = _layout_or_problems(document, shared, problems)
+    config = _scene_config_or_problems(document, shared, problems)
     problems.raise_if_any()
-    return layout
+    return config
 
 
-def _layout_or_problems(
+def _scene_config_or_problems(
     document: Node, shared: Mapping[str, SharedValue], problems: Problems
-) -> Layout:
+) -> SceneConfig:
     lists = {}
     for key in VARYING:
         listed = document.get(key)
         assert listed is not None
-        if refers(listed):
-            listed = resolved(listed, shared, key)
-        lists[key] = _plugins(listed, key, PLUGIN_LISTS[key], problems)
-    return Layout(tuple(sorted(shared.items())), **lists)
+        lists[key] = resolved(listed, shared, key) if refers(listed) else listed
+    return SceneConfig(
+        tuple(sorted(shared.items())),
+        _named_plugins(lists["elements"], "elements", ELEMENTS, problems),
+        _named_plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems),
+        _named_plugins(lists["sensors"], "sensors", SENSORS, problems),
+    )
 
 
-def _plugins(listed: Node, key: str, kind: str, problems: Problems) -> tuple[Any, ...]:
-    """Each item read as the plug-in that its ``type`` names; names must be unique."""
+def _plugins(
+    listed: Node, key: str, table: PluginTable[P], problems: Problems
+) -> tuple[P | None, ...]:
+    """Each item read as the plug-in that its ``type`` names; None where that is impossible."""
     if not isinstance(listed.content, tuple):
-        problems.add(listed.position, key, f"expected a list of {kind}s")
+        problems.add(listed.position, key, f"expected a list of {table.kind}s")
         return ()
-    made: list[Any] = []
-    for number, node in enumerate(listed.content):
-        plugin = _plugin(node, f"{key}[{number}]", kind, problems)
-        if plugin is None:
-            continue
-        name = getattr(plugin, "name", "")
-        if name and name in {getattr(other, "name", "") for other in made}:
-            where = node.get("name") or node
-            fact = f"the name '{name}' is taken; expected a name of its own"
-            problems.add(where.position, f"{key}[{number}].name", fact)
-        made.append(plugin)
-    return tuple(made)
+    return tuple(
+        _plugin(node, f"{key}[{number}]", table, problems)
+        for number, node in enumerate(listed.content)
+    )
 
 
-def _plugin(node: Node, field: str, kind: str, problems: Problems) -> Any:
-    table = TABLES[kind]
-    kind_node = node.get("type")
-    if kind_node is None or not isinstance(kind_node.content, str):
-        where = node.position if kind_node is None else kind_node.position
-        fact = f"expected a {kind}: one of {', '.join(table)}"
-        problems.add(where, f"{field}.type", fact)
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+N = TypeVar("N", bound=_Named)
+
+
+def _named_plugins(
+    listed: Node, key: str, table: PluginTable[N], problems: Problems
+) -> tuple[N, ...]:
+    """The same for plug-ins with names, which must be unique."""
+    made = _plugins(listed, key, table, problems)
+    names: set[str] = set()
+    for number, plugin in enumerate(made):
+        if plugin is not None and plugin.name in names:
+            assert isinstance(listed.content, tuple)
+            node = listed.content[number]
+            fact = f"the name '{plugin.name}' is taken; expected a name of its own"
+            problems.add((node.get("name") or node).position, f"{key}[{number}].name", fact)
+        if plugin is not None:
+            names.add(plugin.name)
+    return tuple(plugin for plugin in made if plugin is not None)
+
+
+def _plugin(node: Node, field: str, table: PluginTable[P], problems: Problems) -> P | None:
+    tag = node.get(table.tag)
+    if tag is None or not isinstance(tag.content, str):
+        where = node.position if tag is None else tag.position
+        fact = f"expected a {table.kind}: one of {', '.join(table)}"
+        problems.add(where, f"{field}.{table.tag}", fact)
         return None
     try:
-        plugin = table.load(kind_node.content)
-    except ConfigError as unknown:
-        problems.add(kind_node.position, f"{field}.type", str(unknown))
+        return make_plugin(table, tag.content, node, problems, field)
+    except ConfigError as refused:
+        problems.add(tag.position, f"{field}.{table.tag}", str(refused))
         return None
-    return validate(node, plugin, problems, field)
 
 
-def _annotations(listed: Node, problems: Problems) -> dict[str, Any]:
+def _renderer_settings(node: Node, problems: Problems) -> RendererSettings | None:
+    """The section ``render``; without ``renderer`` it is that of the default renderer."""
+    if node.get(RENDERERS.tag) is not None:
+        return _plugin(node, "render", RENDERERS, problems)
+    return make_plugin(RENDERERS, DEFAULT_RENDERER, node, problems, "render")
+
+
+def _annotations(listed: Node, problems: Problems) -> dict[str, AnyAnnotator]:
     """Annotators by name; an item is a name, or a mapping with it as ``type`` and parameters."""
-    table = TABLES["annotation"]
     items = listed.content if isinstance(listed.content, tuple) else (listed,)
-    made: dict[str, Any] = {}
+    made: dict[str, AnyAnnotator] = {}
     for number, node in enumerate(items):
         field = f"annotations[{number}]"
         kind = node.get("type") or node
         name = kind.content
-        if not isinstance(name, str) or name not in table:
-            fact = f"unknown annotation {name!r}; expected one of {', '.join(table)}"
-            fact += did_you_mean(str(name), table)
+        if not isinstance(name, str) or name not in ANNOTATIONS:
+            fact = f"unknown annotation {name!r}; expected one of {', '.join(ANNOTATIONS)}"
+            fact += did_you_mean(str(name), ANNOTATIONS)
             problems.add(kind.position, field, fact)
-            continue
-        plugin = table.load(name)
-        if kind is node:
-            made.setdefault(name, plugin())
-        elif not issubclass(plugin, Strict):
-            fact = f"takes no parameters; expected the name alone: - {name}"
-            problems.add(node.position, field, fact)
-        elif name in made:
+        elif kind is not node and name in made:
             problems.add(node.position, field, f"the annotation '{name}' is listed twice")
         else:
-            made[name] = validate(node, plugin, problems, field)
+            entry = Node(node.position, {"type": node}) if kind is node else node
+            annotator = _plugin(entry, field, ANNOTATIONS, problems)
+            if annotator is not None:
+                made.setdefault(name, annotator)
     return made

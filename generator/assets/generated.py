@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Any, TypeVar
 
 from generator.assets.cache import Arrays, Store, content_key
@@ -11,15 +12,15 @@ from generator.assets.ids import AssetId, ParameterValue, shown
 from generator.assets.importer import Imported
 from generator.assets.packing import pack, pack_texture, unpack, unpack_texture
 from generator.assets.procedural.family import (
-    OURS,
     EnvironmentFamily,
     Facts,
     Family,
     TextureFamily,
 )
 from generator.core.cache import Sized
-from generator.core.errors import AssetError, did_you_mean
+from generator.core.errors import AssetError, ConfigError, did_you_mean
 from generator.core.geometry import Asset, Float32, TextureData
+from generator.core.plugins import loaded, package_of, third_party
 
 _MAX_SEED = 2**31 - 1
 _PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
@@ -34,6 +35,8 @@ TABLES = (
     "generator.assets.skies",
 )
 """Packages with tables ``FAMILIES``, ``TEXTURES`` or ``ENVIRONMENTS``."""
+KIND = "asset_family"
+"""Third-party packages add families through the entry-point group ``gen_data.asset_family``."""
 S = TypeVar("S", bound=Sized)
 
 
@@ -47,6 +50,12 @@ class Generated:
             for table in _tables()
             for name, family in table.items()
         }
+        self._packages: dict[str, str] = {}
+        for name, family, package in _third_party():
+            full_name = _PREFIXES[_kind(family)] + name
+            if full_name not in self._families:
+                self._families[full_name] = family
+                self._packages[full_name] = package
 
     def __contains__(self, name: str) -> bool:
         """Whether there is a family of that name."""
@@ -72,7 +81,7 @@ class Generated:
         """The asset of an id whose name is known. Raises AssetError on wrong parameters."""
         family = self._families[asset_id.name]
         facts = _facts(asset_id, family)
-        origin = family.origin if isinstance(family, Family) else OURS
+        origin = family.origin
         return Asset(
             asset_id=str(asset_id),
             kind=_kind(family),
@@ -149,9 +158,11 @@ class Generated:
     def _key(self, asset_id: AssetId, family: AnyFamily) -> str:
         arguments = _arguments(asset_id, family)
         parameters = {name: shown(value) for name, value in arguments.items()}
-        return content_key(
-            {"family": asset_id.name, "version": family.version, "parameters": parameters}
-        )
+        content = {"family": asset_id.name, "version": family.version, "parameters": parameters}
+        if asset_id.name in self._packages:
+            # Another release of a package, or another package, may use the same version number.
+            content["package"] = self._packages[asset_id.name]
+        return content_key(content)
 
 
 def _tables() -> Iterator[Mapping[str, AnyFamily]]:
@@ -159,6 +170,25 @@ def _tables() -> Iterator[Mapping[str, AnyFamily]]:
         module = importlib.import_module(name)
         for table in ("FAMILIES", "TEXTURES", "ENVIRONMENTS"):
             yield getattr(module, table, {})
+
+
+@cache
+def _third_party() -> tuple[tuple[str, AnyFamily, str], ...]:
+    """Name, family and package of every entry point of the group ``gen_data.asset_family``.
+
+    Raises:
+        ConfigError: one of them cannot be imported, or is no family.
+    """
+    found = []
+    for name, entry in sorted(third_party(KIND).items()):
+        family = loaded(entry.value, f"{KIND} '{name}'")
+        if not isinstance(family, (Family, TextureFamily, EnvironmentFamily)):
+            raise ConfigError(
+                f"{KIND} '{name}': {entry.value} is no Family, TextureFamily or EnvironmentFamily;"
+                " see generator.assets.procedural.family"
+            )
+        found.append((name, family, package_of(entry)))
+    return tuple(found)
 
 
 def _facts(asset_id: AssetId, family: AnyFamily) -> Facts:

@@ -39,11 +39,12 @@ def generate(choice: Choice, n: int, *, out: Path | None, workers: int | None) -
     workers = _core_count() if workers is None else workers
     if workers < 0:
         raise ConfigError(f"--workers: {workers}; expected at least 1, or 0 to run in this process")
-    spec = choice.spec()
-    scenes = -(-n // (spec.head.views_per_scene * spec.head.steps_per_scene))
-    warn_of_empty_splits(scenes, spec.split_shares, spec.head.splits.assign, spec.head.seed)
-    factory = PipelineFactory(spec, n)
-    folder = out if out is not None else Path("out") / spec.name
+    config = choice.config()
+    general = config.general
+    scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
+    warn_of_empty_splits(scenes, config.split_shares, general.splits.assign, general.seed)
+    factory = PipelineFactory(config, n)
+    folder = out if out is not None else Path("out") / config.name
     console = Console(stderr=True)
     with _progress_bar(console, n) as show:
         summary = run(

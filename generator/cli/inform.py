@@ -77,10 +77,10 @@ def _versions() -> str:
 def _renders() -> str:
     """One small sample of the shipped tabletop, through every stage."""
     from generator.assemble.recipe import open_pipeline
-    from generator.assemble.spec import load_spec
+    from generator.assemble.spec import load_config
 
-    spec = load_spec("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
-    with open_pipeline(spec) as pipeline:
+    config = load_config("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
+    with open_pipeline(config) as pipeline:
         sample = pipeline.sample(0)
     labelled = sum(len(truth.objects) for truth in sample.truth.values())
     return f"one sample, {labelled} objects labelled, {sample.attempts} layout attempt(s)"

@@ -54,8 +54,8 @@ def preview(
     from generator.assemble.recipe import open_pipeline
     from generator.preview.recording import save_recording, show_samples
 
-    spec = Choice(source, seed, overrides, without).spec()
-    with open_pipeline(spec) as pipeline:
+    config = Choice(source, seed, overrides, without).config()
+    with open_pipeline(config) as pipeline:
         samples = _samples(pipeline.sample, first, n)
         info = pipeline.info
         if save is not None:
@@ -119,11 +119,11 @@ def contact_sheet(
     wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))
     images: list[Image] = []
     for source in sources:
-        spec = Choice(source, seed, overrides, without).spec()
-        with open_pipeline(spec, extra_channels=frozenset(wanted)) as pipeline:
+        config = Choice(source, seed, overrides, without).config()
+        with open_pipeline(config, extra_channels=frozenset(wanted)) as pipeline:
             samples = _samples(pipeline.sample, first, n, step)
             info = pipeline.info
-            shown = info.media if own else dict.fromkeys(info.sensors, wanted)
+            shown = info.media if own else dict.fromkeys(info.cameras, wanted)
             drawn = tiles(samples, shown, labels=labels, devices=own)
             images += pictures(drawn, tile_px, captions=captions)
     write_sheet(arranged(images, columns), out)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from generator.assemble.spec import Spec
+    from generator.assemble.spec import Config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -29,11 +29,11 @@ class Choice:
     overrides: tuple[str, ...]
     without: tuple[str, ...]
 
-    def spec(self) -> Spec:
+    def config(self) -> Config:
         """The validated configuration."""
-        from generator.assemble.spec import spec_of_source
+        from generator.assemble.spec import config_of_source
 
-        return spec_of_source(
+        return config_of_source(
             self.source, seed=self.seed, overrides=self.overrides, without=self.without
         )
 

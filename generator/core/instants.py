@@ -33,7 +33,8 @@ def at(scene: Scene, time_s: float) -> Scene:
     that have happened by then. Changes are looked up from the beginning of time, so that the way
     there does not matter; a body whose first change lies ahead keeps what it has.
 
-    The boxes of instances of several bodies (robots) are measured again by whoever freezes scenes.
+    Boxes of instances of several bodies (robots) stay as they are, since their size takes geometry:
+    scenes for sensors and labels come from ``generator.pipeline.freeze.Timeline``.
     """
     if time_s == scene.time_s:
         return scene

@@ -1,15 +1,34 @@
-"""The seams: what each room of the house promises to the others.
+"""The seams: everything that the assembly, the runner and the pipeline use of a plug-in.
+
+How a plug-in is made
+---------------------
+A plug-in is a class that is named in the ``TABLE`` of its package, or by an entry point of the
+group ``gen_data.<kind>``. Classes of the kinds ``element``, ``randomizer``, ``sensor``,
+``annotation``, ``exporter`` and ``renderer`` derive from ``generator.config.strict.Strict``: their
+fields are the keys of their entry in YAML, and instances are made by validation of that entry. The
+field ``type`` is ``Literal["<name in the table>"]`` (``renderer`` instead of ``type`` for a
+renderer) with the name as its default. Instances are frozen, picklable, and made before any engine
+is opened, so loading their module imports no heavy library.
+
+Every member of a Protocol below is required. Bases supply those that few plug-ins need:
+``randomizers.base.RandomizerBase``, ``scene_templates.element.Element``,
+``generator.sensors.mounting.Mounted`` and ``Instrument``, ``exporters.base.ExporterBase``. A class
+that lacks a member is refused when it is loaded.
+
+The kind ``asset_family`` differs: its entry points name instances of
+``generator.assets.procedural.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
 
 Randomizers get no engine, annotators get no rng, exporters see one shard and compute ids instead
-of counting: what must not be done cannot be done.
+of counting: forbidden operations are impossible, not merely discouraged.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from types import TracebackType
 from typing import Protocol, runtime_checkable
 
 from generator.core.capture import Beams, Channel, Echoes, PointCloud, Reading, Table
@@ -29,6 +48,7 @@ from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth, Sample
 from generator.core.scene import Camera, Lane, Lidar, Scene, StageModel
 from generator.core.se3 import Vec3
 from generator.core.streams import Rng
+from generator.core.tables import Column
 
 
 class Stage(str, Enum):
@@ -104,6 +124,31 @@ class AssetLibrary(AssetIndex, Protocol):
         ...
 
 
+class Element(Protocol):
+    """One line of a template. Draws nothing: every scene of a template has the same elements."""
+
+    @property
+    def name(self) -> str:
+        """Instance name from the YAML; unique in the template."""
+        ...
+
+    @property
+    def follows_others(self) -> bool:
+        """Whether it is added after the elements that do not, whatever the order of the lines.
+
+        For groups of objects, which keep clear of everything that stands on their surfaces.
+        """
+        ...
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """A new scene with this element at its nominal place.
+
+        Raises:
+            ConfigError: a relation names nothing, or cannot hold.
+        """
+        ...
+
+
 class Randomizer(Protocol):
     """Frozen parameters and one pure method."""
 
@@ -117,8 +162,28 @@ class Randomizer(Protocol):
         """When it runs: the value of a Stage."""
         ...
 
+    @property
+    def motion_duration_s(self) -> float | None:
+        """How long the motion that it draws lasts, from time 0 [s]; None if it draws none.
+
+        Sequences that are longer are refused.
+        """
+        ...
+
+    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the assets that only it may bring into a scene; they are part of the plan.
+
+        Assets of nominal bodies and of object groups are known without it.
+        """
+        ...
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """A new scene; the given one stays as it is."""
+        """A new scene; the given one stays as it is.
+
+        Raises:
+            LayoutRejected: this draw cannot be carried out; the next attempt may.
+            ConfigError: no draw can.
+        """
         ...
 
 
@@ -136,7 +201,20 @@ class Settled:
 
 
 class PhysicsEngine(Protocol):
-    """Makes bodies rest and arms obey. A pure function of the scene: no memory between calls."""
+    """Settles bodies and moves arms. A pure function of the scene: no memory between calls."""
+
+    def __enter__(self) -> PhysicsEngine:
+        """Start the engine."""
+        ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Release everything the engine holds."""
+        ...
 
     def settle(self, scene: Scene) -> Settled:
         """The scene at rest."""
@@ -144,15 +222,70 @@ class PhysicsEngine(Protocol):
 
 
 class Renderer(Protocol):
-    """Light and rays. A pure function of its arguments; what it caches are assets."""
+    """Light and rays. A pure function of its arguments; it may cache assets."""
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
-        """Every asked channel of one camera; ``Reading.sensor`` is the camera's name."""
+        """Every requested channel of one camera, with the type and values listed at ``Channel``.
+
+        ``Reading.sensor`` is the camera's name. ``AMODAL`` fills ``Reading.silhouettes`` instead of
+        ``channels``; ``RGB`` and ``RADIANCE`` set ``Reading.ev100``.
+        """
         ...
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
-        """What the rays of a laser scanner's beams hit first, and how well it reflects."""
+        """The first surface on every ray of a laser scanner's beams, and how well it reflects."""
         ...
+
+
+class RendererSettings(Protocol):
+    """The section ``render:`` as one renderer reads it: its plug-in class."""
+
+    def open(self, assets: AssetLibrary) -> Renderer:
+        """A renderer with these settings.
+
+        Raises:
+            ConfigError: this machine cannot render so.
+        """
+        ...
+
+
+class Modality(str, Enum):
+    """The form of a sensor's readings."""
+
+    CAMERA = "camera"
+    """Images: ``Reading``. The sensor is among ``Scene.cameras``."""
+    LIDAR = "lidar"
+    """Points: ``PointCloud``. The sensor is among ``Scene.lidars``."""
+    DEVICE = "device"
+    """Rows of numbers: ``Table``. The sensor is among ``Scene.devices``."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorInfo:
+    """Self-description of one sensor; the same for all scenes.
+
+    Attributes:
+        name: Instance name from the YAML.
+        modality: The form of its readings.
+        kind: Of a device: ``Device.kind``, such as ``radar``; empty for the others.
+        channels: Of a camera: channels that are written as images, in the order of ``Channel``.
+        lens: Of a camera: model of its lens.
+        columns: Of a device: columns of its rows; the first is ``generator.core.tables.TIME``.
+        rate_hz: Readings per second; None = one at every step. Cameras and laser scanners read at
+            most once per step.
+        time_offset_s: How much later than the step's instant it reads [s].
+        needs_clear_view: Whether a place inside the body that carries it is refused.
+    """
+
+    name: str
+    modality: Modality
+    kind: str = ""
+    channels: tuple[Channel, ...] = ()
+    lens: LensModel = "pinhole"
+    columns: tuple[Column, ...] = ()
+    rate_hz: float | None = None
+    time_offset_s: float = 0.0
+    needs_clear_view: bool = False
 
 
 class Sensor(Protocol):
@@ -163,14 +296,32 @@ class Sensor(Protocol):
         """Instance name from the YAML."""
         ...
 
+    def describe(self) -> SensorInfo:
+        """What the rest of the program has to know of it."""
+        ...
+
     def mount(self, scene: Scene) -> Scene:
-        """The scene with the sensor's nominal camera, or its lidar, in it."""
+        """The scene with the sensor's nominal camera, lidar or device in it, by its name.
+
+        Raises:
+            ConfigError: the scene lacks what it is mounted on, or its rate does not fit.
+        """
         ...
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Reading | PointCloud | Table:
-        """What the sensor sees; ``channels`` are what annotators need beyond its own."""
+        """One reading, of the type that its modality names.
+
+        Args:
+            scene: At the instant of the reading.
+            renderer: To see the scene with.
+            channels: Needed by annotators, besides the sensor's own.
+            rng: Stream of this sensor at this step.
+
+        Raises:
+            SampleError: a randomizer made the sensor unfit.
+        """
         ...
 
 
@@ -227,20 +378,23 @@ class FrameAnnotator(Protocol):
         ...
 
 
+AnyAnnotator = Annotator | ImageAnnotator | FrameAnnotator
+"""An annotation plug-in has ``channels`` and the method of one of these Protocols, or of several.
+
+It fills in its own fields of the truth and leaves the rest as it is; it changes no argument.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class DatasetInfo:
-    """What every exporter may know about the data set as a whole.
+    """Facts about the data set as a whole, for exporters.
 
     Attributes:
         categories: Names; category id ``k`` is ``categories[k - 1]``.
-        sensors: Names of the cameras, sorted.
-        lidars: Names of the laser scanners, sorted.
-        media: ``{sensor: channels written as images}``.
+        sensors: Every sensor, sorted by name.
         depth_scale_m: Metres per unit of the 16-bit depth images.
-        devices: ``{sensor: kind}`` of all other sensors, sorted by name.
         steps_per_scene: Instants of one view: the length of a sequence.
         step_s: Time between them.
-        lenses: ``{camera: model of its lens}``; a pinhole where it is missing.
     """
 
     name: str
@@ -248,14 +402,41 @@ class DatasetInfo:
     n: int
     views_per_scene: int
     categories: tuple[str, ...]
-    sensors: tuple[str, ...]
-    media: Mapping[str, tuple[Channel, ...]]
+    sensors: tuple[SensorInfo, ...]
     depth_scale_m: float = 0.0001
-    lidars: tuple[str, ...] = ()
-    devices: Mapping[str, str] = field(default_factory=dict)
     steps_per_scene: int = 1
     step_s: float = 0.1
-    lenses: Mapping[str, LensModel] = field(default_factory=dict)
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of the cameras, sorted."""
+        return tuple(s.name for s in self._of(Modality.CAMERA))
+
+    @property
+    def lidars(self) -> tuple[str, ...]:
+        """Names of the laser scanners, sorted."""
+        return tuple(s.name for s in self._of(Modality.LIDAR))
+
+    @property
+    def devices(self) -> Mapping[str, str]:
+        """``{sensor: kind}`` of all other sensors, sorted by name."""
+        return {s.name: s.kind for s in self._of(Modality.DEVICE)}
+
+    @property
+    def media(self) -> Mapping[str, tuple[Channel, ...]]:
+        """``{camera: channels written as images}``."""
+        return {s.name: s.channels for s in self._of(Modality.CAMERA)}
+
+    def sensor(self, name: str) -> SensorInfo:
+        """The sensor of that name. Raises KeyError if there is none."""
+        for sensor in self.sensors:
+            if sensor.name == name:
+                return sensor
+        raise KeyError(name)
+
+    def _of(self, modality: Modality) -> list[SensorInfo]:
+        found = [s for s in self.sensors if s.modality is modality]
+        return sorted(found, key=lambda s: s.name)
 
 
 class Exporter(Protocol):
@@ -266,8 +447,25 @@ class Exporter(Protocol):
     """
 
     @property
+    def type(self) -> str:
+        """Its name in the table: the folder that ``finalize`` writes."""
+        ...
+
+    @property
     def needs(self) -> frozenset[str]:
         """Names of the annotators whose fields it reads."""
+        ...
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set that the format cannot hold.
+
+        Raises:
+            ConfigError: naming what it lacks, before anything is made.
+        """
+        ...
+
+    def with_assets(self, assets: AssetLibrary) -> Exporter:
+        """The exporter that writes; a format that holds geometry keeps the library."""
         ...
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -276,15 +474,6 @@ class Exporter(Protocol):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Merge all shards, given in index order, into the format's own layout."""
-        ...
-
-
-@runtime_checkable
-class GeometryExporter(Exporter, Protocol):
-    """An exporter of a format that holds geometry."""
-
-    def with_assets(self, assets: AssetLibrary) -> Exporter:
-        """The exporter that writes; what scenes are made of, it takes from the library."""
         ...
 
 

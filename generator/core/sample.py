@@ -93,6 +93,7 @@ class ObjectTruth:
         keypoints: In the order of ``instance.keypoints``; empty if it has none (keypoints).
         lidar_points: Points of each laser scanner on the instance, by sensor; None without one.
         motion: How it moves at the image's instant (motion).
+        extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
     instance: Instance
@@ -111,6 +112,7 @@ class ObjectTruth:
     keypoints: tuple[KeypointTruth, ...] | None = None
     lidar_points: Mapping[str, int] | None = None
     motion: MotionTruth | None = None
+    extra: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,12 +142,14 @@ class ImageTruth:
         objects: In order of instance id.
         borders: Of lanes, in order of the scene's (lanes).
         free_space: Pixels that show ground on which one may drive and nothing stands (free_space).
+        extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
     camera: Camera
     objects: tuple[ObjectTruth, ...]
     borders: tuple[BorderTruth, ...] | None = None
     free_space: MaskPx | None = None
+    extra: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -178,6 +182,7 @@ class FrameTruth:
             laser scanner at the instant of its own sweep (boxes3d).
         borders: Of lanes, world (lanes).
         birdseye: The ground from above (bev_map).
+        extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
     rig: str = ""
@@ -186,6 +191,7 @@ class FrameTruth:
     boxes3d: Mapping[str, Mapping[int, OrientedBox]] | None = None
     borders: tuple[LaneBorder, ...] | None = None
     birdseye: BirdseyeMap | None = None
+    extra: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -203,6 +209,7 @@ class Sample:
         timings_s: Seconds of CPU by stage. Never written to a data file.
         cameras: Sorted names of all cameras of the data set, also of those that do not read at
             this step; empty = those that do.
+        instants: The world at the readings of sensors that do not read at the sample's instant.
     """
 
     index: int
@@ -217,6 +224,11 @@ class Sample:
     step_index: int = 0
     cameras: tuple[str, ...] = ()
     frame: FrameTruth | None = None
+    instants: Mapping[str, Scene] = field(default_factory=dict)
+
+    def scene_of(self, sensor: str) -> Scene:
+        """The world when a sensor read; at the sample's instant where it did not."""
+        return self.instants.get(sensor, self.scene)
 
     def image_id(self, sensor: str) -> int:
         """Number of one image of the sample, from 1, unique in the data set."""

@@ -6,7 +6,7 @@ X forward, Y left, Z up, unless the name says otherwise.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -128,7 +128,12 @@ TABLE_COLUMNS: Mapping[str, tuple[Column, ...]] = {
 
 def table_dtype(kind: str) -> np.dtype[np.void]:
     """The type of the rows of one kind of device; KeyError if there is no such kind."""
-    return np.dtype([(column.name, column.type) for column in TABLE_COLUMNS[kind]])
+    return columns_dtype(TABLE_COLUMNS[kind])
+
+
+def columns_dtype(columns: Sequence[Column]) -> np.dtype[np.void]:
+    """Type of a row with these columns."""
+    return np.dtype([(column.name, column.type) for column in columns])
 
 
 def table_rows(kind: str, count: int, /, **columns: ArrayLike) -> NDArray[np.void]:

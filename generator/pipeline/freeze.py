@@ -3,14 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from generator.core.instants import with_twists
+from generator.core.instants import at, with_twists
 from generator.core.interfaces import AssetLibrary
 from generator.core.scene import Body, Instance, Scene
 from generator.core.se3 import SE3, Array, Vec3
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """A view through time: the only source of scenes that sensors and labels refer to.
+
+    Invariant: every scene it returns follows from the view at its beginning, whatever was asked
+    before, and its instances have the frames, boxes and motion of its own instant.
+
+    Attributes:
+        view: A frozen scene at time 0, with its sensors in their places.
+        category_ids: By name of the category.
+    """
+
+    view: Scene
+    assets: AssetLibrary
+    category_ids: Mapping[str, int]
+    _known: dict[float, Scene] = field(default_factory=dict)
+
+    def at(self, time_s: float) -> Scene:
+        """The scene at an instant; each is computed once."""
+        if time_s == self.view.time_s:
+            return self.view
+        if time_s not in self._known:
+            moved = at(self.view, time_s)
+            self._known[time_s] = frozen_scene(moved, self.assets, self.category_ids)
+        return self._known[time_s]
 
 
 def frozen_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:

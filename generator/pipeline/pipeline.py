@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from generator.core.capture import Capture, Channel, PointCloud, Reading, Table
 from generator.core.errors import LayoutRejected, Rejection, SceneRejected
-from generator.core.instants import at, with_placed_sensors
+from generator.core.instants import with_placed_sensors
 from generator.core.interfaces import (
     AssetLibrary,
     DatasetInfo,
@@ -26,7 +26,7 @@ from generator.core.interfaces import (
 from generator.core.sample import FrameTruth, ImageTruth, Sample
 from generator.core.scene import Scene
 from generator.core.streams import Streams
-from generator.pipeline.freeze import frozen_scene
+from generator.pipeline.freeze import Timeline, frozen_scene
 from generator.pipeline.scans import with_lidar_points
 from generator.pipeline.splits import Assignment, split_of
 
@@ -34,48 +34,38 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Blueprint:
-    """What one scene is made from.
+SceneParts = tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]
+"""A nominal scene with its sensors mounted, its randomizers, and its sensors."""
 
-    Attributes:
-        nominal: The template's scene, with the sensors mounted.
-    """
-
-    nominal: Scene
-    randomizers: Sequence[Randomizer]
-    sensors: Sequence[Sensor]
+SceneSource = Callable[[Streams], SceneParts]
+"""The parts of the scene of given streams: a pure function."""
 
 
 @dataclass(frozen=True, eq=False)
-class Recipe:
+class PipelineConfig:
     """What a pipeline does, as data and pure functions.
 
     Attributes:
-        blueprint: What the scene of these streams is made from: a pure function.
-        channels: What the annotators need to have been rendered.
+        info: The data set as its exporters see it.
+        open_scene: The beginning of every scene.
+        channels: Channels that annotators need.
         image_truth: Annotates one reading.
         frame_truth: Annotates a sample as a whole, given the scene at the sample's instant by
             ``""`` and at each laser scanner's by its name; None if there is nothing to say.
         split_shares: ``{split: share}`` in order; shares sum to 1.
         split_assignment: How scenes are assigned to splits.
         layout_attempts_max: Bound on the attempts at one scene.
-        info: The data set as its exporters see it.
-        strides: Every how many steps a sensor reads, by name, where that is not every one.
-        offsets_s: How much later than its step a sensor reads, by name, where that is not 0.
+        strides: Steps from one reading of a sensor to the next, by name, where that is not one.
     """
 
-    seed: int
-    views_per_scene: int
-    blueprint: Callable[[Streams], Blueprint]
+    info: DatasetInfo
+    open_scene: SceneSource
     channels: frozenset[Channel]
     image_truth: Callable[[Scene, Reading], ImageTruth]
     split_shares: Mapping[str, float]
     layout_attempts_max: int
-    info: DatasetInfo
     exporters: Mapping[str, Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
-    offsets_s: Mapping[str, float] = field(default_factory=dict)
     frame_truth: Callable[[Mapping[str, Scene]], FrameTruth | None] | None = None
     split_assignment: Assignment = "random"
 
@@ -110,7 +100,7 @@ class DrawnView:
 
 
 class Pipeline:
-    """Owns the engines; ``sample(index)`` depends on nothing but the recipe and the index.
+    """Owns the engines; ``sample(index)`` depends on nothing but the config and the index.
 
     The last accepted scene and view are kept, because the next index is usually another view or
     the next instant of them: an optimisation, never a state.
@@ -118,12 +108,12 @@ class Pipeline:
 
     def __init__(
         self,
-        recipe: Recipe,
+        config: PipelineConfig,
         assets: AssetLibrary,
         open_physics: Callable[[], PhysicsEngine],
         open_renderer: Callable[[], Renderer],
     ) -> None:
-        self.recipe = recipe
+        self.config = config
         self.assets = assets
         self._open_physics = open_physics
         self._open_renderer = open_renderer
@@ -131,12 +121,13 @@ class Pipeline:
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
         self._view: DrawnView | None = None
-        self._category_ids = {name: i for i, name in enumerate(recipe.info.categories, 1)}
+        self._offsets_s = {s.name: s.time_offset_s for s in config.info.sensors}
+        self._category_ids = {name: i for i, name in enumerate(config.info.categories, 1)}
 
     @property
     def info(self) -> DatasetInfo:
         """The data set as its exporters see it."""
-        return self.recipe.info
+        return self.config.info
 
     @cached_property
     def renderer(self) -> Renderer:
@@ -146,16 +137,14 @@ class Pipeline:
     @property
     def exporters(self) -> Mapping[str, Exporter]:
         """Exporters by name."""
-        return self.recipe.exporters
+        return self.config.exporters
 
     def __enter__(self) -> Pipeline:
         """Start the engines."""
         engine = self._open_physics()
-        # A machine that cannot draw says so before work begins.
+        # A machine that cannot render fails before work begins.
         _ = self.renderer
-        if hasattr(engine, "__enter__"):
-            engine = self._resources.enter_context(engine)  # type: ignore[arg-type]
-        self._physics = engine
+        self._physics = self._resources.enter_context(engine)
         return self
 
     def __exit__(
@@ -176,18 +165,21 @@ class Pipeline:
             SampleError: the labels contradict each other.
         """
         view_number, step_index = divmod(index, self.info.steps_per_scene)
-        scene_index, view_index = divmod(view_number, self.recipe.views_per_scene)
+        scene_index, view_index = divmod(view_number, self.info.views_per_scene)
         accepted = self.accepted_scene(scene_index)
         first = view_index == 0 and step_index == 0
         timings: dict[str, float] = dict(accepted.timings_s) if first else {}
         with _timed(timings, "randomize"):
             view = self.drawn_view(accepted, view_index)
-            scene = self._instant(view.scene, step_index * self.info.step_s)
+            timeline = Timeline(view.scene, self.assets, self._category_ids)
+            time_s = step_index * self.info.step_s
+            scene = timeline.at(time_s)
             streams = replace(view.streams, step=step_index)
-        capture, truth = self._captured(scene, accepted.sensors, streams, timings)
+        capture, truth = self._captured(accepted.sensors, timeline, time_s, streams, timings)
         with _timed(timings, "annotate"):
-            swept = {n: self._instant(scene, c.time_s) for n, c in capture.clouds.items()}
-            described = self.recipe.frame_truth
+            swept = {name: timeline.at(c.time_s) for name, c in capture.clouds.items()}
+            seen = {name: timeline.at(r.time_s) for name, r in capture.readings.items()}
+            described = self.config.frame_truth
             frame = described({"": scene, **swept}) if described is not None else None
         return Sample(
             index=index,
@@ -200,45 +192,40 @@ class Pipeline:
             truth=with_lidar_points(truth, capture.clouds),
             attempts=accepted.attempt + 1,
             timings_s=timings,
-            cameras=self.info.sensors,
+            cameras=self.info.cameras,
             frame=frame,
+            instants={n: s for n, s in {**swept, **seen}.items() if s is not scene},
         )
 
     def _captured(
         self,
-        scene: Scene,
         sensors: Sequence[Sensor],
+        timeline: Timeline,
+        time_s: float,
         streams: Streams,
         timings_s: dict[str, float],
     ) -> tuple[Capture, dict[str, ImageTruth]]:
-        """What every sensor sees at its own instant, and the truth about every image at that."""
+        """The readings of every sensor at its own instant, and the truth about every image."""
         readings: dict[str, Reading] = {}
         clouds: dict[str, PointCloud] = {}
         tables: dict[str, Table] = {}
         truth: dict[str, ImageTruth] = {}
         for sensor in sensors:
-            if streams.step % self.recipe.strides.get(sensor.name, 1):
+            if streams.step % self.config.strides.get(sensor.name, 1):
                 continue
             rng = streams.rng(f"sensor/{sensor.name}")
-            then = self._instant(scene, scene.time_s + self.recipe.offsets_s.get(sensor.name, 0.0))
+            scene = timeline.at(time_s + self._offsets_s[sensor.name])
             with _timed(timings_s, "render"):
-                seen = sensor.capture(then, self.renderer, self.recipe.channels, rng)
+                seen = sensor.capture(scene, self.renderer, self.config.channels, rng)
             if isinstance(seen, PointCloud):
                 clouds[sensor.name] = seen
             elif isinstance(seen, Table):
                 tables[sensor.name] = seen
             else:
                 with _timed(timings_s, "annotate"):
-                    then = self._instant(then, seen.time_s)
-                    truth[sensor.name] = self.recipe.image_truth(then, seen)
+                    truth[sensor.name] = self.config.image_truth(timeline.at(seen.time_s), seen)
                 readings[sensor.name] = seen
         return Capture(readings, clouds, tables), truth
-
-    def _instant(self, scene: Scene, time_s: float) -> Scene:
-        """The scene at another instant, its instances measured anew."""
-        if time_s == scene.time_s:
-            return scene
-        return frozen_scene(at(scene, time_s), self.assets, self._category_ids)
 
     def accepted_scene(self, scene_index: int) -> AcceptedScene:
         """The scene at rest that all views of it share."""
@@ -248,19 +235,19 @@ class Pipeline:
 
     def split(self, scene_index: int) -> str:
         """The split that all views of a scene belong to."""
-        recipe = self.recipe
-        return split_of(scene_index, recipe.split_shares, recipe.split_assignment, recipe.seed)
+        config = self.config
+        return split_of(scene_index, config.split_shares, config.split_assignment, self.info.seed)
 
     def _accept(self, scene_index: int) -> AcceptedScene:
         assert self._physics is not None, "use the pipeline as a context manager"
         timings: dict[str, float] = {}
         rejections: list[Rejection] = []
-        for attempt in range(self.recipe.layout_attempts_max):
-            streams = Streams(self.recipe.seed, scene_index, attempt=attempt, index=scene_index)
+        for attempt in range(self.config.layout_attempts_max):
+            streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
             try:
                 with _timed(timings, "randomize"):
-                    plan = self.recipe.blueprint(streams)
-                    scene = self._randomized(plan.nominal, plan.randomizers, Stage.BUILD, streams)
+                    nominal, randomizers, sensors = self.config.open_scene(streams)
+                    scene = self._randomized(nominal, randomizers, Stage.BUILD, streams)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
                 continue
@@ -268,9 +255,7 @@ class Pipeline:
                 settled = self._physics.settle(scene)
             if settled.rejection is None:
                 scene = frozen_scene(settled.scene, self.assets, self._category_ids)
-                return AcceptedScene(
-                    scene_index, scene, plan.randomizers, plan.sensors, attempt, timings
-                )
+                return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
             rejections.append(settled.rejection)
         raise SceneRejected(scene_index, tuple(rejections))
 
@@ -286,11 +271,11 @@ class Pipeline:
 
     def _draw_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
         """A view that cannot be drawn is tried again."""
-        number = accepted.index * self.recipe.views_per_scene + view_index
+        number = accepted.index * self.info.views_per_scene + view_index
         rejections: list[Rejection] = []
-        for attempt in range(self.recipe.layout_attempts_max):
+        for attempt in range(self.config.layout_attempts_max):
             streams = Streams(
-                self.recipe.seed, accepted.index, view=view_index, attempt=attempt, index=number
+                self.info.seed, accepted.index, view=view_index, attempt=attempt, index=number
             )
             try:
                 scene = self._randomized(accepted.scene, accepted.randomizers, Stage.VIEW, streams)

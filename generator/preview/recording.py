@@ -269,7 +269,7 @@ def _record_all(recorder: Recorder, samples: Iterable[Sample]) -> None:
 
 def _layout(info: DatasetInfo) -> rrb.Blueprint:
     world = rrb.Spatial3DView(origin="world", name="scene")
-    cameras = rrb.Vertical(*(_camera_view(info, name) for name in info.sensors))
+    cameras = rrb.Vertical(*(_camera_view(info, name) for name in info.cameras))
     return rrb.Blueprint(rrb.Horizontal(world, cameras), collapse_panels=True)
 
 

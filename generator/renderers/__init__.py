@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from generator.core.interfaces import RendererSettings
 from generator.core.plugins import PluginTable
 
-TABLE = PluginTable("renderer", {"warp": "generator.renderers.warp:WarpRenderer"})
+TABLE = PluginTable[RendererSettings](
+    "renderer",
+    {"warp": "generator.renderers.plugin:WarpPlugin"},
+    (RendererSettings,),
+    tag="renderer",
+)

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 from generator import __version__
-from generator.assemble.recipe import PipelineFactory
+from generator.assemble.recipe import PipelineFactory, annotators_of
+from generator.assemble.tables import third_party_packages
 from generator.assets.library import open_library
 from generator.assets.packs import TAG, installed
 from generator.assets.paths import packs_dir
 from generator.core.geometry import Asset
 from generator.core.scene import Scene
 from generator.runner.plan import Plan
-from randomizers.base import RandomizerBase
 
 BYTES_DEPEND_ON = (
     "numpy",
@@ -27,18 +27,19 @@ BYTES_DEPEND_ON = (
 
 def plan_of(factory: PipelineFactory) -> Plan:
     """The identity of the data set that a factory makes."""
-    spec = factory.spec
+    config = factory.config
     assets = possible_assets(factory)
     return Plan(
-        config=spec.resolved,
-        name=spec.name,
-        seed=spec.head.seed,
+        config=config.resolved,
+        name=config.name,
+        seed=config.general.seed,
         n=factory.n,
-        shard_size=spec.head.shard_size,
+        shard_size=config.general.shard_size,
         versions={
             "gen-data": __version__,
             **{name: _release(name) for name in BYTES_DEPEND_ON},
             **_packs(assets),
+            **third_party_packages((*config.plugins(), *annotators_of(config))),
         },
         assets={asset.asset_id: asset.sha256 for asset in assets},
     )
@@ -46,7 +47,7 @@ def plan_of(factory: PipelineFactory) -> Plan:
 
 def licences_text(factory: PipelineFactory, used: Sequence[str]) -> str:
     """Markdown table of the assets with these ids, grouped by where they come from."""
-    library = open_library(factory.spec.asset_folders)
+    library = open_library(factory.config.asset_folders)
     groups: dict[tuple[str, str, str], list[str]] = {}
     for asset in (library.get(asset_id) for asset_id in used):
         family = asset.asset_id.partition("?")[0]
@@ -62,14 +63,13 @@ def licences_text(factory: PipelineFactory, used: Sequence[str]) -> str:
 
 def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
     """Every object, robot and panorama that a sample may contain, sorted by id."""
-    library = open_library(factory.spec.asset_folders)
+    library = open_library(factory.config.asset_folders)
     ids = {asset_id for scene in factory.nominal for asset_id in _ids(scene)}
     drawn = {
         asset_id
-        for layout in factory.spec.probes
-        for randomizer in layout.randomizers
-        if isinstance(randomizer, RandomizerBase)
-        for asset_id in randomizer.may_draw(library)
+        for scene in factory.config.probes
+        for randomizer in scene.randomizers
+        for asset_id in randomizer.possible_assets(library)
     }
     return tuple(library.get(asset_id) for asset_id in sorted(ids | drawn))
 

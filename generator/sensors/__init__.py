@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from generator.core.interfaces import Sensor
 from generator.core.plugins import PluginTable
 
-TABLE = PluginTable(
+TABLE = PluginTable[Sensor](
     "sensor",
     {
         "rgb_camera": "generator.sensors.rgb_camera:RgbCamera",
@@ -17,4 +18,5 @@ TABLE = PluginTable(
         "radar": "generator.sensors.radar:Radar",
         "watcher": "generator.sensors.watcher:Watcher",
     },
+    (Sensor,),
 )

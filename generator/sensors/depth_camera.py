@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from pydantic import Field, field_validator
 
 from generator.core.capture import Channel, Reading
 from generator.core.errors import SampleError
-from generator.core.interfaces import Renderer
+from generator.core.interfaces import Renderer, SensorInfo
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Scene
 from generator.core.streams import Rng
@@ -53,7 +53,6 @@ class DepthCamera(Mounted):
         channels: What is written as images.
     """
 
-    modality: ClassVar[Literal["camera", "lidar"]] = "camera"
     type: Literal["depth_camera"] = "depth_camera"
     name: str = Field("depth_camera", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: str | DepthModel = "kinect_v2"
@@ -83,6 +82,10 @@ class DepthCamera(Mounted):
         width_px, height_px = self.size_px or device.size_px
         hfov_deg = device.hfov_deg if self.hfov_deg is None else self.hfov_deg
         return Intrinsics.from_hfov(width_px, height_px, math.radians(hfov_deg))
+
+    def describe(self) -> SensorInfo:
+        """A camera with the channels that it writes."""
+        return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this camera in it, looking at the scene's focus; as it is if it was.

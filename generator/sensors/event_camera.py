@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -12,7 +12,7 @@ from pydantic import Field
 from generator.core.capture import Channel, Table
 from generator.core.errors import ConfigError
 from generator.core.instants import RIG_AXES, at
-from generator.core.interfaces import Renderer
+from generator.core.interfaces import Renderer, SensorInfo
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Device, Scene
 from generator.core.se3 import Array
@@ -30,6 +30,7 @@ from generator.sensors.event_pixels import (
 from generator.sensors.mounting import Mounted, checked_rate, known_rig, window_s
 
 SidePx = Annotated[int, Field(ge=8, le=2048)]
+KIND = "event_camera"
 CHANNELS = frozenset({Channel.RADIANCE, Channel.INSTANCE})
 
 
@@ -53,7 +54,6 @@ class EventCamera(Mounted):
         shot_noise_hz: Events per pixel and second that noise makes in the dark.
     """
 
-    modality: ClassVar[str] = "event_camera"
     type: Literal["event_camera"] = "event_camera"
     name: str = Field("events", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     camera: str = "color"
@@ -65,6 +65,10 @@ class EventCamera(Mounted):
     refractory_s: float = Field(0.0005, ge=0, le=1)
     leak_hz: float = Field(0.1, ge=0, le=1000)
     shot_noise_hz: float = Field(0.5, ge=0, le=1000)
+
+    def describe(self) -> SensorInfo:
+        """A device that sees nothing from inside the body that carries it."""
+        return self._device_info(self.name, KIND, needs_clear_view=not self.inside)
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this device on its rig, or at its camera.
@@ -82,7 +86,7 @@ class EventCamera(Mounted):
             )
         device = Device(
             self.name,
-            self.modality,
+            KIND,
             rig,
             self.T_rig_sensor,
             camera="" if rig else self.camera,

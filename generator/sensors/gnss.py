@@ -76,7 +76,7 @@ class Gnss(Instrument):
         noise: Factor on the model's errors; 0 = an ideal device.
     """
 
-    modality: ClassVar[str] = "gnss"
+    kind: ClassVar[str] = "gnss"
     type: Literal["gnss"] = "gnss"
     name: str = Field("gnss", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: Annotated[str, AfterValidator(lambda name: known_preset(MAKES, name))] = "standalone"

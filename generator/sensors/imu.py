@@ -61,7 +61,7 @@ class Imu(Instrument):
         noise: Factor on the model's errors; 0 = an ideal device.
     """
 
-    modality: ClassVar[str] = "imu"
+    kind: ClassVar[str] = "imu"
     type: Literal["imu"] = "imu"
     name: str = Field("imu", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: Annotated[str, AfterValidator(lambda name: known_preset(MAKES, name))] = "RT3003"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from pydantic import Field, WithJsonSchema, field_validator
 
 from generator.core.capture import POINT, Beams, Channel, PointCloud
 from generator.core.errors import ConfigError, did_you_mean
-from generator.core.interfaces import Renderer
+from generator.core.interfaces import Modality, Renderer, SensorInfo
 from generator.core.scene import Lidar, Scene, Weather
 from generator.core.streams import Rng
 from generator.sensors.air import dimmed, optical_depth, rain_noise_m, with_air
@@ -75,7 +75,6 @@ class LidarSensor(Mounted):
             all pulses leave in the middle of the sweep.
     """
 
-    modality: ClassVar[Literal["camera", "lidar"]] = "lidar"
     type: Literal["lidar"] = "lidar"
     name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: str | LidarModel = "HDL-64E"
@@ -104,6 +103,16 @@ class LidarSensor(Mounted):
         if self.rotation_hz is not None:
             model = model.model_copy(update={"rotation_hz": self.rotation_hz})
         return model.with_beams(self.beams) if self.beams else model
+
+    def describe(self) -> SensorInfo:
+        """A laser scanner."""
+        return SensorInfo(
+            self.name,
+            Modality.LIDAR,
+            rate_hz=self.rate_hz,
+            time_offset_s=self.time_offset_s,
+            needs_clear_view=not self.inside,
+        )
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this scanner on its rig.

@@ -10,11 +10,14 @@ import numpy as np
 from pydantic import Field
 
 from generator.config.strict import Strict
+from generator.core.capture import Channel
 from generator.core.errors import ConfigError, did_you_mean
-from generator.core.interfaces import AssetIndex
+from generator.core.instants import RIG_AXES
+from generator.core.interfaces import AssetIndex, Modality, SensorInfo
+from generator.core.lens import LensModel
 from generator.core.scene import Device, Scene
 from generator.core.se3 import SE3, Array
-from generator.core.tables import TIME_DECIMALS
+from generator.core.tables import TABLE_COLUMNS, TIME_DECIMALS
 
 BURIED_M = 0.05
 """Sensors may sink in as deep as this: they are bolted on, and bounds are not the hull."""
@@ -52,6 +55,30 @@ class Mounted(Strict):
         turned = SE3.about_z(math.radians(self.yaw_deg), self.offset_m)
         return (turned @ upwards @ leaning).rounded()
 
+    def _camera_info(self, name: str, channels: tuple[Channel, ...], lens: LensModel) -> SensorInfo:
+        """Self-description of a camera that writes these channels."""
+        return SensorInfo(
+            name,
+            Modality.CAMERA,
+            channels=channels,
+            lens=lens,
+            rate_hz=self.rate_hz,
+            time_offset_s=self.time_offset_s,
+            needs_clear_view=not self.inside,
+        )
+
+    def _device_info(self, name: str, kind: str, needs_clear_view: bool = False) -> SensorInfo:
+        """Self-description of a device of one of the kinds of ``TABLE_COLUMNS``."""
+        return SensorInfo(
+            name,
+            Modality.DEVICE,
+            kind,
+            columns=TABLE_COLUMNS[kind],
+            rate_hz=self.rate_hz,
+            time_offset_s=self.time_offset_s,
+            needs_clear_view=needs_clear_view,
+        )
+
 
 class Instrument(Mounted):
     """A sensor on a rig that reports rows of a table.
@@ -62,7 +89,7 @@ class Instrument(Mounted):
         rate_hz: Readings per second, a whole number per step, or of steps; null = one per step.
     """
 
-    modality: ClassVar[str]
+    kind: ClassVar[str]
     name: str = Field("instrument", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     rig: str = "ego"
 
@@ -70,6 +97,10 @@ class Instrument(Mounted):
     def device_model(self) -> str:
         """What it is, for the labels; empty = nothing in particular."""
         return ""
+
+    def describe(self) -> SensorInfo:
+        """A device with the columns of its kind."""
+        return self._device_info(self.name, self.kind)
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this device on its rig.
@@ -79,7 +110,7 @@ class Instrument(Mounted):
         """
         rig = known_rig(scene, self.name, self.rig)
         checked_rate(self.name, self.rate_hz, scene.step_s)
-        device = Device(self.name, self.modality, rig, self.T_rig_sensor, model=self.device_model)
+        device = Device(self.name, self.kind, rig, self.T_rig_sensor, model=self.device_model)
         return replace(scene, devices=(*scene.devices, device))
 
 
@@ -98,26 +129,26 @@ def known_rig(scene: Scene, sensor: str, rig: str) -> str:
     return rig
 
 
-def refuse_buried(scene: Scene, name: str, sensor: Mounted, assets: AssetIndex) -> None:
-    """Refuse a camera or laser scanner inside the body that carries it, where it sees nothing else.
+def refuse_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
+    """Refuse a sensor inside the body that carries it, where it sees nothing else.
 
-    Inside is what the body's bounding box holds, more than ``BURIED_M`` from each of its faces.
+    Inside is the space within the body's bounding box, more than ``BURIED_M`` from its faces.
 
     Args:
-        scene: With the sensor's rig.
+        scene: With the sensor mounted; without a rig, anything goes.
         name: Of the sensor.
-        sensor: On that rig; without one, or with ``inside``, anything goes.
         assets: For the body's bounds.
 
     Raises:
-        ConfigError: it is, and is not meant to be.
+        ConfigError: it is inside.
     """
-    if not sensor.rig or sensor.inside:
+    on_rig, T_rig_sensor = mounted_at(scene, name)
+    if not on_rig:
         return
-    rig = scene.rig(sensor.rig)
+    rig = scene.rig(on_rig)
     body = scene.body(rig.body)
     low_m, high_m = assets.bounds_m(body.asset)
-    place_m = (rig.T_body_rig @ sensor.T_rig_sensor).translation_m
+    place_m = (rig.T_body_rig @ T_rig_sensor).translation_m
     depth_m = min(
         min(at - body.scale * low, body.scale * high - at)
         for at, low, high in zip(place_m, low_m, high_m, strict=True)
@@ -129,6 +160,24 @@ def refuse_buried(scene: Scene, name: str, sensor: Mounted, assets: AssetIndex) 
             f" '{rig.name}'; move it out (its top is at {top_m:.2f} m on the rig), or say"
             " inside: true"
         )
+
+
+def mounted_at(scene: Scene, name: str) -> tuple[str, SE3]:
+    """Rig and pose on it of a camera, laser scanner or device; an empty name for no rig.
+
+    Raises:
+        KeyError: the scene has no sensor of that name.
+    """
+    for camera in scene.cameras:
+        if camera.name == name:
+            return camera.rig, camera.T_rig_camera @ RIG_AXES
+    for lidar in scene.lidars:
+        if lidar.name == name:
+            return lidar.rig, lidar.T_rig_lidar
+    for device in scene.devices:
+        if device.name == name:
+            return device.rig, device.T_rig_device
+    raise KeyError(name)
 
 
 def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:

@@ -41,7 +41,7 @@ class Odometer(Instrument):
         yaw_rate_bias_rad_s: Standard deviation of a bias that is drawn once per sequence.
     """
 
-    modality: ClassVar[str] = "odometer"
+    kind: ClassVar[str] = "odometer"
     type: Literal["odometer"] = "odometer"
     name: str = Field("odometer", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     wheelbase_m: float = Field(2.7, gt=0, le=20)

@@ -73,7 +73,7 @@ class Radar(Instrument):
             false alarms, and whatever is detected half of the time is detected always.
     """
 
-    modality: ClassVar[str] = "radar"
+    kind: ClassVar[str] = "radar"
     type: Literal["radar"] = "radar"
     name: str = Field("radar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: Annotated[str, AfterValidator(lambda name: known_preset(MAKES, name))] = "ARS408-21"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from generator.core.capture import Channel, Reading
 from generator.core.errors import ConfigError, SampleError, did_you_mean
 from generator.core.instants import RIG_AXES
-from generator.core.interfaces import Renderer
+from generator.core.interfaces import Renderer, SensorInfo
 from generator.core.intrinsics import Intrinsics
 from generator.core.scene import Camera, Region, Scene
 from generator.core.se3 import SE3, look_at
@@ -78,7 +78,6 @@ class RgbCamera(Mounted):
             to its right that makes a rectified pair with it.
     """
 
-    modality: ClassVar[Literal["camera", "lidar"]] = "camera"
     type: Literal["rgb_camera"] = "rgb_camera"
     name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     size_px: tuple[SidePx, SidePx] = (640, 480)
@@ -130,6 +129,10 @@ class RgbCamera(Mounted):
     def media(self) -> tuple[Channel, ...]:
         """Channels that are written as images, in a fixed order."""
         return tuple(channel for channel in Channel if channel.value in self.channels)
+
+    def describe(self) -> SensorInfo:
+        """A camera with the channels that it writes."""
+        return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
 
     def mount(self, scene: Scene) -> Scene:
         """The scene with this camera in it, looking at the scene's focus; as it is if it was."""

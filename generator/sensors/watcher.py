@@ -56,7 +56,7 @@ class Watcher(Instrument):
         resolution_s: Between the instants at which collisions and lines are looked for.
     """
 
-    modality: ClassVar[str] = "watcher"
+    kind: ClassVar[str] = "watcher"
     type: Literal["watcher"] = "watcher"
     name: str = Field("watcher", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     events: tuple[Occurrence, ...] = Field(EVERYTHING, min_length=1)

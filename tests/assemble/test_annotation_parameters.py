@@ -11,7 +11,7 @@ from generator.annotations.bev_map import BevMap
 from generator.annotations.boxes2d import Boxes2d
 from generator.annotations.lanes import Lanes
 from generator.assemble.schema import config_schema
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.config.describe import describe
 from generator.core.errors import ConfigError
 
@@ -22,7 +22,7 @@ def loaded(tmp_path: Path, annotations: str) -> dict[str, object]:
     """The annotators of a configuration, by name."""
     path = tmp_path / "some.yaml"
     path.write_text(f"{CAMERA}annotations: {annotations}\n")
-    return dict(load_spec(str(path)).annotations)
+    return dict(load_config(str(path)).annotations)
 
 
 def test_names_and_mappings_may_be_mixed(tmp_path: Path) -> None:
@@ -38,7 +38,7 @@ def test_names_and_mappings_may_be_mixed(tmp_path: Path) -> None:
     [
         ("[{type: bev_map, pxm: 0.5}]", r"annotations\[0\].pxm: unknown key .*'px_m'"),
         ("[{type: bev_map, px_m: -1}]", r"annotations\[0\].px_m: "),
-        ("[{type: boxes2d, px_m: 1}]", "takes no parameters; expected the name alone: - boxes2d"),
+        ("[{type: boxes2d, px_m: 1}]", r"annotations\[0\].px_m: unknown key"),
         ("[lanes, {type: lanes, far_m: 9}]", "the annotation 'lanes' is listed twice"),
         ("[{type: bev_mpa}]", "unknown annotation 'bev_mpa'; .*did you mean 'bev_map'"),
         ("[{px_m: 1}]", "unknown annotation"),

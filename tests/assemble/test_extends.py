@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from generator.assemble.documents import config_document
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.errors import ConfigError
 
 BASE = """\
@@ -44,7 +44,7 @@ def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
 def refusal(source: str) -> str:
     """The message with which a configuration is refused."""
     with pytest.raises(ConfigError) as caught:
-        load_spec(source)
+        load_config(source)
     return str(caught.value)
 
 
@@ -99,19 +99,19 @@ randomizers: [{type: materials, name: clutter}]
 def test_a_chain_is_followed_and_paths_start_from_each_file(folder: Path) -> None:
     """``../base.yaml`` is relative to the file that says so, whatever the current folder is."""
     written(folder, "extends: ../base.yaml\nseed: 4\n", "sub/middle.yaml")
-    spec = load_spec(written(folder, "extends: sub/middle.yaml\nviews_per_scene: 2\n"))
+    spec = load_config(written(folder, "extends: sub/middle.yaml\nviews_per_scene: 2\n"))
 
-    assert (spec.head.seed, spec.head.views_per_scene, spec.name) == (4, 2, "mine")
+    assert (spec.general.seed, spec.general.views_per_scene, spec.name) == (4, 2, "mine")
 
 
 def test_shipped_configurations_can_be_extended_even_by_one_of_the_same_name(
     folder: Path,
 ) -> None:
     """A file never means itself."""
-    spec = load_spec(written(folder, "extends: tabletop.yaml\nseed: 99\n", "tabletop.yaml"))
+    spec = load_config(written(folder, "extends: tabletop.yaml\nseed: 99\n", "tabletop.yaml"))
 
-    assert spec.head.seed == 99
-    assert spec.randomizers == load_spec("tabletop").randomizers
+    assert spec.general.seed == 99
+    assert spec.randomizers == load_config("tabletop").randomizers
 
 
 def test_an_error_in_an_inherited_value_points_to_its_own_file(folder: Path) -> None:
@@ -139,7 +139,7 @@ def test_a_chain_has_an_end(folder: Path) -> None:
         written(folder, f"extends: c{k + 1}.yaml\n", f"c{k}.yaml")
     written(folder, BASE, "c10.yaml")
 
-    assert load_spec(str(folder / "c2.yaml")).head.seed == 3
+    assert load_config(str(folder / "c2.yaml")).general.seed == 3
     assert "more than 8 configurations extend one another" in refusal(str(folder / "c1.yaml"))
 
 
@@ -181,7 +181,7 @@ def template_of(folder: Path, defaults: str) -> str:
 
 def test_a_template_lays_down_what_elements_of_a_type_have_in_common(tmp_path: Path) -> None:
     """Each of them may differ, and a configuration overrides both."""
-    spec = load_spec(template_of(tmp_path, "{surface: {height_m: 0.7, style: bench}}"))
+    spec = load_config(template_of(tmp_path, "{surface: {height_m: 0.7, style: bench}}"))
     a, b = (e for e in spec.elements if e.type == "surface")
 
     assert (a.height_m, a.style, b.height_m, b.style) == (0.7, "trestle", 0.4, "bench")

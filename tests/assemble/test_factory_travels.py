@@ -5,12 +5,12 @@ from __future__ import annotations
 import pickle
 
 from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 
 
 def test_a_factory_takes_its_categories_along_and_leaves_its_scenes_behind() -> None:
     """Finding categories out takes as long as building every nominal scene."""
-    factory = PipelineFactory(load_spec("tabletop.yaml"), n=10)
+    factory = PipelineFactory(load_config("tabletop.yaml"), n=10)
     assert factory.nominal
 
     arrived = pickle.loads(pickle.dumps(factory))

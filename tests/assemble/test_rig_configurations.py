@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 
 from generator.assemble.recipe import nominal_scene, open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.assets.library import open_library
 from generator.core.errors import ConfigError
 from generator.core.instants import with_placed_sensors
 from generator.core.scene import Scene
 from generator.core.se3 import SE3
+from generator.sensors.lidar import LidarSensor
+from generator.sensors.rgb_camera import RgbCamera
 
 
 def rig_scene(name: str, *overrides: str) -> Scene:
     """The nominal scene of a configuration, every sensor in its place."""
-    spec = load_spec(name, overrides=overrides)
+    spec = load_config(name, overrides=overrides)
     return with_placed_sensors(nominal_scene(spec, spec.probes[0], open_library(())))
 
 
@@ -65,9 +67,9 @@ def test_nuscenes_cameras_see_all_around() -> None:
 
 def test_nuscenes_cameras_are_released_as_the_scanner_passes_them() -> None:
     """At a camera's offset in time, a clockwise turn of 50 ms has reached its axis, to a degree."""
-    spec = load_spec("nuscenes_rig")
-    scanner = next(s for s in spec.sensors if s.modality == "lidar")
-    cameras = [s for s in spec.sensors if s.modality == "camera"]
+    spec = load_config("nuscenes_rig")
+    scanner = next(s for s in spec.sensors if isinstance(s, LidarSensor))
+    cameras = [s for s in spec.sensors if isinstance(s, RgbCamera)]
     for camera in cameras:
         looks_deg = scanner.yaw_deg - 360.0 * scanner.rotation_hz * camera.time_offset_s
         assert abs(math.remainder(looks_deg - camera.yaw_deg, 360.0)) < 1.0
@@ -89,13 +91,13 @@ def test_a_sensor_inside_its_carrier_is_refused() -> None:
 
 def test_a_rate_that_does_not_fit_is_refused() -> None:
     """KITTI's rig steps by 0.1 s."""
-    spec = load_spec("kitti_rig", overrides=("sensors.image_03.rate_hz=4",))
+    spec = load_config("kitti_rig", overrides=("sensors.image_03.rate_hz=4",))
     with pytest.raises(ConfigError, match=r"'image_03': rate_hz 4 does not fit step_s 0\.1"):
         open_pipeline(spec)
 
 
 def test_elements_that_a_configuration_adds_can_be_overridden_by_name() -> None:
     """The ego is no element of the template."""
-    spec = load_spec("kitti_rig", overrides=("elements.ego.asset=car?seed=4",))
+    spec = load_config("kitti_rig", overrides=("elements.ego.asset=car?seed=4",))
 
     assert next(e for e in spec.elements if e.name == "ego").asset == "car?seed=4"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.errors import ConfigError
 
 HEAD = """\
@@ -33,7 +33,7 @@ def written(folder: Path, sensor: str) -> str:
 def test_a_sensor_has_the_parameters_of_its_scene(tmp_path: Path) -> None:
     """A pinhole's focal length is half the width over the tangent of half its field of view."""
     camera = f"{{type: rgb_camera, name: eye, size_px: [64, 48], hfov_deg: {WIDE_OR_NARROW}}}"
-    spec = load_spec(written(tmp_path, camera))
+    spec = load_config(written(tmp_path, camera))
 
     with open_pipeline(spec) as pipeline:
         focal_px = [pipeline.sample(k).scene.cameras[0].intrinsics.fx_px for k in range(2)]
@@ -49,7 +49,7 @@ def test_a_sensor_captures_with_the_parameters_of_its_scene(tmp_path: Path) -> N
         "{type: rgb_camera, name: eye, size_px: [64, 48], time_offset_s: 0, "
         "exposure: {switch: lens, wide: {time_s: 0.004}, narrow: {time_s: 0.001}}}"
     )
-    spec = load_spec(written(tmp_path, camera))
+    spec = load_config(written(tmp_path, camera))
 
     with open_pipeline(spec) as pipeline:
         sensors = [pipeline.accepted_scene(k).sensors[0] for k in range(2)]
@@ -77,7 +77,7 @@ def test_what_all_samples_have_in_common_cannot_depend_on_a_shared_value(
     source = written(tmp_path, sensor)
 
     with pytest.raises(ConfigError) as caught:
-        load_spec(source)
+        load_config(source)
 
     assert str(caught.value).startswith(
         f"{source}:9:{column}: {field}: is the same in all scenes of a data set; "

@@ -1,4 +1,4 @@
-"""A configuration and its template become one validated Spec; every fault is told at its place."""
+"""A configuration and its template become one validated Config; every fault has its place."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.spec import load_spec, spec_of_source
+from generator.assemble.spec import config_of_source, load_config
 from generator.assemble.tables import find_plugin
 from generator.core.errors import ConfigError
 
@@ -25,7 +25,7 @@ def written(folder: Path, text: str) -> str:
 def refusal(source: str, **options: object) -> str:
     """The message with which a configuration is refused."""
     with pytest.raises(ConfigError) as error:
-        load_spec(source, **options)  # type: ignore[arg-type]
+        load_config(source, **options)  # type: ignore[arg-type]
     return str(error.value)
 
 
@@ -36,7 +36,7 @@ def test_shipped_configurations_are_valid_from_any_folder(
     """Shipped names work wherever the user is, with or without their suffix."""
     monkeypatch.chdir(tmp_path)
 
-    spec = load_spec(name)
+    spec = load_config(name)
 
     assert spec.name == name.removesuffix(".yaml")
     assert spec.elements and spec.randomizers and spec.sensors and spec.exporters
@@ -49,15 +49,15 @@ def test_a_file_of_the_user_comes_before_a_shipped_one(
     (tmp_path / "tabletop.yaml").write_text("template: tabletop\nseed: 41\n" + CAMERA)
     monkeypatch.chdir(tmp_path)
 
-    assert load_spec("tabletop.yaml").head.seed == 41
+    assert load_config("tabletop.yaml").general.seed == 41
 
 
 def test_configuration_overrides_its_template_by_element_name(tmp_path: Path) -> None:
     """Only what is named changes; the rest of the element stays the template's."""
     source = written(tmp_path, "template: tabletop\nelements: {table: {height_m: 0.9}}\n" + CAMERA)
-    nominal = {e.name: e for e in load_spec("tabletop.yaml").elements}
+    nominal = {e.name: e for e in load_config("tabletop.yaml").elements}
 
-    table = {e.name: e for e in load_spec(source).elements}["table"]
+    table = {e.name: e for e in load_config(source).elements}["table"]
 
     assert table.height_m == 0.9
     assert table.top_size_m == nominal["table"].top_size_m
@@ -75,7 +75,7 @@ def test_override_of_an_unknown_element_is_refused(tmp_path: Path) -> None:
 
 def test_command_line_wins_over_file_and_template() -> None:
     """``--set`` reaches elements and randomizers by name, the top level, and absent sections."""
-    spec = load_spec(
+    spec = load_config(
         "tabletop.yaml",
         seed=0,
         overrides=(
@@ -86,18 +86,18 @@ def test_command_line_wins_over_file_and_template() -> None:
         ),
     )
 
-    assert spec.head.seed == 0
+    assert spec.general.seed == 0
     assert {e.name: e for e in spec.elements}["table"].height_m == 0.6
     assert {r.name: r for r in spec.randomizers}["clutter"].count.mean() == 3
-    assert spec.head.physics.settle_time_s_max == 2.5
-    assert spec.head.views_per_scene == 2
+    assert spec.general.physics.settle_time_s_max == 2.5
+    assert spec.general.views_per_scene == 2
 
 
 def test_without_leaves_a_randomizer_out() -> None:
     """The others keep their order; an unknown name is refused."""
-    names = [r.name for r in load_spec("tabletop.yaml").randomizers]
+    names = [r.name for r in load_config("tabletop.yaml").randomizers]
 
-    kept = [r.name for r in load_spec("tabletop.yaml", without=("colors",)).randomizers]
+    kept = [r.name for r in load_config("tabletop.yaml", without=("colors",)).randomizers]
 
     assert kept == [name for name in names if name != "colors"]
     assert "did you mean 'colors'?" in refusal("tabletop.yaml", without=("colour",))
@@ -105,18 +105,18 @@ def test_without_leaves_a_randomizer_out() -> None:
 
 def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
     """What ``plan.json`` keeps is enough to make every sample of a data set again."""
-    first = load_spec("tabletop.yaml", seed=5, overrides=("randomizers.clutter.count=3",))
+    first = load_config("tabletop.yaml", seed=5, overrides=("randomizers.clutter.count=3",))
     plan = {"config": first.resolved, "name": first.name}
     (tmp_path / "plan.json").write_text(json.dumps(plan))
 
-    again = spec_of_source(str(tmp_path))
+    again = config_of_source(str(tmp_path))
 
     assert again == first
 
 
 def test_spec_crosses_process_borders() -> None:
-    """A worker process gets the Spec itself, not a path that may change meanwhile."""
-    spec = load_spec("tabletop.yaml")
+    """A worker process gets the Config itself, not a path that may change meanwhile."""
+    spec = load_config("tabletop.yaml")
 
     assert pickle.loads(pickle.dumps(spec)) == spec
 

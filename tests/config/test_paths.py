@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.config.paths import find_path
 from generator.config.problems import Position
 from generator.core.errors import ConfigError
@@ -94,10 +94,10 @@ def test_asset_folders_start_from_the_configuration_and_do_not_enter_its_identit
         "template: tabletop\nassets: {folders: [meshes]}\n" + SENSOR
     )
     monkeypatch.chdir(tmp_path)
-    first = load_spec("set/mine.yaml")
+    first = load_config("set/mine.yaml")
     folders = first.asset_folders
     monkeypatch.chdir(tmp_path / "set")
-    second = load_spec("mine.yaml")
+    second = load_config("mine.yaml")
 
     assert [folder.resolve() for folder in second.asset_folders] == [tmp_path / "set" / "meshes"]
     assert folders == (Path("set/meshes"),)
@@ -111,7 +111,7 @@ def test_a_missing_asset_folder_is_told_with_its_place(tmp_path: Path) -> None:
     source.write_text("template: tabletop\nassets: {folders: [mehses]}\n" + SENSOR)
 
     with pytest.raises(ConfigError) as caught:
-        load_spec(str(source))
+        load_config(str(source))
 
     assert str(caught.value).startswith(
         f"{source}:2:20: assets.folders[0]: there is no folder 'mehses'; "

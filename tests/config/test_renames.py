@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.assemble.tables import TABLES
 from generator.config.document import parse
 from generator.config.renames import PLUGINS, RANDOMIZERS, TYPES, with_current_words
@@ -102,7 +102,7 @@ def test_the_command_line_may_use_old_words_too(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("extends: street.yaml\n")
 
-    spec = load_spec(str(path), overrides=("randomizers.people.rows=3",))
+    spec = load_config(str(path), overrides=("randomizers.people.rows=3",))
 
     assert {r.name: r for r in spec.randomizers}["people"].passes == 3
 

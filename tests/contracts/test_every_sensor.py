@@ -17,14 +17,14 @@ from generator.config.schema import json_schema
 from generator.core.capture import POINT, Channel, PointCloud, Reading, Table
 from generator.core.errors import ConfigError
 from generator.core.instants import at, with_placed_sensors, with_twists
-from generator.core.interfaces import Renderer
+from generator.core.interfaces import Modality, Renderer
 from generator.core.intrinsics import Intrinsics
 from generator.core.motion import Track
 from generator.core.scene import Body, Camera, Environment, Instance, Light, Rig, Scene
 from generator.core.se3 import SE3
 from generator.core.serial import canonical_json, from_plain
 from generator.core.streams import Streams
-from generator.core.tables import TABLE_COLUMNS, table_dtype
+from generator.core.tables import TIME, columns_dtype
 from generator.renderers.warp import WarpRenderer
 from generator.sensors import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
@@ -37,10 +37,9 @@ GIVEN: dict[str, dict[str, Any]] = {
 }
 """Fields by which a sensor is quicker than by default."""
 
-IMAGING = ("camera", "lidar")
 each = pytest.mark.parametrize("kind", list(TABLE))
 device = pytest.mark.parametrize(
-    "kind", [kind for kind in TABLE if TABLE.load(kind).modality not in IMAGING]
+    "kind", [kind for kind in TABLE if TABLE.load(kind)().describe().modality is Modality.DEVICE]
 )
 
 
@@ -116,6 +115,25 @@ def test_mounting_adds_it_by_its_name_and_leaves_the_scene_alone(kind: str) -> N
 
 
 @each
+def test_it_is_where_its_description_says(kind: str) -> None:
+    """By its modality among cameras, lidars or devices; it returns what its modality names."""
+    sensor = made(kind, rate_hz=10.0, time_offset_s=0.01)
+    info, scene = sensor.describe(), sensor.mount(street())
+    places = {
+        Modality.CAMERA: (scene.cameras, Reading),
+        Modality.LIDAR: (scene.lidars, PointCloud),
+        Modality.DEVICE: (scene.devices, Table),
+    }
+    mounted, returned = places[info.modality]
+
+    assert (info.name, info.rate_hz, info.time_offset_s) == ("unit", 10.0, 0.01)
+    assert info.name in [other.name for other in mounted]
+    assert isinstance(seen(made(kind)), returned)
+    assert bool(info.channels) == (info.modality is Modality.CAMERA)
+    assert bool(info.columns) == bool(info.kind) == (info.modality is Modality.DEVICE)
+
+
+@each
 def test_an_unknown_rig_is_named_with_those_there_are(kind: str) -> None:
     """Before anything is made."""
     with pytest.raises(ConfigError, match=r"sensor 'unit': there is no rig 'eg'; there is ego"):
@@ -176,12 +194,13 @@ def test_rows_are_of_the_type_that_is_documented(kind: str) -> None:
     returned = seen(made(kind))
 
     assert isinstance(returned, Table)
-    assert returned.rows.dtype == table_dtype(TABLE.load(kind).modality)
+    columns = made(kind).describe().columns
+    assert returned.rows.dtype == columns_dtype(columns)
     assert returned.device.name == "unit"
     assert returned.device.T_world_device.translation_m[0] == pytest.approx(2.4)
     assert returned.time_s == pytest.approx(0.3)
-    for column in TABLE_COLUMNS[TABLE.load(kind).modality]:
-        assert column.meaning
+    assert columns[0] == TIME
+    assert all(column.meaning for column in columns)
 
 
 @device

@@ -13,7 +13,7 @@ import configs
 import scene_templates
 from generator.assemble.recipe import nominal_scene
 from generator.assemble.schema import config_schema
-from generator.assemble.spec import Spec, load_spec
+from generator.assemble.spec import Config, load_config
 from generator.assets.library import Library, open_library
 from generator.config.describe import describe
 from generator.config.document import load
@@ -36,9 +36,9 @@ def library() -> Library:
 
 
 @cache
-def spec(name: str) -> Spec:
+def spec(name: str) -> Config:
     """A shipped configuration."""
-    return load_spec(name)
+    return load_config(name)
 
 
 @cache
@@ -74,7 +74,7 @@ def randomized(name: str, streams: Streams) -> Scene | None:
 
 def test_every_template_is_used_by_a_configuration() -> None:
     """What is shipped can be run."""
-    assert {spec(name).head.template for name in CONFIGS} == set(TEMPLATES)
+    assert {spec(name).general.template for name in CONFIGS} == set(TEMPLATES)
 
 
 @pytest.mark.parametrize("kind", list(scene_templates.TABLE))
@@ -146,7 +146,7 @@ def test_nominal_objects_stand_on_their_surfaces_inside_the_room(name: str) -> N
 @pytest.mark.parametrize("name", CONFIGS)
 def test_nominal_scene_is_the_same_every_time(name: str) -> None:
     """Built twice, from two libraries."""
-    spec_again = load_spec(name)
+    spec_again = load_config(name)
     again = nominal_scene(spec_again, spec_again.probes[0], open_library(()))
 
     assert canonical_json(again) == canonical_json(scene_of(name))

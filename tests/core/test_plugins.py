@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Literal, Protocol
+
 import pytest
+from pydantic import BaseModel
 
 from generator.core.errors import ConfigError
 from generator.core.plugins import PluginTable
@@ -33,3 +36,78 @@ def test_an_unknown_name_is_told_with_all_known_ones() -> None:
     assert str(caught.value) == (
         "unknown noun 'fractoin'; expected one of decimal, fraction (did you mean 'fraction'?)"
     )
+
+
+class Complete(BaseModel):
+    """A class with every member, and its name in the table."""
+
+    type: Literal["complete"] = "complete"
+    size: int = 0
+
+    def area(self) -> int:
+        """The square."""
+        return self.size**2
+
+
+class Lacking(BaseModel):
+    """The same without a method."""
+
+    type: Literal["lacking"] = "lacking"
+    size: int = 0
+
+
+class Misnamed(Complete):
+    """Its field says another name than the table."""
+
+
+class Plain:
+    """Nothing that YAML could be read as."""
+
+    type = "plain"
+    size = 0
+
+    def area(self) -> int:
+        """The square."""
+        return 0
+
+
+class Square(Protocol):
+    """The contract of these plug-ins."""
+
+    @property
+    def size(self) -> int:
+        """The side."""
+        ...
+
+    def area(self) -> int:
+        """The square."""
+        ...
+
+
+SQUARES = PluginTable[Square](
+    "square",
+    {name.lower(): f"{__name__}:{name}" for name in ("Complete", "Lacking", "Misnamed", "Plain")}
+    | {"gone": "no_such_module:Class", "absent": f"{__name__}:NoSuchClass"},
+    (Square,),
+)
+
+
+def test_a_complete_plug_in_is_loaded() -> None:
+    """Every member of the Protocol, and the field ``type``."""
+    assert SQUARES.load("complete") is Complete
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("lacking", r"square 'lacking': .*:Lacking lacks area; see .*interfaces.Square"),
+        ("misnamed", r'Misnamed needs a field `type: Literal\["misnamed"\] = "misnamed"`'),
+        ("plain", "Plain cannot be read from YAML: derive it from .*Strict"),
+        ("gone", "square 'gone': no_such_module:Class cannot be imported: No module named"),
+        ("absent", "square 'absent': .*:NoSuchClass cannot be imported: .*NoSuchClass"),
+    ],
+)
+def test_a_class_that_is_no_plug_in_is_refused_with_the_reason(name: str, fault: str) -> None:
+    """When it is loaded, not when the missing member is used."""
+    with pytest.raises(ConfigError, match=fault):
+        SQUARES.load(name)

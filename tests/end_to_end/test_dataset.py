@@ -80,9 +80,9 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
     program = (
         "import sys, numpy as np\n"
         "from generator.assemble.recipe import open_pipeline\n"
-        "from generator.assemble.spec import spec_of_source\n"
+        "from generator.assemble.spec import config_of_source\n"
         "from generator.core.capture import Channel\n"
-        f"with open_pipeline(spec_of_source({str(dataset)!r})) as pipeline:\n"
+        f"with open_pipeline(config_of_source({str(dataset)!r})) as pipeline:\n"
         "    reading = pipeline.sample(7).capture.readings['color']\n"
         "np.savez('alone.npz', rgb=reading.channels[Channel.RGB],\n"
         "         instance=reading.channels[Channel.INSTANCE])\n"
@@ -102,13 +102,13 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
 def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
     """The Scene in scenes.jsonl is the whole provenance: no randomizer, no physics needed."""
     from generator.assemble.recipe import PipelineFactory
-    from generator.assemble.spec import spec_of_source
+    from generator.assemble.spec import config_of_source
     from generator.core.capture import Channel
     from generator.runner.provenance import kept_scenes
 
     kept = list(kept_scenes(dataset / "shards" / "000002" / "scenes.jsonl"))[3]
     scene = kept.scene
-    pipeline = PipelineFactory(spec_of_source(str(dataset)), n=15)()
+    pipeline = PipelineFactory(config_of_source(str(dataset)), n=15)()
 
     reading = pipeline.renderer.render(scene, scene.camera("color"), frozenset({Channel.RGB}))
 

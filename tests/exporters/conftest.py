@@ -32,14 +32,15 @@ from generator.core.capture import (
 )
 from generator.core.geometry import SURFACES, Keypoint, Material
 from generator.core.instants import RIG_AXES, at, with_placed_sensors, with_twists
-from generator.core.interfaces import DatasetInfo, Exporter, GeometryExporter
+from generator.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo
 from generator.core.intrinsics import Intrinsics
 from generator.core.lanes import LaneBorder
+from generator.core.lens import LensModel
 from generator.core.motion import Track
 from generator.core.sample import BirdseyeMap, FrameTruth, ImageTruth, Sample
 from generator.core.scene import Body, Camera, Device, Instance, Lidar, Rig, Scene
 from generator.core.se3 import SE3, Array, look_at
-from generator.core.tables import table_rows
+from generator.core.tables import TABLE_COLUMNS, table_rows
 from generator.runner.shard import without_pixels
 
 CATEGORIES = ("car", "crate", "pedestrian")
@@ -363,9 +364,27 @@ def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:
 
 
 def make_info(
-    n: int, sensors: Sequence[str] = ("color",), lidars: tuple[str, ...] = (), **changes: Any
+    n: int,
+    cameras: Sequence[str] = ("color",),
+    lidars: Sequence[str] = (),
+    *,
+    media: Mapping[str, tuple[Channel, ...]] | None = None,
+    devices: Mapping[str, str] | None = None,
+    lenses: Mapping[str, LensModel] | None = None,
+    **changes: Any,
 ) -> DatasetInfo:
-    """A data set of ``n`` samples whose sensors write ``MEDIA``."""
+    """A data set of ``n`` samples whose cameras write ``MEDIA`` and have pinholes."""
+    channels, models = media or dict.fromkeys(cameras, MEDIA), lenses or {}
+    kinds = {"imu": "imu"} if devices is None else devices
+    sensors = [
+        SensorInfo(name, Modality.CAMERA, channels=channels[name], lens=models.get(name, "pinhole"))
+        for name in cameras
+    ]
+    sensors += [SensorInfo(name, Modality.LIDAR) for name in lidars]
+    sensors += [
+        SensorInfo(name, Modality.DEVICE, kind, columns=TABLE_COLUMNS[kind])
+        for name, kind in kinds.items()
+    ]
     info = DatasetInfo(
         name="street",
         seed=7,
@@ -373,10 +392,7 @@ def make_info(
         views_per_scene=1,
         categories=CATEGORIES,
         sensors=tuple(sensors),
-        media=dict.fromkeys(sensors, MEDIA),
         depth_scale_m=0.001,
-        lidars=lidars,
-        devices={"imu": "imu"},
     )
     return replace(info, **changes)
 
@@ -402,8 +418,7 @@ def export(
     keep_arrays: bool = False,
 ) -> Path:
     """Write samples shard by shard, merge the shards, and return the data set's folder."""
-    if isinstance(exporter, GeometryExporter):
-        exporter = exporter.with_assets(Sky())
+    exporter = exporter.with_assets(Sky())
     shards = [list(samples[i : i + shard_size]) for i in range(0, len(samples), shard_size)]
     shard_dirs = [folder / f"shards/{k:06d}" for k in range(len(shards))]
     work = list(zip(shards, shard_dirs, strict=True))

@@ -241,8 +241,8 @@ def test_two_cameras_give_two_images_per_sample(world: Any, tmp_path: Path) -> N
     cameras = [world.camera(name) for name in ("depth_only", "left", "right")]
     names = tuple(camera.name for camera in cameras)
     sample = world.sample(0, world.samples[0].scene.instances, cameras)
-    info = world.info(1, names)
-    info.media["depth_only"] = (Channel.Z_DEPTH,)
+    media = {"left": (Channel.RGB,), "right": (Channel.RGB,), "depth_only": (Channel.Z_DEPTH,)}
+    info = world.info(1, names, media=media)
 
     folder = world.export(Coco(), info, [sample], tmp_path)
 

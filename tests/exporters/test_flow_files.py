@@ -86,7 +86,7 @@ def test_coco_tells_how_long_and_when_rows_were_exposed(world: Any, tmp_path: Pa
     shutter = Shutter(0.008, -0.025)
     cameras = [replace(world.camera("dash"), shutter=shutter), world.camera("color")]
     sample = world.sample(0, [world.instance(1, "car", 12.0, 0.0, 0.3)], cameras)
-    info = world.info(1, sensors=("color", "dash"))
+    info = world.info(1, ("color", "dash"))
 
     folder = world.export(Coco(), info, [sample], tmp_path)
     images = json.loads((folder / "annotations/instances_train.json").read_text())["images"]

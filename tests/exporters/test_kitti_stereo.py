@@ -13,6 +13,7 @@ import pytest
 from exporters.kitti_stereo import KittiStereo
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
+from generator.core.interfaces import Modality, SensorInfo
 from generator.core.se3 import SE3
 
 BASELINE_M = 0.54
@@ -125,15 +126,15 @@ def test_data_sets_without_a_pair_are_refused(world: Any) -> None:
     with pytest.raises(ConfigError, match=r"camera '' does not write .*disparity"):
         KittiStereo().check(world.info(4))
     with pytest.raises(ConfigError, match=r"right: '' is no other camera .*one of: none"):
-        KittiStereo().check(replace(info, sensors=("left",)))
-    three = replace(
-        info, sensors=("left", "rear", "right"), media={**info.media, "rear": (Channel.RGB,)}
-    )
+        KittiStereo().check(replace(info, sensors=(info.sensor("left"),)))
+    rear = SensorInfo("rear", Modality.CAMERA, channels=(Channel.RGB,))
+    three = replace(info, sensors=(*info.sensors, rear))
     with pytest.raises(ConfigError, match="expected one of: rear, right"):
         KittiStereo().check(three)
     KittiStereo(right="right").check(three)
+    bent = replace(info.sensor("right"), lens="brown_conrady")
     with pytest.raises(ConfigError, match="'right' has a lens of the model"):
-        KittiStereo().check(replace(info, lenses={"right": "brown_conrady"}))
+        KittiStereo().check(replace(info, sensors=(info.sensor("left"), bent)))
 
 
 def test_cameras_that_are_not_beside_each_other_are_refused(world: Any, tmp_path: Path) -> None:

@@ -609,7 +609,9 @@ def test_sensors_that_are_not_there_are_refused(exporter: Any, message: str, wor
 @pytest.mark.parametrize("exporter", [KittiRaw(), KittiTracking(), Kitti()])
 def test_rectified_formats_refuse_other_lenses_than_pinholes(exporter: Any, world: Any) -> None:
     """The message names the sensor and its lens."""
-    info = replace(drive_info(world), lenses={"left": "fisheye"})
+    info = drive_info(world)
+    sensors = [replace(s, lens="fisheye") if s.name == "left" else s for s in info.sensors]
+    info = replace(info, sensors=tuple(sensors))
     with pytest.raises(ConfigError, match=r"'left' has a lens of the model 'fisheye'.*coco"):
         exporter.check(info)
 

@@ -13,8 +13,10 @@ import pytest
 from exporters.images import write_media
 from exporters.tables import Tables, read_rows
 from generator.core.errors import ConfigError, StorageError
-from generator.core.interfaces import table_path
+from generator.core.interfaces import Modality, SensorInfo, table_path
 from generator.core.tables import TABLE_COLUMNS
+
+IMU = SensorInfo("imu", Modality.DEVICE, "imu", columns=TABLE_COLUMNS["imu"])
 
 
 def test_csv_holds_every_digit_that_matters(world: Any, tmp_path: Path) -> None:
@@ -90,7 +92,7 @@ def test_damaged_rows_are_named(tmp_path: Path) -> None:
     path.write_bytes(b"nothing of the kind")
 
     with pytest.raises(StorageError, match=r"000000000\.npy"):
-        read_rows(path, "imu")
+        read_rows(path, IMU)
     np.save(path, np.zeros(3))
     with pytest.raises(StorageError, match=r"no rows of kind .imu"):
-        read_rows(path, "imu")
+        read_rows(path, IMU)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.assets.paths import packs_dir
 from generator.packs.install import install
 from generator.packs.table import Pack
@@ -22,7 +22,7 @@ from tests.packs.converters import BOX
 def factory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> PipelineFactory:
     """The shipped tabletop, on a machine without packs."""
     monkeypatch.setenv("GEN_DATA_ASSETS", str(tmp_path / "assets"))
-    return PipelineFactory(load_spec("tabletop.yaml"), n=10)
+    return PipelineFactory(load_config("tabletop.yaml"), n=10)
 
 
 def installed_box(tmp_path: Path, side: str) -> None:

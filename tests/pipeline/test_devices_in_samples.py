@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import open_pipeline, recipe_of
-from generator.assemble.spec import load_spec
+from generator.assemble.recipe import open_pipeline, pipeline_config
+from generator.assemble.spec import load_config
 from generator.assets.library import open_library
 from generator.core.capture import Channel
 from generator.core.errors import ConfigError
@@ -17,7 +17,7 @@ from generator.core.scene import Instance
 from generator.core.se3 import SE3
 from generator.core.streams import Streams
 from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.pipeline.pipeline import PipelineConfig
 from generator.sensors.gnss import Gnss
 from generator.sensors.imu import Imu
 from generator.sensors.mounting import Instrument
@@ -55,6 +55,13 @@ class Boxes:
 class AtRest:
     """Physics that finds every scene at rest."""
 
+    def __enter__(self) -> AtRest:
+        """Nothing to start."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Nor to stop."""
+
     def settle(self, scene: object) -> Settled:
         """The scene as it is."""
         return Settled(scene)  # type: ignore[arg-type]
@@ -65,10 +72,8 @@ def pipeline(seed: int = 3) -> Pipeline:
     scene = world(others=[thing(2, "parked", "car", SE3((15.0, 0.0, 0.0)))])
     for sensor in SENSORS:
         scene = sensor.mount(scene)
-    recipe = Recipe(
-        seed=seed,
-        views_per_scene=2,
-        blueprint=lambda streams: Blueprint(scene, (), SENSORS),
+    recipe = PipelineConfig(
+        open_scene=lambda streams: (scene, (), SENSORS),
         channels=frozenset({Channel.INSTANCE}),
         image_truth=lambda scene, reading: None,  # type: ignore[arg-type, return-value]
         split_shares={"train": 1.0},
@@ -79,9 +84,7 @@ def pipeline(seed: int = 3) -> Pipeline:
             8,
             2,
             ("car",),
-            (),
-            {},
-            devices={s.name: s.modality for s in SENSORS},
+            tuple(s.describe() for s in SENSORS),
             steps_per_scene=STEPS,
         ),
         exporters={},
@@ -133,7 +136,7 @@ def test_streams_of_a_sequence_are_the_same_at_every_step() -> None:
 
 def test_configurations_without_the_rig_are_told_so() -> None:
     """Before anything is made."""
-    spec = load_spec("tabletop.yaml", overrides=("sensors=[{type: radar}]", "exporters=[]"))
+    spec = load_config("tabletop.yaml", overrides=("sensors=[{type: radar}]", "exporters=[]"))
     with pytest.raises(ConfigError, match="there is no rig 'ego'; there is arm_wrist"):
         open_pipeline(spec)
 
@@ -141,8 +144,8 @@ def test_configurations_without_the_rig_are_told_so() -> None:
 def test_rates_reach_the_recipe() -> None:
     """A slow event camera reads at every fifth step."""
     sensors = "sensors=[{type: rgb_camera}, {type: event_camera, rate_hz: 2}]"
-    spec = load_spec("tabletop.yaml", overrides=(sensors, "exporters=[{type: tables}]"))
-    recipe = recipe_of(spec, open_library(()), 1, (), frozenset())
+    spec = load_config("tabletop.yaml", overrides=(sensors, "exporters=[{type: tables}]"))
+    recipe = pipeline_config(spec, open_library(()), 1, (), frozenset())
 
     assert recipe.strides["events"] == 5
     assert recipe.info.devices == {"events": "event_camera"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.sample import Sample
 
 SMALL = (
@@ -24,7 +24,7 @@ SMALL = (
 @pytest.fixture(scope="module")
 def samples() -> Iterator[list[Sample]]:
     """Two views of the tabletop."""
-    with open_pipeline(load_spec("tabletop", overrides=SMALL)) as pipeline:
+    with open_pipeline(load_config("tabletop", overrides=SMALL)) as pipeline:
         yield [pipeline.sample(index) for index in range(2)]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.sample import Sample
 from generator.core.scene import Scene
 from generator.core.serial import from_plain, to_plain
@@ -26,7 +26,7 @@ SMALL = (
 @pytest.fixture(scope="module")
 def samples() -> Iterator[list[Sample]]:
     """Two instants of a street, and the first made again in another pipeline."""
-    spec = load_spec("kitti_rig.yaml", overrides=SMALL)
+    spec = load_config("kitti_rig.yaml", overrides=SMALL)
     with open_pipeline(spec) as pipeline:
         made = [pipeline.sample(0), pipeline.sample(1)]
     with open_pipeline(spec) as pipeline:

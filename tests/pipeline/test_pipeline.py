@@ -13,14 +13,14 @@ import pytest
 from generator.core.capture import Channel, Reading
 from generator.core.errors import LayoutRejected, Rejection, SceneRejected
 from generator.core.geometry import Asset, Keypoint, MeshData
-from generator.core.interfaces import DatasetInfo, Settled, Stage
+from generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled, Stage
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth
 from generator.core.scene import Articulation, Body, Camera, Instance, Scene
 from generator.core.se3 import SE3
 from generator.pipeline import Pipeline
 from generator.pipeline.freeze import frozen_scene
-from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.pipeline.pipeline import PipelineConfig
 
 CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(8, 6, 1.0))
 
@@ -59,6 +59,13 @@ class AcceptingPhysics:
     def __init__(self) -> None:
         self.settled = 0
 
+    def __enter__(self) -> AcceptingPhysics:
+        """Nothing to start."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Nor to stop."""
+
     def settle(self, scene: Scene) -> Settled:
         """The scene as it is."""
         self.settled += 1
@@ -67,6 +74,13 @@ class AcceptingPhysics:
 
 class RefusingPhysics:
     """Physics that never finds rest."""
+
+    def __enter__(self) -> RefusingPhysics:
+        """Nothing to start."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Nor to stop."""
 
     def settle(self, scene: Scene) -> Settled:
         """A rejection with alternating reasons."""
@@ -99,15 +113,15 @@ def pipeline(
 ) -> Pipeline:
     """A pipeline of test doubles."""
     sensor = OneCamera()
-    recipe = Recipe(
-        seed=seed,
-        views_per_scene=views_per_scene,
-        blueprint=lambda streams: Blueprint(sensor.mount(Scene("test")), randomizers, (sensor,)),
+    recipe = PipelineConfig(
+        open_scene=lambda streams: (sensor.mount(Scene("test")), randomizers, (sensor,)),
         channels=frozenset(),
         image_truth=lambda scene, reading: ImageTruth(reading.camera, ()),
         split_shares=splits or {"train": 0.8, "val": 0.2},
         layout_attempts_max=5,
-        info=DatasetInfo("test", seed, 100, views_per_scene, (), ("color",), {}),
+        info=DatasetInfo(
+            "test", seed, 100, views_per_scene, (), (SensorInfo("color", Modality.CAMERA),)
+        ),
         exporters={},
     )
     engine = physics or AcceptingPhysics()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.capture import Channel, Reading
 from generator.core.instants import at
 from generator.core.sample import Sample
@@ -27,7 +27,7 @@ def pipeline() -> Iterator[Pipeline]:
         "shared.weather=CloudyNoon",
         "randomizers.people.count=4",
     ]
-    with open_pipeline(load_spec("street_motion", overrides=overrides)) as opened:
+    with open_pipeline(load_config("street_motion", overrides=overrides)) as opened:
         yield opened
 
 

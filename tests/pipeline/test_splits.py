@@ -7,7 +7,7 @@ from collections import Counter
 
 import pytest
 
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.errors import ConfigWarning
 from generator.pipeline.splits import Assignment, split_of, warn_of_empty_splits
 
@@ -77,6 +77,6 @@ def test_no_warning_where_every_split_has_a_scene() -> None:
 
 def test_a_configuration_says_how_scenes_are_assigned() -> None:
     """At random, unless it says otherwise."""
-    assert load_spec("tabletop").head.splits.assign == "random"
-    spec = load_spec("tabletop", overrides=("splits.assign=round_robin",))
-    assert spec.head.splits.assign == "round_robin"
+    assert load_config("tabletop").general.splits.assign == "random"
+    spec = load_config("tabletop", overrides=("splits.assign=round_robin",))
+    assert spec.general.splits.assign == "round_robin"

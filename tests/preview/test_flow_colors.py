@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from generator.core.capture import Capture, Channel, Reading
-from generator.core.interfaces import DatasetInfo
+from generator.core.interfaces import DatasetInfo, Modality, SensorInfo
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, Sample
 from generator.core.scene import Camera, Scene
@@ -95,7 +95,14 @@ def test_a_recording_has_flow_beside_the_image_of_its_camera() -> None:
     """As a picture in a tab of its own; a camera without flow has no tabs."""
     camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
     reading = Reading("c", camera, {Channel.FLOW_FORWARD: np.ones((4, 6, 2), np.float32)})
-    info = DatasetInfo("t", 1, 1, 1, (), ("c",), {"c": (Channel.RGB, Channel.FLOW_FORWARD)})
+    info = DatasetInfo(
+        "t",
+        1,
+        1,
+        1,
+        (),
+        (SensorInfo("c", Modality.CAMERA, channels=(Channel.RGB, Channel.FLOW_FORWARD)),),
+    )
     stream = _Stream()
     recorder = Recorder(stream, None, info)  # type: ignore[arg-type]
     truth = {"c": ImageTruth(camera, ())}

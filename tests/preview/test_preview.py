@@ -13,7 +13,7 @@ from generator.core.capture import POINT, Capture, Channel, PointCloud, Reading
 from generator.core.errors import ConfigError
 from generator.core.geometry import Keypoint, Material, MeshData
 from generator.core.instants import at
-from generator.core.interfaces import DatasetInfo
+from generator.core.interfaces import DatasetInfo, Modality, SensorInfo
 from generator.core.intrinsics import Intrinsics
 from generator.core.lens import Lens
 from generator.core.motion import Track
@@ -93,7 +93,7 @@ class _Stream:
 
 
 def _info(**changes: Any) -> DatasetInfo:
-    about = DatasetInfo("street", 1, 1, 1, ("car",), ("color",), {})
+    about = DatasetInfo("street", 1, 1, 1, ("car",), (SensorInfo("color", Modality.CAMERA),))
     return replace(about, **changes)
 
 

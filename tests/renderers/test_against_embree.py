@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.core.capture import Channel
 from generator.core.interfaces import AssetLibrary, Renderer
 from generator.core.scene import Body, Camera, Scene
@@ -81,7 +81,7 @@ def test_bodies_that_cut_each_other_agree_with_embree(seed: int) -> None:
 def tabletop() -> Iterator[Pipeline]:
     """Random scenes of the shipped tabletop, one view each."""
     open3d_or_skip()
-    spec = load_spec("tabletop.yaml", seed=3, overrides=("views_per_scene=1",))
+    spec = load_config("tabletop.yaml", seed=3, overrides=("views_per_scene=1",))
     with open_pipeline(spec) as pipeline:
         yield pipeline
 

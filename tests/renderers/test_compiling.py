@@ -16,9 +16,9 @@ from generator.renderers.device import open_device
 
 _FIRST_SAMPLE = """
 from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 
-spec = load_spec("tabletop.yaml", overrides=["sensors=[{type: rgb_camera, size_px: [64, 48]}]"])
+spec = load_config("tabletop.yaml", overrides=["sensors=[{type: rgb_camera, size_px: [64, 48]}]"])
 with open_pipeline(spec) as pipeline:
     pipeline.sample(0)
 """

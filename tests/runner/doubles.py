@@ -16,7 +16,7 @@ import numpy as np
 from generator.core.boxes import BoxPx
 from generator.core.capture import Capture, Channel, Reading
 from generator.core.errors import Rejection, SampleError, SceneRejected
-from generator.core.interfaces import DatasetInfo, Exporter, media_path
+from generator.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo, media_path
 from generator.core.intrinsics import Intrinsics
 from generator.core.sample import ImageTruth, MaskPx, ObjectTruth, Sample
 from generator.core.scene import Camera, Instance, Light, Scene
@@ -79,7 +79,7 @@ class LinesExporter:
         (dataset_dir / "all.jsonl").write_text("".join(parts))
         (dataset_dir / "images").mkdir()
         for shard_dir in shard_dirs:
-            for sensor in info.sensors:
+            for sensor in info.cameras:
                 for path in sorted((shard_dir / sensor / "rgb").iterdir()):
                     os.link(path, dataset_dir / "images" / f"{path.stem}_{sensor}.png")
 
@@ -95,7 +95,8 @@ class FakePipeline:
     @property
     def info(self) -> DatasetInfo:
         """Two views per scene, one camera."""
-        return DatasetInfo("fake", 7, self.n, 2, CATEGORIES, ("color",), {"color": (Channel.RGB,)})
+        color = SensorInfo("color", Modality.CAMERA, channels=(Channel.RGB,))
+        return DatasetInfo("fake", 7, self.n, 2, CATEGORIES, (color,))
 
     def __enter__(self) -> FakePipeline:
         """Die, if that is the trouble."""
@@ -175,7 +176,7 @@ def fake_sample(index: int) -> Sample:
 
 def write_raw_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     """The bare bytes of every image, under the name its PNG would have."""
-    for sensor in info.sensors:
+    for sensor in info.cameras:
         for channel in info.media[sensor]:
             path = media_path(shard_dir, sensor, channel, sample.index)
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.spec import load_spec
+from generator.assemble.spec import load_config
 from generator.assets.library import Library, open_library
 from generator.core.errors import ConfigError
 from generator.core.scene import Scene
@@ -64,6 +64,6 @@ def test_a_configuration_adds_an_element_that_its_template_lacks(tmp_path: Path)
     (tmp_path / "more.yaml").write_text(text + "elements: {ego: {type: ego, tags: [car]}}\n")
     (tmp_path / "wrong.yaml").write_text(text + "elements: {ego: {tags: [car]}}\n")
 
-    assert load_spec(str(tmp_path / "more.yaml")).elements[-1] == Ego(name="ego")
+    assert load_config(str(tmp_path / "more.yaml")).elements[-1] == Ego(name="ego")
     with pytest.raises(ConfigError, match="the template has no element 'ego'"):
-        load_spec(str(tmp_path / "wrong.yaml"))
+        load_config(str(tmp_path / "wrong.yaml"))

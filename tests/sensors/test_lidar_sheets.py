@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from generator.assemble.spec import Spec, load_spec, spec_of_source
+from generator.assemble.spec import Config, config_of_source, load_config
 from generator.core.errors import ConfigError
 from generator.core.scene import Body, Rig, Scene
 from generator.core.se3 import SE3
@@ -41,12 +41,12 @@ sensors:
 """
 
 
-def spec(folder: Path, line: str, **files: str) -> Spec:
+def spec(folder: Path, line: str, **files: str) -> Config:
     """The configuration with one line of the scanner's, beside some files."""
     for name, text in files.items():
         (folder / name.replace("_", ".", 1)).write_text(text, encoding="utf-8")
     (folder / "mine.yaml").write_text(CONFIG % line, encoding="utf-8")
-    return load_spec(str(folder / "mine.yaml"))
+    return load_config(str(folder / "mine.yaml"))
 
 
 def told(folder: Path, line: str, **files: str) -> str:
@@ -74,7 +74,7 @@ def test_a_plan_holds_the_data_sheet_and_needs_no_file(tmp_path: Path) -> None:
     plan = canonical_json({"config": made.resolved, "name": "mine"})
     (tmp_path / "plan.json").write_text(plan, encoding="utf-8")
 
-    assert spec_of_source(str(tmp_path)).sensors == made.sensors
+    assert config_of_source(str(tmp_path)).sensors == made.sensors
 
 
 def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,16 +11,17 @@ import numpy as np
 import pytest
 
 from generator.assets.library import open_library
-from generator.core.capture import POINT, Capture, PointCloud, Reading
+from generator.core.capture import POINT, PointCloud, Reading
 from generator.core.errors import ConfigError
 from generator.core.instants import at, with_placed_sensors
-from generator.core.interfaces import DatasetInfo, Settled
-from generator.core.motion import Track
-from generator.core.sample import FrameTruth, ImageTruth
+from generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
+from generator.core.motion import Change, Track
+from generator.core.sample import FrameTruth, ImageTruth, Sample
 from generator.core.scene import Body, Lane, Rig, Scene
 from generator.core.se3 import SE3
 from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import Blueprint, Recipe
+from generator.pipeline.freeze import Timeline
+from generator.pipeline.pipeline import PipelineConfig
 from generator.sensors.lidar import LidarSensor
 from generator.sensors.mounting import stride
 from generator.sensors.rgb_camera import RgbCamera
@@ -126,11 +128,22 @@ class Watching:
 class AtRest:
     """Physics that leaves every scene as it is."""
 
+    def __enter__(self) -> AtRest:
+        """Nothing to start."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Nor to stop."""
+
     def settle(self, scene: Scene) -> Settled:
         return Settled(scene)
 
 
-def sampled(index: int, **recipe: Any) -> tuple[Capture, dict[str, float], dict[str, float]]:
+def sampled(
+    index: int,
+    offsets_s: Mapping[str, float] = {},
+    **recipe: Any,
+) -> tuple[Sample, dict[str, float], dict[str, float]]:
     """What a camera and a scanner return, and the times that truth was asked for."""
     annotated: dict[str, float] = {}
     swept: dict[str, float] = {}
@@ -148,31 +161,40 @@ def sampled(index: int, **recipe: Any) -> tuple[Capture, dict[str, float], dict[
         RgbCamera(name="late", rig="ego"),
         LidarSensor(name="top", rig="ego"),
     )
+    infos = tuple(
+        SensorInfo(name, modality, time_offset_s=offsets_s.get(name, 0.0))
+        for name, modality in (
+            ("early", Modality.CAMERA),
+            ("late", Modality.CAMERA),
+            ("top", Modality.LIDAR),
+        )
+    )
     watching = (Watching("early"), Watching("late"), Watching("top", lidar=True))
-    made = Recipe(
-        seed=1,
-        views_per_scene=1,
-        blueprint=lambda streams: Blueprint(scene, (), watching),  # type: ignore[arg-type]
+    made = PipelineConfig(
+        open_scene=lambda streams: (scene, (), watching),  # type: ignore[arg-type,return-value]
         channels=frozenset(),
         image_truth=image_truth,
         frame_truth=frame_truth,
         split_shares={"train": 1.0},
         layout_attempts_max=1,
-        info=DatasetInfo(
-            "t", 1, 9, 1, (), ("early", "late"), {}, lidars=("top",), steps_per_scene=4
-        ),
+        info=DatasetInfo("t", 1, 9, 1, (), infos, steps_per_scene=4),
         exporters={},
         **recipe,
     )
     pipeline = Pipeline(made, open_library(()), AtRest, lambda: None)  # type: ignore[arg-type]
     with pipeline:
-        return pipeline.sample(index).capture, annotated, swept
+        return pipeline.sample(index), annotated, swept
 
 
 def test_sensors_read_at_their_own_offsets_and_labels_are_of_then() -> None:
     """At step 2 (0.2 s): one camera 0.05 s earlier, the scanner 0.025 s later; 4 m/s along +Y."""
-    capture, annotated, swept = sampled(2, offsets_s={"early": -0.05, "top": 0.025})
+    sample, annotated, swept = sampled(2, offsets_s={"early": -0.05, "top": 0.025})
+    capture = sample.capture
 
+    instants_s = {name: scene.time_s for name, scene in sample.instants.items()}
+    assert instants_s == pytest.approx({"early": 0.15, "top": 0.225})
+    assert sample.scene_of("top").body("ego").T_world_body.translation_m[1] == pytest.approx(5.9)
+    assert sample.scene_of("late") is sample.scene
     assert annotated == pytest.approx({"early": 0.15, "late": 0.2})
     assert swept == pytest.approx({"": 0.2, "top": 0.225})
     assert capture.readings["early"].time_s == pytest.approx(0.15)
@@ -185,12 +207,31 @@ def test_sensors_read_at_their_own_offsets_and_labels_are_of_then() -> None:
     assert y == pytest.approx({"early": 4.6, "late": 4.8, "top": 4.9}, abs=1e-5)
 
 
+def test_a_sensor_that_reads_early_sees_what_has_not_changed_yet() -> None:
+    """A lamp lights at 0.18 s; at step 2 (0.2 s) a camera reads 0.05 s earlier, another at once."""
+    lamp, lit = Body("lamp", "unlit"), Change(0.18, "lamp", asset="lit")
+    view = replace(driven(), bodies=(*driven().bodies, lamp), changes=(lit,), instances=())
+    timeline = Timeline(view, open_library(()), {})
+    assets = [timeline.at(time_s).body("lamp").asset for time_s in (0.2, 0.2 - 0.05, 0.2)]
+
+    assert assets == ["lit", "unlit", "lit"]
+
+
+def test_an_instant_does_not_depend_on_those_before_it() -> None:
+    """Asked after others or alone: the same scene."""
+    one, other = (Timeline(driven(), open_library(()), {}) for _ in range(2))
+    for time_s in (0.1, 0.35, 0.05):
+        one.at(time_s)
+
+    assert one.at(0.2) == other.at(0.2)
+
+
 def test_slower_sensors_are_missing_from_the_steps_between() -> None:
     """The scanner reads at every second step, the late camera at every third."""
     strides = {"top": 2, "late": 3}
     present = [
-        sorted([*capture.readings, *capture.clouds])
-        for capture, _, _ in (sampled(index, strides=strides) for index in range(4))
+        sorted([*sample.capture.readings, *sample.capture.clouds])
+        for sample, _, _ in (sampled(index, strides=strides) for index in range(4))
     ]
 
     assert present == [["early", "late", "top"], ["early"], ["early", "top"], ["early", "late"]]

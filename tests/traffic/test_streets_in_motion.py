@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import blueprints, open_pipeline, recipe_of
-from generator.assemble.spec import Spec, load_spec
+from generator.assemble.recipe import open_pipeline, pipeline_config, scene_source
+from generator.assemble.spec import Config, load_config
 from generator.assets.library import Library, open_library
 from generator.core.errors import ConfigError, LayoutRejected
 from generator.core.instants import at
@@ -31,19 +31,18 @@ def library() -> Library:
 
 
 @cache
-def spec() -> Spec:
+def spec() -> Config:
     """The shipped configuration."""
-    return load_spec("street_sequence", overrides=SMALL)
+    return load_config("street_sequence", overrides=SMALL)
 
 
-def moving_scene(seed: int, of: Spec | None = None) -> Scene:
+def moving_scene(seed: int, of: Config | None = None) -> Scene:
     """A street that moves: the first attempt that is not refused."""
     for attempt in range(10):
         streams = Streams(seed, 0, attempt=attempt)
-        plan = blueprints(of or spec(), library())(streams)
-        scene = plan.nominal
+        scene, randomizers = scene_source(of or spec(), library())(streams)
         try:
-            for randomizer in plan.randomizers:
+            for randomizer in randomizers:
                 scene = randomizer(scene, library(), streams.rng(f"randomizer/{randomizer.name}"))
         except LayoutRejected:
             continue
@@ -211,9 +210,9 @@ def test_the_camera_rides_on_the_ego_vehicle() -> None:
     assert not scenes[1].instance(scenes[1].body("ego").instance_id).annotated
 
 
-def checked_and_moving(wrong: Spec) -> Scene:
+def checked_and_moving(wrong: Config) -> Scene:
     """What a run does first: everything is resolved, then a scene is drawn."""
-    recipe_of(wrong, library(), 1, (), frozenset())
+    pipeline_config(wrong, library(), 1, (), frozenset())
     return moving_scene(1, wrong)
 
 
@@ -235,7 +234,7 @@ def test_what_cannot_be_is_told_in_one_message(message: str) -> None:
     """Wrong routes, names and durations."""
     name, text = BAD[message]
     names = [randomizer.name for randomizer in spec().randomizers]
-    wrong = load_spec(
+    wrong = load_config(
         "street_sequence", overrides=[*SMALL, f"randomizers[{names.index(name)}].{text}"]
     )
     with pytest.raises(ConfigError, match=message):
@@ -258,7 +257,7 @@ def test_a_given_route_is_driven() -> None:
     """Through the junction to the left: the ego vehicle ends on the road it was sent to."""
     names = [randomizer.name for randomizer in spec().randomizers]
     route = "[main/forward0, cross/2to1_0, left/forward0]"
-    asked = load_spec(
+    asked = load_config(
         "street_sequence",
         overrides=[
             *SMALL,

@@ -175,7 +175,7 @@ def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Pa
 def test_a_sequence_is_written_where_it_begins(library: Library, tmp_path: Path) -> None:
     """Shards may end within a sequence: the one with its first step holds the whole stage."""
     scene = table_world(library)
-    info = DatasetInfo("t", 7, 6, 1, (), (), {}, steps_per_scene=3, step_s=STEP_S)
+    info = DatasetInfo("t", 7, 6, 1, (), (), steps_per_scene=3, step_s=STEP_S)
     samples = [
         Sample(k, k // 3, 0, "train", at(scene, k % 3 * STEP_S), Capture({}), {}, step_index=k % 3)
         for k in range(6)

@@ -8,7 +8,7 @@ from exporters.usd import Usd
 from generator.assets.library import Library
 from generator.core.capture import Capture
 from generator.core.geometry import Material
-from generator.core.interfaces import DatasetInfo
+from generator.core.interfaces import DatasetInfo, Modality, SensorInfo
 from generator.core.intrinsics import Intrinsics
 from generator.core.motion import Track
 from generator.core.sample import Sample
@@ -71,7 +71,14 @@ def exported(
 ) -> Path:
     """The stage of a scene, as the exporter leaves it."""
     info = DatasetInfo(
-        "t", 7, steps, 1, ("thing",), ("color",), {}, steps_per_scene=steps, step_s=STEP_S
+        "t",
+        7,
+        steps,
+        1,
+        ("thing",),
+        (SensorInfo("color", Modality.CAMERA),),
+        steps_per_scene=steps,
+        step_s=STEP_S,
     )
     sample = Sample(0, 0, 0, "train", scene, Capture({}), {})
     exporter = Usd.model_validate(options).with_assets(library)

@@ -91,6 +91,7 @@ class TextureFamily:
 
     Attributes:
         variants: Seeds ``range(variants)`` are offered for selection; any other seed works too.
+        origin: Where it comes from, if it is not ours.
     """
 
     name: str
@@ -99,6 +100,7 @@ class TextureFamily:
     version: int
     build: Callable[..., TextureData]
     parameters: Mapping[str, object] = field(default_factory=dict)
+    origin: Origin = OURS
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,7 @@ class EnvironmentFamily:
     Attributes:
         stored: Whether the disk also keeps images that are not offered for selection; not if
             hardly any is asked for twice.
+        origin: Where it comes from, if it is not ours.
     """
 
     name: str
@@ -119,6 +122,7 @@ class EnvironmentFamily:
     build: Callable[..., Float32]
     parameters: Mapping[str, object] = field(default_factory=dict)
     stored: bool = True
+    origin: Origin = OURS
 
 
 @dataclass(frozen=True)

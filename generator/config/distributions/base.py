@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 
-DISTRIBUTIONS = PluginTable(
+DISTRIBUTIONS: PluginTable[Distribution[Any]] = PluginTable(
     "distribution",
     {
         "constant": "generator.config.distributions.discrete:Constant",

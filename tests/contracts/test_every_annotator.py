@@ -1,0 +1,198 @@
+"""The contract of every annotator in the table, and of a third party's.
+
+The truth classes document each field with its annotator's name in brackets at the end: that is what
+an annotator may fill in, and nothing else.
+"""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+import re
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from stranger.annotation import Distance
+
+from generator.annotations import TABLE
+from generator.annotations.truth import Thresholds, complete_truth, frame_truth
+from generator.assemble.recipe import open_pipeline
+from generator.assemble.spec import load_config
+from generator.core.capture import Channel, Reading
+from generator.core.errors import ConfigError
+from generator.core.interfaces import Annotator, AnyAnnotator, AssetLibrary, ImageAnnotator
+from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth
+from generator.core.scene import Scene
+from generator.core.serial import canonical_json, to_plain
+
+ANNOTATORS: dict[str, type[AnyAnnotator]] = {
+    **{name: TABLE.load(name) for name in TABLE},
+    "stranger_distance": Distance,
+}
+each = pytest.mark.parametrize("name", ANNOTATORS)
+
+CONFIG = "street_sequence"
+SMALL = ("sensors[0].size_px=[160, 90]", "exporters=[]", "annotations=[]")
+DISTANCES = frozenset({Channel.Z_DEPTH, Channel.RANGE})
+NEED_A_RIG = ("bev_map",)
+FEW_PX = Thresholds(min_visible_px=1, min_box_px=1)
+
+
+@dataclass(frozen=True)
+class World:
+    """A sample's scene, one reading of it, and the assets of both."""
+
+    scene: Scene
+    reading: Reading
+    assets: AssetLibrary
+
+
+@cache
+def world() -> World:
+    """A street in motion, with vehicles, people, lanes, a rig and a camera on it."""
+    channels = frozenset(c for name in ANNOTATORS for c in made(name).channels)
+    with open_pipeline(load_config(CONFIG, overrides=SMALL), channels) as pipeline:
+        sample = pipeline.sample(1)
+        (reading,) = sample.capture.readings.values()
+        return World(sample.scene, reading, pipeline.assets)
+
+
+def made(name: str) -> AnyAnnotator:
+    """An annotator with its defaults."""
+    return ANNOTATORS[name]()
+
+
+def annotated(name: str, of: World | None = None) -> tuple[ImageTruth, FrameTruth | None]:
+    """Everything that one annotator says."""
+    given = of or world()
+    image = complete_truth(given.scene, given.reading, [made(name)], FEW_PX, given.assets)
+    return image, frame_truth({"": given.scene}, [made(name)], given.assets)
+
+
+def documented(truth: type) -> dict[str, set[str]]:
+    """Fields of a truth class by the annotator that its docstring names for them."""
+    section = inspect.cleandoc(truth.__doc__ or "").partition("Attributes:\n")[2]
+    entries = re.findall(r"^ {4}(\S.*?): (.*?)(?=^ {4}\S|\Z)", section, re.MULTILINE | re.DOTALL)
+    found: dict[str, set[str]] = {}
+    for names, meaning in entries:
+        owner = re.search(r"\((\w+)\)\.\s*\Z", meaning)
+        if owner:
+            found.setdefault(owner.group(1), set()).update(names.split(", "))
+    return found
+
+
+def changed(before: Any, after: Any) -> set[str]:
+    """Names of the fields that an annotator has filled in."""
+    names = {f.name for f in fields(before)} - {"objects"}
+    return {n for n in names if plain(getattr(before, n)) != plain(getattr(after, n))}
+
+
+def plain(value: Any) -> Any:
+    """A value that can be compared, arrays included."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if hasattr(value, "__dataclass_fields__"):
+        return type(value).__name__, {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, tuple):
+        return [plain(item) for item in value]
+    return value
+
+
+def test_every_documented_field_has_an_annotator_and_the_other_way_round() -> None:
+    """But semantic masks, which are images alone."""
+    owners = {n for t in (ObjectTruth, ImageTruth, FrameTruth) for n in documented(t)}
+
+    assert owners == set(TABLE) - {"semantic_masks"}
+
+
+@each
+def test_it_fills_in_its_own_fields_and_no_other(name: str) -> None:
+    """A third party's results are under its own name in ``extra``."""
+    image, frame = annotated(name)
+    allowed = documented(ObjectTruth).get(name, {"extra"} if name not in TABLE else set())
+    for truth in image.objects:
+        bare = ObjectTruth(truth.instance, truth.visible_px, truth.box)
+        assert changed(bare, truth) == allowed - empty_fields(truth, allowed)
+        assert set(truth.extra) == ({name} - set(TABLE))
+    assert isinstance(made(name), Annotator) == bool(image.objects)
+    assert changed(ImageTruth(image.camera, ()), image) == documented(ImageTruth).get(name, set())
+    if frame is not None:
+        bare_frame = FrameTruth(frame.rig, frame.T_world_ego, frame.twist)
+        assert changed(bare_frame, frame) == documented(FrameTruth).get(name, set())
+    assert (frame is not None) == (name in documented(FrameTruth))
+
+
+def empty_fields(truth: ObjectTruth, names: set[str]) -> set[str]:
+    """Fields that stay None: parts of an object that has none."""
+    return {n for n in names if n == "part_px" and not truth.instance.parts}
+
+
+@each
+def test_it_says_the_same_every_time_and_in_every_process(name: str) -> None:
+    """There is no rng; a copy from another process agrees."""
+    copy = pickle.loads(pickle.dumps(made(name)))
+    given = world()
+    image = complete_truth(given.scene, given.reading, [copy], FEW_PX, given.assets)
+
+    assert copy == made(name)
+    assert plain(image) == plain(annotated(name)[0]) == plain(annotated(name)[0])
+    assert plain(annotated(name)[1]) == plain(annotated(name)[1])
+
+
+@each
+def test_its_arguments_stay_as_they_are(name: str) -> None:
+    """Scene and pixels."""
+    given = world()
+    pixels = {channel: image.copy() for channel, image in given.reading.channels.items()}
+    before = canonical_json(given.scene)
+    annotated(name)
+
+    assert canonical_json(given.scene) == before
+    for channel, image in given.reading.channels.items():
+        assert image.tobytes() == pixels[channel].tobytes()
+
+
+@each
+def test_it_needs_no_other_channel_than_it_names(name: str) -> None:
+    """Others need not have been rendered."""
+    given, channels = world(), made(name).channels
+    images = {c: image for c, image in given.reading.channels.items() if c in channels}
+    outlines = given.reading.silhouettes if Channel.AMODAL in channels else {}
+    lean = replace(given.reading, channels=images, silhouettes=outlines)
+
+    assert plain(annotated(name, replace(given, reading=lean))[0].objects) == plain(
+        annotated(name)[0].objects
+    )
+
+
+@each
+def test_an_empty_scene_has_empty_truth(name: str) -> None:
+    """No object; an annotator that needs a rig refuses with its own name."""
+    given = world()
+    nothing = {c: np.zeros_like(image) for c, image in given.reading.channels.items()}
+    nothing |= {c: np.full_like(nothing[c], np.inf) for c in DISTANCES & nothing.keys()}
+    scene = Scene("empty", cameras=(given.reading.camera,))
+    reading = replace(given.reading, channels=nothing, silhouettes={})
+    if name in NEED_A_RIG:
+        with pytest.raises(ConfigError, match=f"annotation '{name}': the scene has no rig"):
+            annotated(name, World(scene, reading, given.assets))
+        return
+    image, frame = annotated(name, World(scene, reading, given.assets))
+    assert image.objects == ()
+    assert not image.borders
+    assert image.free_space is None or not image.free_space.pixels.any()
+    assert frame is None or not (frame.boxes3d or frame.borders or frame.birdseye)
+
+
+def test_images_are_annotated_as_a_whole_where_objects_are_not() -> None:
+    """The world of these tests has something for annotators of images and of samples to say."""
+    image, _ = annotated("lanes")
+
+    assert isinstance(made("lanes"), ImageAnnotator)
+    assert image.borders
+    assert to_plain(world().scene)["rigs"]

@@ -1,0 +1,59 @@
+"""Every shipped configuration renders, exports and verifies, from the command line.
+
+Images, sweeps and sequences are reduced: the paths through the program stay the same.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import configs
+from generator.assemble.spec import load_config
+from generator.core.interfaces import Modality, Sensor
+from generator.runner.verify import verify
+from tests.end_to_end.running import gen_data
+
+CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
+
+
+def reduced(name: str) -> list[str]:
+    """Options that make one sample of a configuration quick."""
+    spec = load_config(name)
+    texts = ["shard_size=1"]
+    if "tier" in spec.resolved["render"]:
+        texts.append("render.samples=1")
+    for number, sensor in enumerate(spec.sensors):
+        texts += [f"sensors[{number}].{text}" for text in smaller(sensor)]
+    return [word for text in texts for word in ("--set", text)]
+
+
+def smaller(sensor: Sensor) -> list[str]:
+    """Settings of a sensor that takes an eighth of the pixels or beams."""
+    size_px = getattr(sensor, "size_px", None)
+    if size_px is None:
+        return []
+    width_px, height_px = (max(64, 4 * (side // 16)) for side in size_px)
+    return [f"size_px=[{width_px}, {height_px}]"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CONFIGS)
+def test_one_sample_is_rendered_exported_and_verified(name: str, tmp_path: Path) -> None:
+    """Every exporter of it writes files, and every byte agrees with the manifest."""
+    options = ("--n", "1", "--workers", "1", "--out", "out", *reduced(name))
+    made = gen_data("--config", name, *options, cwd=tmp_path)
+    assert made.returncode == 0, made.stdout + made.stderr
+    spec = load_config(name)
+
+    verify(tmp_path / "out", full=True)
+    for exporter in spec.exporters:
+        files = [p for p in (tmp_path / "out" / exporter.type).rglob("*") if p.is_file()]
+        assert files, exporter.type
+    for sensor in (s.describe() for s in spec.sensors):
+        folder = {Modality.LIDAR: "points", Modality.DEVICE: "rows"}.get(sensor.modality)
+        channels = [folder] if folder else [channel.value for channel in sensor.channels]
+        for channel in channels:
+            pattern = f"shards/*/{sensor.name}/{channel}/000000000.*"
+            assert list((tmp_path / "out").glob(pattern)), pattern

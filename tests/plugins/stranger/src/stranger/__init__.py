@@ -1,0 +1,1 @@
+"""One plug-in of every kind, written from the Protocols of ``generator.core.interfaces`` alone."""

@@ -1,0 +1,31 @@
+"""An annotation: the distance from the camera to every object."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from generator.config.strict import Strict
+from generator.core.capture import Channel, Reading
+from generator.core.interfaces import Annotator
+from generator.core.sample import ObjectTruth
+from generator.core.scene import Scene
+
+
+class Distance(Strict):
+    """Distance from the camera to the origin of each object, under ``extra``."""
+
+    channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
+    type: Literal["stranger_distance"] = "stranger_distance"
+
+    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+        """Fill in ``extra["stranger_distance"]`` [m]."""
+        eye_m = np.array(reading.camera.T_world_camera.translation_m)
+        there_m = np.array(truth.instance.T_world_instance.translation_m)
+        distance_m = round(float(np.linalg.norm(there_m - eye_m)), 6)
+        return replace(truth, extra={**truth.extra, self.type: distance_m})
+
+
+PLUGIN: type[Annotator] = Distance

@@ -1,0 +1,42 @@
+"""An element: one object at a given place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from generator.config.strict import Strict
+from generator.core.interfaces import AssetIndex, Element
+from generator.core.scene import Body, Instance, Scene
+from generator.core.se3 import SE3
+
+
+class Pedestal(Strict):
+    """An object that stands free in space.
+
+    Attributes:
+        name: Unique in the template.
+        asset: Id of the object.
+        at_m: Its place in the world.
+    """
+
+    type: Literal["stranger_pedestal"] = "stranger_pedestal"
+    name: str
+    asset: str = "mug?seed=0"
+    at_m: tuple[float, float, float] = (0.0, 0.0, 0.5)
+
+    @property
+    def follows_others(self) -> bool:
+        """It keeps clear of nothing."""
+        return False
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """The scene with the object and its instance."""
+        instance_id = max((i.instance_id for i in scene.instances), default=0) + 1
+        body = Body(self.name, self.asset, SE3(self.at_m), instance_id=instance_id)
+        category = assets.get(self.asset).category
+        instance = Instance(instance_id, self.name, category, 0, self.asset)
+        return replace(scene, bodies=(*scene.bodies, body), instances=(*scene.instances, instance))
+
+
+PLUGIN: type[Element] = Pedestal

@@ -1,0 +1,62 @@
+"""An exporter: one JSON line per object and image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Literal
+
+from generator.config.strict import Strict
+from generator.core.errors import ConfigError
+from generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from generator.core.sample import Sample
+from generator.core.serial import canonical_json
+
+
+class Lines(Strict):
+    """``objects.jsonl``: index, camera, category and distance of every object."""
+
+    type: Literal["stranger_lines"] = "stranger_lines"
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """The distance."""
+        return frozenset({"stranger_distance"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a data set without a camera."""
+        if not info.cameras:
+            raise ConfigError(f"exporter '{self.type}': there is no camera")
+
+    def with_assets(self, assets: AssetLibrary) -> Lines:
+        """It writes no geometry."""
+        del assets
+        return self
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """The lines of one shard."""
+        rows = [
+            {
+                "index": sample.index,
+                "camera": camera,
+                "category": truth.instance.category,
+                "distance_m": truth.extra["stranger_distance"],
+            }
+            for sample in samples
+            for camera in info.cameras
+            for truth in sample.truth[camera].objects
+        ]
+        folder = shard_dir / self.type
+        folder.mkdir(parents=True)
+        text = "".join(canonical_json(row) + "\n" for row in rows)
+        (folder / "objects.jsonl").write_text(text, encoding="utf-8")
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """All shards' lines in one file."""
+        del info
+        dataset_dir.mkdir(parents=True, exist_ok=True)
+        parts = [(folder / self.type / "objects.jsonl").read_text("utf-8") for folder in shard_dirs]
+        (dataset_dir / "objects.jsonl").write_text("".join(parts), encoding="utf-8")
+
+
+PLUGIN: type[Exporter] = Lines

@@ -1,0 +1,55 @@
+"""A randomizer: exchanges the asset of one object."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from generator.config.strict import Strict
+from generator.core.interfaces import AssetIndex, Randomizer, Stage
+from generator.core.scene import Scene
+from generator.core.streams import Rng
+
+
+class Swap(Strict):
+    """Draws another asset for one object.
+
+    Attributes:
+        name: The key of its random stream.
+        target: Name of the body.
+        tags: The asset carries all of these.
+    """
+
+    type: Literal["stranger_swap"] = "stranger_swap"
+    name: str
+    target: str
+    tags: tuple[str, ...]
+
+    @property
+    def stage(self) -> Stage:
+        """Before physics: another asset has another shape."""
+        return Stage.BUILD
+
+    @property
+    def motion_duration_s(self) -> None:
+        """Nothing moves."""
+
+    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+        """All that it draws from."""
+        return tuple(asset.asset_id for asset in assets.find(self.tags))
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """The scene with another asset on the target and its instance."""
+        options = self.possible_assets(assets)
+        drawn = options[int(rng.integers(len(options)))]
+        body = replace(scene.body(self.target), asset=drawn)
+        instances = tuple(
+            replace(i, asset=drawn, category=assets.get(drawn).category)
+            if i.instance_id == body.instance_id
+            else i
+            for i in scene.instances
+        )
+        return replace(scene.with_bodies(body), instances=instances)
+
+
+PLUGIN: type[Randomizer] = Swap

@@ -1,0 +1,56 @@
+"""A sensor: a device that measures the mean luminance in front of a camera."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from generator.config.strict import Strict
+from generator.core.capture import Channel, Table
+from generator.core.interfaces import Modality, Renderer, Sensor, SensorInfo
+from generator.core.scene import Device, Scene
+from generator.core.streams import Rng
+from generator.core.tables import TIME, Column, columns_dtype
+
+COLUMNS = (TIME, Column("luminance_cd_m2", "<f8", "mean over the image, with noise"))
+
+
+class LightMeter(Strict):
+    """A light meter that rides with a camera.
+
+    Attributes:
+        name: What files call it.
+        camera: Name of the camera.
+        noise: Relative standard deviation of a reading.
+    """
+
+    type: Literal["stranger_light_meter"] = "stranger_light_meter"
+    name: str = "meter"
+    camera: str = "color"
+    noise: float = 0.01
+
+    def describe(self) -> SensorInfo:
+        """A device with a table of its own."""
+        return SensorInfo(self.name, Modality.DEVICE, "light_meter", columns=COLUMNS)
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with the device at its camera."""
+        device = Device(self.name, "light_meter", "", camera=self.camera)
+        return replace(scene, devices=(*scene.devices, device))
+
+    def capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> Table:
+        """One row."""
+        del channels
+        seen = renderer.render(scene, scene.camera(self.camera), frozenset({Channel.RADIANCE}))
+        mean = float(seen.channels[Channel.RADIANCE].mean(dtype=np.float64))
+        rows = np.zeros(1, columns_dtype(COLUMNS))
+        rows["time_s"] = scene.time_s
+        rows["luminance_cd_m2"] = mean * (1.0 + self.noise * rng.standard_normal())
+        return Table(self.name, scene.device(self.name), rows, scene.time_s)
+
+
+PLUGIN: type[Sensor] = LightMeter

@@ -1,0 +1,25 @@
+"""An asset family: striped textures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from generator.assets.procedural.family import Origin, TextureFamily
+from generator.core.geometry import TextureData
+
+
+def stripes(seed: int) -> TextureData:
+    """Vertical stripes in two shades of one colour; more of them the larger the seed."""
+    columns = np.arange(64) * (seed + 1) // 16 % 2
+    row = np.where(columns[:, None] == 1, [200, 40, 40], [90, 20, 20]).astype(np.uint8)
+    return TextureData(np.ascontiguousarray(np.broadcast_to(row, (64, 64, 3))))
+
+
+STRIPES = TextureFamily(
+    name="stranger_stripes",
+    tags=("stranger_pattern",),
+    variants=2,
+    version=1,
+    build=stripes,
+    origin=Origin("CC0-1.0", "A stranger", "stranger"),
+)

@@ -1,0 +1,187 @@
+"""A package of third-party plug-ins, one of every kind, installed and used from the command line.
+
+It is written from the Protocols of ``generator.core.interfaces`` and inherits nothing but
+``Strict``; ``mypy`` checks it with the rest of the project (``pyproject.toml``).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.end_to_end.running import ROOT, command
+
+PACKAGE = Path(__file__).parent / "stranger"
+CONFIG = """
+seed: 3
+elements:
+  - {type: surface, name: table}
+  - {type: stranger_pedestal, name: cup, at_m: [0.0, 0.0, 1.0]}
+randomizers:
+  - {type: stranger_swap, name: swap, target: cup, tags: [mug]}
+  - {type: textures, name: cover, targets: [table], textures: [stranger_pattern], probability: true}
+  - {type: camera_pose, name: orbit, every: view}
+sensors:
+  - {type: rgb_camera, name: color, size_px: [96, 72]}
+  - {type: stranger_light_meter, name: meter, noise: 0.0}
+annotations: [boxes2d]
+exporters:
+  - {type: stranger_lines}
+  - {type: tables}
+  - {type: coco}
+render: {renderer: stranger_boxes, luminance_cd_m2: 250.0}
+"""
+
+
+def run(*arguments: str, path: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """``gen-data`` in a process that finds a folder of installed packages."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
+    return subprocess.run(
+        command(*arguments),
+        cwd=cwd,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The folder that the package is installed in, offline."""
+    folder = tmp_path_factory.mktemp("stranger")
+    source, target = folder / "source", folder / "site"
+    shutil.copytree(PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__"))
+    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps")
+    done = subprocess.run(
+        [*pip, "--no-build-isolation", "--target", str(target), str(source)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return str(target)
+
+
+@pytest.fixture(scope="session")
+def dataset(installed: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two samples in which every plug-in of the package takes part."""
+    folder = tmp_path_factory.mktemp("strangers-data")
+    (folder / "strange.yaml").write_text(CONFIG)
+    arguments = ("--config", "strange.yaml", "--n", "2", "--workers", "1", "--out", "out")
+    done = run(*arguments, path=installed, cwd=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "out"
+
+
+def scenes(dataset: Path) -> list[dict[str, object]]:
+    """The scene of every sample, as the data set keeps it."""
+    paths = sorted(dataset.glob("shards/*/scenes.jsonl"))
+    return [json.loads(line)["scene"] for path in paths for line in path.read_text().splitlines()]
+
+
+def lines(dataset: Path) -> list[dict[str, object]]:
+    """What the third-party exporter wrote."""
+    text = (dataset / "stranger_lines/objects.jsonl").read_text()
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_the_data_set_verifies(dataset: Path, installed: str) -> None:
+    """Every byte of it."""
+    done = run("verify", str(dataset), "--full", path=installed, cwd=dataset)
+
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_element_is_in_every_scene_with_an_asset_that_the_randomizer_drew(
+    dataset: Path,
+) -> None:
+    """A mug 1 m above the floor; the plan names every mug that might have been drawn."""
+    for scene in scenes(dataset):
+        (cup,) = (body for body in scene["bodies"] if body["name"] == "cup")  # type: ignore[attr-defined]
+        assert cup["asset"].startswith("mug?seed=")
+        assert cup["T_world_body"]["translation_m"] == [0.0, 0.0, 1.0]
+    planned = json.loads((dataset / "plan.json").read_text())["assets"]
+    assert len([name for name in planned if name.startswith("mug?")]) > 1
+
+
+def test_the_texture_covers_the_table_and_keeps_its_licence(dataset: Path) -> None:
+    """It is selected by its tag."""
+    for scene in scenes(dataset):
+        (table,) = (body for body in scene["bodies"] if body["name"] == "table")  # type: ignore[attr-defined]
+        textures = {material["texture"] for material in table["materials"]}
+        assert all(name.startswith("texture/stranger_stripes?seed=") for name in textures)
+    licences = (dataset / "LICENSES-ASSETS.md").read_text()
+    assert "| stranger | CC0-1.0 | A stranger | texture/stranger_stripes |" in licences
+
+
+def test_the_renderer_makes_the_images_that_the_sensor_measures(dataset: Path) -> None:
+    """A box is 250 cd/m^2 and grey, the background black: the meter reads their mean."""
+    for index in range(2):
+        image = np.array(Image.open(next(dataset.glob(f"shards/*/color/rgb/{index:09d}.png"))))
+        assert set(np.unique(image)) == {0, 128}
+        share = (image[..., 0] == 128).mean()
+        row = (dataset / f"tables/meter/{index:06d}.csv").read_text().splitlines()[1]
+        assert float(row.split(",")[2]) == pytest.approx(250.0 * share, rel=1e-6)
+    columns = json.loads((dataset / "tables/columns.json").read_text())["meter"]["columns"]
+    assert [column["name"] for column in columns] == ["sample", "time_s", "luminance_cd_m2"]
+
+
+def test_the_exporter_writes_what_the_annotation_found(dataset: Path) -> None:
+    """Each distance is that from the camera to the mug's place."""
+    cups = [line for line in lines(dataset) if line["category"] == "mug"]
+    for line, scene in zip(cups, scenes(dataset), strict=True):
+        (camera,) = scene["cameras"]  # type: ignore[misc]
+        eye_m = np.array(camera["T_world_camera"]["translation_m"])
+        assert line["distance_m"] == pytest.approx(np.linalg.norm(eye_m - [0, 0, 1]), abs=1e-5)
+
+
+def test_the_plan_names_the_package_so_that_another_release_does_not_resume(
+    dataset: Path,
+) -> None:
+    """Its release can change every byte."""
+    assert json.loads((dataset / "plan.json").read_text())["versions"]["stranger"] == "1.0"
+
+
+def test_plug_ins_explain_themselves(installed: str, tmp_path: Path) -> None:
+    """Fields and docstrings are read like our own."""
+    done = run("describe", "stranger_boxes", path=installed, cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert "renderer stranger_boxes" in done.stdout
+    assert "Of every box; the background is black." in done.stdout
+    schema = json.loads(run("schema", path=installed, cwd=tmp_path).stdout)
+    assert {f"{kind}.stranger_{name}" for kind, name in (
+        ("element", "pedestal"), ("randomizer", "swap"), ("sensor", "light_meter"),
+        ("exporter", "lines"), ("renderer", "boxes"),
+    )} <= set(schema["$defs"])  # fmt: skip
+
+
+def test_an_unknown_field_is_refused_at_its_place(installed: str, tmp_path: Path) -> None:
+    """File, line and column, and the field that was meant."""
+    (tmp_path / "strange.yaml").write_text(CONFIG.replace("luminance_cd_m2", "luminance"))
+    done = run("--config", "strange.yaml", "--n", "1", path=installed, cwd=tmp_path)
+
+    assert done.returncode != 0
+    assert "strange.yaml:18:36: render.luminance: unknown key" in done.stderr
+    assert "luminance_cd_m2" in done.stderr
+
+
+def test_the_examples_of_the_contributors_guide_are_those_of_the_package() -> None:
+    """Each block of code with a file's name in its first line is a part of that file."""
+    guide = (ROOT / "CONTRIBUTING.md").read_text()
+    blocks = re.findall(r"^```\w+\n# (tests/\S+)\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL)
+
+    assert len(blocks) == 8
+    for path, text in blocks:
+        assert text.rstrip() in (ROOT / path).read_text(), path
