@@ -29,7 +29,7 @@ elements:
 randomizers:
   - {type: stranger_swap, name: swap, target: cup, tags: [mug]}
   - {type: textures, name: cover, targets: [table], textures: [stranger_pattern], probability: true}
-  - {type: camera_pose, name: orbit, every: view}
+  - {type: camera_pose, name: orbit, stage: view}
 sensors:
   - {type: rgb_camera, name: color, size_px: [96, 72]}
   - {type: stranger_light_meter, name: meter, noise: 0.0}
