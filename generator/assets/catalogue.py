@@ -418,7 +418,7 @@ def user_folder(root: Path) -> Iterator[Listed]:
     if not root.is_dir():
         raise AssetError(f"{root}: no such folder; create it or correct the list of asset folders")
     path = root / INDEX_NAME
-    index = _user_index(root, path) if path.exists() else _found(root)
+    index = _user_index(root, path) if path.exists() else _index_files(root)
     yield from listed(index, root, "user/", (USER_TAG,))
 
 
@@ -463,7 +463,7 @@ def _count_by_suffix(files: tuple[str, ...]) -> str:
     return ", ".join(f"{count} {suffix}" for suffix, count in counts.most_common(6)) or "no file"
 
 
-def _found(root: Path) -> Index:
+def _index_files(root: Path) -> Index:
     """An index of a folder's files; meshes that a URDF uses are not listed twice."""
     files, panoramas = [], []
     for name in files_below(root):

@@ -67,19 +67,19 @@ class Files:
 
     def names(self) -> Iterator[str]:
         """Every id."""
-        yield from self._all()
+        yield from self._entries()
 
     def user_counts(self) -> Counter[str]:
         """Number of assets in the user's folders, by kind."""
-        return Counter(one.kind for one in self._all().values() if one.root in self._user_roots)
+        return Counter(one.kind for one in self._entries().values() if one.root in self._user_roots)
 
     def __contains__(self, asset_id: str) -> bool:
         """Whether an asset, a robot's link or a stage's piece has that id."""
-        return asset_id in self._all() or self._part(asset_id) is not None
+        return asset_id in self._entries() or self._part(asset_id) is not None
 
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
         """All assets of a kind that carry every tag."""
-        for one in self._all().values():
+        for one in self._entries().values():
             if one.kind == kind and tags.issubset(one.tags()):
                 yield self._asset(one)
         self._digests.save()
@@ -88,7 +88,7 @@ class Files:
         """The asset, or a robot's link or a stage's piece as an object of its own."""
         part = self._part(asset_id)
         if part is None:
-            asset = self._asset(self._all()[asset_id])
+            asset = self._asset(self._entries()[asset_id])
         else:
             whole = self._asset(part[0])
             asset = replace(whole, asset_id=asset_id, kind="object")
@@ -98,7 +98,7 @@ class Files:
     def imported(self, asset_id: str) -> Imported:
         """Geometry of an object, of a robot's link or of a stage's piece."""
         part = self._part(asset_id)
-        one = part[0] if part else self._all()[asset_id]
+        one = part[0] if part else self._entries()[asset_id]
         entry, folder = one.entry, Folder(one.root)
         name = part[1] if part else ""
 
@@ -122,7 +122,7 @@ class Files:
 
     def lanes(self, asset_id: str) -> tuple[Lane, ...]:
         """Lanes of a road network; empty for anything else."""
-        one = self._all().get(asset_id)
+        one = self._entries().get(asset_id)
         if one is None or not _is_road_network(one.entry):
             return ()
         folder = Folder(one.root)
@@ -132,14 +132,14 @@ class Files:
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot."""
-        one = self._all()[asset_id]
+        one = self._entries()[asset_id]
         if not isinstance(one.entry, RobotEntry):
             raise AssetError(f"asset '{asset_id}': is no robot but one of kind {one.kind}")
         return robot_model(asset_id, self._urdf(one), one.entry, str(one.root / one.entry.file))
 
     def stage(self, asset_id: str) -> StageModel:
         """What a stage holds."""
-        one = self._all()[asset_id]
+        one = self._entries()[asset_id]
         entry = one.entry
         if not isinstance(entry, MeshEntry) or not is_stage(entry):
             raise AssetError(f"asset '{asset_id}': is no stage; give a .usd, .usda, .usdc or .usdz")
@@ -153,7 +153,7 @@ class Files:
         """Images of a listed texture, or of a mesh's material (``<asset>#<image>``)."""
         owner, _, name = texture_id.partition("#")
         part = self._part(owner)
-        one = part[0] if part else self._all()[owner]
+        one = part[0] if part else self._entries()[owner]
         folder = Folder(one.root)
         if not name:
             if not isinstance(one.entry, TextureEntry):
@@ -177,7 +177,7 @@ class Files:
 
     def environment(self, asset_id: str) -> Float32:
         """Pixels of a panorama."""
-        one = self._all()[asset_id]
+        one = self._entries()[asset_id]
         if one.kind != "environment":
             raise AssetError(f"asset '{asset_id}': is no environment but one of kind {one.kind}")
         folder, name = Folder(one.root), one.entry.file
@@ -200,7 +200,7 @@ class Files:
             content_key(key), lambda: {what: compute()}, lambda arrays: arrays[what]
         )
 
-    def _all(self) -> dict[str, Listed]:
+    def _entries(self) -> dict[str, Listed]:
         if self._listed is None:
             self._listed = {}
             for one in _everything(self._packs, self._user_roots):
@@ -215,8 +215,8 @@ class Files:
     def _part(self, asset_id: str) -> tuple[Listed, str] | None:
         """Robot and link of an id ``<robot>/<link>``, stage and piece of ``<stage>/<piece>``."""
         whole, slash, part = asset_id.rpartition("/")
-        one = self._all().get(whole) if slash else None
-        if one is None or asset_id in self._all():
+        one = self._entries().get(whole) if slash else None
+        if one is None or asset_id in self._entries():
             return None
         if one.kind == "robot":
             return (one, part) if part in self._urdf(one).links else None

@@ -87,7 +87,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         asset_id = f"{asset_id}/{piece}" if images else asset_id
         entry = entry.model_copy(update={"origin": "center"})
     else:
-        looks, collides, images = _raw(folder, entry)
+        looks, collides, images = _read_geometry(folder, entry)
     decoded = {name: decode(data, f"{place}#{name}", alpha=True) for name, data in images.items()}
     whole = with_reached_holes(
         joined(looks),
@@ -97,7 +97,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
             else decode(folder.read(name), str(folder.root / name), alpha=True)
         ),
     )
-    soup = _finished(whole, entry.materials, place, asset_id)
+    soup = _apply_finishes(whole, entry.materials, place, asset_id)
     matrix = upright(entry)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
@@ -124,7 +124,7 @@ def import_link(
         soup = joined([_shape_soup(folder, shape, SE3()) for shape in link.visuals])
         if entry.palette:
             soup = _palette_colors(folder, soup)
-        soup = _finished(soup, entry.materials, place, robot_id)
+        soup = _apply_finishes(soup, entry.materials, place, robot_id)
         mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
     if link.collisions:
         solids = [_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
@@ -152,7 +152,9 @@ def _grouped(soup: Soup) -> bool:
     return bool((soup.face_groups != soup.face_groups[0]).any())
 
 
-def _raw(folder: Folder, entry: MeshEntry) -> tuple[list[Soup], list[Soup], Mapping[str, bytes]]:
+def _read_geometry(
+    folder: Folder, entry: MeshEntry
+) -> tuple[list[Soup], list[Soup], Mapping[str, bytes]]:
     """What is seen, what collides (empty = the same), and embedded images, as the files have it."""
     images: Mapping[str, bytes] = {}
     collides: list[Soup] = []
@@ -206,11 +208,11 @@ def _shape_soup(folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bo
         soup = Soup.of(cylinder(shape.size[0], shape.size[1]))
     else:
         soup = Soup.of(sphere(shape.size[0]))
-    slots = tuple(_painted(slot, shape) for slot in soup.slots)
+    slots = tuple(_apply_color(slot, shape) for slot in soup.slots)
     return replace(soup, slots=slots).transformed(matrix)
 
 
-def _painted(slot: Slot, shape: Shape) -> Slot:
+def _apply_color(slot: Slot, shape: Shape) -> Slot:
     """A slot under the material of a URDF element: it colours what the file leaves plain.
 
     White is what descriptions say when they mean nothing in particular: the mesh's own colours
@@ -224,7 +226,7 @@ def _painted(slot: Slot, shape: Shape) -> Slot:
     return Slot(shape.material or slot.name, replace(slot.material, base_color=color), True)
 
 
-def _finished(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str) -> Soup:
+def _apply_finishes(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str) -> Soup:
     """Slots with the entry's finishes, textures named by their owner, and no impossible whites."""
     slots = []
     for slot in soup.slots:
@@ -238,9 +240,9 @@ def _finished(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str
         if material.texture:
             material = replace(material, texture=f"{owner}#{material.texture}")
         else:
-            material = replace(material, base_color=_possible(material))
+            material = replace(material, base_color=_limit_white(material))
         if finish is not None:
-            material = _with_finish(material, finish, owner)
+            material = _apply_finish(material, finish, owner)
             _check_placeable(material, finish, soup, f"{place}: material '{slot.name}'")
         slots.append(replace(slot, material=material))
     return replace(soup, slots=tuple(slots))
@@ -270,7 +272,7 @@ def _with_regions(soup: Soup, regions: Sequence[Region], place: str, owner: str)
         for k, slot in enumerate(soup.slots):
             chosen = inside & (soup.face_slots == k)
             if fnmatchcase(slot.name, region.material) and chosen.any():
-                material = _with_finish(slot.material, region.finish, owner)
+                material = _apply_finish(slot.material, region.finish, owner)
                 _check_placeable(material, region.finish, soup, f"{place}: region of '{slot.name}'")
                 soup = replace(
                     soup,
@@ -280,7 +282,7 @@ def _with_regions(soup: Soup, regions: Sequence[Region], place: str, owner: str)
     return soup
 
 
-def _with_finish(material: Material, finish: Finish, owner: str) -> Material:
+def _apply_finish(material: Material, finish: Finish, owner: str) -> Material:
     """What the finish says, and of the file what it leaves.
 
     A finish with a colour stands for a surface of its own: what is behind the file's is not seen.
@@ -302,7 +304,7 @@ def _with_finish(material: Material, finish: Finish, owner: str) -> Material:
     return replace(material, **changes)
 
 
-def _possible(material: Material) -> tuple[float, float, float]:
+def _limit_white(material: Material) -> tuple[float, float, float]:
     if material.metallic > 0.5 or material.transmission > 0.5:
         return material.base_color
     red, green, blue = (min(c, _WHITEST) for c in material.base_color)
