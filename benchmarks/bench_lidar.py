@@ -16,16 +16,16 @@ from dataclasses import replace
 
 from benchmarks.bench_render import timed_launches
 from benchmarks.runs import machine
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_config
-from generator.core.capture import Beams, PointCloud
-from generator.core.motion import Track
-from generator.core.scene import Body, Rig, Scene
-from generator.core.se3 import SE3
-from generator.core.streams import Streams
-from generator.sensors.lidar import LidarSensor
-from generator.sensors.lidars import lidar_model
-from generator.sensors.scanning import sweep_of
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.capture import LidarRays, PointCloud
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.scene import Body, Rig, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.generator.sensors.lidar.presets import lidar_model
+from gen_data.generator.sensors.lidar.scan_pattern import make_sweep
 
 
 def best_s(work: Callable[[], object], repeats: int) -> float:
@@ -55,10 +55,10 @@ def under_way(scene: Scene) -> Scene:
                    lidars=(lidar,), tracks=tuple(tracks))  # fmt: skip
 
 
-def _straight(body: Body, speed_m_s: float, start_s: float) -> Track:
+def _straight(body: Body, speed_m_s: float, start_s: float) -> Trajectory:
     pose = body.T_world_body
     steps = [SE3.about_z(0.02 * k, (0.1 * speed_m_s * k, 0.0, 0.0)) for k in range(-10, 11)]
-    return Track(body.name, 0.1, tuple(pose @ step for step in steps), start_s)
+    return Trajectory(body.name, 0.1, tuple(pose @ step for step in steps), start_s)
 
 
 def main() -> None:
@@ -69,8 +69,8 @@ def main() -> None:
     parser.add_argument("--model", default="HDL-64E")
     arguments = parser.parse_args()
     model = lidar_model(arguments.model)
-    sweep = sweep_of(model, 0.0)
-    beams = Beams(sweep.directions, 0.0, 1, model.range_m[1], order=sweep.order)
+    sweep = make_sweep(model, 0.0)
+    beams = LidarRays(sweep.directions, 0.0, 1, model.range_m[1], order=sweep.order)
     spec = load_config("kitti_rig.yaml", overrides=["sensors[0].size_px=[64, 32]"])
     print(f"{machine()}; {arguments.model}, {len(sweep.ring)} pulses")
     with open_pipeline(spec) as pipeline:

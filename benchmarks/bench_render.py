@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bench_tabletop import spec_of
-from generator.assemble.recipe import open_pipeline
-from generator.core.capture import Channel, Reading
-from generator.core.interfaces import AssetLibrary
-from generator.core.scene import Scene
-from generator.core.streams import Streams
-from generator.renderers.warp import WarpRenderer
-from generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 LABELLED = frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY})
 
@@ -48,7 +48,7 @@ def frame_ms(
     return best
 
 
-def photograph(renderer: WarpRenderer, scene: Scene, channels: frozenset[Channel]) -> Reading:
+def photograph(renderer: WarpRenderer, scene: Scene, channels: frozenset[Channel]) -> SensorReading:
     """An ideal camera's reading: rendered, then developed."""
     rng = Streams(seed=0, scene=0).rng("camera")
     return capture_photograph(scene, renderer, scene.cameras[0], channels, ImagePipeline(), rng)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 
 from benchmarks.runs import described, machine, measured_run
-from generator.assemble.spec import load_config
+from gen_data.generator.assemble.config import load_config
 
 
 def main() -> None:

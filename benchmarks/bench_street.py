@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 
 from benchmarks.runs import described, machine, measured_run
-from generator.assemble.spec import Config, load_config
+from gen_data.generator.assemble.config import Config, load_config
 
 OVERRIDES = (
     "views_per_scene=5",

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.runs import described, machine, measured_run
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import Config, load_config
+from gen_data.generator.assemble.config import Config, load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
 
 OVERRIDES = (
     "randomizers.clutter.count=10",

@@ -13,15 +13,15 @@ from collections.abc import Iterator
 from typing import Any
 
 from benchmarks.runs import machine
-from generator.assemble.recipe import scene_source
-from generator.assemble.spec import load_config
-from generator.assets.library import Library, open_library
-from generator.core.errors import LayoutRejected
-from generator.core.scene import Scene
-from generator.core.streams import Streams
-from generator.traffic.simulation import Motion, simulated
-from randomizers import traffic_flow
-from randomizers.traffic_flow import TrafficFlow
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import scene_source
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import LayoutRejected
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
+from gen_data.randomizers import traffic_flow
+from gen_data.randomizers.traffic_flow import TrafficFlow
 
 FULL = {"traffic": ("gap_m=3", "count=29"), "people": ("gap_m=2", "count=40")}
 
@@ -49,14 +49,14 @@ def spent_ms(scene: Scene, flow: TrafficFlow, library: Library) -> Iterator[dict
     """CPU time of everything the randomizer does, and of the simulation in it, again and again."""
     simulating = 0.0
 
-    def timed(*arguments: Any) -> Motion:
+    def timed(*arguments: Any) -> SimulatedMotion:
         nonlocal simulating
         started = time.process_time()
-        motion = simulated(*arguments)
+        motion = simulate(*arguments)
         simulating = time.process_time() - started
         return motion
 
-    traffic_flow.simulated = timed
+    traffic_flow.simulate = timed
     for attempt in range(20):
         rng = Streams(0, 0, attempt=attempt).rng("randomizer/flow")
         started = time.process_time()

@@ -7,10 +7,10 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import Config
-from generator.runner.identity import licences_text, plan_of
-from generator.runner.run import Summary, run
+from gen_data.generator.assemble.config import Config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.runner.identity import format_licences, make_plan
+from gen_data.generator.runner.run import Summary, run
 
 
 def measured_run(spec: Config, n: int, workers: int) -> Summary:
@@ -18,12 +18,12 @@ def measured_run(spec: Config, n: int, workers: int) -> Summary:
     factory = PipelineFactory(spec, n)
     with tempfile.TemporaryDirectory() as folder:
         return run(
-            plan_of(factory),
+            make_plan(factory),
             factory,
             Path(folder) / "out",
             workers=workers,
             resume_command="",
-            licences=partial(licences_text, factory),
+            licences=partial(format_licences, factory),
         )
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from generator.config.strict import Strict
-from generator.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 
 E = TypeVar("E", bound="ExporterBase")
 

@@ -36,15 +36,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from exporters.base import ExporterBase
-from exporters.images import link_or_copy
-from exporters.png import RowFilter, encode_png
-from generator.core.capture import Channel
-from generator.core.interfaces import DatasetInfo
-from generator.core.lanes import LaneBorder
-from generator.core.motion import Twist
-from generator.core.sample import BirdseyeMap, BorderTruth, FrameTruth, Sample
-from generator.core.serial import canonical_json
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.lane_geometry import LaneBorder
+from gen_data.generator.core.motion import Twist
+from gen_data.generator.core.sample import BirdseyeMap, BorderTruth, EgoTruth, Sample
+from gen_data.generator.core.serialization import canonical_json
 
 FRAMES, LANES = "frames.jsonl", "lanes"
 ROWS_PX = 10
@@ -99,7 +99,7 @@ class Birdseye(ExporterBase):
             _write_lines(dataset_dir / name, ((f / name).read_text("utf-8") for f in folders))
 
 
-def _frame(sample: Sample, truth: FrameTruth, birdseye: BirdseyeMap) -> dict[str, Any]:
+def _frame(sample: Sample, truth: EgoTruth, birdseye: BirdseyeMap) -> dict[str, Any]:
     size_px = len(next(iter(birdseye.layers.values())))
     return {
         "index": sample.index,
@@ -134,7 +134,7 @@ def _borders(
             yield {"name": border.name, "kind": border.kind, "points_m": points}
 
 
-def _boxes(sample: Sample, truth: FrameTruth) -> dict[str, list[dict[str, Any]]]:
+def _boxes(sample: Sample, truth: EgoTruth) -> dict[str, list[dict[str, Any]]]:
     categories = {i.instance_id: i.category for i in sample.scene.instances}
     return {
         frame: [

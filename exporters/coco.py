@@ -39,8 +39,9 @@ instant's number in its sequence, from 0) and ``time_s``, and annotations have `
 same for one object in all images of its sequence, whatever the camera, and unique in the data set.
 
 Images have ``K`` and, where their camera is no pinhole, ``lens``: its ``model`` (one of those in
-``generator.core.lens``), the ``distortion`` that ``K`` maps on, which is OpenCV's vector, with the
-names of its ``coefficients``, and ``half_field_rad``, the angle to the axis where the image ends.
+``gen_data.generator.core.lens``), the ``distortion`` that ``K`` maps on, which is OpenCV's vector,
+with the names of its ``coefficients``, and ``half_field_rad``, the angle to the axis where the
+image ends.
 
 Images whose camera has a shutter have ``exposure_s``, how long a row is exposed, and ``readout_s``,
 from the exposure of the upper edge to that of the lower one (negative = upwards, 0 = at once): row
@@ -66,19 +67,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from exporters.base import ExporterBase
-from exporters.images import link_or_copy
-from exporters.rle import encoded
-from exporters.sensors import instant_s, rgb_cameras
-from exporters.sequences import sequence_of
-from generator.core.boxes import BoxPx, OrientedBox
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import COEFFICIENTS, Lens
-from generator.core.motion import Twist
-from generator.core.sample import (
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.rle import encode_rle
+from gen_data.exporters.sensor_selection import instant_s, rgb_cameras
+from gen_data.exporters.sequences import sequence_number
+from gen_data.generator.core.boxes import BoxPx, OrientedBox
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import COEFFICIENTS, Lens
+from gen_data.generator.core.motion import Twist
+from gen_data.generator.core.sample import (
     ANNOTATION_STRIDE,
     ImageTruth,
     KeypointTruth,
@@ -86,11 +87,11 @@ from generator.core.sample import (
     ObjectTruth,
     Sample,
 )
-from generator.core.scene import Instance, Weather
-from generator.core.se3 import Array
-from generator.core.serial import canonical_json
-from generator.core.shutter import Shutter
-from generator.core.skeletons import Skeleton, skeleton_of
+from gen_data.generator.core.scene import Instance, Weather
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.core.shutter import Shutter
+from gen_data.generator.core.skeletons import Skeleton, find_skeleton
 
 DECIMALS = 9
 """Of metres, matrices and shares: far below what anyone can measure, and short to write."""
@@ -192,16 +193,16 @@ class Coco(ExporterBase):
             "attributes": _facts(instance),
         }
         if info.steps_per_scene > 1:
-            sequence = sequence_of(info, sample.index)
+            sequence = sequence_number(info, sample.index)
             row["track_id"] = sequence * ANNOTATION_STRIDE + instance.instance_id
         if self.segmentation == "rle":
             assert thing.mask is not None, "the annotation instance_masks is in `needs`"
-            row["segmentation"] = encoded(thing.mask, camera.height_px, camera.width_px)
+            row["segmentation"] = encode_rle(thing.mask, camera.height_px, camera.width_px)
         if self.amodal and thing.amodal_box is not None:
             row["amodal_bbox"] = _xywh(thing.amodal_box)
         if self.amodal and thing.amodal_mask is not None:
             mask = thing.amodal_mask
-            row["amodal_segmentation"] = encoded(mask, camera.height_px, camera.width_px)
+            row["amodal_segmentation"] = encode_rle(mask, camera.height_px, camera.width_px)
         return row | _optional(thing)
 
 
@@ -248,7 +249,7 @@ def _of_image(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
             for b in truth.borders
         ]
     if truth.free_space is not None:
-        keys["free_space"] = encoded(truth.free_space, camera.height_px, camera.width_px)
+        keys["free_space"] = encode_rle(truth.free_space, camera.height_px, camera.width_px)
     return keys
 
 
@@ -274,7 +275,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "weather": _weather(sample.scene.weather),
     } | _of_image(sample.truth[sensor], camera.intrinsics)
     if info.steps_per_scene > 1:
-        row["sequence_id"] = sequence_of(info, sample.index)
+        row["sequence_id"] = sequence_number(info, sample.index)
         row["frame_id"] = sample.index % info.steps_per_scene
         row["time_s"] = round(instant_s(sample, sensor), DECIMALS)
     return row
@@ -330,7 +331,7 @@ def _skeletons(fragments: Sequence[Path]) -> dict[int, Skeleton]:
             listed = names.setdefault(int(path.name.split(".")[2]), {})
             for line in _lines(path):
                 listed.update(dict.fromkeys(point[0] for point in json.loads(line)["points"]))
-    return {number: skeleton_of(names[number]) for number in sorted(names) if names[number]}
+    return {number: find_skeleton(names[number]) for number in sorted(names) if names[number]}
 
 
 def _keypoint_rows(lines: Iterable[str], skeleton: Skeleton) -> Iterator[str]:

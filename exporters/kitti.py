@@ -46,19 +46,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from exporters.base import ExporterBase
-from exporters.clouds import T_camera_lidar, read_points, xyzi_bytes
-from exporters.images import link_or_copy
-from exporters.sensors import laser_scanner, pinhole_camera, scanned
-from exporters.sequences import check_frame_names, write_bytes, write_text
-from exporters.upright import UprightBox, boxed_members, upright_box
-from generator.core.boxes import BoxPx
-from generator.core.capture import Channel
-from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ImageTruth, ObjectTruth, Sample
-from generator.core.scene import Instance
-from generator.core.se3 import Array
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.kitti_boxes import UprightBox, members_in_box, upright_box
+from gen_data.exporters.point_cloud_io import T_camera_lidar, read_points, xyzi_bytes
+from gen_data.exporters.sensor_selection import has_scans, laser_scanner, pinhole_camera
+from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
+from gen_data.generator.core.boxes import BoxPx
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.generator.core.scene import Instance
+from gen_data.generator.core.se3 import Array
 
 OFFICIAL_TYPES = {
     "car": "Car",
@@ -146,7 +146,7 @@ class Kitti(ExporterBase):
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
             write_text(folder / f"calib/{frame}.txt", calib)
             lidar = self._lidar(info)
-            if scanned(shard_dir, lidar, sample.index):
+            if has_scans(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
                 write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
                 members, unseen = point_members(points, truth, self, T_camera_velo)
@@ -191,7 +191,7 @@ class Kitti(ExporterBase):
         frame = _frame(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
 
-        if scanned(shard_dir, self._lidar(info), index):
+        if has_scans(shard_dir, self._lidar(info), index):
             names += [f"velodyne/{frame}.bin", f"velodyne_labels/{frame}.label"]
         links = [(shard_dir / self.type / name, name) for name in names]
         rgb = media_path(shard_dir, camera, Channel.RGB, index)
@@ -285,7 +285,7 @@ def point_members(
     x, y, z = points["position_m"].T.astype(np.float64)
     p_camera = np.stack([a * x + b * y + c * z + d for a, b, c, d in T_camera_velo], axis=1)
     ids = points["instance_id"].astype(np.int64)
-    members = boxed_members(ids, p_camera, boxes)
+    members = members_in_box(ids, p_camera, boxes)
     return members, frozenset(labelled) - frozenset(np.unique(ids[members == ids]).tolist())
 
 

@@ -16,8 +16,8 @@
   becomes the next date.
 * Cameras of a drive look the same way: the images are rectified. Reference is camera 00, or 02
   where the data set has no grey one; a camera that is not there has the matrices of the reference.
-* Points, boxes and ``oxts`` are exact; each drive begins at noon. ``exporters.oxts`` and
-  ``exporters.tracklets`` describe their files.
+* Points, boxes and ``oxts`` are exact; each drive begins at noon. ``gen_data.exporters.oxts`` and
+  ``gen_data.exporters.tracklets`` describe their files.
 
 Reference: Geiger et al., "Vision meets Robotics: The KITTI Dataset", IJRR 2013.
 """
@@ -34,35 +34,41 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from exporters.base import ExporterBase
-from exporters.clouds import read_points, xyzi_bytes
-from exporters.images import link_or_copy
-from exporters.oxts import COLUMNS, motion_of, navigation_mount, oxts_row
-from exporters.png import RowFilter, encode_png
-from exporters.sensors import instant_s, laser_scanner, pinhole_camera, rgb_cameras, scanned
-from exporters.sequences import (
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.oxts import COLUMNS, navigation_mount, oxts_row, rig_motion
+from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
+from gen_data.exporters.sensor_selection import (
+    has_scans,
+    instant_s,
+    laser_scanner,
+    pinhole_camera,
+    rgb_cameras,
+)
+from gen_data.exporters.sequences import (
     Frame,
     Mount,
-    between,
     camera_mount,
     check_sequence_count,
     frame_facts,
     lidar_mount,
     matrix_numbers,
     read_sequences,
+    relative_pose,
     timestamp,
     write_bytes,
     write_frames,
     write_text,
 )
-from exporters.tracklets import frame_boxes, tracklets_text
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import Sample
-from generator.core.scene import Scene
-from generator.core.se3 import SE3, Array, Vec3
+from gen_data.exporters.tracklets import frame_boxes, tracklets_text
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 DRIVES_MAX = 10_000
 """Drive numbers have four digits."""
@@ -191,11 +197,11 @@ class KittiRaw(ExporterBase):
                 if name in sample.truth
             },
             "scan": None,
-            "oxts": oxts_row(motion_of(sample.scene, unit), self.origin_deg),
+            "oxts": oxts_row(rig_motion(sample.scene, unit), self.origin_deg),
             "boxes": frame_boxes(sample, cameras["02"], lidar),
             "calibration": calibration_texts(sample, cameras, lidar, unit),
         }
-        if scanned(shard_dir, lidar, sample.index):
+        if has_scans(shard_dir, lidar, sample.index):
             points = read_points(shard_dir, lidar, sample.index)
             path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
             write_bytes(path, xyzi_bytes(points))
@@ -254,9 +260,9 @@ def calibration_texts(
     scanner = lidar_mount(scene, lidar)
     return {
         "calib_cam_to_cam.txt": cameras_text(scene, cameras, reference, "kitti_raw"),
-        "calib_velo_to_cam.txt": _rigid_text(between(scene, reference, scanner))
+        "calib_velo_to_cam.txt": _rigid_text(relative_pose(scene, reference, scanner))
         + "delta_f: 0.000000e+00 0.000000e+00\ndelta_c: 0.000000e+00 0.000000e+00\n",
-        "calib_imu_to_velo.txt": _rigid_text(between(scene, scanner, unit)),
+        "calib_imu_to_velo.txt": _rigid_text(relative_pose(scene, scanner, unit)),
     }
 
 
@@ -304,7 +310,7 @@ def cameras_text(scene: Scene, cameras: Mapping[str, str], reference: Mount, exp
     text = CALIB_TIME + "corner_dist: 0.000000e+00\n"
     for number in ("00", "01", "02", "03"):
         name = cameras.get(number, cameras.get("00", cameras["02"]))
-        pose = between(scene, camera_mount(scene, name), reference)
+        pose = relative_pose(scene, camera_mount(scene, name), reference)
         if 2.0 * float(np.linalg.norm(pose.quaternion_wxyz[1:])) > PARALLEL_RAD:
             raise ConfigError(
                 f"exporter '{exporter}': camera '{name}' is not parallel to the reference camera, "

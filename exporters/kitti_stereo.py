@@ -30,12 +30,12 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from exporters.base import ExporterBase
-from exporters.images import link_or_copy
-from exporters.kitti_raw import cameras_text
-from exporters.png import RowFilter, encode_png
-from exporters.sensors import pinhole_camera, rgb_cameras
-from exporters.sequences import (
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.kitti_raw import cameras_text
+from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.sensor_selection import pinhole_camera, rgb_cameras
+from gen_data.exporters.sequences import (
     Frame,
     camera_mount,
     check_frame_names,
@@ -45,11 +45,11 @@ from exporters.sequences import (
     write_frames,
     write_text,
 )
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.sample import Sample
-from generator.core.stereo import baseline_m
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.stereo import baseline_m
 
 SPLITS = ("train", "val", "test")
 LABELS = {Channel.DISPARITY: "disp_occ_0", Channel.DISPARITY_VISIBLE: "disp_noc_0"}
@@ -96,7 +96,7 @@ class KittiStereo(ExporterBase):
                 path = shard_dir / self.type / f"calib_cam_to_cam/{sample.index:06d}.txt"
                 write_text(path, text)
                 if set(FLOWS) <= set(info.media[pair["02"]]):
-                    data = seen_flow(shard_dir, pair["02"], sample.index)
+                    data = visible_flow(shard_dir, pair["02"], sample.index)
                     write_bytes(self._flow_noc(shard_dir, sample.index), data)
                 rows.append(frame_facts(info, sample))
         write_frames(shard_dir / self.type, rows)
@@ -179,7 +179,7 @@ class KittiStereo(ExporterBase):
         return shard_dir / self.type / f"flow_noc/{index:06d}.png"
 
 
-def seen_flow(shard_dir: Path, camera: str, index: int) -> bytes:
+def visible_flow(shard_dir: Path, camera: str, index: int) -> bytes:
     """The PNG of a camera's flow without that of points which are hidden a step later.
 
     Args:

@@ -27,31 +27,31 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from exporters.base import ExporterBase
-from exporters.clouds import read_points, xyzi_bytes
-from exporters.images import link_or_copy
-from exporters.kitti import label_rows
-from exporters.kitti_raw import Latitude, Longitude, projection
-from exporters.oxts import motion_of, navigation_mount, oxts_row
-from exporters.sensors import laser_scanner, pinhole_camera, scanned
-from exporters.sequences import (
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.kitti import label_rows
+from gen_data.exporters.kitti_raw import Latitude, Longitude, projection
+from gen_data.exporters.oxts import navigation_mount, oxts_row, rig_motion
+from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
+from gen_data.exporters.sensor_selection import has_scans, laser_scanner, pinhole_camera
+from gen_data.exporters.sequences import (
     Frame,
     Mount,
-    between,
     camera_mount,
     check_sequence_count,
     frame_facts,
     lidar_mount,
     matrix_numbers,
     read_sequences,
+    relative_pose,
     write_bytes,
     write_frames,
     write_text,
 )
-from generator.core.capture import Channel
-from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.sample import ObjectTruth, Sample
-from generator.core.scene import Scene
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.sample import ObjectTruth, Sample
+from gen_data.generator.core.scene import Scene
 
 SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""
@@ -107,7 +107,7 @@ class KittiTracking(ExporterBase):
             if camera not in sample.truth:
                 continue
             rows.append(self._row(info, sample))
-            if scanned(shard_dir, lidar, sample.index):
+            if has_scans(shard_dir, lidar, sample.index):
                 path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
                 write_bytes(path, xyzi_bytes(read_points(shard_dir, lidar, sample.index)))
         write_frames(shard_dir / self.type, rows)
@@ -140,7 +140,7 @@ class KittiTracking(ExporterBase):
         things = {thing.instance.instance_id: thing for thing in truth.objects}
         return frame_facts(info, sample) | {
             "cameras": [number for number, name in cameras.items() if name in sample.truth],
-            "oxts": oxts_row(motion_of(scene, unit), self.origin_deg),
+            "oxts": oxts_row(rig_motion(scene, unit), self.origin_deg),
             "calib": calib_text(scene, cameras, laser_scanner(info, self.lidar, self.type), unit),
             "labels": [
                 tracking_label(row, things[instance_id])
@@ -188,12 +188,12 @@ def calib_text(scene: Scene, cameras: Mapping[str, str], lidar: str, unit: Mount
     """
     reference = camera_mount(scene, cameras["02"])
     scanner = lidar_mount(scene, lidar) if lidar else reference
-    T_camera_velo = between(scene, reference, scanner).matrix()[:3]
-    T_velo_imu = between(scene, scanner, unit).matrix()[:3]
+    T_camera_velo = relative_pose(scene, reference, scanner).matrix()[:3]
+    T_velo_imu = relative_pose(scene, scanner, unit).matrix()[:3]
     lines = []
     for k in range(4):
         name = cameras.get(f"{k:02d}", cameras["02"])
-        shift_m = between(scene, camera_mount(scene, name), reference).translation_m
+        shift_m = relative_pose(scene, camera_mount(scene, name), reference).translation_m
         P = projection(scene.camera(name).intrinsics, shift_m)
         lines.append(f"P{k}: {matrix_numbers(P)}\n")
     lines.append(f"R_rect {matrix_numbers(np.eye(3))}\n")

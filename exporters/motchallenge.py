@@ -22,10 +22,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from exporters.base import ExporterBase
-from exporters.images import link_or_copy
-from exporters.sensors import rgb_camera
-from exporters.sequences import (
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.sensor_selection import rgb_camera
+from gen_data.exporters.sequences import (
     Frame,
     check_sequence_count,
     frame_facts,
@@ -34,10 +34,10 @@ from exporters.sequences import (
     write_frames,
     write_text,
 )
-from generator.core.capture import Channel
-from generator.core.interfaces import DatasetInfo, media_path
-from generator.core.sample import ImageTruth, ObjectTruth, Sample
-from generator.core.scene import Instance
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.generator.core.scene import Instance
 
 PEDESTRIAN, PERSON_ON_VEHICLE, BICYCLE, MOTORBIKE, STATIC_PERSON = 1, 2, 4, 5, 7
 CLASSES = {

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exporters.sequences import Mount, mounted_pose
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.motion import STILL, Twist
-from generator.core.scene import Scene
-from generator.core.se3 import SE3, Array
+from gen_data.exporters.sequences import Mount, mounted_pose
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.motion import STILL, Twist
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import SE3, Array
 
 COLUMNS = """\
 lat lon:            position [deg], by the Mercator projection of KITTI's devkit
@@ -46,7 +46,7 @@ EXACT = "0 0 4 12 6 6 6"
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class RigMotion:
     """Where a frame (X forward, Y left, Z up) is and how it moves; world axes."""
 
     T_world_frame: SE3
@@ -77,13 +77,13 @@ def navigation_mount(scene: Scene, name: str, carrier: str, exporter: str) -> Mo
     return Mount(device.rig, device.T_rig_device)
 
 
-def motion_of(scene: Scene, mount: Mount) -> Motion:
+def rig_motion(scene: Scene, mount: Mount) -> RigMotion:
     """How what is mounted there moves: its rig's body along its track, and the lever arm to it."""
     pose = mounted_pose(scene, mount)
     rig = next((rig for rig in scene.rigs if rig.name == mount.rig), None)
     track = scene.track(rig.body) if rig else None
     if rig is None or track is None:
-        return Motion(pose, STILL)
+        return RigMotion(pose, STILL)
     twist = track.twist(scene.time_s)
     origin_m = scene.body(rig.body).T_world_body.translation_m
     arm_m = np.subtract(pose.translation_m, origin_m)
@@ -93,10 +93,10 @@ def motion_of(scene: Scene, mount: Mount) -> Motion:
     acceleration = np.add(twist.acceleration_m_s2, np.cross(turning, swing_m_s))
     vx, vy, vz = (float(v) for v in velocity)
     ax, ay, az = (float(v) for v in acceleration)
-    return Motion(pose, Twist((vx, vy, vz), (ax, ay, az), twist.angular_velocity_rad_s))
+    return RigMotion(pose, Twist((vx, vy, vz), (ax, ay, az), twist.angular_velocity_rad_s))
 
 
-def oxts_row(motion: Motion, origin_deg: tuple[float, float]) -> str:
+def oxts_row(motion: RigMotion, origin_deg: tuple[float, float]) -> str:
     """The thirty columns, without a line end.
 
     Args:

@@ -6,8 +6,8 @@
     <lidar>/poses.jsonl      {"index", "T_world_lidar", "boxes": [3D boxes in the lidar frame]}
 
 Properties: ``x y z intensity time ring instance category surface return_number return_count``, as
-described at ``generator.core.capture.POINT``. Both formats are read by Open3D, PCL, CloudCompare
-and MeshLab; those without a field skip it.
+described at ``gen_data.generator.core.capture.POINT``. Both formats are read by Open3D, PCL,
+CloudCompare and MeshLab; those without a field skip it.
 
 References: Turk, "The PLY Polygon File Format", 1994; PCL, "The PCD file format".
 """
@@ -21,17 +21,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.base import ExporterBase
-from exporters.clouds import read_points, scanner_of
-from exporters.images import link_or_copy
-from exporters.sensors import scanned
-from generator.core.boxes import OrientedBox
-from generator.core.errors import ConfigError
-from generator.core.interfaces import DatasetInfo
-from generator.core.sample import Sample
-from generator.core.scene import Instance
-from generator.core.se3 import SE3
-from generator.core.serial import canonical_json
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.point_cloud_io import read_points, scanner_at_sweep
+from gen_data.exporters.sensor_selection import has_scans
+from gen_data.generator.core.boxes import OrientedBox
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Instance
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.serialization import canonical_json
 
 FILE_POINT = np.dtype(
     [
@@ -82,7 +82,7 @@ class PointClouds(ExporterBase):
         for lidar in info.lidars:
             folder = shard_dir / self.type / lidar
             folder.mkdir(parents=True, exist_ok=True)
-            mine = [sample for sample in kept if scanned(shard_dir, lidar, sample.index)]
+            mine = [sample for sample in kept if has_scans(shard_dir, lidar, sample.index)]
             for sample in mine:
                 points = read_points(shard_dir, lidar, sample.index)
                 path = folder / f"{sample.index:09d}.{self.format}"
@@ -150,7 +150,7 @@ def pcd_bytes(points: NDArray[np.void]) -> bytes:
 def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
     """Boxes of all annotated things in a laser scanner's frame at its sweep, by instance id."""
     scene = sample.scene_of(lidar)
-    T_lidar_world = scanner_of(sample, lidar).T_world_lidar.inverse()
+    T_lidar_world = scanner_at_sweep(sample, lidar).T_world_lidar.inverse()
     things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     boxes = []
     for thing in things:
@@ -163,7 +163,7 @@ def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]
 
 
 def _pose(sample: Sample, lidar: str) -> dict[str, Any]:
-    scanner = scanner_of(sample, lidar)
+    scanner = scanner_at_sweep(sample, lidar)
     return {
         "index": sample.index,
         "model": scanner.model,

@@ -11,7 +11,7 @@ from typing import TypedDict
 import numpy as np
 from pycocotools import mask as coco_mask
 
-from generator.core.sample import MaskPx
+from gen_data.generator.core.sample import MaskPx
 
 
 class Rle(TypedDict):
@@ -44,7 +44,7 @@ def run_lengths(mask: MaskPx, height_px: int, width_px: int) -> list[int]:
     return counts if counts[-1] or len(counts) == 1 else counts[:-1]
 
 
-def encoded(mask: MaskPx, height_px: int, width_px: int) -> Rle:
+def encode_rle(mask: MaskPx, height_px: int, width_px: int) -> Rle:
     """The mask in an image of the given size, in COCO's compressed form."""
     size = [height_px, width_px]
     counts = run_lengths(mask, height_px, width_px)

@@ -31,31 +31,31 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.base import ExporterBase
-from exporters.clouds import read_points, xyzi_bytes
-from exporters.images import link_or_copy
-from exporters.kitti import calib_matrices, matrix_lines
-from exporters.sensors import check_pinholes, instant_s, scanned
-from exporters.sequences import (
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.kitti import calib_matrices, matrix_lines
+from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
+from gen_data.exporters.sensor_selection import check_pinholes, has_scans, instant_s
+from gen_data.exporters.sequences import (
     Frame,
-    between,
     camera_mount,
     frame_facts,
     lidar_mount,
     matrix_numbers,
     mounted_pose,
     read_sequences,
+    relative_pose,
     write_bytes,
     write_frames,
     write_text,
 )
-from generator.core.errors import ConfigError
-from generator.core.geometry import SURFACES
-from generator.core.interfaces import DatasetInfo
-from generator.core.sample import Sample
-from generator.core.scene import Scene
-from generator.core.se3 import SE3
-from generator.core.serial import from_plain
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.serialization import from_plain
 
 THINGS = {
     "car": 10,
@@ -149,7 +149,7 @@ class SemanticKitti(ExporterBase):
         folder = shard_dir / self.type
         rows = []
         for sample in samples:
-            if not scanned(shard_dir, lidar, sample.index):
+            if not has_scans(shard_dir, lidar, sample.index):
                 continue
             points = read_points(shard_dir, lidar, sample.index)
             stem = folder / f"{sample.index:09d}"
@@ -205,7 +205,7 @@ def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
 
 
 def _calib(scene: Scene, camera: str, lidar: str) -> str:
-    T_camera_lidar = between(scene, camera_mount(scene, camera), lidar_mount(scene, lidar))
+    T_camera_lidar = relative_pose(scene, camera_mount(scene, camera), lidar_mount(scene, lidar))
     calib = calib_matrices(scene.camera(camera).intrinsics, T_camera_lidar.matrix()[:3])
     projections = {k: calib[k] for k in ("P0", "P1", "P2", "P3")}
     return matrix_lines(projections | {"Tr": calib["Tr_velo_to_cam"]})

@@ -15,13 +15,13 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from generator.core.errors import ConfigError
-from generator.core.instants import RIG_AXES
-from generator.core.interfaces import DatasetInfo
-from generator.core.sample import Sample
-from generator.core.scene import Scene
-from generator.core.se3 import SE3, Array
-from generator.core.serial import canonical_json
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene_time import RIG_AXES
+from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.core.serialization import canonical_json
 
 FRAMES_NAME = "frames.jsonl"
 _FRAMES_MAX = 1_000_000
@@ -45,7 +45,7 @@ class Frame:
         return int(self.row["index"])
 
 
-def sequence_of(info: DatasetInfo, index: int) -> int:
+def sequence_number(info: DatasetInfo, index: int) -> int:
     """Number of the sequence that a sample belongs to, from 0."""
     return index // info.steps_per_scene
 
@@ -85,7 +85,7 @@ def frame_facts(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
     """What every format's line says about a frame."""
     return {
         "index": sample.index,
-        "sequence": sequence_of(info, sample.index),
+        "sequence": sequence_number(info, sample.index),
         "split": sample.split,
         "step": sample.index % info.steps_per_scene,
     }
@@ -154,7 +154,7 @@ def mounted_pose(scene: Scene, mount: Mount) -> SE3:
     return _rig_pose(scene, mount.rig) @ mount.T_rig_sensor
 
 
-def between(scene: Scene, one: Mount, other: Mount) -> SE3:
+def relative_pose(scene: Scene, one: Mount, other: Mount) -> SE3:
     """``T_one_other``: free of rounding in the world where both are on one rig."""
     if one.rig == other.rig:
         return (one.T_rig_sensor.inverse() @ other.T_rig_sensor).rounded(9)

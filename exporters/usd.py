@@ -7,11 +7,12 @@
     textures/<texture>.png, environments/<sky>.hdr
     stages.jsonl        one line per stage: file, first sample, scene, view, split, steps
 
-What is in a stage and where: ``generator.usd.stage``. Metres, Z up; ``time code = step``. Labels
-are ``UsdSemantics.LabelsAPI`` with the taxonomies ``category``, ``subcategory`` (annotated
-instances) and ``instance_id`` (all, as in the masks). Cameras reproduce the intrinsics of pinholes
-to the last bits of a float; lights are photometric, in UsdLux's units. Triplanar mapping becomes a
-projection along each face's dominant axis; weather and the bending of lenses have no counterpart.
+What is in a stage and where: ``gen_data.generator.usd.stage_writer``. Metres, Z up; ``time code =
+step``. Labels are ``UsdSemantics.LabelsAPI`` with the taxonomies ``category``, ``subcategory``
+(annotated instances) and ``instance_id`` (all, as in the masks). Cameras reproduce the intrinsics
+of pinholes to the last bits of a float; lights are photometric, in UsdLux's units. Triplanar
+mapping becomes a projection along each face's dominant axis; weather and the bending of lenses have
+no counterpart.
 """
 
 from __future__ import annotations
@@ -28,18 +29,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
-from exporters.base import ExporterBase
-from exporters.images import link_or_copy
-from exporters.png import RowFilter, encode_png
-from exporters.sequences import write_bytes, write_text
-from generator.core.geometry import TextureData
-from generator.core.instants import at
-from generator.core.interfaces import AssetLibrary, DatasetInfo
-from generator.core.sample import Sample
-from generator.core.serial import canonical_json
-from generator.usd.asset_layer import write_asset_layer
-from generator.usd.materials import TextureFiles
-from generator.usd.stage import Files, write_stage
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.sequences import write_bytes, write_text
+from gen_data.generator.core.asset_types import TextureData
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.usd.asset_layer import write_asset_layer
+from gen_data.generator.usd.material_writer import TextureFiles
+from gen_data.generator.usd.stage_writer import StageFiles, write_stage
 
 STAGES = "stages.jsonl"
 
@@ -72,7 +73,7 @@ class Usd(ExporterBase):
             if sample.step_index:
                 continue
             count = min(info.steps_per_scene, info.n - sample.index)
-            steps = [at(sample.scene, round(k * info.step_s, 9)) for k in range(count)]
+            steps = [scene_at(sample.scene, round(k * info.step_s, 9)) for k in range(count)]
             path = folder / f"{sample.index:09d}.{self.format}"
             write_stage(path, steps, info.step_s, shared.files())
             rows.append(_row(sample, path.name, count))
@@ -119,9 +120,9 @@ class _SharedFiles:
         self._folder, self._suffix, self._assets = folder, suffix, assets
         self._written: dict[str, TextureFiles] = {}
 
-    def files(self) -> Files:
+    def files(self) -> StageFiles:
         """They, as stages beside the folders of shared files refer to them."""
-        return Files(
+        return StageFiles(
             layer=lambda asset: f"./{self._layer(asset)}",
             textures=lambda texture: self._textures(texture, "./"),
             panorama=lambda sky: f"./{self._panorama(sky)}",

@@ -14,14 +14,14 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from generator import __version__
+from gen_data.generator import __version__
 
 if TYPE_CHECKING:
-    from generator.api.dataset import Dataset, StoredDataset
-    from generator.api.dataset import open_dataset as open  # noqa: A004
-    from generator.api.generate import generate
-    from generator.api.sample import Box2d, Box3d, CameraReading, Sample
-    from generator.core.errors import (
+    from gen_data.generator.api.dataset import Dataset, StoredDataset
+    from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
+    from gen_data.generator.api.generate import generate
+    from gen_data.generator.api.sample import Box2d, Box3d, CameraReading, Sample
+    from gen_data.generator.core.errors import (
         AssetError,
         ConfigError,
         DeterminismError,
@@ -34,28 +34,28 @@ if TYPE_CHECKING:
         UnknownNameError,
         VerificationError,
     )
-    from generator.core.scene import Scene
+    from gen_data.generator.core.scene import Scene
 
 _HOMES = {
-    "Box2d": "generator.api.sample",
-    "Box3d": "generator.api.sample",
-    "CameraReading": "generator.api.sample",
-    "Dataset": "generator.api.dataset",
-    "Sample": "generator.api.sample",
-    "Scene": "generator.core.scene",
-    "StoredDataset": "generator.api.dataset",
-    "generate": "generator.api.generate",
-    "AssetError": "generator.core.errors",
-    "ConfigError": "generator.core.errors",
-    "DeterminismError": "generator.core.errors",
-    "GenDataError": "generator.core.errors",
-    "Interrupted": "generator.core.errors",
-    "SampleError": "generator.core.errors",
-    "SampleIndexError": "generator.core.errors",
-    "SceneRejected": "generator.core.errors",
-    "StorageError": "generator.core.errors",
-    "UnknownNameError": "generator.core.errors",
-    "VerificationError": "generator.core.errors",
+    "Box2d": "gen_data.generator.api.sample",
+    "Box3d": "gen_data.generator.api.sample",
+    "CameraReading": "gen_data.generator.api.sample",
+    "Dataset": "gen_data.generator.api.dataset",
+    "Sample": "gen_data.generator.api.sample",
+    "Scene": "gen_data.generator.core.scene",
+    "StoredDataset": "gen_data.generator.api.dataset",
+    "generate": "gen_data.generator.api.generate",
+    "AssetError": "gen_data.generator.core.errors",
+    "ConfigError": "gen_data.generator.core.errors",
+    "DeterminismError": "gen_data.generator.core.errors",
+    "GenDataError": "gen_data.generator.core.errors",
+    "Interrupted": "gen_data.generator.core.errors",
+    "SampleError": "gen_data.generator.core.errors",
+    "SampleIndexError": "gen_data.generator.core.errors",
+    "SceneRejected": "gen_data.generator.core.errors",
+    "StorageError": "gen_data.generator.core.errors",
+    "UnknownNameError": "gen_data.generator.core.errors",
+    "VerificationError": "gen_data.generator.core.errors",
 }
 """Where each public name lives; a module is imported when its first name is used."""
 
@@ -87,7 +87,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """A public name, from the module where it lives."""
     if name == "open":
-        return import_module("generator.api.dataset").open_dataset
+        return import_module("gen_data.generator.api.dataset").open_dataset
     if name not in _HOMES:
         raise AttributeError(f"module 'gen_data' has no attribute '{name}'")
     return getattr(import_module(_HOMES[name]), name)

@@ -1,5 +1,5 @@
 """``python -m gen_data`` is ``gen-data``."""
 
-from generator.cli.main import main
+from gen_data.generator.cli.main import main
 
 main()

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
     Count,
@@ -17,16 +17,16 @@ from generator.config.distributions import (
     Scalar,
     Uniform,
 )
-from generator.core.errors import ConfigError, LayoutRejected, Rejection
-from generator.core.interfaces import AssetIndex
-from generator.core.lanes import LaneLine, standing_on_lane
-from generator.core.members import Member, add_members, remove_members
-from generator.core.scene import LaneKind, ObjectGroup, Scene
-from generator.core.se3 import SE3, Vec3
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.footprints import Footprint, Ground, ground_of
-from randomizers.groups import Wheel, draw_asset, find_group, make_wheel
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.lane_geometry import LaneLine, pose_on_lane
+from gen_data.generator.core.members import Member, add_members, remove_members
+from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.asset_groups import CategoryWeights, draw_asset, find_group, make_wheel
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.footprints import Footprint, Ground, make_ground
 
 COUNT_MAX = 2000
 """As many as the template's ``along`` element may have."""
@@ -98,7 +98,7 @@ class Along(RandomizerBase):
         scene = remove_members(scene, group.name)
         lines = self._select_lanes(scene, group)
         roads = {lane.road for lane in scene.lanes}
-        ground = ground_of(
+        ground = make_ground(
             (b for b in scene.bodies if b.instance_id and b.name.partition("/")[0] not in roads),
             assets,
         )
@@ -115,7 +115,7 @@ class Along(RandomizerBase):
             members = [members[k] for k in sorted(rng.permutation(len(members))[:wanted].tolist())]
         return add_members(scene, group, members, assets)
 
-    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, Wheel]:
+    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, CategoryWeights]:
         """The group, and the weighted categories of its assets."""
         field = f"randomizers.{self.name}"
         group = find_group(scene, self.group or self.name, f"{field}.group")
@@ -136,7 +136,7 @@ class Along(RandomizerBase):
         self,
         lines: list[LaneLine],
         group: ObjectGroup,
-        wheel: Wheel,
+        wheel: CategoryWeights,
         ground: Ground,
         assets: AssetIndex,
         rng: Rng,
@@ -156,7 +156,7 @@ class Along(RandomizerBase):
                     break
                 if used:
                     place = line.pose(at_m + 0.5 * length_m, left_m)
-                    pose = standing_on_lane(place, line.lane, bounds_m, group.facing, turn)
+                    pose = pose_on_lane(place, line.lane, bounds_m, group.facing, turn)
                     pose = pose.rounded()
                     if self._occupy(ground, pose, bounds_m):
                         yield Member(asset, pose, scale, collides=False)
@@ -172,7 +172,7 @@ class Along(RandomizerBase):
         self,
         lines: list[LaneLine],
         group: ObjectGroup,
-        wheel: Wheel,
+        wheel: CategoryWeights,
         ground: Ground,
         assets: AssetIndex,
         rng: Rng,
@@ -204,7 +204,7 @@ class Along(RandomizerBase):
         return True
 
     def _draw_thing(
-        self, wheel: Wheel, assets: AssetIndex, rng: Rng
+        self, wheel: CategoryWeights, assets: AssetIndex, rng: Rng
     ) -> tuple[str, float, tuple[Vec3, Vec3]]:
         """An asset, its scale, and its bounds."""
         asset = draw_asset(wheel, rng)

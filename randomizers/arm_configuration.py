@@ -8,15 +8,15 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Choice, Name, NonNegative, Uniform, UnitInterval
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.geometry import Joint, RobotModel
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import ArmGoal, Articulation, Body, Scene
-from generator.core.se3 import SE3, Vec3
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.placing import half_extents_m
+from gen_data.generator.config.distributions import Choice, Name, NonNegative, Uniform, UnitInterval
+from gen_data.generator.core.asset_types import Joint, RobotModel
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.placement import half_extents_m
 
 MODES = ("joints", "reach", "hold")
 GRASP_MARGIN = 0.9

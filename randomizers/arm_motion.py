@@ -8,16 +8,23 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from generator.config.distributions import Bounds, Choice, Name, NonNegative, Scalar, Uniform
-from generator.config.strict import Strict
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import ArmGoal, Articulation, Body, Scene, Surface
-from generator.core.se3 import SE3
-from generator.core.streams import Rng
-from randomizers.arm_configuration import GRASP_MARGIN, arm_joints, hand_over, hand_pose
-from randomizers.base import RandomizerBase
-from randomizers.placing import half_extents_m
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.distributions import (
+    Bounds,
+    Choice,
+    Name,
+    NonNegative,
+    Scalar,
+    Uniform,
+)
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.arm_configuration import GRASP_MARGIN, arm_joints, hand_over, hand_pose
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.placement import half_extents_m
 
 TASKS = ("pick_and_place", "reach")
 EDGE_M = 0.08
@@ -223,7 +230,7 @@ class ArmMotion(RandomizerBase):
         return ArmGoal("joints", joint_candidates=(positions,), opening=stop.opening)
 
 
-def _spot(surface: Surface, arm: Articulation, rng: Rng) -> SE3:
+def _spot(surface: SupportSurface, arm: Articulation, rng: Rng) -> SE3:
     """A point of a surface, away from its edges, moved to below the arm's workspace."""
     low, high = arm.workspace_m
     half_x, half_y = (max(0.0, 0.5 * size - EDGE_M) for size in surface.size_m)

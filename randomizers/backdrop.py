@@ -7,14 +7,20 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.assets.procedural.furniture import SLOTS
-from generator.config.distributions import Flag, Positive, Probability, Uniform, UnitInterval
-from generator.core.geometry import Material
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Scene
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase, materials_of, pick, textures_named
-from randomizers.color_space import linear_of_hsv
+from gen_data.generator.assets.procedural.furniture import SLOTS
+from gen_data.generator.config.distributions import (
+    Flag,
+    Positive,
+    Probability,
+    Uniform,
+    UnitInterval,
+)
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase, body_materials, choose, find_textures
+from gen_data.randomizers.color_space import hsv_to_linear
 
 PAINT_ROUGHNESS = 0.85
 
@@ -58,8 +64,8 @@ class Backdrop(RandomizerBase):
         """Ids of the textures of floors and of walls."""
         field = f"randomizers.{self.name}"
         return (
-            textures_named(assets, self.floor, f"{field}.floor"),
-            textures_named(assets, self.walls, f"{field}.walls"),
+            find_textures(assets, self.floor, f"{field}.floor"),
+            find_textures(assets, self.walls, f"{field}.walls"),
         )
 
     def _redecorate(
@@ -70,14 +76,14 @@ class Backdrop(RandomizerBase):
         walls: tuple[str, ...],
         rng: Rng,
     ) -> Body:
-        ground = _covering(pick(floors, rng), self.floor_scale_m.draw(rng))
-        textured = _covering(pick(walls, rng), self.wall_scale_m.draw(rng))
-        color = linear_of_hsv(self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng))
+        ground = _covering(choose(floors, rng), self.floor_scale_m.draw(rng))
+        textured = _covering(choose(walls, rng), self.wall_scale_m.draw(rng))
+        color = hsv_to_linear(self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng))
         paint = Material(base_color=color, roughness=PAINT_ROUGHNESS)
         wall = paint if self.painted.draw(rng) else textured
         looks = {"floor": ground, "ground": ground, "paper": paint, "walls": wall}
         slots = SLOTS.get(body.asset.partition("?")[0], ())
-        materials = list(materials_of(body, assets))
+        materials = list(body_materials(body, assets))
         for number, slot in enumerate(slots[: len(materials)]):
             materials[number] = looks.get(slot, materials[number])
         return replace(body, materials=tuple(materials))

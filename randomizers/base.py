@@ -9,13 +9,13 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.config.strict import Strict
-from generator.core.cache import ObjectCache
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.geometry import Asset, Material
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Scene
-from generator.core.streams import Rng
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import Asset, Material
+from gen_data.generator.core.bounded_cache import ObjectCache
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.streams import Rng
 
 _BY_WORD: ObjectCache[Mapping[str, tuple[str, ...]]] = ObjectCache(2)
 
@@ -84,21 +84,21 @@ class LookRandomizer(RandomizerBase):
                 yield body
 
 
-def materials_of(body: Body, assets: AssetIndex) -> tuple[Material, ...]:
+def body_materials(body: Body, assets: AssetIndex) -> tuple[Material, ...]:
     """The materials a body shows: its own, else its asset's."""
     return body.materials or assets.materials(body.asset)
 
 
-def with_materials(body: Body, assets: AssetIndex, change: Callable[[Material], Material]) -> Body:
+def set_materials(body: Body, assets: AssetIndex, change: Callable[[Material], Material]) -> Body:
     """The body with every material changed that is not printed."""
     changed = tuple(
         material if material.printed else change(material)
-        for material in materials_of(body, assets)
+        for material in body_materials(body, assets)
     )
     return replace(body, materials=changed)
 
 
-def textures_named(assets: AssetIndex, names: tuple[str, ...], field: str) -> tuple[str, ...]:
+def find_textures(assets: AssetIndex, names: tuple[str, ...], field: str) -> tuple[str, ...]:
     """Ids of all textures that carry any of these tags, or are of these families; sorted.
 
     Raises:
@@ -125,7 +125,7 @@ def _by_word(textures: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
     return {word: tuple(ids) for word, ids in by_word.items()}
 
 
-def pick(options: tuple[str, ...], rng: Rng) -> str:
+def choose(options: tuple[str, ...], rng: Rng) -> str:
     """One of several, each as likely as the others."""
     return options[int(rng.integers(len(options)))]
 

@@ -6,15 +6,15 @@ import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
-from generator.config.distributions import Bounds, Normal, Scalar, Uniform
-from generator.config.strict import Strict
-from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import COEFFICIENTS, Lens
-from generator.core.scene import Camera, Scene
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.distributions import Bounds, Normal, Scalar, Uniform
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import COEFFICIENTS, Lens
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
 
 PINHOLE_MAX_DEG = 170.0
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
     Flag,
@@ -17,17 +17,17 @@ from generator.config.distributions import (
     Positive,
     Scalar,
 )
-from generator.core.errors import ConfigError, LayoutRejected, Rejection
-from generator.core.interfaces import AssetIndex
-from generator.core.lanes import LaneLine
-from generator.core.scene import Camera, LaneKind, Scene
-from generator.core.se3 import SE3, look_at
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.clearance import is_clear
-from randomizers.daylight import is_dark
-from randomizers.footprints import Footprint, Ground, ground_of
-from randomizers.vehicle_lights import dipped_beam
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.lane_geometry import LaneLine
+from gen_data.generator.core.scene import Camera, LaneKind, Scene
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.daylight import is_dark
+from gen_data.randomizers.footprints import Footprint, Ground, make_ground
+from gen_data.randomizers.free_space_tests import is_clear
+from gen_data.randomizers.vehicle_lights import dipped_beam
 
 TRIES = 64
 
@@ -88,7 +88,7 @@ class CameraOnLane(RandomizerBase):
                 f"{' or '.join(self.lanes)}; there is {known}"
             )
         groups = {group.name for group in scene.groups}
-        ground = ground_of((b for b in scene.bodies if b.group in groups), assets)
+        ground = make_ground((b for b in scene.bodies if b.group in groups), assets)
         for _ in range(TRIES):
             pose = self._drawn(lines, ground, scene, assets, rng)
             if pose is not None:

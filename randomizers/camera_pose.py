@@ -8,14 +8,21 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Bounds, NonNegative, Normal, Positive, Scalar, Uniform
-from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Camera, Scene
-from generator.core.se3 import look_at
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.clearance import is_in_the_open
+from gen_data.generator.config.distributions import (
+    Bounds,
+    NonNegative,
+    Normal,
+    Positive,
+    Scalar,
+    Uniform,
+)
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.se3 import look_at
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.free_space_tests import is_in_the_open
 
 TRIES = 48
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
     Count,
@@ -19,15 +19,15 @@ from generator.config.distributions import (
     Uniform,
     UniformInteger,
 )
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.fixtures import fixture_asset, with_fixture, without_lights
-from generator.core.interfaces import AssetIndex
-from generator.core.photometry import with_flux
-from generator.core.scene import PANEL_KINDS, Light, LightKind, Scene
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.color_space import linear_of_temperature
+from gen_data.generator.core.area_lights import add_fixture, fixture_asset, remove_lights
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.photometry import scale_to_flux
+from gen_data.generator.core.scene import PANEL_KINDS, Light, LightKind, Scene
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.color_space import temperature_to_linear
 
 
 class CeilingLights(RandomizerBase):
@@ -59,19 +59,19 @@ class CeilingLights(RandomizerBase):
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene under other lights."""
-        scene = scene if self.keep_existing else without_lights(scene)
+        scene = scene if self.keep_existing else remove_lights(scene)
         kind = self._kind(rng)
         rows, columns = self.rows.draw(rng), self.columns.draw(rng)
-        color = linear_of_temperature(self.temperature_k.draw(rng))
+        color = temperature_to_linear(self.temperature_k.draw(rng))
         flux_lm = self.luminous_flux_lm.draw(rng)
         for k in range(rows * columns):
             at_m = _grid_point(scene, k // columns, k % columns, rows, columns)
             light = replace(self._panel(f"{self.name}/{k}", kind, at_m), color=color)
             lit = 0.0 if self.broken.draw(rng) else flux_lm
-            light = with_flux(light, lit)
+            light = scale_to_flux(light, lit)
             if self.visible:
                 materials = assets.materials(fixture_asset(light))
-                scene, light = with_fixture(scene, light, materials)
+                scene, light = add_fixture(scene, light, materials)
             if lit > 0.0:
                 scene = replace(scene, lights=(*scene.lights, light))
         return scene

@@ -6,11 +6,11 @@ import colorsys
 
 import numpy as np
 
-from generator.core.colorimetry import REC709_FROM_XYZ, luminance, srgb_decode
-from generator.core.se3 import Vec3
+from gen_data.generator.core.colorimetry import REC709_FROM_XYZ, luminance, srgb_decode
+from gen_data.generator.core.se3 import Vec3
 
 
-def linear_of_hsv(hue: float, saturation: float, value: float) -> Vec3:
+def hsv_to_linear(hue: float, saturation: float, value: float) -> Vec3:
     """Linear RGB of a colour given as a painter's hue, saturation and value in sRGB."""
     red, green, blue = colorsys.hsv_to_rgb(hue % 1.0, saturation, value)
     return (
@@ -20,7 +20,7 @@ def linear_of_hsv(hue: float, saturation: float, value: float) -> Vec3:
     )
 
 
-def chromaticity_of_temperature(kelvin: float) -> tuple[float, float]:
+def temperature_to_chromaticity(kelvin: float) -> tuple[float, float]:
     """CIE 1931 x, y of a black body between 1667 K and 25000 K.
 
     Source: Kim et al., "Design of advanced color temperature control system for HDTV
@@ -40,9 +40,9 @@ def chromaticity_of_temperature(kelvin: float) -> tuple[float, float]:
     return x, y
 
 
-def linear_of_temperature(kelvin: float) -> Vec3:
+def temperature_to_linear(kelvin: float) -> Vec3:
     """Linear sRGB with luminance 1 of a black body; what the gamut lacks is clipped at 0."""
-    x, y = chromaticity_of_temperature(kelvin)
+    x, y = temperature_to_chromaticity(kelvin)
     big_x, big_z = x / y, (1.0 - x - y) / y
     rgb = np.maximum((REC709_FROM_XYZ * (big_x, 1.0, big_z)).sum(axis=1), 0.0)
     red, green, blue = (round(float(part / luminance(rgb)), 6) for part in rgb)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from generator.config.distributions import Chance, Probability, Uniform, UnitInterval
-from generator.core.geometry import Material
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.streams import Rng
-from randomizers.base import LookRandomizer, with_materials
-from randomizers.color_space import linear_of_hsv
+from gen_data.generator.config.distributions import Chance, Probability, Uniform, UnitInterval
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import LookRandomizer, set_materials
+from gen_data.randomizers.color_space import hsv_to_linear
 
 
 class Colors(LookRandomizer):
@@ -34,12 +34,12 @@ class Colors(LookRandomizer):
         for body in self.chosen(scene):
             if not self.probability.draw(rng):
                 continue
-            color = linear_of_hsv(
+            color = hsv_to_linear(
                 self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng)
             )
 
             def paint(material: Material, color: tuple[float, float, float] = color) -> Material:
                 return replace(material, base_color=color, texture="")
 
-            painted.append(with_materials(body, assets, paint))
+            painted.append(set_materials(body, assets, paint))
         return scene.with_bodies(*painted)

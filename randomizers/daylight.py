@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from generator.assets.skies.daylight import sun_color, sun_radius_rad
-from generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2, sun_lux
-from generator.core.scene import Environment, Light, Scene
-from generator.core.streams import Rng
+from gen_data.generator.assets.skies.daylight import sun_color, sun_radius_rad
+from gen_data.generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2, sun_lux
+from gen_data.generator.core.scene import Environment, Light, Scene
+from gen_data.generator.core.streams import Rng
 
 SUN = "sun"
 """Name of the sun among the lights."""
@@ -29,7 +29,7 @@ class Daylight:
         turbidity: Of clear air: 2 very clear, 6 hazy.
         seed: Of the clouds.
         snow: Whether the land lies under snow.
-        model: Of the sky, as in ``generator.assets.skies.sky.SkyModel``.
+        model: Of the sky, as in ``gen_data.generator.assets.skies.sky.SkyModel``.
     """
 
     sun_altitude_deg: float
@@ -41,12 +41,12 @@ class Daylight:
     model: str = "measured"
 
 
-def cloud_seed(rng: Rng) -> int:
+def draw_cloud_seed(rng: Rng) -> int:
     """A seed for a sky's clouds."""
     return int(rng.integers(_CLOUD_SEEDS))
 
 
-def with_daylight(scene: Scene, light: Daylight) -> Scene:
+def set_daylight(scene: Scene, light: Daylight) -> Scene:
     """The scene under that sun and sky; other suns are taken away, lamps stay."""
     altitude_deg, cloudiness = round(light.sun_altitude_deg, 2), round(light.cloudiness, 3)
     turbidity = round(light.turbidity, 2)
@@ -60,14 +60,14 @@ def with_daylight(scene: Scene, light: Daylight) -> Scene:
     )
     environment = Environment(image, _significant(mean_luminance_cd_m2(model)), yaw)
     lamps = tuple(lamp for lamp in scene.lights if lamp.kind != "sun")
-    return with_shared(
+    return set_shared_values(
         replace(scene, lights=(*_sun(model, yaw), *lamps), environment=environment),
         cloudiness=cloudiness,
         sun_altitude_deg=altitude_deg,
     )
 
 
-def with_shared(scene: Scene, **values: float) -> Scene:
+def set_shared_values(scene: Scene, **values: float) -> Scene:
     """The scene with values that later draws have in common with these."""
     merged = {**dict(scene.shared), **values}
     return replace(scene, shared=tuple(sorted(merged.items())))

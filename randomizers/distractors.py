@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from generator.config.distributions import Bounds, Count, UniformInteger
-from randomizers.objects import COUNT_MAX, Objects
+from gen_data.generator.config.distributions import Bounds, Count, UniformInteger
+from gen_data.randomizers.objects import COUNT_MAX, Objects
 
 
 class Distractors(Objects):

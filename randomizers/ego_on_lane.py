@@ -7,17 +7,17 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Bounds, Normal, Scalar
-from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.lanes import LaneLine
-from generator.core.scene import Body, Scene
-from generator.core.se3 import SE3
-from generator.core.streams import Rng
-from generator.traffic.axles import axles_of
-from generator.traffic.routes import LaneGraph, lanes_through
-from randomizers.base import RandomizerBase
-from randomizers.footprints import Footprint, ground_of
+from gen_data.generator.config.distributions import Bounds, Normal, Scalar
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.lane_geometry import LaneLine
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.traffic.axles import find_axles
+from gen_data.generator.traffic.lane_routes import LaneGraph, lanes_through_point
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.footprints import Footprint, make_ground
 
 TRIES = 32
 
@@ -57,14 +57,14 @@ class EgoOnLane(RandomizerBase):
         """
         body = find_ego(scene, self.ego, f"randomizers.{self.name}.ego")
         lines = self._lines(scene)
-        axles = axles_of(assets, body.asset, body.scale)
+        axles = find_axles(assets, body.asset, body.scale)
         roads = {lane.road for lane in scene.lanes}
         others = (
             b
             for b in scene.bodies
             if b.instance_id and b.name != body.name and b.name.partition("/")[0] not in roads
         )
-        ground = ground_of(others, assets)
+        ground = make_ground(others, assets)
         total_m = sum(line.length_m for line in lines)
         for _ in range(TRIES):
             place, left_m = float(rng.uniform()) * total_m, self.lateral_m.draw(rng)
@@ -86,7 +86,7 @@ class EgoOnLane(RandomizerBase):
         """The lanes that it may start on."""
         graph = LaneGraph.of(scene.lanes, "driving")
         if self.route:
-            names = lanes_through(graph, self.route, f"randomizers.{self.name}.route")
+            names = lanes_through_point(graph, self.route, f"randomizers.{self.name}.route")
             return [graph.lines[names[0]]]
         lines = [
             line

@@ -8,12 +8,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.config.distributions import LogUniform, NonNegative, Scalar, Uniform
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Environment, Scene
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase, pick
+from gen_data.generator.config.distributions import LogUniform, NonNegative, Scalar, Uniform
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Environment, Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase, choose
 
 
 class EnvironmentLight(RandomizerBase):
@@ -44,7 +44,7 @@ class EnvironmentLight(RandomizerBase):
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """The scene in another light."""
         environment = Environment(
-            image=pick(self._options(assets), rng),
+            image=choose(self._options(assets), rng),
             luminance_cd_m2=round(self.luminance_cd_m2.draw(rng), 4),
             yaw_rad=round(math.radians(self.yaw_deg.draw(rng)), 6),
             visible=self.visible,

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from generator.config.distributions import Scalar, Uniform
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
+from gen_data.generator.config.distributions import Scalar, Uniform
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
 
 
 class Exposure(RandomizerBase):

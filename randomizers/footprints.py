@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from generator.core.interfaces import AssetIndex
-from generator.core.obb import rectangles_overlap
-from generator.core.scene import Body
-from generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.obb import rectangles_overlap
+from gen_data.generator.core.scene import Body
+from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Ground:
         return not rectangles_overlap(own[:4], own[4:6], near[:, :4], near[:, 4:6]).any()
 
 
-def ground_of(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
+def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
     """The ground under bodies."""
     ground = Ground()
     for body in bodies:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
     Count,
@@ -21,21 +21,21 @@ from generator.config.distributions import (
     UniformInteger,
     UnitInterval,
 )
-from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
-from generator.core.fixtures import (
+from gen_data.generator.core.area_lights import (
+    add_fixture,
     fixture_asset,
     level_side,
-    with_fixture,
-    without_lights,
+    remove_lights,
 )
-from generator.core.interfaces import AssetIndex
-from generator.core.photometry import intensity_of_flux, intensity_of_illuminance
-from generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.clearance import is_in_the_open, is_inside
-from randomizers.color_space import linear_of_temperature
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.photometry import flux_to_intensity_cd, illuminance_to_intensity_cd
+from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.color_space import temperature_to_linear
+from gen_data.randomizers.free_space_tests import is_in_the_open, is_inside
 
 TRIES = 24
 COUNT_MAX = 64
@@ -98,12 +98,12 @@ class Lighting(RandomizerBase):
         shares = [0.3 + float(rng.uniform()) for _ in range(count)]
         strength = self.illuminance_lux if self.luminous_flux_lm is None else self.luminous_flux_lm
         total = strength.draw(rng)
-        scene = scene if self.keep_existing else without_lights(scene)
+        scene = scene if self.keep_existing else remove_lights(scene)
         for k, share in enumerate(shares):
             light = self._light(scene, assets, rng, f"{self.name}/{k}", total * share / sum(shares))
             if self.visible and light.kind in PANEL_KINDS:
                 materials = assets.materials(fixture_asset(light))
-                scene, light = with_fixture(scene, light, materials)
+                scene, light = add_fixture(scene, light, materials)
             scene = replace(scene, lights=(*scene.lights, light))
         return scene
 
@@ -111,7 +111,7 @@ class Lighting(RandomizerBase):
         self, scene: Scene, assets: AssetIndex, rng: Rng, name: str, strength: float
     ) -> Light:
         light = Light(name, self._kind(rng))
-        light = replace(light, color=linear_of_temperature(self.temperature_k.draw(rng)))
+        light = replace(light, color=temperature_to_linear(self.temperature_k.draw(rng)))
         if light.kind == "sun":
             up = self._direction(rng)
             return replace(
@@ -154,9 +154,9 @@ class Lighting(RandomizerBase):
     def _set_intensity(self, light: Light, strength: float, distance_m: float) -> Light:
         """The light with its share of what all give at the focus, or send out."""
         if self.luminous_flux_lm is None:
-            intensity_cd = intensity_of_illuminance(light, strength, distance_m)
+            intensity_cd = illuminance_to_intensity_cd(light, strength, distance_m)
         else:
-            intensity_cd = intensity_of_flux(light, strength)
+            intensity_cd = flux_to_intensity_cd(light, strength)
         return replace(light, intensity_cd=round(intensity_cd, 4))
 
     def _direction(self, rng: Rng) -> Vec3:

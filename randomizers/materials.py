@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Bounds,
     Chance,
     Constant,
@@ -15,11 +15,11 @@ from generator.config.distributions import (
     Uniform,
     UnitInterval,
 )
-from generator.core.geometry import Material
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.streams import Rng
-from randomizers.base import LookRandomizer, with_materials
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import LookRandomizer, set_materials
 
 
 class Materials(LookRandomizer):
@@ -63,7 +63,7 @@ class Materials(LookRandomizer):
             def finish(material: Material, changes: dict[str, Any] = changes) -> Material:
                 return replace(material, **changes)
 
-            finished.append(with_materials(body, assets, finish))
+            finished.append(set_materials(body, assets, finish))
         return scene.with_bodies(*finished)
 
     def _draw_changes(self, rng: Rng) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
     Count,
@@ -15,13 +15,13 @@ from generator.config.distributions import (
     Scalar,
     UniformInteger,
 )
-from generator.core.interfaces import AssetIndex
-from generator.core.members import Member, add_members, remove_members
-from generator.core.scene import ObjectGroup, Scene
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.groups import Wheel, draw_asset, find_group, make_wheel
-from randomizers.placing import Item, find_floors, half_extents_m, layout
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.members import Member, add_members, remove_members
+from gen_data.generator.core.scene import ObjectGroup, Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.asset_groups import CategoryWeights, draw_asset, find_group, make_wheel
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.placement import Item, find_floors, half_extents_m, lay_out
 
 COUNT_MAX = 500
 """As many as the template's ``objects`` element may have."""
@@ -65,7 +65,7 @@ class Objects(RandomizerBase):
             Item(half_extents_m(*assets.bounds_m(asset.asset_id), scale), asset.stackable)
             for asset, scale in zip(chosen, scales, strict=True)
         ]
-        poses = layout(group, items, find_floors(scene, group, assets), rng, upright)
+        poses = lay_out(group, items, find_floors(scene, group, assets), rng, upright)
         members = [
             Member(
                 asset.asset_id,
@@ -78,7 +78,7 @@ class Objects(RandomizerBase):
         ]
         return add_members(scene, group, members, assets)
 
-    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, Wheel]:
+    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, CategoryWeights]:
         """The group, and the weighted categories of its assets."""
         field = f"randomizers.{self.name}"
         group = find_group(scene, self.group or self.name, f"{field}.group")

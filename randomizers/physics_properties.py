@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     LogUniform,
     NonNegative,
     Positive,
     Uniform,
     UnitInterval,
 )
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Scene
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
 
 
 class PhysicsProperties(RandomizerBase):

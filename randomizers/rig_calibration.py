@@ -6,14 +6,14 @@ import math
 from dataclasses import replace
 from typing import Literal
 
-from generator.config.distributions import Normal, Scalar
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.instants import with_placed_sensors
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Camera, Device, Lidar, Scene
-from generator.core.se3 import SE3, multiply_quaternions
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
+from gen_data.generator.config.distributions import Normal, Scalar
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
+from gen_data.generator.core.scene_time import place_sensors
+from gen_data.generator.core.se3 import SE3, multiply_quaternions
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
 
 
 class RigCalibration(RandomizerBase):
@@ -48,7 +48,7 @@ class RigCalibration(RandomizerBase):
                 f"sensors: {', '.join(known) or 'none'}{did_you_mean(self.rig, known)}"
             )
         rigs = {self.rig} if self.rig else set(known)
-        return with_placed_sensors(
+        return place_sensors(
             replace(
                 scene,
                 cameras=tuple(

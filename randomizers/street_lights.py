@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Bounds,
     Choice,
     Flag,
@@ -18,16 +18,16 @@ from generator.config.distributions import (
     Scalar,
     Uniform,
 )
-from generator.core.colorimetry import luminance
-from generator.core.geometry import Keypoint, Material
-from generator.core.interfaces import AssetIndex
-from generator.core.photometry import intensity_of_flux
-from generator.core.scene import Body, Light, Scene
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase, materials_of
-from randomizers.color_space import linear_of_temperature
-from randomizers.daylight import is_dark
+from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.photometry import flux_to_intensity_cd
+from gen_data.generator.core.scene import Body, Light, Scene
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase, body_materials
+from gen_data.randomizers.color_space import temperature_to_linear
+from gen_data.randomizers.daylight import is_dark
 
 _WHITE_K = 3400.0
 LAMP, WINDOW = "lamp", "window"
@@ -70,12 +70,12 @@ class StreetLights(RandomizerBase):
         """The scene with its lamps on; by day the scene as it is."""
         if self.when == "dark" and not is_dark(scene):
             return scene
-        color = balanced_color(self.temperature_k.draw(rng))
+        color = white_balanced_color(self.temperature_k.draw(rng))
         flux_lm, cone_rad = self.flux_lm.draw(rng), math.radians(self.cone_deg.draw(rng))
         glow = _times(color, self.lamp_luminance_cd_m2.draw(rng))
         lights, bodies = list(scene.lights), []
         for body in scene.bodies:
-            roles = {material.role for material in materials_of(body, assets)}
+            roles = {material.role for material in body_materials(body, assets)}
             lamps = [k for k in assets.keypoints(body.asset) if k.name == LAMP]
             if lamps and not self.broken.draw(rng):
                 lights += (
@@ -89,17 +89,17 @@ class StreetLights(RandomizerBase):
         return replace(scene, bodies=tuple(bodies), lights=tuple(lights))
 
     def _window(self, rng: Rng) -> Vec3:
-        color = balanced_color(self.window_temperature_k.draw(rng))
+        color = white_balanced_color(self.window_temperature_k.draw(rng))
         return _times(color, self.window_luminance_cd_m2.draw(rng))
 
 
-def balanced_color(temperature_k: float) -> Vec3:
+def white_balanced_color(temperature_k: float) -> Vec3:
     """Colour of a lamp for a camera half adapted to a street at night, luminance 1.
 
     Images are balanced for daylight; no camera leaves it at that under sodium lamps.
     """
-    lamp = linear_of_temperature(temperature_k)
-    white = linear_of_temperature(_WHITE_K)
+    lamp = temperature_to_linear(temperature_k)
+    white = temperature_to_linear(_WHITE_K)
     rgb = [part / reference**0.5 for part, reference in zip(lamp, white, strict=True)]
     relative = float(luminance(np.array(rgb)))
     red, green, blue = (round(part / relative, 6) for part in rgb)
@@ -108,7 +108,7 @@ def balanced_color(temperature_k: float) -> Vec3:
 
 def spot_intensity_cd(flux_lm: float, cone_rad: float) -> float:
     """Luminous intensity of a spot that sends a flux into a cone."""
-    return intensity_of_flux(Light("", "spot", cone_rad=cone_rad), flux_lm)
+    return flux_to_intensity_cd(Light("", "spot", cone_rad=cone_rad), flux_lm)
 
 
 def _lamp(
@@ -135,7 +135,7 @@ def _light_up(body: Body, assets: AssetIndex, role: str, emission_cd_m2: Vec3) -
     def set_emission(material: Material) -> Material:
         return replace(material, emission_cd_m2=emission_cd_m2)
 
-    slots = materials_of(body, assets)
+    slots = body_materials(body, assets)
     return replace(body, materials=tuple(set_emission(m) if m.role == role else m for m in slots))
 
 

@@ -7,12 +7,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Chance, Positive, Probability, Uniform
-from generator.core.geometry import Material
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.streams import Rng
-from randomizers.base import LookRandomizer, pick, textures_named, with_materials
+from gen_data.generator.config.distributions import Chance, Positive, Probability, Uniform
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import LookRandomizer, choose, find_textures, set_materials
 
 
 class Textures(LookRandomizer):
@@ -43,7 +43,7 @@ class Textures(LookRandomizer):
         for body in self.chosen(scene):
             if not self.probability.draw(rng):
                 continue
-            texture, scale_m = pick(options, rng), round(self.scale_m.draw(rng), 4)
+            texture, scale_m = choose(options, rng), round(self.scale_m.draw(rng), 4)
 
             def cover(
                 material: Material, texture: str = texture, scale_m: float = scale_m
@@ -52,7 +52,7 @@ class Textures(LookRandomizer):
                     material, base_color=(1.0, 1.0, 1.0), texture=texture, texture_scale_m=scale_m
                 )
 
-            changed = with_materials(body, assets, cover)
+            changed = set_materials(body, assets, cover)
             if self.slots:
                 before = body.materials or assets.materials(body.asset)
                 mixed = tuple(
@@ -65,4 +65,4 @@ class Textures(LookRandomizer):
 
     def _options(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the textures it draws from."""
-        return textures_named(assets, self.textures, f"randomizers.{self.name}.textures")
+        return find_textures(assets, self.textures, f"randomizers.{self.name}.textures")

@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from generator.config.distributions import Bounds, Scalar, Uniform, UnitInterval
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.daylight import Daylight, cloud_seed, shared_number, with_daylight
+from gen_data.generator.config.distributions import Bounds, Scalar, Uniform, UnitInterval
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.daylight import Daylight, draw_cloud_seed, set_daylight, shared_number
 
 Altitude = Annotated[Scalar, Bounds(-90, 90)]
 Turbidity = Annotated[Scalar, Bounds(1.8, 8.0)]
@@ -52,7 +52,7 @@ class TimeOfDay(RandomizerBase):
         del assets
         altitude_deg = self.sun_altitude_deg.draw(rng)
         azimuth_deg = self.sun_azimuth_deg.draw(rng)
-        turbidity, seed = self.turbidity.draw(rng), cloud_seed(rng)
+        turbidity, seed = self.turbidity.draw(rng), draw_cloud_seed(rng)
         given = 0.0 if self.sky == "preetham" else shared_number(scene, "cloudiness")
         if self.cloudiness is not None:
             cloudiness = self.cloudiness.draw(rng)
@@ -64,4 +64,4 @@ class TimeOfDay(RandomizerBase):
         light = Daylight(
             altitude_deg, azimuth_deg, cloudiness, turbidity, seed, snow=snow, model=self.sky
         )
-        return with_daylight(scene, light)
+        return set_daylight(scene, light)

@@ -9,44 +9,50 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from generator.config.distributions import Normal, Positive, Uniform
-from generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.motion import Change, Track
-from generator.core.scene import Body, Scene
-from generator.core.se3 import Array
-from generator.core.streams import Rng
-from generator.traffic.collisions import first_overlap
-from generator.traffic.fleet import LOOKAHEAD_M, Fleet, Vehicle, fleet_of
-from generator.traffic.paths import Walks, drawn_path, walks_of
-from generator.traffic.routes import LaneGraph, drawn_route, lanes_through
-from generator.traffic.signals import Approach, Cycle
-from generator.traffic.simulation import Motion, simulated
-from generator.traffic.tracks import upright_tracks
-from generator.traffic.walking import Walker
-from randomizers.base import RandomizerBase
-from randomizers.ego_on_lane import Stop
-from randomizers.traffic_changes import (
-    gait_changes,
-    lamp_changes,
-    lamp_states,
-    signal_changes,
-    with_first_changes,
-)
-from randomizers.traffic_lights import COLORS, Signal, group_junctions, has_lenses, read_signal
-from randomizers.traffic_members import (
+from gen_data.generator.config.distributions import Normal, Positive, Uniform
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.motion import StateChange, Trajectory
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.traffic.body_trajectories import make_upright_trajectories
+from gen_data.generator.traffic.lane_routes import LaneGraph, draw_route, lanes_through_point
+from gen_data.generator.traffic.obb_overlap import first_overlap
+from gen_data.generator.traffic.pedestrian_paths import WalkNetwork, draw_path, make_walk_network
+from gen_data.generator.traffic.pedestrians import Pedestrian
+from gen_data.generator.traffic.signal_cycles import Approach, Cycle
+from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
+from gen_data.generator.traffic.vehicles import LOOKAHEAD_M, Vehicle, Vehicles, make_vehicles
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.ego_on_lane import Stop
+from gen_data.randomizers.traffic_actors import (
     DRIVERS,
     Driver,
     OnFoot,
     OnRoad,
     Standing,
-    ahead_of,
     cycles_axes,
     find_approaches,
     find_drivers,
     find_obstacles,
     find_pedestrians,
-    with_cycles,
+    heading_direction,
+    set_cycles,
+)
+from gen_data.randomizers.traffic_lights import (
+    COLORS,
+    Signal,
+    group_junctions,
+    has_lenses,
+    read_signal,
+)
+from gen_data.randomizers.traffic_states import (
+    apply_first_changes,
+    gait_changes,
+    lamp_changes,
+    lamp_states,
+    signal_changes,
 )
 
 JUNCTION_M = 40.0
@@ -131,9 +137,9 @@ class TrafficFlow(RandomizerBase):
         standing = find_obstacles(scene, taking_part, assets)
         planned = self._plan_routes(drivers, standing, streets)
         fleet = self._fleet(drivers, streets, planned, standing.boxes, rng)
-        walks = walks_of(streets.sidewalks, streets.crosswalks, standing.boxes)
+        walks = make_walk_network(streets.sidewalks, streets.crosswalks, standing.boxes)
         walkers = self._walkers(people, walks, rng)
-        motion = simulated(fleet, walkers, standing.boxes, approaches, self.duration_s)
+        motion = simulate(fleet, walkers, standing.boxes, approaches, self.duration_s)
         _check(motion, drivers, people, standing, self.name)
         tracks = _tracks(motion, drivers, people, assets)
         changes = [
@@ -153,7 +159,7 @@ class TrafficFlow(RandomizerBase):
             cycle = Cycle(max(cycles_axes(junction)) + 1, round(green_s, 2), round(all_red_s, 2))
             offset_s = round(float(rng.uniform()) * cycle.length_s, 2)
             junctions.append((junction, replace(cycle, offset_s=offset_s)))
-        return with_cycles(junctions)
+        return set_cycles(junctions)
 
     def _plan_routes(
         self, drivers: Sequence[OnRoad], standing: Standing, streets: Streets
@@ -170,7 +176,7 @@ class TrafficFlow(RandomizerBase):
                     f"{', '.join(known) or 'none'}{did_you_mean(name, known)}"
                 )
             _check_points(standing, stops, where)
-            lanes = lanes_through(streets.driving, stops, where)
+            lanes = lanes_through_point(streets.driving, stops, where)
             start = places[name].lane
             if start not in lanes:
                 raise ConfigError(
@@ -187,7 +193,7 @@ class TrafficFlow(RandomizerBase):
         planned: dict[str, tuple[str, ...]],
         obstacles: Array,
         rng: Rng,
-    ) -> Fleet | None:
+    ) -> Vehicles | None:
         """Vehicles with drivers and routes; draws the same number for each of them."""
         vehicles = []
         for member in drivers:
@@ -207,7 +213,7 @@ class TrafficFlow(RandomizerBase):
                     rear_m=member.axles.rear_m,
                     width_m=member.axles.width_m,
                     wheelbase_m=member.axles.wheelbase_m,
-                    route=drawn_route(streets.driving, given, length_m, rng),
+                    route=draw_route(streets.driving, given, length_m, rng),
                     station_m=member.place.at_m,
                     speed_factor=factor,
                     speed_max_m_s=kind.speed_m_s,
@@ -223,20 +229,20 @@ class TrafficFlow(RandomizerBase):
             for n in v.route.lanes
         )
         reach_m = fastest * self.duration_s + 5.0
-        return fleet_of(vehicles, streets.driving, streets.crosswalks, obstacles, reach_m)
+        return make_vehicles(vehicles, streets.driving, streets.crosswalks, obstacles, reach_m)
 
-    def _walkers(self, people: Sequence[OnFoot], walks: Walks, rng: Rng) -> list[Walker]:
+    def _walkers(self, people: Sequence[OnFoot], walks: WalkNetwork, rng: Rng) -> list[Pedestrian]:
         walkers = []
         for member in people:
             speed_m_s = self.walking_m_s.draw(rng)
             x, y, _ = member.body.T_world_body.translation_m
-            ahead = ahead_of(member.body)
+            ahead = heading_direction(member.body)
             graph = walks.sidewalks
             if member.place.lane in walks.crosswalks.lines:
                 graph = walks.crosswalks
             axis = graph.lines[member.place.lane].pose(member.place.at_m).rotation()[:2, 0]
             forward = bool(ahead[0] * axis[0] + ahead[1] * axis[1] >= 0.0)
-            path = drawn_path(
+            path = draw_path(
                 walks,
                 member.place.lane,
                 member.place.at_m,
@@ -247,15 +253,15 @@ class TrafficFlow(RandomizerBase):
             )
             left_m = member.place.left_m if forward else -member.place.left_m
             walkers.append(
-                Walker(member.body.name, (x, y), ahead, speed_m_s, path, left_m)
+                Pedestrian(member.body.name, (x, y), ahead, speed_m_s, path, left_m)
                 if member.walks
-                else Walker(member.body.name, (x, y), ahead)
+                else Pedestrian(member.body.name, (x, y), ahead)
             )
         return walkers
 
     def _signal_changes(
         self, signals: Sequence[tuple[Signal, Approach]], assets: AssetIndex, rng: Rng
-    ) -> list[Change]:
+    ) -> list[StateChange]:
         lens_cd_m2 = round(self.lens_cd_m2.draw(rng), 2)
         return [
             change
@@ -265,13 +271,13 @@ class TrafficFlow(RandomizerBase):
 
     def _lamp_changes(
         self,
-        fleet: Fleet | None,
+        fleet: Vehicles | None,
         drivers: Sequence[OnRoad],
-        motion: Motion,
+        motion: SimulatedMotion,
         assets: AssetIndex,
         rng: Rng,
-    ) -> list[Change]:
-        made: list[Change] = []
+    ) -> list[StateChange]:
+        made: list[StateChange] = []
         for k, member in enumerate(drivers):
             brake, blink = self.brakelight_cd_m2.draw(rng), self.indicator_cd_m2.draw(rng)
             begun = float(rng.uniform())
@@ -299,8 +305,10 @@ def _check_points(standing: Standing, stops: Sequence[Stop], where: str) -> None
             )
 
 
-def _gait(people: Sequence[OnFoot], motion: Motion, assets: AssetIndex, rng: Rng) -> list[Change]:
-    made: list[Change] = []
+def _gait(
+    people: Sequence[OnFoot], motion: SimulatedMotion, assets: AssetIndex, rng: Rng
+) -> list[StateChange]:
+    made: list[StateChange] = []
     for k, member in enumerate(people):
         start = float(rng.uniform())
         if member.walks:
@@ -311,19 +319,19 @@ def _gait(people: Sequence[OnFoot], motion: Motion, assets: AssetIndex, rng: Rng
 
 
 def _tracks(
-    motion: Motion, drivers: Sequence[OnRoad], people: Sequence[OnFoot], assets: AssetIndex
-) -> list[tuple[Body, Track | None]]:
+    motion: SimulatedMotion, drivers: Sequence[OnRoad], people: Sequence[OnFoot], assets: AssetIndex
+) -> list[tuple[Body, Trajectory | None]]:
     """The track of everybody who takes part; None = they never move."""
     backs = [member.axles.T_body_rear.inverse().translation_m for member in drivers]
     wheelbases = np.array([member.axles.wheelbase_m for member in drivers])
     bodies = [m.body for m in drivers] + [m.body for m in people]
-    made = upright_tracks(
+    made = make_upright_trajectories(
         [member.body.name for member in drivers],
         motion.axle_m,
         motion.ahead,
         np.clip(motion.rise / np.maximum(wheelbases, 0.1), -0.3, 0.3),
         backs,
-    ) + upright_tracks(
+    ) + make_upright_trajectories(
         [member.body.name for member in people],
         motion.feet_m,
         motion.look,
@@ -334,7 +342,7 @@ def _tracks(
 
 
 def _check(
-    motion: Motion,
+    motion: SimulatedMotion,
     drivers: Sequence[OnRoad],
     people: Sequence[OnFoot],
     standing: Standing,
@@ -361,7 +369,7 @@ def _check(
 
 
 def _set_in_motion(
-    scene: Scene, tracks: Sequence[tuple[Body, Track | None]], changes: Sequence[Change]
+    scene: Scene, tracks: Sequence[tuple[Body, Trajectory | None]], changes: Sequence[StateChange]
 ) -> Scene:
     """The scene at time 0 with all that will happen."""
     moved = [
@@ -369,7 +377,7 @@ def _set_in_motion(
         for body, track in tracks
         if track is not None
     ]
-    scene = with_first_changes(scene.with_bodies(*moved), changes)
+    scene = apply_first_changes(scene.with_bodies(*moved), changes)
     order = sorted(range(len(changes)), key=lambda k: (changes[k].time_s, k))
     return replace(
         scene,

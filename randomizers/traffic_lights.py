@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-from generator.config.distributions import Choice, Constant, Name, Positive, Uniform
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.geometry import Material
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Instance, Scene
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase, materials_of
+from gen_data.generator.config.distributions import Choice, Constant, Name, Positive, Uniform
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase, body_materials
 
 LIT: Mapping[str, tuple[str, ...]] = {
     "red": ("lens_red", "lens_stop"),
@@ -127,7 +127,7 @@ def read_signal(body: Body) -> Signal:
 
 def has_lenses(body: Body, assets: AssetIndex, roles: frozenset[str]) -> bool:
     """Whether a body has a slot of any of these roles."""
-    return any(material.role in roles for material in materials_of(body, assets))
+    return any(material.role in roles for material in body_materials(body, assets))
 
 
 def show_state(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: float) -> Body:
@@ -140,7 +140,7 @@ def show_state(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: floa
         r, g, b = (round(level * channel, 2) for channel in COLORS[material.role])
         return replace(material, emission_cd_m2=(r, g, b))
 
-    return replace(body, materials=tuple(set_emission(m) for m in materials_of(body, assets)))
+    return replace(body, materials=tuple(set_emission(m) for m in body_materials(body, assets)))
 
 
 def label_state(instance: Instance, state: str) -> Instance:

@@ -7,14 +7,21 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.config.distributions import Choice, Flag, Name, Positive, Probability, Uniform
-from generator.core.geometry import Material
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Instance, Light, Scene
-from generator.core.se3 import SE3, Vec3
-from generator.core.streams import Rng
-from randomizers.base import LookRandomizer, materials_of
-from randomizers.daylight import is_dark
+from gen_data.generator.config.distributions import (
+    Choice,
+    Flag,
+    Name,
+    Positive,
+    Probability,
+    Uniform,
+)
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Instance, Light, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import LookRandomizer, body_materials
+from gen_data.randomizers.daylight import is_dark
 
 _WHITE: Vec3 = (1.02, 1.0, 0.94)
 RED: Vec3 = (4.2, 0.14, 0.06)
@@ -62,7 +69,7 @@ class VehicleLights(LookRandomizer):
             side, beam_cd = self.indicator.draw(rng), self.beam_cd.draw(rng)
             on = on or dark
             glow = self._glow(on, braking, side, rng)
-            bodies.append(with_glow(body, assets, glow))
+            bodies.append(set_emission(body, assets, glow))
             states[body.instance_id] = (
                 ("brake_lights", _word(braking)),
                 ("head_lights", _word(on)),
@@ -89,22 +96,25 @@ class VehicleLights(LookRandomizer):
         )
         glow: dict[str, Vec3] = {}
         if on:
-            glow |= {"headlight": times(_WHITE, head), "taillight": times(RED, tail)}
+            glow |= {
+                "headlight": scale_emission(_WHITE, head),
+                "taillight": scale_emission(RED, tail),
+            }
         if braking:
-            glow["brakelight"] = times(RED, brake)
+            glow["brakelight"] = scale_emission(RED, brake)
         for name in ("left", "right"):
             if side in (name, "both"):
-                glow[f"indicator_{name}"] = times(AMBER, blink)
+                glow[f"indicator_{name}"] = scale_emission(AMBER, blink)
         return glow
 
 
-def with_glow(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
+def set_emission(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
     """The body with the emission of some roles exchanged."""
 
     def set_emission(material: Material) -> Material:
         return replace(material, emission_cd_m2=glow.get(material.role, material.emission_cd_m2))
 
-    return replace(body, materials=tuple(set_emission(m) for m in materials_of(body, assets)))
+    return replace(body, materials=tuple(set_emission(m) for m in body_materials(body, assets)))
 
 
 def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
@@ -146,7 +156,7 @@ def _word(on: bool) -> str:
     return "on" if on else "off"
 
 
-def times(color: Vec3, luminance_cd_m2: float) -> Vec3:
+def scale_emission(color: Vec3, luminance_cd_m2: float) -> Vec3:
     """Emission of a colour of luminance 1."""
     red, green, blue = (round(part * luminance_cd_m2, 3) for part in color)
     return (red, green, blue)

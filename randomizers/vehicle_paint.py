@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.assets.vehicles.plates import SEEDS, with_seed
-from generator.config.distributions import (
+from gen_data.generator.assets.vehicles.plates import SEEDS, reseed_plate
+from gen_data.generator.config.distributions import (
     Chance,
     Constant,
     Flag,
@@ -17,13 +17,13 @@ from generator.config.distributions import (
     Uniform,
     UnitInterval,
 )
-from generator.core.geometry import Material
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Scene
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
-from randomizers.base import LookRandomizer, materials_of
-from randomizers.color_space import linear_of_hsv
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import LookRandomizer, body_materials
+from gen_data.randomizers.color_space import hsv_to_linear
 
 PAINT = "paint"
 _DUST: Vec3 = (0.17, 0.145, 0.115)
@@ -120,7 +120,7 @@ class VehiclePaint(LookRandomizer):
         )
         flakes = self.metallic.draw(rng) and name != "white"
         material = Material(
-            base_color=linear_of_hsv(hue, saturation, value),
+            base_color=hsv_to_linear(hue, saturation, value),
             roughness=round(self.roughness.draw(rng), 4),
             metallic=0.25 if flakes else 0.0,
             specular=0.6,
@@ -149,7 +149,7 @@ def _finish(body: Body, assets: AssetIndex, paint: Material | None, dirt: float)
             )
         return _soil(material, dirt) if material.role in _SOILED else material
 
-    slots = materials_of(body, assets)
+    slots = body_materials(body, assets)
     return replace(body, materials=tuple(finish(material) for material in slots))
 
 
@@ -157,7 +157,7 @@ def _change_plates(body: Body, seed: int) -> Body:
     """The body with another licence plate, where it has one."""
     return replace(
         body,
-        materials=tuple(replace(m, texture=with_seed(m.texture, seed)) for m in body.materials),
+        materials=tuple(replace(m, texture=reseed_plate(m.texture, seed)) for m in body.materials),
     )
 
 

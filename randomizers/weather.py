@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Choice,
     Malformed,
     Name,
@@ -16,15 +16,15 @@ from generator.config.distributions import (
     Uniform,
     UnitInterval,
 )
-from generator.config.distributions.fields import custom_error
-from generator.core.errors import did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.streams import Rng
-from randomizers.base import RandomizerBase
-from randomizers.daylight import Daylight, cloud_seed, with_daylight
-from randomizers.time_of_day import Altitude, Turbidity
-from randomizers.weather_presets import PRESETS, Range
+from gen_data.generator.config.distributions.fields import custom_error
+from gen_data.generator.core.errors import did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.daylight import Daylight, draw_cloud_seed, set_daylight
+from gen_data.randomizers.time_of_day import Altitude, Turbidity
+from gen_data.randomizers.weather_presets import PRESETS, Range
 
 _FIELDS = (
     "fog_extinction_per_m",
@@ -86,7 +86,7 @@ class Weather(RandomizerBase):
             self.sun_azimuth_deg.draw(rng),
             _draw(self.cloudiness, condition.cloudiness, rng),
             _draw(self.turbidity, condition.turbidity, rng),
-            cloud_seed(rng),
+            draw_cloud_seed(rng),
         )
         values: dict[str, Any] = {"seed": int(rng.integers(_PATTERNS))}
         for name in _FIELDS:
@@ -95,7 +95,7 @@ class Weather(RandomizerBase):
                 values[name] = round(given.draw(rng), 6)
         weather = replace(condition.weather, **values)
         light = replace(light, snow=weather.snow_cover > 0.0)
-        return with_daylight(replace(scene, weather=weather), light)
+        return set_daylight(replace(scene, weather=weather), light)
 
     @field_validator("preset")
     @classmethod

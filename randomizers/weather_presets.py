@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from generator.core.scene import Weather
+from gen_data.generator.core.scene import Weather
 
 Range = tuple[float, float]
 

@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-from generator.core.interfaces import Element
-from generator.core.plugins import PluginTable
+from gen_data.generator.core.interfaces import Element
+from gen_data.generator.core.plugins import PluginTable
 
 TABLE = PluginTable[Element](
     "element",
     {
-        "lane_objects": "scene_templates.along:Along",
-        "backdrop": "scene_templates.backdrop:Backdrop",
-        "bin": "scene_templates.bin:Bin",
-        "crosswalk": "scene_templates.crosswalk:Crosswalk",
-        "ego": "scene_templates.ego:Ego",
-        "ground": "scene_templates.ground:GroundElement",
-        "junction": "scene_templates.junction:Junction",
-        "light": "scene_templates.light:LightElement",
-        "objects": "scene_templates.objects:Objects",
-        "parking_area": "scene_templates.parking_area:ParkingArea",
-        "prop": "scene_templates.prop:Prop",
-        "road": "scene_templates.road:Road",
-        "road_network": "scene_templates.road_network:RoadNetwork",
-        "robot": "scene_templates.robot:Robot",
-        "room": "scene_templates.room:Room",
-        "shelf": "scene_templates.shelf:Shelf",
-        "signals": "scene_templates.signals:Signals",
-        "surface": "scene_templates.surface:SurfaceElement",
-        "usd_stage": "scene_templates.usd_stage:UsdStage",
+        "lane_objects": "gen_data.scene_templates.along:Along",
+        "backdrop": "gen_data.scene_templates.backdrop:Backdrop",
+        "bin": "gen_data.scene_templates.bin:Bin",
+        "crosswalk": "gen_data.scene_templates.crosswalk:Crosswalk",
+        "ego": "gen_data.scene_templates.ego:Ego",
+        "ground": "gen_data.scene_templates.ground:GroundElement",
+        "junction": "gen_data.scene_templates.junction:Junction",
+        "light": "gen_data.scene_templates.light:LightElement",
+        "objects": "gen_data.scene_templates.objects:Objects",
+        "parking_area": "gen_data.scene_templates.parking_area:ParkingArea",
+        "prop": "gen_data.scene_templates.prop:Prop",
+        "road": "gen_data.scene_templates.road:Road",
+        "road_network": "gen_data.scene_templates.road_network:RoadNetwork",
+        "robot": "gen_data.scene_templates.robot:Robot",
+        "room": "gen_data.scene_templates.room:Room",
+        "shelf": "gen_data.scene_templates.shelf:Shelf",
+        "signals": "gen_data.scene_templates.signals:Signals",
+        "surface": "gen_data.scene_templates.surface:SurfaceElement",
+        "usd_stage": "gen_data.scene_templates.usd_stage:UsdStage",
     },
     (Element,),
 )

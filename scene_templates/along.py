@@ -7,13 +7,13 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex
-from generator.core.lanes import LaneLine, standing_on_lane
-from generator.core.members import Member, add_members
-from generator.core.scene import LaneKind, ObjectGroup, Scene
-from scene_templates.element import Element
-from scene_templates.objects import AssetChoice
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.lane_geometry import LaneLine, pose_on_lane
+from gen_data.generator.core.members import Member, add_members
+from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
+from gen_data.scene_templates.element import Element
+from gen_data.scene_templates.objects import AssetChoice
 
 
 class Along(Element):
@@ -65,7 +65,7 @@ class Along(Element):
             line, at_m = _locate(lines, total_m * (number + 0.5) / self.count)
             asset = group.assets[(number * len(group.assets)) // self.count]
             bounds_m = assets.bounds_m(asset)
-            pose = standing_on_lane(line.pose(at_m), line.lane, bounds_m, self.facing)
+            pose = pose_on_lane(line.pose(at_m), line.lane, bounds_m, self.facing)
             members.append(Member(asset, pose.rounded(), collides=False))
         return add_members(scene, group, members, assets)
 

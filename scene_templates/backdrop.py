@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from scene_templates.element import PlacedElement, standing, with_static
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.scene_templates.element import PlacedElement, add_static, stand_upright
 
 
 class Backdrop(PlacedElement):
@@ -21,11 +21,11 @@ class Backdrop(PlacedElement):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """A static body; background has no instance."""
-        return with_static(
+        return add_static(
             scene,
             assets,
             name=self.name,
             asset=self.asset,
-            T_world_body=standing(assets, self.asset, self.pose(scene)),
+            T_world_body=stand_upright(assets, self.asset, self.pose(scene)),
             unlabelled=True,
         )

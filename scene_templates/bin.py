@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-from generator.assets.procedural.furniture import bin_interior_m
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene, Surface
-from generator.core.se3 import SE3
-from scene_templates.element import PlacedElement, parametric, with_static, with_surface
+from gen_data.generator.assets.procedural.furniture import bin_interior_m
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3
+from gen_data.scene_templates.element import PlacedElement, add_static, add_surface, parametric_id
 
 
 class Bin(PlacedElement):
@@ -26,16 +26,16 @@ class Bin(PlacedElement):
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """A static body, its instance, and the surface of its floor."""
         T_world_bin = self.pose(scene)
-        scene = with_static(
+        scene = add_static(
             scene,
             assets,
             name=self.name,
-            asset=parametric("bin", size_m=self.size_m),
+            asset=parametric_id("bin", size_m=self.size_m),
             T_world_body=T_world_bin,
             annotated=self.annotate,
         )
         length_m, width_m, floor_m = bin_interior_m(self.size_m)
-        floor = Surface(
+        floor = SupportSurface(
             name=self.name,
             body=self.name,
             T_world_surface=(T_world_bin @ SE3((0.0, 0.0, floor_m))).rounded(),
@@ -43,4 +43,4 @@ class Bin(PlacedElement):
             clearance_m=1.5,
             walled=True,
         )
-        return with_surface(scene, floor)
+        return add_surface(scene, floor)

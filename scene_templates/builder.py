@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex, Element
-from generator.core.scene import Lane, Light, Region, Scene, Surface
-from generator.core.se3 import Vec3
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex, Element
+from gen_data.generator.core.scene import Lane, Light, Region, Scene, SupportSurface
+from gen_data.generator.core.se3 import Vec3
 
 CONTENT_HEIGHT_M = 0.25
 """Height over a surface that counts as what is looked at."""
@@ -21,7 +21,7 @@ STREET_MARGIN_M, STREET_HEIGHT_M = 50.0, 60.0
 DEFAULT_LIGHT = Light("lamp", "sphere", (0.4, -0.9, 2.2), intensity_cd=900.0, radius_m=0.08)
 
 
-def build(name: str, elements: Sequence[Element], assets: AssetIndex) -> Scene:
+def build_scene(name: str, elements: Sequence[Element], assets: AssetIndex) -> Scene:
     """The nominal scene of a template: every element at its nominal place.
 
     Elements are added in the order of their lines, groups of objects after all others: they have
@@ -39,10 +39,10 @@ def build(name: str, elements: Sequence[Element], assets: AssetIndex) -> Scene:
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
     if scene.lanes:
         scene = replace(scene, interior_m=_around_lanes(scene.lanes))
-    return replace(scene, focus=focus_of(scene))
+    return replace(scene, focus=focus_region(scene))
 
 
-def focus_of(scene: Scene) -> Region:
+def focus_region(scene: Scene) -> Region:
     """The box around the surfaces that carry objects; without any, around all surfaces."""
     names = {name for group in scene.groups for name in group.surfaces}
     surfaces = [s for s in scene.surfaces if s.name in names] or list(scene.surfaces)
@@ -80,7 +80,7 @@ def _check_names(elements: Sequence[Element]) -> None:
         seen.add(element.name)
 
 
-def _content_corners(surface: Surface) -> np.ndarray:
+def _content_corners(surface: SupportSurface) -> np.ndarray:
     x, y = 0.5 * surface.size_m[0], 0.5 * surface.size_m[1]
     top = min(CONTENT_HEIGHT_M, surface.clearance_m)
     corners = [[sx * x, sy * y, z] for sx in (-1, 1) for sy in (-1, 1) for z in (0.0, top)]

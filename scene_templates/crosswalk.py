@@ -7,13 +7,13 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Lane, Scene
-from generator.roads.lanes import world_points
-from generator.roads.profile import height_m
-from scene_templates.element import Element, parametric
-from scene_templates.road import road_of, with_street
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Lane, Scene
+from gen_data.generator.roads.cross_section import height_m
+from gen_data.generator.roads.lane_graph import world_points
+from gen_data.scene_templates.element import Element, parametric_id
+from gen_data.scene_templates.road import add_street, find_road
 
 
 class Crosswalk(Element):
@@ -33,14 +33,14 @@ class Crosswalk(Element):
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Paint on the road, and the lane of those who cross."""
         where = f"elements.{self.name}"
-        shape, parameters, T_world_road = road_of(scene, self.road, f"{where}.road")
+        shape, parameters, T_world_road = find_road(scene, self.road, f"{where}.road")
         if not 0.5 * self.width_m <= self.station_m <= shape.length_m - 0.5 * self.width_m:
             raise ConfigError(
                 f"{where}.station_m: {self.station_m:g} is not on '{self.road}', which is "
                 f"{shape.length_m:g} m long"
             )
         looks = {name: parameters[name] for name in ("seed", "wear") if name in parameters}
-        asset = parametric(
+        asset = parametric_id(
             "crosswalk",
             **shape.changed(),
             **looks,
@@ -51,4 +51,4 @@ class Crosswalk(Element):
         flat = shape.line().points(np.full(7, self.station_m), t)
         center = world_points(np.column_stack([flat, height_m(shape, t)]), T_world_road)
         lane = Lane(f"{self.name}/crosswalk", "crosswalk", center, self.width_m, road=self.road)
-        return with_street(scene, assets, self.name, asset, T_world_road, (lane,))
+        return add_street(scene, assets, self.name, asset, T_world_road, (lane,))

@@ -7,12 +7,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex
-from generator.core.lanes import LaneLine
-from generator.core.scene import Body, Instance, Rig, Scene
-from generator.traffic.axles import axles_of
-from scene_templates.element import Element, next_instance_id
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.lane_geometry import LaneLine
+from gen_data.generator.core.scene import Body, Instance, Rig, Scene
+from gen_data.generator.traffic.axles import find_axles
+from gen_data.scene_templates.element import Element, next_instance_id
 
 CATEGORY = "ego"
 """What its pixels are called; no data set has this category, so that they carry none."""
@@ -50,7 +50,7 @@ class Ego(Element):
                 f"elements.{self.name}.lane: there is no {wanted}; list the road before it"
             )
         line = LaneLine(lanes[0])
-        T_body_rig = axles_of(assets, asset, 1.0).T_body_rear
+        T_body_rig = find_axles(assets, asset, 1.0).T_body_rear
         place = line.pose(0.5 * line.length_m)
         instance_id = next_instance_id(scene)
         body = Body(

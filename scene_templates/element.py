@@ -8,13 +8,13 @@ from dataclasses import replace
 
 from pydantic import Field
 
-from generator.assets.ids import AssetId, ParameterValue
-from generator.config.strict import Strict
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.members import free_instance_ids
-from generator.core.scene import Body, Instance, Scene, Surface
-from generator.core.se3 import SE3, Vec3
+from gen_data.generator.assets.asset_ids import AssetId, ParameterValue
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.members import free_instance_ids
+from gen_data.generator.core.scene import Body, Instance, Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3, Vec3
 
 NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]*$"
 
@@ -61,10 +61,10 @@ class PlacedElement(Element):
         local = SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
         if not self.on:
             return local
-        return surfaces_of(scene, self.on, f"elements.{self.name}.on")[0].T_world_surface @ local
+        return find_surfaces(scene, self.on, f"elements.{self.name}.on")[0].T_world_surface @ local
 
 
-def surfaces_of(scene: Scene, name: str, field: str) -> tuple[Surface, ...]:
+def find_surfaces(scene: Scene, name: str, field: str) -> tuple[SupportSurface, ...]:
     """The surface of that name, or all surfaces of the element of that name.
 
     Raises:
@@ -81,7 +81,7 @@ def surfaces_of(scene: Scene, name: str, field: str) -> tuple[Surface, ...]:
     return found
 
 
-def parametric(family: str, **parameters: ParameterValue) -> str:
+def parametric_id(family: str, **parameters: ParameterValue) -> str:
     """Canonical id of a parametric asset."""
     return str(AssetId(family, parameters))
 
@@ -91,7 +91,7 @@ def next_instance_id(scene: Scene) -> int:
     return free_instance_ids(scene, 1)[0]
 
 
-def with_static(
+def add_static(
     scene: Scene,
     assets: AssetIndex,
     *,
@@ -114,12 +114,12 @@ def with_static(
     return replace(scene, bodies=(*scene.bodies, body), instances=(*scene.instances, instance))
 
 
-def with_surface(scene: Scene, surface: Surface) -> Scene:
+def add_surface(scene: Scene, surface: SupportSurface) -> Scene:
     """The scene with one more surface."""
     return replace(scene, surfaces=(*scene.surfaces, surface))
 
 
-def standing(assets: AssetIndex, asset: str, T_world_stand: SE3) -> SE3:
+def stand_upright(assets: AssetIndex, asset: str, T_world_stand: SE3) -> SE3:
     """``T_world_body`` of an upright asset whose lowest point stands at a pose's origin."""
     low, _ = assets.bounds_m(asset)
     return T_world_stand @ SE3((0.0, 0.0, -low[2]))

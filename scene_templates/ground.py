@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.se3 import SE3
-from scene_templates.element import PlacedElement, parametric, with_static
-from scene_templates.road import Ground
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.scene_templates.element import PlacedElement, add_static, parametric_id
+from gen_data.scene_templates.road import Ground
 
 
 class GroundElement(PlacedElement):
@@ -34,7 +34,7 @@ class GroundElement(PlacedElement):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """A static body; background has no instance."""
-        asset = parametric(
+        asset = parametric_id(
             "ground",
             size_m=self.size_m,
             cover=self.cover,
@@ -42,6 +42,6 @@ class GroundElement(PlacedElement):
             seed=self.seed,
         )
         pose = self.pose(scene) @ SE3((0.0, 0.0, self.level_m))
-        return with_static(
+        return add_static(
             scene, assets, name=self.name, asset=asset, T_world_body=pose, unlabelled=True
         )

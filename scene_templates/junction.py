@@ -8,13 +8,13 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.se3 import SE3
-from generator.roads.junction import ABSENT, JunctionShape, junction_lanes
-from scene_templates.element import Element, parametric
-from scene_templates.road import RoadLooks, port, with_street
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.junction_shape import ABSENT, JunctionShape, junction_lanes
+from gen_data.scene_templates.element import Element, parametric_id
+from gen_data.scene_templates.road import RoadLooks, add_street, find_port
 
 
 class Junction(RoadLooks, Element):
@@ -60,9 +60,9 @@ class Junction(RoadLooks, Element):
         shape = self.shape()
         pose = self._pose(scene, shape)
         given: dict[str, Any] = {} if self.crossings == "zebra" else {"crossings": self.crossings}
-        asset = parametric("junction", **shape.changed(), **given, **self.looks())
+        asset = parametric_id("junction", **shape.changed(), **given, **self.looks())
         lanes = junction_lanes(shape, self.name, pose, self.speed_m_s, self.crossings != "none")
-        return with_street(scene, assets, self.name, asset, pose, lanes)
+        return add_street(scene, assets, self.name, asset, pose, lanes)
 
     def shape(self) -> JunctionShape:
         """Its plan. Raises ConfigError if the arms or the corners make none."""
@@ -98,6 +98,6 @@ class Junction(RoadLooks, Element):
             raise ConfigError(
                 f"elements.{self.name}.after: no arm points back to it; expected 180 in arms_deg"
             )
-        return port(scene, self.after, f"elements.{self.name}.after") @ SE3(
+        return find_port(scene, self.after, f"elements.{self.name}.after") @ SE3(
             (shape.reach_m(), 0.0, 0.0)
         )

@@ -8,16 +8,12 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from generator.core.fixtures import (
-    fixture_asset,
-    level_side,
-    with_fixture,
-)
-from generator.core.interfaces import AssetIndex
-from generator.core.photometry import with_flux
-from generator.core.scene import PANEL_KINDS, LampKind, Light, Scene
-from generator.core.se3 import Vec3
-from scene_templates.element import Element
+from gen_data.generator.core.area_lights import add_fixture, fixture_asset, level_side
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.photometry import scale_to_flux
+from gen_data.generator.core.scene import PANEL_KINDS, LampKind, Light, Scene
+from gen_data.generator.core.se3 import Vec3
+from gen_data.scene_templates.element import Element
 
 
 class LightElement(Element):
@@ -74,10 +70,10 @@ class LightElement(Element):
         if self.kind == "rectangle":
             light = replace(light, size_m=self.size_m, side=level_side(light.direction))
         if self.luminous_flux_lm is not None:
-            light = with_flux(light, self.luminous_flux_lm)
+            light = scale_to_flux(light, self.luminous_flux_lm)
         if self.visible and self.kind in PANEL_KINDS:
             materials = assets.materials(fixture_asset(light))
-            scene, light = with_fixture(scene, light, materials)
+            scene, light = add_fixture(scene, light, materials)
         return replace(scene, lights=(*scene.lights, light))
 
 

@@ -8,15 +8,15 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from generator.config.strict import Strict
-from generator.core.errors import ConfigError
-from generator.core.geometry import Asset
-from generator.core.interfaces import AssetIndex
-from generator.core.members import Member, add_members
-from generator.core.scene import ObjectGroup, Placement, Scene, Surface
-from generator.core.se3 import SE3, Vec3
-from scene_templates.element import Element, extent_m, standing, surfaces_of
-from scene_templates.rows import LAYERS, in_rows, standing_discs
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import Asset
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.members import Member, add_members
+from gen_data.generator.core.scene import ObjectGroup, Placement, Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.scene_templates.element import Element, extent_m, find_surfaces, stand_upright
+from gen_data.scene_templates.rows import LAYERS, place_in_rows, standing_discs
 
 
 class AssetChoice(Strict):
@@ -107,7 +107,7 @@ class Objects(Element):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """The group, and its objects in rows on its surfaces, clear of what stands there."""
-        surfaces = surfaces_of(scene, self.on, f"elements.{self.name}.on")
+        surfaces = find_surfaces(scene, self.on, f"elements.{self.name}.on")
         discs = [standing_discs(scene, surface, assets) for surface in surfaces]
         group = ObjectGroup(
             name=self.name,
@@ -126,14 +126,14 @@ class Objects(Element):
             points = self._points(chosen, surface, group, assets)
             members = []
             for asset, point in zip(chosen, points, strict=True):
-                pose = standing(assets, asset, surface.T_world_surface @ SE3(point)).rounded()
+                pose = stand_upright(assets, asset, surface.T_world_surface @ SE3(point)).rounded()
                 mass_kg = assets.get(asset).mass_kg
                 members.append(Member(asset, pose, motion="dynamic", mass_kg=mass_kg))
             scene = add_members(scene, group, members, assets, first=here.start)
         return scene
 
     def _nominal(
-        self, group: ObjectGroup, number: int, surface: Surface, assets: AssetIndex
+        self, group: ObjectGroup, number: int, surface: SupportSurface, assets: AssetIndex
     ) -> str:
         """The asset of an object: evenly from the group's, the next one where one does not fit."""
         first = (number * len(group.assets)) // max(self.count, 1)
@@ -148,7 +148,7 @@ class Objects(Element):
         )
 
     def _points(
-        self, chosen: list[str], surface: Surface, group: ObjectGroup, assets: AssetIndex
+        self, chosen: list[str], surface: SupportSurface, group: ObjectGroup, assets: AssetIndex
     ) -> list[Vec3]:
         """Where the objects of one surface stand, in its frame."""
         T_surface_world = surface.T_world_surface.inverse()
@@ -158,7 +158,7 @@ class Objects(Element):
             here = (T_surface_world @ SE3((x, y, height_m))).translation_m
             discs.append((here[0], here[1], radius_m))
         sizes_m = [extent_m(assets, asset) for asset in chosen]
-        points = in_rows(sizes_m, surface, discs, LAYERS[self.placement])
+        points = place_in_rows(sizes_m, surface, discs, LAYERS[self.placement])
         if points is None:
             raise ConfigError(
                 f"elements.{self.name}.count: {len(chosen)} objects do not fit on surface "

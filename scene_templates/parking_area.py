@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.roads.parking import ParkingShape, parking_lanes
-from scene_templates.element import PlacedElement, parametric
-from scene_templates.road import RoadLooks, with_street
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.roads.parking_shape import ParkingShape, parking_lanes
+from gen_data.scene_templates.element import PlacedElement, parametric_id
+from gen_data.scene_templates.road import RoadLooks, add_street
 
 
 class ParkingArea(RoadLooks, PlacedElement):
@@ -33,7 +33,7 @@ class ParkingArea(RoadLooks, PlacedElement):
         """The surface is background; every bay is a lane."""
         shape = ParkingShape(self.bays, self.aisles, self.bay_m, self.aisle_m)
         pose = self.pose(scene)
-        asset = parametric("parking_area", **shape.changed(), **self.looks())
-        return with_street(
+        asset = parametric_id("parking_area", **shape.changed(), **self.looks())
+        return add_street(
             scene, assets, self.name, asset, pose, parking_lanes(shape, self.name, pose)
         )

@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from scene_templates.element import PlacedElement, standing, with_static
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.scene_templates.element import PlacedElement, add_static, stand_upright
 
 
 class Prop(PlacedElement):
@@ -34,12 +34,12 @@ class Prop(PlacedElement):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """A static body and, unless it is background, its instance."""
-        return with_static(
+        return add_static(
             scene,
             assets,
             name=self.name,
             asset=self.asset,
-            T_world_body=standing(assets, self.asset, self.pose(scene)),
+            T_world_body=stand_upright(assets, self.asset, self.pose(scene)),
             annotated=self.annotate,
             unlabelled=self.hollow,
         )

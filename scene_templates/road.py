@@ -9,16 +9,16 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from pydantic import Field
 
-from generator.assets.ids import parse
-from generator.config.strict import Strict
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Lane, Scene
-from generator.core.se3 import SE3
-from generator.roads.junction import JunctionShape, arm_pose
-from generator.roads.lanes import linked, road_lanes
-from generator.roads.profile import RoadShape
-from scene_templates.element import Element, parametric, with_static
+from gen_data.generator.assets.asset_ids import parse_asset_id
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Lane, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.cross_section import RoadShape
+from gen_data.generator.roads.junction_shape import JunctionShape, arm_pose
+from gen_data.generator.roads.lane_graph import link_lanes, road_lanes
+from gen_data.scene_templates.element import Element, add_static, parametric_id
 
 T = TypeVar("T")
 Width = float
@@ -118,8 +118,8 @@ class Road(RoadLooks, Element):
             "apron_m": (self.apron_m, 6.0),
         }
         given = {name: value for name, (value, default) in options.items() if value != default}
-        asset = parametric("road", **shape.changed(), **given, **self.looks())
-        return with_street(
+        asset = parametric_id("road", **shape.changed(), **given, **self.looks())
+        return add_street(
             scene,
             assets,
             self.name,
@@ -148,7 +148,7 @@ class Road(RoadLooks, Element):
 
     def _pose(self, scene: Scene) -> SE3:
         if self.after:
-            return port(scene, self.after, f"elements.{self.name}.after")
+            return find_port(scene, self.after, f"elements.{self.name}.after")
         x, y, *lift = self.at_m
         return SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
 
@@ -162,7 +162,7 @@ def check_widths(where: str, shape: RoadShape) -> None:
             raise ConfigError(f"{where}.{name}: expected two widths from 0 to 50 m")
 
 
-def with_street(
+def add_street(
     scene: Scene,
     assets: AssetIndex,
     name: str,
@@ -171,13 +171,13 @@ def with_street(
     lanes: tuple[Lane, ...],
 ) -> Scene:
     """The scene with a surface as background, and its lanes linked to those it meets."""
-    scene = with_static(
+    scene = add_static(
         scene, assets, name=name, asset=asset, T_world_body=T_world_body, unlabelled=True
     )
-    return replace(scene, lanes=linked((*scene.lanes, *lanes)))
+    return replace(scene, lanes=link_lanes((*scene.lanes, *lanes)))
 
 
-def road_of(scene: Scene, name: str, field: str) -> tuple[RoadShape, dict[str, Any], SE3]:
+def find_road(scene: Scene, name: str, field: str) -> tuple[RoadShape, dict[str, Any], SE3]:
     """Shape, all parameters and pose of a road that is in the scene already.
 
     Raises:
@@ -190,13 +190,13 @@ def road_of(scene: Scene, name: str, field: str) -> tuple[RoadShape, dict[str, A
             f"{field}: there is no road '{name}'; expected one of {known}"
             f"{did_you_mean(name, roads)}"
         )
-    parameters = dict(parse(roads[name].asset).parameters)
+    parameters = dict(parse_asset_id(roads[name].asset).parameters)
     names = {f.name for f in fields(RoadShape)}
     shape = RoadShape(**{k: v for k, v in parameters.items() if k in names})  # type: ignore[arg-type]
     return shape, parameters, roads[name].T_world_body
 
 
-def port(scene: Scene, name: str, field: str) -> SE3:
+def find_port(scene: Scene, name: str, field: str) -> SE3:
     """Where a road can go on: the end of a road, or of ``<junction>/<arm>``.
 
     Raises:
@@ -205,14 +205,14 @@ def port(scene: Scene, name: str, field: str) -> SE3:
     owner, slash, arm = name.partition("/")
     if slash:
         return _arm_end(scene, owner, arm, field)
-    shape, _, T_world_road = road_of(scene, name, field)
+    shape, _, T_world_road = find_road(scene, name, field)
     x, y, heading = (float(v) for v in shape.line().poses(np.array([shape.length_m]))[0])
     return T_world_road @ SE3.about_z(heading, (x, y, 0.0))
 
 
 def _arm_end(scene: Scene, name: str, arm: str, field: str) -> SE3:
     for body in scene.bodies:
-        parsed = parse(body.asset) if body.name == name else None
+        parsed = parse_asset_id(body.asset) if body.name == name else None
         if parsed is not None and parsed.name == "junction":
             names = {f.name for f in fields(JunctionShape)}
             given: dict[str, Any] = {k: v for k, v in parsed.parameters.items() if k in names}

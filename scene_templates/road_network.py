@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Lane, Scene
-from generator.core.se3 import SE3
-from generator.roads.lanes import world_points
-from scene_templates.element import PlacedElement
-from scene_templates.road import with_street
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Lane, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.lane_graph import world_points
+from gen_data.scene_templates.element import PlacedElement
+from gen_data.scene_templates.road import add_street
 
 
 class RoadNetwork(PlacedElement):
@@ -35,7 +35,7 @@ class RoadNetwork(PlacedElement):
             )
         pose = self.pose(scene)
         placed = tuple(self._placed(lane, pose) for lane in lanes)
-        return with_street(scene, assets, self.name, self.asset, pose, placed)
+        return add_street(scene, assets, self.name, self.asset, pose, placed)
 
     def _placed(self, lane: Lane, pose: SE3) -> Lane:
         """The lane in the world, under this element's name."""

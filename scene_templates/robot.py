@@ -9,12 +9,17 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from generator.core.geometry import RobotModel
-from generator.core.interfaces import AssetIndex
-from generator.core.kinematics import finger_links, link_bodies, link_poses, rigid_group
-from generator.core.scene import Articulation, Instance, Rig, Scene
-from generator.core.se3 import SE3, Vec3
-from scene_templates.element import PlacedElement, next_instance_id, surfaces_of
+from gen_data.generator.core.asset_types import RobotModel
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.kinematics import (
+    finger_links,
+    link_poses,
+    make_link_bodies,
+    rigid_group,
+)
+from gen_data.generator.core.scene import Articulation, Instance, Rig, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.scene_templates.element import PlacedElement, find_surfaces, next_instance_id
 
 CATEGORY = "robot_arm"
 R_GRASP_RIG = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
@@ -68,7 +73,7 @@ class Robot(PlacedElement):
             scene,
             instances=(*scene.instances, instance),
             articulations=(*scene.articulations, articulation),
-            bodies=(*scene.bodies, *link_bodies(articulation, robot, parts)),
+            bodies=(*scene.bodies, *make_link_bodies(articulation, robot, parts)),
             rigs=(*scene.rigs, wrist(f"{self.name}_wrist", self.name, robot)),
         )
 
@@ -83,7 +88,7 @@ class Robot(PlacedElement):
         x, y, z = T_world_base.translation_m
         low, high = [x - self.reach_m, y - self.reach_m], [x + self.reach_m, y + self.reach_m]
         if self.on:
-            surface = surfaces_of(scene, self.on, f"elements.{self.name}.on")[0]
+            surface = find_surfaces(scene, self.on, f"elements.{self.name}.on")[0]
             half_x, half_y = (0.5 * size for size in surface.size_m)
             corners = [[sx * half_x, sy * half_y, 0.0] for sx in (-1, 1) for sy in (-1, 1)]
             around = surface.T_world_surface.apply(np.array(corners))

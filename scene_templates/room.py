@@ -7,10 +7,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene
-from generator.core.se3 import SE3
-from scene_templates.element import Element, parametric, with_static
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.scene_templates.element import Element, add_static, parametric_id
 
 CLEARANCE_M = 0.15
 """Cameras and lights keep this far from the walls."""
@@ -33,8 +33,10 @@ class Room(Element):
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """The room is background: it has no instance."""
         x, y, z = self.size_m
-        asset = parametric("room", size_m=self.size_m, door=int(self.door), window=int(self.window))
-        scene = with_static(
+        asset = parametric_id(
+            "room", size_m=self.size_m, door=int(self.door), window=int(self.window)
+        )
+        scene = add_static(
             scene, assets, name=self.name, asset=asset, T_world_body=SE3(), unlabelled=True
         )
         inside = (

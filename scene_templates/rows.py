@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Placement, Scene, Surface
-from generator.core.se3 import Vec3
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Placement, Scene, SupportSurface
+from gen_data.generator.core.se3 import Vec3
 
 LAYERS: dict[Placement, int] = {"drop": 4, "scatter": 1, "grid": 1, "stack": 4}
 """How many objects may start above one another."""
@@ -23,7 +23,7 @@ _TURNS_MAX = 100_000
 """Steps, rows and layers tried for one object; surfaces of many metres need fewer."""
 
 
-def standing_discs(scene: Scene, surface: Surface, assets: AssetIndex) -> tuple[Vec3, ...]:
+def standing_discs(scene: Scene, surface: SupportSurface, assets: AssetIndex) -> tuple[Vec3, ...]:
     """Discs ``(x, y, radius)`` [m], world, around what stands on a surface: arms, bins.
 
     Objects that can move are none of it.
@@ -46,8 +46,8 @@ def standing_discs(scene: Scene, surface: Surface, assets: AssetIndex) -> tuple[
     return tuple(discs)
 
 
-def in_rows(
-    sizes_m: Sequence[Vec3], surface: Surface, discs: Sequence[Vec3], layers: int
+def place_in_rows(
+    sizes_m: Sequence[Vec3], surface: SupportSurface, discs: Sequence[Vec3], layers: int
 ) -> list[Vec3] | None:
     """Points of the surface's frame [m] to stand upright boxes on, as far apart as they may be.
 
@@ -68,7 +68,11 @@ def in_rows(
 
 
 def _packed(
-    sizes_m: Sequence[Vec3], surface: Surface, discs: Sequence[Vec3], layers: int, gap_m: float
+    sizes_m: Sequence[Vec3],
+    surface: SupportSurface,
+    discs: Sequence[Vec3],
+    layers: int,
+    gap_m: float,
 ) -> list[Vec3] | None:
     """Row after row from the low corner, then layer upon layer."""
     half_x, half_y = (0.5 * size for size in surface.size_m)

@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.assets.procedural.furniture import shelf_clearance_m, shelf_levels_m
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene, Surface
-from generator.core.se3 import SE3
-from scene_templates.element import PlacedElement, parametric, with_static, with_surface
+from gen_data.generator.assets.procedural.furniture import shelf_clearance_m, shelf_levels_m
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3
+from gen_data.scene_templates.element import PlacedElement, add_static, add_surface, parametric_id
 
 SIDE_M = 0.03
 """Width lost to each side board."""
@@ -35,8 +35,8 @@ class Shelf(PlacedElement):
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """A static body, its instance, and one surface per board."""
         T_world_shelf = self.pose(scene)
-        asset = parametric("shelf", size_m=self.size_m, levels=self.levels, style=self.style)
-        scene = with_static(
+        asset = parametric_id("shelf", size_m=self.size_m, levels=self.levels, style=self.style)
+        scene = add_static(
             scene,
             assets,
             name=self.name,
@@ -46,12 +46,12 @@ class Shelf(PlacedElement):
         )
         clearance_m = shelf_clearance_m(self.size_m, self.levels)
         for level, height_m in enumerate(shelf_levels_m(self.size_m, self.levels)):
-            board = Surface(
+            board = SupportSurface(
                 name=f"{self.name}/{level}",
                 body=self.name,
                 T_world_surface=(T_world_shelf @ SE3((0.0, 0.0, height_m))).rounded(),
                 size_m=(self.size_m[0] - 2 * SIDE_M, self.size_m[1] - SIDE_M),
                 clearance_m=clearance_m,
             )
-            scene = with_surface(scene, board)
+            scene = add_surface(scene, board)
         return scene

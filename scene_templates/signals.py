@@ -7,12 +7,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetIndex
-from generator.core.lanes import LaneLine
-from generator.core.scene import Lane, Scene
-from generator.core.se3 import SE3
-from scene_templates.element import Element, parametric, standing, with_static
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.lane_geometry import LaneLine
+from gen_data.generator.core.scene import Lane, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.scene_templates.element import Element, add_static, parametric_id, stand_upright
 
 SIGNAL_M = 0.6
 """From the kerb to the pole."""
@@ -49,17 +49,17 @@ class Signals(Element):
                 f"elements.{self.name}.junction: no road leads to a junction '{self.junction}'; "
                 "list the junction and its roads before its signals"
             )
-        asset = parametric("traffic_light", mount=self.mount, seed=self.seed)
+        asset = parametric_id("traffic_light", mount=self.mount, seed=self.seed)
         for number, lane in enumerate(coming):
             line = LaneLine(lane)
             right_m = 0.5 * lane.width_m + self.beside_m + SIGNAL_M
             stand = line.pose(line.length_m, -right_m) @ SE3.about_z(math.pi)
-            scene = with_static(
+            scene = add_static(
                 scene,
                 assets,
                 name=f"{self.name}/{number}",
                 asset=asset,
-                T_world_body=standing(assets, asset, stand),
+                T_world_body=stand_upright(assets, asset, stand),
                 annotated=self.annotate,
             )
         return scene

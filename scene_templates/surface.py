@@ -6,16 +6,16 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Scene, Surface
-from generator.core.se3 import SE3
-from scene_templates.element import (
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3
+from gen_data.scene_templates.element import (
     PlacedElement,
+    add_static,
+    add_surface,
     extent_m,
-    parametric,
-    standing,
-    with_static,
-    with_surface,
+    parametric_id,
+    stand_upright,
 )
 
 CLEARANCE_M = 1.5
@@ -44,22 +44,22 @@ class SurfaceElement(PlacedElement):
         asset = self.asset
         if asset == "table":
             size_m = (*self.top_size_m, self.height_m)
-            asset = parametric("table", size_m=size_m, style=self.style)
+            asset = parametric_id("table", size_m=size_m, style=self.style)
         T_world_stand = self.pose(scene)
-        scene = with_static(
+        scene = add_static(
             scene,
             assets,
             name=self.name,
             asset=asset,
-            T_world_body=standing(assets, asset, T_world_stand),
+            T_world_body=stand_upright(assets, asset, T_world_stand),
             annotated=self.annotate,
         )
         length_m, width_m, height_m = extent_m(assets, asset)
-        top = Surface(
+        top = SupportSurface(
             name=self.name,
             body=self.name,
             T_world_surface=(T_world_stand @ SE3((0.0, 0.0, height_m))).rounded(),
             size_m=(length_m, width_m),
             clearance_m=CLEARANCE_M,
         )
-        return with_surface(scene, top)
+        return add_surface(scene, top)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from generator.core.instants import RIG_AXES
-from generator.core.interfaces import AssetIndex
-from generator.core.scene import Body, Instance, Light, Rig, Scene, StageModel, StagePiece
-from generator.core.se3 import SE3, rotate_by_quaternion
-from scene_templates.element import PlacedElement, next_instance_id
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Instance, Light, Rig, Scene, StageModel, StagePiece
+from gen_data.generator.core.scene_time import RIG_AXES
+from gen_data.generator.core.se3 import SE3, rotate_by_quaternion
+from gen_data.scene_templates.element import PlacedElement, next_instance_id
 
 
 class UsdStage(PlacedElement):

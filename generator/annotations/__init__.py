@@ -1,35 +1,35 @@
 """Truth about instances in images, about images and about samples: exact, without randomness.
 
 Each annotator is one file and one line in this table. ``truth`` runs them: what an annotator is
-about, its methods say (``generator.core.interfaces``).
+about, its methods say (``gen_data.generator.core.interfaces``).
 """
 
 from __future__ import annotations
 
-from generator.core.interfaces import (
+from gen_data.generator.core.interfaces import (
     Annotator,
     AnyAnnotator,
     FrameAnnotator,
     ImageAnnotator,
 )
-from generator.core.plugins import PluginTable
+from gen_data.generator.core.plugins import PluginTable
 
 TABLE = PluginTable[AnyAnnotator](
     "annotation",
     {
-        "amodal_masks": "generator.annotations.amodal_masks:AmodalMasks",
-        "bev_map": "generator.annotations.bev_map:BevMap",
-        "boxes2d": "generator.annotations.boxes2d:Boxes2d",
-        "boxes3d": "generator.annotations.boxes3d:Boxes3d",
-        "free_space": "generator.annotations.free_space:FreeSpace",
-        "instance_masks": "generator.annotations.instance_masks:InstanceMasks",
-        "keypoints": "generator.annotations.keypoints:Keypoints",
-        "lanes": "generator.annotations.lanes:Lanes",
-        "motion": "generator.annotations.motion:Motion",
-        "part_masks": "generator.annotations.part_masks:PartMasks",
-        "poses": "generator.annotations.poses:Poses",
-        "semantic_masks": "generator.annotations.semantic_masks:SemanticMasks",
-        "visibility": "generator.annotations.visibility:Visibility",
+        "amodal_masks": "gen_data.generator.annotations.amodal_masks:AmodalMasks",
+        "bev_map": "gen_data.generator.annotations.bev_map:BevMap",
+        "boxes2d": "gen_data.generator.annotations.boxes2d:Boxes2d",
+        "boxes3d": "gen_data.generator.annotations.boxes3d:Boxes3d",
+        "free_space": "gen_data.generator.annotations.free_space:FreeSpace",
+        "instance_masks": "gen_data.generator.annotations.instance_masks:InstanceMasks",
+        "keypoints": "gen_data.generator.annotations.keypoints:Keypoints",
+        "lanes": "gen_data.generator.annotations.lanes:Lanes",
+        "motion": "gen_data.generator.annotations.motion:Motion",
+        "part_masks": "gen_data.generator.annotations.part_masks:PartMasks",
+        "poses": "gen_data.generator.annotations.poses:Poses",
+        "semantic_masks": "gen_data.generator.annotations.semantic_masks:SemanticMasks",
+        "visibility": "gen_data.generator.annotations.visibility:Visibility",
     },
     (Annotator, ImageAnnotator, FrameAnnotator),
 )

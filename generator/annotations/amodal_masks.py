@@ -7,12 +7,16 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from generator.annotations.pixels import silhouette_box, silhouette_crop, silhouette_of
-from generator.config.strict import Strict
-from generator.core.boxes import tight_box
-from generator.core.capture import Channel, Reading, Silhouette
-from generator.core.sample import MaskPx, ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.annotations.instance_extents import (
+    find_silhouette,
+    silhouette_box,
+    silhouette_crop,
+)
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.boxes import tight_box
+from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
+from gen_data.generator.core.sample import MaskPx, ObjectTruth
+from gen_data.generator.core.scene import Scene
 
 
 class AmodalMasks(Strict):
@@ -21,16 +25,14 @@ class AmodalMasks(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
     type: Literal["amodal_masks"] = "amodal_masks"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``amodal_mask``, clipped to the image and tight; [0, 0] if nothing is inside."""
         camera = reading.camera.intrinsics
-        silhouette = silhouette_of(reading, truth.instance)
-        return replace(
-            truth, amodal_mask=clipped_mask(silhouette, camera.width_px, camera.height_px)
-        )
+        silhouette = find_silhouette(reading, truth.instance)
+        return replace(truth, amodal_mask=clip_mask(silhouette, camera.width_px, camera.height_px))
 
 
-def clipped_mask(silhouette: Silhouette, width_px: int, height_px: int) -> MaskPx:
+def clip_mask(silhouette: Silhouette, width_px: int, height_px: int) -> MaskPx:
     """The part of a silhouette inside an image, tight; shape [0, 0] when there is none."""
     outer = silhouette_box(silhouette)
     inner = outer.clipped(width_px, height_px) if outer else None

@@ -10,17 +10,17 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from generator.annotations.boxes3d import oriented_box
-from generator.annotations.grounds import carriageways, footprints, ribbon, strips
-from generator.annotations.raster import Grid, covered
-from generator.config.strict import Strict
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetLibrary
-from generator.core.lanes import lane_borders, leftwards
-from generator.core.sample import BirdseyeMap, FrameTruth
-from generator.core.scene import Instance, Scene
-from generator.core.se3 import SE3, Array
+from gen_data.generator.annotations.bev_raster import Grid, covered_cells
+from gen_data.generator.annotations.boxes3d import oriented_box
+from gen_data.generator.annotations.ground_geometry import carriageways, footprints, ribbon, strips
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.lane_geometry import lane_borders, left_normals
+from gen_data.generator.core.sample import BirdseyeMap, EgoTruth
+from gen_data.generator.core.scene import Instance, Scene
+from gen_data.generator.core.se3 import SE3, Array
 
 LINE_PX = 1.5
 """Width of borders: enough that none is broken by the centres it misses."""
@@ -47,8 +47,8 @@ class BevMap(Strict):
     reach_m: float = Field(40.0, ge=1, le=500)
 
     def annotate_frame(
-        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: FrameTruth
-    ) -> FrameTruth:
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
+    ) -> EgoTruth:
         """Fill in ``birdseye``.
 
         Raises:
@@ -59,9 +59,9 @@ class BevMap(Strict):
                 "annotation 'bev_map': the scene has no rig to look down on; add an element 'ego'"
             )
         scene = scenes[""]
-        T_world_map = levelled(truth.T_world_ego)
+        T_world_map = level_pose(truth.T_world_ego)
         grid = Grid(T_world_map, self.px_m, 2 * math.ceil(self.reach_m / self.px_m))
-        drivable = covered(grid, carriageways(scene, assets))
+        drivable = covered_cells(grid, carriageways(scene, assets))
         own = scene.body(scene.rig(truth.rig).body).instance_id
         standing = [b for b in scene.bodies if b.instance_id not in (0, own)]
         kinds = {i.instance_id: frozenset(assets.get(i.asset).tags) for i in scene.instances}
@@ -70,19 +70,19 @@ class BevMap(Strict):
         people = [i for i in shown if kinds[i.instance_id] & PEOPLE]
         layers = {
             "drivable": drivable,
-            "parking": covered(grid, _lanes(scene, "parking")),
-            "crosswalk": covered(grid, _lanes(scene, "crosswalk")),
-            "sidewalk": covered(grid, _lanes(scene, "sidewalk")),
-            "lane_divider": covered(grid, _borders(scene, "lane", LINE_PX * self.px_m)),
-            "road_divider": covered(grid, _borders(scene, "road", LINE_PX * self.px_m)),
-            "vehicles": covered(grid, _floors(vehicles)),
-            "people": covered(grid, _floors(people)),
-            "free_space": drivable & ~covered(grid, footprints(standing, assets)),
+            "parking": covered_cells(grid, _lanes(scene, "parking")),
+            "crosswalk": covered_cells(grid, _lanes(scene, "crosswalk")),
+            "sidewalk": covered_cells(grid, _lanes(scene, "sidewalk")),
+            "lane_divider": covered_cells(grid, _borders(scene, "lane", LINE_PX * self.px_m)),
+            "road_divider": covered_cells(grid, _borders(scene, "road", LINE_PX * self.px_m)),
+            "vehicles": covered_cells(grid, _floors(vehicles)),
+            "people": covered_cells(grid, _floors(people)),
+            "free_space": drivable & ~covered_cells(grid, footprints(standing, assets)),
         }
         return replace(truth, birdseye=BirdseyeMap(T_world_map, self.px_m, layers))
 
 
-def levelled(pose: SE3) -> SE3:
+def level_pose(pose: SE3) -> SE3:
     """The pose turned upright: its X axis points where it did, but level.
 
     Only square roots decide it, so that it has the same bits on every processor.
@@ -106,7 +106,7 @@ def _borders(scene: Scene, kind: str, width_m: float) -> Array:
     for border in lane_borders(scene.lanes):
         if border.kind == kind:
             line = np.asarray(border.points_m)
-            aside = 0.5 * width_m * leftwards(line)
+            aside = 0.5 * width_m * left_normals(line)
             parts.append(ribbon(line + aside, line - aside))
     return np.concatenate(parts)
 

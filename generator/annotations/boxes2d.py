@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-from generator.annotations.pixels import silhouette_box, silhouette_of
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.sample import ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.annotations.instance_extents import find_silhouette, silhouette_box
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.sample import ObjectTruth
+from gen_data.generator.core.scene import Scene
 
 
 class Boxes2d(Strict):
@@ -22,6 +22,6 @@ class Boxes2d(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
     type: Literal["boxes2d"] = "boxes2d"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``amodal_box``; ``box`` is part of every truth."""
-        return replace(truth, amodal_box=silhouette_box(silhouette_of(reading, truth.instance)))
+        return replace(truth, amodal_box=silhouette_box(find_silhouette(reading, truth.instance)))

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-from generator.config.strict import Strict
-from generator.core.boxes import OrientedBox
-from generator.core.capture import Channel, Reading
-from generator.core.interfaces import AssetLibrary
-from generator.core.sample import FrameTruth, ObjectTruth
-from generator.core.scene import Instance, Scene
-from generator.core.se3 import SE3
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.boxes import OrientedBox
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.sample import EgoTruth, ObjectTruth
+from gen_data.generator.core.scene import Instance, Scene
+from gen_data.generator.core.se3 import SE3
 
 
 class Boxes3d(Strict):
@@ -21,7 +21,7 @@ class Boxes3d(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["boxes3d"] = "boxes3d"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``box3d_world`` and ``box3d_camera``."""
         box_world = oriented_box(truth.instance)
         T_camera_world = reading.camera.T_world_camera.inverse()
@@ -30,17 +30,17 @@ class Boxes3d(Strict):
         )
 
     def annotate_frame(
-        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: FrameTruth
-    ) -> FrameTruth:
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
+    ) -> EgoTruth:
         """Fill in ``boxes3d``: in the ego's frame, and in every laser scanner's at its instant."""
         del assets
-        frames = {"ego": boxes_in(scenes[""], truth.T_world_ego)} if truth.rig else {}
+        frames = {"ego": annotate_boxes(scenes[""], truth.T_world_ego)} if truth.rig else {}
         for name in sorted(scenes.keys() - {""}):
-            frames[name] = boxes_in(scenes[name], scenes[name].lidar(name).T_world_lidar)
+            frames[name] = annotate_boxes(scenes[name], scenes[name].lidar(name).T_world_lidar)
         return replace(truth, boxes3d=frames)
 
 
-def boxes_in(scene: Scene, T_world_frame: SE3) -> dict[int, OrientedBox]:
+def annotate_boxes(scene: Scene, T_world_frame: SE3) -> dict[int, OrientedBox]:
     """The boxes of all annotated instances in a frame, by instance id."""
     T_frame_world = T_world_frame.inverse()
     things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)

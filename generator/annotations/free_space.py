@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from generator.annotations.grounds import carriageway
-from generator.annotations.raster import Float32, Grid, heights_m
-from generator.config.strict import Strict
-from generator.core.boxes import tight_box
-from generator.core.capture import Channel, Reading
-from generator.core.interfaces import AssetLibrary
-from generator.core.rows import world_points
-from generator.core.sample import ImageTruth, MaskPx
-from generator.core.scene import Body, Scene
-from generator.core.se3 import SE3
+from gen_data.generator.annotations.bev_raster import Float32, Grid, heights_m
+from gen_data.generator.annotations.ground_geometry import carriageway
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.boxes import tight_box
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.rolling_shutter_projection import world_points
+from gen_data.generator.core.sample import ImageTruth, MaskPx
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import SE3
 
 TILE_M = 16.0
 """Grids are centred on multiples of this, so that the cameras of a rig share one."""
@@ -41,7 +41,7 @@ class FreeSpace(Strict):
     far_m: float = Field(60.0, gt=0, le=200)
 
     def annotate_image(
-        self, scene: Scene, assets: AssetLibrary, reading: Reading, truth: ImageTruth
+        self, scene: Scene, assets: AssetLibrary, reading: SensorReading, truth: ImageTruth
     ) -> ImageTruth:
         """Fill in ``free_space``; an empty mask where there is none."""
         ranges_m = reading.channels[Channel.RANGE]

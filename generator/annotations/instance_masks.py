@@ -7,11 +7,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from generator.annotations.pixels import visible_mask
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.sample import MaskPx, ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.annotations.instance_extents import visible_mask
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.sample import MaskPx, ObjectTruth
+from gen_data.generator.core.scene import Scene
 
 
 class InstanceMasks(Strict):
@@ -20,7 +20,7 @@ class InstanceMasks(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["instance_masks"] = "instance_masks"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``mask``; its pixels fill the box exactly. Shape [0, 0] for the invisible."""
         if truth.box is None:
             return replace(truth, mask=MaskPx(0, 0, np.zeros((0, 0), dtype=bool)))

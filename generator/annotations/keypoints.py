@@ -9,13 +9,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.geometry import Keypoint
-from generator.core.rows import seen_points
-from generator.core.sample import KeypointTruth, ObjectTruth
-from generator.core.scene import Scene
-from generator.core.se3 import Array, Vec3
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import Keypoint
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.rolling_shutter_projection import project_rolling_shutter
+from gen_data.generator.core.sample import KeypointTruth, ObjectTruth
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import Array, Vec3
 
 LEAST_COSINE = 1.0 / 3.0
 """Of the angle under which a surface is seen: below it, depth counts as if it were this."""
@@ -38,7 +38,7 @@ class Keypoints(Strict):
     )
     type: Literal["keypoints"] = "keypoints"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``keypoints``, in the instance's order; empty for one that has none."""
         instance = truth.instance
         if not instance.keypoints:
@@ -49,7 +49,7 @@ class Keypoints(Strict):
         p_camera = np.stack([T_camera_instance.apply(place_m) for place_m in places_m])
         p_seen, image_px = p_camera, reading.camera.intrinsics.project(p_camera)
         if reading.camera.shutter.rolls:
-            p_seen, image_px = seen_points(scene, reading.camera, places_m, instance)
+            p_seen, image_px = project_rolling_shutter(scene, reading.camera, places_m, instance)
         found = tuple(
             _locate(reading, instance.instance_id, point, position_m, seen)
             for point, position_m, *seen in zip(
@@ -60,7 +60,11 @@ class Keypoints(Strict):
 
 
 def _locate(
-    reading: Reading, instance_id: int, point: Keypoint, p_camera: Array, seen: Sequence[Array]
+    reading: SensorReading,
+    instance_id: int,
+    point: Keypoint,
+    p_camera: Array,
+    seen: Sequence[Array],
 ) -> KeypointTruth:
     """One keypoint.
 
@@ -83,7 +87,11 @@ def _locate(
 
 
 def is_visible(
-    reading: Reading, instance_id: int, p_camera: Array, pixel: tuple[int, int], radius_m: float
+    reading: SensorReading,
+    instance_id: int,
+    p_camera: Array,
+    pixel: tuple[int, int],
+    radius_m: float,
 ) -> bool:
     """Whether a point of an instance is seen at its pixel.
 

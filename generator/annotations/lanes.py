@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.interfaces import AssetLibrary
-from generator.core.lanes import LaneBorder, lane_borders
-from generator.core.rows import seen_points
-from generator.core.sample import BorderTruth, FrameTruth, ImageTruth
-from generator.core.scene import Scene
-from generator.core.se3 import Array
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.lane_geometry import LaneBorder, lane_borders
+from gen_data.generator.core.rolling_shutter_projection import project_rolling_shutter
+from gen_data.generator.core.sample import BorderTruth, EgoTruth, ImageTruth
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import Array
 
 FINE_M = 0.1
 """Borders are followed in steps of this length before they are thinned."""
@@ -41,7 +41,7 @@ class Lanes(Strict):
     step_px: float = Field(8.0, ge=1)
 
     def annotate_image(
-        self, scene: Scene, assets: AssetLibrary, reading: Reading, truth: ImageTruth
+        self, scene: Scene, assets: AssetLibrary, reading: SensorReading, truth: ImageTruth
     ) -> ImageTruth:
         """Fill in ``borders``, in the order of the scene's lanes."""
         del assets
@@ -53,31 +53,31 @@ class Lanes(Strict):
         return replace(truth, borders=found)
 
     def annotate_frame(
-        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: FrameTruth
-    ) -> FrameTruth:
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
+    ) -> EgoTruth:
         """Fill in ``borders``."""
         del assets
         return replace(truth, borders=lane_borders(scenes[""].lanes))
 
     def _project_border(
-        self, border: LaneBorder, scene: Scene, reading: Reading
+        self, border: LaneBorder, scene: Scene, reading: SensorReading
     ) -> Iterator[BorderTruth]:
         """The stretches of a border that lie in the image."""
         camera = reading.camera
         lens = camera.intrinsics
-        p_world = resampled(np.asarray(border.points_m), FINE_M)
+        p_world = resample_line(np.asarray(border.points_m), FINE_M)
         p_camera = camera.T_world_camera.inverse().apply(p_world)
         near = (p_camera * p_camera).sum(axis=1) < self.far_m**2
         uv = lens.project(p_camera)
         if camera.shutter.rolls:
-            p_camera, uv = seen_points(scene, camera, p_world)
+            p_camera, uv = project_rolling_shutter(scene, camera, p_world)
         # What the lens does not show is NaN, and less than nothing.
         inside = near & (uv >= 0.0).all(axis=1)
         inside &= (uv[:, 0] < lens.width_px) & (uv[:, 1] < lens.height_px)
         for start, end in runs(inside):
             if end - start < 2:
                 continue
-            rows = start + thinned(uv[start:end], self.step_px)
+            rows = start + thin_line(uv[start:end], self.step_px)
             visible = is_seen(reading, p_camera[rows], uv[rows])
             yield BorderTruth(
                 border.name,
@@ -87,7 +87,7 @@ class Lanes(Strict):
             )
 
 
-def resampled(line_m: Array, step_m: float) -> Array:
+def resample_line(line_m: Array, step_m: float) -> Array:
     """Points [n, 3] along a line, at most a step apart, its own points included at the ends."""
     lengths = np.sqrt((np.diff(line_m, axis=0) ** 2).sum(axis=1))
     at_m = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -101,7 +101,7 @@ def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def thinned(uv: Array, step_px: float) -> NDArray[np.intp]:
+def thin_line(uv: Array, step_px: float) -> NDArray[np.intp]:
     """Rows of points about a step apart along a line of image points, both ends included."""
     way = np.sqrt((np.diff(uv, axis=0) ** 2).sum(axis=1))
     bins = (np.concatenate([[0.0], np.cumsum(way)]) / step_px).astype(np.int64)
@@ -109,7 +109,7 @@ def thinned(uv: Array, step_px: float) -> NDArray[np.intp]:
     return np.unique(np.append(first, len(uv) - 1))
 
 
-def is_seen(reading: Reading, p_camera: Array, uv: Array) -> NDArray[np.bool_]:
+def is_seen(reading: SensorReading, p_camera: Array, uv: Array) -> NDArray[np.bool_]:
     """Whether points on the ground are seen: nothing that stands on it lies before them.
 
     Args:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.instants import ego_rig
-from generator.core.sample import MotionTruth, ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.sample import MotionTruth, ObjectTruth
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene_time import ego_rig
 
 
 class Motion(Strict):
@@ -22,7 +22,7 @@ class Motion(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["motion"] = "motion"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``motion``."""
         twist = truth.instance.twist
         rig = ego_rig(scene)

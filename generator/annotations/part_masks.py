@@ -7,12 +7,12 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from generator.annotations.pixels import crop, visible_mask
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.errors import SampleError
-from generator.core.sample import ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.annotations.instance_extents import crop, visible_mask
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import SampleError
+from gen_data.generator.core.sample import ObjectTruth
+from gen_data.generator.core.scene import Scene
 
 
 class PartMasks(Strict):
@@ -24,7 +24,7 @@ class PartMasks(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.PART})
     type: Literal["part_masks"] = "part_masks"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``part_px`` for an instance with parts, every part named; else None.
 
         Raises:

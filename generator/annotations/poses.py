@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.sample import ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.sample import ObjectTruth
+from gen_data.generator.core.scene import Scene
 
 
 class Poses(Strict):
@@ -17,7 +17,7 @@ class Poses(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["poses"] = "poses"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``T_camera_object``."""
         T_camera_world = reading.camera.T_world_camera.inverse()
         return replace(truth, T_camera_object=T_camera_world @ truth.instance.T_world_instance)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from generator.annotations.pixels import crop, visible_mask
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.errors import SampleError
-from generator.core.sample import ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.annotations.instance_extents import crop, visible_mask
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import SampleError
+from gen_data.generator.core.sample import ObjectTruth
+from gen_data.generator.core.scene import Scene
 
 
 class SemanticMasks(Strict):
@@ -18,7 +18,7 @@ class SemanticMasks(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.CATEGORY})
     type: Literal["semantic_masks"] = "semantic_masks"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """The truth as it is, once the category image is known to agree with it.
 
         Raises:

@@ -7,11 +7,15 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from generator.annotations.pixels import silhouette_box, silhouette_crop, silhouette_of
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.sample import ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.annotations.instance_extents import (
+    find_silhouette,
+    silhouette_box,
+    silhouette_crop,
+)
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.sample import ObjectTruth
+from gen_data.generator.core.scene import Scene
 
 
 class Visibility(Strict):
@@ -25,9 +29,9 @@ class Visibility(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
     type: Literal["visibility"] = "visibility"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``visible_fraction``, ``occlusion`` and ``truncation``."""
-        silhouette = silhouette_of(reading, truth.instance)
+        silhouette = find_silhouette(reading, truth.instance)
         outer = silhouette_box(silhouette)
         if outer is None:
             return replace(truth, visible_fraction=0.0, occlusion=0.0, truncation=1.0)

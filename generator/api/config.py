@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
-from generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from generator.assemble.spec import Config
+    from gen_data.generator.assemble.config import Config
 
 ConfigLike = str | PathLike[str] | Mapping[str, Any]
 """A file, a shipped name, the folder of a data set, or a dictionary of the same content."""
@@ -27,12 +27,12 @@ def load_config(
     Raises:
         ConfigError: the message names everything that is wrong, with its place.
     """
-    from generator.assemble.spec import config_of_source, config_of_text
+    from gen_data.generator.assemble.config import load_source_config, parse_config
 
     choice: dict[str, Any] = {"seed": seed, "overrides": overrides, "without": without}
     if isinstance(config, Mapping):
-        return config_of_text(_yaml_text(config), "<config>", **choice)
-    return config_of_source(fspath(config), **choice)
+        return parse_config(_yaml_text(config), "<config>", **choice)
+    return load_source_config(fspath(config), **choice)
 
 
 def _yaml_text(config: Mapping[str, Any]) -> str:

@@ -10,15 +10,15 @@ from os import PathLike
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
-from generator.api.config import ConfigLike, load_config
-from generator.api.sample import Sample
-from generator.api.stored import StoredSamples
-from generator.core.errors import ConfigError, SampleIndexError, did_you_mean
-from generator.core.sample import Sample as CoreSample
+from gen_data.generator.api.config import ConfigLike, load_config
+from gen_data.generator.api.sample import Sample
+from gen_data.generator.api.stored import StoredSamples
+from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_you_mean
+from gen_data.generator.core.sample import Sample as CoreSample
 
 if TYPE_CHECKING:
-    from generator.core.capture import Channel
-    from generator.pipeline import Pipeline
+    from gen_data.generator.core.capture import Channel
+    from gen_data.generator.pipeline import Pipeline
 
 Self = TypeVar("Self", bound="SampleSequence")
 
@@ -181,7 +181,7 @@ class GeneratedSamples:
     """Samples made by a pipeline in this process, which starts when the first one is read."""
 
     def __init__(self, spec: Any, channels: frozenset[Channel]) -> None:
-        from generator.assemble.recipe import PipelineFactory
+        from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 
         self._make_pipeline = PipelineFactory(spec, n=1, extra_channels=channels)
         self._pipeline: Pipeline | None = None
@@ -245,7 +245,7 @@ def open_dataset(folder: str | PathLike[str]) -> StoredDataset:
 
 
 def _channels(names: Sequence[str]) -> frozenset[Channel]:
-    from generator.core.capture import Channel
+    from gen_data.generator.core.capture import Channel
 
     known = {channel.value: channel for channel in Channel if channel is not Channel.AMODAL}
     for name in names:

@@ -9,11 +9,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from generator.api.config import ConfigLike, load_config
-from generator.core.errors import ConfigError
+from gen_data.generator.api.config import ConfigLike, load_config
+from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from generator.runner.progress import RunProgress, Summary
+    from gen_data.generator.runner.progress import RunProgress, Summary
 
 
 def generate(  # noqa: PLR0913  (keywords of one front door)
@@ -46,12 +46,12 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
 
     Raises:
         ConfigError: the configuration or an argument is wrong.
-        GenDataError: of the kind that fits; see ``generator.core.errors``.
+        GenDataError: of the kind that fits; see ``gen_data.generator.core.errors``.
         Interrupted: Ctrl-C or SIGTERM; finished shards stay.
     """
-    from generator.assemble.recipe import PipelineFactory
-    from generator.runner.identity import licences_text, plan_of
-    from generator.runner.run import run
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+    from gen_data.generator.runner.identity import format_licences, make_plan
+    from gen_data.generator.runner.run import run
 
     if n < 1:
         raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
@@ -63,12 +63,12 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     factory = PipelineFactory(spec, n)
     folder = Path(out) if out is not None else Path("out") / spec.name
     return run(
-        plan_of(factory),
+        make_plan(factory),
         factory,
         folder,
         workers=len(os.sched_getaffinity(0)) if workers is None else workers,
         resume_command=resume_command,
-        licences=partial(licences_text, factory),
+        licences=partial(format_licences, factory),
         progress=on_progress or _ignore,
     )
 

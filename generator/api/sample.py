@@ -10,13 +10,13 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.boxes import BoxPx, OrientedBox
-from generator.core.capture import Channel, PointCloud, Reading
-from generator.core.errors import UnknownNameError, did_you_mean
-from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth
-from generator.core.sample import Sample as CoreSample
-from generator.core.scene import Scene
-from generator.core.se3 import Array
+from gen_data.generator.core.boxes import BoxPx, OrientedBox
+from gen_data.generator.core.capture import Channel, PointCloud, SensorReading
+from gen_data.generator.core.errors import UnknownNameError, did_you_mean
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.generator.core.sample import Sample as CoreSample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import Array
 
 T = TypeVar("T")
 
@@ -111,7 +111,7 @@ class CameraReading:
     Arrays are [height, width, ...]; their values for "nothing" are those of CONVENTIONS.md.
     """
 
-    def __init__(self, reading: Reading, truth: ImageTruth) -> None:
+    def __init__(self, reading: SensorReading, truth: ImageTruth) -> None:
         self._reading = reading
         self._truth = truth
 
@@ -282,7 +282,7 @@ class Sample:
         return self._by_camera(lambda camera: camera.objects)
 
     @property
-    def ego(self) -> FrameTruth | None:
+    def ego(self) -> EgoTruth | None:
         """The ego vehicle's pose, motion and surroundings; None where none was annotated."""
         return self.core.frame
 

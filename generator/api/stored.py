@@ -12,14 +12,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.capture import Capture, Channel, PointCloud, Reading, Table
-from generator.core.errors import StorageError
-from generator.core.interfaces import cloud_path, media_path, table_path
-from generator.core.sample import Sample
-from generator.runner.labels import LABELS_NAME, Labels, read_labels
-from generator.runner.plan import load_plan
-from generator.runner.provenance import SCENES_NAME, KeptScene, kept_scenes
-from generator.runner.store import MANIFEST_NAME, SHARDS_NAME
+from gen_data.generator.core.capture import (
+    Capture,
+    Channel,
+    Measurements,
+    PointCloud,
+    SensorReading,
+)
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.interfaces import cloud_path, media_path, table_path
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.runner.labels import LABELS_NAME, Labels, read_labels
+from gen_data.generator.runner.plan import load_plan
+from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, read_scenes
+from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME
 
 SHARDS_KEPT = 4
 """Shards whose scenes and labels stay in memory; images are read when they are asked for."""
@@ -84,7 +90,7 @@ class StoredSamples:
     def _capture(self, folder: Path, labels: Labels) -> Capture:
         index = labels.index
         readings = {
-            name: Reading(
+            name: SensorReading(
                 name,
                 labels.truth[name].camera,
                 ImageFiles(folder, name, index, self._channels(name), self._info["depth_scale_m"]),
@@ -98,7 +104,9 @@ class StoredSamples:
             for name, scan in labels.scans.items()
         }
         tables = {
-            name: Table(name, table.device, _load(table_path(folder, name, index)), table.time_s)
+            name: Measurements(
+                name, table.device, _load(table_path(folder, name, index)), table.time_s
+            )
             for name, table in labels.tables.items()
         }
         return Capture(readings, clouds, tables)
@@ -109,7 +117,7 @@ class StoredSamples:
     def _read_shard(self, shard: int) -> list[tuple[KeptScene, Labels]]:
         folder = self._shard_dir(shard)
         try:
-            scenes = list(kept_scenes(folder / SCENES_NAME))
+            scenes = list(read_scenes(folder / SCENES_NAME))
             by_index = {kept.index: kept.scene for kept in scenes}
             return list(zip(scenes, read_labels(folder / LABELS_NAME, by_index), strict=True))
         except (OSError, ValueError, KeyError, TypeError) as error:
@@ -158,7 +166,7 @@ class ImageFiles(Mapping[Channel, NDArray[Any]]):
 
     def __getitem__(self, channel: Channel) -> NDArray[Any]:
         """Decode one image."""
-        from exporters.images import read_image
+        from gen_data.exporters.image_files import read_image
 
         return read_image(self._paths[channel], channel, self._depth_scale_m)
 

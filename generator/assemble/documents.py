@@ -7,21 +7,20 @@ from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 
-import configs
-import scene_templates
-from generator.assemble.inheritance import (
+from gen_data import configs, scene_templates
+from gen_data.generator.assemble.inheritance import (
     LISTS,
     extended_document,
     mapping_of,
     overridden_elements,
 )
-from generator.config.document import Node, load, with_override
-from generator.config.merging import merge
-from generator.config.paths import find_path
-from generator.config.problems import Position, Problems
-from generator.config.renames import with_current_words
-from generator.core.errors import ConfigError, did_you_mean
-from generator.sensors.sheets import with_files
+from gen_data.generator.config.merging import merge_nodes
+from gen_data.generator.config.paths import find_path
+from gen_data.generator.config.problems import Position, Problems
+from gen_data.generator.config.renamed_keys import replace_old_words
+from gen_data.generator.config.yaml_tree import Node, load_yaml, with_override
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.sensors.lidar.datasheets import load_sheets
 
 SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
@@ -30,7 +29,7 @@ TEMPLATE_KEYS = ("shared", "defaults", "elements")
 """What a template may say."""
 
 
-def resolved_document(
+def resolve_document(
     document: Node, *, seed: int | None, overrides: Sequence[str], without: Sequence[str]
 ) -> Node:
     """A configuration with its template's elements in it and the command line laid over it.
@@ -40,7 +39,7 @@ def resolved_document(
     Raises:
         ConfigError: naming the place of what is wrong.
     """
-    document = with_current_words(document)
+    document = replace_old_words(document)
     content = dict(mapping_of(document))
     template = _template(document)
     content["elements"] = _elements(document, template)
@@ -57,7 +56,7 @@ def resolved_document(
         if not separator:
             raise ConfigError(f"--set {text}: expected KEY=VALUE")
         resolved = with_override(resolved, path.strip(), value.strip())
-    resolved = with_current_words(resolved)
+    resolved = replace_old_words(resolved)
     return _without_randomizers(_with_sensor_files(resolved), without)
 
 
@@ -65,12 +64,12 @@ def _with_sensor_files(document: Node) -> Node:
     """The document with what sensors keep in files in their places."""
     content, sensors = dict(mapping_of(document)), document.get("sensors")
     if sensors is not None and isinstance(sensors.content, tuple):
-        listed = tuple(with_files(sensor) for sensor in sensors.content)
+        listed = tuple(load_sheets(sensor) for sensor in sensors.content)
         content["sensors"] = Node(sensors.position, listed, sensors.key_positions)
     return Node(document.position, content, document.key_positions)
 
 
-def config_document(name: str) -> Node:
+def load_config_document(name: str) -> Node:
     """The document of a configuration, by path or shipped name, with all that it extends.
 
     Raises:
@@ -99,7 +98,7 @@ def _template(document: Node) -> Node | None:
         raise AssertionError("unreachable")
     shipped = _files_of(scene_templates)
     path = find_path(template.content, template.position, "template", "template", shipped=shipped)
-    loaded = with_current_words(load(path))
+    loaded = replace_old_words(load_yaml(path))
     problems = Problems()
     for key in mapping_of(loaded):
         if key not in TEMPLATE_KEYS:
@@ -151,7 +150,9 @@ def _with_defaults(elements: Node, defaults: Node | None) -> Node:
             problems.add(defaults.key_position(kind), f"defaults.{kind}", fact)
     problems.raise_if_any()
     merged = tuple(
-        merge(by_type[kind], item) if (kind := str(_scalar(item, "type"))) in by_type else item
+        merge_nodes(by_type[kind], item)
+        if (kind := str(_scalar(item, "type"))) in by_type
+        else item
         for item in elements.content
     )
     return Node(elements.position, merged)

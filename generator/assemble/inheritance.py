@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from generator.config.document import Node, load
-from generator.config.merging import merge, merge_named, name_of, with_entry
-from generator.config.paths import find_path
-from generator.config.problems import Position, Problem, Problems
-from generator.config.renames import with_current_words
-from generator.config.scalars import shown
-from generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.config.merging import merge_named, merge_nodes, node_name, with_entry
+from gen_data.generator.config.paths import find_path
+from gen_data.generator.config.problems import Position, Problem, Problems
+from gen_data.generator.config.renamed_keys import replace_old_words
+from gen_data.generator.config.yaml_scalars import quote_value
+from gen_data.generator.config.yaml_tree import Node, load_yaml
+from gen_data.generator.core.errors import ConfigError, did_you_mean
 
 LISTS = ("randomizers", "sensors", "annotations", "exporters")
 """Lists of plug-ins of a configuration, besides its elements."""
@@ -39,7 +39,7 @@ def extended_document(
     Raises:
         ConfigError: a file is missing or invalid, or extends itself.
     """
-    document = with_current_words(load(path))
+    document = replace_old_words(load_yaml(path))
     base = document.get("extends")
     if base is None:
         return document
@@ -68,7 +68,7 @@ def _inheriting(base: Node, document: Node) -> Node:
         elif key in (*LISTS, "elements"):
             content[key] = _merged_items(inherited, node)
         else:
-            content[key] = merge(inherited, node)
+            content[key] = merge_nodes(inherited, node)
     positions = {**base.key_positions, **document.key_positions}
     return Node(document.position, content, positions)
 
@@ -79,7 +79,7 @@ def _merged_items(base: Node, override: Node) -> Node:
         return overridden_elements(base, override)
     if isinstance(base.content, tuple):
         return merge_named(base, override)
-    return merge(base, override)
+    return merge_nodes(base, override)
 
 
 def _without(base: Node, dropped: Node | None) -> Node:
@@ -109,10 +109,10 @@ def _dropped(section: Node | None, names: tuple[Node, ...], field: str, problems
     if isinstance(inherited, Mapping):
         kept = dict(inherited)
     elif isinstance(inherited, tuple):
-        kept = {name_of(item): item for item in inherited}
+        kept = {node_name(item): item for item in inherited}
     for name in names:
         if str(name.content) not in kept:
-            fact = f"nothing inherited is named {shown(name.content)}; expected one of "
+            fact = f"nothing inherited is named {quote_value(name.content)}; expected one of "
             fact += ", ".join(kept) + did_you_mean(str(name.content), kept)
             problems.add(name.position, field, fact)
         kept.pop(str(name.content), None)
@@ -127,7 +127,7 @@ def overridden_elements(elements: Node, overrides: Node) -> Node:
         ConfigError: an override names no element.
     """
     assert isinstance(elements.content, tuple)
-    by_name = {name_of(node): node for node in elements.content}
+    by_name = {node_name(node): node for node in elements.content}
     problems = Problems()
     if not isinstance(overrides.content, Mapping):
         problems.add(overrides.position, "elements", "expected overrides by element name")
@@ -143,7 +143,7 @@ def overridden_elements(elements: Node, overrides: Node) -> Node:
                 fact += ", ".join(by_name) + did_you_mean(name, by_name)
                 problems.add(overrides.key_position(name), f"elements.{name}", fact)
             else:
-                by_name[name] = merge(by_name[name], node)
+                by_name[name] = merge_nodes(by_name[name], node)
     problems.raise_if_any()
     return Node(elements.position, tuple(by_name.values()))
 

@@ -8,11 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.assets.catalogue import METRES_PER_UNIT, Listed, MeshEntry, user_folder
-from generator.assets.library import Library
-from generator.core.errors import AssetError
-from generator.core.kinematics import link_poses
-from generator.core.se3 import SE3, Vec3
+from gen_data.generator.assets.folder_index import (
+    METRES_PER_UNIT,
+    IndexedAsset,
+    MeshEntry,
+    user_folder,
+)
+from gen_data.generator.assets.library import Library
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.kinematics import link_poses
+from gen_data.generator.core.se3 import SE3, Vec3
 
 _SMALLEST_M, _LARGEST_M = 0.001, 20.0
 """Longest edges beyond which the unit is doubtful."""
@@ -61,7 +66,7 @@ def check_folder(root: Path, library: Library) -> Iterator[Finding]:
             yield Finding(one.asset_id, one.kind, one.category(), error=str(error))
 
 
-def _inspect(one: Listed, library: Library) -> Finding:
+def _inspect(one: IndexedAsset, library: Library) -> Finding:
     """What an asset is. Raises AssetError if it cannot be used."""
     origin = () if one.origin.licence not in ("", "unknown") else ("no licence is given",)
     if one.kind == "texture":
@@ -78,13 +83,13 @@ def _inspect(one: Listed, library: Library) -> Finding:
     )  # fmt: skip
 
 
-def _object(one: Listed, library: Library) -> tuple[int, Vec3, Vec3]:
+def _object(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
     """Number of triangles and bounding box of an object that can be seen and collide."""
     library.convex_parts(one.asset_id)
     return (len(library.mesh(one.asset_id).faces), *library.bounds_m(one.asset_id))
 
 
-def _robot(one: Listed, library: Library) -> tuple[int, Vec3, Vec3]:
+def _robot(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
     """Number of triangles and bounding box of a robot at home."""
     robot = library.robot(one.asset_id)
     poses = link_poses(robot, SE3(), robot.home)
@@ -102,7 +107,7 @@ def _robot(one: Listed, library: Library) -> tuple[int, Vec3, Vec3]:
     return triangles, (x, y, z), (far_x, far_y, far_z)
 
 
-def _unit(one: Listed) -> str:
+def _unit(one: IndexedAsset) -> str:
     """How an entry says that numbers become metres."""
     entry = one.entry
     if not isinstance(entry, MeshEntry):
@@ -114,7 +119,7 @@ def _unit(one: Listed) -> str:
     return entry.unit or "m (assumed)"
 
 
-def _up(one: Listed) -> str:
+def _up(one: IndexedAsset) -> str:
     """Axis that an entry, or a convention of the format, says to be up."""
     entry = one.entry
     if not isinstance(entry, MeshEntry):
@@ -124,7 +129,7 @@ def _up(one: Listed) -> str:
     return entry.up or f"{entry.up_axis()} (assumed)"
 
 
-def _doubts(one: Listed, longest_m: float) -> Iterator[str]:
+def _doubts(one: IndexedAsset, longest_m: float) -> Iterator[str]:
     """Signs of a wrong unit."""
     if not isinstance(one.entry, MeshEntry) or one.entry.file.lower().endswith(".xodr"):
         return

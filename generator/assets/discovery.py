@@ -6,7 +6,7 @@ import os
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
-from generator.core.errors import AssetError
+from gen_data.generator.core.errors import AssetError
 
 MAX_ENTRIES = 100_000
 """Files and folders that are looked at; more are not a folder of assets but a whole disk."""

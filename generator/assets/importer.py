@@ -14,22 +14,28 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from generator.assets.catalogue import Finish, MeshEntry, Region, RobotEntry
-from generator.assets.convex import convex_parts, one_hull
-from generator.assets.coverage import with_reached_holes
-from generator.assets.decimate import decimated
-from generator.assets.folder import Folder
-from generator.assets.images import decode
-from generator.assets.mesh import NormalForm, check_coordinates, normal_form
-from generator.assets.primitives import box, cylinder, sphere
-from generator.assets.readers import read_mesh
-from generator.assets.readers.source import Source, linear_of_srgb
-from generator.assets.readers.usd import opened
-from generator.assets.soup import Float64, Int64, Slot, Soup, joined
-from generator.assets.urdf import Shape, Urdf, read_urdf
-from generator.core.errors import AssetError
-from generator.core.geometry import ConvexParts, Keypoint, Material, MeshData, UInt8
-from generator.core.se3 import SE3, Vec3
+from gen_data.generator.assets.alpha_trim import trim_unreached_holes
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.convex_decomposition import convex_parts, single_hull
+from gen_data.generator.assets.folder_index import Finish, MeshEntry, Region, RobotEntry
+from gen_data.generator.assets.image_decoding import decode_image
+from gen_data.generator.assets.mesh_decimation import decimate
+from gen_data.generator.assets.normal_form import NormalForm, check_coordinates, normal_form
+from gen_data.generator.assets.primitive_solids import box, cylinder, sphere
+from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
+from gen_data.generator.assets.readers.usd import open_stage
+from gen_data.generator.assets.triangle_soup import (
+    Float64,
+    Int64,
+    MaterialSlot,
+    TriangleSoup,
+    join_soups,
+)
+from gen_data.generator.assets.urdf import Shape, Urdf, read_urdf
+from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.se3 import SE3, Vec3
 
 VERSION = 5
 """Raised whenever the same files would come out as other geometry."""
@@ -45,7 +51,7 @@ _WHITEST = 0.85
 
 
 @dataclass(frozen=True, eq=False)
-class Imported:
+class ImportedMesh:
     """An asset in the normal form.
 
     Attributes:
@@ -53,7 +59,8 @@ class Imported:
         collision: None for a robot link that is only seen.
         images: ``{name: uint8 [h, w, 3]}`` of the images inside the file, with a fourth channel
             where they are transparent; a material's texture ``<asset id>#<name>`` refers to one of
-            these or to a file of the folder, or to several (``generator.assets.maps``).
+            these or to a file of the folder, or to several
+            (``gen_data.generator.assets.texture_maps``).
         keypoints: Named points in the asset's frame.
     """
 
@@ -71,7 +78,7 @@ class Imported:
         return held if self.mesh is None else held + self.mesh.nbytes
 
 
-def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = "") -> Imported:
+def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = "") -> ImportedMesh:
     """An object from its mesh or URDF file. Raises AssetError if it is unfit.
 
     Args:
@@ -83,81 +90,83 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     place = str(folder.root / entry.file)
     if piece:
         source = _piece(folder, entry, piece)
-        looks, collides, images = [source.soup], list[Soup](), source.images
+        looks, collides, images = [source.soup], list[TriangleSoup](), source.images
         asset_id = f"{asset_id}/{piece}" if images else asset_id
         entry = entry.model_copy(update={"origin": "center"})
     else:
         looks, collides, images = _read_geometry(folder, entry)
-    decoded = {name: decode(data, f"{place}#{name}", alpha=True) for name, data in images.items()}
-    whole = with_reached_holes(
-        joined(looks),
+    decoded = {
+        name: decode_image(data, f"{place}#{name}", alpha=True) for name, data in images.items()
+    }
+    whole = trim_unreached_holes(
+        join_soups(looks),
         lambda name: (
             decoded[name]
             if name in decoded
-            else decode(folder.read(name), str(folder.root / name), alpha=True)
+            else decode_image(folder.read(name), str(folder.root / name), alpha=True)
         ),
     )
     soup = _apply_finishes(whole, entry.materials, place, asset_id)
-    matrix = upright(entry)
+    matrix = upright_transform(entry)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
     soup = _with_regions(soup.transformed(_scaling(scale, shift)), entry.regions, place, asset_id)
     mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
     if collides:
-        solid = joined(collides).transformed(matrix).transformed(_scaling(scale, shift))
+        solid = join_soups(collides).transformed(matrix).transformed(_scaling(scale, shift))
         check_coordinates(solid, place)
         collision = convex_parts(solid, place, entry.parts)
     else:
         collision = convex_parts(_solid_of(mesh, entry.max_faces), place, entry.parts)
     keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
-    return Imported(mesh, collision, decoded, keypoints)
+    return ImportedMesh(mesh, collision, decoded, keypoints)
 
 
 def import_link(
     folder: Folder, entry: RobotEntry, robot_id: str, urdf: Urdf, link_name: str
-) -> Imported:
+) -> ImportedMesh:
     """One link of a robot, in the link's frame. Raises AssetError if it is unfit."""
     link = urdf.links[link_name]
     place = f"{folder.root / entry.file}: link '{link_name}'"
     mesh = collision = None
     if link.visuals:
-        soup = joined([_shape_soup(folder, shape, SE3()) for shape in link.visuals])
+        soup = join_soups([_shape_soup(folder, shape, SE3()) for shape in link.visuals])
         if entry.palette:
             soup = _palette_colors(folder, soup)
         soup = _apply_finishes(soup, entry.materials, place, robot_id)
         mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
     if link.collisions:
         solids = [_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
-        check_coordinates(joined(solids), place)
+        check_coordinates(join_soups(solids), place)
         # One hull per element and group: what a URDF collides with is taken as convex.
         collision = ConvexParts(
             tuple(
                 part
                 for solid in solids
                 for part in (
-                    convex_parts(solid, place, 1) if _grouped(solid) else one_hull(solid, place)
+                    convex_parts(solid, place, 1) if _grouped(solid) else single_hull(solid, place)
                 ).parts_m
             )
         )
-    return Imported(mesh, collision, {})
+    return ImportedMesh(mesh, collision, {})
 
 
-def _solid_of(mesh: MeshData, max_faces: int) -> Soup:
+def _solid_of(mesh: MeshData, max_faces: int) -> TriangleSoup:
     """Triangles of a mesh as a solid to collide with, few enough to be cut up quickly."""
-    soup = Soup.of(mesh.vertices_m.astype(np.float64)[mesh.faces])
-    return decimated(soup, max_faces) if len(soup) > max_faces else soup
+    soup = TriangleSoup.of(mesh.vertices_m.astype(np.float64)[mesh.faces])
+    return decimate(soup, max_faces) if len(soup) > max_faces else soup
 
 
-def _grouped(soup: Soup) -> bool:
+def _grouped(soup: TriangleSoup) -> bool:
     return bool((soup.face_groups != soup.face_groups[0]).any())
 
 
 def _read_geometry(
     folder: Folder, entry: MeshEntry
-) -> tuple[list[Soup], list[Soup], Mapping[str, bytes]]:
+) -> tuple[list[TriangleSoup], list[TriangleSoup], Mapping[str, bytes]]:
     """What is seen, what collides (empty = the same), and embedded images, as the files have it."""
     images: Mapping[str, bytes] = {}
-    collides: list[Soup] = []
+    collides: list[TriangleSoup] = []
     if entry.file.lower().endswith(".urdf"):
         urdf = read_urdf(folder, entry.file)
         poses = urdf.poses_at_zero()
@@ -176,9 +185,9 @@ def _read_geometry(
     return looks, collides, images
 
 
-def _piece(folder: Folder, entry: MeshEntry, name: str) -> Source:
+def _piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
     """One mesh of a stage. Raises AssetError if there is none of that name."""
-    with opened(folder, entry.file) as stage:
+    with open_stage(folder, entry.file) as stage:
         pieces = tuple(piece for piece in stage.pieces() if piece.name == name)
         if not pieces:
             raise AssetError(f"{folder.root / entry.file}: has no mesh '{name}'; correct the id")
@@ -190,7 +199,9 @@ def _geometry(placed: tuple[Shape, SE3]) -> tuple[object, ...]:
     return (shape.kind, shape.file, shape.size, shape.T_link_shape, pose)
 
 
-def _shape_soup(folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True) -> Soup:
+def _shape_soup(
+    folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
+) -> TriangleSoup:
     """Triangles of a URDF element in the root frame, with the element's colour."""
     matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
     if shape.kind == "mesh":
@@ -203,16 +214,16 @@ def _shape_soup(folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bo
         soup = source.soup
         matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
     elif shape.kind == "box":
-        soup = Soup.of(box(shape.size))
+        soup = TriangleSoup.of(box(shape.size))
     elif shape.kind == "cylinder":
-        soup = Soup.of(cylinder(shape.size[0], shape.size[1]))
+        soup = TriangleSoup.of(cylinder(shape.size[0], shape.size[1]))
     else:
-        soup = Soup.of(sphere(shape.size[0]))
+        soup = TriangleSoup.of(sphere(shape.size[0]))
     slots = tuple(_apply_color(slot, shape) for slot in soup.slots)
     return replace(soup, slots=slots).transformed(matrix)
 
 
-def _apply_color(slot: Slot, shape: Shape) -> Slot:
+def _apply_color(slot: MaterialSlot, shape: Shape) -> MaterialSlot:
     """A slot under the material of a URDF element: it colours what the file leaves plain.
 
     White is what descriptions say when they mean nothing in particular: the mesh's own colours
@@ -222,11 +233,13 @@ def _apply_color(slot: Slot, shape: Shape) -> Slot:
         return slot
     if slot.from_file and min(shape.color) > 0.99:
         return slot
-    color = linear_of_srgb(shape.color)
-    return Slot(shape.material or slot.name, replace(slot.material, base_color=color), True)
+    color = srgb_to_linear(shape.color)
+    return MaterialSlot(shape.material or slot.name, replace(slot.material, base_color=color), True)
 
 
-def _apply_finishes(soup: Soup, finishes: Mapping[str, Finish], place: str, owner: str) -> Soup:
+def _apply_finishes(
+    soup: TriangleSoup, finishes: Mapping[str, Finish], place: str, owner: str
+) -> TriangleSoup:
     """Slots with the entry's finishes, textures named by their owner, and no impossible whites."""
     slots = []
     for slot in soup.slots:
@@ -256,7 +269,7 @@ def _finish_of(name: str, finishes: Mapping[str, Finish]) -> Finish | None:
     return finishes[max(fitting, key=len)] if fitting else None
 
 
-def _check_placeable(material: Material, finish: Finish, soup: Soup, place: str) -> None:
+def _check_placeable(material: Material, finish: Finish, soup: TriangleSoup, place: str) -> None:
     """Raise AssetError if nothing says where a finish's images lie on the surface."""
     if finish.maps is not None and soup.uvs is None and not material.texture_scale_m:
         raise AssetError(
@@ -264,7 +277,9 @@ def _check_placeable(material: Material, finish: Finish, soup: Soup, place: str)
         )
 
 
-def _with_regions(soup: Soup, regions: Sequence[Region], place: str, owner: str) -> Soup:
+def _with_regions(
+    soup: TriangleSoup, regions: Sequence[Region], place: str, owner: str
+) -> TriangleSoup:
     """The soup with a slot of its own for the triangles of each region."""
     for region in regions:
         centers = soup.corners.mean(axis=1)
@@ -277,7 +292,7 @@ def _with_regions(soup: Soup, regions: Sequence[Region], place: str, owner: str)
                 soup = replace(
                     soup,
                     face_slots=np.where(chosen, len(soup.slots), soup.face_slots),
-                    slots=(*soup.slots, Slot("", material, from_file=True)),
+                    slots=(*soup.slots, MaterialSlot("", material, from_file=True)),
                 )
     return soup
 
@@ -311,7 +326,7 @@ def _limit_white(material: Material) -> tuple[float, float, float]:
     return (red, green, blue)
 
 
-def _palette_colors(folder: Folder, soup: Soup) -> Soup:
+def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
     """Slots whose image only holds a colour take it: the median of what their corners touch.
 
     The file's own colour wins where it is darker, since exporters write it beside the image.
@@ -320,11 +335,11 @@ def _palette_colors(folder: Folder, soup: Soup) -> Soup:
     for k, slot in enumerate(soup.slots):
         chosen = soup.face_slots == k
         if slot.material.texture and soup.uvs is not None and chosen.any():
-            image = decode(folder.read(slot.material.texture), slot.material.texture)
+            image = decode_image(folder.read(slot.material.texture), slot.material.texture)
             rows, columns = _pixels(soup.uvs[chosen].reshape(-1, 2), image.shape[:2])
             median = np.median(image[rows, columns], axis=0) / 255.0
             own = slot.declared_color
-            color = linear_of_srgb((float(median[0]), float(median[1]), float(median[2])))
+            color = srgb_to_linear((float(median[0]), float(median[1]), float(median[2])))
             red, green, blue = (min(a, b) for a, b in zip(color, own, strict=True))
             material = replace(slot.material, texture="", base_color=(red, green, blue))
             slot = replace(slot, material=material)  # noqa: PLW2901
@@ -339,7 +354,7 @@ def _pixels(uvs: Float64, shape: tuple[int, ...]) -> tuple[Int64, Int64]:
     return rows, columns
 
 
-def upright(entry: MeshEntry) -> Float64:
+def upright_transform(entry: MeshEntry) -> Float64:
     """Affine map that turns the file's axes to Z up and the front to +X."""
     up = np.array(_AXES[entry.up_axis()])
     front = np.array(_AXES[entry.front or _DEFAULT_FRONT[entry.up_axis()]])
@@ -352,7 +367,7 @@ def upright(entry: MeshEntry) -> Float64:
     return matrix
 
 
-def scale_and_shift(soup: Soup, entry: MeshEntry, place: str) -> tuple[float, Float64]:
+def scale_and_shift(soup: TriangleSoup, entry: MeshEntry, place: str) -> tuple[float, Float64]:
     """Metres per unit, and how the scaled soup is moved so that its origin is the entry's.
 
     Raises:

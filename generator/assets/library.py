@@ -6,14 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from generator.assets.cache import DiskCache, Store
-from generator.assets.files import Files
-from generator.assets.generated import Generated
-from generator.assets.ids import parse
-from generator.assets.importer import Imported
-from generator.assets.paths import packs_dir
-from generator.core.errors import AssetError, UnknownAsset, did_you_mean
-from generator.core.geometry import (
+from gen_data.generator.assets.asset_cache import DiskCache, Store
+from gen_data.generator.assets.asset_ids import parse_asset_id
+from gen_data.generator.assets.file_library import FileLibrary
+from gen_data.generator.assets.importer import ImportedMesh
+from gen_data.generator.assets.paths import packs_dir
+from gen_data.generator.assets.procedural_library import ProceduralLibrary
+from gen_data.generator.core.asset_types import (
     Asset,
     ConvexParts,
     Float32,
@@ -23,8 +22,9 @@ from generator.core.geometry import (
     RobotModel,
     TextureData,
 )
-from generator.core.scene import Lane, StageModel
-from generator.core.se3 import Vec3
+from gen_data.generator.core.errors import AssetError, UnknownAsset, did_you_mean
+from gen_data.generator.core.scene import Lane, StageModel
+from gen_data.generator.core.se3 import Vec3
 
 
 def open_library(
@@ -63,8 +63,8 @@ class Library:
     def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path, packs: Path) -> None:
         disk = DiskCache(cache_dir)
         store = Store(disk)
-        self._generated = Generated(store)
-        self._files = Files(packs, user_roots, disk, store)
+        self._generated = ProceduralLibrary(store)
+        self._files = FileLibrary(packs, user_roots, disk, store)
         self._entries: dict[str, Asset] = {}
         self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
         self._known: dict[str, _Known] = {}
@@ -74,7 +74,9 @@ class Library:
         if asset_id not in self._entries:
             generated = self._is_generated(asset_id)
             self._entries[asset_id] = (
-                self._generated.get(parse(asset_id)) if generated else self._files.get(asset_id)
+                self._generated.get(parse_asset_id(asset_id))
+                if generated
+                else self._files.get(asset_id)
             )
         return self._entries[asset_id]
 
@@ -135,13 +137,13 @@ class Library:
     def texture(self, texture_id: str) -> TextureData:
         """Images of a texture."""
         if self._is_generated(texture_id.partition("#")[0]):
-            return self._generated.texture(parse(texture_id))
+            return self._generated.texture(parse_asset_id(texture_id))
         return self._files.texture(texture_id)
 
     def environment(self, environment_id: str) -> Float32:
         """Equirectangular relative radiance as ``AssetLibrary`` describes it."""
         if self._is_generated(environment_id):
-            return self._generated.environment(parse(environment_id))
+            return self._generated.environment(parse_asset_id(environment_id))
         return self._files.environment(environment_id)
 
     def _of_mesh(self, asset_id: str) -> _Known:
@@ -152,9 +154,9 @@ class Library:
             self._known[asset_id] = _Known(mesh.bounds_m(), mesh.materials, keypoints)
         return self._known[asset_id]
 
-    def _imported(self, asset_id: str) -> Imported:
+    def _imported(self, asset_id: str) -> ImportedMesh:
         if self._is_generated(asset_id):
-            return self._generated.imported(parse(asset_id))
+            return self._generated.imported(parse_asset_id(asset_id))
         return self._files.imported(asset_id)
 
     def _is_generated(self, asset_id: str) -> bool:

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
-from generator.assets.folder import Folder
-from generator.core.errors import AssetError
-from generator.core.geometry import Joint
-from generator.core.kinematics import leader_of
-from generator.core.markup import parsed_xml, place_of
-from generator.core.se3 import SE3, Vec3
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.core.asset_types import Joint
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.kinematics import leader_of
+from gen_data.generator.core.safe_xml import parse_xml, place_of
+from gen_data.generator.core.se3 import SE3, Vec3
 
 _MAX_ELEMENTS = 50_000
 _MAX_LINKS = 500
@@ -86,7 +86,7 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
         AssetError: if it is malformed, is no tree of links, or refers outside the folder.
     """
     place = str(folder.root / relative)
-    root = parsed_xml(folder.read(relative), place, "robot", "a URDF", _MAX_ELEMENTS)
+    root = parse_xml(folder.read(relative), place, "robot", "a URDF", _MAX_ELEMENTS)
     at = root
     try:
         colors = dict(_named_colors(root))

@@ -1,6 +1,6 @@
-"""``python -m generator.cli`` is ``gen-data``."""
+"""``python -m gen_data.generator.cli`` is ``gen-data``."""
 
-from generator.cli.main import main
+from gen_data.generator.cli.main import main
 
 if __name__ == "__main__":
     main()

@@ -21,9 +21,9 @@ from pathlib import Path
 
 import click
 
-from generator import __version__
-from generator.core.errors import GenDataError, SampleError
-from generator.core.quiet import silenced
+from gen_data.generator import __version__
+from gen_data.generator.core.errors import GenDataError, SampleError
+from gen_data.generator.core.silence_stdio import silence_stdio
 
 REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
 
@@ -85,7 +85,7 @@ def _attempt_in_process(check: Check) -> tuple[bool, str]:
 
 def _report(check: Check, sender: Connection) -> None:
     try:
-        with silenced():
+        with silence_stdio():
             finding = check.attempt()
         sender.send((True, finding))
     except GenDataError as error:
@@ -108,7 +108,7 @@ def _try_python() -> str:
 
 
 def _try_cache() -> str:
-    from generator.assets.library import default_cache_dir
+    from gen_data.generator.assets.library import default_cache_dir
 
     folder = default_cache_dir()
     folder.mkdir(parents=True, exist_ok=True)
@@ -120,7 +120,7 @@ def _try_cache() -> str:
 def _try_renderer() -> str:
     import warp as wp
 
-    from generator.renderers.device import open_device
+    from gen_data.generator.renderers.warp.device import open_device
 
     device = open_device("auto")
     total = float(wp.full(1000, 2.0, dtype=float, device=device).numpy().sum())
@@ -218,8 +218,8 @@ def _try_preview() -> str:
 
 def _try_sample() -> str:
     """One small sample of the shipped tabletop, through every stage."""
-    from generator.assemble.recipe import open_pipeline
-    from generator.assemble.spec import load_config
+    from gen_data.generator.assemble.config import load_config
+    from gen_data.generator.assemble.pipeline_factory import open_pipeline
 
     spec = load_config("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
     with open_pipeline(spec) as pipeline:
@@ -236,10 +236,10 @@ def _try_denoiser() -> str:
 
 
 def _try_packs() -> str:
-    from generator.assets.packs import installed
-    from generator.assets.paths import packs_dir
+    from gen_data.generator.assets.installed_packs import installed_packs
+    from gen_data.generator.assets.paths import packs_dir
 
-    records = installed(packs_dir())
+    records = installed_packs(packs_dir())
     _expect(bool(records), f"none installed in {packs_dir()}")
     return ", ".join(f"{record.name} {record.version}" for record in records)
 

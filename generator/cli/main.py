@@ -15,9 +15,9 @@ from typing import Any
 
 import click
 
-from generator import __version__
-from generator.cli.options import Choice, configuration_options
-from generator.core.errors import ConfigError, ConfigWarning, GenDataError, Interrupted
+from gen_data.generator import __version__
+from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
+from gen_data.generator.core.errors import ConfigError, ConfigWarning, GenDataError, Interrupted
 
 SINGLE_THREADED = (
     "OMP_NUM_THREADS",
@@ -32,14 +32,14 @@ class LateCommands(click.Group):
     """A group whose commands are imported when they are asked for."""
 
     modules = {  # noqa: RUF012
-        "preview": "generator.cli.look:preview",
-        "contact-sheet": "generator.cli.look:contact_sheet",
-        "assets": "generator.cli.assets:assets",
-        "report": "generator.cli.report:report",
-        "verify": "generator.cli.inform:verify",
-        "describe": "generator.cli.inform:describe",
-        "schema": "generator.cli.inform:schema",
-        "doctor": "generator.cli.doctor:doctor",
+        "preview": "gen_data.generator.cli.preview_commands:preview",
+        "contact-sheet": "gen_data.generator.cli.preview_commands:contact_sheet",
+        "assets": "gen_data.generator.cli.asset_commands:assets",
+        "report": "gen_data.generator.cli.report_command:report",
+        "verify": "gen_data.generator.cli.info_commands:verify",
+        "describe": "gen_data.generator.cli.info_commands:describe",
+        "schema": "gen_data.generator.cli.info_commands:schema",
+        "doctor": "gen_data.generator.cli.doctor:doctor",
     }
     summaries = {  # noqa: RUF012
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
@@ -122,9 +122,9 @@ def cli(
         return
     if n is None:
         raise ConfigError("--n is missing: how many samples?")
-    from generator.cli.generate import generate
+    from gen_data.generator.cli.generate_command import generate
 
-    choice = Choice(config, seed, overrides, without)
+    choice = ConfigurationOptions(config, seed, overrides, without)
     generate(choice, n, out=out, workers=workers, repair=repair)
 
 

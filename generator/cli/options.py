@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from generator.assemble.spec import Config
+    from gen_data.generator.assemble.config import Config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
-class Choice:
+class ConfigurationOptions:
     """A configuration and what the command line changes in it.
 
     Attributes:
@@ -31,9 +31,9 @@ class Choice:
 
     def config(self) -> Config:
         """The validated configuration."""
-        from generator.assemble.spec import config_of_source
+        from gen_data.generator.assemble.config import load_source_config
 
-        return config_of_source(
+        return load_source_config(
             self.source, seed=self.seed, overrides=self.overrides, without=self.without
         )
 

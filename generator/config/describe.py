@@ -14,10 +14,16 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from generator.config.distributions import Distribution
-from generator.config.distributions.fields import Bounds, FieldOf
-from generator.config.scalars import flow
-from generator.config.words import bounds_of, branches, in_words, is_union, unwrapped
+from gen_data.generator.config.distributions import Distribution
+from gen_data.generator.config.distributions.fields import Bounds, FieldOf
+from gen_data.generator.config.type_names import (
+    describe_type,
+    is_union,
+    numeric_bounds,
+    union_branches,
+    unwrap_annotated,
+)
+from gen_data.generator.config.yaml_scalars import to_flow_yaml
 
 _TEXT_WIDTH = 100
 _EXAMPLES: dict[Any, Any] = {int: 1, float: 1, str: "example", bool: True}
@@ -30,22 +36,22 @@ def describe(model: type) -> str:
     What takes no parameters, such as most annotators, is told by its docstring alone.
     """
     if not issubclass(model, BaseModel):
-        return summary_of(model) + "\n"
+        return docstring_summary(model) + "\n"
     attributes = documented_attributes(model)
     rows = [
         (name, _type_words(info), _default_words(info), _meaning(info, attributes.get(name, "")))
         for name, info in model.model_fields.items()
     ]
-    parts = [summary_of(model)]
+    parts = [docstring_summary(model)]
     if rows:
         parts.append("\n".join(_table(rows)))
-    example = example_of(model)
+    example = make_example(model)
     if example:
         parts.append(f"Example:\n{textwrap.indent(_block(example), '  ')}")
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def example_of(model: type[BaseModel]) -> dict[str, Any] | None:
+def make_example(model: type[BaseModel]) -> dict[str, Any] | None:
     """Plain data that the model accepts: what it requires, and up to two of its options.
 
     Required fields take their first declared example (``Field(examples=[...])``), else a value
@@ -69,10 +75,10 @@ def example_of(model: type[BaseModel]) -> dict[str, Any] | None:
 
 def plain_default(info: FieldInfo) -> Any:
     """A field's default as plain data."""
-    return plain_of(info.get_default(call_default_factory=True, validated_data={}))
+    return to_plain_yaml(info.get_default(call_default_factory=True, validated_data={}))
 
 
-def plain_of(value: Any) -> Any:
+def to_plain_yaml(value: Any) -> Any:
     """A value of a model as the plain data that YAML would hold."""
     if isinstance(value, Distribution):
         return value.to_yaml()
@@ -81,15 +87,15 @@ def plain_of(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, Mapping):
-        return {str(key): plain_of(item) for key, item in value.items()}
+        return {str(key): to_plain_yaml(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain_of(item) for item in value]
+        return [to_plain_yaml(item) for item in value]
     if isinstance(value, (set, frozenset)):
-        return sorted(plain_of(item) for item in value)
+        return sorted(to_plain_yaml(item) for item in value)
     return value
 
 
-def summary_of(model: type) -> str:
+def docstring_summary(model: type) -> str:
     """First paragraph of a class's docstring, on one line."""
     documented = inspect.cleandoc(model.__doc__ or "")
     return documented.partition("\n\n")[0].replace("\n", " ")
@@ -105,12 +111,12 @@ def documented_attributes(model: type[BaseModel]) -> dict[str, str]:
 
 
 def _type_words(info: FieldInfo) -> str:
-    words = in_words(info.annotation, tuple(info.metadata))
+    words = describe_type(info.annotation, tuple(info.metadata))
     return re.sub(r"^an? ", "", words)
 
 
 def _default_words(info: FieldInfo) -> str:
-    return "required" if info.is_required() else flow(plain_default(info))
+    return "required" if info.is_required() else to_flow_yaml(plain_default(info))
 
 
 def _meaning(info: FieldInfo, documented: str) -> str:
@@ -143,7 +149,7 @@ def _table(rows: list[tuple[str, str, str, str]]) -> Iterator[str]:
 
 def _sample_value(info: FieldInfo) -> Any:
     if info.examples:
-        return plain_of(info.examples[0])
+        return to_plain_yaml(info.examples[0])
     if not info.is_required():
         return plain_default(info)
     return _made_up(info.annotation, tuple(info.metadata))
@@ -151,10 +157,10 @@ def _sample_value(info: FieldInfo) -> Any:
 
 def _made_up(annotation: Any, metadata: tuple[Any, ...] = ()) -> Any:
     """Some value of a type."""
-    annotation, metadata = unwrapped(annotation, metadata)
+    annotation, metadata = unwrap_annotated(annotation, metadata)
     marker = next((m for m in metadata if isinstance(m, FieldOf)), None)
     value = marker.kind.example if marker is not None else _EXAMPLES.get(annotation)
-    limits = bounds_of(metadata)
+    limits = numeric_bounds(metadata)
     if limits is not None and isinstance(value, (int, float)):
         return _within(value, limits)
     return _made_up_collection(annotation) if value is None else value
@@ -171,7 +177,7 @@ def _within(value: float, limits: Bounds) -> float:
 def _made_up_collection(annotation: Any) -> Any:
     origin, arguments = get_origin(annotation), get_args(annotation)
     if is_union(annotation):
-        return _made_up(branches(annotation)[0])
+        return _made_up(union_branches(annotation)[0])
     if origin is tuple and Ellipsis not in arguments:
         return [_made_up(argument) for argument in arguments]
     if origin in (list, tuple):
@@ -179,7 +185,7 @@ def _made_up_collection(annotation: Any) -> Any:
     if origin is Literal:
         return arguments[0]
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return example_of(annotation)
+        return make_example(annotation)
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         return next(iter(annotation)).value
     return {}
@@ -187,4 +193,4 @@ def _made_up_collection(annotation: Any) -> Any:
 
 def _block(example: Mapping[str, Any]) -> str:
     """A mapping as YAML, one key per line."""
-    return "\n".join(f"{key}: {flow(value)}" for key, value in example.items())
+    return "\n".join(f"{key}: {to_flow_yaml(value)}" for key, value in example.items())

@@ -13,14 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from generator.config.document import Node, is_distribution
-from generator.config.shared import is_reference
+from gen_data.generator.config.shared_values import is_reference
+from gen_data.generator.config.yaml_tree import Node, is_distribution
 
 ASSET_KEYS = frozenset({"asset", "ids", "tags", "any_of"})
 """Alternatives: a mapping that gives one of these keys inherits none of them."""
 
 
-def merge(base: Node, override: Node) -> Node:
+def merge_nodes(base: Node, override: Node) -> Node:
     """``override`` laid over ``base``."""
     if not isinstance(base.content, Mapping) or not isinstance(override.content, Mapping):
         return override
@@ -31,7 +31,7 @@ def merge(base: Node, override: Node) -> Node:
     dropped = ASSET_KEYS if ASSET_KEYS & override.content.keys() else frozenset()
     content = {key: node for key, node in base.content.items() if key not in dropped}
     for key, node in override.content.items():
-        content[key] = merge(content[key], node) if key in content else node
+        content[key] = merge_nodes(content[key], node) if key in content else node
     positions = {**base.key_positions, **override.key_positions}
     return Node(override.position, content, positions)
 
@@ -44,13 +44,13 @@ def merge_named(base: Node, override: Node) -> Node:
     """
     if not isinstance(base.content, tuple) or not isinstance(override.content, tuple):
         return override
-    items = {name_of(item): item for item in base.content}
+    items = {node_name(item): item for item in base.content}
     order = list(items)
     new: list[str] = []
     for item in override.content:
-        name = name_of(item)
+        name = node_name(item)
         if name in items:
-            items[name] = merge(items[name], _named_as(item, items[name]))
+            items[name] = merge_nodes(items[name], _named_as(item, items[name]))
             at = order.index(name)
             order[at:at], new = new, []
         else:
@@ -59,7 +59,7 @@ def merge_named(base: Node, override: Node) -> Node:
     return Node(override.position, tuple(items[name] for name in (*order, *new)))
 
 
-def name_of(item: Node) -> str:
+def node_name(item: Node) -> str:
     """What tells an item of a list of plug-ins from the others: its name, else its type."""
     for node in (item.get("name"), item.get("type"), item):
         if node is not None and isinstance(node.content, str):

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from generator.config.problems import Position, Problem
-from generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.config.problems import Position, Problem
+from gen_data.generator.core.errors import ConfigError, did_you_mean
 
 PLAN = "plan.json"
 """A data set's own record names paths as its configuration did, which lies elsewhere."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from generator.config.document import Node
-from generator.config.problems import FieldPath, Position, dotted
+from gen_data.generator.config.problems import FieldPath, Position, format_path
+from gen_data.generator.config.yaml_tree import Node
 
 
-def place_of_text(document: Node, text: str) -> tuple[Position, str] | None:
+def find_text(document: Node, text: str) -> tuple[Position, str] | None:
     """Position and field of the first scalar with that text; None if there is none."""
     for path, node in _scalars(document, ()):
         if text in (node.text, node.content):
-            return node.position, dotted(path)
+            return node.position, format_path(path)
     return None
 
 

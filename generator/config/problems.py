@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError
 
 FieldPath = tuple[str | int, ...]
 """Keys and indices from the root of a document: ``("randomizers", 0, "count")``."""
@@ -87,7 +87,7 @@ class Problems:
         raise ConfigError("\n".join(told))
 
 
-def dotted(path: FieldPath) -> str:
+def format_path(path: FieldPath) -> str:
     """``randomizers[0].count``; a key that is no plain word is quoted."""
     text = ""
     for part in path:

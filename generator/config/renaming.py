@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel
 
-from generator.config.document import Node
-from generator.config.faults import child_of
-from generator.config.problems import Position, Problems
-from generator.config.strict import Strict
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.problems import Position, Problems
+from gen_data.generator.config.pydantic_errors import child_type
+from gen_data.generator.config.yaml_tree import Node
 
 
 class RenamedKeyWarning(UserWarning):
@@ -43,7 +43,7 @@ def with_present_keys(
         if name != key:
             text = f"{node.key_position(key)}: {field}: deprecated key; it is now '{name}'"
             warnings.warn(text, RenamedKeyWarning, stacklevel=2)
-        annotation = child_of(model, name)[0]
+        annotation = child_type(model, name)[0]
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
             child = with_present_keys(child, annotation, problems, field)  # noqa: PLW2901
         content[name], positions[name] = child, node.key_position(key)

@@ -8,8 +8,12 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
-from generator.config.describe import documented_attributes, plain_of, summary_of
-from generator.config.distributions.fields import DISTRIBUTION_TITLE
+from gen_data.generator.config.describe import (
+    docstring_summary,
+    documented_attributes,
+    to_plain_yaml,
+)
+from gen_data.generator.config.distributions.fields import DISTRIBUTION_TITLE
 
 SHARED_VALUE = "shared_value"
 """Name of the definition of what stands for a shared value."""
@@ -32,7 +36,7 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
     schema: dict[str, Any] = _shared(
         model.model_json_schema(schema_generator=_Generator), definitions
     )
-    schema["description"] = summary_of(model)
+    schema["description"] = docstring_summary(model)
     attributes = documented_attributes(model)
     for name, entry in schema.get("properties", {}).items():
         if name in attributes:
@@ -86,7 +90,7 @@ class _Generator(GenerateJsonSchema):
     """Writes defaults as YAML has them."""
 
     def encode_default(self, dft: Any) -> Any:
-        return plain_of(dft)
+        return to_plain_yaml(dft)
 
 
 def _shared(part: Any, definitions: dict[str, Any]) -> Any:

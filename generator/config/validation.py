@@ -7,11 +7,11 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from generator.config.document import Node
-from generator.config.faults import Fault, located, without_union_noise
-from generator.config.problems import FieldPath, Position, Problems, dotted
-from generator.config.renaming import with_present_keys
-from generator.config.wording import fact
+from gen_data.generator.config.error_messages import error_text
+from gen_data.generator.config.problems import FieldPath, Position, Problems, format_path
+from gen_data.generator.config.pydantic_errors import Fault, locate_error, without_union_noise
+from gen_data.generator.config.renaming import with_present_keys
+from gen_data.generator.config.yaml_tree import Node
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -37,10 +37,10 @@ def validate(
         return model.model_validate_json(json.dumps(node.plain(), allow_nan=False))
     except ValidationError as error:
         details = error.errors(include_url=False)
-    for fault in without_union_noise([located(detail, model) for detail in details]):
-        path = dotted(fault.path)
+    for fault in without_union_noise([locate_error(detail, model) for detail in details]):
+        path = format_path(fault.path)
         joint = "." if field_prefix and path and not path.startswith("[") else ""
-        problems.add(_position(node, fault), f"{field_prefix}{joint}{path}", fact(fault))
+        problems.add(_position(node, fault), f"{field_prefix}{joint}{path}", error_text(fault))
     return None
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 
 @dataclass(frozen=True, slots=True)

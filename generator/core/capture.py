@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.scene import Camera, Device, Lidar
+from gen_data.generator.core.scene import Camera, Device, Lidar
 
 
 class Channel(str, Enum):
@@ -95,7 +95,7 @@ class Silhouette:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Reading:
+class SensorReading:
     """What one sensor returned.
 
     Attributes:
@@ -135,7 +135,7 @@ intensity                 [0, 1], what the device reports after its own range co
 time_s                    when the pulse left, from the start of the sweep
 ring                      row of the model's table, from 0, the highest first
 instance_id, category_id  what reflected it; 0 where that is the air or has no label
-surface                   what kind of surface, a number of ``generator.core.geometry.SURFACES``
+surface                   what kind of surface, a number of ``asset_types.SURFACES``
 return_number             1 the first of its pulse, 2 the second
 return_count              how many returns its pulse has
 ========================  ====================================================================
@@ -163,11 +163,12 @@ class PointCloud:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Table:
+class Measurements:
     """What a device measured: radar, inertial unit, satellite receiver, odometer, watcher.
 
     Attributes:
-        rows: Records [n] of ``generator.core.tables.table_dtype(device.kind)``; may be empty.
+        rows: Records [n] of
+            ``gen_data.generator.core.measurement_dtypes.table_dtype(device.kind)``; may be empty.
         time_s: The instant that ``device`` refers to.
     """
 
@@ -178,7 +179,7 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Beams:
+class LidarRays:
     """The light that a laser scanner sends out; "lidar frame" is that of the scene's instant.
 
     Attributes:
@@ -203,13 +204,13 @@ class Beams:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Detours:
+class SecondaryHits:
     """What rays meet through panes of glass or by way of a mirror; arrays are [m].
 
     Attributes:
         ray: Number of the ray: beam times subrays plus subray, int64; at most twice the same.
-        range_m, reflectance: As of Echoes; the whole way, and what glass or mirror leave of it.
-        instance_id, category_id, surface: As of Echoes. What a mirror shows has no ids, as it is
+        range_m, reflectance: As of LidarHits; the whole way, and what glass or mirror leave of it.
+        instance_id, category_id, surface: As of LidarHits. What a mirror shows has no ids, as it is
             not where the point is.
     """
 
@@ -222,7 +223,7 @@ class Detours:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Echoes:
+class LidarHits:
     """What the rays of beams hit first; arrays are [n, subrays].
 
     Attributes:
@@ -232,7 +233,7 @@ class Echoes:
             float32; 0 where there is nothing.
         incidence_cos: Cosine of the angle to the surface's normal, float32; 0.
         instance_id, category_id: uint16; 0.
-        surface: Number in ``generator.core.geometry.SURFACES``, uint8; 0.
+        surface: Number in ``gen_data.generator.core.asset_types.SURFACES``, uint8; 0.
         detours: What some rays meet besides; None = nothing.
     """
 
@@ -242,7 +243,7 @@ class Echoes:
     instance_id: NDArray[np.uint16]
     category_id: NDArray[np.uint16]
     surface: NDArray[np.uint8]
-    detours: Detours | None = None
+    detours: SecondaryHits | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -253,6 +254,6 @@ class Capture:
     missing from the steps between.
     """
 
-    readings: Mapping[str, Reading]
+    readings: Mapping[str, SensorReading]
     clouds: Mapping[str, PointCloud] = field(default_factory=dict)
-    tables: Mapping[str, Table] = field(default_factory=dict)
+    tables: Mapping[str, Measurements] = field(default_factory=dict)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.core.se3 import Array
+from gen_data.generator.core.se3 import Array
 
 EQUATOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
@@ -21,7 +21,7 @@ SECOND_ECCENTRICITY2 = ECCENTRICITY2 / (1.0 - ECCENTRICITY2)
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
+class GeodeticOrigin:
     """Where on the earth the world's origin is; altitude above the ellipsoid."""
 
     latitude_deg: float
@@ -41,16 +41,16 @@ class Origin:
         )
 
 
-def geodetic(points_m: Array, origin: Origin) -> Array:
+def to_geodetic(points_m: Array, origin: GeodeticOrigin) -> Array:
     """Latitude [deg], longitude [deg] and altitude [m] of points of the world, [n, 3]."""
-    centre = earth_centred(
+    centre = geodetic_to_ecef(
         np.array([[origin.latitude_deg, origin.longitude_deg, origin.altitude_m]])
     )
     turned = np.einsum("ij,nj->ni", origin.axes(), np.asarray(points_m), optimize=False)
-    return from_earth_centred(centre + turned)
+    return ecef_to_geodetic(centre + turned)
 
 
-def earth_centred(places: Array) -> Array:
+def geodetic_to_ecef(places: Array) -> Array:
     """Earth-centred coordinates [m] of latitude [deg], longitude [deg], altitude [m], [n, 3]."""
     lat, lon, altitude_m = np.radians(places[:, 0]), np.radians(places[:, 1]), places[:, 2]
     normal_m = EQUATOR_M / np.sqrt(1.0 - ECCENTRICITY2 * np.sin(lat) ** 2)
@@ -59,8 +59,8 @@ def earth_centred(places: Array) -> Array:
     return np.stack([level_m * np.cos(lon), level_m * np.sin(lon), z_m], axis=1)
 
 
-def from_earth_centred(points_m: Array) -> Array:
-    """The inverse of ``earth_centred``."""
+def ecef_to_geodetic(points_m: Array) -> Array:
+    """The inverse of ``geodetic_to_ecef``."""
     x_m, y_m, z_m = points_m.T
     level_m = np.hypot(x_m, y_m)
     reduced = np.arctan2(z_m * EQUATOR_M, level_m * POLE_M)

@@ -4,19 +4,20 @@ How a plug-in is made
 ---------------------
 A plug-in is a class that is named in the ``TABLE`` of its package, or by an entry point of the
 group ``gen_data.<kind>``. Classes of the kinds ``element``, ``randomizer``, ``sensor``,
-``annotation``, ``exporter`` and ``renderer`` derive from ``generator.config.strict.Strict``: their
-fields are the keys of their entry in YAML, and instances are made by validation of that entry. The
-field ``type`` is ``Literal["<name in the table>"]`` (``renderer`` instead of ``type`` for a
-renderer) with the name as its default. Instances are frozen, picklable, and made before any engine
-is opened, so loading their module imports no heavy library.
+``annotation``, ``exporter`` and ``renderer`` derive from
+``gen_data.generator.config.base_model.Strict``: their fields are the keys of their entry in YAML,
+and instances are made by validation of that entry. The field ``type`` is ``Literal["<name in the
+table>"]`` (``renderer`` instead of ``type`` for a renderer) with the name as its default. Instances
+are frozen, picklable, and made before any engine is opened, so loading their module imports no
+heavy library.
 
 Every member of a Protocol below is required. Bases supply those that few plug-ins need:
-``randomizers.base.RandomizerBase``, ``scene_templates.element.Element``,
-``generator.sensors.mounting.Mounted`` and ``Instrument``, ``exporters.base.ExporterBase``. A class
-that lacks a member is refused when it is loaded.
+``gen_data.randomizers.base.RandomizerBase``, ``gen_data.scene_templates.element.Element``,
+``gen_data.generator.sensors.mounting.Mounted`` and ``Instrument``,
+``gen_data.exporters.base.ExporterBase``. A class that lacks a member is refused when it is loaded.
 
 The kind ``asset_family`` differs: its entry points name instances of
-``generator.assets.procedural.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
+``gen_data.generator.assets.procedural.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
 
 Randomizers get no engine, annotators get no rng, exporters see one shard and compute ids instead
 of counting: forbidden operations are impossible, not merely discouraged.
@@ -31,9 +32,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol, runtime_checkable
 
-from generator.core.capture import Beams, Channel, Echoes, PointCloud, Reading, Table
-from generator.core.errors import Rejection
-from generator.core.geometry import (
+from gen_data.generator.core.asset_types import (
     Asset,
     ConvexParts,
     Float32,
@@ -43,12 +42,21 @@ from generator.core.geometry import (
     RobotModel,
     TextureData,
 )
-from generator.core.lens import LensModel
-from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth, Sample
-from generator.core.scene import Camera, Lane, Lidar, Scene, StageModel
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
-from generator.core.tables import Column
+from gen_data.generator.core.capture import (
+    Channel,
+    LidarHits,
+    LidarRays,
+    Measurements,
+    PointCloud,
+    SensorReading,
+)
+from gen_data.generator.core.errors import Rejection
+from gen_data.generator.core.lens import LensModel
+from gen_data.generator.core.measurement_dtypes import Column
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
+from gen_data.generator.core.scene import Camera, Lane, Lidar, Scene, StageModel
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
 
 
 class Stage(str, Enum):
@@ -224,7 +232,7 @@ class PhysicsEngine(Protocol):
 class Renderer(Protocol):
     """Light and rays. A pure function of its arguments; it may cache assets."""
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """Every requested channel of one camera, with the type and values listed at ``Channel``.
 
         ``Reading.sensor`` is the camera's name. ``AMODAL`` fills ``Reading.silhouettes`` instead of
@@ -232,7 +240,7 @@ class Renderer(Protocol):
         """
         ...
 
-    def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
+    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
         """The first surface on every ray of a laser scanner's beams, and how well it reflects."""
         ...
 
@@ -253,11 +261,11 @@ class Modality(str, Enum):
     """The form of a sensor's readings."""
 
     CAMERA = "camera"
-    """Images: ``Reading``. The sensor is among ``Scene.cameras``."""
+    """Images: ``SensorReading``. The sensor is among ``Scene.cameras``."""
     LIDAR = "lidar"
     """Points: ``PointCloud``. The sensor is among ``Scene.lidars``."""
     DEVICE = "device"
-    """Rows of numbers: ``Table``. The sensor is among ``Scene.devices``."""
+    """Rows of numbers: ``Measurements``. The sensor is among ``Scene.devices``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,9 +278,10 @@ class SensorInfo:
         kind: Of a device: ``Device.kind``, such as ``radar``; empty for the others.
         channels: Of a camera: channels that are written as images, in the order of ``Channel``.
         lens: Of a camera: model of its lens.
-        columns: Of a device: columns of its rows; the first is ``generator.core.tables.TIME``.
-        rate_hz: Readings per second; None = one at every step. Cameras and laser scanners read at
-            most once per step.
+        columns: Of a device: columns of its rows; the first is
+            ``gen_data.generator.core.measurement_dtypes.TIME``.
+        rate_hz: SensorReadings per second; None = one at every step. Cameras and laser scanners
+            read at most once per step.
         time_offset_s: How much later than the step's instant it reads [s].
         needs_clear_view: Whether a place inside the body that carries it is refused.
     """
@@ -310,7 +319,7 @@ class Sensor(Protocol):
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
-    ) -> Reading | PointCloud | Table:
+    ) -> SensorReading | PointCloud | Measurements:
         """One reading, of the type that its modality names.
 
         Args:
@@ -327,14 +336,14 @@ class Sensor(Protocol):
 
 @runtime_checkable
 class Annotator(Protocol):
-    """Truth computed from Scene and Reading, one object at a time. No randomness."""
+    """Truth computed from Scene and SensorReading, one object at a time. No randomness."""
 
     @property
     def channels(self) -> frozenset[Channel]:
         """What it needs to have been rendered."""
         ...
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """The truth with this annotator's fields filled in."""
         ...
 
@@ -349,7 +358,7 @@ class ImageAnnotator(Protocol):
         ...
 
     def annotate_image(
-        self, scene: Scene, assets: AssetLibrary, reading: Reading, truth: ImageTruth
+        self, scene: Scene, assets: AssetLibrary, reading: SensorReading, truth: ImageTruth
     ) -> ImageTruth:
         """The truth with this annotator's fields filled in."""
         ...
@@ -365,8 +374,8 @@ class FrameAnnotator(Protocol):
         ...
 
     def annotate_frame(
-        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: FrameTruth
-    ) -> FrameTruth:
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
+    ) -> EgoTruth:
         """The truth with this annotator's fields filled in.
 
         Args:
@@ -488,5 +497,5 @@ def cloud_path(shard_dir: Path, sensor: str, index: int) -> Path:
 
 
 def table_path(shard_dir: Path, sensor: str, index: int) -> Path:
-    """Where the rows of one reading lie: a NumPy file of ``generator.core.tables`` records."""
+    """Where the rows of one reading lie: a NumPy file of ``core.measurement_dtypes`` records."""
     return shard_dir / sensor / "rows" / f"{index:09d}.npy"

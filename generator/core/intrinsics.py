@@ -13,8 +13,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.lens import PINHOLE, Lens
-from generator.core.se3 import Array
+from gen_data.generator.core.lens import PINHOLE, Lens
+from gen_data.generator.core.se3 import Array
 
 _ROWS_AT_ONCE = 64
 
@@ -23,7 +23,7 @@ _ROWS_AT_ONCE = 64
 class Intrinsics:
     """A camera's inner geometry; values in pixels.
 
-    A point of the lens's plane (see ``generator.core.lens``) is in the image at
+    A point of the lens's plane (see ``gen_data.generator.core.lens``) is in the image at
     ``(fx_px * x + cx_px, fy_px * y + cy_px)``.
     """
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from generator.core.errors import did_you_mean
-from generator.core.geometry import Gripper, Joint, RobotModel
-from generator.core.scene import Articulation, Body
-from generator.core.se3 import SE3
+from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.generator.core.errors import did_you_mean
+from gen_data.generator.core.scene import Articulation, Body
+from gen_data.generator.core.se3 import SE3
 
 POSITION_DECIMALS = 6
 """Joint positions leave physics on this decimal grid [rad or m]."""
@@ -31,11 +31,13 @@ def link_poses(robot: RobotModel, T_world_base: SE3, positions: Sequence[float])
     remaining = iter(positions)
     for joint in robot.joints:
         pose = poses[joint.parent] @ joint.T_parent_joint
-        poses[joint.child] = pose @ joint_motion(joint, next(remaining)) if joint.movable else pose
+        poses[joint.child] = (
+            pose @ joint_transform(joint, next(remaining)) if joint.movable else pose
+        )
     return poses
 
 
-def joint_motion(joint: Joint, position: float) -> SE3:
+def joint_transform(joint: Joint, position: float) -> SE3:
     """Pose of the child link in the joint frame at a position [rad or m]."""
     x, y, z = joint.axis
     if joint.kind == "prismatic":
@@ -44,7 +46,7 @@ def joint_motion(joint: Joint, position: float) -> SE3:
     return SE3(quaternion_wxyz=(math.cos(0.5 * position), x * s, y * s, z * s))
 
 
-def link_bodies(
+def make_link_bodies(
     articulation: Articulation, robot: RobotModel, parts: tuple[str, ...]
 ) -> tuple[Body, ...]:
     """The bodies that show a robot at ``articulation.joint_positions``, one per visible link.
@@ -71,7 +73,7 @@ def link_bodies(
     )
 
 
-def rounded_positions(positions: Sequence[float]) -> tuple[float, ...]:
+def round_positions(positions: Sequence[float]) -> tuple[float, ...]:
     """Joint positions on the decimal grid that collision checks and labels share."""
     return tuple(round(value, POSITION_DECIMALS) + 0.0 for value in positions)
 
@@ -191,10 +193,10 @@ def all_positions(
             given[joint.name] = next(remaining)
         elif robot.gripper and not joint.mimic:
             given[joint.name] = finger_position(joint, robot.gripper, opening)
-    return rounded_positions(positions_of(robot.joints, given))
+    return round_positions(positions_of(robot.joints, given))
 
 
-def within_limits(robot: RobotModel, positions: Sequence[float]) -> bool:
+def is_within_limits(robot: RobotModel, positions: Sequence[float]) -> bool:
     """Whether every joint is inside its limits, to within the rounding of positions."""
     slack = 10.0**-POSITION_DECIMALS
     return all(

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.geometry import Material
-from generator.core.se3 import (
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import (
     SE3,
     Array,
     Vec3,
     multiply_quaternions,
+    quaternions_to_rotations,
     rotate_by_quaternion,
-    rotations_of,
 )
 
 
@@ -52,7 +52,7 @@ STILL = Twist()
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class Trajectory:
     """The way of one body through time.
 
     Positions between knots lie on cubic Hermite curves with the slopes of Catmull and Rom (1974),
@@ -102,7 +102,7 @@ class Track:
 
     def poses(self, times_s: NDArray[np.floating]) -> tuple[Array, Array]:
         """Rotation matrices [n, 3, 3] and translations [n, 3] at several instants, as ``pose``."""
-        rotations, translations = poses_of((self,), times_s)
+        rotations, translations = interpolate_poses((self,), times_s)
         return rotations[0], translations[0]
 
     def twist(self, time_s: float) -> Twist:
@@ -157,7 +157,9 @@ class Track:
         return (w / norm, x / norm, y / norm, z / norm)
 
 
-def poses_of(tracks: Sequence[Track], times_s: NDArray[np.floating]) -> tuple[Array, Array]:
+def interpolate_poses(
+    tracks: Sequence[Trajectory], times_s: NDArray[np.floating]
+) -> tuple[Array, Array]:
     """Where bodies are at several instants, as ``Track.pose``.
 
     Returns:
@@ -200,12 +202,12 @@ def _between(ways: Sequence[tuple[SE3, ...]], steps: Array) -> tuple[Array, Arra
     a, b = turns[:, k], turns[:, k + 1]
     same = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
     sign = np.where(same + a[..., 3] * b[..., 3] >= 0.0, 1.0, -1.0)[..., None]
-    rotations = rotations_of((g * a + f * sign * b).reshape(-1, 4))
+    rotations = quaternions_to_rotations((g * a + f * sign * b).reshape(-1, 4))
     return rotations.reshape(*a.shape[:2], 3, 3), translations
 
 
 @dataclass(frozen=True, slots=True)
-class JointTrack:
+class JointTrajectory:
     """The joint positions of a robot through time; linear between knots.
 
     Attributes:
@@ -231,7 +233,7 @@ class JointTrack:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class StateChange:
     """What a body is like from an instant on: a lamp that lights, the next step of a walk.
 
     Attributes:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 _SLACK_M = 1e-12
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from generator.core.scene import Light
+from gen_data.generator.core.scene import Light
 
 
-def intensity_of_flux(light: Light, flux_lm: float) -> float:
+def flux_to_intensity_cd(light: Light, flux_lm: float) -> float:
     """Luminous intensity [cd] of a light that sends out a luminous flux.
 
     A ball sends it everywhere, a panel into the half space before it by Lambert's law, a spot into
@@ -34,7 +34,7 @@ def intensity_of_flux(light: Light, flux_lm: float) -> float:
             return flux_lm / math.pi
 
 
-def intensity_of_illuminance(light: Light, lux: float, distance_m: float) -> float:
+def illuminance_to_intensity_cd(light: Light, lux: float, distance_m: float) -> float:
     """Luminous intensity [cd] with which a light gives an illuminance straight before it.
 
     Args:
@@ -74,6 +74,6 @@ def luminance_cd_m2(light: Light) -> float:
             raise ValueError(f"a light of kind {light.kind} is no panel")
 
 
-def with_flux(light: Light, flux_lm: float) -> Light:
+def scale_to_flux(light: Light, flux_lm: float) -> Light:
     """The light with the intensity that belongs to a luminous flux."""
-    return replace(light, intensity_cd=round(intensity_of_flux(light, flux_lm), 4))
+    return replace(light, intensity_cd=round(flux_to_intensity_cd(light, flux_lm), 4))

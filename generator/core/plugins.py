@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
-from generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.errors import ConfigError, did_you_mean
 
 P = TypeVar("P")
 """The Protocol that the plug-ins of a table implement."""
@@ -70,13 +70,19 @@ class PluginTable(Generic[P]):
         if not self.protocols:
             return ""
         if not hasattr(plugin, "model_validate_json"):
-            return "cannot be read from YAML: derive it from generator.config.strict.Strict"
+            return (
+                "cannot be read from YAML: derive it from "
+                "gen_data.generator.config.base_model.Strict"
+            )
         own = {m for base in plugin.__mro__ for m in (*vars(base), *_annotations(base))}
         lacking: list[list[str]] = [sorted(_members(protocol) - own) for protocol in self.protocols]
         if all(lacking):
             fewest = min(lacking, key=len)
             protocol = self.protocols[lacking.index(fewest)]
-            return f"lacks {', '.join(fewest)}; see generator.core.interfaces.{protocol.__name__}"
+            return (
+                f"lacks {', '.join(fewest)}; see "
+                f"gen_data.generator.core.interfaces.{protocol.__name__}"
+            )
         if f"'{name}'" not in str(_field_type(plugin, self.tag)).replace('"', "'"):
             return f"""needs a field `{self.tag}: Literal["{name}"] = "{name}"`"""
         return ""

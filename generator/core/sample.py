@@ -10,12 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.boxes import BoxPx, OrientedBox
-from generator.core.capture import Capture
-from generator.core.lanes import LaneBorder
-from generator.core.motion import STILL, Twist
-from generator.core.scene import Camera, Instance, Scene
-from generator.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.generator.core.boxes import BoxPx, OrientedBox
+from gen_data.generator.core.capture import Capture
+from gen_data.generator.core.lane_geometry import LaneBorder
+from gen_data.generator.core.motion import STILL, Twist
+from gen_data.generator.core.scene import Camera, Instance, Scene
+from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -169,7 +169,7 @@ class BirdseyeMap:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class FrameTruth:
+class EgoTruth:
     """What is true of all sensors' readings together.
 
     A field is None when its annotator was not asked for.
@@ -223,7 +223,7 @@ class Sample:
     timings_s: Mapping[str, float] = field(default_factory=dict)
     step_index: int = 0
     cameras: tuple[str, ...] = ()
-    frame: FrameTruth | None = None
+    frame: EgoTruth | None = None
     instants: Mapping[str, Scene] = field(default_factory=dict)
 
     def scene_of(self, sensor: str) -> Scene:

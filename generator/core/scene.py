@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, TypeVar, get_args
 
-from generator.core.geometry import Keypoint, Material
-from generator.core.intrinsics import Intrinsics
-from generator.core.motion import STILL, Change, JointTrack, Track, Twist
-from generator.core.se3 import IDENTITY, SE3, Vec3
-from generator.core.shutter import INSTANT, Shutter
+from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.motion import STILL, JointTrajectory, StateChange, Trajectory, Twist
+from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.generator.core.shutter import INSTANT, Shutter
 
 SharedValue = str | float | int | bool
 Motion = Literal["static", "dynamic", "kinematic"]
@@ -96,7 +96,7 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
-class Surface:
+class SupportSurface:
     """A horizontal rectangle that things can stand on.
 
     Attributes:
@@ -220,7 +220,7 @@ class Articulation:
     goal: ArmGoal | None = None
     workspace_m: tuple[Vec3, Vec3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     way: tuple[ArmGoal, ...] = ()
-    joint_track: JointTrack | None = None
+    joint_track: JointTrajectory | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -451,7 +451,7 @@ class Scene:
     template: str
     bodies: tuple[Body, ...] = ()
     instances: tuple[Instance, ...] = ()
-    surfaces: tuple[Surface, ...] = ()
+    surfaces: tuple[SupportSurface, ...] = ()
     groups: tuple[ObjectGroup, ...] = ()
     articulations: tuple[Articulation, ...] = ()
     lights: tuple[Light, ...] = ()
@@ -467,14 +467,14 @@ class Scene:
     devices: tuple[Device, ...] = ()
     time_s: float = 0.0
     step_s: float = 0.1
-    tracks: tuple[Track, ...] = ()
-    changes: tuple[Change, ...] = ()
+    tracks: tuple[Trajectory, ...] = ()
+    changes: tuple[StateChange, ...] = ()
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""
         return _named(self.bodies, name)
 
-    def surface(self, name: str) -> Surface:
+    def surface(self, name: str) -> SupportSurface:
         """The surface of that name; KeyError if there is none."""
         return _named(self.surfaces, name)
 
@@ -494,7 +494,7 @@ class Scene:
         """The rig of that name; KeyError if there is none."""
         return _named(self.rigs, name)
 
-    def track(self, body: str) -> Track | None:
+    def track(self, body: str) -> Trajectory | None:
         """The track of that body; None if it stands still."""
         return next((track for track in self.tracks if track.body == body), None)
 

@@ -33,7 +33,7 @@ class SE3:
     def from_matrix(cls, matrix: Array) -> SE3:
         """Pose of a homogeneous matrix, shape [4, 4] or [3, 4]."""
         x, y, z = (float(v) for v in matrix[:3, 3])
-        return cls((x, y, z), quaternion_of_rotation(matrix[:3, :3]))
+        return cls((x, y, z), rotation_to_quaternion(matrix[:3, :3]))
 
     @classmethod
     def about_z(cls, yaw_rad: float, translation_m: Vec3 = (0.0, 0.0, 0.0)) -> SE3:
@@ -121,14 +121,14 @@ def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
-def rotations_of(quaternions_wxyz: Array) -> Array:
+def quaternions_to_rotations(quaternions_wxyz: Array) -> Array:
     """Rotation matrices [n, 3, 3] of quaternions [n, 4] of any length above 0, scalar first."""
     w, x, y, z = quaternions_wxyz.T
     norm = np.sqrt(w * w + x * x + y * y + z * z)
-    return rotations_of_unit(quaternions_wxyz / norm[:, None])
+    return unit_quaternions_to_rotations(quaternions_wxyz / norm[:, None])
 
 
-def rotations_of_unit(quaternions_wxyz: Array) -> Array:
+def unit_quaternions_to_rotations(quaternions_wxyz: Array) -> Array:
     """Rotation matrices [n, 3, 3] of unit quaternions [n, 4], as ``SE3.rotation``."""
     w, x, y, z = quaternions_wxyz.T
     rows = [
@@ -140,7 +140,7 @@ def rotations_of_unit(quaternions_wxyz: Array) -> Array:
     return rotations
 
 
-def quaternion_of_rotation(rotation: Array) -> Quaternion:
+def rotation_to_quaternion(rotation: Array) -> Quaternion:
     """Unit quaternion (scalar first, scalar >= 0) of a rotation matrix, shape [3, 3].
 
     Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978.

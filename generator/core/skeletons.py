@@ -57,7 +57,7 @@ CYCLIST = _joined(
 KNOWN = (PERSON, VEHICLE, TWO_WHEELER, CYCLIST)
 
 
-def skeleton_of(names: Iterable[str]) -> Skeleton:
+def find_skeleton(names: Iterable[str]) -> Skeleton:
     """The first known skeleton that has all the names; else just the names, in their order.
 
     A category's points are thus the same in every data set, even where one of them never occurs.

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.geometry import Float32
-from generator.core.scene import Camera
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.scene import Camera
 
 ALIGNED = 1e-6
 """Largest deviation, in metres and as a sine, of cameras that look the same way."""
@@ -50,7 +50,9 @@ def disparity_px(z_depth_m: Float32, focal_baseline: float) -> Float32:
     return disparity
 
 
-def seen_by_both(here_px: Float32, there_px: Float32, *, beyond: bool = False) -> NDArray[np.bool_]:
+def is_seen_by_both(
+    here_px: Float32, there_px: Float32, *, beyond: bool = False
+) -> NDArray[np.bool_]:
     """Whether the other camera sees what this one does, bool [h, w].
 
     It does if the point is in its image and nothing there is nearer by more than a pixel, in at

@@ -23,7 +23,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO, cast
 
-from generator.core.errors import AssetError
+from gen_data.generator.core.errors import AssetError
 
 _CHUNK = 1 << 20
 _INNER = (".sh3f", ".zip")

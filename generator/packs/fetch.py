@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from generator.core.errors import AssetError
-from generator.packs.table import ClientName, Pack
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.packs.pack_table import ClientName, Pack
 
 _TIMEOUT_S = 1800
 _NO_NETWORK = (

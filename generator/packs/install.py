@@ -14,12 +14,12 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from generator.assets.packs import RECORD_NAME, Record, StoredFile, read_record
-from generator.core.errors import AssetError, GenDataError, StorageError, VerificationError
-from generator.core.serial import canonical_json
-from generator.packs.archives import extract
-from generator.packs.fetch import check_archive, fetch, file_digest
-from generator.packs.table import Pack
+from gen_data.generator.assets.installed_packs import RECORD_NAME, Record, StoredFile, read_record
+from gen_data.generator.core.errors import AssetError, GenDataError, StorageError, VerificationError
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.packs.archives import extract
+from gen_data.generator.packs.fetch import check_archive, fetch, file_digest
+from gen_data.generator.packs.pack_table import Pack
 
 _SCRATCH = ".scratch-"
 _LOCK = ".lock"

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element, SubElement
 
-from generator.assets.folder import Folder
-from generator.core.errors import AssetError
-from generator.core.markup import parsed_xml
-from generator.core.se3 import SE3
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.safe_xml import parse_xml
+from gen_data.generator.core.se3 import SE3
 
 _MAX_ELEMENTS = 50_000
 _VISUAL_GROUP = "1"
@@ -45,7 +45,7 @@ class Mjcf:
 def read_mjcf(folder: Folder, relative: str) -> Mjcf:
     """The description in an MJCF file. Raises AssetError if it is malformed."""
     place = str(folder.root / relative)
-    root = parsed_xml(folder.read(relative), place, "mujoco", "an MJCF", _MAX_ELEMENTS)
+    root = parse_xml(folder.read(relative), place, "mujoco", "an MJCF", _MAX_ELEMENTS)
     body = root.find("worldbody/body")
     if body is None:
         raise AssetError(f"{place}: holds no body")

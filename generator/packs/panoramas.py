@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.assets.catalogue import ImageEntry, Index
-from generator.assets.images import read_exr
-from generator.assets.packs import INDEX_NAME, TAG
-from generator.core.errors import AssetError
-from generator.core.geometry import Float32
+from gen_data.generator.assets.folder_index import FolderIndex, ImageEntry
+from gen_data.generator.assets.image_decoding import read_exr
+from gen_data.generator.assets.installed_packs import INDEX_NAME, TAG
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.errors import AssetError
 
 _DATA_URL = re.compile(rb"base64,([A-Za-z0-9+/=]+)")
 _SUFFIX = ".exr.js"
@@ -57,10 +57,10 @@ def convert(source: Path, target: Path) -> None:
             raise AssetError(f"{source}: holds no panorama '{name}'")
         place = str(found[name])
         (target / f"{name}.hdr").write_bytes(
-            radiance_file(read_exr(exr_bytes(found[name].read_bytes(), place), place))
+            encode_radiance(read_exr(exr_bytes(found[name].read_bytes(), place), place))
         )
         entries.append(ImageEntry(id=name, file=f"{name}.hdr", tags=tuple(sorted((*tags, TAG)))))
-    index = Index(
+    index = FolderIndex(
         licence="CC0-1.0",
         author="Poly Haven",
         source="npm @pmndrs/assets 1.7.0",
@@ -79,7 +79,7 @@ def exr_bytes(script: bytes, place: str) -> bytes:
         raise AssetError(f"{place}: holds no base64 data URL") from None
 
 
-def radiance_file(rgb: Float32) -> bytes:
+def encode_radiance(rgb: Float32) -> bytes:
     """A Radiance .hdr file of an image, uncompressed.
 
     Source: Ward's ``color.c``: the largest component gives the shared exponent, e = 128 biased.

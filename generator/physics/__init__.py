@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from generator.core.interfaces import AssetLibrary
-from generator.physics.config import PhysicsConfig
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.physics.physics_config import PhysicsConfig
 
 if TYPE_CHECKING:
-    from generator.physics.engine import BulletEngine
+    from gen_data.generator.physics.engine import BulletEngine
 
 __all__ = ["PhysicsConfig", "open_engine"]
 
 
 def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> BulletEngine:
     """The physics engine, to be used as a context manager."""
-    from generator.physics.engine import BulletEngine
+    from gen_data.generator.physics.engine import BulletEngine
 
     return BulletEngine(assets, config)

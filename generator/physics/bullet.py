@@ -13,11 +13,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from generator.core.quiet import silenced
-from generator.core.se3 import SE3, Array, Vec3
-from generator.physics.shapes import CollisionShape, scale_step
+from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.silence_stdio import silence_stdio
+from gen_data.generator.physics.collision_shapes import CollisionShape, scale_step
 
-with silenced():  # it tells when it was built
+with silence_stdio():  # it tells when it was built
     import pybullet
 
 GRAVITY_M_S2 = 9.81

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from types import TracebackType
 
-from generator.core.errors import Rejection
-from generator.core.interfaces import AssetLibrary, Settled
-from generator.core.kinematics import link_bodies
-from generator.core.scene import Articulation, Body, Scene
-from generator.physics.bullet import World
-from generator.physics.config import PhysicsConfig
-from generator.physics.dropping import Drop
-from generator.physics.goals import Arm, Stance
-from generator.physics.recording import Recording
-from generator.physics.shapes import CollisionShape, collision_shape
-from generator.physics.support import surfaces_of
-from generator.physics.ways import Way
+from gen_data.generator.core.errors import Rejection
+from gen_data.generator.core.interfaces import AssetLibrary, Settled
+from gen_data.generator.core.kinematics import make_link_bodies
+from gen_data.generator.core.scene import Articulation, Body, Scene
+from gen_data.generator.physics.bullet import World
+from gen_data.generator.physics.collision_shapes import CollisionShape, collision_shape
+from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
+from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
+from gen_data.generator.physics.manipulation.trajectory_recording import TrajectoryRecording
+from gen_data.generator.physics.physics_config import PhysicsConfig
+from gen_data.generator.physics.placement_surfaces import candidate_surfaces
+from gen_data.generator.physics.settling import Settling
 
 _DENSITY_KG_M3 = 300.0
 """Of the bounding box of a thing whose mass is unknown: household things are mostly hollow."""
@@ -70,9 +70,9 @@ class BulletEngine:
         obeyed = self._solve_goals(scene, fixed, _resting_bodies(scene, falling))
         if isinstance(obeyed, Rejection):
             return Settled(scene, obeyed)
-        surfaces = {body.name: surfaces_of(scene, body) for body in falling}
+        surfaces = {body.name: candidate_surfaces(scene, body) for body in falling}
         arms = [name for name in self._world.names if name not in fixed and name not in surfaces]
-        rejection = Drop(self._world, falling, surfaces, self._config).settle(fixed, arms)
+        rejection = Settling(self._world, falling, surfaces, self._config).settle(fixed, arms)
         if rejection is not None:
             return Settled(scene, rejection)
         settled = self._frozen(scene, falling, tuple(stance for _, stance in obeyed))
@@ -101,9 +101,9 @@ class BulletEngine:
 
     def _solve_goals(
         self, scene: Scene, fixed: list[str], placed: list[str]
-    ) -> list[tuple[Arm, Stance]] | Rejection:
+    ) -> list[tuple[Arm, ArmState]] | Rejection:
         """Each arm and what it does; arms avoid those before them."""
-        obeyed: list[tuple[Arm, Stance]] = []
+        obeyed: list[tuple[Arm, ArmState]] = []
         obstacles = list(fixed)
         for articulation in scene.articulations:
             robot = self._assets.robot(articulation.asset)
@@ -123,7 +123,7 @@ class BulletEngine:
         scene: Scene,
         fixed: list[str],
         fallen: list[str],
-        obeyed: list[tuple[Arm, Stance]],
+        obeyed: list[tuple[Arm, ArmState]],
     ) -> Scene | Rejection:
         """The scene with the tracks of arms that have a way, and of what they carry.
 
@@ -137,12 +137,12 @@ class BulletEngine:
             if arm.articulation.goal and stance.T_world_held is not None
         ]
         resting = {name: scene.body(name).T_world_body for name in (*fallen, *held)}
-        recording = Recording(dict(resting))
+        recording = TrajectoryRecording(dict(resting))
         for arm, stance in obeyed:
             if not arm.articulation.way:
                 continue
             others = [name for other, _ in obeyed if other is not arm for name in other.bodies]
-            way = Way(arm, stance, self._world, [*fixed, *others], resting, scene.surfaces)
+            way = TaskPlanner(arm, stance, self._world, [*fixed, *others], resting, scene.surfaces)
             legs = way.legs()
             if isinstance(legs, Rejection):
                 return legs
@@ -159,7 +159,7 @@ class BulletEngine:
             ),
         )
 
-    def _frozen(self, scene: Scene, fallen: list[Body], stances: tuple[Stance, ...]) -> Scene:
+    def _frozen(self, scene: Scene, fallen: list[Body], stances: tuple[ArmState, ...]) -> Scene:
         """The scene with what the world and the arms came to."""
         poses = {body.name: self._world.pose(body.name).rounded() for body in fallen}
         bodies = {
@@ -186,7 +186,7 @@ class BulletEngine:
         parts = next(
             (i.parts for i in scene.instances if i.instance_id == articulation.instance_id), ()
         )
-        return link_bodies(articulation, self._assets.robot(articulation.asset), parts)
+        return make_link_bodies(articulation, self._assets.robot(articulation.asset), parts)
 
 
 def _solids(scene: Scene) -> list[Body]:

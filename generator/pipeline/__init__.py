@@ -1,9 +1,9 @@
 """Pipeline.sample(index): a pure function of (configuration, index).
 
 It sees physics, renderers, sensors, annotations and randomizers only through the Protocols of
-``generator.core.interfaces``.
+``gen_data.generator.core.interfaces``.
 """
 
-from generator.pipeline.pipeline import Pipeline
+from gen_data.generator.pipeline.pipeline import Pipeline
 
 __all__ = ["Pipeline"]

@@ -10,10 +10,15 @@ from functools import cached_property
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from generator.core.capture import Capture, Channel, PointCloud, Reading, Table
-from generator.core.errors import LayoutRejected, Rejection, SceneRejected
-from generator.core.instants import with_placed_sensors
-from generator.core.interfaces import (
+from gen_data.generator.core.capture import (
+    Capture,
+    Channel,
+    Measurements,
+    PointCloud,
+    SensorReading,
+)
+from gen_data.generator.core.errors import LayoutRejected, Rejection, SceneRejected
+from gen_data.generator.core.interfaces import (
     AssetLibrary,
     DatasetInfo,
     Exporter,
@@ -23,12 +28,13 @@ from generator.core.interfaces import (
     Sensor,
     Stage,
 )
-from generator.core.sample import FrameTruth, ImageTruth, Sample
-from generator.core.scene import Scene
-from generator.core.streams import Streams
-from generator.pipeline.freeze import Timeline, frozen_scene
-from generator.pipeline.scans import with_lidar_points
-from generator.pipeline.splits import Assignment, split_of
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene_time import place_sensors
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.pipeline.finalize_scene import Timeline, finalize_scene
+from gen_data.generator.pipeline.lidar_counts import count_lidar_points
+from gen_data.generator.pipeline.splits import Assignment, split_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -59,12 +65,12 @@ class PipelineConfig:
     info: DatasetInfo
     open_scene: SceneSource
     channels: frozenset[Channel]
-    image_truth: Callable[[Scene, Reading], ImageTruth]
+    image_truth: Callable[[Scene, SensorReading], ImageTruth]
     split_shares: Mapping[str, float]
     layout_attempts_max: int
     exporters: Mapping[str, Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
-    frame_truth: Callable[[Mapping[str, Scene]], FrameTruth | None] | None = None
+    frame_truth: Callable[[Mapping[str, Scene]], EgoTruth | None] | None = None
     split_assignment: Assignment = "random"
 
 
@@ -187,7 +193,7 @@ class Pipeline:
             split=self.split(scene_index),
             scene=scene,
             capture=capture,
-            truth=with_lidar_points(truth, capture.clouds),
+            truth=count_lidar_points(truth, capture.clouds),
             attempts=accepted.attempt + 1,
             timings_s=timings,
             cameras=self.info.cameras,
@@ -204,9 +210,9 @@ class Pipeline:
         timings_s: dict[str, float],
     ) -> tuple[Capture, dict[str, ImageTruth]]:
         """The readings of every sensor at its own instant, and the truth about every image."""
-        readings: dict[str, Reading] = {}
+        readings: dict[str, SensorReading] = {}
         clouds: dict[str, PointCloud] = {}
-        tables: dict[str, Table] = {}
+        tables: dict[str, Measurements] = {}
         truth: dict[str, ImageTruth] = {}
         for sensor in sensors:
             if streams.step % self.config.strides.get(sensor.name, 1):
@@ -217,7 +223,7 @@ class Pipeline:
                 seen = sensor.capture(scene, self.renderer, self.config.channels, rng)
             if isinstance(seen, PointCloud):
                 clouds[sensor.name] = seen
-            elif isinstance(seen, Table):
+            elif isinstance(seen, Measurements):
                 tables[sensor.name] = seen
             else:
                 with _timed(timings_s, "annotate"):
@@ -252,7 +258,7 @@ class Pipeline:
             with _timed(timings, "physics"):
                 settled = self._physics.settle(scene)
             if settled.rejection is None:
-                scene = frozen_scene(settled.scene, self.assets, self._category_ids)
+                scene = finalize_scene(settled.scene, self.assets, self._category_ids)
                 return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
             rejections.append(settled.rejection)
         raise SceneRejected(scene_index, tuple(rejections))
@@ -280,7 +286,7 @@ class Pipeline:
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
                 continue
-            return DrawnView(accepted.index, view_index, with_placed_sensors(scene), streams)
+            return DrawnView(accepted.index, view_index, place_sensors(scene), streams)
         raise SceneRejected(accepted.index, tuple(rejections))
 
     def _randomized(

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Literal
 
-from generator.core.errors import ConfigWarning
-from generator.core.streams import Streams
+from gen_data.generator.core.errors import ConfigWarning
+from gen_data.generator.core.streams import Streams
 
 Assignment = Literal["random", "round_robin"]
 """``random``: every scene draws its split. ``round_robin``: splits take turns by their shares."""

@@ -10,18 +10,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.boxes import OrientedBox
-from generator.core.capture import Channel, Reading
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from generator.core.skeletons import skeleton_of
-from generator.preview.palette import (
+from gen_data.generator.core.boxes import OrientedBox
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
+from gen_data.generator.core.skeletons import find_skeleton
+from gen_data.generator.preview.palette import (
     Rgb,
-    color_of,
-    colored_depth,
-    colored_flow,
-    colored_ids,
-    infrared_grey,
+    color_depth,
+    color_flow,
+    color_ids,
+    grey_infrared,
+    id_color,
 )
 
 Image = NDArray[np.uint8]
@@ -37,13 +37,13 @@ NEAR_M = 0.01
 """Edges are cut where they come closer to the camera plane than this."""
 
 
-def labelled_image(reading: Reading, truth: ImageTruth) -> Image:
+def draw_labels(reading: SensorReading, truth: ImageTruth) -> Image:
     """The RGB image with every label drawn on it, uint8 [h, w, 3]."""
     image: Image = np.array(reading.channels[Channel.RGB], np.uint8, order="C")
     for item in truth.objects:
         _tint(image, item)
     for item in truth.objects:
-        color = color_of(item.instance.instance_id)
+        color = id_color(item.instance.instance_id)
         if item.box3d_camera is not None:
             draw_box3d(image, item.box3d_camera, truth.camera.intrinsics, color)
         if item.box is not None:
@@ -54,24 +54,24 @@ def labelled_image(reading: Reading, truth: ImageTruth) -> Image:
     return image
 
 
-def channel_image(reading: Reading, channel: Channel) -> Image:
+def channel_image(reading: SensorReading, channel: Channel) -> Image:
     """Any channel as something to look at, uint8 [h, w, 3].
 
     Raises:
         KeyError: if the reading does not have the channel.
     """
     image = reading.channels[channel]
-    return _SHOWN[channel](image) if channel in _SHOWN else colored_ids(image)
+    return _SHOWN[channel](image) if channel in _SHOWN else color_ids(image)
 
 
 def _disparity(disparity_px: NDArray[Any]) -> Image:
     nothing = np.full_like(disparity_px, np.inf)
-    return colored_depth(np.divide(1.0, disparity_px, out=nothing, where=disparity_px > 0))
+    return color_depth(np.divide(1.0, disparity_px, out=nothing, where=disparity_px > 0))
 
 
 def _flow_from_above(scene_flow_m: NDArray[Any]) -> Image:
     """To the right, and away from the camera."""
-    return colored_flow(np.stack([scene_flow_m[..., 0], -scene_flow_m[..., 2]], axis=-1))
+    return color_flow(np.stack([scene_flow_m[..., 0], -scene_flow_m[..., 2]], axis=-1))
 
 
 def _white_where_set(flags: NDArray[Any]) -> Image:
@@ -80,16 +80,16 @@ def _white_where_set(flags: NDArray[Any]) -> Image:
 
 _SHOWN: Mapping[Channel, Callable[[NDArray[Any]], Image]] = {
     Channel.RGB: lambda image: np.asarray(image, np.uint8),
-    Channel.Z_DEPTH: colored_depth,
-    Channel.RANGE: colored_depth,
-    Channel.MEASURED_DEPTH: colored_depth,
+    Channel.Z_DEPTH: color_depth,
+    Channel.RANGE: color_depth,
+    Channel.MEASURED_DEPTH: color_depth,
     Channel.DISPARITY: _disparity,
     Channel.DISPARITY_VISIBLE: _disparity,
-    Channel.INFRARED: infrared_grey,
+    Channel.INFRARED: grey_infrared,
     Channel.NORMALS: lambda normals: np.round((normals + 1.0) * 127.5).astype(np.uint8),
     Channel.OBJECT_COORDINATES: lambda places: np.round(places * 255.0).astype(np.uint8),
-    Channel.FLOW_FORWARD: colored_flow,
-    Channel.FLOW_BACKWARD: colored_flow,
+    Channel.FLOW_FORWARD: color_flow,
+    Channel.FLOW_BACKWARD: color_flow,
     Channel.SCENE_FLOW: _flow_from_above,
     Channel.FLOW_OCCLUDED_FORWARD: _white_where_set,
     Channel.FLOW_OCCLUDED_BACKWARD: _white_where_set,
@@ -129,7 +129,7 @@ def _draw_bent(
 def draw_keypoints(image: Image, points: Sequence[KeypointTruth], color: Rgb) -> None:
     """Draw bones and points that are in the image, in place: hidden points are rings."""
     shown = {p.name: p for p in points if p.visibility}
-    skeleton = skeleton_of(p.name for p in points)
+    skeleton = find_skeleton(p.name for p in points)
     for a, b in skeleton.bones:
         ends = [shown.get(skeleton.names[k]) for k in (a, b)]
         if ends[0] is not None and ends[1] is not None:
@@ -170,7 +170,7 @@ def _tint(image: Image, item: ObjectTruth) -> None:
         return
     height, width = item.mask.pixels.shape
     window = image[item.mask.y_px :, item.mask.x_px :][:height, :width]
-    color = np.array(color_of(item.instance.instance_id), np.float32)
+    color = np.array(id_color(item.instance.instance_id), np.float32)
     tinted = 0.65 * window[item.mask.pixels] + 0.35 * color
     window[item.mask.pixels] = tinted.astype(np.uint8)
 

@@ -12,7 +12,7 @@ GOLDEN_RATIO_CONJUGATE = 0.618033988749895
 """Steps of this around the hue circle never come close to each other early on."""
 
 
-def color_of(number: int) -> Rgb:
+def id_color(number: int) -> Rgb:
     """SRGB colour of an id; black for 0."""
     if number == 0:
         return (0, 0, 0)
@@ -21,14 +21,14 @@ def color_of(number: int) -> Rgb:
     return (round(255 * red), round(255 * green), round(255 * blue))
 
 
-def colored_ids(ids: NDArray[np.integer]) -> NDArray[np.uint8]:
+def color_ids(ids: NDArray[np.integer]) -> NDArray[np.uint8]:
     """An id image [h, w] as colours, uint8 [h, w, 3]."""
-    table = np.array([color_of(i) for i in range(int(ids.max(initial=0)) + 1)], np.uint8)
+    table = np.array([id_color(i) for i in range(int(ids.max(initial=0)) + 1)], np.uint8)
     colored: NDArray[np.uint8] = table[ids]
     return colored
 
 
-def colored_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
+def color_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
     """A depth image [h, w] as grey, near = bright, uint8 [h, w, 3]; black = nothing."""
     seen = np.isfinite(z_depth_m)
     grey = np.zeros(z_depth_m.shape, np.uint8)
@@ -39,14 +39,14 @@ def colored_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
     return np.repeat(grey[..., None], 3, axis=2)
 
 
-def infrared_grey(infrared: NDArray[np.uint16]) -> NDArray[np.uint8]:
+def grey_infrared(infrared: NDArray[np.uint16]) -> NDArray[np.uint8]:
     """An infrared image [h, w] in the gamma of screens, uint8 [h, w, 3]; a hundredth is white."""
     white = max(float(np.quantile(infrared, 0.99)), 1.0)
     grey = np.round(255.0 * np.clip(infrared / white, 0.0, 1.0) ** (1.0 / 2.2)).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
 
 
-def colored_flow(flow_px: NDArray[np.floating]) -> NDArray[np.uint8]:
+def color_flow(flow_px: NDArray[np.floating]) -> NDArray[np.uint8]:
     """A flow image [h, w, 2] on the colour wheel of flow, uint8 [h, w, 3]; black = none.
 
     The hue is the direction, red to the right and yellow downwards; the saturation is the length,
@@ -79,7 +79,7 @@ def _flow_wheel() -> NDArray[np.float64]:
     return np.concatenate(ramps)
 
 
-def colored_shares(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
+def color_shares(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
     """Shares [n] as colours from blue (0) over green to red (1), uint8 [n, 3]; others are clipped.
 
     The hue runs from 240 degrees to 0 at full saturation.

@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.capture import Channel
-from generator.core.geometry import Asset
-from generator.core.interfaces import AssetLibrary, Renderer
-from generator.core.intrinsics import Intrinsics
-from generator.core.kinematics import link_bodies
-from generator.core.scene import Articulation, Body, Camera, Environment, Light, Scene
-from generator.core.se3 import SE3, look_at
-from generator.preview.overlay import Image
+from gen_data.generator.core.asset_types import Asset
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import AssetLibrary, Renderer
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.kinematics import make_link_bodies
+from gen_data.generator.core.scene import Articulation, Body, Camera, Environment, Light, Scene
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.preview.overlay import Image
 
 _HALF_FIELD_RAD = math.radians(15.0)
 _AZIMUTH_RAD, _ELEVATION_RAD = math.radians(35.0), math.radians(25.0)
@@ -49,7 +49,7 @@ def _bodies(asset: Asset, library: AssetLibrary) -> tuple[Body, ...]:
     if asset.kind != "robot":
         return (Body("object", asset.asset_id),)
     robot = library.robot(asset.asset_id)
-    return link_bodies(Articulation("robot", asset.asset_id, 1, SE3(), robot.home), robot, ())
+    return make_link_bodies(Articulation("robot", asset.asset_id, 1, SE3(), robot.home), robot, ())
 
 
 def _camera(scene: Scene, library: AssetLibrary, size_px: int) -> Camera:

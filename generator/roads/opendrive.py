@@ -15,9 +15,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from generator.core.errors import AssetError
-from generator.core.markup import parsed_xml
-from generator.roads.geometry import (
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.safe_xml import parse_xml
+from gen_data.generator.roads.reference_line import (
     Arc,
     Array,
     Curve,
@@ -179,7 +179,7 @@ def read_opendrive(data: bytes, place: str) -> Network:
         AssetError: malformed, incomplete, with gaps, or with links to what it has not; the message
             names the road.
     """
-    root = parsed_xml(data, place, "OpenDRIVE", "an OpenDRIVE file", _MAX_ELEMENTS)
+    root = parse_xml(data, place, "OpenDRIVE", "an OpenDRIVE file", _MAX_ELEMENTS)
     elements = root.findall("road")
     if not elements:
         raise AssetError(f"{place}: holds no roads; export it again")

@@ -9,23 +9,29 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from generator.core.errors import StorageError
-from generator.core.interfaces import DatasetInfo
-from generator.core.serial import canonical_json
-from generator.runner.files import (
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.runner.durable_files import (
     Inode,
-    inode_of,
+    get_inode,
+    hash_file,
     move_durably,
-    sha256_of_file,
     sync_tree,
     tree_sizes,
     write_durably,
 )
-from generator.runner.plan import PLAN_NAME, Plan, plan_bytes
-from generator.runner.record import ShardRecord, summed
-from generator.runner.shard import PipelineLike
-from generator.runner.store import LICENCES_NAME, MANIFEST_NAME, SHARDS_NAME, SUMS_NAME, LocalStore
-from generator.runner.unforeseen import explaining
+from gen_data.generator.runner.error_context import explain_errors
+from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
+from gen_data.generator.runner.shard import PipelineLike
+from gen_data.generator.runner.shard_record import ShardRecord, sum_counts
+from gen_data.generator.runner.store import (
+    LICENCES_NAME,
+    MANIFEST_NAME,
+    SHARDS_NAME,
+    SUMS_NAME,
+    LocalStore,
+)
 
 LicencesOf = Callable[[Sequence[str]], str]
 """Makes the text about the assets with these ids."""
@@ -58,7 +64,7 @@ def finalize(
         known = _inodes(store, records)
         names = sorted(pipeline.exporters)
         for name in names:
-            with explaining(f"exporter {name}, merging"), store.errors():
+            with explain_errors(f"exporter {name}, merging"), store.errors():
                 _merge(plan, store, pipeline, name, known)
         scratch = store.scratch_dir()
         if licences is not None:
@@ -100,7 +106,7 @@ def _all_records(plan: Plan, store: LocalStore) -> list[ShardRecord]:
 def _inodes(store: LocalStore, records: list[ShardRecord]) -> dict[Inode, str]:
     """Digests by inode: what exporters hard-link need not be hashed again."""
     return {
-        inode_of(store.shard_dir(record.shard) / file.path): file.sha256
+        get_inode(store.shard_dir(record.shard) / file.path): file.sha256
         for record in records
         for file in record.files
     }
@@ -142,7 +148,7 @@ def _entries(
     for name in exporters:
         for inner, size in tree_sizes(store.root / name).items():
             path = store.root / name / inner
-            digest = known.get(inode_of(path)) or sha256_of_file(path)
+            digest = known.get(get_inode(path)) or hash_file(path)
             yield Entry(f"{name}/{inner}", size, digest)
 
 
@@ -159,7 +165,7 @@ def _manifest(
         "n": plan.n,
         "shard_size": plan.shard_size,
         "info": info,
-        "splits": summed(count for record in records for count in record.splits),
+        "splits": sum_counts(count for record in records for count in record.splits),
         "scenes": sum(record.scenes for record in records),
         "rejections": sum(record.rejections for record in records),
         "bytes": sum(record.size_bytes for record in records),

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from generator import __version__
-from generator.assemble.recipe import PipelineFactory, annotators_of
-from generator.assemble.tables import third_party_packages
-from generator.assets.library import open_library
-from generator.assets.packs import TAG, installed
-from generator.assets.paths import packs_dir
-from generator.core.geometry import Asset
-from generator.core.scene import Scene
-from generator.runner.plan import Plan
+from gen_data.generator import __version__
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory, annotators_of
+from gen_data.generator.assemble.plugin_tables import third_party_packages
+from gen_data.generator.assets.installed_packs import TAG, installed_packs
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.paths import packs_dir
+from gen_data.generator.core.asset_types import Asset
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.runner.plan import Plan
 
 BYTES_DEPEND_ON = {
     "OpenEXR": "OpenEXR",
@@ -38,7 +38,7 @@ known to change nothing.
 """
 
 
-def plan_of(factory: PipelineFactory) -> Plan:
+def make_plan(factory: PipelineFactory) -> Plan:
     """The identity of the data set that a factory makes."""
     config = factory.config
     assets = possible_assets(factory)
@@ -58,7 +58,7 @@ def plan_of(factory: PipelineFactory) -> Plan:
     )
 
 
-def licences_text(factory: PipelineFactory, used: Sequence[str]) -> str:
+def format_licences(factory: PipelineFactory, used: Sequence[str]) -> str:
     """Markdown table of the assets with these ids, grouped by where they come from."""
     library = open_library(factory.config.asset_folders)
     groups: dict[tuple[str, str, str], list[str]] = {}
@@ -93,7 +93,7 @@ def _packs(assets: tuple[Asset, ...]) -> dict[str, str]:
         return {}
     return {
         f"pack {record.name}": f"{record.version} {record.digest[:16]}"
-        for record in installed(packs_dir())
+        for record in installed_packs(packs_dir())
     }
 
 

@@ -15,16 +15,16 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth, Sample
-from generator.core.scene import Device, Instance, Lidar, Scene
-from generator.core.serial import canonical_json, from_plain, to_plain
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
+from gen_data.generator.core.scene import Device, Instance, Lidar, Scene
+from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
 
 LABELS_NAME = "labels.jsonl"
 
 
 @dataclass(frozen=True, slots=True)
 class ImageInfo:
-    """When a camera read, and how it was exposed; as of ``Reading``."""
+    """When a camera read, and how it was exposed; as of ``SensorReading``."""
 
     time_s: float
     ev100: float | None = None
@@ -59,7 +59,7 @@ class Labels:
 
     index: int
     truth: Mapping[str, ImageTruth]
-    frame: FrameTruth | None
+    frame: EgoTruth | None
     images: Mapping[str, ImageInfo]
     scans: Mapping[str, ScanInfo] = field(default_factory=dict)
     tables: Mapping[str, TableInfo] = field(default_factory=dict)

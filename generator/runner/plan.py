@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from generator.core.errors import StorageError
-from generator.core.serial import canonical_json, from_plain, to_plain
-from generator.runner.files import write_durably
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.generator.runner.durable_files import write_durably
 
 FORMAT_VERSION = 1
 """Version of the folder layout, the shard records and the manifest."""
@@ -86,7 +86,7 @@ def load_plan(folder: Path) -> Plan:
         ) from None
 
 
-def compare(old: Plan, new: Plan) -> list[str]:
+def compare_plans(old: Plan, new: Plan) -> list[str]:
     """What differs, one line per field: ``camera.fov_deg: was 50, now 60``; empty when equal.
 
     Fields of the configuration are named as in the YAML file, all others by their place in Plan.

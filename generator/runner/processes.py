@@ -22,8 +22,11 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 
-from generator.core.errors import GenDataError
-from generator.runner.events import (
+from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.runner.shard import Job
+from gen_data.generator.runner.supervisor import Supervisor
+from gen_data.generator.runner.termination_signals import Interruption
+from gen_data.generator.runner.worker_events import (
     Abort,
     Action,
     Assign,
@@ -34,9 +37,6 @@ from generator.runner.events import (
     Spawn,
     Tick,
 )
-from generator.runner.interruption import Interruption
-from generator.runner.shard import Job
-from generator.runner.supervisor import Supervisor
 
 TICK_S = 0.5
 ENDING_TICK_S = 0.02
@@ -46,7 +46,7 @@ must not keep the run; its parent-death signal is pending."""
 
 START_WORKER = (
     "import sys; sys.path[:] = sys.argv[5:]; "
-    "from generator.runner.worker import main; main(*map(int, sys.argv[1:5]))"
+    "from gen_data.generator.runner.worker import main; main(*map(int, sys.argv[1:5]))"
 )
 """The module search path is this process's: a plug-in that is found here is found there."""
 
@@ -149,7 +149,7 @@ class WorkerPool:
         return Exited(number, exit_code, out_of_memory)
 
 
-def drive(
+def run_supervisor(
     job: Job,
     supervisor: Supervisor,
     interruption: Interruption,

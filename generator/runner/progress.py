@@ -7,13 +7,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from generator.core.errors import GenDataError, StorageError
-from generator.core.serial import canonical_json
-from generator.runner.events import Action, Event, Exited, Note, SampleDone, ShardDone, Spawn
-from generator.runner.files import free_bytes
+from gen_data.generator.core.errors import GenDataError, StorageError
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.runner.durable_files import free_bytes
+from gen_data.generator.runner.worker_events import (
+    Action,
+    Event,
+    Exited,
+    Note,
+    SampleDone,
+    ShardDone,
+    Spawn,
+)
 
 if TYPE_CHECKING:
-    from generator.runner.store import LocalStore, Scan
+    from gen_data.generator.runner.store import LocalStore, Scan
 
 FREE_SPACE_MARGIN = 1.05
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from generator.core.sample import Sample
-from generator.core.scene import Scene
-from generator.core.serial import canonical_json, from_plain
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.serialization import canonical_json, from_plain
 
 SCENES_NAME = "scenes.jsonl"
 
@@ -57,7 +57,7 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
     )
 
 
-def kept_scenes(path: Path) -> Iterator[KeptScene]:
+def read_scenes(path: Path) -> Iterator[KeptScene]:
     """The scenes of a shard's file, in order.
 
     Raises:

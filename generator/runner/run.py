@@ -8,19 +8,25 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from generator.core.errors import GenDataError
-from generator.core.sample import Sample
-from generator.runner.events import SampleDone
-from generator.runner.finalize import LicencesOf, finalize
-from generator.runner.interruption import Interruption
-from generator.runner.plan import Plan
-from generator.runner.processes import drive
-from generator.runner.progress import RunMonitor, RunProgress, Summary
-from generator.runner.shard import EnteredPipeline, Job, MediaWriter, make_shard, write_images
-from generator.runner.store import FolderState, LocalStore, Scan
-from generator.runner.supervisor import Limits, Supervisor
-from generator.runner.verify import findings
-from generator.runner.worker import done_event
+from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.runner.finalize import LicencesOf, finalize
+from gen_data.generator.runner.plan import Plan
+from gen_data.generator.runner.processes import run_supervisor
+from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
+from gen_data.generator.runner.shard import (
+    EnteredPipeline,
+    Job,
+    MediaWriter,
+    make_shard,
+    write_images,
+)
+from gen_data.generator.runner.store import FolderState, LocalStore, Scan
+from gen_data.generator.runner.supervisor import Limits, Supervisor
+from gen_data.generator.runner.termination_signals import Interruption
+from gen_data.generator.runner.verify import find_deviations
+from gen_data.generator.runner.worker import done_event
+from gen_data.generator.runner.worker_events import SampleDone
 
 __all__ = ["Limits", "RunProgress", "Settings", "Summary", "run"]
 
@@ -134,7 +140,7 @@ class _Run:
             describe_sample=self.job.store.reproduce_command,
             limits=self.settings.limits,
         )
-        drive(self.job, supervisor, self.interruption, monitor.observe)
+        run_supervisor(self.job, supervisor, self.interruption, monitor.observe)
         monitor.worker_deaths = supervisor.deaths
         if supervisor.error is not None:
             raise supervisor.error
@@ -153,7 +159,7 @@ class _Run:
 
     def _is_whole(self) -> bool:
         """Whether a finished data set still is one. Files that others put there do not matter."""
-        found = findings(self.job.store.root, self.settings.full_check)
+        found = find_deviations(self.job.store.root, self.settings.full_check)
         return all(finding.kind == "extra" for finding in found)
 
     def _nothing_to_do(self) -> Summary:

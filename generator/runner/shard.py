@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from generator.core.capture import Capture, Reading
-from generator.core.interfaces import DatasetInfo, Exporter
-from generator.core.sample import Sample
-from generator.runner.labels import LABELS_NAME, labels_line
-from generator.runner.plan import Plan
-from generator.runner.provenance import SCENES_NAME, scene_line
-from generator.runner.record import ShardRecord, describe_shard
-from generator.runner.store import LocalStore
-from generator.runner.unforeseen import explaining
+from gen_data.generator.core.capture import Capture, SensorReading
+from gen_data.generator.core.interfaces import DatasetInfo, Exporter
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.runner.error_context import explain_errors
+from gen_data.generator.runner.labels import LABELS_NAME, labels_line
+from gen_data.generator.runner.plan import Plan
+from gen_data.generator.runner.provenance import SCENES_NAME, scene_line
+from gen_data.generator.runner.shard_record import ShardRecord, describe_shard
+from gen_data.generator.runner.store import LocalStore
 
 MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
 
@@ -58,7 +58,7 @@ class EnteredPipeline(PipelineLike, Protocol):
 
 def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     """Encode a sample's images to where exporters expect them; imports OpenCV when first used."""
-    from exporters.images import write_media
+    from gen_data.exporters.image_files import write_media
 
     write_media(info, sample, shard_dir)
 
@@ -107,7 +107,7 @@ def make_shard(
             samples.append(_written(job, pipeline, index, folder, samples, on_sample))
         started_s = time.process_time()
         for name in sorted(pipeline.exporters):
-            with explaining(f"shard {shard}, exporter {name}"), job.store.errors():
+            with explain_errors(f"shard {shard}, exporter {name}"), job.store.errors():
                 pipeline.exporters[name].write_shard(pipeline.info, samples, folder)
         with job.store.errors():
             record = describe_shard(shard, indices, samples, folder)
@@ -131,7 +131,7 @@ def _written(
 
     ``before`` are the shard's samples before it.
     """
-    with explaining(f"sample {index}", job.store.reproduce_command(index)):
+    with explain_errors(f"sample {index}", job.store.reproduce_command(index)):
         sample = pipeline.sample(index)
         started_s = time.process_time()
         with job.store.errors():
@@ -143,14 +143,14 @@ def _written(
                 labels.write(labels_line(sample) + "\n")
         encode_s = time.process_time() - started_s
     on_sample(replace(sample, timings_s={**sample.timings_s, "encode": encode_s}))
-    return without_pixels(sample)
+    return drop_pixels(sample)
 
 
-def without_pixels(sample: Sample) -> Sample:
+def drop_pixels(sample: Sample) -> Sample:
     """The sample with its labels, and of what its sensors saw only when and from where."""
     capture = sample.capture
     readings = {
-        name: Reading(reading.sensor, reading.camera, {}, time_s=reading.time_s)
+        name: SensorReading(reading.sensor, reading.camera, {}, time_s=reading.time_s)
         for name, reading in capture.readings.items()
     }
     clouds = {

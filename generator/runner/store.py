@@ -27,19 +27,26 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from generator.core.errors import ConfigError, DeterminismError, StorageError
-from generator.runner.files import (
+from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
+from gen_data.generator.runner.durable_files import (
+    hash_file,
     make_folder,
     move_durably,
-    sha256_of_file,
     storage_errors,
-    sync,
+    sync_path,
     sync_tree,
     tree_sizes,
     write_durably,
 )
-from generator.runner.plan import PLAN_NAME, Plan, compare, load_plan, plan_bytes, write_plan
-from generator.runner.record import ShardRecord, parse_record
+from gen_data.generator.runner.plan import (
+    PLAN_NAME,
+    Plan,
+    compare_plans,
+    load_plan,
+    plan_bytes,
+    write_plan,
+)
+from gen_data.generator.runner.shard_record import ShardRecord, parse_record
 
 MANIFEST_NAME = "manifest.json"
 SUMS_NAME = "SHA256SUMS"
@@ -176,7 +183,7 @@ class LocalStore:
             make_folder(self._shards_dir)
             if self.manifest_path.exists():
                 self.manifest_path.unlink()
-                sync(self.root)
+                sync_path(self.root)
 
     def clear_scratch(self) -> None:
         """Remove unfinished files. The folder moves away first, so that no late writer finds it."""
@@ -269,7 +276,7 @@ class LocalStore:
             return None
         if tree_sizes(folder) != {file.path: file.bytes for file in record.files}:
             return None
-        if full and any(sha256_of_file(folder / f.path) != f.sha256 for f in record.files):
+        if full and any(hash_file(folder / f.path) != f.sha256 for f in record.files):
             return None
         return record
 
@@ -296,7 +303,7 @@ class LocalStore:
                 raise StorageError(f"{path}: is not a folder; {REMEDY}")
 
     def _refuse_another(self, plan: Plan) -> None:
-        differences = compare(load_plan(self.root), plan)
+        differences = compare_plans(load_plan(self.root), plan)
         if differences:
             listed = "\n".join(f"  {line}" for line in differences[:20])
             more = f"\n  and {len(differences) - 20} more" if len(differences) > 20 else ""

@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from generator.core.errors import DeterminismError, GenDataError, StorageError, WorkerLost
-from generator.runner.events import (
+from gen_data.generator.core.errors import DeterminismError, GenDataError, StorageError, WorkerLost
+from gen_data.generator.runner.worker_events import (
     Abort,
     Action,
     Assign,

@@ -11,12 +11,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from generator.core.errors import StorageError, VerificationError
-from generator.runner.files import Inode, inode_of, sha256_of_file, tree_sizes
-from generator.runner.finalize import dataset_id
-from generator.runner.plan import Plan, load_plan
-from generator.runner.record import ShardRecord, parse_record
-from generator.runner.store import MANIFEST_NAME, RUN_NAME, SHARDS_NAME, SUMS_NAME, LocalStore
+from gen_data.generator.core.errors import StorageError, VerificationError
+from gen_data.generator.runner.durable_files import Inode, get_inode, hash_file, tree_sizes
+from gen_data.generator.runner.finalize import dataset_id
+from gen_data.generator.runner.plan import Plan, load_plan
+from gen_data.generator.runner.shard_record import ShardRecord, parse_record
+from gen_data.generator.runner.store import (
+    MANIFEST_NAME,
+    RUN_NAME,
+    SHARDS_NAME,
+    SUMS_NAME,
+    LocalStore,
+)
 
 SUM_LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
 SAMPLE_NAME = re.compile(r"(?:^|[/_])(\d{6,9})[._]")
@@ -82,7 +88,7 @@ def verify(folder: Path, full: bool = False) -> Report:
             f"{folder}: not a finished data set: {MANIFEST_NAME} is missing. "
             "The command that started it finishes it."
         )
-    found = findings(folder, full)
+    found = find_deviations(folder, full)
     if found:
         listed = "\n".join(f"  {finding}" for finding in found[:SHOWN_MAX])
         more = f"\n  and {len(found) - SHOWN_MAX} more" if len(found) > SHOWN_MAX else ""
@@ -92,7 +98,7 @@ def verify(folder: Path, full: bool = False) -> Report:
     return Report(manifest["dataset_id"], manifest["n"], len(sizes), sum(sizes.values()), full)
 
 
-def findings(folder: Path, full: bool = False) -> list[Finding]:
+def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
     """Every deviation, in order of discovery; empty if there is none."""
     try:
         plan = load_plan(folder)
@@ -183,9 +189,9 @@ class _Check:
 
     def _digest(self, path: str) -> str:
         """Digest of a file; hard links to one file are read once."""
-        inode = inode_of(self._folder / path)
+        inode = get_inode(self._folder / path)
         if inode not in self._hashed:
-            self._hashed[inode] = sha256_of_file(self._folder / path)
+            self._hashed[inode] = hash_file(self._folder / path)
         return self._hashed[inode]
 
     def _samples_of(self, path: str) -> str:

@@ -22,14 +22,14 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from generator.core.child_processes import end_with_parent
-from generator.core.errors import GenDataError
-from generator.runner.events import Failed, Ready, SampleDone, ShardDone
-from generator.runner.unforeseen import unforeseen
+from gen_data.generator.core.child_processes import end_with_parent
+from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.runner.error_context import unexpected_error
+from gen_data.generator.runner.worker_events import Failed, Ready, SampleDone, ShardDone
 
 if TYPE_CHECKING:
-    from generator.core.sample import Sample
-    from generator.runner.shard import Job, MadeShard, PipelineLike
+    from gen_data.generator.core.sample import Sample
+    from gen_data.generator.runner.shard import Job, MadeShard, PipelineLike
 
 
 def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
@@ -57,7 +57,7 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
     except Exception as error:
         traceback.print_exc()
         with suppress(ConnectionError):
-            connection.send(Failed(number, sendable(error)))
+            connection.send(Failed(number, make_sendable(error)))
         sys.exit(1)
 
 
@@ -76,10 +76,10 @@ def _keep_temporary_files_in(folder: Path) -> None:
     tempfile.tempdir = f"/proc/self/fd/{os.open(folder, os.O_RDONLY | os.O_DIRECTORY)}"
 
 
-def sendable(error: Exception) -> GenDataError:
+def make_sendable(error: Exception) -> GenDataError:
     """The error as one that survives the way to another process and has a message for users."""
     if not isinstance(error, GenDataError):
-        return unforeseen(error, "a worker could not start")
+        return unexpected_error(error, "a worker could not start")
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
@@ -118,7 +118,7 @@ def _make(
         connection.send(SampleDone(number, shard, sample.index, dict(sample.timings_s)))
 
     # Imports numpy: only after this process is tied to its parent.
-    from generator.runner.shard import make_shard
+    from gen_data.generator.runner.shard import make_shard
 
     made = make_shard(job, pipeline, shard, report)
     connection.send(done_event(number, made))

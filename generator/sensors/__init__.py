@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from generator.core.interfaces import Sensor
-from generator.core.plugins import PluginTable
+from gen_data.generator.core.interfaces import Sensor
+from gen_data.generator.core.plugins import PluginTable
 
 TABLE = PluginTable[Sensor](
     "sensor",
     {
-        "rgb_camera": "generator.sensors.rgb_camera:RgbCamera",
-        "depth_camera": "generator.sensors.depth_camera:DepthCamera",
-        "lidar": "generator.sensors.lidar:LidarSensor",
-        "pseudo_lidar": "generator.sensors.pseudo_lidar:PseudoLidar",
-        "imu": "generator.sensors.imu:Imu",
-        "event_camera": "generator.sensors.event_camera:EventCamera",
-        "gnss": "generator.sensors.gnss:Gnss",
-        "odometer": "generator.sensors.odometer:Odometer",
-        "radar": "generator.sensors.radar:Radar",
-        "watcher": "generator.sensors.watcher:Watcher",
+        "rgb_camera": "gen_data.generator.sensors.camera.rgb_camera:RgbCamera",
+        "depth_camera": "gen_data.generator.sensors.depth.depth_camera:DepthCamera",
+        "lidar": "gen_data.generator.sensors.lidar.lidar_sensor:LidarSensor",
+        "pseudo_lidar": "gen_data.generator.sensors.lidar.pseudo_lidar:PseudoLidar",
+        "imu": "gen_data.generator.sensors.navigation.imu:Imu",
+        "event_camera": "gen_data.generator.sensors.event_camera.event_camera:EventCamera",
+        "gnss": "gen_data.generator.sensors.navigation.gnss:Gnss",
+        "odometer": "gen_data.generator.sensors.navigation.odometer:Odometer",
+        "radar": "gen_data.generator.sensors.radar.radar_sensor:Radar",
+        "watcher": "gen_data.generator.sensors.events.event_detector:EventDetector",
     },
     (Sensor,),
 )

@@ -9,15 +9,15 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from generator.config.strict import Strict
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError, did_you_mean
-from generator.core.instants import RIG_AXES
-from generator.core.interfaces import AssetIndex, Modality, SensorInfo
-from generator.core.lens import LensModel
-from generator.core.scene import Camera, Device, Lidar, Scene
-from generator.core.se3 import SE3, Array
-from generator.core.tables import TABLE_COLUMNS, TIME_DECIMALS
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex, Modality, SensorInfo
+from gen_data.generator.core.lens import LensModel
+from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIMALS
+from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
+from gen_data.generator.core.scene_time import RIG_AXES
+from gen_data.generator.core.se3 import SE3, Array
 
 BURIED_M = 0.05
 """Sensors may sink in as deep as this: they are bolted on, and bounds are not the hull."""
@@ -108,13 +108,13 @@ class Instrument(Mounted):
         Raises:
             ConfigError: there is no such rig, or its rate does not fit the sequence.
         """
-        rig = known_rig(scene, self.name, self.rig)
-        checked_rate(self.name, self.rate_hz, scene.step_s)
+        rig = check_rig(scene, self.name, self.rig)
+        check_rate(self.name, self.rate_hz, scene.step_s)
         device = Device(self.name, self.kind, rig, self.T_rig_sensor, model=self.device_model)
         return replace(scene, devices=(*scene.devices, device))
 
 
-def known_rig(scene: Scene, sensor: str, rig: str) -> str:
+def check_rig(scene: Scene, sensor: str, rig: str) -> str:
     """The rig's name, if the scene has it.
 
     Raises:
@@ -141,7 +141,7 @@ def with_lidar(scene: Scene, sensor: Mounted, lidar: Lidar) -> Scene:
         ConfigError: the scene has no such rig or camera.
     """
     if sensor.rig:
-        rig = known_rig(scene, lidar.name, sensor.rig)
+        rig = check_rig(scene, lidar.name, sensor.rig)
         return replace(scene, lidars=(*scene.lidars, replace(lidar, camera="", rig=rig)))
     known_camera(scene, lidar.name, lidar.camera)
     return replace(scene, lidars=(*scene.lidars, lidar))
@@ -162,7 +162,7 @@ def known_camera(scene: Scene, sensor: str, camera: str) -> Camera:
     return known[camera]
 
 
-def refuse_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
+def check_not_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
     """Refuse a sensor inside the body that carries it, where it sees nothing else.
 
     Inside is the space within the body's bounding box, more than ``BURIED_M`` from its faces.
@@ -236,7 +236,7 @@ def within_steps(rate_hz: float | None, step_s: float) -> bool:
     return rate_hz is not None and rate_hz * step_s > 1.0 + 1e-6
 
 
-def checked_rate(sensor: str, rate_hz: float | None, step_s: float) -> None:
+def check_rate(sensor: str, rate_hz: float | None, step_s: float) -> None:
     """Refuse a rate that does not fit the steps of the sequence.
 
     Raises:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from generator.core.interfaces import AssetIndex
-from generator.core.se3 import SE3
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.se3 import SE3
 
 _OVERHANG = 0.2
 """Share of its length by which a vehicle of unknown wheels reaches over either axle."""
@@ -29,7 +29,7 @@ class Axles:
     width_m: float
 
 
-def axles_of(assets: AssetIndex, asset: str, scale: float) -> Axles:
+def find_axles(assets: AssetIndex, asset: str, scale: float) -> Axles:
     """Axles by the keypoints ``wheel_front...`` and ``wheel_rear...``, else by the length."""
     (x0, y0, z0), (x1, y1, _) = assets.bounds_m(asset)
     points = assets.keypoints(asset)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.core.se3 import Array
+from gen_data.generator.core.se3 import Array
 
 HARDEST_M_S2 = 8.0
 """Nobody brakes harder: what tyres hold on a dry road."""

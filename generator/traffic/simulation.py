@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.se3 import Array
-from generator.traffic.driving import Driving
-from generator.traffic.fleet import Fleet
-from generator.traffic.routes import STATION_M
-from generator.traffic.signals import Approach
-from generator.traffic.walking import Walker, Walking
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.traffic.lane_routes import STATION_M
+from gen_data.generator.traffic.pedestrians import Pedestrian, Pedestrians
+from gen_data.generator.traffic.signal_cycles import Approach
+from gen_data.generator.traffic.vehicle_model import VehicleModel
+from gen_data.generator.traffic.vehicles import Vehicles
 
 STEP_S = 0.05
 KNOT_S = 0.1
@@ -23,7 +23,7 @@ _PER_KNOT = round(KNOT_S / STEP_S)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Motion:
+class SimulatedMotion:
     """What n vehicles and p people do; arrays over t knots, or t' steps where it says so.
 
     Attributes:
@@ -55,13 +55,13 @@ class Motion:
         return len(self.feet_m)
 
 
-def simulated(
-    fleet: Fleet | None,
-    walkers: Sequence[Walker],
+def simulate(
+    fleet: Vehicles | None,
+    walkers: Sequence[Pedestrian],
     obstacles: Array,
     approaches: Mapping[str, Approach],
     duration_s: float,
-) -> Motion:
+) -> SimulatedMotion:
     """What happens from time 0 to the first knot at or after ``duration_s``.
 
     Args:
@@ -72,8 +72,8 @@ def simulated(
         duration_s: How long.
     """
     steps = _PER_KNOT * math.ceil(duration_s / KNOT_S - 1e-9)
-    driving = Driving(fleet, approaches) if fleet is not None else None
-    walking = Walking(walkers, approaches, obstacles)
+    driving = VehicleModel(fleet, approaches) if fleet is not None else None
+    walking = Pedestrians(walkers, approaches, obstacles)
     if driving is not None:
         driving.settle(walking.crossers())
     cars: list[tuple[Array, Array, Array]] = []
@@ -99,10 +99,10 @@ def _always(crosswalk: str) -> bool:
 
 
 def _motion(
-    fleet: Fleet | None,
+    fleet: Vehicles | None,
     cars: Sequence[tuple[Array, Array, Array]],
     people: Sequence[tuple[Array, ...]],
-) -> Motion:
+) -> SimulatedMotion:
     xy, z, look, walked, pace = (np.stack(column) for column in zip(*people, strict=True))
     kept = slice(None, None, _PER_KNOT)
     feet = np.concatenate([xy[kept], z[kept, :, None]], axis=2)
@@ -117,10 +117,12 @@ def _motion(
     else:
         station, speed, acceleration = (np.stack(column) for column in zip(*cars, strict=True))
         axle, ahead, rise = _poses(fleet, station[kept])
-    return Motion(axle, ahead, rise, station, speed, acceleration, feet, look[kept], walked, pace)
+    return SimulatedMotion(
+        axle, ahead, rise, station, speed, acceleration, feet, look[kept], walked, pace
+    )
 
 
-def _poses(fleet: Fleet, station_m: Array) -> tuple[Array, Array, Array]:
+def _poses(fleet: Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
     """Rear axles [t, n, 3], directions [t, n, 2] and rises [t, n] of vehicles at stations."""
     along = (station_m - fleet.first_m) / STATION_M
     xy, ahead = fleet.courses.poses(along)

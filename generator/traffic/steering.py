@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.se3 import Array
+from gen_data.generator.core.se3 import Array
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,10 +47,10 @@ class Courses:
         # A cubic whose ends point where the axle points.
         xy = (1.0 + 2.0 * f) * g * g * a + f * f * (3.0 - 2.0 * f) * b
         xy = xy + span * (f * g * g * u + f * f * (f - 1.0) * v)
-        return xy, unit(g * u + f * v)
+        return xy, normalize(g * u + f * v)
 
 
-def driven(
+def follow_lines(
     lines_m: Array,
     xy_m: Array,
     ahead: Array,
@@ -68,7 +68,7 @@ def driven(
         sharpest_per_m: Greatest curvatures that they can steer [n].
     """
     n, m = lookahead.shape
-    tangents = unit(np.gradient(lines_m, axis=1))
+    tangents = normalize(np.gradient(lines_m, axis=1))
     rows = np.arange(n)
     xy, way, curvature = np.zeros((n, m, 2)), np.zeros((n, m, 2)), np.zeros((n, m))
     p, h = np.array(xy_m, dtype=np.float64), np.array(ahead, dtype=np.float64)
@@ -85,13 +85,13 @@ def driven(
         t, ahead_of = tangents[:, k + 1], lines_m[:, k + 1] - p
         along = np.maximum(h[:, 0] * t[:, 0] + h[:, 1] * t[:, 1], 0.3)
         step = np.maximum((ahead_of[:, 0] * t[:, 0] + ahead_of[:, 1] * t[:, 1]) / along, 0.0)
-        middle = turned(h, 0.5 * bend * step)
+        middle = rotate_small(h, 0.5 * bend * step)
         p = p + step[:, None] * middle
-        h = turned(middle, 0.5 * bend * step)
+        h = rotate_small(middle, 0.5 * bend * step)
     return Courses(xy, way, curvature)
 
 
-def turned(vectors: Array, angle_rad: Array) -> Array:
+def rotate_small(vectors: Array, angle_rad: Array) -> Array:
     """Vectors [n, 2] turned to the left by small angles [n]; ``tan(x)`` is taken to be x."""
     q = 0.5 * angle_rad
     scale = 1.0 / (1.0 + q * q)
@@ -100,7 +100,7 @@ def turned(vectors: Array, angle_rad: Array) -> Array:
     return np.stack([c * x - s * y, s * x + c * y], axis=1)
 
 
-def unit(vectors: Array) -> Array:
+def normalize(vectors: Array) -> Array:
     """Vectors [..., 2] at length 1."""
     x, y = vectors[..., :1], vectors[..., 1:]
     scaled: Array = vectors / np.maximum(np.sqrt(x * x + y * y), 1e-12)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from generator.core.geometry import Float32, Material, MeshData
-from generator.usd.materials import BOX_UV, UV, TextureFinder, define_material
-from generator.usd.opening import writing_stage
+from gen_data.generator.core.asset_types import Float32, Material, MeshData
+from gen_data.generator.usd.material_writer import BOX_UV, UV, TextureFinder, define_material
+from gen_data.generator.usd.stage_files import open_stage_for_writing
 
 MESH = "Mesh"
 ASSET = "/Asset"
@@ -23,7 +23,7 @@ def write_asset_layer(path: Path, mesh: MeshData, textures: TextureFinder) -> No
     Raises:
         StorageError: if it cannot be written.
     """
-    with writing_stage(path, ASSET) as stage:
+    with open_stage_for_writing(path, ASSET) as stage:
         _define_mesh(stage, f"{ASSET}/{MESH}", mesh)
         bind_materials(stage, f"{ASSET}/{MESH}", f"{ASSET}/Looks", mesh.materials, textures)
 

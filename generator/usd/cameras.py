@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from generator.core.scene import Camera
-from generator.core.se3 import SE3, Array
-from generator.usd.placing import T_CAMERA_USD, place
+from gen_data.generator.core.scene import Camera
+from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.usd.xforms import T_CAMERA_USD, set_transforms
 
 PIXEL = 2.0**-11
 """Width of a pixel on the sensor, in tenths of a metre, USD's unit for it: about 49 micrometres. A
@@ -37,7 +37,9 @@ def define_camera(stage: Any, path: str, steps: Sequence[Camera]) -> None:
     size.Set(Gf.Vec2i(k.width_px, k.height_px))
     if not k.straight:
         _define_lens(prim.GetPrim(), steps[0])
-    place(prim.GetPrim(), [(step.T_world_camera @ T_CAMERA_USD).matrix() for step in steps])
+    set_transforms(
+        prim.GetPrim(), [(step.T_world_camera @ T_CAMERA_USD).matrix() for step in steps]
+    )
 
 
 def read_camera_pose(T_stage_usd: Array) -> SE3:

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from generator.core.colorimetry import luminance
-from generator.core.errors import AssetError
-from generator.core.photometry import luminance_cd_m2
-from generator.core.scene import Environment, Light
-from generator.core.se3 import SE3, Array, Vec3
-from generator.usd.placing import along_minus_z, place
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.photometry import luminance_cd_m2
+from gen_data.generator.core.scene import Environment, Light
+from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.usd.xforms import along_minus_z, set_transforms
 
 RADIUS_M_MIN = 1e-3
 """A point is written as a ball of this size: it has a radiance, which USD asks for."""
@@ -57,7 +57,7 @@ def define_light(stage: Any, path: str, steps: Sequence[Light]) -> None:
             shaping.CreateShapingConeAngleAttr(math.degrees(light.cone_rad))
             shaping.CreateShapingConeSoftnessAttr(1.0 - light.even)
     prim.CreateColorAttr(light.color)
-    place(prim.GetPrim(), [_pose(step).matrix() for step in steps])
+    set_transforms(prim.GetPrim(), [_pose(step).matrix() for step in steps])
 
 
 def define_sky(stage: Any, path: str, environment: Environment, image: str) -> None:
@@ -68,7 +68,7 @@ def define_sky(stage: Any, path: str, environment: Environment, image: str) -> N
     prim.CreateTextureFileAttr(image)
     prim.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
     prim.CreateIntensityAttr(environment.luminance_cd_m2)
-    place(prim.GetPrim(), [(SE3.about_z(environment.yaw_rad) @ T_WORLD_DOME).matrix()])
+    set_transforms(prim.GetPrim(), [(SE3.about_z(environment.yaw_rad) @ T_WORLD_DOME).matrix()])
 
 
 def read_light(prim: Any, name: str, T_stage_light: Array) -> Light | None:
@@ -92,7 +92,7 @@ def read_light(prim: Any, name: str, T_stage_light: Array) -> Light | None:
     return None
 
 
-def checked(light: Light, place: str) -> Light:
+def check_light(light: Light, place: str) -> Light:
     """The light, if it can be.
 
     Raises:

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from generator.annotations import TABLE
-from generator.annotations.truth import Thresholds, image_truth
-from generator.core.boxes import BoxPx
-from generator.core.capture import Channel, Reading, Silhouette
-from generator.core.errors import ConfigError, SampleError
-from generator.core.interfaces import Annotator
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import KeypointTruth, ObjectTruth
-from generator.core.scene import Camera, Instance, Scene
-from generator.core.se3 import SE3, look_at
+from gen_data.generator.annotations import TABLE
+from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
+from gen_data.generator.core.boxes import BoxPx
+from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
+from gen_data.generator.core.errors import ConfigError, SampleError
+from gen_data.generator.core.interfaces import Annotator
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import KeypointTruth, ObjectTruth
+from gen_data.generator.core.scene import Camera, Instance, Scene
+from gen_data.generator.core.se3 import SE3, look_at
 
 W, H = 20, 12
 CAMERA = Camera(
@@ -59,14 +59,14 @@ def image(rectangles: Mapping[tuple[int, int, int, int], int]) -> NDArray[np.uin
     return pixels
 
 
-def scene_and_reading() -> tuple[Scene, Reading]:
+def scene_and_reading() -> tuple[Scene, SensorReading]:
     """The mug stands before the arm, which leaves the image at the left; a carpet lies below.
 
     The arm's silhouette is 10 x 8 = 80 px; 4 of its columns are outside the image and 12 of its
     pixels are behind the mug.
     """
     ids = image({(0, 9, 20, 12): 9, (0, 2, 6, 10): 2, (4, 4, 8, 10): 5})
-    reading = Reading(
+    reading = SensorReading(
         "color",
         CAMERA,
         {
@@ -97,7 +97,7 @@ def annotators(*names: str) -> list[Annotator]:
 @pytest.fixture
 def truths() -> tuple[ObjectTruth, ...]:
     """Arm and mug, with everything known about them."""
-    return image_truth(*scene_and_reading(), annotators(), Thresholds()).objects
+    return annotate_objects(*scene_and_reading(), annotators(), Thresholds()).objects
 
 
 def test_instances_come_in_order_of_id_and_the_unannotated_not_at_all(
@@ -220,7 +220,7 @@ def test_every_annotator_fills_only_its_own_fields(name: str) -> None:
     scene, reading = scene_and_reading()
     (annotator,) = annotators(name)
 
-    (arm, _) = image_truth(scene, reading, [annotator], Thresholds()).objects
+    (arm, _) = annotate_objects(scene, reading, [annotator], Thresholds()).objects
 
     optional = set().union(*fields.values())
     assert {f for f in optional if getattr(arm, f) is not None} == fields[name]
@@ -247,7 +247,7 @@ def test_every_annotator_needs_only_the_channels_it_names(name: str) -> None:
         silhouettes=reading.silhouettes if Channel.AMODAL in annotator.channels else {},
     )
 
-    assert len(image_truth(scene, lean, [annotator], Thresholds()).objects) == 2
+    assert len(annotate_objects(scene, lean, [annotator], Thresholds()).objects) == 2
 
 
 @pytest.mark.parametrize(
@@ -267,7 +267,7 @@ def test_thresholds_are_the_smallest_values_that_are_listed(
     thresholds: Thresholds, listed: list[str]
 ) -> None:
     """Arm: 36 px, 0.45 visible, 6 x 8 px. Mug: 24 px, whole, 4 x 6 px."""
-    truth = image_truth(*scene_and_reading(), annotators(), thresholds)
+    truth = annotate_objects(*scene_and_reading(), annotators(), thresholds)
 
     assert [t.instance.name for t in truth.objects] == listed
 
@@ -283,8 +283,8 @@ def test_hidden_and_absent_instances_are_listed_only_on_request() -> None:
     ):
         gone = replace(reading, silhouettes={**reading.silhouettes, 6: silhouette})
 
-        usual = image_truth(scene, gone, annotators(), Thresholds())
-        complete = image_truth(scene, gone, annotators(), Thresholds(include_invisible=True))
+        usual = annotate_objects(scene, gone, annotators(), Thresholds())
+        complete = annotate_objects(scene, gone, annotators(), Thresholds(include_invisible=True))
 
         assert len(usual.objects) == 2
         last = complete.objects[-1]
@@ -297,14 +297,16 @@ def test_hidden_and_absent_instances_are_listed_only_on_request() -> None:
 def test_a_fraction_that_is_not_measured_cannot_be_a_threshold() -> None:
     """The message says what to add."""
     with pytest.raises(ConfigError, match="add 'visibility' to annotations"):
-        image_truth(*scene_and_reading(), annotators("poses"), Thresholds(min_visible_fraction=0.1))
+        annotate_objects(
+            *scene_and_reading(), annotators("poses"), Thresholds(min_visible_fraction=0.1)
+        )
 
 
 def test_without_annotators_nothing_is_annotated() -> None:
     """A data set of images only needs no id image."""
     scene, reading = scene_and_reading()
 
-    truth = image_truth(scene, replace(reading, channels={}), [], Thresholds())
+    truth = annotate_objects(scene, replace(reading, channels={}), [], Thresholds())
 
     assert truth.objects == ()
     assert truth.camera is CAMERA
@@ -348,7 +350,7 @@ def test_a_silhouette_that_contradicts_the_image_stops_the_sample(spoil: Any, fa
     bad = replace(reading, silhouettes={**reading.silhouettes, 2: spoil(reading.silhouettes[2])})
 
     with pytest.raises(SampleError, match=f"sensor 'color', instance 2 'arm': .*{fault}"):
-        image_truth(scene, bad, annotators("boxes2d"), Thresholds())
+        annotate_objects(scene, bad, annotators("boxes2d"), Thresholds())
 
 
 def test_a_silhouette_that_was_not_rendered_stops_the_sample() -> None:
@@ -356,7 +358,7 @@ def test_a_silhouette_that_was_not_rendered_stops_the_sample() -> None:
     scene, reading = scene_and_reading()
 
     with pytest.raises(SampleError, match="instance 2 'arm': the renderer returned no silhouette"):
-        image_truth(scene, replace(reading, silhouettes={}), annotators(), Thresholds())
+        annotate_objects(scene, replace(reading, silhouettes={}), annotators(), Thresholds())
 
 
 @pytest.mark.parametrize(
@@ -377,7 +379,7 @@ def test_an_instance_that_cannot_be_stops_the_sample(changes: dict[str, Any], fa
     scene = replace(scene, instances=(replace(ARM, **changes), MUG))
 
     with pytest.raises(SampleError, match=f"instance 2 'arm': .*{fault}"):
-        image_truth(scene, reading, annotators(), Thresholds())
+        annotate_objects(scene, reading, annotators(), Thresholds())
 
 
 def test_an_annotated_instance_without_a_category_stops_the_sample() -> None:
@@ -386,7 +388,7 @@ def test_an_annotated_instance_without_a_category_stops_the_sample() -> None:
     scene = replace(scene, instances=(replace(ARM, category_id=0),))
 
     with pytest.raises(SampleError, match="annotated and its category 'robot' has no id"):
-        image_truth(scene, reading, annotators("poses"), Thresholds())
+        annotate_objects(scene, reading, annotators("poses"), Thresholds())
 
 
 class _Liar:
@@ -397,7 +399,7 @@ class _Liar:
     def __init__(self, **changes: Any) -> None:
         self.changes = changes
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         return replace(truth, **self.changes)
 
 
@@ -422,15 +424,15 @@ def test_labels_are_checked_against_the_image_whoever_made_them(
 ) -> None:
     """Third-party annotators are held to the same contract."""
     with pytest.raises(SampleError, match=f"instance 2 'arm': .*{fault}"):
-        image_truth(*scene_and_reading(), [*annotators(), _Liar(**changes)], Thresholds())
+        annotate_objects(*scene_and_reading(), [*annotators(), _Liar(**changes)], Thresholds())
 
 
 def test_a_mask_of_other_pixels_stops_the_sample() -> None:
     """Also one of the right shape and count."""
     scene, reading = scene_and_reading()
-    arm = image_truth(scene, reading, annotators(), Thresholds()).objects[0]
+    arm = annotate_objects(scene, reading, annotators(), Thresholds()).objects[0]
     assert arm.mask is not None
     turned = replace(arm.mask, pixels=arm.mask.pixels[::-1, ::-1])
 
     with pytest.raises(SampleError, match="mask is not its visible pixels"):
-        image_truth(scene, reading, [*annotators(), _Liar(mask=turned)], Thresholds())
+        annotate_objects(scene, reading, [*annotators(), _Liar(mask=turned)], Thresholds())

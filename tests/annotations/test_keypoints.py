@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from generator.annotations.keypoints import Keypoints
-from generator.annotations.truth import Thresholds, image_truth
-from generator.core.capture import Channel, Reading
-from generator.core.geometry import Keypoint
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.sample import KeypointTruth
-from generator.core.scene import Camera, Instance, Scene
-from generator.core.se3 import IDENTITY, SE3
-from generator.core.skeletons import PERSON, VEHICLE, skeleton_of
+from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
+from gen_data.generator.annotations.keypoints import Keypoints
+from gen_data.generator.core.asset_types import Keypoint
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.sample import KeypointTruth
+from gen_data.generator.core.scene import Camera, Instance, Scene
+from gen_data.generator.core.se3 import IDENTITY, SE3
+from gen_data.generator.core.skeletons import PERSON, VEHICLE, find_skeleton
 
 W, H = 20, 12
 CAMERA = Camera("color", IDENTITY, Intrinsics(W, H, 10.0, 10.0, 10.0, 6.0))
@@ -45,9 +45,9 @@ def seen(
     normals = np.full((H, W, 3), normal, np.float32)
     range_m = depth_m / CAMERA.intrinsics.pixel_rays()[..., 2]
     channels = {Channel.INSTANCE: ids, Channel.RANGE: range_m, Channel.NORMALS: normals}
-    reading = Reading("color", CAMERA, channels)
+    reading = SensorReading("color", CAMERA, channels)
     scene = Scene("panel", instances=(panel,))
-    (truth,) = image_truth(scene, reading, [Keypoints()], Thresholds()).objects
+    (truth,) = annotate_objects(scene, reading, [Keypoints()], Thresholds()).objects
     assert truth.keypoints is not None
     return truth.keypoints
 
@@ -159,11 +159,11 @@ def test_the_persons_skeleton_is_cocos() -> None:
 
 def test_a_skeleton_is_found_by_any_of_its_names() -> None:
     """And unknown names are a skeleton without bones, in their own order."""
-    assert skeleton_of(["headlight_left", "wheel_rear_left"]) is VEHICLE
-    assert skeleton_of(["right_knee"]) is PERSON
-    assert skeleton_of(["lid", "handle", "lid"]).names == ("lid", "handle")
-    assert skeleton_of(["lid"]).bones == ()
-    assert len(skeleton_of([*PERSON.names, "wheel_front"]).names) == 21
+    assert find_skeleton(["headlight_left", "wheel_rear_left"]) is VEHICLE
+    assert find_skeleton(["right_knee"]) is PERSON
+    assert find_skeleton(["lid", "handle", "lid"]).names == ("lid", "handle")
+    assert find_skeleton(["lid"]).bones == ()
+    assert len(find_skeleton([*PERSON.names, "wheel_front"]).names) == 21
 
 
 def test_a_fisheye_sees_points_beside_and_behind_it() -> None:
@@ -180,8 +180,8 @@ def test_a_fisheye_sees_points_beside_and_behind_it() -> None:
     }
     scene = Scene("test", instances=(thing,))
 
-    (truth,) = image_truth(
-        scene, Reading("color", camera, channels), [Keypoints()], Thresholds()
+    (truth,) = annotate_objects(
+        scene, SensorReading("color", camera, channels), [Keypoints()], Thresholds()
     ).objects
 
     assert truth.keypoints is not None

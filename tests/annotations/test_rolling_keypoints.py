@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.annotations.keypoints import Keypoints
-from generator.annotations.lanes import Lanes
-from generator.core.capture import Channel, Reading
-from generator.core.geometry import Keypoint
-from generator.core.intrinsics import Intrinsics
-from generator.core.motion import Track
-from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from generator.core.scene import Body, Camera, Instance, Lane, Rig, Scene
-from generator.core.se3 import SE3, look_at
-from generator.core.shutter import INSTANT, Shutter
+from gen_data.generator.annotations.keypoints import Keypoints
+from gen_data.generator.annotations.lanes import Lanes
+from gen_data.generator.core.asset_types import Keypoint
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
+from gen_data.generator.core.scene import Body, Camera, Instance, Lane, Rig, Scene
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.core.shutter import INSTANT, Shutter
 
 LENS = Intrinsics(100, 80, 100.0, 100.0, 50.0, 40.0)
 SPEED_M_S = 5.0
@@ -27,7 +27,7 @@ def seen(v_px: float, shutter: Shutter) -> KeypointTruth:
     camera = Camera("c", SE3(), LENS, shutter=shutter)
     tip = Keypoint("tip", (0.0, (v_px - 40.0) * 0.02, 0.0))
     thing = Instance(1, "t", "t", 1, "t", T_world_instance=SE3((0.0, 0.0, 2.0)), keypoints=(tip,))
-    track = Track(
+    track = Trajectory(
         "t", 1.0, (SE3((-5.0, 0.0, 2.0)), SE3((0.0, 0.0, 2.0)), SE3((5.0, 0.0, 2.0))), -1.0
     )
     scene = Scene(
@@ -41,7 +41,9 @@ def seen(v_px: float, shutter: Shutter) -> KeypointTruth:
         Channel.NORMALS: np.broadcast_to(np.float32([0, 0, -1]), (*shape, 3)),
     }
     truth = ObjectTruth(thing, visible_px=8000, box=None)
-    (point,) = Keypoints().annotate(scene, Reading("c", camera, channels), truth).keypoints or ()
+    (point,) = (
+        Keypoints().annotate(scene, SensorReading("c", camera, channels), truth).keypoints or ()
+    )
     return point
 
 
@@ -70,7 +72,7 @@ def test_borders_of_lanes_bend_with_the_rows() -> None:
     camera = Camera("c", pose, LENS, rig="eye", T_rig_camera=pose)
     scene = Scene(
         "t", bodies=(Body("car", "car"),), rigs=(Rig("eye", "car"),), lanes=(lane,),
-        tracks=(Track("car", 1.0, knots, -1.0),),
+        tracks=(Trajectory("car", 1.0, knots, -1.0),),
     )  # fmt: skip
     far = {Channel.RANGE: np.full((80, 100), 1e3, np.float32)}
 
@@ -80,7 +82,7 @@ def test_borders_of_lanes_bend_with_the_rows() -> None:
         truth = Lanes(step_px=1.0).annotate_image(
             scene,
             None,
-            Reading("c", at, far),
+            SensorReading("c", at, far),
             ImageTruth(at, ()),  # type: ignore[arg-type]
         )
         assert truth.borders

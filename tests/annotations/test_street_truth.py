@@ -9,24 +9,24 @@ from functools import cache
 import numpy as np
 import pytest
 
-from generator.annotations.bev_map import BevMap, levelled
-from generator.annotations.boxes3d import Boxes3d
-from generator.annotations.free_space import FreeSpace
-from generator.annotations.lanes import Lanes
-from generator.annotations.motion import Motion
-from generator.annotations.truth import Thresholds, complete_truth, frame_truth
-from generator.assets.library import Library, open_library
-from generator.core.capture import Channel, Reading
-from generator.core.errors import ConfigError
-from generator.core.instants import RIG_AXES, at, with_placed_sensors, with_twists
-from generator.core.intrinsics import Intrinsics
-from generator.core.motion import Track
-from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth
-from generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
-from generator.core.se3 import SE3, Array
-from scene_templates.builder import build
-from scene_templates.crosswalk import Crosswalk
-from scene_templates.road import Road
+from gen_data.generator.annotations.annotate import Thresholds, annotate_ego, annotate_reading
+from gen_data.generator.annotations.bev_map import BevMap, level_pose
+from gen_data.generator.annotations.boxes3d import Boxes3d
+from gen_data.generator.annotations.free_space import FreeSpace
+from gen_data.generator.annotations.lanes import Lanes
+from gen_data.generator.annotations.motion import Motion
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
+from gen_data.generator.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
+from gen_data.generator.core.se3 import SE3, Array
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.crosswalk import Crosswalk
+from gen_data.scene_templates.road import Road
 
 LENS = Intrinsics.from_hfov(320, 200, math.radians(80.0))
 EYE_M = 1.6
@@ -48,14 +48,14 @@ def street(yaw_rad: float = 0.0) -> Scene:
         Road(name="main", at_m=(-50.0, 0.0), length_m=100.0, lane_width_m=4.0, crown=0.0),
         Crosswalk(name="zebra", road="main", station_m=60.0, width_m=4.0),
     )
-    scene = build("street", elements, library())
+    scene = build_scene("street", elements, library())
     low, high = library().bounds_m(CAR)
     middle = 0.5 * (low[0] + high[0])
     pose = SE3((20.0 - middle, -2.0, -low[2]))
     car = Instance(1, "car/0", "car", 1, CAR, T_world_instance=pose, box_min_m=low, box_max_m=high)
     ego = Body("ego", CAR, SE3.about_z(yaw_rad, (0.0, -2.0, 0.0)), collides=False)
     camera = Camera("front", SE3(), LENS, None, "ego", SE3((0.0, 0.0, EYE_M)) @ RIG_AXES.inverse())
-    return with_placed_sensors(
+    return place_sensors(
         replace(
             scene,
             bodies=(*scene.bodies, Body("car/0", CAR, pose, instance_id=1), ego),
@@ -75,7 +75,7 @@ def pixel_rays() -> Array:
     return np.stack([np.ones_like(right), -right, -down], axis=-1)
 
 
-def seen(scene: Scene) -> Reading:
+def seen(scene: Scene) -> SensorReading:
     """The ground and the car's box as the camera sees them, without a renderer."""
     rays = pixel_rays()
     eye = np.array([0.0, -2.0, EYE_M])
@@ -93,7 +93,7 @@ def seen(scene: Scene) -> Reading:
         Channel.Z_DEPTH: depth.astype(np.float32),
         Channel.RANGE: (depth * np.linalg.norm(rays, axis=-1)).astype(np.float32),
     }
-    return Reading("front", scene.cameras[0], channels)
+    return SensorReading("front", scene.cameras[0], channels)
 
 
 def test_borders_are_where_the_ground_is_seen_under_them() -> None:
@@ -176,7 +176,7 @@ def test_nothing_is_free_where_there_is_no_street() -> None:
 def test_the_map_shows_what_lies_around_the_ego(yaw_deg: float) -> None:
     """Every pixel's centre, taken back to the world, against the street's own numbers."""
     scene = street(math.radians(yaw_deg))
-    truth = frame_truth({"": scene}, [BevMap(px_m=0.25, reach_m=30.0)], library())
+    truth = annotate_ego({"": scene}, [BevMap(px_m=0.25, reach_m=30.0)], library())
     assert truth is not None
     birdseye = truth.birdseye
     assert birdseye is not None
@@ -214,14 +214,14 @@ def test_a_map_is_level_and_looks_ahead_on_any_slope() -> None:
     """Half a turn included; looking straight up it keeps the world's axes."""
     for yaw in (-3.1, -1.0, 0.0, 2.0, math.pi):
         tilted = SE3.about_z(yaw, (1.0, 2.0, 3.0)) @ SE3((0.0,) * 3, (0.995, 0.0, 0.0998749, 0.0))
-        map_pose = levelled(tilted)
+        map_pose = level_pose(tilted)
         assert map_pose.translation_m == (1.0, 2.0, 3.0)
         np.testing.assert_allclose(
             map_pose.rotation()[:, 0], [math.cos(yaw), math.sin(yaw), 0.0], atol=1e-6
         )
         np.testing.assert_allclose(map_pose.rotation()[:, 2], [0.0, 0.0, 1.0], atol=1e-12)
     up = SE3((0.0,) * 3, (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0))
-    assert levelled(up) == SE3()
+    assert level_pose(up) == SE3()
 
 
 def test_a_map_needs_a_rig() -> None:
@@ -229,16 +229,16 @@ def test_a_map_needs_a_rig() -> None:
     scene = replace(street(), rigs=(), cameras=(), lidars=())
 
     with pytest.raises(ConfigError, match="no rig to look down on; add an element 'ego'"):
-        frame_truth({"": scene}, [BevMap()], library())
+        annotate_ego({"": scene}, [BevMap()], library())
 
 
 def test_boxes_are_given_in_the_frames_of_ego_and_scanner_at_their_instants() -> None:
     """The ego stands at y = -2 facing +Y; the scanner sweeps when the car has moved on by 1 m."""
     scene = street(math.radians(90.0))
     car = scene.instances[0].T_world_instance
-    track = Track("car/0", 1.0, (car, SE3((10.0, 0.0, 0.0)) @ car))
+    track = Trajectory("car/0", 1.0, (car, SE3((10.0, 0.0, 0.0)) @ car))
     scene = replace(scene, tracks=(track,))
-    truth = frame_truth({"": scene, "roof": at(scene, 0.1)}, [Boxes3d()], library())
+    truth = annotate_ego({"": scene, "roof": scene_at(scene, 0.1)}, [Boxes3d()], library())
     assert truth is not None
     boxes = truth.boxes3d
     assert boxes is not None
@@ -255,10 +255,10 @@ def test_motion_is_told_along_the_axes_of_three_frames() -> None:
     """5 m/s along +X; the ego faces +Y, so that is to its right, and so to its camera's."""
     scene = street(math.radians(90.0))
     car = scene.instances[0].T_world_instance
-    track = Track("car/0", 1.0, (car, SE3((5.0, 0.0, 0.0)) @ car, SE3((10.0, 0.0, 0.0)) @ car))
-    scene = with_twists(replace(scene, tracks=(track,), time_s=1.0))
+    track = Trajectory("car/0", 1.0, (car, SE3((5.0, 0.0, 0.0)) @ car, SE3((10.0, 0.0, 0.0)) @ car))
+    scene = add_twists(replace(scene, tracks=(track,), time_s=1.0))
     given = ObjectTruth(scene.instances[0], 100, None)
-    reading = Reading("front", scene.cameras[0], {})
+    reading = SensorReading("front", scene.cameras[0], {})
 
     motion = Motion().annotate(scene, reading, given).motion
 
@@ -281,9 +281,9 @@ def test_the_ego_turns_about_its_body_and_not_about_its_rig() -> None:
         "turn",
         bodies=(Body("ego", "car"),),
         rigs=(Rig("ego", "ego", SE3((2.0, 0.0, 0.0))),),
-        tracks=(Track("ego", 0.02, knots, -0.04),),
+        tracks=(Trajectory("ego", 0.02, knots, -0.04),),
     )
-    truth = frame_truth({"": scene}, [Boxes3d()], library())
+    truth = annotate_ego({"": scene}, [Boxes3d()], library())
 
     assert truth is not None
     assert truth.twist.velocity_m_s == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
@@ -295,13 +295,13 @@ def test_annotators_do_what_their_methods_say() -> None:
     """Objects, images, samples: none gets what is another's; where none asks, nothing is made."""
     scene = street()
     annotators = [Motion(), Lanes(), Boxes3d()]
-    image = complete_truth(scene, seen(scene), annotators, Thresholds(), library())
-    frame = frame_truth({"": scene}, annotators, library())
+    image = annotate_reading(scene, seen(scene), annotators, Thresholds(), library())
+    frame = annotate_ego({"": scene}, annotators, library())
 
     assert [thing.motion is not None for thing in image.objects] == [True]
     assert image.borders
     assert image.free_space is None
-    assert isinstance(frame, FrameTruth)
+    assert isinstance(frame, EgoTruth)
     assert len(frame.borders or ()) == 3
     assert frame.birdseye is None
-    assert frame_truth({"": scene}, [Motion()], library()) is None
+    assert annotate_ego({"": scene}, [Motion()], library()) is None

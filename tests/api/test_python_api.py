@@ -12,9 +12,9 @@ import pytest
 import yaml
 
 import gen_data
-from exporters.images import SIGNED_ZERO, png, read_image
-from generator.core.capture import Channel
-from generator.core.serial import to_plain
+from gen_data.exporters.image_files import SIGNED_ZERO, encode_channel, read_image
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.serialization import to_plain
 from tests.end_to_end.running import environment
 
 SMALL = ("sensors.color.size_px=[96, 72]", "shard_size=3")
@@ -132,7 +132,7 @@ def test_typed_plug_ins_can_stand_in_a_dictionary() -> None:
     """An object of a plug-in's class means what its YAML means."""
     sensor = {"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 70.0}
     typed = gen_data.Dataset({**MINIMAL, "sensors": [sensor]})
-    from generator.sensors.rgb_camera import RgbCamera
+    from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 
     camera = RgbCamera(name="color", size_px=(64, 48), hfov_deg=70.0)
     assert gen_data.Dataset({**MINIMAL, "sensors": [camera]}).config == typed.config
@@ -245,7 +245,7 @@ def test_images_of_motion_are_read_as_written(channel: Channel, tmp_path: Path) 
         image = (units * unit).astype(np.float32)
         image[2, 3] = np.nan
     path = tmp_path / "image.png"
-    path.write_bytes(png(channel, image, 0.001))
+    path.write_bytes(encode_channel(channel, image, 0.001))
 
     np.testing.assert_allclose(read_image(path, channel, 0.001), image, atol=1e-6)
 
@@ -257,7 +257,7 @@ def test_normals_are_read_as_unit_vectors(tmp_path: Path) -> None:
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     normals[0, 0] = 0.0
     path = tmp_path / "image.png"
-    path.write_bytes(png(Channel.NORMALS, normals.astype(np.float32), 0.001))
+    path.write_bytes(encode_channel(Channel.NORMALS, normals.astype(np.float32), 0.001))
 
     read = read_image(path, Channel.NORMALS, 0.001)
 

@@ -8,9 +8,9 @@ import sys
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import load_config
-from generator.runner.identity import BYTES_DEPEND_ON, plan_of
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.runner.identity import BYTES_DEPEND_ON, make_plan
 from tests.architecture.test_rules import OURS, ROOT, python_files
 
 BYTES_DO_NOT_DEPEND_ON = {
@@ -56,7 +56,7 @@ def test_every_library_of_the_identity_is_a_declared_dependency() -> None:
 
 def test_a_plan_names_the_release_of_every_library() -> None:
     """So that ``pip install -U deflate`` in the middle of a data set is refused."""
-    versions = plan_of(PipelineFactory(load_config("tabletop.yaml"), n=1)).versions
+    versions = make_plan(PipelineFactory(load_config("tabletop.yaml"), n=1)).versions
 
     for package in BYTES_DEPEND_ON.values():
         try:

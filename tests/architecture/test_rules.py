@@ -49,7 +49,7 @@ def test_help_imports_click_and_nothing_else() -> None:
     program = (
         "import sys\n"
         "before = set(sys.modules)\n"
-        "from generator.cli.main import main\n"
+        "from gen_data.generator.cli.main import main\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         "loaded = {name.partition('.')[0] for name in set(sys.modules) - before}\n"
         "print('LOADED', *sorted(loaded - sys.stdlib_module_names))\n"

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from generator.annotations import TABLE
-from generator.annotations.bev_map import BevMap
-from generator.annotations.boxes2d import Boxes2d
-from generator.annotations.lanes import Lanes
-from generator.assemble.schema import config_schema
-from generator.assemble.spec import load_config
-from generator.config.describe import describe
-from generator.core.errors import ConfigError
+from gen_data.generator.annotations import TABLE
+from gen_data.generator.annotations.bev_map import BevMap
+from gen_data.generator.annotations.boxes2d import Boxes2d
+from gen_data.generator.annotations.lanes import Lanes
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.config_schema import config_schema
+from gen_data.generator.config.describe import describe
+from gen_data.generator.core.errors import ConfigError
 
 CAMERA = "template: tabletop\nsensors:\n  - {type: rgb_camera, name: color}\n"
 

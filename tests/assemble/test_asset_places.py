@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_config
-from generator.core.errors import UnknownAsset
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.errors import UnknownAsset
 
 
 @pytest.mark.parametrize("wrong", ["../../../etc/passwd", "pybullet/teddie", "muug?seed=3"])

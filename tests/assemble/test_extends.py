@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.documents import config_document
-from generator.assemble.spec import load_config
-from generator.core.errors import ConfigError
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.documents import load_config_document
+from gen_data.generator.core.errors import ConfigError
 
 BASE = """\
 seed: 3
@@ -60,7 +60,7 @@ randomizers:
 annotations: [poses]
 exporters: [{type: kitti}]
 """
-    plain = config_document(written(folder, own)).plain()
+    plain = load_config_document(written(folder, own)).plain()
 
     assert plain == {
         "seed": 3,
@@ -86,7 +86,7 @@ extends: base.yaml
 without: {randomizers: [clutter], exporters: [coco], elements: [table], annotations: [boxes2d]}
 randomizers: [{type: materials, name: clutter}]
 """
-    plain = config_document(written(folder, own)).plain()
+    plain = load_config_document(written(folder, own)).plain()
 
     assert plain["randomizers"] == [
         {"type": "colors", "name": "colors"},

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import load_config
-from generator.core.errors import ConfigError
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.core.errors import ConfigError
 
 HEAD = (
     "template: tabletop\n"

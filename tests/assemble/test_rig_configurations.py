@@ -7,21 +7,21 @@ import math
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import nominal_scene, open_pipeline
-from generator.assemble.spec import load_config
-from generator.assets.library import open_library
-from generator.core.errors import ConfigError
-from generator.core.instants import with_placed_sensors
-from generator.core.scene import Scene
-from generator.core.se3 import SE3
-from generator.sensors.lidar import LidarSensor
-from generator.sensors.rgb_camera import RgbCamera
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import nominal_scene, open_pipeline
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene_time import place_sensors
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
 
 
 def rig_scene(name: str, *overrides: str) -> Scene:
     """The nominal scene of a configuration, every sensor in its place."""
     spec = load_config(name, overrides=overrides)
-    return with_placed_sensors(nominal_scene(spec, spec.probes[0], open_library(())))
+    return place_sensors(nominal_scene(spec, spec.probes[0], open_library(())))
 
 
 def on_rig(scene: Scene, pose: SE3) -> SE3:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_config
-from generator.core.errors import ConfigError
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.errors import ConfigError
 
 HEAD = """\
 seed: 3

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.spec import config_of_source, load_config
-from generator.assemble.tables import find_plugin
-from generator.core.errors import ConfigError
+from gen_data.generator.assemble.config import load_config, load_source_config
+from gen_data.generator.assemble.plugin_tables import find_plugin
+from gen_data.generator.core.errors import ConfigError
 
 CAMERA = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}]\n"
 
@@ -109,7 +109,7 @@ def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
     plan = {"config": first.resolved, "name": first.name}
     (tmp_path / "plan.json").write_text(json.dumps(plan))
 
-    again = config_of_source(str(tmp_path))
+    again = load_source_config(str(tmp_path))
 
     assert again == first
 

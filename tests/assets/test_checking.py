@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generator.assets.catalogue import Index
-from generator.assets.checking import Finding, check_folder
-from generator.assets.library import open_library
-from generator.cli.assets import assets
-from generator.config.document import parse
-from generator.config.problems import Problems
-from generator.config.validation import validate
-from generator.core.errors import AssetError
+from gen_data.generator.assets.checking import Finding, check_folder
+from gen_data.generator.assets.folder_index import FolderIndex
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.cli.asset_commands import assets
+from gen_data.generator.config.problems import Problems
+from gen_data.generator.config.validation import validate
+from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.generator.core.errors import AssetError
 from tests.assets.test_user_folders import ARM, write_box
 
 
@@ -116,7 +116,7 @@ def test_the_page_on_assets_shows_a_valid_index() -> None:
     examples = page.read_text(encoding="utf-8").split("```yaml\n")[1:]
     text = max((example.partition("```")[0] for example in examples), key=len)
     problems = Problems()
-    index = validate(parse(text, str(page)), Index, problems)
+    index = validate(parse_yaml(text, str(page)), FolderIndex, problems)
     problems.raise_if_any()
     assert index is not None
     assert len(index.assets) == 3

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from generator.assets import digests
-from generator.assets.cache import DiskCache
-from generator.assets.digests import Digests
-from generator.assets.folder import Folder
-from generator.assets.references import files_of
+from gen_data.generator.assets import content_hashes
+from gen_data.generator.assets.asset_cache import DiskCache
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.content_hashes import ContentHashes
+from gen_data.generator.assets.file_references import find_referenced_files
 
 OLD = b"o " + b"a" * 40 + b"\n"
 NEW = b"o " + b"b" * 40 + b"\n"
@@ -34,12 +34,12 @@ def folder(tmp_path: Path) -> Folder:
 def settled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every digest is learnt an hour after the files have changed last."""
     now_ns = time.time_ns
-    monkeypatch.setattr(digests, "_now_ns", lambda: now_ns() + 3_600_000_000_000)
+    monkeypatch.setattr(content_hashes, "_now_ns", lambda: now_ns() + 3_600_000_000_000)
 
 
 def digest_of(folder: Folder, cache: Path) -> str:
     """What a process of its own says of the file."""
-    known = Digests(DiskCache(cache))
+    known = ContentHashes(DiskCache(cache))
     found = known.of(Folder(folder.root), "a.obj")["a.obj"]
     known.save()
     return found
@@ -101,11 +101,11 @@ def test_a_file_as_young_as_its_digest_is_read_again(folder: Folder, tmp_path: P
 def test_a_file_that_was_missing_and_came_changes_the_asset(folder: Folder, tmp_path: Path) -> None:
     """A material library that is put beside its mesh later."""
     (folder.root / "a.obj").write_bytes(b"mtllib a.mtl\n")
-    known = Digests(DiskCache(tmp_path / "cache"))
+    known = ContentHashes(DiskCache(tmp_path / "cache"))
     assert set(known.of(folder, "a.obj")) == {"a.obj"}
     known.save()
     (folder.root / "a.mtl").write_bytes(b"newmtl x\n")
-    again = Digests(DiskCache(tmp_path / "cache"))
+    again = ContentHashes(DiskCache(tmp_path / "cache"))
     assert set(again.of(folder, "a.obj")) == {"a.mtl", "a.obj"}
 
 
@@ -113,7 +113,7 @@ def test_a_file_that_was_missing_and_came_changes_the_asset(folder: Folder, tmp_
 def test_lines_full_of_blanks_are_read_in_linear_time(folder: Folder, blank: str) -> None:
     """Two million blanks; a pattern that tries every split of them would not end."""
     (folder.root / "a.obj").write_text(blank.format(" " * 2_000_000))
-    assert files_of(folder, "a.obj") == ("a.obj",)
+    assert find_referenced_files(folder, "a.obj") == ("a.obj",)
 
 
 def test_the_last_word_of_a_map_is_its_file(folder: Folder) -> None:
@@ -121,4 +121,4 @@ def test_the_last_word_of_a_map_is_its_file(folder: Folder) -> None:
     (folder.root / "a.obj").write_text("mtllib  my a.mtl \r\n")
     (folder.root / "my a.mtl").write_text("newmtl x\n map_Kd -s 1 1 1\tw.png\nbump" + " " * 10**6)
     (folder.root / "w.png").write_bytes(b"x")
-    assert files_of(folder, "a.obj") == ("a.obj", "my a.mtl", "w.png")
+    assert find_referenced_files(folder, "a.obj") == ("a.obj", "my a.mtl", "w.png")

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from generator.assets.ids import AssetId, canonical, parse
-from generator.core.errors import AssetError
+from gen_data.generator.assets.asset_ids import AssetId, canonical_id, parse_asset_id
+from gen_data.generator.core.errors import AssetError
 
 KEYS = st.from_regex(r"[a-z][a-z0-9_]{0,8}", fullmatch=True)
 NUMBERS = st.integers(-(10**9), 10**9) | st.floats(-1e6, 1e6, allow_nan=False)
@@ -17,22 +17,22 @@ LISTS = st.lists(st.floats(-1e6, 1e6, allow_nan=False), min_size=2, max_size=4).
 
 def test_keys_are_sorted_and_numbers_shortened() -> None:
     """Equal assets have equal ids, however they were spelled."""
-    assert canonical("table?style=legs&size_m=1.20,0.8,74e-2") == (
+    assert canonical_id("table?style=legs&size_m=1.20,0.8,74e-2") == (
         "table?size_m=1.2,0.8,0.74&style=legs"
     )
-    assert canonical("mug?seed=007") == "mug?seed=7"
+    assert canonical_id("mug?seed=007") == "mug?seed=7"
 
 
 def test_values_are_numbers_lists_or_words() -> None:
     """Types follow from the spelling alone."""
-    parsed = parse("x?a=3&b=0.5&c=1,2&d=blue")
+    parsed = parse_asset_id("x?a=3&b=0.5&c=1,2&d=blue")
     assert parsed == AssetId("x", {"a": 3, "b": 0.5, "c": (1.0, 2.0), "d": "blue"})
 
 
 def test_a_plain_id_is_its_own_canonical_form() -> None:
     """Paths and image names pass through."""
-    assert canonical("pybullet/teddy") == "pybullet/teddy"
-    assert str(parse("random_urdfs/000")) == "random_urdfs/000"
+    assert canonical_id("pybullet/teddy") == "pybullet/teddy"
+    assert str(parse_asset_id("random_urdfs/000")) == "random_urdfs/000"
 
 
 @given(st.dictionaries(KEYS, NUMBERS | WORDS | LISTS, max_size=4))
@@ -41,8 +41,8 @@ def test_canonical_ids_read_back_as_themselves(
 ) -> None:
     """Writing and reading an id loses nothing."""
     text = str(AssetId("family", parameters))
-    assert str(parse(text)) == text
-    assert parse(text).parameters == parameters
+    assert str(parse_asset_id(text)) == text
+    assert parse_asset_id(text).parameters == parameters
 
 
 @pytest.mark.parametrize(
@@ -56,4 +56,4 @@ def test_canonical_ids_read_back_as_themselves(
 def test_malformed_ids_are_refused(text: str) -> None:
     """Nothing that is not an id reaches the file system."""
     with pytest.raises(AssetError, match="asset"):
-        parse(text)
+        parse_asset_id(text)

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from generator.assets.folder import Folder
-from generator.assets.library import open_library
-from generator.assets.maps import Maps, composed, maps_named
-from generator.assets.readers import read_mesh
-from generator.core.errors import AssetError, ConfigError
-from generator.core.geometry import Material, TextureData
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.assets.texture_maps import TextureMaps, compose_texture, find_maps
+from gen_data.generator.core.asset_types import Material, TextureData
+from gen_data.generator.core.errors import AssetError, ConfigError
 
 TRIANGLE_OBJ = (
     "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
@@ -260,16 +260,20 @@ def test_index_values_out_of_range_are_one_clear_error(
 
 def test_names_of_maps_survive_any_file_name() -> None:
     """Spaces, semicolons and equal signs in names of images come back."""
-    maps = Maps(albedo="a b;c=d.png", metallic="x%20/y.png!2", alpha="a b;c=d.png!3", cutoff=0.2)
-    assert maps_named(maps.name()) == maps
-    assert maps_named("plain.png") is None
-    assert Maps(albedo="plain.png").name() == "plain.png"
+    maps = TextureMaps(
+        albedo="a b;c=d.png", metallic="x%20/y.png!2", alpha="a b;c=d.png!3", cutoff=0.2
+    )
+    assert find_maps(maps.name()) == maps
+    assert find_maps("plain.png") is None
+    assert TextureMaps(albedo="plain.png").name() == "plain.png"
 
 
 def test_maps_of_several_sizes_take_the_largest() -> None:
     """A grey of 2 x 2 beside a colour of 8 x 4."""
     small, large = np.full((2, 2, 3), 70, np.uint8), np.full((4, 8, 3), 9, np.uint8)
-    texture = composed(Maps(albedo="s", emission="l"), {"s": small, "l": large}.__getitem__)
+    texture = compose_texture(
+        TextureMaps(albedo="s", emission="l"), {"s": small, "l": large}.__getitem__
+    )
     assert texture.albedo.shape == (4, 8, 3) and (texture.albedo == 70).all()
 
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from generator.assets.convex import convex_parts, hull_vertices
-from generator.assets.primitives import box, sphere
-from generator.assets.soup import Soup, joined
-from generator.core.errors import AssetError
+from gen_data.generator.assets.convex_decomposition import convex_parts, hull_vertices
+from gen_data.generator.assets.primitive_solids import box, sphere
+from gen_data.generator.assets.triangle_soup import TriangleSoup, join_soups
+from gen_data.generator.core.errors import AssetError
 
 
 def moved(corners: np.ndarray, by: tuple[float, float, float]) -> np.ndarray:
     return corners + np.array(by)
 
 
-def tray() -> Soup:
+def tray() -> TriangleSoup:
     """A floor and four walls in one group, 0.4 x 0.4 x 0.1 m, 0.02 m thick."""
     parts = [
         box((0.4, 0.4, 0.02)),
@@ -25,12 +25,12 @@ def tray() -> Soup:
         moved(box((0.4, 0.02, 0.1)), (0, -0.19, 0.05)),
         moved(box((0.4, 0.02, 0.1)), (0, 0.19, 0.05)),
     ]
-    return Soup.of(np.concatenate(parts))
+    return TriangleSoup.of(np.concatenate(parts))
 
 
 def test_a_convex_solid_is_one_part_with_its_corners() -> None:
     """A box is its eight corners."""
-    (part,) = convex_parts(Soup.of(box((0.1, 0.2, 0.3))), "box").parts_m
+    (part,) = convex_parts(TriangleSoup.of(box((0.1, 0.2, 0.3))), "box").parts_m
     assert sorted(map(tuple, part.tolist())) == sorted(
         (x, y, z) for x in (-0.05, 0.05) for y in (-0.1, 0.1) for z in (-0.15, 0.15)
     )
@@ -38,7 +38,9 @@ def test_a_convex_solid_is_one_part_with_its_corners() -> None:
 
 def test_groups_of_a_file_become_parts() -> None:
     """A decomposition made elsewhere is taken as it is."""
-    two = joined([Soup.of(box((1, 1, 1))), Soup.of(moved(box((1, 1, 1)), (3, 0, 0)))])
+    two = join_soups(
+        [TriangleSoup.of(box((1, 1, 1))), TriangleSoup.of(moved(box((1, 1, 1)), (3, 0, 0)))]
+    )
     parts = convex_parts(two, "two").parts_m
     assert [len(part) for part in parts] == [8, 8]
 
@@ -78,7 +80,7 @@ def test_a_sheet_of_paper_gets_a_thickness() -> None:
     sheet = np.array(
         [[[0.0, 0, 0], [0.2, 0, 0], [0, 0.3, 0]], [[0.2, 0, 0], [0.2, 0.3, 0], [0, 0.3, 0]]]
     )
-    (part,) = convex_parts(Soup.of(sheet), "sheet").parts_m
+    (part,) = convex_parts(TriangleSoup.of(sheet), "sheet").parts_m
     assert part[:, 2].max() - part[:, 2].min() == pytest.approx(0.02 * 0.3)
 
 

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from generator.assets.catalogue import Index, MeshEntry, listed
-from generator.assets.folder import Folder
-from generator.assets.library import open_library
-from generator.assets.readers import read_mesh
-from generator.assets.soup import Soup
-from generator.core.errors import AssetError
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.folder_index import FolderIndex, MeshEntry, list_assets
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.assets.triangle_soup import TriangleSoup
+from gen_data.generator.core.errors import AssetError
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 TETRAHEDRON = TRIANGLE + "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
@@ -411,7 +411,9 @@ def test_a_polygon_of_twenty_thousand_corners_is_fine(tmp_path: Path) -> None:
 def test_a_series_writes_numbers_with_three_digits() -> None:
     """``000`` is the place of the number in id and file."""
     entry = MeshEntry(id="a/000", file="x/000/000.obj", category="c", count=12)
-    names = [(one.asset_id, one.entry.file) for one in listed(Index(assets=(entry,)), Path())]
+    names = [
+        (one.asset_id, one.entry.file) for one in list_assets(FolderIndex(assets=(entry,)), Path())
+    ]
     assert names[11] == ("a/011", "x/011/011.obj")
 
 
@@ -433,7 +435,7 @@ def test_an_stl_with_too_many_triangles_is_refused_before_it_is_decoded(
 ) -> None:
     """Its header says how many there are."""
     (tmp_path / "a.stl").write_bytes(stl(4, 4))
-    monkeypatch.setattr("generator.assets.readers.source.MAX_FACES", 3)
-    monkeypatch.setattr(Soup, "of", lambda *_: pytest.fail("decoded"))
+    monkeypatch.setattr("gen_data.generator.assets.readers.mesh_source.MAX_FACES", 3)
+    monkeypatch.setattr(TriangleSoup, "of", lambda *_: pytest.fail("decoded"))
     with pytest.raises(AssetError, match="4 triangles, at most 3"):
         read_mesh(Folder(tmp_path), "a.stl")

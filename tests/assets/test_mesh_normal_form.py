@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.assets.mesh import NormalForm, normal_form
-from generator.assets.primitives import box, cylinder, sphere
-from generator.assets.soup import Slot, Soup
-from generator.core.errors import AssetError
-from generator.core.geometry import Material, MeshData
+from gen_data.generator.assets.normal_form import NormalForm, normal_form
+from gen_data.generator.assets.primitive_solids import box, cylinder, sphere
+from gen_data.generator.assets.triangle_soup import MaterialSlot, TriangleSoup
+from gen_data.generator.core.asset_types import Material, MeshData
+from gen_data.generator.core.errors import AssetError
 
 
 def volume_m3(mesh: MeshData) -> float:
@@ -29,7 +29,7 @@ def face_normals(mesh: MeshData) -> np.ndarray:
 
 def test_a_box_keeps_its_edges() -> None:
     """Six flat sides share no vertex: 24 vertices, each normal along an axis."""
-    mesh = normal_form(Soup.of(box((0.2, 0.3, 0.4))), "box")
+    mesh = normal_form(TriangleSoup.of(box((0.2, 0.3, 0.4))), "box")
     assert (len(mesh.vertices_m), len(mesh.faces)) == (24, 12)
     assert np.abs(mesh.normals).max(axis=1) == pytest.approx(1.0)
     assert volume_m3(mesh) == pytest.approx(0.2 * 0.3 * 0.4, rel=1e-5)
@@ -37,7 +37,7 @@ def test_a_box_keeps_its_edges() -> None:
 
 def test_a_ball_is_smooth() -> None:
     """No vertex is split, and normals point along the radius."""
-    mesh = normal_form(Soup.of(sphere(0.1)), "ball")
+    mesh = normal_form(TriangleSoup.of(sphere(0.1)), "ball")
     directions = mesh.vertices_m / np.linalg.norm(mesh.vertices_m, axis=1, keepdims=True)
     assert (mesh.normals * directions).sum(axis=1).min() > 0.999
     assert len(mesh.vertices_m) == len(np.unique(mesh.vertices_m.round(6), axis=0))
@@ -45,7 +45,7 @@ def test_a_ball_is_smooth() -> None:
 
 def test_a_cylinder_is_smooth_around_and_sharp_at_its_rims() -> None:
     """Each rim vertex occurs twice: once for the side, once for the cap."""
-    mesh = normal_form(Soup.of(cylinder(0.05, 0.2)), "can")
+    mesh = normal_form(TriangleSoup.of(cylinder(0.05, 0.2)), "can")
     rim = np.abs(np.hypot(mesh.vertices_m[:, 0], mesh.vertices_m[:, 1]) - 0.05) < 1e-6
     assert rim.sum() == 2 * 2 * 32
     vertical = np.abs(mesh.normals[rim, 2])
@@ -55,7 +55,9 @@ def test_a_cylinder_is_smooth_around_and_sharp_at_its_rims() -> None:
 @pytest.mark.parametrize("crease_deg", [5.0, 60.0])
 def test_the_crease_angle_decides_what_is_smooth(crease_deg: float) -> None:
     """A 32-sided cylinder has 11.25 degrees between its sides."""
-    mesh = normal_form(Soup.of(cylinder(0.05, 0.2)), "can", NormalForm(crease_deg=crease_deg))
+    mesh = normal_form(
+        TriangleSoup.of(cylinder(0.05, 0.2)), "can", NormalForm(crease_deg=crease_deg)
+    )
     flat = np.repeat(face_normals(mesh), 3, axis=0)
     deviation = (mesh.normals[mesh.faces.reshape(-1)] * flat).sum(axis=1).min()
     expected = 1.0 if crease_deg < 11.25 else math.cos(math.radians(11.25 / 2))
@@ -64,7 +66,7 @@ def test_the_crease_angle_decides_what_is_smooth(crease_deg: float) -> None:
 
 def test_an_inside_out_mesh_is_turned() -> None:
     """A closed surface encloses a positive volume."""
-    mesh = normal_form(Soup.of(box((0.2, 0.2, 0.2))).flipped(), "box")
+    mesh = normal_form(TriangleSoup.of(box((0.2, 0.2, 0.2))).flipped(), "box")
     assert volume_m3(mesh) == pytest.approx(0.008, rel=1e-5)
     outward = (face_normals(mesh) * mesh.vertices_m[mesh.faces].mean(axis=1)).sum(axis=1)
     assert (outward > 0).all()
@@ -74,16 +76,18 @@ def test_mixed_windings_are_made_consistent() -> None:
     """Every third triangle of a ball is wound the wrong way."""
     corners = sphere(0.1)
     corners[::3] = corners[::3, ::-1]
-    mesh = normal_form(Soup.of(corners), "ball")
-    assert volume_m3(mesh) == pytest.approx(volume_m3(normal_form(Soup.of(sphere(0.1)), "ball")))
+    mesh = normal_form(TriangleSoup.of(corners), "ball")
+    assert volume_m3(mesh) == pytest.approx(
+        volume_m3(normal_form(TriangleSoup.of(sphere(0.1)), "ball"))
+    )
     assert (face_normals(mesh) * mesh.vertices_m[mesh.faces].mean(axis=1)).sum(axis=1).min() > 0
 
 
 def test_an_open_surface_keeps_the_winding_of_its_file() -> None:
     """A single triangle has no inside."""
     triangle = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
-    assert normal_form(Soup.of(triangle), "t").normals[0, 2] == 1.0
-    assert normal_form(Soup.of(triangle).flipped(), "t").normals[0, 2] == -1.0
+    assert normal_form(TriangleSoup.of(triangle), "t").normals[0, 2] == 1.0
+    assert normal_form(TriangleSoup.of(triangle).flipped(), "t").normals[0, 2] == -1.0
 
 
 def test_degenerate_and_duplicate_triangles_are_dropped() -> None:
@@ -91,13 +95,13 @@ def test_degenerate_and_duplicate_triangles_are_dropped() -> None:
     triangle = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]
     turned = [triangle[1], triangle[2], triangle[0]]
     line = [[0.0, 0, 0], [0.5, 0, 0], [1, 0, 0]]
-    mesh = normal_form(Soup.of(np.array([triangle, [triangle[0]] * 3, line, turned])), "t")
+    mesh = normal_form(TriangleSoup.of(np.array([triangle, [triangle[0]] * 3, line, turned])), "t")
     assert mesh.faces.tolist() == [[0, 1, 2]]
 
 
 def test_good_normals_of_a_file_are_kept() -> None:
     """An artist's normals, up to 45 degrees off the face, survive."""
-    soup = Soup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
+    soup = TriangleSoup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
     tilted = np.array([[[0.6, 0, 0.8], [0, 0.6, 0.8], [0.0, 0, 1]]])
     assert normal_form(replace(soup, normals=tilted), "t").normals == pytest.approx(tilted[0])
 
@@ -105,7 +109,7 @@ def test_good_normals_of_a_file_are_kept() -> None:
 @pytest.mark.parametrize("bad", [np.zeros((1, 3, 3)), np.full((1, 3, 3), np.nan)])
 def test_bad_normals_of_a_file_are_replaced(bad: np.ndarray) -> None:
     """Zero, undefined or backward normals say nothing."""
-    soup = Soup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
+    soup = TriangleSoup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
     backward = np.broadcast_to(np.array([0.0, 0.0, -1.0]), (1, 3, 3))
     for normals in (bad, backward):
         mesh = normal_form(replace(soup, normals=normals), "t")
@@ -118,7 +122,9 @@ def test_a_dense_mesh_is_thinned_out_to_its_budget_and_keeps_its_shape() -> None
     upper = (corners.mean(axis=1)[:, 2] > 0).astype(np.int64)
     red, blue = Material(base_color=(1, 0, 0)), Material(base_color=(0, 0, 1))
     soup = replace(
-        Soup.of(corners), face_slots=upper, slots=(Slot("a", red, True), Slot("b", blue, True))
+        TriangleSoup.of(corners),
+        face_slots=upper,
+        slots=(MaterialSlot("a", red, True), MaterialSlot("b", blue, True)),
     )
     mesh = normal_form(soup, "ball", NormalForm(max_faces=1000))
     assert len(corners) > 3500
@@ -141,8 +147,12 @@ def _subdivided(corners: np.ndarray, times: int) -> np.ndarray:
 def test_equal_materials_become_one_slot_and_unused_ones_none() -> None:
     """Renderers get one draw per look, not one per name."""
     plain = Material()
-    slots = (Slot("a", plain), Slot("b", plain), Slot("c", Material(roughness=0.1)))
-    soup = replace(Soup.of(box((1, 1, 1))), face_slots=np.array([0, 1] * 6), slots=slots)
+    slots = (
+        MaterialSlot("a", plain),
+        MaterialSlot("b", plain),
+        MaterialSlot("c", Material(roughness=0.1)),
+    )
+    soup = replace(TriangleSoup.of(box((1, 1, 1))), face_slots=np.array([0, 1] * 6), slots=slots)
     mesh = normal_form(soup, "box")
     assert mesh.materials == (plain,)
     assert set(mesh.face_slots.tolist()) == {0}
@@ -162,13 +172,13 @@ def test_equal_materials_become_one_slot_and_unused_ones_none() -> None:
 def test_unusable_soups_are_refused(corners: np.ndarray, reason: str) -> None:
     """The message names the place, the fact and what to do."""
     with pytest.raises(AssetError, match=rf"^place: .*{reason}"):
-        normal_form(Soup.of(corners), "place")
+        normal_form(TriangleSoup.of(corners), "place")
 
 
 def test_mirroring_keeps_the_outside_outside() -> None:
     """A scale of -1 along one axis, as some URDFs have, does not turn a mesh inside out."""
     matrix = np.hstack([np.diag([-1.0, 1.0, 1.0]), np.zeros((3, 1))])
-    soup = Soup.of(box((0.1, 0.2, 0.3))).transformed(matrix)
+    soup = TriangleSoup.of(box((0.1, 0.2, 0.3))).transformed(matrix)
     assert (np.einsum("ni,ni->n", soup.corners.mean(axis=1),
             np.cross(soup.corners[:, 1] - soup.corners[:, 0],
                      soup.corners[:, 2] - soup.corners[:, 0])) > 0).all()  # fmt: skip

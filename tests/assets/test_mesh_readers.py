@@ -13,11 +13,11 @@ import pytest
 import trimesh
 from PIL import Image
 
-from generator.assets.folder import Folder
-from generator.assets.library import open_library
-from generator.assets.primitives import box, sphere
-from generator.assets.readers import read_mesh
-from generator.core.errors import AssetError
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.primitive_solids import box, sphere
+from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.core.errors import AssetError
 
 CUBE_OBJ = """mtllib cube.mtl
 v 0 0 0

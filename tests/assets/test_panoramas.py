@@ -10,10 +10,10 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from generator.assets.images import decode_radiance
-from generator.assets.library import open_library
-from generator.core.errors import AssetError
-from generator.packs.panoramas import radiance_file
+from gen_data.generator.assets.image_decoding import decode_radiance
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.packs.panoramas import encode_radiance
 
 
 def pixels(height: int = 8) -> np.ndarray:
@@ -41,7 +41,7 @@ def test_openexr_and_radiance_hold_the_same_light() -> None:
     """The same panorama of mean luminance 1 from both, to the precision of Radiance (1 %)."""
     exr, hdr = (
         decode_radiance(exr_file(pixels()), "a"),
-        decode_radiance(radiance_file(pixels()), "b"),
+        decode_radiance(encode_radiance(pixels()), "b"),
     )
 
     np.testing.assert_allclose(exr, hdr, rtol=0.01)
@@ -70,8 +70,8 @@ def test_a_little_ringing_below_zero_is_dark() -> None:
         (lambda: exr_file(pixels(64))[:600], "unreadable OpenEXR image"),
         (lambda: exr_file(pixels())[:4] + bytes(200), "unreadable OpenEXR image"),
         (lambda: exr_file(np.ones((1, 17000, 3), np.float32)), "at most 16384 a side"),
-        (lambda: radiance_file(pixels())[:-100], "unreadable panorama"),
-        (lambda: radiance_file(0.0 * pixels()), "black"),
+        (lambda: encode_radiance(pixels())[:-100], "unreadable panorama"),
+        (lambda: encode_radiance(0.0 * pixels()), "black"),
         (lambda: b"#?RADIANCE\n\nnonsense", "neither Radiance nor OpenEXR"),
         (lambda: b"", "neither Radiance nor OpenEXR"),
         (lambda: b"\x89PNG\r\n\x1a\n" + bytes(64), "neither Radiance nor OpenEXR"),

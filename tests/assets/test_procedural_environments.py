@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.assets.procedural import ENVIRONMENTS
-from generator.assets.procedural.environments import directions, normalised
+from gen_data.generator.assets.procedural import ENVIRONMENTS
+from gen_data.generator.assets.procedural.environments import normalize_luminance, pixel_directions
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -38,7 +38,7 @@ def test_equal_seeds_make_equal_environments_and_others_differ(name: str) -> Non
 
 def test_columns_grow_clockwise_from_minus_x() -> None:
     """Row 0 is the zenith, column 0 is -X, the centre +X, three quarters -Y."""
-    d = directions(64)
+    d = pixel_directions(64)
 
     assert d[0, 0, 2] > 0.999
     assert np.allclose(d[32, 0], (-1.0, 0.0, 0.0), atol=0.05)
@@ -85,4 +85,4 @@ def test_studio_light_comes_from_a_few_small_places() -> None:
 
 def test_normalising_a_uniform_image_gives_ones() -> None:
     """The scale of the input does not matter."""
-    assert np.allclose(normalised(np.full((16, 32, 3), 7.0)), 1.0, atol=1e-6)
+    assert np.allclose(normalize_luminance(np.full((16, 32, 3), 7.0)), 1.0, atol=1e-6)

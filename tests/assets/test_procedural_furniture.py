@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from generator.assets.procedural import FAMILIES
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.furniture import (
+from gen_data.generator.assets.procedural import FAMILIES
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.furniture import (
     SLOTS,
     bin_interior_m,
     shelf_clearance_m,
     shelf_levels_m,
 )
-from generator.core.errors import AssetError
+from gen_data.generator.core.errors import AssetError
 
 FURNITURE = sorted(name for name, family in FAMILIES.items() if not family.variants)
 SIZED = ("table", "shelf", "bin", "box", "pedestal", "gantry")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from generator.assets.procedural import FAMILIES, TEXTURES
-from generator.assets.procedural.family import Solid
-from generator.core.geometry import MeshData
+from gen_data.generator.assets.procedural import FAMILIES, TEXTURES
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.core.asset_types import MeshData
 
 SEEDS = (0, 1, 7, 11)
 OBJECTS = sorted(name for name, family in FAMILIES.items() if family.variants)

@@ -7,22 +7,27 @@ import math
 import numpy as np
 import pytest
 
-from generator.assets.procedural.mesh import CREASE_DEG, Patch, finished, joined
-from generator.assets.procedural.shapes import (
-    along_grain,
+from gen_data.generator.assets.procedural.patches import (
+    CREASE_DEG,
+    Patch,
+    finish_mesh,
+    join_patches,
+)
+from gen_data.generator.assets.procedural.surface_shapes import (
     ball,
     block,
     circle,
     cone,
-    extruded,
+    extrude,
     fillet,
     lathe,
+    map_along_grain,
     rounded_box,
     spline,
     sweep,
-    triangulated,
+    triangulate,
 )
-from generator.core.geometry import Material
+from gen_data.generator.core.asset_types import Material
 
 
 def test_a_turned_cylinder_has_the_volume_of_its_prism() -> None:
@@ -80,7 +85,7 @@ def test_a_rounded_box_keeps_its_size_and_loses_its_corners() -> None:
 
 def test_flat_faces_next_to_a_bevel_stay_flat() -> None:
     """Their normals lean by less than two degrees, or large faces would look like pillows."""
-    mesh = finished(block((0.0, 0.0, 0.0), (1.0, 0.6, 0.03), 0.003), [Material()], CREASE_DEG)
+    mesh = finish_mesh(block((0.0, 0.0, 0.0), (1.0, 0.6, 0.03), 0.003), [Material()], CREASE_DEG)
     top = mesh.normals[(mesh.vertices_m[:, 2] > 0.0299) & (mesh.normals[:, 2] > 0.8)]
 
     assert len(top)
@@ -89,8 +94,8 @@ def test_flat_faces_next_to_a_bevel_stay_flat() -> None:
 
 def test_a_plain_box_is_split_at_its_edges_and_a_ball_is_not() -> None:
     """Creases have one normal per face; smooth surfaces one per vertex."""
-    box = finished(block((0, 0, 0), (1, 1, 1)), [Material()], CREASE_DEG)
-    sphere = finished(ball(lambda d: d, 12, 24), [Material()], CREASE_DEG)
+    box = finish_mesh(block((0, 0, 0), (1, 1, 1)), [Material()], CREASE_DEG)
+    sphere = finish_mesh(ball(lambda d: d, 12, 24), [Material()], CREASE_DEG)
 
     assert len(box.vertices_m) == 24
     assert {tuple(n) for n in np.abs(box.normals).tolist()} == {(1, 0, 0), (0, 1, 0), (0, 0, 1)}
@@ -103,7 +108,7 @@ def test_an_extruded_ring_has_the_volume_of_its_area() -> None:
     holes = [hole, hole[::-1] + np.array([0.03, 0.0]), circle(0.006, 12, (-0.02, 0.025))]
     area = _area(outer) - 2 * _area(hole) - _area(holes[2])
 
-    assert _volume(extruded(outer, 0.02, holes=holes)) == pytest.approx(area * 0.02)
+    assert _volume(extrude(outer, 0.02, holes=holes)) == pytest.approx(area * 0.02)
 
 
 @pytest.mark.parametrize("teeth", [5, 9, 16])
@@ -112,7 +117,7 @@ def test_triangles_of_a_star_cover_it_exactly(teeth: int) -> None:
     turn = np.pi * np.arange(2 * teeth) / teeth
     reach = np.where(np.arange(2 * teeth) % 2 == 0, 1.0, 0.45)
     star = np.stack([reach * np.cos(turn), reach * np.sin(turn)], axis=1)
-    triangles = triangulated(star, [circle(0.2, 7)[::-1]])
+    triangles = triangulate(star, [circle(0.2, 7)[::-1]])
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     areas = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
 
@@ -123,7 +128,7 @@ def test_triangles_of_a_star_cover_it_exactly(teeth: int) -> None:
 def test_a_hole_outside_its_outline_is_refused() -> None:
     """Instead of triangles that overlap."""
     with pytest.raises(ValueError, match="outside"):
-        triangulated(circle(1.0, 8), [circle(0.2, 8, (3.0, 0.0))[::-1]])
+        triangulate(circle(1.0, 8), [circle(0.2, 8, (3.0, 0.0))[::-1]])
 
 
 def test_a_fillet_touches_both_sides_and_keeps_its_radius() -> None:
@@ -145,7 +150,7 @@ def test_a_spline_passes_through_its_points() -> None:
 
 def test_seams_of_the_image_do_not_crease_the_surface() -> None:
     """Vertices on both sides of the seam have one normal."""
-    mesh = finished(lathe([(0.1, 0.0), (0.1, 0.2)], 24), [Material()], CREASE_DEG)
+    mesh = finish_mesh(lathe([(0.1, 0.0), (0.1, 0.2)], 24), [Material()], CREASE_DEG)
     seam = (mesh.vertices_m[:, 0] < -0.0999) & (mesh.vertices_m[:, 2] < 1e-6)
 
     assert seam.sum() == 2
@@ -155,7 +160,7 @@ def test_seams_of_the_image_do_not_crease_the_surface() -> None:
 def test_degenerate_triangles_are_left_out() -> None:
     """A pole of a sphere is a fan, not quads with a side of no length."""
     rings, segments = 6, 12
-    mesh = finished(ball(lambda d: d, rings, segments), [Material()], CREASE_DEG)
+    mesh = finish_mesh(ball(lambda d: d, rings, segments), [Material()], CREASE_DEG)
 
     assert len(mesh.faces) == 2 * segments * (rings - 1)
 
@@ -163,7 +168,7 @@ def test_degenerate_triangles_are_left_out() -> None:
 def test_grain_follows_the_longest_side_whatever_the_direction() -> None:
     """A board along Y and one along Z have u along their length."""
     for size in ((0.1, 1.0, 0.02), (0.1, 0.02, 1.0)):
-        patch = along_grain(block((0.0, 0.0, 0.0), size), 0.5)
+        patch = map_along_grain(block((0.0, 0.0, 0.0), size), 0.5)
         axis = int(np.argmax(size))
         long = np.ptp(patch.corners_m[:, :, axis], axis=1) > 0.5
         du = np.ptp(patch.uvs[long, :, 0], axis=1)
@@ -173,7 +178,7 @@ def test_grain_follows_the_longest_side_whatever_the_direction() -> None:
 def test_turning_and_moving_keep_the_volume() -> None:
     """Patches are rigid, and painted slots survive joining."""
     cylinder = cone((0.1, 0.0), (0.05, 0.3), 16)
-    both = joined([cylinder, cylinder.rotated("x", 0.7).moved(1.0, 2.0, 3.0).painted(1)])
+    both = join_patches([cylinder, cylinder.rotated("x", 0.7).moved(1.0, 2.0, 3.0).painted(1)])
 
     assert _volume(both) == pytest.approx(2 * _volume(cylinder))
     assert set(both.slots.tolist()) == {0, 1}

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.assets.procedural import TEXTURES
-from generator.assets.procedural.cans import can_size
-from generator.assets.procedural.noise import fbm, perlin, worley
-from generator.core.geometry import TextureData
-from generator.core.streams import Streams
+from gen_data.generator.assets.procedural import TEXTURES
+from gen_data.generator.assets.procedural.cans import can_size
+from gen_data.generator.assets.procedural.noise import fbm, perlin, worley
+from gen_data.generator.core.asset_types import TextureData
+from gen_data.generator.core.streams import Streams
 
 PRINTED = {"label", "can_label", "carton", "milk_label", "book_cover"}
 FOOD = {"apple_skin", "citrus_peel", "banana_peel", "pear_skin", "ball_cover"}

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from generator.assets.library import open_library
-from generator.assets.skies import daylight
-from generator.assets.skies.sky import (
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.skies import daylight
+from gen_data.generator.assets.skies.sky import (
     SkyModel,
     clear_sky,
     luminance_cd_m2,
@@ -18,7 +18,7 @@ from generator.assets.skies.sky import (
     sky,
     sun_lux,
 )
-from generator.core.errors import AssetError
+from gen_data.generator.core.errors import AssetError
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from generator.assets.library import Library, open_library
-from generator.core.geometry import RobotModel
-from generator.core.se3 import SE3
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.asset_types import RobotModel
+from gen_data.generator.core.se3 import SE3
 
 ROBOTS = ("franka_panda", "kuka_iiwa", "xarm6")
 

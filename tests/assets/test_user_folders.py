@@ -12,15 +12,15 @@ import pytest
 import trimesh
 from PIL import Image
 
-from generator.assets import discovery
-from generator.assets.catalogue import MeshEntry
-from generator.assets.importer import upright
-from generator.assets.library import open_library
-from generator.assets.primitives import box
-from generator.core.errors import AssetError, ConfigError, UnknownAsset
-from generator.core.geometry import Symmetry
-from generator.core.kinematics import link_poses
-from generator.core.se3 import SE3
+from gen_data.generator.assets import discovery
+from gen_data.generator.assets.folder_index import MeshEntry
+from gen_data.generator.assets.importer import upright_transform
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.primitive_solids import box
+from gen_data.generator.core.asset_types import Symmetry
+from gen_data.generator.core.errors import AssetError, ConfigError, UnknownAsset
+from gen_data.generator.core.kinematics import link_poses
+from gen_data.generator.core.se3 import SE3
 
 ARM = """<robot name="arm">
   <link name="base"><visual><geometry><box size="0.2 0.2 0.1"/></geometry>
@@ -273,7 +273,9 @@ def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
     """As a turn: nothing is mirrored."""
     names = {"x": (1.0, 0, 0), "y": (0, 1.0, 0), "z": (0, 0, 1.0), "-x": (-1.0, 0, 0),
              "-y": (0, -1.0, 0), "-z": (0, 0, -1.0)}  # fmt: skip
-    turn = upright(MeshEntry.model_validate({"file": "a.obj", "up": up, "front": front}))[:, :3]
+    turn = upright_transform(MeshEntry.model_validate({"file": "a.obj", "up": up, "front": front}))[
+        :, :3
+    ]
     assert turn @ names[up] == pytest.approx((0, 0, 1))
     assert turn @ names[front] == pytest.approx((1, 0, 0))
     assert np.linalg.det(turn) == pytest.approx(1.0)

@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field
 
-from generator.config.describe import describe, example_of
-from generator.config.distributions import (
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.describe import describe, make_example
+from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
     Count,
@@ -25,11 +26,10 @@ from generator.config.distributions import (
     So3,
     Uniform,
 )
-from generator.config.document import parse
-from generator.config.problems import Problems
-from generator.config.schema import json_schema
-from generator.config.strict import Strict
-from generator.config.validation import validate
+from gen_data.generator.config.problems import Problems
+from gen_data.generator.config.schema import json_schema
+from gen_data.generator.config.validation import validate
+from gen_data.generator.config.yaml_tree import parse_yaml
 
 
 class Falloff(str, Enum):
@@ -121,7 +121,9 @@ def test_the_example_of_a_description_validates(model: type[Strict]) -> None:
     text = describe(model).partition("Example:\n")[2]
     problems = Problems()
 
-    made = validate(parse(text.replace("\n  ", "\n").removeprefix("  "), "x.yaml"), model, problems)
+    made = validate(
+        parse_yaml(text.replace("\n  ", "\n").removeprefix("  "), "x.yaml"), model, problems
+    )
 
     problems.raise_if_any()
     assert isinstance(made, model)
@@ -135,7 +137,7 @@ def test_a_model_that_refuses_every_made_up_value_has_no_example() -> None:
 
         word: str = Field(pattern="^sesame$")
 
-    assert example_of(Picky) is None
+    assert make_example(Picky) is None
     assert "Example" not in describe(Picky)
 
 

@@ -10,7 +10,8 @@ from typing import Annotated, Any
 
 import pytest
 
-from generator.config.distributions import (
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.distributions import (
     DISTRIBUTIONS,
     AboutZ,
     Bounds,
@@ -39,15 +40,14 @@ from generator.config.distributions import (
     Sphere,
     Uniform,
     UniformInteger,
-    bounded,
     fields,
+    with_bounds,
 )
-from generator.config.document import parse
-from generator.config.problems import Problems
-from generator.config.scalars import flow
-from generator.config.strict import Strict
-from generator.config.validation import validate
-from generator.core.streams import Rng, Streams
+from gen_data.generator.config.problems import Problems
+from gen_data.generator.config.validation import validate
+from gen_data.generator.config.yaml_scalars import to_flow_yaml
+from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.generator.core.streams import Rng, Streams
 
 
 def rng_of(index: int) -> Rng:
@@ -118,7 +118,7 @@ YAML_FORMS: list[tuple[str, str, Distribution[Any]]] = [
 def read(field: str, text: str) -> Distribution[Any]:
     """The distribution that a YAML text stands for in a field."""
     problems = Problems()
-    fields = validate(parse(f"{field}: {text}", "x.yaml"), Fields, problems)
+    fields = validate(parse_yaml(f"{field}: {text}", "x.yaml"), Fields, problems)
     problems.raise_if_any()
     found: Distribution[Any] = getattr(fields, field)
     return found
@@ -140,7 +140,7 @@ def test_each_distribution_writes_yaml_that_reads_back(
     """So a resolved configuration is a configuration."""
     del text
 
-    assert read(field, flow(expected.to_yaml())) == expected
+    assert read(field, to_flow_yaml(expected.to_yaml())) == expected
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
@@ -368,7 +368,7 @@ def test_mistakes_in_rotations_directions_and_positions_are_told(text: str, fact
     """In the same style as for numbers."""
     problems = Problems()
 
-    validate(parse(text, "x.yaml"), Fields, problems)
+    validate(parse_yaml(text, "x.yaml"), Fields, problems)
 
     assert [problem.fact for problem in problems.sorted()] == [fact]
 
@@ -403,7 +403,7 @@ def test_faults_inside_a_distribution_are_told_with_their_place(
     """The column of the part that is wrong, at any depth."""
     problems = Problems()
 
-    validate(parse(text, "x.yaml"), Fields, problems)
+    validate(parse_yaml(text, "x.yaml"), Fields, problems)
 
     (problem,) = problems.sorted()
     assert (str(problem.position), problem.fact) == (f"x.yaml:{place}", fact)
@@ -413,7 +413,7 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its YAML form, messages and JSON Schema follow from its fields."""
-    from generator.config.distributions import base
+    from gen_data.generator.config.distributions import base
 
     @base.parameters
     class Triangular(Numeric[float], name="triangular", kinds=("number",)):
@@ -438,11 +438,11 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
     monkeypatch.setattr(base, "distribution", lambda name: Triangular)
     kind = fields.NUMBER
 
-    assert base.read({"triangular": {"peak": 2}}, kind) == Triangular(2.0)
+    assert base.read_distribution({"triangular": {"peak": 2}}, kind) == Triangular(2.0)
     assert Triangular(2.0).to_yaml() == {"triangular": {"peak": 2.0, "reach": 1.0}}
     assert Triangular.schema({})["required"] == ["peak"]
     with pytest.raises(Malformed, match="triangular needs 'peak'"):
-        base.read({"triangular": {"reach": 2}}, kind)
+        base.read_distribution({"triangular": {"reach": 2}}, kind)
 
 
 def test_reprs_show_how_to_make_the_value() -> None:
@@ -483,10 +483,10 @@ def test_bounds_can_be_set_on_any_field_type() -> None:
     class Limited(Strict):
         a: Annotated[Scalar, Bounds(0, 1)] = Constant(0.5)
         b: Annotated[float, Bounds(0, 1)] = 0.5
-        c: bounded(Scalar, 2, 3) = Constant(2)  # type: ignore[valid-type]
+        c: with_bounds(Scalar, 2, 3) = Constant(2)  # type: ignore[valid-type]
 
     problems = Problems()
-    validate(parse("{a: {uniform: [0, 2]}, b: 2, c: 1}", "x.yaml"), Limited, problems)
+    validate(parse_yaml("{a: {uniform: [0, 2]}, b: 2, c: 1}", "x.yaml"), Limited, problems)
 
     assert [f"{problem.field}: {problem.fact}" for problem in problems.sorted()] == [
         "a: uniform can give 2, but every value must be in [0, 1]",

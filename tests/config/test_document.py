@@ -11,9 +11,9 @@ import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from generator.config.document import load, parse
-from generator.config.problems import Position
-from generator.core.errors import ConfigError
+from gen_data.generator.config.problems import Position
+from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
+from gen_data.generator.core.errors import ConfigError
 
 TABLETOP = """\
 # a comment
@@ -30,13 +30,13 @@ randomizers:
 def message_of(text: str) -> str:
     """What reading a text complains about."""
     with pytest.raises(ConfigError) as caught:
-        parse(text, "x.yaml")
+        parse_yaml(text, "x.yaml")
     return str(caught.value)
 
 
 def test_a_document_becomes_plain_data() -> None:
     """Comments vanish, quotes make strings, flow and block style mean the same."""
-    assert parse(TABLETOP, "t.yaml").plain() == {
+    assert parse_yaml(TABLETOP, "t.yaml").plain() == {
         "seed": 7,
         "camera": {"fov_deg": 60, "size": [640, 480]},
         "randomizers": [
@@ -60,7 +60,7 @@ def test_a_document_becomes_plain_data() -> None:
 )
 def test_every_value_knows_its_place(path: tuple[str | int, ...], line: int, column: int) -> None:
     """Line and column count from 1."""
-    node = parse(TABLETOP, "t.yaml").get(*path)
+    node = parse_yaml(TABLETOP, "t.yaml").get(*path)
 
     assert node is not None
     assert node.position == Position("t.yaml", line, column)
@@ -68,7 +68,7 @@ def test_every_value_knows_its_place(path: tuple[str | int, ...], line: int, col
 
 def test_every_key_knows_its_place() -> None:
     """Needed to point at a key that nobody expected."""
-    document = parse(TABLETOP, "t.yaml")
+    document = parse_yaml(TABLETOP, "t.yaml")
     camera = document.get("camera")
 
     assert camera is not None
@@ -84,7 +84,7 @@ def test_columns_count_characters_not_bytes() -> None:
 
 def test_scalars_keep_their_raw_text() -> None:
     """``010`` is ten, and still known as ``010``."""
-    node = parse("a: 010", "x.yaml").get("a")
+    node = parse_yaml("a: 010", "x.yaml").get("a")
 
     assert node is not None
     assert (node.content, node.text) == (10, "010")
@@ -92,7 +92,7 @@ def test_scalars_keep_their_raw_text() -> None:
 
 def test_a_path_that_leads_nowhere_gives_none() -> None:
     """Keys of lists, indices of mappings, and parts of scalars do not exist."""
-    document = parse(TABLETOP, "t.yaml")
+    document = parse_yaml(TABLETOP, "t.yaml")
 
     for path in [("x",), ("seed", "x"), ("randomizers", 2), ("randomizers", "a"), ("camera", 0)]:
         assert document.get(*path) is None
@@ -101,7 +101,7 @@ def test_a_path_that_leads_nowhere_gives_none() -> None:
 
 def test_keys_are_always_text() -> None:
     """As in JSON: weights by number are keyed by their text."""
-    assert parse("{1: a, true: b, null: c}", "x.yaml").plain() == {
+    assert parse_yaml("{1: a, true: b, null: c}", "x.yaml").plain() == {
         "1": "a",
         "true": "b",
         "null": "c",
@@ -110,7 +110,7 @@ def test_keys_are_always_text() -> None:
 
 def test_aliases_are_expanded() -> None:
     """An alias is the value of its anchor; the last anchor of a name counts."""
-    assert parse("a: &x [1, 2]\nb: *x\nc: &x 3\nd: *x\n", "x.yaml").plain() == {
+    assert parse_yaml("a: &x [1, 2]\nb: *x\nc: &x 3\nd: *x\n", "x.yaml").plain() == {
         "a": [1, 2],
         "b": [1, 2],
         "c": 3,
@@ -120,7 +120,7 @@ def test_aliases_are_expanded() -> None:
 
 def test_a_byte_order_mark_is_ignored() -> None:
     """Some editors write one."""
-    assert parse("\ufeffa: 1", "x.yaml").plain() == {"a": 1}
+    assert parse_yaml("\ufeffa: 1", "x.yaml").plain() == {"a": 1}
 
 
 def test_windows_line_ends_are_line_ends() -> None:
@@ -278,22 +278,22 @@ def test_without_the_c_parser_the_same_is_refused(
     case: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """PyYAML can be built without libyaml; its Python parser gives the same events."""
-    monkeypatch.setattr("generator.config.document._LOADER", yaml.SafeLoader)
+    monkeypatch.setattr("gen_data.generator.config.yaml_tree._LOADER", yaml.SafeLoader)
     text, fact = {**REFUSED, **NASTY}[case]
 
-    assert parse(TABLETOP, "t.yaml").get("randomizers", 0, "count") is not None
+    assert parse_yaml(TABLETOP, "t.yaml").get("randomizers", 0, "count") is not None
     assert fact in message_of(text)
 
 
 def test_bad_timestamps_are_text() -> None:
     """The core schema has no dates, so none can be malformed."""
-    assert parse("a: 2020-99-99T99:99:99Z", "x.yaml").plain() == {"a": "2020-99-99T99:99:99Z"}
+    assert parse_yaml("a: 2020-99-99T99:99:99Z", "x.yaml").plain() == {"a": "2020-99-99T99:99:99Z"}
 
 
 def test_a_document_at_the_limits_is_read() -> None:
     """32 levels, 4,096 bytes of text: the limit itself is allowed."""
-    deep = parse("a: " + "[" * 31 + "]" * 31, "x.yaml")
-    long = parse("a: " + "x" * 4096, "x.yaml")
+    deep = parse_yaml("a: " + "[" * 31 + "]" * 31, "x.yaml")
+    long = parse_yaml("a: " + "x" * 4096, "x.yaml")
 
     assert deep.get("a", *[0] * 30) is not None
     assert len(long.plain()["a"]) == 4096
@@ -304,7 +304,7 @@ def test_a_large_document_is_read_in_a_second() -> None:
     text = "a:\n" + "  - {x: 1.5, y: [1, 2]}\n" * 6_000
 
     begun = time.process_time()
-    document = parse(text, "x.yaml")
+    document = parse_yaml(text, "x.yaml")
 
     assert len(document.plain()["a"]) == 6_000
     assert time.process_time() - begun < 10.0
@@ -318,7 +318,7 @@ def test_a_file_is_read_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text("a: 1\n")
 
-    document = load(path)
+    document = load_yaml(path)
 
     assert document.plain() == {"a": 1}
     assert str(document.position) == f"{path}:1:1"
@@ -339,7 +339,7 @@ def test_files_that_are_no_text_are_refused(tmp_path: Path, data: bytes, message
     path.write_bytes(data)
 
     with pytest.raises(ConfigError) as caught:
-        load(path)
+        load_yaml(path)
 
     assert str(caught.value) == f"{path}{message}"
 
@@ -356,7 +356,7 @@ def test_what_is_no_readable_file_is_refused(tmp_path: Path) -> None:
         (Path("a\0b"), "is no file name"),
     ]:
         with pytest.raises(ConfigError, match=fact):
-            load(path)
+            load_yaml(path)
 
 
 # --- fuzz
@@ -367,7 +367,7 @@ ALPHABET = "abc:,-[]{}&*!|>'\"%@#? \n\t\\0123456789.~\x00\x85\ufeff\ud800é😀"
 def outcome_of(text: str) -> str:
     """``read``, or the message of the error."""
     try:
-        node = parse(text, "f.yaml")
+        node = parse_yaml(text, "f.yaml")
         node.plain()
     except ConfigError as error:
         return str(error)
@@ -418,7 +418,7 @@ def test_any_bytes_in_a_file_give_a_tree_or_an_error(
     path = tmp_path_factory.getbasetemp() / "fuzz.yaml"
     path.write_bytes(data)
     try:
-        outcome = type(load(path).plain()).__name__
+        outcome = type(load_yaml(path).plain()).__name__
     except ConfigError as error:
         outcome = str(error)
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from generator.config.document import parse
-from generator.config.merging import merge, merge_named
+from gen_data.generator.config.merging import merge_named, merge_nodes
+from gen_data.generator.config.yaml_tree import parse_yaml
 
 
 def test_merging_lays_mappings_over_each_other() -> None:
     """Key by key, at every depth; lists and scalars are replaced as a whole."""
-    base = parse("{a: {x: 1, y: [1, 2]}, b: 1, c: {z: 1}}", "base.yaml")
-    override = parse("{a: {y: [3], w: 4}, b: {v: 5}, d: 6}", "over.yaml")
+    base = parse_yaml("{a: {x: 1, y: [1, 2]}, b: 1, c: {z: 1}}", "base.yaml")
+    override = parse_yaml("{a: {y: [3], w: 4}, b: {v: 5}, d: 6}", "over.yaml")
 
-    merged = merge(base, override)
+    merged = merge_nodes(base, override)
 
     assert merged.plain() == {
         "a": {"x": 1, "y": [3], "w": 4},
@@ -25,7 +25,9 @@ def test_merging_lays_mappings_over_each_other() -> None:
 
 def test_merged_values_keep_the_place_they_came_from() -> None:
     """Messages point into the file in which the value stands."""
-    merged = merge(parse("a: {x: 1, y: 2}", "base.yaml"), parse("a: {y: 3}", "over.yaml"))
+    merged = merge_nodes(
+        parse_yaml("a: {x: 1, y: 2}", "base.yaml"), parse_yaml("a: {y: 3}", "over.yaml")
+    )
     x, y, a = merged.get("a", "x"), merged.get("a", "y"), merged.get("a")
 
     assert x is not None
@@ -37,10 +39,10 @@ def test_merged_values_keep_the_place_they_came_from() -> None:
 
 def test_merging_replaces_a_distribution_by_another_as_a_whole() -> None:
     """Two distributions must not end up in one mapping."""
-    base = parse("{r: {uniform: [0, 1]}, s: {uniform: [0, 1]}, t: 1}", "base.yaml")
-    override = parse("{r: {normal: {mean: 0, stddev: 1}}, t: {choice: [1, 2]}}", "over.yaml")
+    base = parse_yaml("{r: {uniform: [0, 1]}, s: {uniform: [0, 1]}, t: 1}", "base.yaml")
+    override = parse_yaml("{r: {normal: {mean: 0, stddev: 1}}, t: {choice: [1, 2]}}", "over.yaml")
 
-    assert merge(base, override).plain() == {
+    assert merge_nodes(base, override).plain() == {
         "r": {"normal": {"mean": 0, "stddev": 1}},
         "s": {"uniform": [0, 1]},
         "t": {"choice": [1, 2]},
@@ -49,9 +51,9 @@ def test_merging_replaces_a_distribution_by_another_as_a_whole() -> None:
 
 def test_merging_leaves_its_arguments_alone() -> None:
     """Trees are values."""
-    base, override = parse("a: {x: 1}", "b.yaml"), parse("a: {y: 2}", "o.yaml")
+    base, override = parse_yaml("a: {x: 1}", "b.yaml"), parse_yaml("a: {y: 2}", "o.yaml")
 
-    merge(base, override)
+    merge_nodes(base, override)
 
     assert base.plain() == {"a": {"x": 1}}
     assert override.plain() == {"a": {"y": 2}}
@@ -75,7 +77,9 @@ def test_one_choice_of_assets_replaces_another(
     base: str, override: str, merged: dict[str, object]
 ) -> None:
     """Tags and ids are alternatives: who names ids does not want the inherited tags besides."""
-    result = merge(parse(f"assets: {base}", "base"), parse(f"assets: {override}", "over"))
+    result = merge_nodes(
+        parse_yaml(f"assets: {base}", "base"), parse_yaml(f"assets: {override}", "over")
+    )
 
     assert result.plain() == {"assets": merged}
 
@@ -97,23 +101,23 @@ def test_a_mapping_of_another_kind_inherits_nothing(
     base: str, override: str, merged: dict[str, object]
 ) -> None:
     """The coefficients of one lens mean nothing to another; a sensor keeps its mount."""
-    result = merge(parse(f"it: {base}", "base"), parse(f"it: {override}", "over"))
+    result = merge_nodes(parse_yaml(f"it: {base}", "base"), parse_yaml(f"it: {override}", "over"))
 
     assert result.plain() == {"it": merged}
 
 
 def test_a_selection_is_replaced_as_a_whole() -> None:
     """Entries of two selections by different shared values have nothing in common."""
-    base = parse("x: {switch: style, old: 1, new: 2}", "base")
-    override = parse("x: {switch: traffic, light: 3, default: 4}", "over")
+    base = parse_yaml("x: {switch: style, old: 1, new: 2}", "base")
+    override = parse_yaml("x: {switch: traffic, light: 3, default: 4}", "over")
 
-    assert merge(base, override).plain() == override.plain()
+    assert merge_nodes(base, override).plain() == override.plain()
 
 
 def listed(text: str) -> list[object]:
     """Plain items of a list merged with ``[{type: t, name: a, x: 1}, {type: t, name: b}]``."""
-    base = parse("l: [{type: t, name: a, x: 1}, {type: t, name: b}]", "base").get("l")
-    override = parse(f"l: {text}", "over").get("l")
+    base = parse_yaml("l: [{type: t, name: a, x: 1}, {type: t, name: b}]", "base").get("l")
+    override = parse_yaml(f"l: {text}", "over").get("l")
     assert base is not None
     assert override is not None
     plain: list[object] = merge_named(base, override).plain()
@@ -137,8 +141,8 @@ def test_new_items_come_last_or_before_the_inherited_one_that_follows_them() -> 
 
 def test_items_without_a_name_are_told_apart_by_their_type() -> None:
     """Exporters have no names; an annotation may be its type alone."""
-    base = parse("l: [{type: coco}, poses, {type: lanes, far_m: 80}]", "base").get("l")
-    override = parse("l: [lanes, {type: coco, x: 1}, poses]", "over").get("l")
+    base = parse_yaml("l: [{type: coco}, poses, {type: lanes, far_m: 80}]", "base").get("l")
+    override = parse_yaml("l: [lanes, {type: coco, x: 1}, poses]", "over").get("l")
     assert base is not None
     assert override is not None
 

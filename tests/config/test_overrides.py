@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generator.config.document import Node, parse, with_override
-from generator.core.errors import ConfigError
+from gen_data.generator.config.yaml_tree import Node, parse_yaml, with_override
+from gen_data.generator.core.errors import ConfigError
 
 TEXT = """\
 seed: 7
@@ -23,7 +23,7 @@ randomizers:
 @pytest.fixture
 def document() -> Node:
     """A configuration in short."""
-    return parse(TEXT, "t.yaml")
+    return parse_yaml(TEXT, "t.yaml")
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_an_override_exchanges_one_value(
 
     assert node is not None
     assert node.plain() == expected
-    assert document.plain() == parse(TEXT, "t.yaml").plain()
+    assert document.plain() == parse_yaml(TEXT, "t.yaml").plain()
     untouched = {k: v for k, v in document.plain().items() if k != reached[0]}
     assert {k: v for k, v in changed.plain().items() if k != reached[0]} == untouched
 
@@ -143,7 +143,7 @@ def test_overrides_that_lead_nowhere_say_so(
 
 def test_a_list_without_names_is_addressed_by_index() -> None:
     """The message says how."""
-    document = parse("a: [1, 2]", "t.yaml")
+    document = parse_yaml("a: [1, 2]", "t.yaml")
 
     with pytest.raises(ConfigError, match=r"no item is named 'x'; expected an index such as \[0\]"):
         with_override(document, "a.x", "1")
@@ -160,7 +160,7 @@ def test_a_path_cannot_be_used_to_nest_without_end(document: Node) -> None:
 def test_any_override_gives_a_tree_or_an_error(path: str, value: str) -> None:
     """What comes from a shell may be anything."""
     try:
-        outcome = type(with_override(parse(TEXT, "t.yaml"), path, value).plain()).__name__
+        outcome = type(with_override(parse_yaml(TEXT, "t.yaml"), path, value).plain()).__name__
     except ConfigError as error:
         outcome = str(error)
 

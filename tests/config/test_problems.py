@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from generator.config.problems import Position, Problems, dotted
-from generator.core.errors import ConfigError
+from gen_data.generator.config.problems import Position, Problems, format_path
+from gen_data.generator.core.errors import ConfigError
 
 
 def told(problems: Problems) -> str:
@@ -88,4 +88,4 @@ def test_of_very_many_problems_the_first_hundred_are_told() -> None:
 )
 def test_paths_are_dotted(path: tuple[str | int, ...], text: str) -> None:
     """Indices in brackets; keys that are no plain words in quotes."""
-    assert dotted(path) == text
+    assert format_path(path) == text

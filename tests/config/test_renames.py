@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.spec import load_config
-from generator.assemble.tables import TABLES
-from generator.config.document import parse
-from generator.config.renames import PLUGINS, RANDOMIZERS, TYPES, with_current_words
-from generator.core.errors import ConfigError
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.plugin_tables import TABLES
+from gen_data.generator.config.renamed_keys import PLUGINS, RANDOMIZERS, TYPES, replace_old_words
+from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.generator.core.errors import ConfigError
 
 OLD = """\
 template: street
@@ -48,15 +48,15 @@ sensors:
 def test_old_words_mean_what_the_new_ones_mean() -> None:
     """The same document, word by word, and the order of its keys."""
     with pytest.warns(FutureWarning):
-        current = with_current_words(parse(OLD, "old.yaml"))
+        current = replace_old_words(parse_yaml(OLD, "old.yaml"))
 
-    assert current.plain() == parse(NEW, "new.yaml").plain()
+    assert current.plain() == parse_yaml(NEW, "new.yaml").plain()
 
 
 def test_the_warning_names_the_place_and_the_new_word() -> None:
     """Each place once."""
     with pytest.warns(FutureWarning) as caught:
-        with_current_words(parse(OLD, "old.yaml"))
+        replace_old_words(parse_yaml(OLD, "old.yaml"))
     messages = [str(warning.message) for warning in caught]
 
     assert len(messages) == len(set(messages)) == 19
@@ -69,19 +69,19 @@ def test_the_warning_names_the_place_and_the_new_word() -> None:
 
 def test_current_words_warn_of_nothing() -> None:
     """The document itself comes back."""
-    document = parse(NEW, "new.yaml")
+    document = parse_yaml(NEW, "new.yaml")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert with_current_words(document) == document
+        assert replace_old_words(document) == document
 
 
 def test_the_plan_of_an_older_data_set_is_read_in_silence() -> None:
     """Nobody is meant to edit it."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        current = with_current_words(parse(OLD, "out/street/plan.json"))
+        current = replace_old_words(parse_yaml(OLD, "out/street/plan.json"))
 
-    assert current.plain() == parse(NEW, "new.yaml").plain()
+    assert current.plain() == parse_yaml(NEW, "new.yaml").plain()
 
 
 def test_old_and_new_word_side_by_side_are_refused() -> None:
@@ -89,7 +89,7 @@ def test_old_and_new_word_side_by_side_are_refused() -> None:
     text = "randomizers: [{type: ego_on_lane, name: e, spare_m: 1, min_clearance_m: 2}]"
 
     with pytest.raises(ConfigError) as caught:
-        with_current_words(parse(text, "x.yaml"))
+        replace_old_words(parse_yaml(text, "x.yaml"))
 
     assert str(caught.value).startswith(
         "x.yaml:1:44: randomizers[0].spare_m: is called 'min_clearance_m' now"
@@ -129,7 +129,7 @@ def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> N
     path.write_text("extends: street.yaml\nrandomizers: [{type: along, name: x, sped: 1}]\n")
 
     done = subprocess.run(
-        [sys.executable, "-m", "generator.cli", "--config", str(path), "--n", "1"],
+        [sys.executable, "-m", "gen_data.generator.cli", "--config", str(path), "--n", "1"],
         capture_output=True,
         text=True,
         check=False,

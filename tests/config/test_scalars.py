@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generator.config.document import parse
-from generator.config.scalars import flow, resolve, shown
+from gen_data.generator.config.yaml_scalars import quote_value, resolve_scalar, to_flow_yaml
+from gen_data.generator.config.yaml_tree import parse_yaml
 
 # Expected values: YAML 1.2.2, sections 10.2.1 and 10.3.2.
 CORE_SCHEMA = [
@@ -42,7 +42,7 @@ CORE_SCHEMA = [
 @pytest.mark.parametrize(("text", "value"), CORE_SCHEMA)
 def test_unquoted_scalars_follow_the_core_schema(text: str, value: object) -> None:
     """What YAML 1.1 would have read as a date, a boolean or base sixty is a string."""
-    resolved = resolve(text)
+    resolved = resolve_scalar(text)
 
     assert resolved == value
     assert type(resolved) is type(value)
@@ -62,15 +62,15 @@ def test_unquoted_scalars_follow_the_core_schema(text: str, value: object) -> No
 def test_numbers_that_cannot_be_held_are_refused(text: str, message: str) -> None:
     """Not silently rounded, wrapped or made infinite."""
     with pytest.raises(ValueError, match=r".") as caught:
-        resolve(text)
+        resolve_scalar(text)
 
     assert str(caught.value) == message
 
 
 def test_the_largest_whole_number_is_two_to_the_63_minus_1() -> None:
     """Leading zeros do not count."""
-    assert resolve("000" + "0" * 90 + str(2**63 - 1)) == 2**63 - 1
-    assert resolve(str(-(2**63) + 1)) == -(2**63) + 1
+    assert resolve_scalar("000" + "0" * 90 + str(2**63 - 1)) == 2**63 - 1
+    assert resolve_scalar(str(-(2**63) + 1)) == -(2**63) + 1
 
 
 PLAIN = st.recursive(
@@ -90,8 +90,8 @@ PLAIN = st.recursive(
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(PLAIN)
 def test_what_is_written_in_flow_style_reads_back_equal(value: object) -> None:
-    """``flow`` is the inverse of reading: defaults can be shown as YAML and pasted."""
-    assert parse(f"value: {flow(value)}\n", "x.yaml").plain() == {"value": value}
+    """``to_flow_yaml`` is the inverse of reading: defaults can be shown as YAML and pasted."""
+    assert parse_yaml(f"value: {to_flow_yaml(value)}\n", "x.yaml").plain() == {"value": value}
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_what_is_written_in_flow_style_reads_back_equal(value: object) -> None:
 )
 def test_flow_style_is_what_a_person_would_write(value: object, text: str) -> None:
     """Quotes only where needed, no trailing zeros."""
-    assert flow(value) == text
+    assert to_flow_yaml(value) == text
 
 
 @pytest.mark.parametrize(
@@ -127,4 +127,4 @@ def test_flow_style_is_what_a_person_would_write(value: object, text: str) -> No
 )
 def test_messages_quote_values_on_one_printable_line(value: object, text: str) -> None:
     """A value cannot break a message apart or steer the terminal."""
-    assert shown(value) == text
+    assert quote_value(value) == text

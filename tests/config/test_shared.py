@@ -6,10 +6,15 @@ from collections import Counter
 
 import pytest
 
-from generator.config.document import parse
-from generator.config.shared import drawn, probes, refers, resolved
-from generator.core.errors import ConfigError
-from generator.core.streams import Streams
+from gen_data.generator.config.shared_values import (
+    draw_shared,
+    probe_values,
+    refers,
+    resolve_shared,
+)
+from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.streams import Streams
 
 SECTION = """
 lanes: {switch: road, highway: 3, default: {uniform_integer: [1, 2]}}
@@ -21,8 +26,8 @@ wet: {probability: 0.5}
 
 def test_values_follow_their_distributions_and_the_values_they_depend_on() -> None:
     """3 : 1 within four standard errors of a binomial count; lanes obey the road."""
-    section = parse(SECTION, "test")
-    draws = [drawn(section, Streams(7, scene)) for scene in range(1000)]
+    section = parse_yaml(SECTION, "test")
+    draws = [draw_shared(section, Streams(7, scene)) for scene in range(1000)]
 
     highways = Counter(d["road"] for d in draws)["highway"]
     assert abs(highways - 250) < 4 * (1000 * 0.25 * 0.75) ** 0.5
@@ -49,15 +54,17 @@ def test_values_follow_their_distributions_and_the_values_they_depend_on() -> No
 )
 def test_a_value_is_of_the_kind_it_is_written_as(text: str, kind: type) -> None:
     """Whole numbers stay whole: they count lanes."""
-    assert type(drawn(parse(f"x: {text}", "test"), Streams(0, 1))["x"]) is kind
+    assert type(draw_shared(parse_yaml(f"x: {text}", "test"), Streams(0, 1))["x"]) is kind
 
 
 def test_order_of_writing_moves_no_draw() -> None:
     """Each value has a stream of its own."""
     lines = SECTION.strip().splitlines()
     for order in (lines[::-1], [*lines[2:], *lines[:2]]):
-        again = parse("\n".join(order), "test")
-        assert drawn(again, Streams(7, 3)) == drawn(parse(SECTION, "test"), Streams(7, 3))
+        again = parse_yaml("\n".join(order), "test")
+        assert draw_shared(again, Streams(7, 3)) == draw_shared(
+            parse_yaml(SECTION, "test"), Streams(7, 3)
+        )
 
 
 def test_references_and_selections_are_replaced_wherever_they_stand() -> None:
@@ -67,25 +74,27 @@ def test_references_and_selections_are_replaced_wherever_they_stand() -> None:
     b: [1, {switch: road, highway: [$shared.lanes, 9], default: none}]
     c: {uniform: [0, 1]}
     """
-    node = parse(text, "test")
+    node = parse_yaml(text, "test")
 
     assert refers(node)
-    plain = resolved(node, {"lanes": 3, "road": "highway"}).plain()
+    plain = resolve_shared(node, {"lanes": 3, "road": "highway"}).plain()
     assert plain == {"a": 3, "b": [1, [3, 9]], "c": {"uniform": [0, 1]}}
-    assert resolved(node, {"lanes": 1, "road": "street"}).plain()["b"] == [1, "none"]
-    assert not refers(parse("c: {uniform: [0, 1]}", "test"))
+    assert resolve_shared(node, {"lanes": 1, "road": "street"}).plain()["b"] == [1, "none"]
+    assert not refers(parse_yaml("c: {uniform: [0, 1]}", "test"))
 
 
 def test_numbers_and_flags_select_by_value() -> None:
     """Keys are read as YAML reads them."""
-    node = parse("x: {switch: k, 1: one, 2: two}\ny: {switch: f, true: yes, false: no}", "test")
-    assert resolved(node, {"k": 2, "f": True}).plain() == {"x": "two", "y": "yes"}
+    node = parse_yaml(
+        "x: {switch: k, 1: one, 2: two}\ny: {switch: f, true: yes, false: no}", "test"
+    )
+    assert resolve_shared(node, {"k": 2, "f": True}).plain() == {"x": "two", "y": "yes"}
 
 
 def test_probes_show_every_outcome_of_every_choice() -> None:
     """What is rare must be checked, too."""
-    section = parse("road: {choice: {street: 1, alley: 0.000001}}", "test")
-    assert {p["road"] for p in probes(section, 0)} == {"street", "alley"}
+    section = parse_yaml("road: {choice: {street: 1, alley: 0.000001}}", "test")
+    assert {p["road"] for p in probe_values(section, 0)} == {"street", "alley"}
 
 
 @pytest.mark.parametrize(
@@ -98,21 +107,21 @@ def test_probes_show_every_outcome_of_every_choice() -> None:
 def test_a_reference_that_leads_nowhere_is_one_clear_error(text: str, fact: str) -> None:
     """Place, fact, and what was expected."""
     with pytest.raises(ConfigError, match=r".") as caught:
-        resolved(parse(text, "test"), {"road": "street"})
+        resolve_shared(parse_yaml(text, "test"), {"road": "street"})
     assert str(caught.value).startswith(fact)
 
 
 def test_values_that_need_one_another_are_refused() -> None:
     """A circle has no beginning."""
     with pytest.raises(ConfigError, match="need one another"):
-        drawn(parse("a: $shared.b\nb: $shared.a", "test"), Streams(0, 0))
+        draw_shared(parse_yaml("a: $shared.b\nb: $shared.a", "test"), Streams(0, 0))
 
 
 def test_order_of_a_choices_entries_moves_no_draw() -> None:
     """A plan keeps its keys sorted, and must make the same samples again."""
-    one = parse("x: {choice: {wet: 3, dry: 1, 10: 2, 9: 1}}", "test")
-    other = parse("x: {choice: {10: 2, 9: 1, dry: 1, wet: 3}}", "test")
+    one = parse_yaml("x: {choice: {wet: 3, dry: 1, 10: 2, 9: 1}}", "test")
+    other = parse_yaml("x: {choice: {10: 2, 9: 1, dry: 1, wet: 3}}", "test")
 
-    assert [drawn(one, Streams(5, k)) for k in range(50)] == [
-        drawn(other, Streams(5, k)) for k in range(50)
+    assert [draw_shared(one, Streams(5, k)) for k in range(50)] == [
+        draw_shared(other, Streams(5, k)) for k in range(50)
     ]

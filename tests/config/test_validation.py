@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import Field, model_validator
 
-from generator.config.distributions import (
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
     Count,
@@ -21,11 +22,10 @@ from generator.config.distributions import (
     Uniform,
     UnitInterval,
 )
-from generator.config.document import parse, with_override
-from generator.config.problems import Problems
-from generator.config.strict import Strict
-from generator.config.validation import validate
-from generator.core.errors import ConfigError
+from gen_data.generator.config.problems import Problems
+from gen_data.generator.config.validation import validate
+from gen_data.generator.config.yaml_tree import parse_yaml, with_override
+from gen_data.generator.core.errors import ConfigError
 
 
 class Mode(str, Enum):
@@ -91,7 +91,7 @@ class Config(Strict):
 def told(text: str) -> str:
     """The message about a text."""
     problems = Problems()
-    assert validate(parse(text, "x.yaml"), Config, problems) is None
+    assert validate(parse_yaml(text, "x.yaml"), Config, problems) is None
     with pytest.raises(ConfigError) as caught:
         problems.raise_if_any()
     return str(caught.value)
@@ -104,7 +104,7 @@ def test_a_valid_document_becomes_a_frozen_model() -> None:
         "{camera: {fov_deg: 60, size_px: [1, 2], mode: good}, names: [a, b], share: 1, wet: true}"
     )
 
-    config = validate(parse(text, "x.yaml"), Config, problems)
+    config = validate(parse_yaml(text, "x.yaml"), Config, problems)
 
     problems.raise_if_any()
     assert config is not None
@@ -260,7 +260,7 @@ def test_all_mistakes_are_told_at_once() -> None:
 
 def test_fields_are_named_from_the_root_of_the_document() -> None:
     """The prefix says where the validated node hangs."""
-    document = parse("randomizers:\n  - {fov_deg: 0}\n", "x.yaml")
+    document = parse_yaml("randomizers:\n  - {fov_deg: 0}\n", "x.yaml")
     node, problems = document.get("randomizers", 0), Problems()
 
     assert node is not None
@@ -272,7 +272,7 @@ def test_fields_are_named_from_the_root_of_the_document() -> None:
 
 def test_a_node_that_is_no_mapping_is_told() -> None:
     """With the prefix alone as the field."""
-    document, problems = parse("a: [1]", "x.yaml"), Problems()
+    document, problems = parse_yaml("a: [1]", "x.yaml"), Problems()
     node = document.get("a", 0)
 
     assert node is not None
@@ -284,7 +284,7 @@ def test_a_node_that_is_no_mapping_is_told() -> None:
 
 def test_a_mistake_on_the_command_line_is_placed_there() -> None:
     """The rest of the tree still points into its file."""
-    document = with_override(parse("camera: {fov_deg: 60}", "x.yaml"), "camera.fov_deg", "400")
+    document = with_override(parse_yaml("camera: {fov_deg: 60}", "x.yaml"), "camera.fov_deg", "400")
     problems = Problems()
 
     validate(document, Config, problems)
@@ -305,7 +305,7 @@ def test_a_mistake_on_the_command_line_is_placed_there() -> None:
 )
 def test_a_misspelt_override_is_an_unknown_key(path: str, message: str) -> None:
     """New keys are allowed in the tree and judged by the model."""
-    document, problems = parse("camera: {fov_deg: 60}", "x.yaml"), Problems()
+    document, problems = parse_yaml("camera: {fov_deg: 60}", "x.yaml"), Problems()
 
     validate(with_override(document, path, "3"), Config, problems)
 
@@ -331,10 +331,10 @@ YAML_LIKE = st.recursive(
 @given(st.dictionaries(st.sampled_from([*Config.model_fields, "zzz"]), YAML_LIKE, max_size=4))
 def test_any_document_gives_a_model_or_problems(plain: dict[str, Any]) -> None:
     """Every field with every shape of value: no other exception, always a place and a field."""
-    from generator.config.scalars import flow
+    from gen_data.generator.config.yaml_scalars import to_flow_yaml
 
-    text, problems = flow(plain), Problems()
-    made = validate(parse(text, "x.yaml"), Config, problems)
+    text, problems = to_flow_yaml(plain), Problems()
+    made = validate(parse_yaml(text, "x.yaml"), Config, problems)
 
     assert (made is None) == bool(len(problems))
     for problem in problems.sorted():

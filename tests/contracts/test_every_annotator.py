@@ -17,16 +17,16 @@ import numpy as np
 import pytest
 from stranger.annotation import Distance
 
-from generator.annotations import TABLE
-from generator.annotations.truth import Thresholds, complete_truth, frame_truth
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_config
-from generator.core.capture import Channel, Reading
-from generator.core.errors import ConfigError
-from generator.core.interfaces import Annotator, AnyAnnotator, AssetLibrary, ImageAnnotator
-from generator.core.sample import FrameTruth, ImageTruth, ObjectTruth
-from generator.core.scene import Scene
-from generator.core.serial import canonical_json, to_plain
+from gen_data.generator.annotations import TABLE
+from gen_data.generator.annotations.annotate import Thresholds, annotate_ego, annotate_reading
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import Annotator, AnyAnnotator, AssetLibrary, ImageAnnotator
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.serialization import canonical_json, to_plain
 
 ANNOTATORS: dict[str, type[AnyAnnotator]] = {
     **{name: TABLE.load(name) for name in TABLE},
@@ -46,7 +46,7 @@ class World:
     """A sample's scene, one reading of it, and the assets of both."""
 
     scene: Scene
-    reading: Reading
+    reading: SensorReading
     assets: AssetLibrary
 
 
@@ -65,11 +65,11 @@ def made(name: str) -> AnyAnnotator:
     return ANNOTATORS[name]()
 
 
-def annotated(name: str, of: World | None = None) -> tuple[ImageTruth, FrameTruth | None]:
+def annotated(name: str, of: World | None = None) -> tuple[ImageTruth, EgoTruth | None]:
     """Everything that one annotator says."""
     given = of or world()
-    image = complete_truth(given.scene, given.reading, [made(name)], FEW_PX, given.assets)
-    return image, frame_truth({"": given.scene}, [made(name)], given.assets)
+    image = annotate_reading(given.scene, given.reading, [made(name)], FEW_PX, given.assets)
+    return image, annotate_ego({"": given.scene}, [made(name)], given.assets)
 
 
 def documented(truth: type) -> dict[str, set[str]]:
@@ -105,7 +105,7 @@ def plain(value: Any) -> Any:
 
 def test_every_documented_field_has_an_annotator_and_the_other_way_round() -> None:
     """But semantic masks, which are images alone."""
-    owners = {n for t in (ObjectTruth, ImageTruth, FrameTruth) for n in documented(t)}
+    owners = {n for t in (ObjectTruth, ImageTruth, EgoTruth) for n in documented(t)}
 
     assert owners == set(TABLE) - {"semantic_masks"}
 
@@ -122,9 +122,9 @@ def test_it_fills_in_its_own_fields_and_no_other(name: str) -> None:
     assert isinstance(made(name), Annotator) == bool(image.objects)
     assert changed(ImageTruth(image.camera, ()), image) == documented(ImageTruth).get(name, set())
     if frame is not None:
-        bare_frame = FrameTruth(frame.rig, frame.T_world_ego, frame.twist)
-        assert changed(bare_frame, frame) == documented(FrameTruth).get(name, set())
-    assert (frame is not None) == (name in documented(FrameTruth))
+        bare_frame = EgoTruth(frame.rig, frame.T_world_ego, frame.twist)
+        assert changed(bare_frame, frame) == documented(EgoTruth).get(name, set())
+    assert (frame is not None) == (name in documented(EgoTruth))
 
 
 def empty_fields(truth: ObjectTruth, names: set[str]) -> set[str]:
@@ -137,7 +137,7 @@ def test_it_says_the_same_every_time_and_in_every_process(name: str) -> None:
     """There is no rng; a copy from another process agrees."""
     copy = pickle.loads(pickle.dumps(made(name)))
     given = world()
-    image = complete_truth(given.scene, given.reading, [copy], FEW_PX, given.assets)
+    image = annotate_reading(given.scene, given.reading, [copy], FEW_PX, given.assets)
 
     assert copy == made(name)
     assert plain(image) == plain(annotated(name)[0]) == plain(annotated(name)[0])

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-import configs
-from generator.assemble.spec import load_config
-from generator.core.interfaces import Modality, Sensor
-from generator.runner.verify import verify
+from gen_data import configs
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.core.interfaces import Modality, Sensor
+from gen_data.generator.runner.verify import verify
 from tests.end_to_end.running import gen_data
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))

@@ -10,19 +10,28 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from generator.config.describe import describe
-from generator.config.schema import json_schema
-from generator.core.interfaces import Stage
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Instance, Lane, Lidar, ObjectGroup, Rig, Scene
-from generator.core.se3 import SE3, look_at
-from generator.core.serial import canonical_json, from_plain, to_plain
-from randomizers import TABLE
-from scene_templates.builder import build
-from scene_templates.objects import AssetChoice, Objects
-from scene_templates.robot import Robot
-from scene_templates.room import Room
-from scene_templates.surface import SurfaceElement
+from gen_data.generator.config.describe import describe
+from gen_data.generator.config.schema import json_schema
+from gen_data.generator.core.interfaces import Stage
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import (
+    Body,
+    Camera,
+    Instance,
+    Lane,
+    Lidar,
+    ObjectGroup,
+    Rig,
+    Scene,
+)
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.randomizers import TABLE
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.objects import AssetChoice, Objects
+from gen_data.scene_templates.robot import Robot
+from gen_data.scene_templates.room import Room
+from gen_data.scene_templates.surface import SurfaceElement
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 GIVEN: dict[str, dict[str, Any]] = {
@@ -64,7 +73,7 @@ def nominal_scene() -> Scene:
     labelled = Instance(99, "lane_objects/0", "car", 0, "wagon")
     ego = Body("ego", "wagon", SE3((-20.0, 5.0, 0.75)), instance_id=98)
     carrier = Instance(98, "ego", "ego", 0, "wagon", annotated=False)
-    scene = build("test", elements, FakeAssets())
+    scene = build_scene("test", elements, FakeAssets())
     lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
     signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
     return replace(

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from stranger.renderer import BoxesPlugin
 
-from generator.core.capture import Beams, Channel, Reading
-from generator.core.interfaces import Renderer, RendererSettings
-from generator.core.scene import Body, Instance, Lidar, Light, Scene
-from generator.core.se3 import SE3
-from generator.core.serial import canonical_json
-from generator.renderers import TABLE
+from gen_data.generator.core.capture import Channel, LidarRays, SensorReading
+from gen_data.generator.core.interfaces import Renderer, RendererSettings
+from gen_data.generator.core.scene import Body, Instance, Lidar, Light, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.renderers import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at
 
 SETTINGS: Mapping[str, type[RendererSettings]] = {
@@ -85,12 +85,12 @@ CAMERA = camera_at((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (WIDTH_PX, HEIGHT_PX))
 
 def rendered(
     name: str, scene: Scene = SCENE, channels: frozenset[Channel] = CHANNELS, new: bool = False
-) -> Reading:
+) -> SensorReading:
     """One reading."""
     return (fresh(name) if new else opened(name)).render(scene, CAMERA, channels)
 
 
-def assert_same(one: Reading, other: Reading) -> None:
+def assert_same(one: SensorReading, other: SensorReading) -> None:
     """Byte by byte."""
     assert one.channels.keys() == other.channels.keys()
     for channel, image in one.channels.items():
@@ -232,8 +232,8 @@ def test_beams_meet_the_first_surface_in_their_way(name: str) -> None:
     ahead, side, back = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)
     lidar = Lidar("lidar", "", T_world_lidar=SE3((-1.0, 0.0, 0.0)))
     directions = np.array([ahead, side, back], np.float32)
-    found = opened(name).scan(SCENE, lidar, Beams(directions, 0.0, 1, 100.0))
-    near = opened(name).scan(SCENE, lidar, Beams(directions, 0.0, 1, 1.7))
+    found = opened(name).scan(SCENE, lidar, LidarRays(directions, 0.0, 1, 100.0))
+    near = opened(name).scan(SCENE, lidar, LidarRays(directions, 0.0, 1, 1.7))
 
     np.testing.assert_allclose(found.range_m[:, 0], [1.8, np.inf, 1.8], atol=1e-5)
     assert found.instance_id[:, 0].tolist() == [1, 0, 3]

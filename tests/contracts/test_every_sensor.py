@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.config.describe import describe
-from generator.config.schema import json_schema
-from generator.core.capture import POINT, Channel, PointCloud, Reading, Table
-from generator.core.errors import ConfigError
-from generator.core.instants import at, with_placed_sensors, with_twists
-from generator.core.interfaces import Modality, Renderer
-from generator.core.intrinsics import Intrinsics
-from generator.core.motion import Track
-from generator.core.scene import Body, Camera, Environment, Instance, Light, Rig, Scene
-from generator.core.se3 import SE3
-from generator.core.serial import canonical_json, from_plain
-from generator.core.streams import Streams
-from generator.core.tables import TIME, columns_dtype
-from generator.renderers.warp import WarpRenderer
-from generator.sensors import TABLE
+from gen_data.generator.config.describe import describe
+from gen_data.generator.config.schema import json_schema
+from gen_data.generator.core.capture import POINT, Channel, Measurements, PointCloud, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import Modality, Renderer
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.measurement_dtypes import TIME, columns_dtype
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Light, Rig, Scene
+from gen_data.generator.core.scene_time import add_twists, place_sensors, scene_at
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.serialization import canonical_json, from_plain
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.sensors import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 GIVEN: dict[str, dict[str, Any]] = {
@@ -66,7 +66,7 @@ def street() -> Scene:
         for k, b in enumerate(boxes, 1)
     ]
     lens = Intrinsics.from_hfov(32, 24, 1.0)
-    return with_twists(
+    return add_twists(
         Scene(
             "test",
             bodies=(*boxes, Body("ground", "ground")),
@@ -75,7 +75,7 @@ def street() -> Scene:
             rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 1.0))),),
             lights=(Light("sun", "sun", direction=(0.0, 0.6, -0.8), illuminance_lux=5e4),),
             environment=Environment(luminance_cd_m2=3000.0),
-            tracks=tuple(Track(name, 0.1, way) for name, way in poses.items()),
+            tracks=tuple(Trajectory(name, 0.1, way) for name, way in poses.items()),
         )
     )
 
@@ -86,19 +86,19 @@ def made(kind: str, **fields: Any) -> Any:
     return TABLE.load(kind).model_validate_json(json.dumps(plain))
 
 
-def seen(sensor: Any, step: int = 3, seed: int = 0) -> Reading | PointCloud | Table:
+def seen(sensor: Any, step: int = 3, seed: int = 0) -> SensorReading | PointCloud | Measurements:
     """What it returns at one step."""
-    scene = with_placed_sensors(sensor.mount(street()))
+    scene = place_sensors(sensor.mount(street()))
     rng = Streams(seed, scene=0, view=0, step=step).rng("sensor/unit")
     channels = frozenset({Channel.INSTANCE})
-    return sensor.capture(at(scene, 0.1 * step), renderer(), channels, rng)
+    return sensor.capture(scene_at(scene, 0.1 * step), renderer(), channels, rng)
 
 
-def data(returned: Reading | PointCloud | Table) -> bytes:
+def data(returned: SensorReading | PointCloud | Measurements) -> bytes:
     """All bytes of what was returned."""
-    if isinstance(returned, Reading):
+    if isinstance(returned, SensorReading):
         return b"".join(returned.channels[c].tobytes() for c in sorted(returned.channels))
-    return (returned.rows if isinstance(returned, Table) else returned.points).tobytes()
+    return (returned.rows if isinstance(returned, Measurements) else returned.points).tobytes()
 
 
 @each
@@ -106,7 +106,7 @@ def test_mounting_adds_it_by_its_name_and_leaves_the_scene_alone(kind: str) -> N
     """The new scene has it among cameras, lidars or devices; it survives serialisation."""
     before = canonical_json(street())
     sensor = made(kind)
-    scene = with_placed_sensors(sensor.mount(street()))
+    scene = place_sensors(sensor.mount(street()))
 
     assert canonical_json(street()) == before
     names = [s.name for s in (*scene.cameras, *scene.lidars, *scene.devices)]
@@ -120,9 +120,9 @@ def test_it_is_where_its_description_says(kind: str) -> None:
     sensor = made(kind, rate_hz=10.0, time_offset_s=0.01)
     info, scene = sensor.describe(), sensor.mount(street())
     places = {
-        Modality.CAMERA: (scene.cameras, Reading),
+        Modality.CAMERA: (scene.cameras, SensorReading),
         Modality.LIDAR: (scene.lidars, PointCloud),
-        Modality.DEVICE: (scene.devices, Table),
+        Modality.DEVICE: (scene.devices, Measurements),
     }
     mounted, returned = places[info.modality]
 
@@ -143,7 +143,7 @@ def test_an_unknown_rig_is_named_with_those_there_are(kind: str) -> None:
 @each
 def test_it_moves_with_its_rig(kind: str) -> None:
     """0.8 m in 0.1 s."""
-    scene = with_placed_sensors(made(kind, offset_m=[0.5, 0.0, 0.2]).mount(street()))
+    scene = place_sensors(made(kind, offset_m=[0.5, 0.0, 0.2]).mount(street()))
 
     def place(s: Scene) -> np.ndarray:
         poses = [c.T_world_camera for c in s.cameras if c.name == "unit"]
@@ -152,7 +152,7 @@ def test_it_moves_with_its_rig(kind: str) -> None:
         return np.array(poses[0].translation_m)
 
     assert np.allclose(place(scene), [0.5, 0.0, 1.7], atol=1e-6)
-    assert np.allclose(place(at(scene, 0.1)), [1.3, 0.0, 1.7], atol=1e-6)
+    assert np.allclose(place(scene_at(scene, 0.1)), [1.3, 0.0, 1.7], atol=1e-6)
 
 
 @each
@@ -193,7 +193,7 @@ def test_rows_are_of_the_type_that_is_documented(kind: str) -> None:
     """And every column says what it means, its unit at its name's end."""
     returned = seen(made(kind))
 
-    assert isinstance(returned, Table)
+    assert isinstance(returned, Measurements)
     columns = made(kind).describe().columns
     assert returned.rows.dtype == columns_dtype(columns)
     assert returned.device.name == "unit"
@@ -208,7 +208,7 @@ def test_rows_lie_between_the_last_step_and_this_one(kind: str) -> None:
     """In order of time."""
     for step in range(4):
         returned = seen(made(kind), step)
-        assert isinstance(returned, Table)
+        assert isinstance(returned, Measurements)
         times_s = returned.rows["time_s"]
         assert (np.diff(times_s) >= 0.0).all()
         assert (times_s <= 0.1 * step + 1e-9).all()

@@ -9,21 +9,20 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-import configs
-import scene_templates
-from generator.assemble.recipe import nominal_scene
-from generator.assemble.schema import config_schema
-from generator.assemble.spec import Config, load_config
-from generator.assets.library import Library, open_library
-from generator.config.describe import describe
-from generator.config.document import load
-from generator.config.schema import json_schema
-from generator.core.errors import LayoutRejected
-from generator.core.instants import with_placed_sensors
-from generator.core.interfaces import Stage
-from generator.core.scene import Body, Scene
-from generator.core.serial import canonical_json
-from generator.core.streams import Streams
+from gen_data import configs, scene_templates
+from gen_data.generator.assemble.config import Config, load_config
+from gen_data.generator.assemble.config_schema import config_schema
+from gen_data.generator.assemble.pipeline_factory import nominal_scene
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.config.describe import describe
+from gen_data.generator.config.schema import json_schema
+from gen_data.generator.config.yaml_tree import load_yaml
+from gen_data.generator.core.errors import LayoutRejected
+from gen_data.generator.core.interfaces import Stage
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.scene_time import place_sensors
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.core.streams import Streams
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
 TEMPLATES = sorted(path.stem for path in Path(scene_templates.__path__[0]).glob("*.yaml"))
@@ -100,7 +99,7 @@ def test_template_has_a_comment_that_tells_what_it_is(name: str) -> None:
 
     assert first.startswith("# ")
     assert len(first) > 20
-    assert load(Path(scene_templates.__path__[0]) / f"{name}.yaml").get("elements") is not None
+    assert load_yaml(Path(scene_templates.__path__[0]) / f"{name}.yaml").get("elements") is not None
 
 
 @pytest.mark.parametrize("name", CONFIGS)
@@ -114,7 +113,7 @@ def test_configuration_tells_editors_its_schema(name: str) -> None:
 @pytest.mark.parametrize("name", CONFIGS)
 def test_configuration_satisfies_the_schema_that_editors_check_it_against(name: str) -> None:
     """jsonschema, an independent validator, finds no error in any file that is shipped."""
-    document = load(Path(configs.__path__[0]) / f"{name}.yaml").plain()
+    document = load_yaml(Path(configs.__path__[0]) / f"{name}.yaml").plain()
 
     errors = [error.json_path for error in validator().iter_errors(document)]
 
@@ -164,7 +163,7 @@ def test_randomizers_draw_valid_scenes(name: str) -> None:
             scene = randomized(name, Streams(1, scene_index, attempt=attempts))
         low, high = (np.array(corner) for corner in scene.interior_m)
         places = [light.position_m for light in scene.lights if light.kind != "sun"]
-        placed = with_placed_sensors(scene).cameras
+        placed = place_sensors(scene).cameras
         places += [camera.T_world_camera.translation_m for camera in placed]
 
         assert all(((low <= place) & (place <= high)).all() for place in map(np.array, places))

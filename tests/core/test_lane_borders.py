@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.core.lanes import LaneBorder, border_line, lane_borders
-from generator.core.scene import Lane
-from generator.core.se3 import SE3
-from generator.roads.lanes import road_lanes
-from generator.roads.profile import RoadShape, height_m
+from gen_data.generator.core.lane_geometry import LaneBorder, border_line, lane_borders
+from gen_data.generator.core.scene import Lane
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.cross_section import RoadShape, height_m
+from gen_data.generator.roads.lane_graph import road_lanes
 
 
 def road(**given: object) -> tuple[Lane, ...]:

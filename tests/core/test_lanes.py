@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from generator.core.lanes import LaneLine, standing_on_lane
-from generator.core.scene import Lane
-from generator.core.se3 import SE3
+from gen_data.generator.core.lane_geometry import LaneLine, pose_on_lane
+from gen_data.generator.core.scene import Lane
+from gen_data.generator.core.se3 import SE3
 
 RADIUS_M = 50.0
 
@@ -50,8 +50,8 @@ def test_what_stands_on_a_lane_has_its_middle_there_and_its_lowest_point_on_the_
     bounds_m = ((-1.0, -1.0, -0.3), (3.0, 1.0, 1.2))
     place = LaneLine(lane).pose(20.0)
 
-    pose = standing_on_lane(place, lane, bounds_m, "along")
-    turned = standing_on_lane(place, lane, bounds_m, "left")
+    pose = pose_on_lane(place, lane, bounds_m, "along")
+    turned = pose_on_lane(place, lane, bounds_m, "left")
 
     assert pose.translation_m == pytest.approx((19.0, 0.0, 0.4))
     assert (turned @ SE3((1.0, 0.0, -0.3))).translation_m == pytest.approx((20.0, 0.0, 0.1))
@@ -62,7 +62,7 @@ def test_fronts_of_houses_stand_on_their_line() -> None:
     """A house of 10 m depth faces the street on the lane's left."""
     lane = Lane("fronts", "frontage", ((0.0, 0.0, 0.0), (100.0, 0.0, 0.0)), 1.0)
     bounds_m = ((-10.0, -6.0, 0.0), (0.5, 6.0, 9.0))
-    pose = standing_on_lane(LaneLine(lane).pose(50.0), lane, bounds_m, "left")
+    pose = pose_on_lane(LaneLine(lane).pose(50.0), lane, bounds_m, "left")
 
     front = pose @ SE3((0.5, 0.0, 0.0))
     assert front.translation_m == pytest.approx((50.0, 0.0, 0.0), abs=1e-9)

@@ -12,11 +12,17 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
-from generator.core.instants import at, with_placed_sensors
-from generator.core.intrinsics import Intrinsics
-from generator.core.motion import STILL, Change, JointTrack, Track, poses_of
-from generator.core.scene import Body, Camera, Device, Instance, Lidar, Light, Rig, Scene
-from generator.core.se3 import SE3
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.motion import (
+    STILL,
+    JointTrajectory,
+    StateChange,
+    Trajectory,
+    interpolate_poses,
+)
+from gen_data.generator.core.scene import Body, Camera, Device, Instance, Lidar, Light, Rig, Scene
+from gen_data.generator.core.scene_time import place_sensors, scene_at
+from gen_data.generator.core.se3 import SE3
 
 QUICK = settings(max_examples=60, deadline=None, derandomize=True)
 
@@ -25,9 +31,9 @@ ways = st.lists(
 )
 
 
-def track_of(points: list[tuple[float, float, float]], step_s: float = 0.25) -> Track:
+def track_of(points: list[tuple[float, float, float]], step_s: float = 0.25) -> Trajectory:
     """A track through points, turning a little at every knot."""
-    return Track(
+    return Trajectory(
         "car", step_s, tuple(SE3.about_z(0.1 * k, p) for k, p in enumerate(points)), start_s=1.0
     )
 
@@ -50,7 +56,7 @@ def test_poses_of_several_tracks_are_those_of_each() -> None:
     ]
     times_s = np.array([0.5, 1.0, 1.06, 1.31, 1.75, 1.76, 9.0])
 
-    rotations, translations = poses_of(tracks, times_s)
+    rotations, translations = interpolate_poses(tracks, times_s)
 
     for i, track in enumerate(tracks):
         for k, time_s in enumerate(times_s.tolist()):
@@ -82,14 +88,14 @@ def test_positions_velocities_and_accelerations_are_those_of_a_catmull_rom_splin
 @given(st.floats(0.0, 1.0), st.floats(-0.4, 0.4))
 def test_rotations_between_knots_stay_near_the_shortest_arc(f: float, turn_rad: float) -> None:
     """A normalised linear blend of small turns differs from slerp by a hair."""
-    track = Track("car", 1.0, (SE3(), SE3.about_z(turn_rad)))
+    track = Trajectory("car", 1.0, (SE3(), SE3.about_z(turn_rad)))
     turned = Rotation.from_matrix(track.pose(f).rotation()).magnitude()
     assert turned == pytest.approx(abs(turn_rad) * f, abs=1e-3)
 
 
 def test_angular_velocity_is_the_turn_over_the_step() -> None:
     """A quarter turn to the left in half a second is pi radians a second about Z."""
-    track = Track("car", 0.5, (SE3(), SE3.about_z(0.5 * math.pi)))
+    track = Trajectory("car", 0.5, (SE3(), SE3.about_z(0.5 * math.pi)))
     np.testing.assert_allclose(
         track.twist(0.2).angular_velocity_rad_s, (0.0, 0.0, math.pi), atol=1e-9
     )
@@ -106,13 +112,13 @@ def test_outside_its_knots_a_body_stands_still() -> None:
 def test_a_track_of_one_knot_is_refused() -> None:
     """It is no way."""
     with pytest.raises(ValueError, match="two knots"):
-        Track("car", 0.1, (SE3(),))
+        Trajectory("car", 0.1, (SE3(),))
 
 
 def scene() -> Scene:
     """A car with a lamp, a rig and sensors on it, which drives 1 m in 1 s along X."""
     k = Intrinsics.from_hfov(8, 6, 1.0)
-    return with_placed_sensors(
+    return place_sensors(
         Scene(
             "test",
             bodies=(
@@ -131,10 +137,10 @@ def scene() -> Scene:
             lidars=(Lidar("top", "", SE3((0.0, 0.0, 2.0)), rig="ego"),),
             devices=(Device("imu", "imu", "ego", SE3((0.1, 0.0, 0.3))),),
             rigs=(Rig("ego", "car", SE3((0.0, 0.0, 0.1))),),
-            tracks=(Track("car", 1.0, (SE3(), SE3((1.0, 0.0, 0.0)))),),
+            tracks=(Trajectory("car", 1.0, (SE3(), SE3((1.0, 0.0, 0.0)))),),
             changes=(
-                Change(0.5, "car", asset="box?lit", attributes=(("brake", "on"),)),
-                Change(0.8, "car", attributes=(("brake", "off"),)),
+                StateChange(0.5, "car", asset="box?lit", attributes=(("brake", "on"),)),
+                StateChange(0.8, "car", attributes=(("brake", "off"),)),
             ),
         )
     )
@@ -142,7 +148,7 @@ def scene() -> Scene:
 
 def test_everything_on_a_moving_body_moves_with_it() -> None:
     """Body, instance, lamp, camera, lidar and device; the tree and the sun stay."""
-    then = at(scene(), 1.0)
+    then = scene_at(scene(), 1.0)
     assert then.body("car").T_world_body.translation_m == (1.0, 0.0, 0.0)
     assert then.instance(1).T_world_instance.translation_m == (1.0, 0.0, 0.0)
     assert then.lights[0].position_m == (3.0, 0.5, 0.6)
@@ -159,9 +165,9 @@ def test_a_panel_turns_with_its_body() -> None:
         "p", "rectangle", (1.0, 0.0, 1.0), (1.0, 0.0, 0.0), side=(0.0, 1.0, 0.0), body="car"
     )
     turned = SE3.about_z(0.5 * math.pi)
-    moving = replace(scene(), lights=(panel,), tracks=(Track("car", 1.0, (SE3(), turned)),))
+    moving = replace(scene(), lights=(panel,), tracks=(Trajectory("car", 1.0, (SE3(), turned)),))
 
-    (then,) = at(moving, 1.0).lights
+    (then,) = scene_at(moving, 1.0).lights
 
     assert then.position_m == pytest.approx((0.0, 1.0, 1.0))
     assert then.direction == pytest.approx((0.0, 1.0, 0.0))
@@ -175,27 +181,27 @@ def test_changes_hold_until_the_next_one() -> None:
         (0.6, "on", "box?lit"),
         (0.9, "off", "box?lit"),
     ):
-        then = at(scene(), time_s)
+        then = scene_at(scene(), time_s)
         assert dict(then.instance(1).attributes)["brake"] == brake
         assert then.body("car").asset == then.instance(1).asset == asset
 
 
 def test_the_way_to_an_instant_does_not_matter() -> None:
     """By another instant or straight: the same bodies."""
-    detour = at(at(scene(), 0.3), 0.7)
-    assert detour.bodies == at(scene(), 0.7).bodies
+    detour = scene_at(scene_at(scene(), 0.3), 0.7)
+    assert detour.bodies == scene_at(scene(), 0.7).bodies
 
 
 def test_what_moves_is_known_to_its_instance() -> None:
     """One metre in one second; the tree stands."""
-    then = at(scene(), 0.5)
+    then = scene_at(scene(), 0.5)
     assert then.instance(1).twist.velocity_m_s == pytest.approx((1.0, 0.0, 0.0))
     assert then.instance(2).twist == STILL
 
 
 def test_joint_positions_are_linear_between_knots_and_constant_outside() -> None:
     """Half a radian in half a second, from the first second on."""
-    track = JointTrack(0.5, ((0.0, 1.0), (0.5, 1.0)), start_s=1.0)
+    track = JointTrajectory(0.5, ((0.0, 1.0), (0.5, 1.0)), start_s=1.0)
     assert track.positions(0.0) == (0.0, 1.0)
     assert track.positions(1.25) == (0.25, 1.0)
     assert track.positions(9.0) == (0.5, 1.0)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad, quad
 
-from generator.core.fixtures import level_side, with_fixture, without_lights
-from generator.core.geometry import Material
-from generator.core.photometry import (
-    intensity_of_flux,
-    intensity_of_illuminance,
+from gen_data.generator.core.area_lights import add_fixture, level_side, remove_lights
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.photometry import (
+    flux_to_intensity_cd,
+    illuminance_to_intensity_cd,
     luminance_cd_m2,
-    with_flux,
+    scale_to_flux,
 )
-from generator.core.scene import Body, Light, Scene
+from gen_data.generator.core.scene import Body, Light, Scene
 
 SPHERE, SPOT = Light("s", "sphere"), Light("p", "spot", cone_rad=0.5, even=0.6)
 RECTANGLE = Light("r", "rectangle", size_m=(1.2, 0.5))
@@ -37,27 +37,27 @@ def share_of_intensity(light: Light, angle_rad: float) -> float:
 @pytest.mark.parametrize("light", [SPHERE, SPOT, RECTANGLE, DISK])
 def test_intensity_over_all_directions_sums_to_the_flux(light: Light) -> None:
     """The integral of I(angle) over the sphere, by quadrature, is the luminous flux."""
-    intensity_cd = intensity_of_flux(light, 3000.0)
+    intensity_cd = flux_to_intensity_cd(light, 3000.0)
 
     flux_lm, _ = quad(
         lambda a: 2.0 * math.pi * math.sin(a) * share_of_intensity(light, a) * intensity_cd,
         0.0, math.pi, points=[0.3, 0.5, math.pi / 2],
     )  # fmt: skip
     assert flux_lm == pytest.approx(3000.0, rel=1e-6)
-    assert with_flux(light, 3000.0).intensity_cd == pytest.approx(intensity_cd, abs=1e-4)
+    assert scale_to_flux(light, 3000.0).intensity_cd == pytest.approx(intensity_cd, abs=1e-4)
 
 
 def test_a_sun_has_no_flux() -> None:
     """It is at infinity: only what arrives is known."""
     with pytest.raises(ValueError, match="not a flux"):
-        intensity_of_flux(Light("s", "sun"), 100.0)
+        flux_to_intensity_cd(Light("s", "sun"), 100.0)
 
 
 @pytest.mark.parametrize("distance_m", [0.3, 1.0, 7.0])
 def test_panels_give_the_illuminance_that_was_asked_for(distance_m: float) -> None:
     """L cos cos / d^2 over the panel, by quadrature, straight before its middle."""
     for light in (RECTANGLE, DISK):
-        cd = intensity_of_illuminance(light, 500.0, distance_m)
+        cd = illuminance_to_intensity_cd(light, 500.0, distance_m)
         lit = Light("l", light.kind, intensity_cd=cd, size_m=light.size_m, radius_m=light.radius_m)
 
         def arriving(x: float, y: float) -> float:
@@ -75,7 +75,7 @@ def test_panels_give_the_illuminance_that_was_asked_for(distance_m: float) -> No
 
 def test_balls_follow_the_inverse_square_law() -> None:
     """500 lx at 3 m are 4500 cd."""
-    assert intensity_of_illuminance(SPHERE, 500.0, 3.0) == 4500.0
+    assert illuminance_to_intensity_cd(SPHERE, 500.0, 3.0) == 4500.0
 
 
 def test_only_panels_have_a_luminance() -> None:
@@ -95,7 +95,7 @@ def test_a_fixture_lies_right_behind_its_panel(direction: tuple[float, float, fl
     )  # fmt: skip
     slots = (Material(), Material(role="lamp"))
 
-    scene, shown = with_fixture(Scene("t"), light, slots)
+    scene, shown = add_fixture(Scene("t"), light, slots)
 
     (body,) = scene.bodies
     front = body.T_world_body.apply(np.zeros(3))
@@ -116,10 +116,10 @@ def test_a_fixture_lies_right_behind_its_panel(direction: tuple[float, float, fl
 def test_lights_go_with_their_fixtures_and_leave_what_else_they_ride_on() -> None:
     """A panel's housing goes; a car stays when its lamps do not."""
     panel = Light("panel", "disk", radius_m=0.2, intensity_cd=5.0)
-    scene, shown = with_fixture(Scene("t", (Body("car", "car"),)), panel, (Material(role="lamp"),))
+    scene, shown = add_fixture(Scene("t", (Body("car", "car"),)), panel, (Material(role="lamp"),))
     headlight = Light("head", "spot", body="car")
 
-    left = without_lights(Scene("t", scene.bodies, lights=(shown, headlight)))
+    left = remove_lights(Scene("t", scene.bodies, lights=(shown, headlight)))
 
     assert left.lights == ()
     assert [body.name for body in left.bodies] == ["car"]

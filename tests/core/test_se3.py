@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from generator.core.se3 import IDENTITY, SE3, look_at, quaternion_of_rotation
+from gen_data.generator.core.se3 import IDENTITY, SE3, look_at, rotation_to_quaternion
 
 QUICK = settings(max_examples=150, deadline=None, derandomize=True)
 
@@ -112,7 +112,7 @@ def test_half_turns_survive_the_matrix(axis: int) -> None:
     q = [0.0, 0.0, 0.0, 0.0]
     q[1 + axis] = 1.0
 
-    assert quaternion_of_rotation(SE3((0, 0, 0), tuple(q)).rotation()) == tuple(q)  # type: ignore[arg-type]
+    assert rotation_to_quaternion(SE3((0, 0, 0), tuple(q)).rotation()) == tuple(q)  # type: ignore[arg-type]
 
 
 def test_about_z_turns_x_to_y() -> None:

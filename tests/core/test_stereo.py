@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera
-from generator.core.se3 import SE3
-from generator.core.stereo import baseline_m, disparity_px, seen_by_both
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Camera
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.stereo import baseline_m, disparity_px, is_seen_by_both
 
 FOCAL_PX, BASELINE_M, WIDTH_PX = 100.0, 0.2, 160
 WALL_M, BOARD_M, BOARD_FROM_M, BOARD_TO_M = 4.0, 1.0, -0.163, 0.207
@@ -87,7 +87,7 @@ def test_what_the_other_camera_sees_agrees_with_lines_of_sight(sign: float) -> N
 
     focal_baseline = FOCAL_PX * other_m
     here, there = (disparity_px(image(d), focal_baseline) for d in (here_m, columns_m(other_m)))
-    seen = seen_by_both(here, there)
+    seen = is_seen_by_both(here, there)
 
     certain = ~near_edge
     assert met[certain].sum() > 5
@@ -99,13 +99,13 @@ def test_a_projector_may_reach_beyond_the_image() -> None:
     """What lies beside its image is seen if one says so."""
     flat = np.full((2, 20), 5.0, np.float32)
 
-    assert seen_by_both(flat, flat)[0].tolist() == [False] * 4 + [True] * 16
-    assert seen_by_both(flat, flat, beyond=True).all()
+    assert is_seen_by_both(flat, flat)[0].tolist() == [False] * 4 + [True] * 16
+    assert is_seen_by_both(flat, flat, beyond=True).all()
 
 
 def test_nothing_is_seen_by_nobody() -> None:
     """Where there is no surface there is none for the other camera either."""
     nothing = np.zeros((2, 6), np.float32)
 
-    assert not seen_by_both(nothing, nothing, beyond=True).any()
+    assert not is_seen_by_both(nothing, nothing, beyond=True).any()
     assert math.isfinite(float(disparity_px(np.full((1, 1), np.inf, np.float32), 20.0)[0, 0]))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from generator.runner.verify import verify
+from gen_data.generator.runner.verify import verify
 from tests.runner.doubles import make, tree_digest
 from tests.runner.fake_run import DELAY_S, SHARD_SIZE, N
 from tests.runner.test_processes import start_fake_run

@@ -80,9 +80,9 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
     """Pixels of sample 7, made in another process with no other sample before it."""
     program = (
         "import sys, numpy as np\n"
-        "from generator.assemble.recipe import open_pipeline\n"
-        "from generator.assemble.spec import config_of_source\n"
-        "from generator.core.capture import Channel\n"
+        "from gen_data.generator.assemble.pipeline_factory import open_pipeline\n"
+        "from gen_data.generator.assemble.config import load_source_config as config_of_source\n"
+        "from gen_data.generator.core.capture import Channel\n"
         f"with open_pipeline(config_of_source({str(dataset)!r})) as pipeline:\n"
         "    reading = pipeline.sample(7).capture.readings['color']\n"
         "np.savez('alone.npz', rgb=reading.channels[Channel.RGB],\n"
@@ -102,15 +102,15 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
 
 def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
     """The Scene in scenes.jsonl is the whole provenance: no randomizer, no physics needed."""
-    from generator.assemble.recipe import PipelineFactory
-    from generator.assemble.spec import config_of_source
-    from generator.core.capture import Channel
-    from generator.core.streams import Streams
-    from generator.runner.provenance import kept_scenes
+    from gen_data.generator.assemble.config import load_source_config
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+    from gen_data.generator.core.capture import Channel
+    from gen_data.generator.core.streams import Streams
+    from gen_data.generator.runner.provenance import read_scenes
 
-    kept = list(kept_scenes(dataset / "shards" / "000002" / "scenes.jsonl"))[3]
+    kept = list(read_scenes(dataset / "shards" / "000002" / "scenes.jsonl"))[3]
     scene = kept.scene
-    config = config_of_source(str(dataset))
+    config = load_source_config(str(dataset))
     pipeline = PipelineFactory(config, n=15)()
     (camera,) = (sensor for sensor in config.sensors if sensor.name == "color")
     stream = Streams(seed=0, scene=0).rng("color")
@@ -144,11 +144,11 @@ def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
 
 def test_licences_name_what_was_used_and_nothing_else(dataset: Path) -> None:
     """The families in LICENSES-ASSETS.md are those of the scenes that were kept."""
-    from generator.runner.provenance import kept_scenes
+    from gen_data.generator.runner.provenance import read_scenes
 
     used = set()
     for path in sorted((dataset / "shards").glob("*/scenes.jsonl")):
-        for kept in kept_scenes(path):
+        for kept in read_scenes(path):
             used |= {b.asset for b in kept.scene.bodies if not b.name.startswith("arm/")}
             used |= {m.texture for b in kept.scene.bodies for m in b.materials if m.texture}
             used |= {a.asset for a in kept.scene.articulations} | {kept.scene.environment.image}

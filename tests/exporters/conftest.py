@@ -16,32 +16,32 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exporters.images import write_media
-from generator import annotations
-from generator.annotations.boxes3d import oriented_box
-from generator.annotations.truth import Thresholds, image_truth
-from generator.core.boxes import BoxPx, tight_box
-from generator.core.capture import (
+from gen_data.exporters.image_files import write_media
+from gen_data.generator import annotations
+from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
+from gen_data.generator.annotations.boxes3d import oriented_box
+from gen_data.generator.core.asset_types import SURFACES, Keypoint, Material
+from gen_data.generator.core.boxes import BoxPx, tight_box
+from gen_data.generator.core.capture import (
     POINT,
     Capture,
     Channel,
+    Measurements,
     PointCloud,
-    Reading,
+    SensorReading,
     Silhouette,
-    Table,
 )
-from generator.core.geometry import SURFACES, Keypoint, Material
-from generator.core.instants import RIG_AXES, at, with_placed_sensors, with_twists
-from generator.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo
-from generator.core.intrinsics import Intrinsics
-from generator.core.lanes import LaneBorder
-from generator.core.lens import LensModel
-from generator.core.motion import Track
-from generator.core.sample import BirdseyeMap, FrameTruth, ImageTruth, Sample
-from generator.core.scene import Body, Camera, Device, Instance, Lidar, Rig, Scene
-from generator.core.se3 import SE3, Array, look_at
-from generator.core.tables import TABLE_COLUMNS, table_rows
-from generator.runner.shard import without_pixels
+from gen_data.generator.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lane_geometry import LaneBorder
+from gen_data.generator.core.lens import LensModel
+from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, table_rows
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.sample import BirdseyeMap, EgoTruth, ImageTruth, Sample
+from gen_data.generator.core.scene import Body, Camera, Device, Instance, Lidar, Rig, Scene
+from gen_data.generator.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
+from gen_data.generator.core.se3 import SE3, Array, look_at
+from gen_data.generator.runner.shard import drop_pixels
 
 CATEGORIES = ("car", "crate", "pedestrian")
 MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
@@ -96,7 +96,7 @@ def level_camera(name: str = "color", size_px: tuple[int, int] = (160, 120)) -> 
     return Camera(name, look_at((0.0, 0.0, 1.6), (10.0, 0.0, 1.6)), intrinsics)
 
 
-def ray_cast(scene: Scene, camera: Camera) -> Reading:
+def ray_cast(scene: Scene, camera: Camera) -> SensorReading:
     """Every channel, and silhouettes on a canvas three images wide and high."""
     k = camera.intrinsics
     w, h = k.width_px, k.height_px
@@ -127,7 +127,7 @@ def ray_cast(scene: Scene, camera: Camera) -> Reading:
         Channel.CATEGORY: categories,
         Channel.PART: np.zeros_like(ids),
     }
-    return Reading(camera.name, camera, channels, silhouettes)
+    return SensorReading(camera.name, camera, channels, silhouettes)
 
 
 def _normals(points: Array) -> NDArray[np.float32]:
@@ -200,7 +200,7 @@ def make_sample(
     imu = Device("imu", "imu", "ego", T_world_device=SE3((0.0, 0.0, 0.5)), model="RT3003")
     scene = replace(scene, lidars=(lidar,), devices=(imu,))
     clouds = {"top": PointCloud("top", lidar, scan(scene, lidar))}
-    tables = {"imu": Table("imu", imu, imu_rows(index))}
+    tables = {"imu": Measurements("imu", imu, imu_rows(index))}
     capture, frame = Capture(readings, clouds, tables), frame_of(scene)
     return Sample(index, index, 0, split, scene, capture, truth, frame=frame)
 
@@ -213,12 +213,12 @@ def imu_rows(index: int) -> NDArray[Any]:
 
 
 def annotated(
-    scene: Scene, readings: Mapping[str, Reading], thresholds: Thresholds
+    scene: Scene, readings: Mapping[str, SensorReading], thresholds: Thresholds
 ) -> dict[str, ImageTruth]:
     """Every annotation of every reading."""
     annotators = [annotations.TABLE.load(name)() for name in annotations.TABLE]
     return {
-        name: image_truth(scene, reading, annotators, thresholds)
+        name: annotate_objects(scene, reading, annotators, thresholds)
         for name, reading in readings.items()
     }
 
@@ -260,9 +260,9 @@ def driving_scene() -> Scene:
         cameras=cameras,
         lidars=(Lidar("top", "", SE3((0.0, 0.0, 1.73)), model="VLP-16", rig="ego"),),
         rigs=(Rig("ego", "ego"),),
-        tracks=tuple(Track(name, STEP_S, tuple(way), -0.2) for name, way in ways.items()),
+        tracks=tuple(Trajectory(name, STEP_S, tuple(way), -0.2) for name, way in ways.items()),
     )
-    return with_twists(with_placed_sensors(scene))
+    return add_twists(place_sensors(scene))
 
 
 def make_drive(strides: Mapping[str, int] | None = None) -> list[Sample]:
@@ -270,7 +270,7 @@ def make_drive(strides: Mapping[str, int] | None = None) -> list[Sample]:
     samples = []
     for index in range(8):
         sequence, step = divmod(index, 4)
-        scene = at(driving_scene(), STEP_S * step)
+        scene = scene_at(driving_scene(), STEP_S * step)
         reads = [n for n in ("left", "right", "top") if step % (strides or {}).get(n, 1) == 0]
         readings = {
             camera.name: replace(ray_cast(scene, camera), time_s=scene.time_s)
@@ -325,11 +325,11 @@ def make_pairs() -> tuple[DatasetInfo, list[Sample]]:
     return make_info(8, names, ("top",), media=media, steps_per_scene=4), samples
 
 
-def frame_of(scene: Scene) -> FrameTruth:
+def frame_of(scene: Scene) -> EgoTruth:
     """A map of 40 m in which half of the ground is drivable, and boxes."""
     drivable = np.zeros((80, 80), bool)
     drivable[:, 40:] = True
-    return FrameTruth(
+    return EgoTruth(
         "ego",
         boxes3d={"ego": {i.instance_id: oriented_box(i) for i in scene.instances}},
         borders=(LaneBorder("lane:left", "road", ((-90.0, 0.0, 0.0), (90.0, 0.0, 0.0))),),
@@ -425,7 +425,7 @@ def export(
     for shard, shard_dir in reversed(work) if backwards else work:
         for sample in shard:
             write_media(info, sample, shard_dir)
-        exporter.write_shard(info, shard if keep_arrays else map(without_pixels, shard), shard_dir)
+        exporter.write_shard(info, shard if keep_arrays else map(drop_pixels, shard), shard_dir)
     exporter.finalize(info, shard_dirs, folder / "dataset")
     return folder / "dataset"
 

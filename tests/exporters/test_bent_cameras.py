@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from exporters import TABLE
-from generator.core.errors import ConfigError
+from gen_data.exporters import TABLE
+from gen_data.generator.core.errors import ConfigError
 
 
 @pytest.mark.parametrize("kind", ["kitti", "kitti_raw", "kitti_tracking", "semantickitti"])

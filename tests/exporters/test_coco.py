@@ -17,13 +17,13 @@ from pycocotools import mask as coco_mask
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
-from exporters.coco import Coco
-from generator.annotations.truth import Thresholds
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.lens import Lens
-from generator.core.scene import Weather
-from generator.core.se3 import SE3
+from gen_data.exporters.coco import Coco
+from gen_data.generator.annotations.annotate import Thresholds
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.scene import Weather
+from gen_data.generator.core.se3 import SE3
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from exporters import TABLE
-from generator import annotations
+from gen_data.exporters import TABLE
+from gen_data.generator import annotations
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exporters.coco import Coco
-from exporters.images import png
-from generator.core.capture import Channel
-from generator.core.shutter import Shutter
+from gen_data.exporters.coco import Coco
+from gen_data.exporters.image_files import encode_channel
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.shutter import Shutter
 
 H, W = 7, 9
 
@@ -32,7 +32,7 @@ def test_flow_is_kittis(channel: Channel) -> None:
     flow = np.random.default_rng(1).uniform(-500.0, 500.0, (H, W, 2)).astype(np.float32)
     flow[2, 3] = np.nan
     flow[4, 5] = (3.0, np.nan)
-    values = read(png(channel, flow, 0.001)).astype(np.float64)
+    values = read(encode_channel(channel, flow, 0.001)).astype(np.float64)
 
     known = values[..., 2] == 1
     assert np.array_equal(~known, np.isnan(flow).any(axis=-1))
@@ -43,7 +43,7 @@ def test_flow_is_kittis(channel: Channel) -> None:
 
 def test_no_flow_is_not_flow_of_nothing() -> None:
     """What stands still is valid, and 2^15 in both coordinates."""
-    values = read(png(Channel.FLOW_FORWARD, np.zeros((H, W, 2), np.float32), 0.001))
+    values = read(encode_channel(Channel.FLOW_FORWARD, np.zeros((H, W, 2), np.float32), 0.001))
 
     assert np.array_equal(values, np.broadcast_to([32768, 32768, 1], (H, W, 3)))
 
@@ -53,7 +53,7 @@ def test_flow_beyond_what_the_file_can_hold_is_none(beyond_px: float) -> None:
     """It does not wrap around."""
     flow = np.zeros((H, W, 2), np.float32)
     flow[1, 1, 0] = beyond_px
-    values = read(png(Channel.FLOW_FORWARD, flow, 0.001))
+    values = read(encode_channel(Channel.FLOW_FORWARD, flow, 0.001))
 
     assert (values[1, 1] == 0).all()
     assert (values[1, 2] == [32768, 32768, 1]).all()
@@ -64,7 +64,7 @@ def test_scene_flow_is_in_units_of_depth() -> None:
     flow = np.random.default_rng(2).uniform(-30.0, 30.0, (H, W, 3)).astype(np.float32)
     flow[0, 0] = np.nan
     flow[0, 1, 2] = 33.0
-    values = read(png(Channel.SCENE_FLOW, flow, 0.001)).astype(np.float64)
+    values = read(encode_channel(Channel.SCENE_FLOW, flow, 0.001)).astype(np.float64)
 
     assert (values[0, 0] == 0).all()
     assert (values[0, 1] == 0).all()
@@ -75,7 +75,7 @@ def test_occlusion_is_white() -> None:
     """255 where a point cannot be seen, 0 where it can."""
     hidden = (np.arange(H * W).reshape(H, W) % 2).astype(np.uint8)
 
-    values = read(png(Channel.FLOW_OCCLUDED_BACKWARD, hidden, 0.001))
+    values = read(encode_channel(Channel.FLOW_OCCLUDED_BACKWARD, hidden, 0.001))
 
     assert values.dtype == np.uint8
     assert np.array_equal(values, 255 * hidden)

@@ -14,10 +14,10 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from exporters.images import depth_units, link_or_copy, png, write_media
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError, SampleError
-from generator.core.interfaces import media_path
+from gen_data.exporters.image_files import depth_units, encode_channel, link_or_copy, write_media
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError, SampleError
+from gen_data.generator.core.interfaces import media_path
 
 H, W = 37, 53
 
@@ -58,7 +58,7 @@ def test_rgb_keeps_its_order_of_colours_and_every_value() -> None:
     """A red image is red for every reader; OpenCV's BGR stays inside."""
     rgb = np.random.default_rng(0).integers(0, 256, (H, W, 3), dtype=np.uint8)
 
-    mode, pixels = read(png(Channel.RGB, rgb, 1.0))
+    mode, pixels = read(encode_channel(Channel.RGB, rgb, 1.0))
 
     assert mode == "RGB"
     np.testing.assert_array_equal(pixels, rgb)
@@ -70,8 +70,8 @@ def test_ids_are_16_bit_grey_up_to_the_largest(channel: Channel) -> None:
     ids = np.random.default_rng(1).integers(0, 65_536, (H, W), dtype=np.uint16)
     ids[0, 0], ids[0, 1] = 0, 65_535
 
-    mode, pixels = read(png(channel, ids, 1.0))
-    small_mode, _ = read(png(channel, ids % 3, 1.0))
+    mode, pixels = read(encode_channel(channel, ids, 1.0))
+    small_mode, _ = read(encode_channel(channel, ids % 3, 1.0))
 
     assert mode == small_mode == "I;16"
     np.testing.assert_array_equal(pixels, ids)
@@ -82,7 +82,7 @@ def test_depth_is_written_in_units_of_the_scale(channel: Channel) -> None:
     """Half to even; 0 where there is nothing and where 16 bits do not reach."""
     depth_m = np.array([[1.0, 0.25, 0.75, 1.25], [np.inf, 32_767.5, 32_768.0, 0.0]], np.float32)
 
-    mode, pixels = read(png(channel, depth_m, 0.5))
+    mode, pixels = read(encode_channel(channel, depth_m, 0.5))
 
     assert mode == "I;16"
     assert pixels.tolist() == [[2, 0, 2, 2], [0, 65_535, 0, 0]]
@@ -92,7 +92,7 @@ def test_depth_survives_the_file_to_half_a_unit(tmp_path: Path) -> None:
     """0.1 mm units: never more than 0.05 mm away, and equal to what the pure function says."""
     depth_m = np.random.default_rng(2).uniform(0.3, 6.5, (H, W)).astype(np.float32)
 
-    _, units = read(png(Channel.Z_DEPTH, depth_m, 0.0001))
+    _, units = read(encode_channel(Channel.Z_DEPTH, depth_m, 0.0001))
 
     assert np.abs(units * 0.0001 - depth_m).max() <= 0.00005 + 1e-9
     np.testing.assert_array_equal(units, depth_units(depth_m, 0.0001))
@@ -102,14 +102,14 @@ def test_depth_survives_the_file_to_half_a_unit(tmp_path: Path) -> None:
 def test_a_depth_that_is_no_distance_is_an_error(wrong: float) -> None:
     """16-bit integers would wrap a negative depth to a far one."""
     with pytest.raises(SampleError, match="negative number or NaN"):
-        png(Channel.Z_DEPTH, np.array([[1.0, wrong]], np.float32), 0.001)
+        encode_channel(Channel.Z_DEPTH, np.array([[1.0, wrong]], np.float32), 0.001)
 
 
 def test_normals_map_minus_one_to_one_onto_a_byte() -> None:
     """Red is the camera's x; nothing is the middle grey 128."""
     normals = np.array([[[-1, 0, 1], [1, -1, 0], [0, 0, 0]]], np.float32)
 
-    mode, pixels = read(png(Channel.NORMALS, normals, 1.0))
+    mode, pixels = read(encode_channel(Channel.NORMALS, normals, 1.0))
 
     assert mode == "RGB"
     assert pixels.tolist() == [[[0, 128, 255], [255, 0, 128], [128, 128, 128]]]
@@ -120,7 +120,7 @@ def test_object_coordinates_are_16_bit_colour() -> None:
     coordinates = np.random.default_rng(3).random((H, W, 3)).astype(np.float32)
     coordinates[0, 0], coordinates[0, 1] = 0.0, 1.0
 
-    pixels = read_rgb16(png(Channel.OBJECT_COORDINATES, coordinates, 1.0))
+    pixels = read_rgb16(encode_channel(Channel.OBJECT_COORDINATES, coordinates, 1.0))
 
     assert pixels[0, :2].tolist() == [[0, 0, 0], [65_535, 65_535, 65_535]]
     assert np.abs(pixels / 65_535 - coordinates).max() <= 0.5 / 65_535 + 1e-7
@@ -130,7 +130,7 @@ def test_object_coordinates_a_rounding_outside_the_box_do_not_wrap() -> None:
     """Boxes are known to a micrometre; 1.0001 is 1, not 0."""
     coordinates = np.array([[[1.0001, -0.0001, 0.5]]], np.float32)
 
-    assert read_rgb16(png(Channel.OBJECT_COORDINATES, coordinates, 1.0)).tolist() == [
+    assert read_rgb16(encode_channel(Channel.OBJECT_COORDINATES, coordinates, 1.0)).tolist() == [
         [[65_535, 0, 32_768]]
     ]
 
@@ -139,13 +139,13 @@ def test_encoding_twice_gives_the_same_bytes() -> None:
     """Data sets are compared by hash."""
     rgb = np.random.default_rng(4).integers(0, 256, (H, W, 3), dtype=np.uint8)
 
-    assert png(Channel.RGB, rgb, 1.0) == png(Channel.RGB, rgb.copy(), 1.0)
+    assert encode_channel(Channel.RGB, rgb, 1.0) == encode_channel(Channel.RGB, rgb.copy(), 1.0)
 
 
 def test_silhouettes_cannot_be_written_as_an_image() -> None:
     """The message lists what can."""
     with pytest.raises(ConfigError, match=r"'amodal'.*rgb, depth, range, instance"):
-        png(Channel.AMODAL, np.zeros((2, 2), bool), 1.0)
+        encode_channel(Channel.AMODAL, np.zeros((2, 2), bool), 1.0)
 
 
 def test_every_channel_of_the_media_is_written_to_its_path(world: Any, tmp_path: Path) -> None:

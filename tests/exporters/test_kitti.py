@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
-from exporters.kitti import (
+from gen_data.exporters.kitti import (
     Kitti,
     calib_text,
     label_row,
@@ -21,14 +21,14 @@ from exporters.kitti import (
     official_type,
     upright_box,
 )
-from generator.annotations.truth import Thresholds
-from generator.core.boxes import BoxPx, OrientedBox
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ImageTruth, ObjectTruth
-from generator.core.scene import Camera, Instance
-from generator.core.se3 import IDENTITY, SE3
+from gen_data.generator.annotations.annotate import Thresholds
+from gen_data.generator.core.boxes import BoxPx, OrientedBox
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import ImageTruth, ObjectTruth
+from gen_data.generator.core.scene import Camera, Instance
+from gen_data.generator.core.se3 import IDENTITY, SE3
 
 Array = NDArray[np.float64]
 CAMERA = Camera("color", IDENTITY, Intrinsics(200, 100, 150.0, 150.0, 100.0, 50.0))

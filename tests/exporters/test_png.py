@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from exporters.png import SIGNATURE, RowFilter, encode_png
+from gen_data.exporters.png import SIGNATURE, RowFilter, encode_png
 
 
 def noise(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:

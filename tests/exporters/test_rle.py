@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
-from exporters.rle import encoded, run_lengths
-from generator.core.boxes import tight_box
-from generator.core.sample import MaskPx
+from gen_data.exporters.rle import encode_rle, run_lengths
+from gen_data.generator.core.boxes import tight_box
+from gen_data.generator.core.sample import MaskPx
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -40,7 +40,7 @@ def test_rle_of_a_crop_is_what_pycocotools_makes_of_the_whole_mask(
     if not image.any():
         image[-1, -1] = True
 
-    ours = encoded(tight(image), height, width)
+    ours = encode_rle(tight(image), height, width)
 
     theirs = coco_mask.encode(np.asfortranarray(image.astype(np.uint8)))
     assert ours == {"size": list(theirs["size"]), "counts": theirs["counts"].decode()}
@@ -62,5 +62,5 @@ def test_an_empty_mask_is_one_run_of_zeros() -> None:
     """What amodal masks are of things wholly outside the image."""
     mask = MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
 
-    assert not coco_mask.decode(dict(encoded(mask, 5, 6))).any()
+    assert not coco_mask.decode(dict(encode_rle(mask, 5, 6))).any()
     assert run_lengths(mask, 5, 6) == [30]

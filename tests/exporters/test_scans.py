@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from exporters.clouds import read_points
-from exporters.kitti import (
+from gen_data.exporters.kitti import (
     Kitti,
     label_rows,
     label_text,
@@ -22,13 +21,14 @@ from exporters.kitti import (
     point_members,
     upright_box,
 )
-from exporters.pointclouds import PointClouds
-from exporters.semantickitti import SemanticKitti
-from exporters.semantickitti import point_labels as semantic_labels
-from generator.core.capture import POINT
-from generator.core.errors import ConfigError, StorageError
-from generator.core.geometry import SURFACES
-from generator.core.motion import Twist
+from gen_data.exporters.point_cloud_io import read_points
+from gen_data.exporters.pointclouds import PointClouds
+from gen_data.exporters.semantickitti import SemanticKitti
+from gen_data.exporters.semantickitti import point_labels as semantic_labels
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.capture import POINT
+from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.core.motion import Twist
 
 POINT_FIELDS = [
     *("x", "y", "z", "intensity", "time", "ring", "instance", "category", "surface"),

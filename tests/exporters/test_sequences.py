@@ -15,26 +15,26 @@ import cv2
 import numpy as np
 import pytest
 
-from exporters.coco import Coco
-from exporters.kitti import Kitti
-from exporters.kitti_raw import KittiRaw, luma
-from exporters.kitti_tracking import KittiTracking, truncation_level
-from exporters.motchallenge import MotChallenge, mot_class
-from exporters.oxts import (
+from gen_data.exporters.coco import Coco
+from gen_data.exporters.kitti import Kitti
+from gen_data.exporters.kitti_raw import KittiRaw, luma
+from gen_data.exporters.kitti_tracking import KittiTracking, truncation_level
+from gen_data.exporters.motchallenge import MotChallenge, mot_class
+from gen_data.exporters.oxts import (
     GRAVITY_M_S2,
-    Motion,
-    motion_of,
+    RigMotion,
     navigation_mount,
     oxts_row,
+    rig_motion,
     roll_pitch_yaw,
 )
-from exporters.pointclouds import PointClouds
-from exporters.semantickitti import SemanticKitti
-from exporters.sequences import timestamp
-from generator.core.errors import ConfigError
-from generator.core.motion import STILL, Twist
-from generator.core.scene import Device
-from generator.core.se3 import SE3
+from gen_data.exporters.pointclouds import PointClouds
+from gen_data.exporters.semantickitti import SemanticKitti
+from gen_data.exporters.sequences import timestamp
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.motion import STILL, Twist
+from gen_data.generator.core.scene import Device
+from gen_data.generator.core.se3 import SE3
 
 DRIVE = "2011_09_26/2011_09_26_drive_{:04d}_sync"
 FRAMES = [f"{k:06d}" for k in range(4)]
@@ -211,7 +211,7 @@ def test_navigation_follows_the_rig(exported: Any, world: Any) -> None:
 def test_navigation_of_a_leaning_unit_at_rest_feels_gravity_along_its_own_axes() -> None:
     """Nose up by 30 degrees: half of gravity forward along its axis, none along the level one."""
     up = SE3((0.0, 0.0, 7.0), (math.cos(math.radians(15)), 0.0, -math.sin(math.radians(15)), 0.0))
-    row = np.array(oxts_row(Motion(up, STILL), (49.0, 8.0)).split(), float)
+    row = np.array(oxts_row(RigMotion(up, STILL), (49.0, 8.0)).split(), float)
 
     assert row[:3] == pytest.approx([49.0, 8.0, 7.0])
     assert row[3:6] == pytest.approx([0.0, -math.radians(30), 0.0])
@@ -225,7 +225,7 @@ def test_navigation_of_a_device_is_that_of_its_place_on_the_rig(samples: Any) ->
     device = Device("gnss", "gnss", "ego", SE3((0.0, 1.0, 0.5)))
     scene = replace(samples[1].scene, devices=(device,))
     mount = navigation_mount(scene, "gnss", "ego", "kitti_raw")
-    row = np.array(oxts_row(motion_of(scene, mount), (0.0, 0.0)).split(), float)
+    row = np.array(oxts_row(rig_motion(scene, mount), (0.0, 0.0)).split(), float)
 
     assert row[8:11] == pytest.approx([9.8, 0.0, 0.0], abs=2e-3)
     assert row[12] == pytest.approx(9.8 * 0.2, abs=0.01)
@@ -237,7 +237,7 @@ def test_navigation_of_a_device_is_that_of_its_place_on_the_rig(samples: Any) ->
 def test_navigation_north_and_east() -> None:
     """World Y is north, X is east; heading north makes both forward and leftward differ."""
     north = SE3.about_z(math.radians(90))
-    motion = Motion(north, Twist((1.0, 5.0, 0.0)))
+    motion = RigMotion(north, Twist((1.0, 5.0, 0.0)))
     row = np.array(oxts_row(motion, (0.0, 0.0)).split(), float)
 
     assert row[6:11] == pytest.approx([5.0, 1.0, 5.0, -1.0, 0.0])

@@ -16,7 +16,7 @@ def gen_data(*arguments: str, home: Path) -> subprocess.CompletedProcess[str]:
     """The program in a process of its own, with an asset folder of its own."""
     environment = {**os.environ, "GEN_DATA_ASSETS": str(home), "PYTHONPATH": str(ROOT)}
     return subprocess.run(
-        [sys.executable, "-m", "generator.cli", *arguments],
+        [sys.executable, "-m", "gen_data.generator.cli", *arguments],
         capture_output=True, text=True, env=environment, cwd=home, check=False,
     )  # fmt: skip
 
@@ -69,7 +69,7 @@ def test_errors_have_one_message_and_their_exit_code(
 def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
     """``--help`` is for people in a hurry: neither numpy nor pydantic is loaded."""
     code = (
-        "import sys; from generator.cli.main import cli;"
+        "import sys; from gen_data.generator.cli.main import cli;"
         "cli.main(['--help'], standalone_mode=False);"
         "sys.exit(any(name in sys.modules for name in ('numpy', 'pydantic', 'yaml')))"
     )

@@ -11,14 +11,21 @@ import cv2
 import numpy as np
 import pytest
 
-from generator.assets.images import decode_radiance
-from generator.assets.library import open_library
-from generator.assets.packs import TAG
-from generator.core.errors import AssetError
-from generator.core.kinematics import link_poses
-from generator.core.se3 import SE3
-from generator.packs import catalogue, panoramas, robots
-from generator.packs.catalogue import Choice, Group, Lamp, Model, mesh_entry, read_selection
+from gen_data.generator.assets.image_decoding import decode_radiance
+from gen_data.generator.assets.installed_packs import TAG
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.kinematics import link_poses
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.packs import panoramas, robosuite, sweethome3d
+from gen_data.generator.packs.sweethome3d import (
+    Group,
+    Lamp,
+    Model,
+    ModelChoice,
+    mesh_entry,
+    read_selection,
+)
 from tests.packs.converters import BOX
 
 FACTS = """
@@ -83,7 +90,7 @@ def test_sizes_and_creators_come_from_the_package(tmp_path: Path) -> None:
         (tmp_path / name / "PluginFurnitureCatalog.properties").write_bytes(
             FACTS.replace("things", name[:3]).encode("latin-1")
         )
-    models = catalogue.read_models(tmp_path)
+    models = sweethome3d.read_models(tmp_path)
     assert models["Sco/box/box.obj"].size_m == (0.2, 0.1, 0.4)
     assert models["Sco/box/box.obj"].creator == "A. Modeller"
     assert models["Sco/box/box.obj"].licence.startswith("CC-BY-3.0")
@@ -92,7 +99,7 @@ def test_sizes_and_creators_come_from_the_package(tmp_path: Path) -> None:
 
 def test_a_point_beside_the_middle_stands_for_two() -> None:
     """Left first."""
-    choice = Choice(
+    choice = ModelChoice(
         id="car", category="car", model="car.obj", keypoints={"wheel_front": (1.2, 0.7, 0.3)}
     )
     entry = mesh_entry(choice, Group(models=()), _model(Path()), {})
@@ -108,7 +115,7 @@ def test_a_wheel_counts_as_seen_from_the_side_and_from_ahead(view: str) -> None:
 
     The far hub, 1.4 m behind the near one, is hidden either way.
     """
-    choice = Choice(
+    choice = ModelChoice(
         id="car", category="car", model="car.obj", keypoints={"wheel_front": (1.2, 0.7, 0.3)}
     )
     left, right = mesh_entry(choice, Group(models=()), _model(Path()), {}).keypoints
@@ -119,7 +126,7 @@ def test_a_wheel_counts_as_seen_from_the_side_and_from_ahead(view: str) -> None:
 
 def test_what_fits_between_fingers_is_graspable() -> None:
     """One of its edges must be at most 7 cm; the package says 20 x 10 x 40 cm."""
-    choice = Choice(id="mug", category="mug", model="mug.obj")
+    choice = ModelChoice(id="mug", category="mug", model="mug.obj")
     for size_m, graspable in ((None, False), (0.28, True)):
         sized = choice.model_copy(update={"size_m": size_m})
         entry = mesh_entry(sized, Group(tags=("household",), models=()), _model(Path()), {})
@@ -130,7 +137,7 @@ def test_lamps_are_cut_out_on_both_sides() -> None:
     """Two boxes, mirrored at the middle."""
     selection = read_selection()
     lamp = Lamp(material="m", finish="headlight", low_m=(1, 0.4, 0.5), high_m=(2, 0.9, 0.8))
-    choice = Choice(id="car", category="car", model="car.obj", lamps=(lamp,))
+    choice = ModelChoice(id="car", category="car", model="car.obj", lamps=(lamp,))
     regions = mesh_entry(choice, Group(models=()), _model(Path()), selection.finishes).regions
     assert [(r.low_m, r.high_m) for r in regions] == [
         ((1, 0.4, 0.5), (2, 0.9, 0.8)),
@@ -188,14 +195,14 @@ def test_a_finish_with_a_colour_hides_what_the_files_surface_let_through(
 def test_a_package_without_a_selected_model_is_refused(tmp_path: Path) -> None:
     """It is another release of the catalogue."""
     with pytest.raises(AssetError, match="holds no model"):
-        catalogue.convert(tmp_path, tmp_path / "out")
+        sweethome3d.convert(tmp_path, tmp_path / "out")
 
 
 def test_a_panorama_survives_the_radiance_file() -> None:
     """Read by OpenCV, within the half percent that eight bits of mantissa leave."""
     rows, columns = np.mgrid[0:8, 0:16]
     image = np.stack([rows + 0.01, columns * 100.0, 0.001 * rows * columns], axis=2)
-    data = panoramas.radiance_file(image.astype(np.float32))
+    data = panoramas.encode_radiance(image.astype(np.float32))
     read = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)[..., ::-1]
     brightest = image.max(axis=2, keepdims=True)
     assert np.abs(read - image).max() > 0.0
@@ -240,7 +247,7 @@ HAND = """<mujoco model="hand"><worldbody><body name="gripper_base">
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An arm of one joint, and the gripper."""
-    monkeypatch.setattr(robots, "ARMS", (robots.Arm("mini", "nobody", {"elbow": 0.5}),))
+    monkeypatch.setattr(robosuite, "ARMS", (robosuite.Arm("mini", "nobody", {"elbow": 0.5}),))
     root = tmp_path / "robosuite" / "models" / "assets"
     for name, text in (
         ("robots/mini/robot.xml", ARM.replace("{flange}", "right_hand")),
@@ -259,12 +266,12 @@ def test_an_mjcf_arm_becomes_a_robot(package: Path, tmp_path: Path) -> None:
     """
     folder = tmp_path / "packs" / "robots"
     folder.mkdir(parents=True)
-    robots.convert(package, folder)
+    robosuite.convert(package, folder)
     library = open_library(cache_dir=tmp_path / "cache", packs=tmp_path / "packs")
     robot = library.robot("robots/mini")
     elbow = robot.movable[0]
     assert (elbow.name, elbow.lower, elbow.upper) == ("elbow", -1.0, 2.0)
-    assert robot.gripper is not None and robot.gripper.finger_joints == robots._FINGERS
+    assert robot.gripper is not None and robot.gripper.finger_joints == robosuite._FINGERS
     poses = link_poses(robot, SE3(), (0.0, 0.0, 0.0))
     # Half a turn about Z takes +Y to -Y; the flange's quaternion maps X to Y, Y to Z, Z to X.
     assert np.allclose(poses["gripper_base"].translation_m, (0.0, -0.5, 1.0))
@@ -287,14 +294,14 @@ def test_a_body_with_two_joints_is_refused(package: Path, tmp_path: Path) -> Non
     path.write_text(text.replace(joint, joint + joint.replace("elbow", "two")), encoding="utf-8")
     (tmp_path / "out").mkdir()
     with pytest.raises(AssetError, match="only one hinge or slide"):
-        robots.convert(package, tmp_path / "out")
+        robosuite.convert(package, tmp_path / "out")
 
 
 def test_gimbal_lock_keeps_the_rotation(tmp_path: Path) -> None:
     """A quarter turn about Y has no unique roll and yaw, but one rotation."""
     from xml.etree.ElementTree import Element
 
-    from generator.packs.mjcf import _origin
+    from gen_data.generator.packs.mjcf import _origin
 
     for w, x, y, z in ((1, 0, 1, 0), (1, 0, -1, 0), (0.5, 0.5, 0.5, 0.5), (1, 2, 3, 4)):
         element = Element("visual")

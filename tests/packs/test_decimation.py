@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.decimate import decimated
-from generator.assets.soup import Slot, Soup
-from generator.core.geometry import Material
+from gen_data.generator.assets.mesh_decimation import decimate
+from gen_data.generator.assets.triangle_soup import MaterialSlot, TriangleSoup
+from gen_data.generator.core.asset_types import Material
 
 
-def sheet(n: int, textured: bool) -> Soup:
+def sheet(n: int, textured: bool) -> TriangleSoup:
     """A gently curved square of 2 n^2 triangles; u and v are x and y."""
     x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
     points = np.stack([x, y, 0.05 * np.sin(3.0 * x) * np.cos(2.0 * y)], axis=2)
@@ -20,14 +20,14 @@ def sheet(n: int, textured: bool) -> Soup:
             np.stack([a, c, d], axis=2).reshape(-1, 3, 3),
         ]
     )
-    slot = Slot("cloth", Material(texture="t" if textured else ""))
+    slot = MaterialSlot("cloth", Material(texture="t" if textured else ""))
     zeros = np.zeros(len(corners), dtype=np.int64)
-    return Soup(corners, corners[..., :2].copy(), None, zeros, zeros, (slot,))
+    return TriangleSoup(corners, corners[..., :2].copy(), None, zeros, zeros, (slot,))
 
 
 def test_texture_coordinates_follow_the_surface() -> None:
     """U and v still are x and y after nine tenths of the triangles are gone."""
-    soup = decimated(sheet(40, textured=True), 320)
+    soup = decimate(sheet(40, textured=True), 320)
     assert len(soup) < 600
     assert soup.uvs is not None
     assert np.abs(soup.uvs - soup.corners[..., :2]).max() < 0.05
@@ -40,7 +40,7 @@ def test_seams_stay_where_they_are() -> None:
     right = soup.corners[..., 0].min(axis=1) >= 0.5 - 1e-9
     assert soup.uvs is not None
     soup.uvs[right] += 5.0
-    thinned = decimated(soup, 640)
+    thinned = decimate(soup, 640)
     assert thinned.uvs is not None
     offset = thinned.uvs[..., 0] - thinned.corners[..., 0]
     near = np.minimum(np.abs(offset), np.abs(offset - 5.0))
@@ -51,14 +51,14 @@ def test_seams_stay_where_they_are() -> None:
 def test_a_material_of_few_triangles_is_left_alone() -> None:
     """Each of them may be one whole side of a box."""
     large, small = sheet(40, textured=False), sheet(3, textured=False)
-    both = Soup(
+    both = TriangleSoup(
         np.concatenate([large.corners, small.corners + 2.0]),
         None,
         None,
         np.repeat([0, 1], [len(large), len(small)]),
         np.zeros(len(large) + len(small), dtype=np.int64),
-        (large.slots[0], Slot("lid", Material(roughness=0.9))),
+        (large.slots[0], MaterialSlot("lid", Material(roughness=0.9))),
     )
-    thinned = decimated(both, 400)
+    thinned = decimate(both, 400)
     assert (thinned.face_slots == 1).sum() == 18
     assert (thinned.face_slots == 0).sum() < 600

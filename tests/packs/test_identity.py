@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.recipe import PipelineFactory
-from generator.assemble.spec import load_config
-from generator.assets.paths import packs_dir
-from generator.packs.install import install
-from generator.packs.table import Pack
-from generator.runner.identity import licences_text, plan_of
-from generator.runner.plan import compare
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.assets.paths import packs_dir
+from gen_data.generator.packs.install import install
+from gen_data.generator.packs.pack_table import Pack
+from gen_data.generator.runner.identity import format_licences, make_plan
+from gen_data.generator.runner.plan import compare_plans
 from tests.packs.converters import BOX
 
 
@@ -46,7 +46,7 @@ def installed_box(tmp_path: Path, side: str) -> None:
 
 def test_without_packs_a_plan_names_none(factory: PipelineFactory) -> None:
     """So that data sets of procedural assets never care."""
-    assert not [name for name in plan_of(factory).versions if name.startswith("pack ")]
+    assert not [name for name in make_plan(factory).versions if name.startswith("pack ")]
 
 
 def test_a_pack_that_fits_is_part_of_the_plan_and_of_the_licences(
@@ -54,10 +54,10 @@ def test_a_pack_that_fits_is_part_of_the_plan_and_of_the_licences(
 ) -> None:
     """Its household object may lie on the table."""
     installed_box(tmp_path, "0.1")
-    plan = plan_of(factory)
+    plan = make_plan(factory)
     assert plan.versions["pack boxes"].startswith("1.0 ")
     assert "boxes/box" in plan.assets
-    text = licences_text(factory, ["boxes/box"])
+    text = format_licences(factory, ["boxes/box"])
     assert "| a test | CC-BY-3.0 | A. Modeller | boxes/box |" in text
 
 
@@ -66,16 +66,16 @@ def test_another_content_of_the_pack_is_another_data_set(
 ) -> None:
     """Resuming is refused; the difference is named."""
     installed_box(tmp_path, "0.1")
-    before = plan_of(factory)
+    before = make_plan(factory)
     installed_box(tmp_path, "0.2")
-    differences = compare(before, plan_of(factory))
+    differences = compare_plans(before, make_plan(factory))
     assert any(line.startswith("versions.pack boxes: was") for line in differences)
-    assert compare(before, before) == []
+    assert compare_plans(before, before) == []
 
 
 def test_panoramas_that_may_light_a_scene_belong_to_the_data_set(
     factory: PipelineFactory,
 ) -> None:
     """Light changes every byte."""
-    environments = [name for name in plan_of(factory).assets if name.startswith("environment/")]
+    environments = [name for name in make_plan(factory).assets if name.startswith("environment/")]
     assert environments

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from generator.assets.library import Library, open_library
-from generator.assets.packs import installed
-from generator.core.errors import AssetError, StorageError, VerificationError
-from generator.packs.install import install, is_installed, remove, verify
-from generator.packs.table import PACKS, ClientName, Pack, find_pack
+from gen_data.generator.assets.installed_packs import installed_packs
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import AssetError, StorageError, VerificationError
+from gen_data.generator.packs.install import install, is_installed, remove, verify
+from gen_data.generator.packs.pack_table import PACKS, ClientName, Pack, find_pack
 from tests.packs.converters import BOX
 
 
@@ -151,7 +151,7 @@ def test_a_killed_installation_leaves_nothing_behind(
     process.start()
     process.join()
     assert process.exitcode == -signal.SIGKILL
-    assert installed(folder) == ()
+    assert installed_packs(folder) == ()
     assert library_with(folder, tmp_path).find(("pack",)) == ()
     install(pack, folder, archive)
     assert names_in(folder) == {"boxes"}
@@ -240,7 +240,7 @@ def test_a_damaged_record_says_what_to_do(pack: Pack, archive: Path, tmp_path: P
     install(pack, folder, archive)
     (folder / "boxes" / "pack.json").write_text("{", encoding="utf-8")
     with pytest.raises(AssetError, match="install the pack again"):
-        installed(folder)
+        installed_packs(folder)
 
 
 def test_an_unknown_pack_is_answered_with_the_nearest() -> None:

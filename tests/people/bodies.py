@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from generator.assets.people.body import Body, load
-from generator.assets.people.families import pack_file
-from generator.assets.people.simple import simple_body
+from gen_data.generator.assets.people.analytic_body import simple_body
+from gen_data.generator.assets.people.body import BodyTemplate, load
+from gen_data.generator.assets.people.families import pack_file
 
 VARIABLE = "GEN_DATA_TEST_ASSETS"
 """Names a folder with the people pack, installed for these tests alone:
@@ -25,6 +25,6 @@ KINDS = [
 ]
 
 
-def body_of(kind: str) -> Body:
+def body_of(kind: str) -> BodyTemplate:
     """The body of a kind."""
     return simple_body() if kind == "simple" else load(PACK_FILE)

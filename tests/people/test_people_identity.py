@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from generator.assets import people
-from generator.assets.library import open_library
-from generator.assets.paths import packs_dir
-from generator.assets.people.body import load
-from generator.assets.people.convert import convert
-from generator.assets.people.person import drawn_person, facts
-from generator.core.errors import AssetError
+from gen_data.generator.assets import people
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.paths import packs_dir
+from gen_data.generator.assets.people.body import load
+from gen_data.generator.assets.people.convert import convert
+from gen_data.generator.assets.people.person import draw_person, facts
+from gen_data.generator.core.errors import AssetError
 
 
 def test_grown_people_are_from_150_to_195_cm_and_about_as_tall_as_the_population() -> None:
     """Means within 2 cm of NCHS 2021 for either sex."""
-    grown = [p for p in map(drawn_person, range(600)) if p.age_group != "child"]
+    grown = [p for p in map(draw_person, range(600)) if p.age_group != "child"]
     assert all(1.5 <= p.height_m <= 1.95 for p in grown)
     for sex, mean in (("female", 1.613), ("male", 1.753)):
         heights = [p.height_m for p in grown if p.sex == sex]
@@ -28,7 +28,7 @@ def test_grown_people_are_from_150_to_195_cm_and_about_as_tall_as_the_population
 
 def test_one_person_in_ten_is_a_child() -> None:
     """And children are smaller than any grown person."""
-    drawn = [drawn_person(seed) for seed in range(600)]
+    drawn = [draw_person(seed) for seed in range(600)]
     children = [p for p in drawn if p.age_group == "child"]
     assert 0.06 < len(children) / len(drawn) < 0.14
     assert max(p.height_m for p in children) <= 1.5
@@ -36,7 +36,7 @@ def test_one_person_in_ten_is_a_child() -> None:
 
 def test_a_pose_that_is_asked_for_leaves_the_person_the_same() -> None:
     """Pose has a stream of its own."""
-    walking, sitting = drawn_person(7, "walk", 0.5), drawn_person(7, "sit")
+    walking, sitting = draw_person(7, "walk", 0.5), draw_person(7, "sit")
     assert walking.outfit == sitting.outfit and walking.skin == sitting.skin
     assert walking.height_m == sitting.height_m
     assert (walking.pose, walking.step, sitting.pose) == ("walk", 8, "sit")
@@ -44,7 +44,7 @@ def test_a_pose_that_is_asked_for_leaves_the_person_the_same() -> None:
 
 def test_phases_are_rounded_to_sixteenths() -> None:
     """So that a data set needs at most sixteen meshes per walking person."""
-    assert [drawn_person(1, "walk", p).step for p in (0.0, 0.03, 0.04, 0.97, 1.0)] == [
+    assert [draw_person(1, "walk", p).step for p in (0.0, 0.03, 0.04, 0.97, 1.0)] == [
         0,
         0,
         1,
@@ -56,7 +56,7 @@ def test_phases_are_rounded_to_sixteenths() -> None:
 def test_a_pose_that_does_not_exist_is_refused_with_a_suggestion() -> None:
     """The message names what there is."""
     with pytest.raises(ValueError, match=r"pose 'walks' is none of walk, run.*did you mean 'walk'"):
-        drawn_person(1, "walks")
+        draw_person(1, "walks")
 
 
 def test_facts_say_what_labels_need() -> None:

@@ -7,12 +7,12 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from generator.assets.people.build import built, dressed
-from generator.assets.people.families import simple_person
-from generator.assets.people.gait import POSES
-from generator.assets.people.person import Person, drawn_person
-from generator.assets.procedural.family import Solid
-from generator.core.geometry import MeshData
+from gen_data.generator.assets.people.animation import POSES
+from gen_data.generator.assets.people.families import simple_person
+from gen_data.generator.assets.people.person import Person, draw_person
+from gen_data.generator.assets.people.person_mesh import build_person, dress_person
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.core.asset_types import MeshData
 from tests.people.bodies import KINDS, body_of
 
 # https://cocodataset.org/#keypoints-2020, in the order of its annotation files.
@@ -40,7 +40,7 @@ SEEDS = range(12)
 
 def made(person: Person, kind: str) -> Solid:
     """A person with the body of a kind."""
-    return built(person, dressed(person, body_of(kind)))
+    return build_person(person, dress_person(person, body_of(kind)))
 
 
 def distances_m(points: np.ndarray, mesh: MeshData) -> np.ndarray:
@@ -55,7 +55,7 @@ def distances_m(points: np.ndarray, mesh: MeshData) -> np.ndarray:
 def test_the_lowest_vertex_stands_on_the_ground(kind: str, pose: str) -> None:
     """The ground is z = 0, whatever a person does."""
     for phase in (0.0, 0.3125, 0.6875):
-        mesh = made(drawn_person(3, pose, phase), kind).mesh
+        mesh = made(draw_person(3, pose, phase), kind).mesh
         assert mesh.vertices_m[:, 2].min() == 0.0
 
 
@@ -63,7 +63,7 @@ def test_the_lowest_vertex_stands_on_the_ground(kind: str, pose: str) -> None:
 def test_standing_people_are_as_tall_as_their_facts_say(kind: str) -> None:
     """Shoes, hair and hats add at most 7 cm, and nothing takes more than 2 cm away."""
     for seed in SEEDS:
-        person = drawn_person(seed, "stand")
+        person = draw_person(seed, "stand")
         top = float(made(person, kind).mesh.vertices_m[:, 2].max())
         assert person.height_m - 0.02 <= top <= person.height_m + 0.07
 
@@ -71,7 +71,7 @@ def test_standing_people_are_as_tall_as_their_facts_say(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_people_have_cocos_seventeen_keypoints_in_its_order(kind: str) -> None:
     """Names and order are those of the COCO data set."""
-    keypoints = made(drawn_person(0), kind).keypoints
+    keypoints = made(draw_person(0), kind).keypoints
     assert [point.name for point in keypoints] == COCO_17
 
 
@@ -80,7 +80,7 @@ def test_people_have_cocos_seventeen_keypoints_in_its_order(kind: str) -> None:
 def test_left_keypoints_lie_to_the_left_of_right_ones(kind: str, pose: str) -> None:
     """+X is ahead and Z up, so left is +Y."""
     for seed in SEEDS:
-        points = made(drawn_person(seed, pose), kind).keypoints
+        points = made(draw_person(seed, pose), kind).keypoints
         at = {point.name: np.array(point.position_m) for point in points}
         for name, place in at.items():
             if name.startswith("left_"):
@@ -93,7 +93,7 @@ def test_left_keypoints_lie_to_the_left_of_right_ones(kind: str, pose: str) -> N
 def test_every_keypoint_lies_no_deeper_than_its_radius(kind: str, pose: str) -> None:
     """Else a keypoint in full view would count as hidden."""
     for seed in SEEDS:
-        solid = made(drawn_person(seed, pose, 0.125), kind)
+        solid = made(draw_person(seed, pose, 0.125), kind)
         points = np.array([point.position_m for point in solid.keypoints])
         radii = np.array([point.radius_m for point in solid.keypoints])
         deep = distances_m(points, solid.mesh)
@@ -104,7 +104,7 @@ def test_every_keypoint_lies_no_deeper_than_its_radius(kind: str, pose: str) -> 
 @pytest.mark.parametrize("kind", KINDS)
 def test_standing_bodies_are_mirror_images_of_themselves(kind: str) -> None:
     """Joints of a symmetric pose differ in the sign of y only."""
-    points = made(drawn_person(5, "stand"), kind).keypoints
+    points = made(draw_person(5, "stand"), kind).keypoints
     at = {point.name: np.array(point.position_m) for point in points}
     for name, place in at.items():
         if name.startswith("left_"):
@@ -117,7 +117,7 @@ def test_half_a_stride_later_left_and_right_have_changed_places(kind: str) -> No
     """A walk is the same on both sides, half a stride apart."""
     now, later = (
         {k.name: np.array(k.position_m) for k in made(person, kind).keypoints}
-        for person in (drawn_person(4, "walk", 0.125), drawn_person(4, "walk", 0.625))
+        for person in (draw_person(4, "walk", 0.125), draw_person(4, "walk", 0.625))
     )
     for joint in ("knee", "ankle", "wrist", "hip"):
         mirrored = later[f"right_{joint}"] * (1.0, -1.0, 1.0)
@@ -127,7 +127,7 @@ def test_half_a_stride_later_left_and_right_have_changed_places(kind: str) -> No
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_stride_takes_the_left_foot_forward_first(kind: str) -> None:
     """Phase 0 is the left heel strike: left foot ahead, right arm ahead."""
-    points = made(drawn_person(4, "walk", 0.0), kind).keypoints
+    points = made(draw_person(4, "walk", 0.0), kind).keypoints
     at = {point.name: point.position_m for point in points}
     assert at["left_ankle"][0] > at["right_ankle"][0] + 0.3
     assert at["right_wrist"][0] > at["left_wrist"][0] + 0.1
@@ -137,14 +137,14 @@ def test_a_stride_takes_the_left_foot_forward_first(kind: str) -> None:
 def test_people_keep_to_the_triangle_budget(kind: str) -> None:
     """At most 6,000 triangles, clothes, hair and bags included."""
     for seed in range(40):
-        assert len(made(drawn_person(seed, "carry"), kind).mesh.faces) <= 6000
+        assert len(made(draw_person(seed, "carry"), kind).mesh.faces) <= 6000
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_meshes_are_well_formed(kind: str) -> None:
     """Indices are in range, normals are unit, faces have three corners, all is finite."""
     for seed in SEEDS:
-        mesh = made(drawn_person(seed), kind).mesh
+        mesh = made(draw_person(seed), kind).mesh
         assert np.isfinite(mesh.vertices_m).all()
         assert mesh.faces.min() == 0 and mesh.faces.max() == len(mesh.vertices_m) - 1
         assert mesh.face_slots.max() < len(mesh.materials)
@@ -156,7 +156,7 @@ def test_meshes_are_well_formed(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_normals_look_outward(kind: str) -> None:
     """Normals of a torso point away from the body's axis, far more often than not."""
-    mesh = made(drawn_person(5, "stand"), kind).mesh
+    mesh = made(draw_person(5, "stand"), kind).mesh
     v, n = mesh.vertices_m, mesh.normals
     trunk = (v[:, 2] > 1.1) & (v[:, 2] < 1.3) & (np.abs(v[:, 1]) < 0.12)
     assert ((v[trunk] * n[trunk])[:, :2].sum(axis=1) > 0.0).mean() > 0.95
@@ -165,7 +165,7 @@ def test_normals_look_outward(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_material_says_what_it_is(kind: str) -> None:
     """Roles let randomizers recolour clothes and leave skin alone."""
-    mesh = made(drawn_person(5, "stand"), kind).mesh
+    mesh = made(draw_person(5, "stand"), kind).mesh
     roles = Counter(material.role for material in mesh.materials)
     assert {"skin", "hair", "eyes", "top", "bottom", "shoes"} <= set(roles)
     assert "" not in roles
@@ -174,7 +174,7 @@ def test_every_material_says_what_it_is(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_same_person_is_the_same_bytes(kind: str) -> None:
     """Building twice gives equal arrays."""
-    first, second = (made(drawn_person(9, "walk", 0.25), kind) for _ in range(2))
+    first, second = (made(draw_person(9, "walk", 0.25), kind) for _ in range(2))
     assert first.mesh.vertices_m.tobytes() == second.mesh.vertices_m.tobytes()
     assert first.mesh.normals.tobytes() == second.mesh.normals.tobytes()
     assert first.keypoints == second.keypoints
@@ -187,7 +187,7 @@ def test_a_pose_is_the_same_whatever_the_same_person_did_before() -> None:
     simple_person(7, "sit", 0.0)
     again, fresh = (
         simple_person(7, "walk", 0.25).mesh,
-        made(drawn_person(7, "walk", 0.25), "simple"),
+        made(draw_person(7, "walk", 0.25), "simple"),
     )
     for name in ("vertices_m", "normals", "faces", "face_slots"):
         expected = getattr(first, name).tobytes()

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from generator.assets.people.body import DELTA_M, FILE, load
-from generator.assets.people.build import built, dressed
-from generator.assets.people.convert import convert
-from generator.assets.people.person import drawn_person
-from generator.assets.people.simple import simple_body
+from gen_data.generator.assets.people.analytic_body import simple_body
+from gen_data.generator.assets.people.body import DELTA_M, FILE, load
+from gen_data.generator.assets.people.convert import convert
+from gen_data.generator.assets.people.person import draw_person
+from gen_data.generator.assets.people.person_mesh import build_person, dress_person
 
 # Which zones of the body from formulas stand in for the groups of the pack's base mesh.
 GROUPS = {
@@ -101,8 +101,8 @@ def test_a_converted_pack_makes_people(source: Path, tmp_path: Path) -> None:
     for bone in ("calf_l", "hand_r", "head"):
         expected = formula.points_m[formula.bone(bone)]
         np.testing.assert_allclose(body.points_m[body.bone(bone)], expected, atol=1e-5)
-    person = drawn_person(2, "stand")
-    solid = built(person, dressed(person, body))
+    person = draw_person(2, "stand")
+    solid = build_person(person, dress_person(person, body))
     assert solid.mesh.vertices_m[:, 2].min() == 0.0
     assert len(solid.keypoints) == 17
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.assets.people.gait import PHASES, POSES, stance
-from generator.assets.people.pose import rotations_of
-from generator.assets.people.skinning import bone_transforms, skinned, vertex_normals
+from gen_data.generator.assets.people.animation import PHASES, POSES, stance
+from gen_data.generator.assets.people.bone_rotations import bone_rotations
+from gen_data.generator.assets.people.skinning import bone_transforms, skin_points, vertex_normals
 from tests.people.bodies import KINDS, body_of
 
 
@@ -16,7 +16,7 @@ def posed_heads(kind: str, pose: str, step: int) -> tuple[np.ndarray, np.ndarray
     body = body_of(kind)
     count = len(body.bones)
     heads = body.points_m[:count]
-    transforms = bone_transforms(body, heads, rotations_of(body, heads, stance(pose, step)))
+    transforms = bone_transforms(body, heads, bone_rotations(body, heads, stance(pose, step)))
     after = np.einsum("bij,bj->bi", transforms[:, :, :3], heads) + transforms[:, :, 3]
     return heads, after, body.parents
 
@@ -38,7 +38,7 @@ def test_rotations_are_rotations(kind: str) -> None:
     body = body_of(kind)
     heads = body.points_m[: len(body.bones)]
     for pose in POSES:
-        for rotation in rotations_of(body, heads, stance(pose, 5)).values():
+        for rotation in bone_rotations(body, heads, stance(pose, 5)).values():
             np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
             assert np.linalg.det(rotation) == pytest.approx(1.0)
 
@@ -50,7 +50,7 @@ def test_points_of_one_bone_move_rigidly() -> None:
     transforms = np.stack([np.eye(3, 4), quarter])
     bones = np.array([[1, 0, 0, 0], [0, 1, 0, 0]])
     weights = np.array([[1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]])
-    moved = skinned(points, bones, weights, transforms)
+    moved = skin_points(points, bones, weights, transforms)
     np.testing.assert_allclose(moved[0], [-2.0 + 5.0, 1.0 + 6.0, 10.0])
     np.testing.assert_allclose(moved[1], 0.5 * points[1] + 0.5 * np.array([6.0, 6.0, 7.5]))
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from generator.core.errors import AssetError
-from generator.core.geometry import ConvexParts, Joint, RobotModel
-from generator.core.scene import Body, ObjectGroup, Scene, Surface
-from generator.core.se3 import SE3
+from gen_data.generator.core.asset_types import ConvexParts, Joint, RobotModel
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3
 from tests.physics.panda import mesh_vertices, panda
 
 TABLE_TOP_Z_M = 0.75
@@ -150,7 +150,7 @@ ROBOTS = {"panda": cache(panda), "gantry": gantry}
 def table_scene(*bodies: Body, placement: str = "drop", walled: bool = False) -> Scene:
     """A table of 1.2 m by 0.8 m, 0.75 m high, on a floor, and bodies of a group ``things``."""
     x, y = TABLE_SIZE_M
-    surface = Surface(
+    surface = SupportSurface(
         "table", "table", SE3((0, 0, TABLE_TOP_Z_M)), TABLE_SIZE_M, clearance_m=2.0, walled=walled
     )
     furniture = (

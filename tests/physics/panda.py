@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pybullet_data
 
-from generator.core.geometry import Gripper, Joint, RobotModel
-from generator.core.se3 import SE3, multiply_quaternions
+from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.generator.core.se3 import SE3, multiply_quaternions
 
 URDF = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
 HOME = (0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.785398, 0.04, 0.04)

@@ -10,11 +10,11 @@ import numpy as np
 import pybullet
 import pytest
 
-from generator.core.kinematics import link_poses
-from generator.core.scene import ArmGoal, Articulation, Body, Instance, Scene
-from generator.core.se3 import IDENTITY, SE3, multiply_quaternions
-from generator.physics import PhysicsConfig
-from generator.physics.engine import BulletEngine
+from gen_data.generator.core.kinematics import link_poses
+from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Instance, Scene
+from gen_data.generator.core.se3 import IDENTITY, SE3, multiply_quaternions
+from gen_data.generator.physics import PhysicsConfig
+from gen_data.generator.physics.engine import BulletEngine
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, table_scene, thing, world_vertices
 from tests.physics.panda import HOME, panda
 

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from generator.core.geometry import ConvexParts
-from generator.core.scene import ArmGoal, Articulation, Scene
-from generator.core.se3 import SE3
-from generator.core.serial import canonical_json
-from generator.physics import PhysicsConfig, open_engine
-from generator.physics.bullet import World
-from generator.physics.engine import BulletEngine
-from generator.physics.shapes import collision_shape
+from gen_data.generator.core.asset_types import ConvexParts
+from gen_data.generator.core.scene import ArmGoal, Articulation, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.physics import PhysicsConfig, open_engine
+from gen_data.generator.physics.bullet import World
+from gen_data.generator.physics.collision_shapes import collision_shape
+from gen_data.generator.physics.engine import BulletEngine
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, box, dropped_clutter, table_scene, thing
 from tests.physics.panda import HOME
 

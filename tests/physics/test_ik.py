@@ -7,16 +7,21 @@ import math
 import numpy as np
 import pytest
 
-from generator.core.geometry import Gripper, Joint, RobotModel
-from generator.core.kinematics import all_positions, is_arm_joint, link_poses, within_limits
-from generator.core.se3 import SE3
-from generator.physics.ik import Chain, chain_of, solutions
+from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.generator.core.kinematics import (
+    all_positions,
+    is_arm_joint,
+    is_within_limits,
+    link_poses,
+)
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.physics.manipulation.inverse_kinematics import Chain, make_chain, solve_all
 from tests.physics.panda import panda
 
 ROBOT = panda()
 assert ROBOT.gripper is not None
 GRIPPER = ROBOT.gripper
-CHAIN: Chain = chain_of(ROBOT, GRIPPER)
+CHAIN: Chain = make_chain(ROBOT, GRIPPER)
 
 
 def grasp_pose(arm_positions: tuple[float, ...]) -> SE3:
@@ -33,7 +38,7 @@ def test_poses_made_by_forward_kinematics_are_reached() -> None:
 
     for _ in range(100):
         target = grasp_pose(tuple(float(rng.uniform(j.lower, j.upper)) for j in arm))
-        found = next(solutions(CHAIN, target), None)
+        found = next(solve_all(CHAIN, target), None)
         if found is None:
             continue
         reached += 1
@@ -41,26 +46,26 @@ def test_poses_made_by_forward_kinematics_are_reached() -> None:
         assert math.dist(pose.translation_m, target.translation_m) < 1e-3
         cosine = 0.5 * (np.trace(pose.rotation().T @ target.rotation()) - 1.0)
         assert math.acos(min(1.0, float(cosine))) < math.radians(0.5)
-        assert within_limits(ROBOT, all_positions(ROBOT, found, 1.0))
+        assert is_within_limits(ROBOT, all_positions(ROBOT, found, 1.0))
 
     assert reached >= 97
 
 
 def test_what_is_too_far_away_has_no_solution() -> None:
     """Two metres from the base, an arm of 0.86 m finds nothing."""
-    assert list(solutions(CHAIN, SE3((2.0, 0.0, 0.3)))) == []
+    assert list(solve_all(CHAIN, SE3((2.0, 0.0, 0.3)))) == []
 
 
 def test_what_only_an_endless_wrist_could_reach_has_no_solution() -> None:
     """Just beyond the stretched arm every start is tried, and none pretends to arrive."""
-    assert list(solutions(CHAIN, SE3((0.0, 0.0, 1.40)))) == []
+    assert list(solve_all(CHAIN, SE3((0.0, 0.0, 1.40)))) == []
 
 
 def test_the_solution_next_to_home_comes_first() -> None:
     """The home pose itself is solved by the home position."""
     home = ROBOT.home[:7]
 
-    assert next(solutions(CHAIN, grasp_pose(home))) == home
+    assert next(solve_all(CHAIN, grasp_pose(home))) == home
 
 
 def levelled_arm() -> RobotModel:
@@ -97,7 +102,7 @@ def test_joints_that_mimic_move_with_their_leaders() -> None:
     x = 0.5 * math.cos(0.7) + 0.5 * math.cos(-0.5) + (0.2 + 0.3) * math.cos(-1.2)
     y = 0.5 * math.sin(0.7) + 0.5 * math.sin(-0.5) + (0.2 + 0.3) * math.sin(-1.2)
 
-    found = next(solutions(chain_of(robot, robot.gripper), SE3.about_z(-1.2, (x, y, 0.0))))
+    found = next(solve_all(make_chain(robot, robot.gripper), SE3.about_z(-1.2, (x, y, 0.0))))
 
     assert found == pytest.approx((0.7, 0.3), abs=5e-3)
     assert all_positions(robot, found, 1.0)[1:3] == pytest.approx((-1.2, -0.7), abs=1e-2)

@@ -9,20 +9,20 @@ import numpy as np
 import pybullet
 import pytest
 
-from generator.core.geometry import Gripper, Joint, RobotModel
-from generator.core.kinematics import (
+from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.generator.core.kinematics import (
     all_positions,
     finger_links,
     gripper_opening,
-    link_bodies,
+    is_within_limits,
     link_poses,
+    make_link_bodies,
     position_limits,
     rigid_group,
-    rounded_positions,
-    within_limits,
+    round_positions,
 )
-from generator.core.scene import Articulation
-from generator.core.se3 import SE3
+from gen_data.generator.core.scene import Articulation
+from gen_data.generator.core.se3 import SE3
 from tests.physics.panda import HOME, URDF, panda
 
 
@@ -76,7 +76,7 @@ def test_link_bodies_carry_the_part_ids_of_the_instance() -> None:
     robot = panda()
     arm = Articulation("arm", "panda", 7, SE3(), HOME)
 
-    bodies = link_bodies(arm, robot, ("panda_link0", "panda_hand"))
+    bodies = make_link_bodies(arm, robot, ("panda_link0", "panda_hand"))
 
     assert [body.name for body in bodies] == [f"arm/{link}" for link in robot.visuals]
     part_ids = {body.name: body.part_id for body in bodies}
@@ -96,8 +96,8 @@ def test_fingers_follow_the_opening_and_the_arm_its_own_positions() -> None:
 
 def test_limits_bound_every_joint() -> None:
     """The fourth joint of the Panda cannot bend backwards."""
-    assert within_limits(panda(), HOME)
-    assert not within_limits(panda(), (*HOME[:3], 0.1, *HOME[4:]))
+    assert is_within_limits(panda(), HOME)
+    assert not is_within_limits(panda(), (*HOME[:3], 0.1, *HOME[4:]))
 
 
 def test_hand_flange_and_last_link_move_as_one_and_fingers_do_not() -> None:
@@ -110,7 +110,7 @@ def test_hand_flange_and_last_link_move_as_one_and_fingers_do_not() -> None:
 
 def test_positions_are_rounded_to_six_decimals_without_negative_zero() -> None:
     """What is written to files is what was simulated."""
-    rounded = rounded_positions((math.pi, -1e-9))
+    rounded = round_positions((math.pi, -1e-9))
 
     assert rounded == (3.141593, 0.0)
     assert math.copysign(1.0, rounded[1]) == 1.0

@@ -8,7 +8,7 @@ import sys
 import pytest
 from pydantic import ValidationError
 
-from generator.physics import PhysicsConfig
+from gen_data.generator.physics import PhysicsConfig
 
 
 @pytest.mark.parametrize(
@@ -34,6 +34,6 @@ def test_every_field_says_what_it_means() -> None:
 
 def test_reading_a_configuration_loads_no_engine() -> None:
     """The command line starts without pybullet."""
-    code = "import sys, generator.physics; sys.exit('pybullet' in sys.modules)"
+    code = "import sys, gen_data.generator.physics; sys.exit('pybullet' in sys.modules)"
 
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.core.scene import Body, ObjectGroup, Scene, Surface
-from generator.core.se3 import SE3
-from generator.physics import PhysicsConfig
-from generator.physics.engine import BulletEngine
+from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.physics import PhysicsConfig
+from gen_data.generator.physics.engine import BulletEngine
 from tests.physics.doubles import (
     HOUSEHOLD,
     TABLE_TOP_Z_M,
@@ -200,7 +200,9 @@ def test_a_few_objects_in_a_bin_stay_inside(engine: BulletEngine) -> None:
 def bin_scene(size_m: tuple[float, float, float], bodies: list[Body]) -> Scene:
     """A bin on a floor and bodies that belong in it."""
     x, y, z = size_m
-    surface = Surface("bin", "bin", SE3((0, 0, 0.01)), (x - 0.02, y - 0.02), 3.0, walled=True)
+    surface = SupportSurface(
+        "bin", "bin", SE3((0, 0, 0.01)), (x - 0.02, y - 0.02), 3.0, walled=True
+    )
     furniture = (
         Body("floor", "box 6 6 0.1", SE3((0, 0, -0.05))),
         Body("bin", f"bin {x} {y} {z}", SE3((0, 0, z / 2))),
@@ -251,7 +253,7 @@ def test_objects_on_neighbouring_tables_do_not_meet_each_others_walls(
 ) -> None:
     """The wall of one table stands on the other, but is there for its own objects only."""
     scene = table_scene(thing("near", "box 0.05 0.05 0.05", x=-0.2))
-    other = Surface("annex", "annex", SE3((0.9, 0, TABLE_TOP_Z_M)), (0.6, 0.8), 2.0)
+    other = SupportSurface("annex", "annex", SE3((0.9, 0, TABLE_TOP_Z_M)), (0.6, 0.8), 2.0)
     group = ObjectGroup("more", ("annex",), (), 1, "drop")
     far = Body("far", "box 0.05 0.05 0.05", SE3((0.63, 0, 0.9)), group="more", motion="dynamic")
     scene = replace(

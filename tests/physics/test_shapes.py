@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.core.geometry import ConvexParts
-from generator.physics.shapes import SHELL_M, collision_shape, scale_step
+from gen_data.generator.core.asset_types import ConvexParts
+from gen_data.generator.physics.collision_shapes import SHELL_M, collision_shape, scale_step
 from tests.physics.doubles import ball, box, cylinder
 
 

@@ -7,23 +7,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import open_pipeline, pipeline_config
-from generator.assemble.spec import load_config
-from generator.assets.library import open_library
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.interfaces import DatasetInfo, Settled
-from generator.core.scene import Instance
-from generator.core.se3 import SE3
-from generator.core.streams import Streams
-from generator.pipeline import Pipeline
-from generator.pipeline.pipeline import PipelineConfig
-from generator.sensors.gnss import Gnss
-from generator.sensors.imu import Imu
-from generator.sensors.mounting import Instrument
-from generator.sensors.odometer import Odometer
-from generator.sensors.radar import Radar
-from generator.sensors.watcher import Watcher
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline, pipeline_config
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, Settled
+from gen_data.generator.core.scene import Instance
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.pipeline import Pipeline
+from gen_data.generator.pipeline.pipeline import PipelineConfig
+from gen_data.generator.sensors.events.event_detector import EventDetector
+from gen_data.generator.sensors.mounting import Instrument
+from gen_data.generator.sensors.navigation.gnss import Gnss
+from gen_data.generator.sensors.navigation.imu import Imu
+from gen_data.generator.sensors.navigation.odometer import Odometer
+from gen_data.generator.sensors.radar.radar_sensor import Radar
 from tests.sensors.streetcar import CAR_M, BoxRays, thing, world
 
 SENSORS: tuple[Instrument, ...] = (
@@ -31,7 +31,7 @@ SENSORS: tuple[Instrument, ...] = (
     Gnss(rate_hz=5.0),
     Odometer(),
     Radar(offset_m=(2.2, 0.0, 0.5)),
-    Watcher(),
+    EventDetector(),
 )
 STEPS = 4
 

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_config
-from generator.core.sample import Sample
-from generator.core.scene import Scene
-from generator.core.serial import from_plain, to_plain
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.serialization import from_plain, to_plain
 
 SMALL = (
     "sensors[0].size_px=[128, 64]",

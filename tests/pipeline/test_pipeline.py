@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel, Reading
-from generator.core.errors import LayoutRejected, Rejection, SceneRejected
-from generator.core.geometry import Asset, Keypoint, MeshData
-from generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled, Stage
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ImageTruth
-from generator.core.scene import Articulation, Body, Camera, Instance, Scene
-from generator.core.se3 import SE3
-from generator.pipeline import Pipeline
-from generator.pipeline.freeze import frozen_scene
-from generator.pipeline.pipeline import PipelineConfig
+from gen_data.generator.core.asset_types import Asset, Keypoint, MeshData
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import LayoutRejected, Rejection, SceneRejected
+from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled, Stage
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import ImageTruth
+from gen_data.generator.core.scene import Articulation, Body, Camera, Instance, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.pipeline import Pipeline
+from gen_data.generator.pipeline.finalize_scene import finalize_scene
+from gen_data.generator.pipeline.pipeline import PipelineConfig
 
 CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(8, 6, 1.0))
 
@@ -98,10 +98,10 @@ class OneCamera:
         """The scene with the camera in it."""
         return replace(scene, cameras=(CAMERA,))
 
-    def capture(self, scene: Scene, renderer: Any, channels: Any, rng: Any) -> Reading:
+    def capture(self, scene: Scene, renderer: Any, channels: Any, rng: Any) -> SensorReading:
         """The yaw, and one draw of the sensor's own stream."""
         values = np.array([[scene.environment.yaw_rad, rng.uniform()]])
-        return Reading(self.name, scene.cameras[0], {Channel.RGB: values})
+        return SensorReading(self.name, scene.cameras[0], {Channel.RGB: values})
 
 
 def pipeline(
@@ -254,7 +254,7 @@ def test_freezing_fills_ids_frames_and_boxes() -> None:
         articulations=(Articulation("arm", "arm", 2, SE3((0.0, 0.0, -1.0)), ()),),
     )
 
-    frozen = frozen_scene(scene, TwoBoxes(), {"mug": 1, "robot_arm": 2})  # type: ignore[arg-type]
+    frozen = finalize_scene(scene, TwoBoxes(), {"mug": 1, "robot_arm": 2})  # type: ignore[arg-type]
 
     cup, arm = frozen.instances
     assert (cup.category_id, arm.category_id) == (1, 2)

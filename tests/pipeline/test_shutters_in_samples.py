@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_config
-from generator.core.capture import Channel, Reading
-from generator.core.instants import at
-from generator.core.sample import Sample
-from generator.core.shutter import INSTANT
-from generator.core.streams import Streams
-from generator.pipeline import Pipeline
-from generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.shutter import INSTANT
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.pipeline import Pipeline
+from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 SIZE_PX = (240, 136)
 
@@ -39,7 +39,7 @@ def sample(pipeline: Pipeline) -> Sample:
     return pipeline.sample(6)
 
 
-def reading(sample: Sample) -> Reading:
+def reading(sample: Sample) -> SensorReading:
     return sample.capture.readings["dash"]
 
 
@@ -74,7 +74,7 @@ def test_the_camera_of_the_truth_tells_when_its_rows_were_exposed(sample: Sample
 def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample) -> None:
     """Against a camera at the same place that sees one instant: other pixels, softer ones."""
     rolled = reading(sample)
-    scene = at(sample.scene, rolled.time_s)
+    scene = scene_at(sample.scene, rolled.time_s)
     camera = replace(scene.camera("dash"), shutter=INSTANT)
     channels = frozenset({Channel.RGB, Channel.INSTANCE})
     stream = Streams(seed=0, scene=0).rng("dash")

@@ -7,9 +7,9 @@ from collections import Counter
 
 import pytest
 
-from generator.assemble.spec import load_config
-from generator.core.errors import ConfigWarning
-from generator.pipeline.splits import Assignment, split_of, warn_of_empty_splits
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.core.errors import ConfigWarning
+from gen_data.generator.pipeline.splits import Assignment, split_of, warn_of_empty_splits
 
 SHARES = {"train": 0.8, "val": 0.1, "test": 0.1}
 

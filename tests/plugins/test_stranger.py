@@ -1,6 +1,6 @@
 """A package of third-party plug-ins, one of every kind, installed and used from the command line.
 
-It is written from the Protocols of ``generator.core.interfaces`` and inherits nothing but
+It is written from the Protocols of ``gen_data.generator.core.interfaces`` and inherits nothing but
 ``Strict``; ``mypy`` checks it with the rest of the project (``pyproject.toml``).
 """
 

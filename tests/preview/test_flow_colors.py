@@ -8,15 +8,15 @@ import math
 import numpy as np
 import pytest
 
-from generator.core.capture import Capture, Channel, Reading
-from generator.core.interfaces import DatasetInfo, Modality, SensorInfo
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ImageTruth, Sample
-from generator.core.scene import Camera, Scene
-from generator.core.se3 import IDENTITY
-from generator.preview.overlay import channel_image
-from generator.preview.palette import colored_flow
-from generator.preview.recording import Recorder
+from gen_data.generator.core.capture import Capture, Channel, SensorReading
+from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import ImageTruth, Sample
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.se3 import IDENTITY
+from gen_data.generator.preview.overlay import channel_image
+from gen_data.generator.preview.palette import color_flow
+from gen_data.generator.preview.rerun_recording import Recorder
 
 
 def color_of_flow(u: float, v: float) -> tuple[int, int, int]:
@@ -24,7 +24,7 @@ def color_of_flow(u: float, v: float) -> tuple[int, int, int]:
     flow = np.zeros((1, 1000, 2), np.float32)
     flow[0, 20:] = (10.0, 0.0)
     flow[0, 0] = (u, v)
-    red, green, blue = colored_flow(flow)[0, 0].tolist()
+    red, green, blue = color_flow(flow)[0, 0].tolist()
     return red, green, blue
 
 
@@ -66,7 +66,7 @@ def test_every_channel_of_flow_can_be_looked_at(channel: Channel, depth: int) ->
     data = np.ones(shape, np.float32 if depth else np.uint8)
     camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
 
-    image = channel_image(Reading("c", camera, {channel: data}), channel)
+    image = channel_image(SensorReading("c", camera, {channel: data}), channel)
 
     assert image.shape == (4, 6, 3)
     assert image.dtype == np.uint8
@@ -94,7 +94,7 @@ class _Stream:
 def test_a_recording_has_flow_beside_the_image_of_its_camera() -> None:
     """As a picture in a tab of its own; a camera without flow has no tabs."""
     camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
-    reading = Reading("c", camera, {Channel.FLOW_FORWARD: np.ones((4, 6, 2), np.float32)})
+    reading = SensorReading("c", camera, {Channel.FLOW_FORWARD: np.ones((4, 6, 2), np.float32)})
     info = DatasetInfo(
         "t",
         1,

@@ -8,24 +8,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from generator.core.boxes import BoxPx, OrientedBox
-from generator.core.capture import POINT, Capture, Channel, PointCloud, Reading
-from generator.core.errors import ConfigError
-from generator.core.geometry import Keypoint, Material, MeshData
-from generator.core.instants import at
-from generator.core.interfaces import DatasetInfo, Modality, SensorInfo
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.motion import Track
-from generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
-from generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
-from generator.core.se3 import IDENTITY, SE3
-from generator.core.skeletons import PERSON
-from generator.preview.clouds import ROW_PX, point_colors, range_view, top_view
-from generator.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
-from generator.preview.palette import color_of, colored_depth, colored_ids, colored_shares
-from generator.preview.recording import Recorder
-from generator.preview.sheet import GAP_PX, arranged
+from gen_data.generator.core.asset_types import Keypoint, Material, MeshData
+from gen_data.generator.core.boxes import BoxPx, OrientedBox
+from gen_data.generator.core.capture import POINT, Capture, Channel, PointCloud, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
+from gen_data.generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.se3 import IDENTITY, SE3
+from gen_data.generator.core.skeletons import PERSON
+from gen_data.generator.preview.contact_sheet import GAP_PX, arrange_tiles
+from gen_data.generator.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
+from gen_data.generator.preview.palette import color_depth, color_ids, color_shares, id_color
+from gen_data.generator.preview.point_cloud_views import ROW_PX, point_colors, range_view, top_view
+from gen_data.generator.preview.rerun_recording import Recorder
 
 
 def test_box_edges_join_corners_that_differ_in_one_axis() -> None:
@@ -117,7 +117,7 @@ def test_a_recording_joins_the_keypoints_of_each_object_by_itself() -> None:
         ),
     )
     scene = Scene("street", instances=tuple(item.instance for item in truth.objects))
-    capture = Capture({"color": Reading("color", camera, {})})
+    capture = Capture({"color": SensorReading("color", camera, {})})
     stream = _Stream()
     recorder = Recorder(stream, None, _info(categories=("person",)))  # type: ignore[arg-type]
 
@@ -168,7 +168,7 @@ def test_images_that_rerun_cannot_place_in_space_are_shown_by_themselves() -> No
     """A pinhole is logged for a pinhole only."""
     for lens, pinholes in ((Lens(), 1), (Lens("equirectangular"), 0)):
         camera = Camera("color", IDENTITY, Intrinsics(8, 4, 1.3, 1.3, 4.0, 2.0, lens))
-        reading = Reading("color", camera, {})
+        reading = SensorReading("color", camera, {})
         stream = _Stream()
         recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
         truth = {"color": ImageTruth(camera, ())}
@@ -197,7 +197,7 @@ def test_every_channel_of_a_camera_is_in_the_recording() -> None:
     }
     stream = _Stream()
     recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
-    capture = Capture({"color": Reading("color", camera, channels)})
+    capture = Capture({"color": SensorReading("color", camera, channels)})
     truth = {"color": ImageTruth(camera, ())}
 
     recorder.record(Sample(0, 0, 0, "train", Scene("s"), capture, truth))
@@ -211,17 +211,17 @@ def test_every_channel_of_a_camera_is_in_the_recording() -> None:
 
 def test_neighbouring_ids_look_different_and_nothing_is_black() -> None:
     """At least 60 grey levels in some channel between consecutive ids."""
-    colors = np.array([color_of(i) for i in range(1, 200)], int)
+    colors = np.array([id_color(i) for i in range(1, 200)], int)
 
-    assert color_of(0) == (0, 0, 0)
+    assert id_color(0) == (0, 0, 0)
     assert (np.abs(np.diff(colors, axis=0)).max(axis=1) >= 60).all()
     ids = np.array([[0, 3], [7, 3]], np.uint16)
-    assert tuple(colored_ids(ids)[0, 1]) == color_of(3)
+    assert tuple(color_ids(ids)[0, 1]) == id_color(3)
 
 
 def test_depth_is_bright_when_near_and_black_when_nothing() -> None:
     """Infinite depth is black; the nearest pixel is the brightest."""
-    shown = colored_depth(np.array([[1.0, 2.0], [3.0, np.inf]]))[..., 0]
+    shown = color_depth(np.array([[1.0, 2.0], [3.0, np.inf]]))[..., 0]
 
     assert shown[1, 1] == 0
     assert shown[0, 0] > shown[0, 1] > shown[1, 0] > 0
@@ -231,7 +231,7 @@ def test_sheet_places_tiles_row_by_row() -> None:
     """Five tiles in columns of three: the fifth is second in the second row."""
     images = [np.full((10, 20, 3), 50 * k, np.uint8) for k in range(1, 6)]
 
-    sheet = arranged(images, columns=3)
+    sheet = arrange_tiles(images, columns=3)
 
     assert sheet.shape == (2 * (10 + GAP_PX) + GAP_PX, 3 * (20 + GAP_PX) + GAP_PX, 3)
     assert (sheet[GAP_PX * 2 + 10 + 5, GAP_PX * 2 + 20 + 5] == 250).all()
@@ -240,7 +240,7 @@ def test_sheet_places_tiles_row_by_row() -> None:
 def test_sheet_of_nothing_is_refused() -> None:
     """No tile, no picture."""
     with pytest.raises(ConfigError):
-        arranged([], columns=3)
+        arrange_tiles([], columns=3)
 
 
 def test_a_scan_from_above_has_its_points_where_they_are() -> None:
@@ -255,7 +255,7 @@ def test_a_scan_from_above_has_its_points_where_they_are() -> None:
     assert view.shape == (480, 960, 3)
     (row,), (column,) = np.nonzero(view.any(axis=-1))
     assert (row, column) == (240 - 96, 480 + 240)
-    assert tuple(view[row, column]) == color_of(3)
+    assert tuple(view[row, column]) == id_color(3)
 
 
 class _Triangles:
@@ -280,9 +280,9 @@ def _moving(step_index: int, *, first: int = 0) -> Sample:
         "street",
         bodies=(Body("house", "house"), Body("ego", "car")),
         rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 2.0))),),
-        tracks=(Track("ego", 0.1, knots),),
+        tracks=(Trajectory("ego", 0.1, knots),),
     )
-    shown = at(scene, 0.1 * step_index)
+    shown = scene_at(scene, 0.1 * step_index)
     index = first + step_index
     return Sample(index, 0, 0, "train", shown, Capture({}), {}, step_index=step_index)
 
@@ -327,7 +327,7 @@ def test_a_way_is_where_a_body_goes_until_the_end_of_its_sequence() -> None:
 
 def test_colors_of_shares_run_from_blue_over_green_to_red() -> None:
     """Shares outside [0, 1] are clipped."""
-    shown = colored_shares(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])).tolist()
+    shown = color_shares(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])).tolist()
 
     blue, green, red = [0, 0, 255], [0, 255, 0], [255, 0, 0]
     assert shown == [blue, blue, green, red, red]
@@ -341,7 +341,7 @@ def test_points_are_colored_by_intensity_if_asked() -> None:
     cloud = PointCloud("top", Lidar("top", "color"), points)
 
     assert point_colors(cloud, "intensity").tolist() == [[0, 0, 255], [255, 0, 0]]
-    assert tuple(point_colors(cloud)[0]) == color_of(3)
+    assert tuple(point_colors(cloud)[0]) == id_color(3)
 
 
 def test_a_range_image_has_ahead_in_the_middle_and_left_on_the_left() -> None:

@@ -9,32 +9,32 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from generator.assemble.spec import config_of_source
-from generator.core.capture import Capture, Channel, Reading, Table
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ImageTruth, Sample
-from generator.core.scene import Camera, Device, Instance, Scene
-from generator.core.se3 import SE3
-from generator.core.tables import table_rows
-from generator.preview.devices import BRIGHTER, DARKER, GREY, event_view, radar_view
-from generator.preview.sheet import CAPTION_PX, Tile, pictures, tiles
+from gen_data.generator.assemble.config import load_source_config
+from gen_data.generator.core.capture import Capture, Channel, Measurements, SensorReading
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.measurement_dtypes import table_rows
+from gen_data.generator.core.sample import ImageTruth, Sample
+from gen_data.generator.core.scene import Camera, Device, Instance, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.preview.contact_sheet import CAPTION_PX, Tile, pictures, tiles
+from gen_data.generator.preview.device_views import BRIGHTER, DARKER, GREY, event_view, radar_view
 
 DOCS = Path(__file__).parents[2] / "docs"
 SHEETS = sorted((DOCS / "sheets").glob("*.yaml"))
 CAR = Instance(1, "car", "car", 1, "car", box_min_m=(-2, -1, 0), box_max_m=(2, 1, 1.5))
 
 
-def radar_table(**columns: object) -> Table:
+def radar_table(**columns: object) -> Measurements:
     """Detections of a radar at the world's origin."""
     device = Device("radar", "radar", "ego", T_world_device=SE3())
-    return Table("radar", device, table_rows("radar", 1, **columns))  # type: ignore[arg-type]
+    return Measurements("radar", device, table_rows("radar", 1, **columns))  # type: ignore[arg-type]
 
 
-def event_table() -> Table:
+def event_table() -> Measurements:
     """Three events: one pixel twice, first brighter, then darker."""
     rows = table_rows("event_camera", 3, time_s=[0.1, 0.2, 0.3], x_px=[9, 3, 9], y_px=[7, 2, 7])
     rows["polarity"] = [1, 1, -1]
-    return Table("events", Device("events", "event_camera", "ego"), rows)
+    return Measurements("events", Device("events", "event_camera", "ego"), rows)
 
 
 def sample() -> Sample:
@@ -45,7 +45,7 @@ def sample() -> Sample:
         Channel.RGB: np.full((24, 32, 3), 90, np.uint8),
         Channel.Z_DEPTH: np.full((24, 32), 2.0, np.float32),
     }
-    readings = {c.name: Reading(c.name, c, images) for c in (color, depth)}
+    readings = {c.name: SensorReading(c.name, c, images) for c in (color, depth)}
     tables = {"radar": radar_table(range_m=10.0), "events": event_table()}
     truth = {c.name: ImageTruth(c, ()) for c in (color, depth)}
     scene = Scene("t", cameras=(color, depth))
@@ -116,7 +116,7 @@ def test_things_are_outlined_around_a_radar() -> None:
 def test_sheets_of_the_documentation_are_valid_and_tell_their_command(path: Path) -> None:
     """Each is read without a fault; the picture that its command makes is there."""
     text = path.read_text("utf-8")
-    assert config_of_source(str(path)).sensors
+    assert load_source_config(str(path)).sensors
     source = path.with_name("sensors.yaml").read_text("utf-8") if path.stem == "depth" else text
     (out,) = re.findall(r"--out docs/(\S+)", source)
     assert (DOCS / out).exists()

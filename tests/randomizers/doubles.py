@@ -8,12 +8,19 @@ from itertools import combinations
 
 import numpy as np
 
-from generator.assets.ids import parse
-from generator.core.errors import AssetError, did_you_mean
-from generator.core.geometry import Asset, Gripper, Joint, Keypoint, Material, RobotModel
-from generator.core.scene import Body, ObjectGroup, Scene, Surface
-from generator.core.se3 import SE3, Array, Vec3
-from generator.core.streams import Rng, Streams
+from gen_data.generator.assets.asset_ids import parse_asset_id
+from gen_data.generator.core.asset_types import (
+    Asset,
+    Gripper,
+    Joint,
+    Keypoint,
+    Material,
+    RobotModel,
+)
+from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.streams import Rng, Streams
 
 FURNITURE_M: dict[str, tuple[float, ...]] = {
     "table": (1.2, 0.8, 0.74),
@@ -98,7 +105,7 @@ class FakeAssets:
             return _asset(asset_id, "texture", "", TEXTURES[asset_id])
         if asset_id in ENVIRONMENTS:
             return _asset(asset_id, "environment", "", ENVIRONMENTS[asset_id])
-        family = parse(asset_id).name
+        family = parse_asset_id(asset_id).name
         if family in FURNITURE_M:
             return _asset(asset_id, "object", family, ("furniture",))
         if family == "two_link":
@@ -117,14 +124,14 @@ class FakeAssets:
         """The thing's own; plain ones for furniture and links."""
         if asset_id in THINGS:
             return THINGS[asset_id].materials
-        return (Material(),) * SLOTS.get(parse(asset_id).name, 1)
+        return (Material(),) * SLOTS.get(parse_asset_id(asset_id).name, 1)
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Things lie around their origin; furniture stands on its."""
         if asset_id in THINGS:
             x, y, z = THINGS[asset_id].size_m
             return (-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2)
-        wanted = parse(asset_id)
+        wanted = parse_asset_id(asset_id)
         if wanted.name.startswith("two_link/"):
             return (-0.05, -0.05, 0.0), (0.05, 0.05, 0.3)
         self.get(asset_id)
@@ -190,7 +197,7 @@ def surface_scene(
 ) -> Scene:
     """An empty group ``clutter`` on surfaces above each other, the lowest 1 m over the floor."""
     surfaces = tuple(
-        Surface(f"s{k}", "s", SE3((0.2, -0.1, 1.0 + k * clearance_m)), size_m, clearance_m)
+        SupportSurface(f"s{k}", "s", SE3((0.2, -0.1, 1.0 + k * clearance_m)), size_m, clearance_m)
         for k in range(levels)
     )
     group = ObjectGroup(

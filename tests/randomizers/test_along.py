@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from generator.config.distributions import Constant, Probability, Uniform
-from generator.core.errors import ConfigError, LayoutRejected
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Lane, ObjectGroup, Scene
-from generator.core.se3 import SE3
-from randomizers.along import Along
-from randomizers.camera_on_lane import CameraOnLane
-from randomizers.footprints import Footprint, Ground
+from gen_data.generator.config.distributions import Constant, Probability, Uniform
+from gen_data.generator.core.errors import ConfigError, LayoutRejected
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Body, Camera, Lane, ObjectGroup, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.randomizers.along import Along
+from gen_data.randomizers.camera_on_lane import CameraOnLane
+from gen_data.randomizers.footprints import Footprint, Ground
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 BRICK_M = (0.06, 0.03)

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.config.distributions import Choice, Constant, Uniform
-from generator.core.errors import ConfigError
-from generator.core.geometry import RobotModel
-from generator.core.scene import ArmGoal, Articulation, Body, Scene
-from generator.core.se3 import SE3
-from randomizers.arm_configuration import ArmConfiguration
+from gen_data.generator.config.distributions import Choice, Constant, Uniform
+from gen_data.generator.core.asset_types import RobotModel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.randomizers.arm_configuration import ArmConfiguration
 from tests.randomizers.doubles import FakeAssets, rng_of, two_link_arm
 
 WORKSPACE_M = ((-0.2, -0.3, 0.9), (0.4, 0.3, 1.3))

@@ -9,16 +9,23 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.config.distributions import Constant
-from generator.core.errors import ConfigError
-from generator.core.scene import ArmGoal, Articulation, Body, ObjectGroup, Scene, Surface
-from generator.core.se3 import SE3
-from randomizers.arm_motion import ArmMotion, Stop
+from gen_data.generator.config.distributions import Constant
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import (
+    ArmGoal,
+    Articulation,
+    Body,
+    ObjectGroup,
+    Scene,
+    SupportSurface,
+)
+from gen_data.generator.core.se3 import SE3
+from gen_data.randomizers.arm_motion import ArmMotion, Stop
 from tests.randomizers.doubles import FakeAssets, rng_of, two_link_arm
 
 ARM = Articulation("arm", "two_link", 1, SE3((-0.5, 0.0, 0.74)), two_link_arm().home,
                    workspace_m=((-0.2, -0.3, 0.9), (0.4, 0.3, 1.3)))  # fmt: skip
-TABLE = Surface("table", "table", SE3((0.0, 0.0, 0.74)), (1.2, 0.8), 1.0)
+TABLE = SupportSurface("table", "table", SE3((0.0, 0.0, 0.74)), (1.2, 0.8), 1.0)
 CLUTTER = ObjectGroup("clutter", ("table",), (), 2, "drop")
 
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.config.distributions import Constant, Uniform
-from generator.core.errors import ConfigError, LayoutRejected
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Region, Scene
-from generator.core.se3 import SE3
-from randomizers.camera_intrinsics import CameraIntrinsics
-from randomizers.camera_pose import CameraPose
-from randomizers.exposure import Exposure
+from gen_data.generator.config.distributions import Constant, Uniform
+from gen_data.generator.core.errors import ConfigError, LayoutRejected
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Body, Camera, Region, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.randomizers.camera_intrinsics import CameraIntrinsics
+from gen_data.randomizers.camera_pose import CameraPose
+from gen_data.randomizers.exposure import Exposure
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 FOCUS = Region((0.3, -0.2, 0.8), (1.2, 0.8, 0.25))

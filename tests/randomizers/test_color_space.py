@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from randomizers.color_space import (
-    chromaticity_of_temperature,
-    linear_of_hsv,
-    linear_of_temperature,
+from gen_data.randomizers.color_space import (
+    hsv_to_linear,
+    temperature_to_chromaticity,
+    temperature_to_linear,
 )
 
 PLANCKIAN_XY = {
@@ -33,13 +33,13 @@ XYZ_OF_SRGB = (
 @pytest.mark.parametrize("kelvin", PLANCKIAN_XY)
 def test_chromaticity_is_that_of_the_tables(kelvin: int) -> None:
     """Within 0.001 in x and y: less than a just noticeable difference."""
-    assert chromaticity_of_temperature(kelvin) == pytest.approx(PLANCKIAN_XY[kelvin], abs=1e-3)
+    assert temperature_to_chromaticity(kelvin) == pytest.approx(PLANCKIAN_XY[kelvin], abs=1e-3)
 
 
 @pytest.mark.parametrize("kelvin", [k for k in PLANCKIAN_XY if k > 2000])
 def test_linear_rgb_has_the_chromaticity_and_luminance_one(kelvin: int) -> None:
     """Back through the matrix of sRGB."""
-    rgb = linear_of_temperature(kelvin)
+    rgb = temperature_to_linear(kelvin)
     big_x, big_y, big_z = (sum(a * v for a, v in zip(row, rgb, strict=True)) for row in XYZ_OF_SRGB)
 
     assert big_y == pytest.approx(1.0, abs=1e-3)
@@ -49,7 +49,7 @@ def test_linear_rgb_has_the_chromaticity_and_luminance_one(kelvin: int) -> None:
 
 def test_candles_are_red_and_skies_are_blue() -> None:
     """Order of the channels; no channel is negative where the gamut ends."""
-    candle, sky = linear_of_temperature(1700.0), linear_of_temperature(12000.0)
+    candle, sky = temperature_to_linear(1700.0), temperature_to_linear(12000.0)
 
     assert candle[0] > candle[1] > candle[2] >= 0.0
     assert sky[2] > sky[1] > sky[0] > 0.0
@@ -57,7 +57,7 @@ def test_candles_are_red_and_skies_are_blue() -> None:
 
 def test_hue_turns_through_the_primaries() -> None:
     """Red, green, blue at thirds; no saturation is grey."""
-    assert linear_of_hsv(0.0, 1.0, 1.0) == (1.0, 0.0, 0.0)
-    assert linear_of_hsv(1 / 3, 1.0, 1.0) == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
-    assert linear_of_hsv(2 / 3, 1.0, 1.0) == pytest.approx((0.0, 0.0, 1.0), abs=1e-6)
-    assert linear_of_hsv(0.7, 0.0, 0.5) == pytest.approx((0.21404,) * 3, abs=1e-5)
+    assert hsv_to_linear(0.0, 1.0, 1.0) == (1.0, 0.0, 0.0)
+    assert hsv_to_linear(1 / 3, 1.0, 1.0) == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+    assert hsv_to_linear(2 / 3, 1.0, 1.0) == pytest.approx((0.0, 0.0, 1.0), abs=1e-6)
+    assert hsv_to_linear(0.7, 0.0, 0.5) == pytest.approx((0.21404,) * 3, abs=1e-5)

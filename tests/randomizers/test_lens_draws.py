@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from generator.config.distributions import Constant, Uniform
-from generator.core.errors import ConfigError, LayoutRejected
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.scene import Camera, Scene
-from generator.core.se3 import SE3
-from randomizers.camera_intrinsics import CameraIntrinsics, Coefficients
+from gen_data.generator.config.distributions import Constant, Uniform
+from gen_data.generator.core.errors import ConfigError, LayoutRejected
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.randomizers.camera_intrinsics import CameraIntrinsics, Coefficients
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 BARREL = Lens("brown_conrady", (-0.2, 0.03, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0))

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.config.distributions import Choice, Constant, Sequence, Uniform
-from generator.core.errors import ConfigError, LayoutRejected
-from generator.core.scene import Body, Light, Region, Scene
-from generator.core.se3 import SE3
-from randomizers.ceiling_lights import CeilingLights
-from randomizers.clearance import is_clear
-from randomizers.environment import EnvironmentLight
-from randomizers.lighting import Lighting
+from gen_data.generator.config.distributions import Choice, Constant, Sequence, Uniform
+from gen_data.generator.core.errors import ConfigError, LayoutRejected
+from gen_data.generator.core.scene import Body, Light, Region, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.randomizers.ceiling_lights import CeilingLights
+from gen_data.randomizers.environment import EnvironmentLight
+from gen_data.randomizers.free_space_tests import is_clear
+from gen_data.randomizers.lighting import Lighting
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 FOCUS = Region((0.3, -0.2, 0.8), (1.2, 0.8, 0.25))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.config.distributions import (
+from gen_data.generator.config.distributions import (
     Constant,
     Count,
     Flag,
@@ -19,11 +19,11 @@ from generator.config.distributions import (
     Uniform,
     UniformInteger,
 )
-from generator.core.errors import ConfigError, LayoutRejected
-from generator.core.scene import Body, Instance, Scene
-from generator.core.se3 import SE3, Vec3
-from randomizers.distractors import Distractors
-from randomizers.objects import Objects
+from gen_data.generator.core.errors import ConfigError, LayoutRejected
+from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.randomizers.distractors import Distractors
+from gen_data.randomizers.objects import Objects
 from tests.randomizers.doubles import (
     THINGS,
     FakeAssets,

@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.config.distributions import Constant, Uniform
-from generator.core.errors import ConfigError
-from generator.core.instants import RIG_AXES, with_placed_sensors
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Device, Lidar, Rig, Scene
-from generator.core.se3 import SE3
-from randomizers.rig_calibration import RigCalibration
+from gen_data.generator.config.distributions import Constant, Uniform
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Body, Camera, Device, Lidar, Rig, Scene
+from gen_data.generator.core.scene_time import RIG_AXES, place_sensors
+from gen_data.generator.core.se3 import SE3
+from gen_data.randomizers.rig_calibration import RigCalibration
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 LENS = Intrinsics.from_hfov(64, 48, 1.0)
-SCENE = with_placed_sensors(
+SCENE = place_sensors(
     Scene(
         "rigs",
         bodies=(Body("ego", "car", SE3.about_z(0.3, (5.0, 1.0, 0.0))), Body("hand", "arm")),

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.assets.skies import daylight
-from generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2
-from generator.core.geometry import Material
-from generator.core.scene import Body, Light, Scene
-from generator.core.scene import Weather as SceneWeather
-from generator.core.se3 import SE3
-from randomizers import TABLE
-from randomizers.street_lights import StreetLights, balanced_color, spot_intensity_cd
-from randomizers.time_of_day import TimeOfDay
-from randomizers.weather_presets import ALTITUDES_DEG, CONDITIONS, PRESETS
+from gen_data.generator.assets.skies import daylight
+from gen_data.generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.scene import Body, Light, Scene
+from gen_data.generator.core.scene import Weather as SceneWeather
+from gen_data.generator.core.se3 import SE3
+from gen_data.randomizers import TABLE
+from gen_data.randomizers.street_lights import StreetLights, spot_intensity_cd, white_balanced_color
+from gen_data.randomizers.time_of_day import TimeOfDay
+from gen_data.randomizers.weather_presets import ALTITUDES_DEG, CONDITIONS, PRESETS
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 CARLA = (
@@ -207,7 +207,7 @@ def test_spot_sends_out_its_flux() -> None:
 
 def test_warm_lamps_look_warm_and_cold_ones_do_not() -> None:
     """Red over blue falls with the colour temperature."""
-    ratios = [red / blue for red, _, blue in map(balanced_color, (2300.0, 3000.0, 4000.0))]
+    ratios = [red / blue for red, _, blue in map(white_balanced_color, (2300.0, 3000.0, 4000.0))]
 
     assert ratios == sorted(ratios, reverse=True)
     assert 0.8 < ratios[-1] < 2.0

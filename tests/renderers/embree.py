@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from generator.core.interfaces import AssetLibrary
-from generator.core.scene import Camera, Scene
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.scene import Camera, Scene
 
 
 def open3d_or_skip() -> Any:

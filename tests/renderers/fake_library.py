@@ -7,8 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from generator.core.errors import AssetError
-from generator.core.geometry import (
+from gen_data.generator.core.asset_types import (
     Asset,
     ConvexParts,
     Float32,
@@ -18,9 +17,10 @@ from generator.core.geometry import (
     RobotModel,
     TextureData,
 )
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera, Environment
-from generator.core.se3 import SE3, Vec3, look_at
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Camera, Environment
+from gen_data.generator.core.se3 import SE3, Vec3, look_at
 
 
 def box_mesh(

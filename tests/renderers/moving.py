@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from generator.core.geometry import Material
-from generator.core.instants import at, with_placed_sensors
-from generator.core.intrinsics import Intrinsics
-from generator.core.motion import Change, Track
-from generator.core.scene import Body, Camera, Instance, Rig, Scene
-from generator.core.se3 import IDENTITY, SE3, Vec3
-from generator.core.shutter import INSTANT, Shutter
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.motion import StateChange, Trajectory
+from gen_data.generator.core.scene import Body, Camera, Instance, Rig, Scene
+from gen_data.generator.core.scene_time import place_sensors, scene_at
+from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.generator.core.shutter import INSTANT, Shutter
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, plane_mesh
 
 LENS = Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)
@@ -30,7 +30,7 @@ MESHES = FakeLibrary(
 )
 
 
-def even_track(body: str, start: SE3, velocity_m_s: Vec3, turn_rad_s: float = 0.0) -> Track:
+def even_track(body: str, start: SE3, velocity_m_s: Vec3, turn_rad_s: float = 0.0) -> Trajectory:
     """A straight way from -1 s to 1 s that passes the start at 0, turning about the world's Y.
 
     Knots are close enough for turns to be even between them.
@@ -44,13 +44,13 @@ def even_track(body: str, start: SE3, velocity_m_s: Vec3, turn_rad_s: float = 0.
         )
         x, y, z = (p + v * time_s for p, v in zip(start.translation_m, velocity_m_s, strict=True))
         knots.append(SE3((x, y, z), turned.quaternion_wxyz))
-    return Track(body, 0.05, tuple(knots), -1.0)
+    return Trajectory(body, 0.05, tuple(knots), -1.0)
 
 
 def world(
     *bodies: Body,
-    tracks: tuple[Track, ...] = (),
-    changes: tuple[Change, ...] = (),
+    tracks: tuple[Trajectory, ...] = (),
+    changes: tuple[StateChange, ...] = (),
     camera_velocity_m_s: Vec3 = (0.0, 0.0, 0.0),
     camera_turn_rad_s: float = 0.0,
     lens: Intrinsics = LENS,
@@ -77,4 +77,4 @@ def world(
         changes=changes,
         time_s=-1.0,
     )
-    return at(with_placed_sensors(scene), time_s)
+    return scene_at(place_sensors(scene), time_s)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.core.capture import Channel
-from generator.core.scene import Camera, Scene
-from generator.renderers.device import open_device
-from generator.renderers.packing import pack_view, pack_world
-from generator.renderers.pathtracer import PathTracer
-from generator.renderers.settings import RenderSettings
-from generator.renderers.stock import AssetStock
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pack_world
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary
 
 BOTH, ASKED, MET = 3, 1, 2
@@ -41,7 +41,7 @@ def replicates_of(
     max_bounces: int = 16,
 ) -> np.ndarray:
     """Independent images of as many seeds, [count, h, w, 3]: their spread is the true error."""
-    stock = AssetStock(library, open_device("cpu"))
+    stock = DeviceCache(library, open_device("cpu"))
     tracer = PathTracer(stock, settings_of(samples, max_bounces))
     view = pack_view(camera, stock)
     shape = (view.height, view.width, 3)

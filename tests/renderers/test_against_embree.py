@@ -7,22 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_config
-from generator.core.capture import Channel
-from generator.core.interfaces import AssetLibrary, Renderer
-from generator.core.scene import Body, Camera, Scene
-from generator.core.se3 import SE3
-from generator.pipeline import Pipeline
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import AssetLibrary, Renderer
+from gen_data.generator.core.scene import Body, Camera, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.pipeline import Pipeline
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from tests.renderers.embree import cast, near_edges, open3d_or_skip
-from tests.renderers.fake_library import (
-    FakeLibrary,
-    box_mesh,
-    camera_at,
-    room_mesh,
-    sphere_mesh,
-)
+from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, room_mesh, sphere_mesh
 
 LABELS = frozenset({Channel.Z_DEPTH, Channel.INSTANCE})
 LIBRARY = FakeLibrary(

@@ -9,29 +9,22 @@ import numpy as np
 import pytest
 import warp as wp
 
-from generator.core.capture import Channel
-from generator.core.fixtures import fixture_asset, with_fixture
-from generator.core.geometry import Material
-from generator.core.photometry import luminance_cd_m2
-from generator.core.scene import Body, Camera, Light, Scene
-from generator.core.se3 import SE3, Vec3
-from generator.renderers.device import open_device
-from generator.renderers.kernels import lighting, records
-from generator.renderers.kernels.brdf import make_brdf, specular_lobe
-from generator.renderers.lamps import main_lamps
-from generator.renderers.lobes import lobe_albedo
-from generator.renderers.packing import lamp_records
-from generator.renderers.settings import RenderSettings
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.area_lights import add_fixture, fixture_asset
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.photometry import luminance_cd_m2
+from gen_data.generator.core.scene import Body, Camera, Light, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
+from gen_data.generator.renderers.warp.scene.kernels import analytic_lights, records
+from gen_data.generator.renderers.warp.scene.kernels.brdf import make_brdf, specular_lobe
+from gen_data.generator.renderers.warp.scene.light_selection import main_lamps
+from gen_data.generator.renderers.warp.scene.scene_packing import lamp_records
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.embree import open3d_or_skip
-from tests.renderers.fake_library import (
-    DARK,
-    MATTE,
-    FakeLibrary,
-    box_mesh,
-    camera_at,
-    plane_mesh,
-)
+from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at, plane_mesh
 
 PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0, antialias=1)
 RECTANGLE = Light(
@@ -89,7 +82,7 @@ def summed_lux(
 
 @wp.kernel(enable_backward=False)
 def _at_points(  # noqa: ANN202, PLR0917
-    lamps: wp.array(dtype=records.Lamp),
+    lamps: wp.array(dtype=records.LightRecord),
     table: wp.array(dtype=wp.vec2, ndim=2),
     p: wp.array(dtype=wp.vec3),
     n: wp.array(dtype=wp.vec3),
@@ -103,19 +96,24 @@ def _at_points(  # noqa: ANN202, PLR0917
 ):
     """Illuminance; a white metal's reflection by one point; the same summed over the panel."""
     i = wp.tid()
-    beam = lighting.beam_from(lamps[0], p[i])
-    share = lighting.facing(lamps[0], beam, p[i], n[i])
+    beam = analytic_lights.beam_from(lamps[0], p[i])
+    share = analytic_lights.relative_illuminance(lamps[0], beam, p[i], n[i])
     lux[i] = beam.normal_lux[1] * share
     n_v = wp.dot(n[i], v[i])
     s = make_brdf(table, wp.vec3(1.0, 1.0, 1.0), roughness, 1.0, 0.5, n_v)
     alpha = s.roughness * s.roughness
     ray = n[i] * (2.0 * n_v) - v[i]
-    way = lighting.towards_mirror(lamps[0], beam, p[i], ray, alpha)
+    way = analytic_lights.towards_mirror(lamps[0], beam, p[i], ray, alpha)
     n_l = wp.max(wp.dot(n[i], way), 1.0e-3)
-    wider = lighting.widening(lamps[0], beam, alpha)
+    wider = analytic_lights.lobe_widening(lamps[0], beam, alpha)
     if share > 0.0:
         lobe = specular_lobe(s, n[i], v[i], way, n_l, wider)
-        mirrored[i] = lobe[1] * n_l * beam.normal_lux[1] * lighting.risen(lamps[0], beam, n[i])
+        mirrored[i] = (
+            lobe[1]
+            * n_l
+            * beam.normal_lux[1]
+            * analytic_lights.above_horizon_fraction(lamps[0], beam, n[i])
+        )
     total = wp.float32(0.0)
     for k in range(panel.shape[0]):
         to_part = panel[k] - p[i]
@@ -137,7 +135,7 @@ def at_points(
     q, area_m2 = points_on(light, 60)
     outputs = [wp.zeros(len(p), dtype=float, device="cpu") for _ in range(3)]
     vectors = [wp.array(a.astype(np.float32), dtype=wp.vec3, device="cpu") for a in (p, n, v, q)]
-    lamps = wp.array(lamp_records([light]), dtype=records.Lamp, device="cpu")
+    lamps = wp.array(lamp_records([light]), dtype=records.LightRecord, device="cpu")
     table = wp.array(lobe_albedo(), dtype=wp.vec2, device="cpu")
     inputs = [lamps, table, *vectors, area_m2, roughness]
     wp.launch(_at_points, len(p), inputs, outputs, device="cpu")
@@ -302,7 +300,7 @@ def test_a_panel_is_seen_in_its_fixture_and_labels_do_not_know_it() -> None:
     meshes = {asset: _fixture_mesh((1.2, 0.6, 0.04), glass), "plane": plane_mesh(20.0, (MATTE,))}
     library = FakeLibrary(meshes)
     scene = Scene("t", (Body("p", "plane"),), environment=DARK)
-    scene, shown = with_fixture(scene, light, library.materials(asset))
+    scene, shown = add_fixture(scene, light, library.materials(asset))
     scene = replace(scene, lights=(shown,))
     renderer = WarpRenderer(library, "cpu", PLAIN)
     wanted = frozenset({Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH})
@@ -361,7 +359,7 @@ def test_a_mirror_shows_a_panel_once(visible: bool) -> None:
     library = FakeLibrary(meshes)
     scene = Scene("t", (Body("p", "plane"),), environment=DARK)
     if visible:
-        scene, light = with_fixture(scene, light, library.materials(asset))
+        scene, light = add_fixture(scene, light, library.materials(asset))
     scene = replace(scene, lights=(light,))
     camera = camera_at((-0.3, 0.0, 0.8), (0.0, 0.0, 0.0), (48, 36), hfov_deg=8.0)
 

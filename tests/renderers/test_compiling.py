@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 import warp as wp
 
-from generator.renderers import kernels
-from generator.renderers.device import open_device
+from gen_data.generator.renderers import warp
+from gen_data.generator.renderers.warp.device import open_device
 
 _FIRST_SAMPLE = """
-from generator.assemble.recipe import open_pipeline
-from generator.assemble.spec import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.assemble.config import load_config
 
 spec = load_config("tabletop.yaml", overrides=["sensors=[{type: rgb_camera, size_px: [64, 48]}]"])
 with open_pipeline(spec) as pipeline:
@@ -24,8 +24,8 @@ with open_pipeline(spec) as pipeline:
 """
 
 KERNEL_MODULES = sorted(
-    path.stem
-    for path in Path(kernels.__path__[0]).glob("*.py")
+    f"{path.parts[-3]}.kernels.{path.stem}"
+    for path in Path(warp.__path__[0]).glob("*/kernels/*.py")
     if "@wp.kernel" in path.read_text(encoding="utf-8")
 )
 
@@ -33,9 +33,13 @@ KERNEL_MODULES = sorted(
 @pytest.mark.slow
 def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes(tmp_path: Path) -> None:
     """After it the first sample of a process adds nothing to the cache, nor does the next."""
-    compiler = [sys.executable, "-c", "from generator.renderers.device import open_device\n"
-                "from generator.renderers.compiling import compile_kernels\n"
-                "compile_kernels(open_device('cpu').alias)"]  # fmt: skip
+    compiler = [
+        sys.executable,
+        "-c",
+        "from gen_data.generator.renderers.warp.device import open_device\n"
+        "from gen_data.generator.renderers.warp.kernel_compilation import compile_kernels\n"
+        "compile_kernels(open_device('cpu').alias)",
+    ]
     environment = {**os.environ, "WARP_CACHE_PATH": str(tmp_path)}
     subprocess.run(compiler, env=environment, check=True)
     compiled = _modules(tmp_path)
@@ -50,7 +54,7 @@ def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes(tmp_path: 
 def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
     """To PTX, which takes Warp's compiler but no GPU."""
     open_device("cpu")
-    module = importlib.import_module(f"{kernels.__name__}.{name}")
+    module = importlib.import_module(f"{warp.__name__}.{name}")
 
     wp.compile_aot_module(module, arch=80, module_dir=tmp_path, use_ptx=True)
 

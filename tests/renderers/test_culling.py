@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel
-from generator.core.geometry import Material
-from generator.core.scene import Body, Environment, Instance, Scene
-from generator.core.se3 import SE3
-from generator.renderers.device import open_device
-from generator.renderers.meshes import boxes_around
-from generator.renderers.packing import pack_view, pack_world
-from generator.renderers.settings import RenderSettings
-from generator.renderers.stock import AssetStock
-from generator.renderers.trees import face_boxes
-from generator.renderers.visibility import bodies_within, project
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.scene import Body, Environment, Instance, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.bvh import face_boxes
+from gen_data.generator.renderers.warp.scene.device_meshes import boxes_around
+from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pack_world
+from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.generator.renderers.warp.visibility.gbuffer import bodies_within, project_vertices
 from tests.renderers.fake_library import (
     FakeLibrary,
     box_mesh,
@@ -43,7 +43,7 @@ def ring_of_boxes() -> Scene:
 def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
     """Vertices are projected by Intrinsics; most bodies are left out all the same."""
     scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
-    stock = AssetStock(FakeLibrary(MESHES), open_device("cpu"))
+    stock = DeviceCache(FakeLibrary(MESHES), open_device("cpu"))
     kept = set(
         bodies_within(pack_world(scene, camera, stock).placed, pack_view(camera, stock), margin)
     )
@@ -75,12 +75,12 @@ def test_whatever_is_drawn_was_projected() -> None:
     """The narrow test alone keeps bodies that the wide one refuses: those must not be drawn."""
     meshes = {"slab": box_mesh((8.0, 0.4, 1.0))}
     scene = slabs_all_around()
-    stock = AssetStock(FakeLibrary(meshes), open_device("cpu"))
+    stock = DeviceCache(FakeLibrary(meshes), open_device("cpu"))
     apart = 0
     for target in ((1.0, 0.2, 0.1), (-1.0, 0.4, -0.3), (0.2, 1.0, 0.5)):
         camera = camera_at((0.0, 0.0, 0.0), target)
         world, view = pack_world(scene, camera, stock), pack_view(camera, stock)
-        projected = project(world, view, stock)
+        projected = project_vertices(world, view, stock)
         narrow = bodies_within(world.placed, view, 0.0)
         apart += len(np.setdiff1d(narrow, projected.reached))
         assert np.isin(projected.in_view, projected.reached).all()

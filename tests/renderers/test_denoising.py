@@ -7,20 +7,13 @@ import sys
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.scene import Body, Light, Scene
-from generator.core.se3 import SE3
-from generator.renderers.settings import RenderSettings
-from generator.renderers.warp import WarpRenderer
-from tests.renderers.fake_library import (
-    DARK,
-    MATTE,
-    FakeLibrary,
-    box_mesh,
-    camera_at,
-    room_mesh,
-)
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Body, Light, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.settings import RenderSettings
+from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at, room_mesh
 
 DENOISED = RenderSettings(tier="pathtraced", samples=4, denoise=True)
 

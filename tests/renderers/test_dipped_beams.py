@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel
-from generator.core.scene import Body, Light, Scene
-from generator.core.se3 import SE3
-from generator.renderers.kernels import records
-from generator.renderers.lamps import dipped_share, main_lamps
-from generator.renderers.warp import WarpRenderer
-from randomizers.vehicle_lights import dipped_beam
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.scene import Body, Light, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.light_selection import dipped_share, main_lamps
+from gen_data.randomizers.vehicle_lights import dipped_beam
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at
 from tests.renderers.test_shading import LINEAR
 
@@ -43,7 +43,7 @@ def headlight(beam_cd: float, T_world_lens: SE3 | None = None) -> Light:
 
 def lamp_records(lights: list[Light]) -> np.ndarray:
     """What the renderer knows of spots."""
-    values = np.zeros(len(lights), dtype=records.Lamp.numpy_dtype())
+    values = np.zeros(len(lights), dtype=records.LightRecord.numpy_dtype())
     for value, light in zip(values, lights, strict=True):
         value["kind"], value["cutoff"] = 1, light.cutoff
         value["position_m"], value["direction"] = light.position_m, light.direction

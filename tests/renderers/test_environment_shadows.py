@@ -8,15 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel
-from generator.core.geometry import Float32, Material
-from generator.core.scene import Body, Environment, Light, Region, Scene
-from generator.core.se3 import SE3, Vec3
-from generator.renderers.brightest import SkyLamp, without_brightest
-from generator.renderers.device import open_device
-from generator.renderers.environments import upload_environment, upload_split
-from generator.renderers.settings import RenderSettings
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import Float32, Material
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.scene import Body, Environment, Light, Region, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.environment_maps import (
+    upload_environment,
+    upload_split,
+)
+from gen_data.generator.renderers.warp.scene.envmap_peaks import SkyLamp, remove_peaks
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.embree import open3d_or_skip
 from tests.renderers.fake_library import (
     MATTE,
@@ -102,7 +105,7 @@ def test_lamps_and_the_rest_give_the_irradiance_of_the_panorama(
     """On surfaces that face any way, to 1 % of what the brightest of them gets."""
     image, normals = panorama(*lights), every_normal()
 
-    rest, lamps = without_brightest(image)
+    rest, lamps = remove_peaks(image)
 
     whole = irradiance(image, normals)
     parts = irradiance(rest, normals) + sum(disc_irradiance(lamp, normals) for lamp in lamps)
@@ -118,7 +121,7 @@ def test_a_disc_in_the_sky_is_found_where_and_as_large_as_it_is(
     towards: Vec3, radius_rad: float, luminance: float
 ) -> None:
     """To half a degree and a twelfth of its size; texels are 0.7 degrees wide."""
-    _, lamps = without_brightest(panorama((towards, radius_rad, luminance)))
+    _, lamps = remove_peaks(panorama((towards, radius_rad, luminance)))
 
     unit = np.asarray(towards) / np.linalg.norm(towards)
     assert len(lamps) == 1
@@ -147,7 +150,7 @@ def test_a_fine_panorama_is_lit_and_mirrored_like_a_coarse_one() -> None:
 def test_even_and_cloudy_skies_stay_as_they_are() -> None:
     """Nothing stands out of them: no lamp, and the same image."""
     for image in (panorama(), panorama(((0.5, 0.5, 0.6), 0.6, 3.0))):
-        rest, lamps = without_brightest(image)
+        rest, lamps = remove_peaks(image)
 
         assert lamps == ()
         assert rest is image

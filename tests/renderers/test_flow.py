@@ -8,16 +8,16 @@ import cv2
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel
-from generator.core.geometry import MeshData
-from generator.core.instants import at
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.motion import Change
-from generator.core.scene import Body, Scene
-from generator.core.se3 import SE3
-from generator.core.shutter import Shutter
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import MeshData
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.motion import StateChange
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.shutter import Shutter
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 from tests.renderers.moving import FACING, LENS, MESHES, STEP_S, even_track, world
 
@@ -58,7 +58,7 @@ def through(homography: np.ndarray) -> np.ndarray:
 
 def camera_motion(scene: Scene, step_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Rotation and translation from the camera's frame to that of another instant."""
-    other = at(scene, scene.time_s + step_s)
+    other = scene_at(scene, scene.time_s + step_s)
     pose = other.cameras[0].T_world_camera.inverse() @ scene.cameras[0].T_world_camera
     return pose.rotation(), np.asarray(pose.translation_m)
 
@@ -144,7 +144,7 @@ def test_going_there_and_back_leads_to_the_same_pixel(renderer: WarpRenderer) ->
         WALL, box, tracks=(even_track("box", start, (-0.7, 0.2, 0.3), 0.6),),
         camera_velocity_m_s=(0.4, 0.1, 0.5), camera_turn_rad_s=-0.2,
     )  # fmt: skip
-    now, then = images(renderer, scene), images(renderer, at(scene, scene.time_s + STEP_S))
+    now, then = images(renderer, scene), images(renderer, scene_at(scene, scene.time_s + STEP_S))
     flow = now[Channel.FLOW_FORWARD].astype(np.float64)
     place = centres()[..., :2] - 0.5 + flow
     first = np.floor(place).astype(int)
@@ -178,7 +178,7 @@ def test_points_are_occluded_where_a_ray_to_them_meets_something_before(
         camera_velocity_m_s=(-1.0, 0.0, 0.0),
     )  # fmt: skip
     seen = images(renderer, scene)
-    later = at(scene, scene.time_s + STEP_S)
+    later = scene_at(scene, scene.time_s + STEP_S)
 
     z = seen[Channel.Z_DEPTH].astype(np.float64)
     p = np.einsum("ij,hwj->hwi", np.linalg.inv(LENS.matrix()), centres()) * z[..., None]
@@ -231,7 +231,7 @@ def test_what_changes_its_shape_flows_with_its_triangles() -> None:
     )  # fmt: skip
     library = FakeLibrary({**MESHES.meshes, "large": large})
     box = Body("box", "box", SE3((0.0, 0.0, 3.0)), instance_id=1)
-    scene = world(box, changes=(Change(0.25, "box", asset="large"),))
+    scene = world(box, changes=(StateChange(0.25, "box", asset="large"),))
     seen = images(WarpRenderer(library, "cpu"), scene)
 
     own = seen[Channel.INSTANCE] == 1

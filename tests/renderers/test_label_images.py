@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel
-from generator.core.errors import ConfigError
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Instance, Scene
-from generator.core.se3 import SE3, look_at
-from generator.renderers.settings import RenderSettings
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Body, Camera, Instance, Scene
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, sphere_mesh
 
 LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)

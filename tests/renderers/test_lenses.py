@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 import warp as wp
 
-from generator.core.capture import Channel, Reading
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.scene import Body, Camera, Instance, Light, Scene, Weather
-from generator.core.se3 import SE3, look_at
-from generator.renderers.device import open_device
-from generator.renderers.kernels.optics import pixel_of
-from generator.renderers.kernels.records import View
-from generator.renderers.outlooks import cone_around
-from generator.renderers.packing import pack_view
-from generator.renderers.precipitation import rain, traces
-from generator.renderers.stock import AssetStock
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.scene import Body, Camera, Instance, Light, Scene, Weather
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.renderers.warp.atmosphere.precipitation import make_streaks, rain
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.kernels.records import View
+from gen_data.generator.renderers.warp.scene.scene_packing import pack_view
+from gen_data.generator.renderers.warp.visibility.amodal_lens import bounding_cone
+from gen_data.generator.renderers.warp.visibility.kernels.distortion import project_to_pixel
 from tests.renderers.embree import near_edges, open3d_or_skip
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, room_mesh, sphere_mesh
 
@@ -64,7 +64,7 @@ def scene_of(*bodies: Body) -> Scene:
     return Scene("test", bodies, instances, environment=DARK)
 
 
-def rendered(scene: Scene, camera: Camera, channels: frozenset[Channel] = LABELS) -> Reading:
+def rendered(scene: Scene, camera: Camera, channels: frozenset[Channel] = LABELS) -> SensorReading:
     return WarpRenderer(LIBRARY, "cpu").render(scene, camera, channels)
 
 
@@ -137,7 +137,7 @@ def test_a_lens_without_coefficients_is_a_pinhole() -> None:
 
 def test_a_pinhole_has_no_table_of_directions() -> None:
     """It costs what it did."""
-    stock = AssetStock(LIBRARY, open_device("cpu"))
+    stock = DeviceCache(LIBRARY, open_device("cpu"))
 
     view = pack_view(ahead(Intrinsics(8, 6, 5.0, 5.0, 4.0, 3.0)), stock)
 
@@ -284,7 +284,7 @@ def test_a_cone_around_a_box_holds_all_of_it() -> None:
     for _ in range(300):
         low = rng.normal(size=3) * 2.0
         ends = np.stack([low, low + rng.uniform(0.05, 4.0, 3)])
-        axis, half_rad = cone_around(ends)
+        axis, half_rad = bounding_cone(ends)
         points = ends[0] + rng.random((500, 3)) * (ends[1] - ends[0])
         cosines = points @ axis / np.linalg.norm(points, axis=1)
         assert half_rad == math.pi or (np.arccos(np.clip(cosines, -1, 1)) <= half_rad + 1e-6).all()
@@ -385,7 +385,7 @@ def test_rain_before_a_lens_is_as_dense_as_before_a_pinhole() -> None:
     found = []
     for lens in (Lens(), Lens("brown_conrady", (0.0,) * 8)):
         camera = ahead(replace(pinhole, lens=lens))
-        views = [traces(rain(2.0), camera, Weather(seed=k), 0.01, "rain") for k in range(9)]
+        views = [make_streaks(rain(2.0), camera, Weather(seed=k), 0.01, "rain") for k in range(9)]
         all_ = np.concatenate(views)
         away_m = np.linalg.norm(all_["p_m"], axis=1)
         found.append(all_[(away_m < 6.0) & (all_["p_m"][:, 2] > 0.5)])
@@ -403,7 +403,7 @@ def test_rain_falls_all_around_a_panorama() -> None:
     """Streaks in every quarter of the image, none across the seam."""
     k = Intrinsics.from_hfov(256, 128, 2.0 * math.pi, Lens("equirectangular"))
 
-    streaks = traces(rain(20.0), ahead(k), Weather(seed=3), 0.01, "rain")
+    streaks = make_streaks(rain(20.0), ahead(k), Weather(seed=3), 0.01, "rain")
 
     quarters = np.bincount((streaks["start_px"][:, 0] // 64).astype(int).clip(0, 3), minlength=4)
     assert quarters.min() > 0.8 * quarters.mean()
@@ -414,7 +414,7 @@ def test_rain_falls_all_around_a_panorama() -> None:
 def look_up(view: View, points: wp.array(dtype=wp.vec3), pixels: wp.array(dtype=int)):  # noqa: ANN201
     """What the renderer takes for the pixels of points."""
     i = wp.tid()
-    j, _depth = pixel_of(view, points[i])
+    j, _depth = project_to_pixel(view, points[i])
     pixels[i] = j
 
 
@@ -423,7 +423,7 @@ def look_up(view: View, points: wp.array(dtype=wp.vec3), pixels: wp.array(dtype=
 )
 def test_reflections_look_points_up_where_they_are_seen(k: Intrinsics) -> None:
     """The kernels' projection is that of Intrinsics; none outside the image or the field."""
-    stock = AssetStock(LIBRARY, open_device("cpu"))
+    stock = DeviceCache(LIBRARY, open_device("cpu"))
     points = np.random.default_rng(2).normal(size=(4000, 3))
     places = k.project(points)
     inside = ((places >= 0.0) & (places < (k.width_px, k.height_px))).all(axis=1)

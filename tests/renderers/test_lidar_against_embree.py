@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.core.capture import Beams
-from generator.core.scene import Body, Instance, Lidar, Scene
-from generator.core.se3 import SE3
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.capture import LidarRays
+from gen_data.generator.core.scene import Body, Instance, Lidar, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from tests.renderers.embree import open3d_or_skip
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, room_mesh, sphere_mesh
 
@@ -67,7 +67,9 @@ def test_ranges_and_labels_agree_with_embree(seed: int) -> None:
     expected_m = hit["t_hit"].numpy()
     ids = np.array([body.instance_id for body in scene.bodies])[hit["geometry_ids"].numpy()]
 
-    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(scene, lidar, Beams(rays, 0.0, 1, 200.0))
+    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(
+        scene, lidar, LidarRays(rays, 0.0, 1, 200.0)
+    )
 
     assert (np.abs(echoes.range_m[:, 0] - expected_m) < 1e-3).mean() >= 0.999
     assert (echoes.instance_id[:, 0] == ids).mean() >= 0.999
@@ -81,7 +83,9 @@ def test_a_ground_plane_is_where_geometry_says() -> None:
     lidar = Lidar("top", "color", T_world_lidar=SE3((10.0, 20.0, 1.73)))
     scene = Scene("plane", (Body("plane", "plane"),))
 
-    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(scene, lidar, Beams(rays, 0.0, 1, 120.0))
+    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(
+        scene, lidar, LidarRays(rays, 0.0, 1, 120.0)
+    )
 
     np.testing.assert_allclose(echoes.range_m[:, 0], 1.73 / np.sin(down), rtol=1e-5)
     np.testing.assert_allclose(echoes.incidence_cos[:, 0], np.sin(down), rtol=1e-4)
@@ -94,8 +98,8 @@ def test_nothing_beyond_the_reach_of_beams_is_hit() -> None:
     scene = Scene("plane", (Body("plane", "plane", instance_id=3),))
     renderer = WarpRenderer(FakeLibrary(MESHES), "cpu")
 
-    near = renderer.scan(scene, lidar, Beams(rays, 0.0, 1, 29.0))
-    far = renderer.scan(scene, lidar, Beams(rays, 0.0, 1, 31.0))
+    near = renderer.scan(scene, lidar, LidarRays(rays, 0.0, 1, 29.0))
+    far = renderer.scan(scene, lidar, LidarRays(rays, 0.0, 1, 31.0))
 
     assert near.range_m[0, 0] == np.inf
     assert near.instance_id[0, 0] == 0 and near.reflectance[0, 0] == 0.0
@@ -109,7 +113,9 @@ def test_rays_of_a_wide_beam_surround_its_axis() -> None:
     lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, 10.0)))
     scene = Scene("plane", (Body("plane", "plane"),))
 
-    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(scene, lidar, Beams(rays, 0.2, 7, 120.0))
+    echoes = WarpRenderer(FakeLibrary(MESHES), "cpu").scan(
+        scene, lidar, LidarRays(rays, 0.2, 7, 120.0)
+    )
 
     slant_m = 10.0 * np.hypot(1.0, np.tan(0.1) / np.sqrt(2.0))
     np.testing.assert_allclose(echoes.range_m[0], [10.0, *[slant_m] * 6], rtol=1e-5)

@@ -7,18 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from generator.core.capture import Beams, Channel, Echoes
-from generator.core.geometry import SURFACES, Material
-from generator.core.scene import Body, Lidar, Scene
-from generator.core.se3 import SE3
-from generator.renderers.infrared import infrared_of, oren_nayar
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import SURFACES, Material
+from gen_data.generator.core.capture import Channel, LidarHits, LidarRays
+from gen_data.generator.core.scene import Body, Lidar, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.lidar.infrared_materials import infrared_fields, oren_nayar
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh, sphere_mesh
 
 MATTE = Material(base_color=(0.4, 0.4, 0.4), roughness=1.0, specular=0.0)
 
 
-def seen_at(material: Material, angles_deg: list[float]) -> Echoes:
+def seen_at(material: Material, angles_deg: list[float]) -> LidarHits:
     """A plane from one metre, seen under angles of incidence."""
     angles = np.radians(angles_deg)
     rays = np.stack([np.sin(angles), np.zeros_like(angles), -np.cos(angles)], axis=1)
@@ -26,7 +26,7 @@ def seen_at(material: Material, angles_deg: list[float]) -> Echoes:
     lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, 1.0)))
     scene = Scene("plane", (Body("plane", "plane"),))
     return WarpRenderer(library, "cpu").scan(
-        scene, lidar, Beams(rays.astype(np.float32), 0.0, 1, 200.0)
+        scene, lidar, LidarRays(rays.astype(np.float32), 0.0, 1, 200.0)
     )
 
 
@@ -74,14 +74,14 @@ def test_signs_are_retro_reflectors() -> None:
 @pytest.mark.parametrize("role", ["leaf", "skin", "asphalt", "top"])
 def test_the_infrared_is_not_what_the_eye_sees(role: str) -> None:
     """A black leaf, face, road or shirt is none for a laser: roles have their own reflectance."""
-    even, rim, *_ = infrared_of(Material(role=role), np.zeros(3))
+    even, rim, *_ = infrared_fields(Material(role=role), np.zeros(3))
 
     assert even + rim > 0.15
 
 
 def test_black_paint_is_black_to_a_laser_too() -> None:
     """Carbon absorbs the infrared as well."""
-    even, rim, *_ = infrared_of(Material(role="paint"), np.full(3, 0.02))
+    even, rim, *_ = infrared_fields(Material(role="paint"), np.full(3, 0.02))
 
     assert even == pytest.approx(0.02) and rim == 0.0
 
@@ -114,7 +114,7 @@ def test_camera_and_lidar_see_the_same_world() -> None:
     rays = in_camera / np.linalg.norm(in_camera, axis=1, keepdims=True)
     lidar = Lidar("top", "camera", T_world_lidar=camera.T_world_camera)
 
-    echoes = renderer.scan(scene, lidar, Beams(rays.astype(np.float32), 0.0, 1, 300.0))
+    echoes = renderer.scan(scene, lidar, LidarRays(rays.astype(np.float32), 0.0, 1, 300.0))
 
     z_m = echoes.range_m[:, 0] * rays[:, 2]
     depth_m = reading.channels[Channel.Z_DEPTH][v.astype(int), u.astype(int)]
@@ -132,9 +132,9 @@ def test_what_is_clear_to_the_eye_is_clear_to_a_laser() -> None:
     glass = Material((1, 1, 1), 0.04, transmission=0.75, ior=1.5)
     veil = Material((1, 1, 1), 1.0, opacity=0.25)
 
-    even, _, _, _, _, mirror, clear = infrared_of(glass, white)
+    even, _, _, _, _, mirror, clear = infrared_fields(glass, white)
     assert (clear, mirror) == pytest.approx((0.75, 0.04))
     assert even == pytest.approx(0.25)
-    even, _, _, _, _, mirror, clear = infrared_of(veil, white)
+    even, _, _, _, _, mirror, clear = infrared_fields(veil, white)
     assert (clear, mirror, even) == pytest.approx((0.75, 0.0, 0.25))
-    assert infrared_of(Material(), white)[5:] == (0.0, 0.0)
+    assert infrared_fields(Material(), white)[5:] == (0.0, 0.0)

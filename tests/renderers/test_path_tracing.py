@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from generator.core.capture import Channel
-from generator.core.geometry import Material, TextureData
-from generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
-from generator.core.se3 import SE3
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import Material, TextureData
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import (
     DARK,
     MATTE,
@@ -391,13 +391,14 @@ def test_snow_whitens_and_puddles_mirror() -> None:
 def test_the_other_tier_never_loads_the_kernels_of_paths() -> None:
     """Starting cold it costs what it did."""
     code = (
-        "import sys; from generator.renderers.settings import RenderSettings;"
-        "from generator.renderers.warp import WarpRenderer;"
-        "from generator.core.capture import Channel; from tests.renderers import fake_library as f;"
-        "from generator.core.scene import Scene;"
+        "import sys; from gen_data.generator.renderers.warp.settings import RenderSettings;"
+        "from gen_data.generator.renderers.warp.renderer import WarpRenderer;"
+        "from gen_data.generator.core.capture import Channel; from tests.renderers import "
+        "fake_library as f;"
+        "from gen_data.generator.core.scene import Scene;"
         "WarpRenderer(f.FakeLibrary({}), 'cpu').render("
         "Scene('t', ()), f.camera_at((0, 0, 1), (1, 0, 1), (8, 8)), frozenset({Channel.RADIANCE}));"
-        "assert 'generator.renderers.color' in sys.modules;"
+        "assert 'gen_data.generator.renderers.warp.realtime.realtime_shading' in sys.modules;"
         "loaded = [name for name in sys.modules if '.path' in name and 'renderers' in name];"
         "assert not loaded, loaded"
     )

@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from generator.core.geometry import Material, TextureData
-from generator.core.scene import Body, Camera, Environment, Light, Scene
-from generator.core.se3 import SE3
-from generator.renderers.environments import texel_directions
-from generator.sensors.camera.exposure import metered_ev100, saturation_cd_m2
-from generator.sensors.camera.tone import display_values
+from gen_data.generator.core.asset_types import Material, TextureData
+from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.scene.environment_maps import texel_directions
+from gen_data.generator.sensors.camera.exposure import metered_ev100, saturation_cd_m2
+from gen_data.generator.sensors.camera.tone import display_values
 from tests.renderers.fake_library import (
     DARK,
     FakeLibrary,

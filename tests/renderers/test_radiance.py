@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel
-from generator.core.geometry import Material
-from generator.core.scene import Body, Camera, Environment, Light, Scene
-from generator.core.se3 import SE3
-from generator.renderers.occlusion import pixel_parts
-from generator.renderers.settings import RenderSettings
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.realtime.light_visibility import pixel_parts
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     DARK,
     FakeLibrary,

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from generator.core.cache import ObjectCache
-from generator.core.capture import Channel
-from generator.core.geometry import Material, TextureData
-from generator.core.scene import Body, Light, Scene, Weather
-from generator.core.se3 import SE3
-from generator.renderers.device import open_device
-from generator.renderers.packing import pack_world
-from generator.renderers.stock import AssetStock
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import Material, TextureData
+from gen_data.generator.core.bounded_cache import ObjectCache
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.scene import Body, Light, Scene, Weather
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.scene_packing import pack_world
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh
 
 CHECKER = TextureData(np.full((4, 4, 3), 128, np.uint8))
@@ -82,7 +82,7 @@ def test_another_scene_is_packed_anew() -> None:
 
 def test_textures_of_several_bodies_find_their_places() -> None:
     """Materials with and without textures, in any order of bodies."""
-    stock = AssetStock(LIBRARY, open_device("cpu"))
+    stock = DeviceCache(LIBRARY, open_device("cpu"))
     plain, brick, wood = (Material(texture=name) for name in ("", "brick", "ash"))
     looks = ((plain,), (brick,), (wood,), (plain,), (brick,))
     bodies = tuple(Body(f"{k}", "box", materials=look) for k, look in enumerate(looks))

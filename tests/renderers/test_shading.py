@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import warp as wp
 
-from generator.core.capture import Channel
-from generator.core.geometry import Float32, Material, TextureData
-from generator.core.scene import Body, Camera, Environment, Light, Scene
-from generator.core.se3 import SE3, Vec3
-from generator.renderers.device import open_device
-from generator.renderers.kernels.brdf import make_brdf, specular_lobe
-from generator.renderers.lobes import lobe_albedo
-from generator.renderers.settings import RenderSettings
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import Float32, Material, TextureData
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
+from gen_data.generator.renderers.warp.scene.kernels.brdf import make_brdf, specular_lobe
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     DARK,
     MATTE,

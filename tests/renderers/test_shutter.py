@@ -9,18 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generator.core.capture import Channel, Reading
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import PINHOLE, Lens
-from generator.core.rows import seen_points, world_points
-from generator.core.scene import Body, Scene
-from generator.core.se3 import SE3
-from generator.core.shutter import INSTANT, Shutter
-from generator.renderers.moments import Moment, sight
-from generator.renderers.pace import timed_bands
-from generator.renderers.shown import drawn_bands
-from generator.renderers.shutter import light_of, slices_of
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import PINHOLE, Lens
+from gen_data.generator.core.rolling_shutter_projection import project_rolling_shutter, world_points
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.shutter import INSTANT, Shutter
+from gen_data.generator.renderers.warp.frame_context import CameraState, render_view
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.shutter_integration import integrate_light, split_slices
+from gen_data.generator.renderers.warp.visibility.banded_gbuffer import render_bands
+from gen_data.generator.renderers.warp.visibility.motion_bounds import make_bands
 from tests.renderers.moving import FACING, LENS, MESHES, even_track, world
 
 LABELS = frozenset(
@@ -51,7 +51,7 @@ def passing(speed_px_s: float, shutter: Shutter, time_s: float = 0.0) -> Scene:
     return world(LAMP, tracks=(track,), shutter=shutter, time_s=time_s)
 
 
-def shot(renderer: WarpRenderer, scene: Scene) -> Reading:
+def shot(renderer: WarpRenderer, scene: Scene) -> SensorReading:
     return renderer.render(scene, scene.cameras[0], ALL)
 
 
@@ -124,7 +124,7 @@ def test_slices_of_time_hold_every_row_once_around_its_instant(
     # Slices of a short exposure of many rows would be thousands.
     readout_s = max(min(readout_s, 10 * exposure_s), -10 * exposure_s)
     scene = world(lens=lens, shutter=Shutter(exposure_s, readout_s, samples))
-    slices = slices_of(Moment.of(scene, scene.cameras[0]), samples)
+    slices = split_slices(CameraState.of(scene, scene.cameras[0]), samples)
     shares, instants = np.zeros(12), np.zeros(12)
     for part in slices:
         rows = slice(part.band.first, part.band.end)
@@ -140,9 +140,9 @@ def test_slices_of_time_hold_every_row_once_around_its_instant(
 def test_rows_in_which_nothing_moves_are_rendered_once(readout_s: float) -> None:
     """In the slice nearest to their instant; others in every slice of their exposure."""
     scene = world(shutter=Shutter(0.01, readout_s, samples=4))
-    moment = Moment.of(scene, scene.cameras[0])
+    moment = CameraState.of(scene, scene.cameras[0])
     blurred = np.arange(LENS.height_px) >= 40
-    slices = slices_of(moment, 4, blurred)
+    slices = split_slices(moment, 4, blurred)
     shares, times = np.zeros(LENS.height_px), np.zeros(LENS.height_px, int)
     delays = scene.cameras[0].shutter.row_delays_s(LENS.height_px)
     for part in slices:
@@ -223,15 +223,15 @@ def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, len
         lens=replace(LENS, lens=lens),
     )  # fmt: skip
     studio = renderer._studio
-    near = sight(Moment.of(scene, scene.cameras[0]), studio)
-    whole_bands = timed_bands(near.moment, [0])
-    rows = timed_bands(near.moment, list(range(0, LENS.height_px, 5)))
+    near = render_view(CameraState.of(scene, scene.cameras[0]), studio)
+    whole_bands = make_bands(near.moment, [0])
+    rows = make_bands(near.moment, list(range(0, LENS.height_px, 5)))
 
     def light(see):  # noqa: ANN001, ANN202
-        return light_of(see, studio)
+        return integrate_light(see, studio)
 
-    one, images = drawn_bands(whole_bands, LABELS, studio, near, light)
-    other, banded = drawn_bands(rows, LABELS, studio, near, light)
+    one, images = render_bands(whole_bands, LABELS, studio, near, light)
+    other, banded = render_bands(rows, LABELS, studio, near, light)
     for channel in LABELS:
         assert np.array_equal(images[channel], banded[channel]), channel
     assert np.array_equal(one.hits, other.hits)
@@ -259,7 +259,7 @@ def test_points_are_projected_where_their_rows_show_them(renderer: WarpRenderer)
     )
     mask = shot(renderer, scene).channels[Channel.INSTANCE] == 1
     corners = np.array([[x, y, -0.5] for y in (-0.5, 0.5) for x in (-0.5, 0.5)])
-    _, image_px = seen_points(scene, scene.cameras[0], corners, scene.instances[0])
+    _, image_px = project_rolling_shutter(scene, scene.cameras[0], corners, scene.instances[0])
 
     rows = np.flatnonzero(mask.any(axis=1))
     top, bottom = np.flatnonzero(mask[rows[0]]), np.flatnonzero(mask[rows[-1]])
@@ -276,7 +276,9 @@ def test_a_point_that_sinks_is_met_by_the_row_that_reads_it() -> None:
     track = even_track("lamp", SE3((0.0, -0.3, 3.0)), (0.0, 2.0, 0.0))
     shutter = Shutter(0.0, 0.08)
     scene = world(LAMP, tracks=(track,), shutter=shutter, time_s=0.0)
-    _, image_px = seen_points(scene, scene.cameras[0], np.zeros((1, 3)), scene.instances[0])
+    _, image_px = project_rolling_shutter(
+        scene, scene.cameras[0], np.zeros((1, 3)), scene.instances[0]
+    )
 
     still, speed = 32.0 - 80.0 * 0.3 / 3.0, 80.0 * 2.0 / 3.0
     expected = (still - 0.5 * speed * 0.08) / (1.0 - speed * 0.08 / LENS.height_px)
@@ -286,7 +288,9 @@ def test_a_point_that_sinks_is_met_by_the_row_that_reads_it() -> None:
 def test_a_camera_without_rolling_rows_projects_as_ever() -> None:
     """One look, at the image's instant."""
     scene = world(LAMP, shutter=Shutter(exposure_s=0.05), camera_velocity_m_s=(1.0, 0.0, 0.0))
-    p_camera, image_px = seen_points(scene, scene.cameras[0], np.array([[0.0, 0.0, 3.0]]))
+    p_camera, image_px = project_rolling_shutter(
+        scene, scene.cameras[0], np.array([[0.0, 0.0, 3.0]])
+    )
 
     expected = scene.cameras[0].T_world_camera.inverse().apply(np.array([[0.0, 0.0, 3.0]]))
     np.testing.assert_allclose(p_camera, expected, atol=1e-6)

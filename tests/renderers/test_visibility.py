@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.core.capture import Channel, Reading
-from generator.core.geometry import Material, MeshData
-from generator.core.scene import Body, Camera, Instance, Scene
-from generator.core.se3 import SE3, Vec3
-from generator.renderers.flow import FLOW
-from generator.renderers.settings import RenderSettings
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import Material, MeshData
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.scene import Body, Camera, Instance, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW
 from tests.renderers.fake_library import (
     FakeLibrary,
     box_mesh,
@@ -48,7 +48,7 @@ def facing_plane(z_m: float) -> Body:
     return Body("plane", "plane", SE3((0.0, 0.0, z_m), (0.0, 1.0, 0.0, 0.0)))
 
 
-def seen(renderer: WarpRenderer, scene: Scene, camera: Camera) -> Reading:
+def seen(renderer: WarpRenderer, scene: Scene, camera: Camera) -> SensorReading:
     return renderer.render(scene, camera, LABELS)
 
 

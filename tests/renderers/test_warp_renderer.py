@@ -10,16 +10,16 @@ import numpy as np
 import psutil
 import pytest
 
-from generator.core.cache import ByteCache
-from generator.core.capture import Channel, Reading
-from generator.core.errors import ConfigError
-from generator.core.geometry import Material
-from generator.core.scene import Body, Camera, Light, Scene
-from generator.core.se3 import SE3
-from generator.renderers import TABLE
-from generator.renderers.meshes import is_convex_solid
-from generator.renderers.settings import RenderSettings
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.bounded_cache import ByteCache
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Body, Camera, Light, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers import TABLE
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.device_meshes import is_convex_solid
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     FakeLibrary,
     box_mesh,
@@ -54,7 +54,7 @@ def camera(size_px: tuple[int, int] = (96, 72)) -> Camera:
     return camera_at((1.2, -0.8, 1.0), (0.0, 0.0, 0.1), size_px)
 
 
-def assert_same(a: Reading, b: Reading) -> None:
+def assert_same(a: SensorReading, b: SensorReading) -> None:
     assert a.channels.keys() == b.channels.keys()
     for channel, image in a.channels.items():
         np.testing.assert_array_equal(image, b.channels[channel], err_msg=str(channel))

@@ -9,25 +9,25 @@ import numpy as np
 import pytest
 import warp as wp
 
-from generator.core.capture import Channel, Reading
-from generator.core.geometry import Material
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
-from generator.core.se3 import SE3, look_at
-from generator.renderers.device import open_device
-from generator.renderers.lamps import main_lamps
-from generator.renderers.packing import pack_world
-from generator.renderers.precipitation import (
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.renderers.warp.atmosphere.precipitation import (
     light_level_ev100,
+    make_streaks,
     poisson,
     rain,
     snow,
-    traces,
     usual_exposure_s,
 )
-from generator.renderers.settings import RenderSettings
-from generator.renderers.stock import AssetStock
-from generator.renderers.warp import WarpRenderer
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.renderers.warp.scene.light_selection import main_lamps
+from gen_data.generator.renderers.warp.scene.scene_packing import pack_world
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.randomizers.doubles import rng_of
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
@@ -81,7 +81,7 @@ def flat(weather: Weather, *bodies: Body) -> Scene:
                  weather=weather)  # fmt: skip
 
 
-def luminance(reading: Reading) -> np.ndarray:
+def luminance(reading: SensorReading) -> np.ndarray:
     """Of grey things [cd/m^2]."""
     return reading.channels[Channel.RADIANCE][..., 1].astype(float)
 
@@ -220,7 +220,7 @@ def test_puddles_mirror_what_stands_behind_them(renderer: WarpRenderer) -> None:
 def test_streaks_are_a_poisson_process() -> None:
     """Their number has equal mean and variance; they spread evenly over the image."""
     kind = rain(1.0)
-    found = [traces(kind, AHEAD, Weather(seed=k), 0.004, "rain") for k in range(300)]
+    found = [make_streaks(kind, AHEAD, Weather(seed=k), 0.004, "rain") for k in range(300)]
     numbers = np.array([len(values) for values in found])
     frustum_m3 = (96 / 80) * (64 / 80) / 3.0 * (6.0**3 - 0.35**3)
     expected = 8000.0 / 4.1 * math.exp(-4.1) * frustum_m3
@@ -243,8 +243,8 @@ def test_small_poisson_numbers_have_the_right_mean_and_variance() -> None:
 
 def test_drops_fall_faster_than_flakes() -> None:
     """Streaks of rain are several times longer than those of flakes."""
-    streaks = traces(rain(10.0), AHEAD, Weather(seed=1), 0.01, "rain")
-    flakes = traces(snow(1.0), AHEAD, Weather(seed=1), 0.01, "snow")
+    streaks = make_streaks(rain(10.0), AHEAD, Weather(seed=1), 0.01, "rain")
+    flakes = make_streaks(snow(1.0), AHEAD, Weather(seed=1), 0.01, "snow")
     lengths = [
         float(np.median(np.hypot(*(v["end_px"] - v["start_px"]).T) * v["z_m"]))
         for v in (streaks, flakes)
@@ -303,7 +303,7 @@ def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:
         for k in range(40)
     )
     scene = street(Weather(), DARK, *lamps, SUN)
-    stock = AssetStock(library, open_device("cpu"))
+    stock = DeviceCache(library, open_device("cpu"))
     records = pack_world(scene, AHEAD, stock).record.lamps.numpy()
     ground = np.stack([np.linspace(1.0, 20.0, 60), np.zeros(60), np.zeros(60)], axis=-1)
     up = np.tile([0.0, 0.0, 1.0], (60, 1))

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from generator.cli.report import report
-from generator.core.errors import StorageError
-from generator.report.labels import Label, Picture, Points, records
-from generator.report.page import page
-from generator.report.published import DIFFICULTIES, TYPES
-from generator.report.scans import SCANS_MAX, scans
-from generator.report.survey import Survey, survey
-from generator.report.tables import (
+from gen_data.generator.cli.report_command import report
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.report.html_page import page
+from gen_data.generator.report.kitti_statistics import DIFFICULTIES, TYPES
+from gen_data.generator.report.label_files import Label, Picture, Points, records
+from gen_data.generator.report.label_statistics import Survey, collect_statistics
+from gen_data.generator.report.lidar_scans import SCANS_MAX, scans
+from gen_data.generator.report.report_tables import (
     Histogram,
     Table,
     counts_at,
@@ -140,7 +140,7 @@ def test_a_coco_file_of_another_layout_is_refused(tmp_path: Path) -> None:
 
 def test_tables_count_what_was_written(street: Path) -> None:
     """Two of four objects in each of two images, one image empty."""
-    made = tables(survey(records(street)))
+    made = tables(collect_statistics(records(street)))
 
     images = row_of(made, "Images", "all")
     assert (images["images"], images["objects"], images["empty"]) == ("3", "4", "33.3 %")
@@ -162,7 +162,9 @@ def test_tables_count_what_was_written(street: Path) -> None:
 
 def test_labels_that_were_not_annotated_are_left_blank() -> None:
     """A data set of boxes only has sizes still; without its types KITTI is no match."""
-    made = tables(survey([Picture("train", "1"), Label(("train", "1"), "mug", "Misc", 10, 20)]))
+    made = tables(
+        collect_statistics([Picture("train", "1"), Label(("train", "1"), "mug", "Misc", 10, 20)])
+    )
 
     hidden = row_of(made, "Occlusion and truncation", "mug")
     assert set(hidden.values()) == {"mug", "-"}
@@ -172,7 +174,7 @@ def test_labels_that_were_not_annotated_are_left_blank() -> None:
 
 def test_a_data_set_without_objects_has_a_report() -> None:
     """Only negatives."""
-    found = survey([Picture("train", "1")])
+    found = collect_statistics([Picture("train", "1")])
 
     assert row_of(tables(found), "Images", "train")["empty"] == "100.0 %"
     assert histograms(found)[0].counts["images"].sum() == 1
@@ -202,7 +204,7 @@ def test_kittis_counts_add_up() -> None:
 
 def test_histograms_lose_nothing(street: Path) -> None:
     """What is beyond the last edge is in the last bin."""
-    found = survey(records(street))
+    found = collect_statistics(records(street))
     found.numbers[("car", "Car")].extend([5000.0, 4000.0, 0, 0, 1, 999.0, 4, 2, 1])
 
     made = histograms(found)
@@ -243,7 +245,7 @@ def test_memory_grows_by_nine_numbers_per_object() -> None:
     """A million objects are 72 MB."""
     label = Label(("train", "1"), "mug", "Misc", 10, 20)
 
-    found: Survey = survey(label for _ in range(1000))
+    found: Survey = collect_statistics(label for _ in range(1000))
 
     assert found.numbers[("mug", "Misc")].buffer_info()[1] == 9000
 

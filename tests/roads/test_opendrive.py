@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from generator.assets.library import open_library
-from generator.core.errors import AssetError, ConfigError
-from generator.core.scene import Scene
-from generator.roads.network import network_lanes, origin_m
-from generator.roads.opendrive import read_opendrive
-from scene_templates.road_network import RoadNetwork
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.core.errors import AssetError, ConfigError
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.roads.opendrive import read_opendrive
+from gen_data.generator.roads.opendrive_lanes import network_lanes, origin_m
+from gen_data.scene_templates.road_network import RoadNetwork
 from tests.roads.xodr import town
 
 

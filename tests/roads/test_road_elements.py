@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generator.assets.library import Library, open_library
-from generator.core.errors import ConfigError
-from generator.core.scene import Lane, Scene
-from scene_templates import TABLE
-from scene_templates.builder import build
-from scene_templates.element import Element
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Lane, Scene
+from gen_data.scene_templates import TABLE
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.element import Element
 
 ROAD = {"type": "road", "name": "main", "length_m": 100.0}
 
@@ -33,7 +33,7 @@ def built(library: Library, *lines: dict[str, Any]) -> Scene:
     elements: list[Element] = [
         TABLE.load(line["type"]).model_validate(line, strict=False) for line in lines
     ]
-    return build("street", elements, library)
+    return build_scene("street", elements, library)
 
 
 def by_name(scene: Scene) -> dict[str, Lane]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import fresnel
 
-from generator.roads.geometry import (
+from gen_data.generator.roads.reference_line import (
     Arc,
     Curve,
     Line,
@@ -20,7 +20,7 @@ from generator.roads.geometry import (
     Poly3,
     ReferenceLine,
     Spiral,
-    bend,
+    bend_line,
 )
 
 CURVATURES = st.floats(-0.2, 0.2, allow_nan=False)
@@ -119,7 +119,7 @@ def test_pieces_follow_one_another() -> None:
 @given(st.floats(-0.05, 0.05), st.floats(-8.0, 8.0))
 def test_offset_is_measured_at_right_angles(curvature: float, t: float) -> None:
     """Points beside the line are |t| away from it, on the side of t's sign."""
-    line = bend(30.0, curvature)
+    line = bend_line(30.0, curvature)
     s = np.array([12.0])
     x, y, heading = line.poses(s)[0]
     px, py = line.points(s, np.array([t]))[0]

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from generator.assets.roads import FAMILIES, TEXTURES
-from generator.assets.roads.markings import stripes
-from generator.core.geometry import MeshData
-from generator.roads.junction import JunctionShape, fan_of
-from generator.roads.profile import RoadShape
+from gen_data.generator.assets.roads import FAMILIES, TEXTURES
+from gen_data.generator.assets.roads.markings import stripes
+from gen_data.generator.core.asset_types import MeshData
+from gen_data.generator.roads.cross_section import RoadShape
+from gen_data.generator.roads.junction_shape import JunctionShape, make_fan
 
 SLOTS = ("asphalt", "asphalt_new", "marking", "kerb", "pavement", "verge", "ground")
 
@@ -98,7 +98,7 @@ def test_long_road_stays_within_its_budget() -> None:
 def test_junction_mouths_meet_the_roads() -> None:
     """The fan's outline has the crowned profile of a road at every arm's end."""
     shape = JunctionShape()
-    fan = fan_of(shape)
+    fan = make_fan(shape)
     reach = shape.reach_m()
     at = np.array([[reach, 0.0], [0.0, reach], [reach, 1.75], [-reach, -3.5 + 1e-9]])
 

@@ -16,18 +16,24 @@ from pathlib import Path
 
 import numpy as np
 
-from generator.core.boxes import BoxPx
-from generator.core.capture import Capture, Channel, Reading
-from generator.core.errors import Rejection, SampleError, SceneRejected
-from generator.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo, media_path
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import ImageTruth, MaskPx, ObjectTruth, Sample
-from generator.core.scene import Camera, Instance, Light, Scene
-from generator.core.se3 import IDENTITY
-from generator.core.serial import canonical_json
-from generator.core.streams import Streams
-from generator.runner.plan import Plan
-from generator.runner.run import Settings, Summary, run
+from gen_data.generator.core.boxes import BoxPx
+from gen_data.generator.core.capture import Capture, Channel, SensorReading
+from gen_data.generator.core.errors import Rejection, SampleError, SceneRejected
+from gen_data.generator.core.interfaces import (
+    DatasetInfo,
+    Exporter,
+    Modality,
+    SensorInfo,
+    media_path,
+)
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import ImageTruth, MaskPx, ObjectTruth, Sample
+from gen_data.generator.core.scene import Camera, Instance, Light, Scene
+from gen_data.generator.core.se3 import IDENTITY
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.runner.plan import Plan
+from gen_data.generator.runner.run import Settings, Summary, run
 
 WIDTH_PX, HEIGHT_PX = 8, 6
 CATEGORIES = ("bowl", "mug")
@@ -176,7 +182,7 @@ def fake_sample(index: int) -> Sample:
         view_index=index % 2,
         split="val" if index // 2 % 4 == 3 else "train",
         scene=Scene("fake", instances=(instance,), lights=(light,), cameras=(camera,)),
-        capture=Capture({"color": Reading("color", camera, {Channel.RGB: rgb})}),
+        capture=Capture({"color": SensorReading("color", camera, {Channel.RGB: rgb})}),
         truth={"color": ImageTruth(camera, (truth,))},
         attempts=1 + index // 2 % 3,
         timings_s={"render": 0.25, "physics": 0.5},

@@ -11,7 +11,7 @@ import os
 import sys
 from pathlib import Path
 
-from generator.core.errors import GenDataError
+from gen_data.generator.core.errors import GenDataError
 from tests.runner.doubles import Trouble, make
 
 N, SHARD_SIZE = 24, 2

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from generator.core.errors import StorageError
-from generator.runner.plan import compare, load_plan, plan_bytes, write_plan
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.runner.plan import compare_plans, load_plan, plan_bytes, write_plan
 from tests.runner.doubles import fake_plan
 
 
@@ -50,7 +50,7 @@ def test_equal_plans_are_equal_bytes_whatever_the_order_of_keys() -> None:
     second = replace(fake_plan(), config={"b": [2.5, None], "a": 1})
 
     assert plan_bytes(first) == plan_bytes(second)
-    assert compare(first, second) == []
+    assert compare_plans(first, second) == []
 
 
 def test_differences_name_the_field_as_in_yaml_and_both_values() -> None:
@@ -62,7 +62,7 @@ def test_differences_name_the_field_as_in_yaml_and_both_values() -> None:
         assets={},
     )
 
-    assert compare(old, new) == [
+    assert compare_plans(old, new) == [
         "added: was (absent), now true",
         "camera.fov_deg: was 50, now 60",
         "objects[0].count: was 3, now 4",

@@ -13,17 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from generator.core.errors import SampleError, SceneRejected, WorkerLost
-from generator.runner.run import Limits, Settings
-from generator.runner.worker import sendable
-from tests.runner.doubles import (
-    RESUME,
-    Trouble,
-    make,
-    notes_of,
-    tree_digest,
-    write_raw_images,
-)
+from gen_data.generator.core.errors import SampleError, SceneRejected, WorkerLost
+from gen_data.generator.runner.run import Limits, Settings
+from gen_data.generator.runner.worker import make_sendable
+from tests.runner.doubles import RESUME, Trouble, make, notes_of, tree_digest, write_raw_images
 
 ROOT = Path(__file__).parents[2]
 HANG_S = 120.0
@@ -267,13 +260,13 @@ class Stubborn(SceneRejected):
 )
 def test_a_damaged_kernel_cache_is_named_with_its_remedy(text: str) -> None:
     """Warp says what it missed; a user needs to know what to delete."""
-    assert "delete its folder, ~/.cache/warp" in str(sendable(RuntimeError(text)))
-    assert "~/.cache/warp" not in str(sendable(RuntimeError("something else")))
+    assert "delete its folder, ~/.cache/warp" in str(make_sendable(RuntimeError(text)))
+    assert "~/.cache/warp" not in str(make_sendable(RuntimeError("something else")))
 
 
 def test_an_error_that_cannot_travel_arrives_as_its_nearest_relative() -> None:
     """Kind and text survive; only the class of the plug-in is lost."""
-    arrived = sendable(Stubborn())
+    arrived = make_sendable(Stubborn())
 
     assert type(arrived) is SampleError
     assert str(arrived).startswith("scene 3: no valid layout")

@@ -14,18 +14,18 @@ from pathlib import Path
 
 import pytest
 
-from generator.core.capture import Capture
-from generator.core.errors import ConfigError, DeterminismError, StorageError
-from generator.core.intrinsics import Intrinsics
-from generator.core.sample import Sample
-from generator.core.scene import Body, Camera, Scene
-from generator.core.se3 import SE3
-from generator.runner import files
-from generator.runner.plan import load_plan
-from generator.runner.provenance import kept_scenes, scene_line
-from generator.runner.run import Settings, run
-from generator.runner.shard import Job, make_shard
-from generator.runner.store import FolderState, LocalStore
+from gen_data.generator.core.capture import Capture
+from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Body, Camera, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.runner import durable_files
+from gen_data.generator.runner.plan import load_plan
+from gen_data.generator.runner.provenance import read_scenes, scene_line
+from gen_data.generator.runner.run import Settings, run
+from gen_data.generator.runner.shard import Job, make_shard
+from gen_data.generator.runner.store import FolderState, LocalStore
 from tests.runner.doubles import (
     RESUME,
     FakeFactory,
@@ -148,8 +148,8 @@ def test_views_keep_what_differs_and_read_back_complete(tmp_path: Path) -> None:
     path.write_text(f"{scene_line(first, None)}\n{scene_line(second, first)}\n")
 
     assert set(json.loads(path.read_text().splitlines()[1])["scene"]) == {"cameras"}
-    assert [kept.scene for kept in kept_scenes(path)] == [first.scene, second.scene]
-    assert [(kept.index, kept.view_index) for kept in kept_scenes(path)] == [(4, 0), (5, 1)]
+    assert [kept.scene for kept in read_scenes(path)] == [first.scene, second.scene]
+    assert [(kept.index, kept.view_index) for kept in read_scenes(path)] == [(4, 0), (5, 1)]
 
 
 def test_exporters_see_no_pixels(tmp_path: Path) -> None:
@@ -486,7 +486,7 @@ def test_the_power_cut_harness_catches_a_missing_fsync(
     mutant: object,
 ) -> None:
     """With one kind of fsync planted out, a cut after the end damages a finished data set."""
-    monkeypatch.setattr(f"generator.runner.{place}", mutant)
+    monkeypatch.setattr(f"gen_data.generator.runner.{place}", mutant)
 
     survived = [
         survives_power_cut(tmp_path, monkeypatch, reference_digest, 0, seed) for seed in range(12)
@@ -527,7 +527,7 @@ def test_a_run_that_will_not_fit_stops_after_its_first_shard(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """6 of 10 samples to go at about 1.2 kB each: 2 kB free are not enough, the shard stays."""
-    monkeypatch.setattr("generator.runner.progress.free_bytes", lambda path: 2_000)
+    monkeypatch.setattr("gen_data.generator.runner.progress.free_bytes", lambda path: 2_000)
 
     with pytest.raises(StorageError, match="other 6 samples need about") as caught:
         make(tmp_path / "out")
@@ -554,7 +554,11 @@ def test_tree_sizes_reports_links_as_irregular(tmp_path: Path) -> None:
     (tmp_path / "b").symlink_to("a")
     (tmp_path / "c").symlink_to(tmp_path, target_is_directory=True)
 
-    assert files.tree_sizes(tmp_path) == {"a": 3, "b": files.IRREGULAR, "c": files.IRREGULAR}
+    assert durable_files.tree_sizes(tmp_path) == {
+        "a": 3,
+        "b": durable_files.IRREGULAR,
+        "c": durable_files.IRREGULAR,
+    }
 
 
 @pytest.mark.parametrize(

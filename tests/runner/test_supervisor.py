@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from generator.core.errors import (
+from gen_data.generator.core.errors import (
     AssetError,
     GenDataError,
     Interrupted,
@@ -16,7 +16,8 @@ from generator.core.errors import (
     StorageError,
     WorkerLost,
 )
-from generator.runner.events import (
+from gen_data.generator.runner.supervisor import Limits, Supervisor
+from gen_data.generator.runner.worker_events import (
     Abort,
     Action,
     Assign,
@@ -31,7 +32,6 @@ from generator.runner.events import (
     Spawn,
     Tick,
 )
-from generator.runner.supervisor import Limits, Supervisor
 
 SHARD_SIZE = 4
 

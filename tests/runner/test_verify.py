@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from generator.core.errors import VerificationError
-from generator.runner.verify import findings, verify
+from gen_data.generator.core.errors import VerificationError
+from gen_data.generator.runner.verify import find_deviations, verify
 from tests.runner.doubles import make
 
 
@@ -62,12 +62,12 @@ def test_every_flipped_bit_is_found_by_full_verification(dataset: Path) -> None:
         path = rng.choice(paths)
         bit = rng.randrange(path.stat().st_size * 8)
         flip_bit(path, bit)
-        named = [finding.path for finding in findings(dataset, full=True)]
+        named = [finding.path for finding in find_deviations(dataset, full=True)]
         name = path.relative_to(dataset).as_posix()
         assert named, f"bit {bit} of {name} went unnoticed"
         assert name in named or name in sealing, f"bit {bit} of {name}: only {named}"
         flip_bit(path, bit)
-    assert findings(dataset, full=True) == []
+    assert find_deviations(dataset, full=True) == []
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,10 @@ def test_swapped_files_are_found(dataset: Path) -> None:
     first.write_bytes(second.read_bytes())
     second.write_bytes(content)
 
-    assert [finding.samples for finding in findings(dataset, full=True)] == ["sample 0", "sample 1"]
+    assert [finding.samples for finding in find_deviations(dataset, full=True)] == [
+        "sample 0",
+        "sample 1",
+    ]
 
 
 def test_all_deviations_are_listed_together(dataset: Path) -> None:
@@ -136,4 +139,4 @@ def test_a_record_edited_together_with_its_file_is_found(dataset: Path) -> None:
     record = dataset / "shards/000000.json"
     record.write_text(record.read_text().replace('"rejections":1', '"rejections":0'))
 
-    assert [f.path for f in findings(dataset)] == ["shards/000000.json"]
+    assert [f.path for f in find_deviations(dataset)] == ["shards/000000.json"]

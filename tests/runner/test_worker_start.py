@@ -11,13 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.runner.doubles import RESUME, notes_of
-from tests.runner.test_processes import (
-    HANG_S,
-    ROOT,
-    processes_of_session,
-    start_fake_run,
-    wait_for,
-)
+from tests.runner.test_processes import HANG_S, ROOT, processes_of_session, start_fake_run, wait_for
 
 PIPE_BYTES = 65_536
 """Capacity of a pipe on Linux (``man 7 pipe``)."""
@@ -25,7 +19,7 @@ PIPE_BYTES = 65_536
 AT_BIRTH = """
 import os, signal, sys
 # The command that starts a worker names its module; helpers of the standard library do not.
-if any("generator.runner.worker" in a for a in sys.orig_argv):
+if any("gen_data.generator.runner.worker" in a for a in sys.orig_argv):
     try:
         os.close(os.open({marker!r}, os.O_CREAT | os.O_EXCL))
     except FileExistsError:
@@ -97,7 +91,7 @@ def test_a_signal_while_a_worker_starts_ends_the_run(
 
 def test_a_worker_that_cannot_be_imported_is_reported_in_the_run_folder(tmp_path: Path) -> None:
     """The terminal shows no traceback of a process that the user never started."""
-    environment = with_action_at_birth(tmp_path, "sys.modules['generator.runner'] = None")
+    environment = with_action_at_birth(tmp_path, "sys.modules['gen_data.generator.runner'] = None")
 
     process = start_fake_run(tmp_path / "out", 1, 0.0, environment=environment)
     message = finish(process)
@@ -124,7 +118,7 @@ def test_a_worker_that_cannot_be_killed_does_not_keep_the_run(tmp_path: Path) ->
     program = (
         "import subprocess, sys, types\n"
         "from tests.runner import fake_run\n"
-        "from generator.runner import processes\n"
+        "from gen_data.generator.runner import processes\n"
         "processes.JOIN_S = 0.2\n"
         "subprocess.Popen.kill = lambda self: None\n"
         "sys.exit(fake_run.main())\n"

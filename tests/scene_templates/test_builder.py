@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.core.errors import AssetError, ConfigError
-from generator.core.scene import Scene
-from scene_templates import TABLE
-from scene_templates.builder import build
-from scene_templates.element import Element
+from gen_data.generator.core.errors import AssetError, ConfigError
+from gen_data.generator.core.scene import Scene
+from gen_data.scene_templates import TABLE
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.element import Element
 from tests.randomizers.doubles import FakeAssets, corners_of, deepest_overlap_m
 
 TABLE_M = (1.2, 0.8)
@@ -28,7 +28,7 @@ def element(**plain: Any) -> Element:
 
 def built(*lines: dict[str, Any]) -> Scene:
     """The nominal scene of some elements."""
-    return build("test", [element(**line) for line in lines], FakeAssets())
+    return build_scene("test", [element(**line) for line in lines], FakeAssets())
 
 
 ROOM = {"type": "room", "name": "room", "size_m": (5, 4, 2.8)}

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from generator.assemble.spec import load_config
-from generator.assets.library import Library, open_library
-from generator.core.errors import ConfigError
-from generator.core.scene import Scene
-from scene_templates.builder import build
-from scene_templates.ego import Ego
-from scene_templates.road import Road
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Scene
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.ego import Ego
+from gen_data.scene_templates.road import Road
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def library() -> Library:
 
 def street(library: Library, ego: Ego) -> Scene:
     """A road with an ego vehicle on it."""
-    return build("test", [Road(name="main", length_m=80.0), ego], library)
+    return build_scene("test", [Road(name="main", length_m=80.0), ego], library)
 
 
 def test_rig_is_on_the_ground_below_the_rear_axle(library: Library) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.core.errors import AssetError
-from generator.core.scene import Scene
-from scene_templates.robot import Robot
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Scene
+from gen_data.scene_templates.robot import Robot
 from tests.randomizers.doubles import FakeAssets, two_link_arm
 
 

@@ -8,15 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from generator.assets.library import Library, open_library
-from generator.core.errors import ConfigError
-from generator.core.scene import Body, Scene
-from scene_templates.along import Along
-from scene_templates.builder import build
-from scene_templates.junction import Junction
-from scene_templates.objects import AssetChoice
-from scene_templates.road import Road
-from scene_templates.signals import Signals
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.scene_templates.along import Along
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.junction import Junction
+from gen_data.scene_templates.objects import AssetChoice
+from gen_data.scene_templates.road import Road
+from gen_data.scene_templates.signals import Signals
 
 
 @cache
@@ -36,7 +36,7 @@ def crossing() -> list[object]:
 
 def built(*elements: object) -> Scene:
     """The scene of a crossing and more elements."""
-    return build("test", [*crossing(), *elements], library())  # type: ignore[list-item]
+    return build_scene("test", [*crossing(), *elements], library())  # type: ignore[list-item]
 
 
 def yaw_of(body: Body) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from generator.core.geometry import MeshData
+from gen_data.generator.core.asset_types import MeshData
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.assets.procedural.family import Solid
-from generator.assets.scenery.buildings import building, building_facts
-from generator.assets.scenery.designs import STYLES, design
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.scenery.building_designs import STYLES, draw_design
+from gen_data.generator.assets.scenery.buildings import building, building_facts
 from tests.scenery.rays import cast
 
 SEEDS = (0, 1, 2, 5, 9)
@@ -29,10 +29,10 @@ def window_faces(solid: Solid) -> np.ndarray:
 def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int, Solid]) -> None:
     """Rays along -X through the front panes meet glass 0.1-0.35 m behind the wall's plane."""
     style, seed, solid = built
-    front_x = 0.5 * design(style, seed).depth_m
+    front_x = 0.5 * draw_design(style, seed).depth_m
     corners = solid.mesh.vertices_m[solid.mesh.faces].astype(np.float64)
     pane = window_faces(solid) & (corners[..., 0].min(axis=1) > front_x - 0.5)
-    pane &= corners[..., 2].max(axis=1) < design(style, seed).eaves_m
+    pane &= corners[..., 2].max(axis=1) < draw_design(style, seed).eaves_m
     # Oriels have walls of their own, before the front.
     pane &= corners[..., 0].max(axis=1) < front_x
     centres = corners[pane].mean(axis=1)
@@ -52,7 +52,7 @@ def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int,
 def test_windows_have_the_size_and_sills_of_real_ones(built: tuple[str, int, Solid]) -> None:
     """German building practice: 1.0-2.9 m wide, 1.2-2.4 m high, storeys of 2.7-4.7 m."""
     style, seed, _ = built
-    plan = design(style, seed)
+    plan = draw_design(style, seed)
 
     assert 1.0 <= plan.window_m[0] <= 2.95
     assert 1.2 <= plan.window_m[1] <= 2.4
@@ -66,7 +66,7 @@ def test_windows_have_the_size_and_sills_of_real_ones(built: tuple[str, int, Sol
 def test_who_looks_at_it_from_outside_never_sees_an_inside(built: tuple[str, int, Solid]) -> None:
     """Rays from all around meet the front of a face first; thin railings excepted."""
     style, seed, solid = built
-    plan = design(style, seed)
+    plan = draw_design(style, seed)
     turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
     height = np.linspace(0.4, plan.eaves_m + 1.0, 23)
     eye = np.array([(60 * np.cos(t), 60 * np.sin(t), 1.65) for t in turn for _ in height])
@@ -84,7 +84,7 @@ def test_who_looks_at_it_from_outside_never_sees_an_inside(built: tuple[str, int
 def test_walls_are_closed_below_and_roofs_above(built: tuple[str, int, Solid]) -> None:
     """A ray up from below the ground meets the floor, a ray down from the sky the roof."""
     style, seed, solid = built
-    plan = design(style, seed)
+    plan = draw_design(style, seed)
     spread = np.linspace(-0.45, 0.45, 7)
     points = np.array([(a * plan.depth_m, b * plan.width_m) for a in spread for b in spread])
     n = len(points)
@@ -114,7 +114,7 @@ def test_the_front_faces_plus_x(built: tuple[str, int, Solid]) -> None:
 @pytest.mark.parametrize("style", STYLES)
 def test_a_style_has_varied_buildings(style: str) -> None:
     """Sixteen seeds differ in width, floors and colour of the facade."""
-    plans = [design(style, seed) for seed in range(16)]
+    plans = [draw_design(style, seed) for seed in range(16)]
     colors = {building(seed, style).mesh.materials[0].base_color for seed in range(8)}
 
     assert len({plan.width_m for plan in plans}) >= 8
@@ -127,4 +127,4 @@ def test_facts_name_style_and_floors() -> None:
     facts = building_facts(3, "old_town")
 
     assert facts.subcategory == "old_town"
-    assert facts.attributes == {"floors": str(design("old_town", 3).floors)}
+    assert facts.attributes == {"floors": str(draw_design("old_town", 3).floors)}

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.assets.procedural.draw import rng_of
-from generator.assets.scenery.branching import Lobe, grown, points_in
-from generator.assets.scenery.trees import SPECIES, tree
-from generator.core.geometry import MeshData
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
+from gen_data.generator.assets.scenery.branching import Lobe, grow_skeleton, points_in
+from gen_data.generator.assets.scenery.trees import SPECIES, tree
+from gen_data.generator.core.asset_types import MeshData
 from tests.scenery.rays import cast
 
 LEAFY = [name for name in SPECIES if name != "conifer"]
@@ -63,11 +63,11 @@ def test_leaf_normals_point_away_from_the_crowns_middle(species: str) -> None:
 
 def test_branches_obey_the_pipe_model() -> None:
     """At every fork, the children's r^2.3 add up to the parent's (Shinozaki 1964)."""
-    rng = rng_of("test", 0)
+    rng = variant_rng("test", 0)
     points = points_in((Lobe((0.0, 0.0, 4.0), (1.5, 1.5, 1.5)),), 200, rng)
     trunk = np.array([(0.0, 0.0, 0.5 * k) for k in range(6)])
 
-    skeleton = grown(trunk, points, 0.25, 0.15)
+    skeleton = grow_skeleton(trunk, points, 0.25, 0.15)
 
     area = skeleton.radii_m**2.3
     inner = np.unique(skeleton.parents[1:])
@@ -82,7 +82,7 @@ def test_attraction_points_lie_in_their_lobes() -> None:
     """Inside the ellipsoid and not in its core."""
     lobe = Lobe((1.0, 2.0, 3.0), (2.0, 1.0, 0.5))
 
-    points = points_in((lobe,), 100, rng_of("test", 1))
+    points = points_in((lobe,), 100, variant_rng("test", 1))
 
     scaled = (points - lobe.centre_m) / lobe.axes_m
     r2 = (scaled**2).sum(axis=1)

@@ -7,10 +7,10 @@ import hashlib
 import numpy as np
 import pytest
 
-from generator.assets.generated import TABLES, _tables
-from generator.assets.procedural.family import Solid
-from generator.assets.scenery import FAMILIES, TEXTURES
-from generator.core.errors import AssetError
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural_library import TABLES, _tables
+from gen_data.generator.assets.scenery import FAMILIES, TEXTURES
+from gen_data.generator.core.errors import AssetError
 
 # Height range [m] of real ones, and the largest number of triangles that a street affords.
 LIMITS = {

@@ -8,18 +8,18 @@ from collections.abc import Callable
 import pytest
 from scipy.stats import chisquare
 
-from generator.assets.library import Library, open_library
-from generator.assets.scenery.traffic_lights import (
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.assets.scenery.traffic_lights import (
     PEDESTRIAN_LENSES,
     VEHICLE_LENSES,
     pedestrian_signal,
     traffic_light,
 )
-from generator.core.errors import ConfigError
-from generator.core.scene import Body, Instance, Scene
-from generator.core.se3 import SE3
-from generator.core.streams import Rng, Streams
-from randomizers.traffic_lights import COLORS, TrafficLights
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.randomizers.traffic_lights import COLORS, TrafficLights
 
 Draw = Callable[..., Scene]
 WEIGHTS = {"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04}

@@ -8,14 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from generator.core.capture import Beams, Channel, Echoes, Reading, Table
-from generator.core.geometry import SURFACES
-from generator.core.instants import at, with_placed_sensors, with_twists
-from generator.core.motion import Track
-from generator.core.scene import Body, Camera, Instance, Lane, Lidar, Rig, Scene
-from generator.core.se3 import SE3, Vec3
-from generator.core.streams import Rng, Streams
-from generator.sensors.mounting import Instrument
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.capture import (
+    Channel,
+    LidarHits,
+    LidarRays,
+    Measurements,
+    SensorReading,
+)
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.scene import Body, Camera, Instance, Lane, Lidar, Rig, Scene
+from gen_data.generator.core.scene_time import add_twists, place_sensors, scene_at
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.sensors.mounting import Instrument
 
 CAR_M = ((-2.2, -0.9, 0.0), (2.2, 0.9, 1.5))
 PERSON_M = ((-0.25, -0.3, 0.0), (0.25, 0.3, 1.8))
@@ -46,10 +52,10 @@ def circle(radius_m: float, speed_m_s: float) -> Way:
     return pose
 
 
-def track_of(body: str, pose: Way, seconds: float = 4.0) -> Track:
+def track_of(body: str, pose: Way, seconds: float = 4.0) -> Trajectory:
     """Knots of a way from time 0."""
     count = round(seconds / KNOT_S)
-    return Track(body, KNOT_S, tuple(pose(k * KNOT_S) for k in range(count + 1)))
+    return Trajectory(body, KNOT_S, tuple(pose(k * KNOT_S) for k in range(count + 1)))
 
 
 def thing(
@@ -74,7 +80,7 @@ def thing(
 def world(
     ego: Way | None = None,
     others: Sequence[tuple[Body, Instance]] = (),
-    tracks: Sequence[Track] = (),
+    tracks: Sequence[Trajectory] = (),
     lanes: Sequence[Lane] = (),
     step_s: float = 0.1,
     seconds: float = 4.0,
@@ -82,7 +88,7 @@ def world(
     """An ego car with a rig at its origin, at 10 m/s along X, and what is around it."""
     ego = ego or straight((0.0, 0.0), (10.0, 0.0))
     things = [thing(1, "ego", "car", ego(0.0)), *others]
-    return with_twists(
+    return add_twists(
         Scene(
             "test",
             bodies=tuple(body for body, _ in things),
@@ -99,10 +105,10 @@ def rng(step: int = 0, seed: int = 0, name: str = "sensor/device") -> Rng:
     return Streams(seed, scene=0, view=0, step=step).rng(name)
 
 
-def reading(sensor: Instrument, scene: Scene, step: int = 0, seed: int = 0) -> Table:
+def reading(sensor: Instrument, scene: Scene, step: int = 0, seed: int = 0) -> Measurements:
     """What a device reports at one step of a sequence."""
-    mounted = with_placed_sensors(sensor.mount(scene))
-    then = with_twists(at(mounted, step * scene.step_s))
+    mounted = place_sensors(sensor.mount(scene))
+    then = add_twists(scene_at(mounted, step * scene.step_s))
     return sensor.capture(then, BoxRays(), frozenset(), rng(step, seed))
 
 
@@ -114,7 +120,7 @@ def readings(sensor: Instrument, scene: Scene, steps: int, seed: int = 0) -> np.
 class BoxRays:
     """A renderer whose world are the boxes of instances; reflectance 0.5 everywhere."""
 
-    def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
+    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
         """First hits by the slab method."""
         shape = (len(beams.directions), beams.subrays)
         best = np.full(len(beams.directions), np.inf)
@@ -137,7 +143,7 @@ class BoxRays:
         def wide(values: np.ndarray, kind: type) -> np.ndarray:
             return np.broadcast_to(values[:, None], shape).astype(kind)
 
-        return Echoes(
+        return LidarHits(
             wide(best, np.float32),
             wide(np.where(found, 0.5, 0.0), np.float32),
             wide(found, np.float32),
@@ -146,7 +152,7 @@ class BoxRays:
             np.full(shape, SURFACES.index(""), np.uint8),
         )
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """Pictures are made by other doubles."""
         raise AssertionError("this device does not look at pictures")
 

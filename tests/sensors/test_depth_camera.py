@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.core.capture import Channel, Reading
-from generator.core.errors import ConfigError, SampleError
-from generator.core.geometry import Material
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.scene import Body, Camera, Environment, Light, Scene
-from generator.core.se3 import SE3
-from generator.core.streams import Streams
-from generator.renderers.warp import WarpRenderer
-from generator.sensors.depth.model import DepthModel
-from generator.sensors.depth.structured_light import axial_noise_m, lateral_noise_px
-from generator.sensors.depth.time_of_flight import unwrapped
-from generator.sensors.depth_camera import DepthCamera
-from generator.sensors.presets import preset_names
-from generator.sensors.rgb_camera import RgbCamera
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import ConfigError, SampleError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.generator.sensors.depth.depth_camera import DepthCamera
+from gen_data.generator.sensors.depth.depth_model import DepthModel
+from gen_data.generator.sensors.depth.structured_light import axial_noise_m, lateral_noise_px
+from gen_data.generator.sensors.depth.time_of_flight import unwrap_phases
+from gen_data.generator.sensors.device_presets import preset_names
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 
 SIZE_PX = (200, 150)
@@ -76,7 +76,7 @@ def model(kind: str, range_m: tuple[float, float] = (0.0, 50.0), **principle: An
     return DepthModel.model_validate_json(json.dumps(plain))
 
 
-def read(device: DepthModel, *bodies: Body, seed: int = 0) -> Reading:
+def read(device: DepthModel, *bodies: Body, seed: int = 0) -> SensorReading:
     sensor = DepthCamera(model=device)
     rng = Streams(seed, scene=0).rng("sensor/depth_camera")
     return sensor.capture(scene(*bodies), RENDERER, frozenset(), rng)
@@ -105,7 +105,7 @@ def test_an_ideal_device_reports_the_truth_within_its_range() -> None:
     assert seen_share(far_m) == 0.0
 
 
-@pytest.mark.parametrize("name", preset_names("generator.sensors.depth"))
+@pytest.mark.parametrize("name", preset_names("gen_data.generator.sensors.depth"))
 def test_every_device_sees_a_grey_wall_at_a_metre_and_a_half(name: str) -> None:
     """Nearly everywhere, and to within a few centimetres."""
     sensor = DepthCamera(model=name, size_px=SIZE_PX)
@@ -276,9 +276,9 @@ def test_phases_that_belong_to_no_distance_disagree() -> None:
     mhz = (16, 80, 120)
     range_m = np.array([[0.3, 3.1, 17.0]])
     phases = np.stack([4e6 * math.pi * f * range_m / LIGHT_M_S for f in mhz]) % (2 * math.pi)
-    found_m, disagreement = unwrapped(phases.astype(np.float32), mhz)
+    found_m, disagreement = unwrap_phases(phases.astype(np.float32), mhz)
     off = phases + np.array([0.0, 0.5 * math.pi, 0.0])[:, None, None]
-    _, worse = unwrapped((off % (2 * math.pi)).astype(np.float32), mhz)
+    _, worse = unwrap_phases((off % (2 * math.pi)).astype(np.float32), mhz)
 
     assert np.allclose(found_m, range_m, atol=1e-4)
     assert disagreement.max() < 1e-3
@@ -379,7 +379,9 @@ def test_edges_are_fat_and_their_left_sides_have_holes() -> None:
 # -- pairs of colour cameras ---------------------------------------------------------------------
 
 
-def stereo(right_m: tuple[float, float, float] = (0.1, 0.0, 0.0), of: str = "right") -> Reading:
+def stereo(
+    right_m: tuple[float, float, float] = (0.1, 0.0, 0.0), of: str = "right"
+) -> SensorReading:
     lens = Intrinsics.from_hfov(*SIZE_PX, math.radians(HFOV_DEG))
     cameras = (Camera("left", SE3(), lens), Camera("right", SE3(right_m), lens))
     world = Scene("t", bodies=(board("board", 0.8), board("wall", 2.0)), cameras=cameras)

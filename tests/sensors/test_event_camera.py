@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.core.capture import Channel, Reading, Table
-from generator.core.errors import ConfigError
-from generator.core.instants import at, with_placed_sensors
-from generator.core.interfaces import Renderer
-from generator.core.intrinsics import Intrinsics
-from generator.core.scene import Camera, Scene, Weather
-from generator.core.se3 import SE3
-from generator.sensors.event_camera import EventCamera
-from generator.sensors.event_pixels import (
+from gen_data.generator.core.capture import Channel, Measurements, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import Renderer
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Camera, Scene, Weather
+from gen_data.generator.core.scene_time import place_sensors, scene_at
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.sensors.event_camera.event_camera import EventCamera
+from gen_data.generator.sensors.event_camera.event_pixels import (
     DARK_CD_M2,
     Events,
-    after_rest,
-    logarithm_of,
+    apply_refractory_period,
+    log_response,
     noise_events,
-    order_of,
+    stable_order,
 )
 from tests.sensors.streetcar import BoxRays, rng, straight, world
 
@@ -39,7 +39,7 @@ class Film(BoxRays):
         self.luminance = luminance
         self.frames = 0
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """A grey image; instance 5 from 0.15 s on."""
         self.frames += 1
         shape = (camera.intrinsics.height_px, camera.intrinsics.width_px)
@@ -47,15 +47,15 @@ class Film(BoxRays):
             Channel.RADIANCE: np.full((*shape, 3), self.luminance(scene.time_s), np.float32),
             Channel.INSTANCE: np.full(shape, 5 if scene.time_s > 0.15 else 0, np.uint16),
         }
-        return Reading(camera.name, camera, images, time_s=scene.time_s)
+        return SensorReading(camera.name, camera, images, time_s=scene.time_s)
 
 
 def seen(
     sensor: EventCamera, film: Renderer, step: int, scene: Scene | None = None, seed: int = 0
-) -> Table:
+) -> Measurements:
     """One reading of a camera on the rig."""
-    mounted = with_placed_sensors(sensor.mount(scene or world()))
-    return sensor.capture(at(mounted, 0.1 * step), film, frozenset(), rng(step, seed))
+    mounted = place_sensors(sensor.mount(scene or world()))
+    return sensor.capture(scene_at(mounted, 0.1 * step), film, frozenset(), rng(step, seed))
 
 
 def test_brightness_that_grows_evenly_makes_events_at_an_even_rate() -> None:
@@ -78,10 +78,10 @@ def test_no_event_is_lost_or_told_twice_between_steps() -> None:
     def counts(step_s: float) -> np.ndarray:
         sensor = EventCamera(rig="ego", frames_per_step=round(step_s / 0.05), **QUIET)
         scene = replace(world(), step_s=step_s)
-        mounted = with_placed_sensors(sensor.mount(scene))
+        mounted = place_sensors(sensor.mount(scene))
         total = np.zeros(SIZE_PX[::-1], int)
         for k in range(1, round(1.0 / step_s) + 1):
-            then = at(mounted, round(k * step_s, 9))
+            then = scene_at(mounted, round(k * step_s, 9))
             rows = sensor.capture(then, film, frozenset(), rng(k)).rows
             assert (rows["polarity"] == -1).all()
             np.add.at(total, (rows["y_px"], rows["x_px"]), 1)
@@ -160,10 +160,10 @@ def test_pixels_rest_after_an_event() -> None:
     """At 0, 3 and 11 ms with 5 ms of rest: the second is lost; the other pixel's are not."""
     times_s = np.array([0.0, 0.001, 0.003, 0.011, 0.012])
     events = Events(times_s, np.array([7, 2, 7, 7, 2]), np.ones(5, int))
-    kept = after_rest(events, 0.005)
+    kept = apply_refractory_period(events, 0.005)
 
     assert kept.time_s.tolist() == [0.0, 0.001, 0.011, 0.012]
-    assert after_rest(events, 0.0).time_s.tolist() == times_s.tolist()
+    assert apply_refractory_period(events, 0.0).time_s.tolist() == times_s.tolist()
 
 
 def test_first_instant_has_no_events_and_needs_no_picture() -> None:
@@ -197,14 +197,14 @@ def test_orders_are_stable_for_any_whole_numbers() -> None:
     """As numpy's own stable sort, also of numbers of more than 16 bits and below 0."""
     draws = rng().integers(-(2**40), 2**40, 500)
     for numbers in (draws, draws >> 38, draws % 70_000, draws[:0], np.zeros(3, int)):
-        assert np.array_equal(order_of(numbers), np.argsort(numbers, kind="stable"))
+        assert np.array_equal(stable_order(numbers), np.argsort(numbers, kind="stable"))
 
 
 def test_darkness_hides_contrast() -> None:
     """Far above the dark current only the ratio counts; as bright as it, half of the change."""
     ratio = math.e
     for luminance, expected in ((1e4, 1.0), (1.0, 0.997), (DARK_CD_M2, math.log((1 + ratio) / 2))):
-        change = np.diff(logarithm_of(np.array([luminance, ratio * luminance])))[0]
+        change = np.diff(log_response(np.array([luminance, ratio * luminance])))[0]
         assert change == pytest.approx(expected, abs=1e-3)
 
 
@@ -213,7 +213,7 @@ def test_it_may_share_the_place_of_a_camera() -> None:
     pose = SE3((1.0, 2.0, 3.0), (0.5, -0.5, 0.5, -0.5))
     camera = Camera("color", pose, Intrinsics.from_hfov(64, 48, 1.0))
     scene = replace(world(), cameras=(camera,))
-    placed = with_placed_sensors(EventCamera().mount(scene))
+    placed = place_sensors(EventCamera().mount(scene))
 
     place = placed.device("events").T_world_device.translation_m
     assert np.allclose(place, (1.0, 2.0, 3.0))

@@ -8,13 +8,18 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.core.errors import ConfigError
-from generator.core.geodesy import Origin, earth_centred, from_earth_centred, geodetic
-from generator.core.scene import Scene
-from generator.core.se3 import SE3
-from generator.sensors.gnss import Gnss
-from generator.sensors.imu import Imu
-from generator.sensors.odometer import Odometer
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.geodesy import (
+    GeodeticOrigin,
+    ecef_to_geodetic,
+    geodetic_to_ecef,
+    to_geodetic,
+)
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.sensors.navigation.gnss import Gnss
+from gen_data.generator.sensors.navigation.imu import Imu
+from gen_data.generator.sensors.navigation.odometer import Odometer
 from tests.sensors.streetcar import WALL_M, circle, reading, readings, straight, thing, world
 
 GRAVITY = 9.80665
@@ -166,15 +171,17 @@ def test_geodetic_coordinates_of_known_places() -> None:
         ]
     )
 
-    assert np.allclose(earth_centred(places), centred, atol=1e-4)
-    back = from_earth_centred(centred)
+    assert np.allclose(geodetic_to_ecef(places), centred, atol=1e-4)
+    back = ecef_to_geodetic(centred)
     assert np.allclose(back[:, [0, 2]], places[:, [0, 2]], atol=1e-6)
     assert np.allclose(back[[0, 1, 3], 1], places[[0, 1, 3], 1], atol=1e-9)
 
 
 def test_a_kilometre_north_and_east_is_the_published_share_of_a_degree() -> None:
     """At 49 degrees, one of latitude is 111.2095 km, one of longitude 73.1727 km (WGS 84)."""
-    ends = geodetic(np.array([[1000.0, 0.0, 0.0], [0.0, 1000.0, 0.0]]), Origin(49.0, 8.0))
+    ends = to_geodetic(
+        np.array([[1000.0, 0.0, 0.0], [0.0, 1000.0, 0.0]]), GeodeticOrigin(49.0, 8.0)
+    )
 
     assert ends[1, 0] - 49.0 == pytest.approx(1000.0 / 111_209.5, rel=3e-5)
     assert ends[0, 1] - 8.0 == pytest.approx(1000.0 / 73_172.7, rel=3e-5)
@@ -187,8 +194,8 @@ def test_ideal_receiver_tells_where_the_antenna_is() -> None:
 
     place = np.array([[row["latitude_deg"], row["longitude_deg"], row["altitude_m"]]])
     turned = (
-        Origin(49.0, 8.0).axes().T
-        @ (earth_centred(place) - earth_centred(np.array([[49.0, 8.0, 100.0]])))[0]
+        GeodeticOrigin(49.0, 8.0).axes().T
+        @ (geodetic_to_ecef(place) - geodetic_to_ecef(np.array([[49.0, 8.0, 100.0]])))[0]
     )
     assert np.allclose(turned, [5.5, 0.0, 1.6], atol=1e-4)
     assert row["velocity_east_m_s"] == pytest.approx(10.0, abs=1e-4)
@@ -198,15 +205,15 @@ def test_ideal_receiver_tells_where_the_antenna_is() -> None:
 def test_receiver_errs_as_its_data_sheet_says() -> None:
     """2.5 m CEP: half of the fixes of many sequences are within 2.5 m."""
     still = world(straight((0.0, 0.0), (0.0, 0.0)))
-    origin = Origin(49.0114, 8.4244, 115.0)
+    origin = GeodeticOrigin(49.0114, 8.4244, 115.0)
     errors = []
     for seed in range(300):
         row = reading(Gnss(), still, 0, seed).rows[0]
         place = np.array([[row["latitude_deg"], row["longitude_deg"], row["altitude_m"]]])
-        centre = earth_centred(
+        centre = geodetic_to_ecef(
             np.array([[origin.latitude_deg, origin.longitude_deg, origin.altitude_m]])
         )
-        errors.append((origin.axes().T @ (earth_centred(place) - centre)[0])[:2])
+        errors.append((origin.axes().T @ (geodetic_to_ecef(place) - centre)[0])[:2])
     circular = np.hypot(*np.array(errors).T)
 
     assert np.median(circular) == pytest.approx(2.5, rel=0.12)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.core.capture import Channel, Reading
-from generator.core.lens import COEFFICIENTS
-from generator.core.scene import Camera, Region, Scene
-from generator.core.streams import Streams
-from generator.sensors.camera.lens_models import CALIBRATIONS
-from generator.sensors.rgb_camera import RgbCamera
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.lens import COEFFICIENTS
+from gen_data.generator.core.scene import Camera, Region, Scene
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.sensors.camera.lens_models import CALIBRATIONS
+from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 
 
 def camera(**given: Any) -> Camera:
@@ -140,7 +140,7 @@ class Rendering:
     def __init__(self) -> None:
         self.asked: frozenset[Channel] = frozenset()
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """Whatever there is."""
         del scene
         self.asked = channels
@@ -150,7 +150,7 @@ class Rendering:
             Channel.RANGE: np.full(shape, 2.0, np.float32),
             Channel.Z_DEPTH: np.full(shape, 2.0, np.float32),
         }
-        return Reading(camera.name, camera, images, ev100=8.0)
+        return SensorReading(camera.name, camera, images, ev100=8.0)
 
 
 @pytest.mark.parametrize(

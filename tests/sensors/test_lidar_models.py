@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.core.errors import ConfigError
-from generator.sensors.lidars import lidar_model, model_names
-from generator.sensors.scanning import LidarModel, sweep_of
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.sensors.lidar.presets import lidar_model, model_names
+from gen_data.generator.sensors.lidar.scan_pattern import LidarModel, make_sweep
 
 
 def angles_deg(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Elevation, azimuth and ring of every pulse of a sweep."""
-    sweep = sweep_of(lidar_model(name), 0.0)
+    sweep = make_sweep(lidar_model(name), 0.0)
     x, y, z = sweep.directions.astype(np.float64).T
     return np.degrees(np.arcsin(z)), np.degrees(np.arctan2(y, x)), sweep.ring
 
@@ -55,7 +55,7 @@ def test_rings_and_pulses_are_those_of_the_data_sheet(
 def test_every_direction_is_a_unit_vector_and_time_rises_within_a_sweep(name: str) -> None:
     """From 0 to one rotation."""
     model = lidar_model(name)
-    sweep = sweep_of(model, 1.25)
+    sweep = make_sweep(model, 1.25)
 
     assert np.abs(np.linalg.norm(sweep.directions, axis=1) - 1.0).max() < 1e-6
     assert (np.diff(sweep.time_s) >= 0).all()
@@ -85,7 +85,7 @@ def test_lasers_of_an_os1_are_staggered() -> None:
 def test_a_rosette_fills_its_round_view_and_never_repeats() -> None:
     """Within 19.2 degrees of its axis; the next sweep shares hardly any direction."""
     model = lidar_model("livox")
-    one, next_ = sweep_of(model, 10.0), sweep_of(model, 10.1)
+    one, next_ = make_sweep(model, 10.0), make_sweep(model, 10.1)
     away = np.degrees(np.arccos(np.clip(one.directions[:, 0].astype(float), -1, 1)))
 
     assert away.max() == pytest.approx(19.2, abs=0.05)
@@ -111,7 +111,7 @@ def test_a_scanner_either_turns_or_draws_a_rosette() -> None:
 @pytest.mark.parametrize("name", ["HDL-64E", "OS1-64", "VLP-16"])
 def test_pulses_in_the_order_of_a_sweep_are_neighbours(name: str) -> None:
     """Every pulse once, and the first hundred of each tile within a few degrees."""
-    sweep = sweep_of(lidar_model(name), 0.0)
+    sweep = make_sweep(lidar_model(name), 0.0)
     assert sweep.order is not None
     np.testing.assert_array_equal(np.sort(sweep.order), np.arange(len(sweep.ring)))
 
@@ -123,7 +123,7 @@ def test_pulses_in_the_order_of_a_sweep_are_neighbours(name: str) -> None:
 
 def test_a_sweep_that_is_shared_cannot_be_written_to() -> None:
     """It is made once for each model."""
-    sweep = sweep_of(lidar_model("VLP-16"), 0.0)
-    assert sweep_of(lidar_model("VLP-16"), 5.0) is sweep
+    sweep = make_sweep(lidar_model("VLP-16"), 0.0)
+    assert make_sweep(lidar_model("VLP-16"), 5.0) is sweep
     with pytest.raises(ValueError, match="read-only"):
         sweep.directions[0] = 0.0

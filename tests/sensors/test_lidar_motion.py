@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.core.capture import PointCloud
-from generator.core.instants import at
-from generator.core.intrinsics import Intrinsics
-from generator.core.motion import Track
-from generator.core.scene import Body, Camera, Lidar, Rig, Scene
-from generator.core.se3 import SE3
-from generator.core.streams import Streams
-from generator.renderers.warp import WarpRenderer
-from generator.sensors.lidar import LidarSensor
+from gen_data.generator.core.capture import PointCloud
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.scene import Body, Camera, Lidar, Rig, Scene
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
 from tests.renderers.fake_library import FakeLibrary, box_mesh, room_mesh
 
 MESHES = {"wall": box_mesh((0.2, 80.0, 30.0)), "box": box_mesh((4.0, 2.0, 1.6)),
@@ -24,23 +24,23 @@ STEP_S = 0.05
 PERIOD_S = 0.1
 
 
-def moving(body: str, start: tuple[float, float, float], turning: bool = True) -> Track:
+def moving(body: str, start: tuple[float, float, float], turning: bool = True) -> Trajectory:
     """Even motion, and an even turn to the left, from 1 s before to 1 s after time 0."""
     knots = []
     for k in range(-20, 21):
         place = np.asarray(start) + SPEED_M_S * (k * STEP_S)
         yaw = YAW_RATE_RAD_S * k * STEP_S if turning else 0.0
         knots.append(SE3.about_z(yaw, tuple(map(float, place))))
-    return Track(body, STEP_S, tuple(knots), start_s=-20 * STEP_S)
+    return Trajectory(body, STEP_S, tuple(knots), start_s=-20 * STEP_S)
 
 
-def scene_of(bodies: list[Body], *tracks: Track) -> Scene:
+def scene_of(bodies: list[Body], *tracks: Trajectory) -> Scene:
     """Bodies about a scanner on a cart at the origin."""
     cart = Body("cart", "cart", SE3((0.0, 0.0, -3.0)))
     rig = Rig("rig", "cart", SE3((0.0, 0.0, 3.0)))
     lidar = Lidar("velodyne", "", SE3((0.5, 0.0, 0.0)), rig="rig", sweep_s=PERIOD_S)
     scene = Scene("test", (cart, *bodies), tracks=tracks, rigs=(rig,), lidars=(lidar,))
-    return at(scene, 0.2)
+    return scene_at(scene, 0.2)
 
 
 def sweep(scene: Scene, motion: str, **fields: object) -> PointCloud:
@@ -160,7 +160,7 @@ def test_where_nothing_moves_every_kind_of_sweep_is_the_same(motion: str) -> Non
     """Byte by byte; a track that rests moves nothing either."""
     hall = Body("hall", "hall", SE3((0.0, 0.0, -5.0)))
     still = scene_of([hall])
-    resting = Track("hall", 0.1, (hall.T_world_body,) * 4)
+    resting = Trajectory("hall", 0.1, (hall.T_world_body,) * 4)
 
     frozen = sweep(still, "none").points.tobytes()
 
@@ -176,7 +176,7 @@ def test_a_scanner_beside_a_camera_rides_with_the_camera_s_rig() -> None:
     beside = Scene("test", scene.bodies, cameras=(camera,), rigs=scene.rigs, tracks=scene.tracks,
                    lidars=(Lidar("velodyne", "color", sweep_s=PERIOD_S),))  # fmt: skip
 
-    one, other = sweep(scene, "raw"), sweep(at(beside, 0.2), "raw")
+    one, other = sweep(scene, "raw"), sweep(scene_at(beside, 0.2), "raw")
 
     assert len(one.points) == len(other.points)
     np.testing.assert_allclose(one.points["position_m"], other.points["position_m"], atol=2e-4)

@@ -8,17 +8,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from generator.core.capture import POINT, Beams, Detours, Echoes, PointCloud
-from generator.core.errors import ConfigError
-from generator.core.geometry import SURFACES
-from generator.core.scene import Camera, Lidar, Scene, Weather
-from generator.core.se3 import SE3
-from generator.core.streams import Rng, Streams
-from generator.sensors.air import fog_peak, optical_depth, rain_extinction_per_m
-from generator.sensors.lidar import LidarSensor
-from generator.sensors.lidars import lidar_model
-from generator.sensors.returns import detected, light_of, pulses_of, reported_intensity, selected
-from generator.sensors.rgb_camera import RgbCamera
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.capture import POINT, LidarHits, LidarRays, PointCloud, SecondaryHits
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Camera, Lidar, Scene, Weather
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.generator.sensors.lidar.lidar_atmosphere import (
+    fog_peak,
+    optical_depth,
+    rain_extinction_per_m,
+)
+from gen_data.generator.sensors.lidar.lidar_detection import (
+    is_detected,
+    make_pulses,
+    received_light,
+    report_intensity,
+    select_returns,
+)
+from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.generator.sensors.lidar.presets import lidar_model
 
 MODEL = lidar_model("VLP-16")
 
@@ -27,11 +37,11 @@ def rng(seed: int = 0) -> Rng:
     return Streams(seed=seed, scene=0).rng("sensor/lidar")
 
 
-def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> Echoes:
+def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> LidarHits:
     """Hits on instance 7 of category 2, where there is any."""
     ranges_m = np.asarray(ranges_m, np.float32)
     hit = np.isfinite(ranges_m)
-    return Echoes(
+    return LidarHits(
         ranges_m,
         np.where(hit, np.float32(reflectance), np.float32(0)),
         hit.astype(np.float32),
@@ -47,7 +57,7 @@ class Wall:
     def __init__(self, range_m: float, reflectance: float = 0.5) -> None:
         self.range_m, self.reflectance = range_m, reflectance
 
-    def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
+    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
         shape = (len(beams.directions), beams.subrays)
         return echoes(np.full(shape, self.range_m), self.reflectance)
 
@@ -69,7 +79,7 @@ def scan(sensor: LidarSensor, wall: Wall, weather: Weather | None = None, seed: 
 def test_light_falls_with_the_square_of_range() -> None:
     """Twice as far is a quarter; the unit is the model's own sensitivity."""
     r = np.array([10.0, 20.0, MODEL.seen.range_m], np.float32)
-    light = light_of(np.full(3, MODEL.seen.reflectance, np.float32), r, MODEL)
+    light = received_light(np.full(3, MODEL.seen.reflectance, np.float32), r, MODEL)
 
     assert light[0] / light[1] == pytest.approx(4.0, rel=1e-5)
     assert light[2] == pytest.approx(1.0, rel=1e-5)
@@ -202,31 +212,31 @@ def test_snow_sends_back_more_than_rain() -> None:
 def test_a_beam_that_meets_two_things_can_return_both() -> None:
     """Strongest and last; nearest first; rays that end close to each other are one return."""
     near_and_far = np.array([[10.0, 10.1, 10.2, 10.1, 30.0, 30.1, np.inf]])
-    pulses = pulses_of(echoes(near_and_far), MODEL)
+    pulses = make_pulses(echoes(near_and_far), MODEL)
     noticed = pulses.light > 0.0
 
-    rows, picks = selected(pulses, noticed, "dual")
+    rows, picks = select_returns(pulses, noticed, "dual")
     np.testing.assert_allclose(pulses.range_m[rows, picks], [10.0, 30.0])
     assert pulses.reflectance[rows, picks] == pytest.approx([0.5 * 4 / 7, 0.5 * 2 / 7])
-    rows, picks = selected(pulses, noticed, "strongest")
+    rows, picks = select_returns(pulses, noticed, "strongest")
     np.testing.assert_allclose(pulses.range_m[rows, picks], [10.0])
-    rows, picks = selected(pulses, noticed, "last")
+    rows, picks = select_returns(pulses, noticed, "last")
     np.testing.assert_allclose(pulses.range_m[rows, picks], [30.0])
 
 
 def test_the_detector_notices_by_light() -> None:
     """L^6 / (1 + L^6), within four standard deviations."""
     for light in (0.7, 1.0, 1.3):
-        pulses = pulses_of(echoes(np.full((20_000, 1), 10.0)), MODEL)
+        pulses = make_pulses(echoes(np.full((20_000, 1), 10.0)), MODEL)
         pulses = replace(pulses, light=np.full((20_000, 1), light, np.float32))
         expected = light**6 / (1.0 + light**6)
         spread = math.sqrt(expected * (1 - expected) / 20_000)
-        assert detected(pulses, rng()).mean() == pytest.approx(expected, abs=4 * spread)
+        assert is_detected(pulses, rng()).mean() == pytest.approx(expected, abs=4 * spread)
 
 
 def test_retro_reflectors_are_told_from_white() -> None:
     """White matte is 100 of 255 on a Velodyne, the brightest sign 255."""
-    told = reported_intensity(np.float32([0.0, 0.5, 1.0, 800.0, 1e5]), MODEL)
+    told = report_intensity(np.float32([0.0, 0.5, 1.0, 800.0, 1e5]), MODEL)
 
     np.testing.assert_allclose(told, [0.0, 0.196, 0.392, 1.0, 1.0], atol=1e-6)
 
@@ -257,7 +267,7 @@ def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None
     ray = np.sort(np.concatenate([np.arange(0, n, 2), np.arange(0, n, 5)]))
     m = len(ray)
     far_m = first.range_m[ray, 0] + np.where(draw.random(m) < 0.4, 0.3, 4.0) * draw.random(m)
-    detours = Detours(
+    detours = SecondaryHits(
         ray,
         far_m.astype(np.float32),
         (draw.random(m) ** 4).astype(np.float32),
@@ -267,8 +277,8 @@ def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None
     )
     seen = replace(first, detours=detours)
 
-    strongest = pulses_of(seen, MODEL, "strongest")
-    every = pulses_of(seen, MODEL, "dual")
+    strongest = make_pulses(seen, MODEL, "strongest")
+    every = make_pulses(seen, MODEL, "dual")
 
     best = every.light.argmax(axis=1)[:, None]
     assert 0.05 < (strongest.instance_id == 9).mean() < 0.5

@@ -9,16 +9,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from generator.core.capture import POINT, Channel, PointCloud
-from generator.core.errors import ConfigError
-from generator.core.instants import with_placed_sensors
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.scene import Body, Camera, Instance, Scene
-from generator.core.se3 import SE3, look_at
-from generator.core.streams import Streams
-from generator.renderers.warp import WarpRenderer
-from generator.sensors.pseudo_lidar import PseudoLidar, every_nth_pixel
+from gen_data.generator.core.capture import POINT, Channel, PointCloud
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.scene import Body, Camera, Instance, Scene
+from gen_data.generator.core.scene_time import place_sensors
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.sensors.lidar.pseudo_lidar import PseudoLidar, every_nth_pixel
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 BOX_M = (2.0, 1.0, 1.5)
@@ -49,7 +49,7 @@ def scene(lens: Intrinsics) -> Scene:
 def cloud_of(sensor: PseudoLidar, world: Scene) -> PointCloud:
     """What it returns."""
     rng = Streams(0, scene=0, view=0, step=0).rng("sensor")
-    mounted = with_placed_sensors(sensor.mount(world))
+    mounted = place_sensors(sensor.mount(world))
     return sensor.capture(mounted, renderer(), frozenset(), rng)
 
 

@@ -9,12 +9,17 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.core.geometry import SURFACES
-from generator.core.scene import Body, Instance, Scene, Weather
-from generator.core.se3 import SE3
-from generator.sensors.presets import preset, preset_names
-from generator.sensors.radar import MAKES, Radar, RadarModel
-from generator.sensors.reflectors import TARGETS, area_factor, cross_section_m2, silhouette_m2
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.scene import Body, Instance, Scene, Weather
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.sensors.device_presets import load_preset, preset_names
+from gen_data.generator.sensors.radar.cross_section import (
+    TARGETS,
+    area_factor,
+    cross_section_m2,
+    silhouette_m2,
+)
+from gen_data.generator.sensors.radar.radar_sensor import MAKES, Radar, RadarModel
 from tests.sensors.streetcar import (
     PERSON_M,
     WALL_M,
@@ -277,7 +282,7 @@ def test_a_reading_made_again_has_the_same_bytes() -> None:
 @pytest.mark.parametrize("name", preset_names(MAKES))
 def test_every_make_is_complete(name: str) -> None:
     """Its looks cover what they say, and reach where they report."""
-    make = preset(MAKES, name, RadarModel)
+    make = load_preset(MAKES, name, RadarModel)
     for look in make.looks:
         assert 0.0 < look.range_m[0] < look.range_m[1] <= max(r for _, r in look.reach_m)
         assert look.spacing_deg[0] < min(size for _, size in look.resolution.azimuth_deg)

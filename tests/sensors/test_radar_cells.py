@@ -7,11 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from generator.sensors.presets import preset
-from generator.sensors.radar import MAKES, RadarModel
-from generator.sensors.radar_cells import Cells, Echo, cells_of, merged_by, peaks
+from gen_data.generator.sensors.device_presets import load_preset
+from gen_data.generator.sensors.radar.radar_detection import (
+    Cells,
+    Echo,
+    find_peaks,
+    make_cells,
+    merge_echoes,
+)
+from gen_data.generator.sensors.radar.radar_sensor import MAKES, RadarModel
 
-NEAR = preset(MAKES, "ARS408-21", RadarModel).looks[0]
+NEAR = load_preset(MAKES, "ARS408-21", RadarModel).looks[0]
 
 
 def rays(
@@ -39,7 +45,7 @@ def keyed(keys: list[tuple[int, int, int, int]]) -> Cells:
 
 def test_rays_of_one_cell_are_one_echo_in_their_middle() -> None:
     """Cross sections add, places are weighted by them, and the stronger gives its label."""
-    cells = cells_of(rays([20.0, 20.2], [1.0, 2.0], [1.0, 3.0], [7, 9]), NEAR)
+    cells = make_cells(rays([20.0, 20.2], [1.0, 2.0], [1.0, 3.0], [7, 9]), NEAR)
 
     assert len(cells.echo.range_m) == 1
     assert cells.echo.range_m[0] == pytest.approx(20.15)
@@ -52,7 +58,7 @@ def test_cells_grow_towards_the_sides_and_never_fold_back() -> None:
     """3.2 degrees ahead, 12.3 at the side: rays in order of azimuth are cells in that order."""
     azimuth_deg = np.linspace(-59.9, 59.9, 400)
     count = len(azimuth_deg)
-    cells = cells_of(rays([20.0] * count, azimuth_deg.tolist(), [1.0] * count, [1] * count), NEAR)
+    cells = make_cells(rays([20.0] * count, azimuth_deg.tolist(), [1.0] * count, [1] * count), NEAR)
     middles = np.degrees(cells.echo.azimuth_rad)
     order = np.argsort(cells.keys[:, 1])
     widths = np.diff(middles[order])
@@ -67,8 +73,8 @@ def test_neighbours_flow_to_the_same_peak() -> None:
     """A slope of four cells has one peak, a valley between two slopes parts them."""
     slope = keyed([(k, 0, 0, 0) for k in range(5)])
 
-    assert peaks(slope, np.array([1.0, 2.0, 3.0, 4.0, 5.0])).tolist() == [0] * 5
-    assert peaks(slope, np.array([5.0, 2.0, 1.0, 3.0, 4.0])).tolist() == [0, 0, 1, 1, 1]
+    assert find_peaks(slope, np.array([1.0, 2.0, 3.0, 4.0, 5.0])).tolist() == [0] * 5
+    assert find_peaks(slope, np.array([5.0, 2.0, 1.0, 3.0, 4.0])).tolist() == [0, 0, 1, 1, 1]
 
 
 def test_cells_apart_are_peaks_of_their_own() -> None:
@@ -77,14 +83,14 @@ def test_cells_apart_are_peaks_of_their_own() -> None:
         near, far = [0, 0, 0, 0], [0, 0, 0, 0]
         near[axis], far[axis] = -1, 1
         apart = keyed([tuple(near), tuple(far)])  # type: ignore[list-item]
-        assert len(set(peaks(apart, np.array([1.0, 2.0])).tolist())) == 2
+        assert len(set(find_peaks(apart, np.array([1.0, 2.0])).tolist())) == 2
     touching = keyed([(-1, -1, 0, -1), (0, 0, 0, 0)])
-    assert len(set(peaks(touching, np.array([1.0, 2.0])).tolist())) == 1
+    assert len(set(find_peaks(touching, np.array([1.0, 2.0])).tolist())) == 1
 
 
 def test_nothing_has_no_peaks() -> None:
     """An empty world."""
     empty = rays([], [], [], [])
 
-    assert len(peaks(cells_of(empty, NEAR), np.zeros(0))) == 0
-    assert len(merged_by(empty, np.zeros(0, np.int64), np.zeros(0)).range_m) == 0
+    assert len(find_peaks(make_cells(empty, NEAR), np.zeros(0))) == 0
+    assert len(merge_echoes(empty, np.zeros(0, np.int64), np.zeros(0)).range_m) == 0

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.core.capture import Channel, Reading
-from generator.core.scene import Camera, Region, Scene
-from generator.core.streams import Rng, Streams
-from generator.sensors import TABLE
-from generator.sensors.rgb_camera import RgbCamera
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.scene import Camera, Region, Scene
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.sensors import TABLE
+from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 
 FOCUS = Region((0.5, -0.2, 0.75), (1.2, 0.8, 0.4))
 
@@ -24,11 +24,11 @@ class Asked:
         self.camera: Camera | None = None
         self.channels: frozenset[Channel] = frozenset()
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         del scene
         self.camera, self.channels = camera, channels
         shape = (camera.intrinsics.height_px, camera.intrinsics.width_px, 3)
-        return Reading(camera.name, camera, {Channel.RADIANCE: np.ones(shape, np.float32)})
+        return SensorReading(camera.name, camera, {Channel.RADIANCE: np.ones(shape, np.float32)})
 
 
 def rng() -> Rng:

@@ -10,24 +10,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from generator.assets.library import open_library
-from generator.core.capture import POINT, PointCloud, Reading
-from generator.core.errors import ConfigError
-from generator.core.instants import at, with_placed_sensors
-from generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
-from generator.core.motion import Change, Track
-from generator.core.sample import FrameTruth, ImageTruth, Sample
-from generator.core.scene import Body, Lane, Rig, Scene
-from generator.core.se3 import SE3
-from generator.pipeline import Pipeline
-from generator.pipeline.freeze import Timeline
-from generator.pipeline.pipeline import PipelineConfig
-from generator.sensors.lidar import LidarSensor
-from generator.sensors.mounting import stride
-from generator.sensors.rgb_camera import RgbCamera
-from randomizers.camera_on_lane import CameraOnLane
-from randomizers.camera_pose import CameraPose
-from scene_templates.robot import Robot
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.core.capture import POINT, PointCloud, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
+from gen_data.generator.core.motion import StateChange, Trajectory
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
+from gen_data.generator.core.scene import Body, Lane, Rig, Scene
+from gen_data.generator.core.scene_time import place_sensors, scene_at
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.pipeline import Pipeline
+from gen_data.generator.pipeline.finalize_scene import Timeline
+from gen_data.generator.pipeline.pipeline import PipelineConfig
+from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.generator.sensors.mounting import stride
+from gen_data.randomizers.camera_on_lane import CameraOnLane
+from gen_data.randomizers.camera_pose import CameraPose
+from gen_data.scene_templates.robot import Robot
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 CAR = "car?seed=0"
@@ -41,11 +41,11 @@ def driven(*sensors: Any) -> Scene:
         "drive",
         bodies=(Body("ego", CAR, start, collides=False),),
         rigs=(Rig("ego", "ego", SE3((-1.0, 0.0, 0.0))),),
-        tracks=(Track("ego", 0.1, way, -0.5),),
+        tracks=(Trajectory("ego", 0.1, way, -0.5),),
     )
     for sensor in sensors:
         scene = sensor.mount(scene)
-    return with_placed_sensors(scene)
+    return place_sensors(scene)
 
 
 def test_a_camera_is_where_its_rig_carries_it() -> None:
@@ -54,7 +54,7 @@ def test_a_camera_is_where_its_rig_carries_it() -> None:
     scene = driven(camera)
 
     for time_s, y in ((0.0, 4.0), (0.5, 6.0)):
-        pose = at(scene, time_s).camera("side").T_world_camera
+        pose = scene_at(scene, time_s).camera("side").T_world_camera
         assert pose.translation_m == pytest.approx((9.5, y + 2.0, 1.8), abs=1e-5)
         np.testing.assert_allclose(pose.rotation()[:, 2], [-1.0, 0.0, 0.0], atol=1e-6)
         np.testing.assert_allclose(pose.rotation()[:, 1], [0.0, 0.0, -1.0], atol=1e-6)
@@ -119,10 +119,10 @@ class Watching:
     def __init__(self, name: str, lidar: bool = False) -> None:
         self.name, self.lidar = name, lidar
 
-    def capture(self, scene: Scene, *_: Any) -> Reading | PointCloud:
+    def capture(self, scene: Scene, *_: Any) -> SensorReading | PointCloud:
         if self.lidar:
             return PointCloud(self.name, scene.lidar(self.name), np.zeros(0, POINT), scene.time_s)
-        return Reading(self.name, scene.camera(self.name), {}, time_s=scene.time_s)
+        return SensorReading(self.name, scene.camera(self.name), {}, time_s=scene.time_s)
 
 
 class AtRest:
@@ -148,13 +148,13 @@ def sampled(
     annotated: dict[str, float] = {}
     swept: dict[str, float] = {}
 
-    def image_truth(scene: Scene, reading: Reading) -> ImageTruth:
+    def image_truth(scene: Scene, reading: SensorReading) -> ImageTruth:
         annotated[reading.sensor] = scene.time_s
         return ImageTruth(reading.camera, ())
 
-    def frame_truth(scenes: Any) -> FrameTruth:
+    def frame_truth(scenes: Any) -> EgoTruth:
         swept.update({name: scene.time_s for name, scene in scenes.items()})
-        return FrameTruth()
+        return EgoTruth()
 
     scene = driven(
         RgbCamera(name="early", rig="ego"),
@@ -209,7 +209,7 @@ def test_sensors_read_at_their_own_offsets_and_labels_are_of_then() -> None:
 
 def test_a_sensor_that_reads_early_sees_what_has_not_changed_yet() -> None:
     """A lamp lights at 0.18 s; at step 2 (0.2 s) a camera reads 0.05 s earlier, another at once."""
-    lamp, lit = Body("lamp", "unlit"), Change(0.18, "lamp", asset="lit")
+    lamp, lit = Body("lamp", "unlit"), StateChange(0.18, "lamp", asset="lit")
     view = replace(driven(), bodies=(*driven().bodies, lamp), changes=(lit,), instances=())
     timeline = Timeline(view, open_library(()), {})
     assets = [timeline.at(time_s).body("lamp").asset for time_s in (0.2, 0.2 - 0.05, 0.2)]
@@ -264,11 +264,11 @@ def test_a_wrist_camera_follows_the_arm() -> None:
     library = open_library(())
     scene = Robot(name="arm").add(Scene("t"), library)
     scene = RgbCamera(name="eye", rig="arm_wrist", offset_m=(0.0, 0.0, 0.07)).mount(scene)
-    before = with_placed_sensors(scene).camera("eye").T_world_camera
+    before = place_sensors(scene).camera("eye").T_world_camera
     hand = scene.body("arm/panda_hand")
     lifted = replace(hand, T_world_body=SE3((0.0, 0.0, 0.1)) @ hand.T_world_body)
 
-    after = with_placed_sensors(scene.with_bodies(lifted)).camera("eye").T_world_camera
+    after = place_sensors(scene.with_bodies(lifted)).camera("eye").T_world_camera
 
     assert np.subtract(after.translation_m, before.translation_m) == pytest.approx(
         (0.0, 0.0, 0.1), abs=1e-6

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from generator.core.scene import Lane, LaneKind
-from generator.core.streams import Rng, Streams
-from generator.traffic.fleet import Fleet, Vehicle, fleet_of
-from generator.traffic.routes import LaneGraph, drawn_route
-from generator.traffic.signals import Approach
-from generator.traffic.simulation import Motion, simulated
-from generator.traffic.walking import Walker
+from gen_data.generator.core.scene import Lane, LaneKind
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.traffic.lane_routes import LaneGraph, draw_route
+from gen_data.generator.traffic.pedestrians import Pedestrian
+from gen_data.generator.traffic.signal_cycles import Approach
+from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
+from gen_data.generator.traffic.vehicles import Vehicle, Vehicles, make_vehicles
 
 NO_BOXES = np.zeros((0, 6))
 REACH_M = 400.0
@@ -55,7 +55,7 @@ def car(graph: LaneGraph, name: str, on: str, at_m: float, **changes: float) -> 
     """A car of 4.5 m in the middle of a lane; its rear axle is at ``at_m``."""
     x, y, _ = graph.lines[on].pose(at_m).translation_m
     cosine, sine = graph.lines[on].pose(at_m).rotation()[:2, 0].tolist()
-    route = drawn_route(graph, [on], at_m + REACH_M, rng_of(name))
+    route = draw_route(graph, [on], at_m + REACH_M, rng_of(name))
     return Vehicle(
         name, (x, y), (cosine, sine), front_m=3.6, rear_m=0.9, width_m=1.9, wheelbase_m=2.7,
         route=route, station_m=at_m, **changes,
@@ -64,11 +64,11 @@ def car(graph: LaneGraph, name: str, on: str, at_m: float, **changes: float) -> 
 
 def fleet(
     lanes: Sequence[Lane], *cars: tuple[str, float], obstacles: np.ndarray = NO_BOXES
-) -> Fleet:
+) -> Vehicles:
     """Cars on lanes at stations."""
     graph = LaneGraph.of(lanes, "driving")
     vehicles = [car(graph, f"car/{k}", on, at_m) for k, (on, at_m) in enumerate(cars)]
-    return fleet_of(vehicles, graph, LaneGraph.of(lanes, "crosswalk"), obstacles, REACH_M)
+    return make_vehicles(vehicles, graph, LaneGraph.of(lanes, "crosswalk"), obstacles, REACH_M)
 
 
 def driven(
@@ -76,14 +76,14 @@ def driven(
     *cars: tuple[str, float],
     duration_s: float = 15.0,
     approaches: Mapping[str, Approach] | None = None,
-    walkers: Sequence[Walker] = (),
+    walkers: Sequence[Pedestrian] = (),
     obstacles: np.ndarray = NO_BOXES,
-) -> tuple[Fleet, Motion]:
+) -> tuple[Vehicles, SimulatedMotion]:
     """What cars and people do."""
     made = fleet(lanes, *cars, obstacles=obstacles)
-    return made, simulated(made, walkers, obstacles, approaches or {}, duration_s)
+    return made, simulate(made, walkers, obstacles, approaches or {}, duration_s)
 
 
-def fronts_m(made: Fleet, motion: Motion) -> np.ndarray:
+def fronts_m(made: Vehicles, motion: SimulatedMotion) -> np.ndarray:
     """Stations of the cars' fronts at every step."""
     return motion.station_m + made.front_m

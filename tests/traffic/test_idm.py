@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from generator.traffic.fleet import fleet_of
-from generator.traffic.idm import (
+from gen_data.generator.traffic.idm import (
     Drivers,
     equilibrium_speed,
     free_acceleration,
     interaction,
 )
-from generator.traffic.routes import LaneGraph
-from generator.traffic.simulation import simulated
+from gen_data.generator.traffic.lane_routes import LaneGraph
+from gen_data.generator.traffic.simulation import simulate
+from gen_data.generator.traffic.vehicles import make_vehicles
 from tests.traffic.roads import NO_BOXES, car, driven, fronts_m, lane
 
 
@@ -66,8 +66,8 @@ def test_a_car_settles_in_the_equilibrium_gap_behind_a_slow_one() -> None:
         car(graph, "slow", "long", 50.0, speed_max_m_s=8.0),
         car(graph, "eager", "long", 5.0),
     )
-    made = fleet_of([slow, eager], graph, LaneGraph.of([], "crosswalk"), NO_BOXES, 700.0)
-    motion = simulated(made, [], NO_BOXES, {}, 60.0)
+    made = make_vehicles([slow, eager], graph, LaneGraph.of([], "crosswalk"), NO_BOXES, 700.0)
+    motion = simulate(made, [], NO_BOXES, {}, 60.0)
     gap = motion.station_m[-1, 0] - slow.rear_m - motion.station_m[-1, 1] - eager.front_m
     v = motion.speed_m_s[-1, 0]
 

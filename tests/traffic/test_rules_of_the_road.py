@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from generator.traffic.collisions import first_overlap
-from generator.traffic.fleet import Fleet
-from generator.traffic.paths import drawn_path, walks_of
-from generator.traffic.routes import LaneGraph
-from generator.traffic.signals import AMBER_S, Approach, Cycle
-from generator.traffic.simulation import Motion, simulated
-from generator.traffic.walking import Walker
+from gen_data.generator.traffic.lane_routes import LaneGraph
+from gen_data.generator.traffic.obb_overlap import first_overlap
+from gen_data.generator.traffic.pedestrian_paths import draw_path, make_walk_network
+from gen_data.generator.traffic.pedestrians import Pedestrian
+from gen_data.generator.traffic.signal_cycles import AMBER_S, Approach, Cycle
+from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
+from gen_data.generator.traffic.vehicles import Vehicles
 from tests.traffic.roads import NO_BOXES, crossing, driven, fronts_m, lane, rng_of
 
 LINE_M = 140.0
 """Station at which the lanes into the crossing end."""
 
 
-def boxes(made: Fleet, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+def boxes(made: Vehicles, motion: SimulatedMotion) -> tuple[np.ndarray, np.ndarray]:
     """Centres and directions over time, and half extents."""
     middle = 0.5 * (made.front_m - made.rear_m)
     centres = motion.axle_m[..., :2] + middle[:, None] * motion.ahead
@@ -120,13 +120,15 @@ def zebra() -> list:
     ]
 
 
-def pedestrian(start: str = "near", at_m: float = 96.0) -> Walker:
+def pedestrian(start: str = "near", at_m: float = 96.0) -> Pedestrian:
     """Somebody who comes to the crosswalk and takes it."""
     lanes = zebra()
-    walks = walks_of(LaneGraph.of(lanes, "sidewalk"), LaneGraph.of(lanes, "crosswalk"), NO_BOXES)
-    path = drawn_path(walks, start, at_m, True, 40.0, 1.0, rng_of())
+    walks = make_walk_network(
+        LaneGraph.of(lanes, "sidewalk"), LaneGraph.of(lanes, "crosswalk"), NO_BOXES
+    )
+    path = draw_path(walks, start, at_m, True, 40.0, 1.0, rng_of())
     x, y, _ = path.points_m[0]
-    return Walker("person", (float(x), float(y)), (1.0, 0.0), 1.4, path)
+    return Pedestrian("person", (float(x), float(y)), (1.0, 0.0), 1.4, path)
 
 
 @pytest.mark.parametrize("at_m", [20.0, 45.0, 60.0, 75.0, 85.0])
@@ -174,14 +176,16 @@ def test_people_walk_around_each_other_and_around_things() -> None:
     """Two who meet and a post between them: nobody is nearer than a body, both arrive."""
     lanes = [lane("walk", (0.0, 0.0), (60.0, 0.0), kind="sidewalk", width_m=3.0)]
     post = np.array([[15.0, 0.8, 0.2, 0.2, 1.0, 0.0]])
-    walks = walks_of(LaneGraph.of(lanes, "sidewalk"), LaneGraph.of(lanes, "crosswalk"), post)
-    there = drawn_path(walks, "walk", 5.0, True, 25.0, 0.0, rng_of())
-    back = drawn_path(walks, "walk", 25.0, False, 24.0, 0.0, rng_of())
+    walks = make_walk_network(
+        LaneGraph.of(lanes, "sidewalk"), LaneGraph.of(lanes, "crosswalk"), post
+    )
+    there = draw_path(walks, "walk", 5.0, True, 25.0, 0.0, rng_of())
+    back = draw_path(walks, "walk", 25.0, False, 24.0, 0.0, rng_of())
     people = [
-        Walker("a", (5.0, 0.0), (1.0, 0.0), 1.4, there),
-        Walker("b", (25.0, 0.0), (-1.0, 0.0), 1.2, back),
+        Pedestrian("a", (5.0, 0.0), (1.0, 0.0), 1.4, there),
+        Pedestrian("b", (25.0, 0.0), (-1.0, 0.0), 1.2, back),
     ]
-    motion = simulated(None, people, post, {}, 14.0)
+    motion = simulate(None, people, post, {}, 14.0)
     apart = np.hypot(*(motion.feet_m[:, 0, :2] - motion.feet_m[:, 1, :2]).T)
     beside = np.maximum(np.abs(motion.feet_m[..., :2] - post[0, :2]) - 0.2, 0.0)
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from generator.traffic.routes import STATION_M
-from generator.traffic.steering import driven, turned, unit
-from generator.traffic.tracks import upright_tracks
+from gen_data.generator.traffic.body_trajectories import make_upright_trajectories
+from gen_data.generator.traffic.lane_routes import STATION_M
+from gen_data.generator.traffic.steering import follow_lines, normalize, rotate_small
 
 
 def circle(radius_m: float, count: int) -> np.ndarray:
@@ -21,7 +21,7 @@ def circle(radius_m: float, count: int) -> np.ndarray:
 def test_a_vehicle_on_an_arc_stays_on_it() -> None:
     """The circle through the axle and the goal is the arc itself: to a centimetre over 30 m."""
     line = circle(12.0, 90)[None]
-    courses = driven(
+    courses = follow_lines(
         line, np.zeros((1, 2)), np.array([[1.0, 0.0]]), np.full((1, 61), 8), np.array([0.3])
     )
     radii = np.hypot(courses.xy_m[0, :, 0], courses.xy_m[0, :, 1] - 12.0)
@@ -33,7 +33,7 @@ def test_a_vehicle_on_an_arc_stays_on_it() -> None:
 def test_a_vehicle_beside_its_line_comes_back_to_it() -> None:
     """One metre off to the left, it ends on the line, pointing along it, without crossing far."""
     line = np.stack([STATION_M * np.arange(120.0), np.zeros(120)], axis=1)[None]
-    courses = driven(
+    courses = follow_lines(
         line, np.array([[0.0, 1.0]]), np.array([[1.0, 0.0]]), np.full((1, 100), 12), np.array([0.3])
     )
     y = courses.xy_m[0, :, 1]
@@ -52,7 +52,7 @@ def test_nobody_steers_sharper_than_they_can() -> None:
             np.stack([np.full(60, 20.0), STATION_M * np.arange(60.0)], axis=1),
         ]
     )[None]
-    courses = driven(
+    courses = follow_lines(
         corner, np.zeros((1, 2)), np.array([[1.0, 0.0]]), np.full((1, 80), 8), np.array([0.2])
     )
 
@@ -62,18 +62,18 @@ def test_nobody_steers_sharper_than_they_can() -> None:
 def test_axles_move_where_they_point() -> None:
     """No side slip: the way from station to station is along the mean of both directions."""
     line = circle(15.0, 80)[None]
-    courses = driven(
+    courses = follow_lines(
         line, np.array([[0.0, 0.5]]), np.array([[1.0, 0.0]]), np.full((1, 60), 8), np.array([0.3])
     )
-    way = unit(np.diff(courses.xy_m[0], axis=0))
-    mean = unit(courses.ahead[0, 1:] + courses.ahead[0, :-1])
+    way = normalize(np.diff(courses.xy_m[0], axis=0))
+    mean = normalize(courses.ahead[0, 1:] + courses.ahead[0, :-1])
 
     assert (np.sum(way * mean, axis=1) > 0.9999).all()
 
 
 def test_small_turns_keep_lengths() -> None:
     """The rational turn is a rotation: by 0.1 rad to a thousandth."""
-    vectors = turned(np.array([[3.0, 4.0]]), np.array([0.1]))
+    vectors = rotate_small(np.array([[3.0, 4.0]]), np.array([0.1]))
 
     assert np.hypot(*vectors[0]) == pytest.approx(5.0, abs=1e-12)
     assert math.atan2(vectors[0, 1], vectors[0, 0]) == pytest.approx(
@@ -87,7 +87,9 @@ def test_tracks_point_where_the_vehicle_does(yaw_deg: float) -> None:
     yaw = math.radians(yaw_deg)
     ahead = np.array([[[math.cos(yaw), math.sin(yaw)]]] * 2)
     ground = np.array([[[0.0, 0.0, 0.0]], [[5.0, 0.0, 0.0]]])
-    (track,) = upright_tracks(["car"], ground, ahead, np.full((2, 1), 0.1), [(1.0, 0.0, 0.0)])
+    (track,) = make_upright_trajectories(
+        ["car"], ground, ahead, np.full((2, 1), 0.1), [(1.0, 0.0, 0.0)]
+    )
 
     assert track is not None
     x_axis = track.knots[0].rotation()[:, 0]
@@ -101,4 +103,6 @@ def test_what_stands_has_no_track() -> None:
     """Still for all time."""
     ground, ahead = np.zeros((5, 1, 3)), np.tile([1.0, 0.0], (5, 1, 1))
 
-    assert upright_tracks(["car"], ground, ahead, np.zeros((5, 1)), [(0.0, 0.0, 0.0)]) == [None]
+    assert make_upright_trajectories(
+        ["car"], ground, ahead, np.zeros((5, 1)), [(0.0, 0.0, 0.0)]
+    ) == [None]

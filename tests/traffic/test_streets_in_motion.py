@@ -7,16 +7,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from generator.assemble.recipe import open_pipeline, pipeline_config, scene_source
-from generator.assemble.spec import Config, load_config
-from generator.assets.library import Library, open_library
-from generator.core.errors import ConfigError, LayoutRejected
-from generator.core.instants import at
-from generator.core.scene import Body, Scene
-from generator.core.serial import canonical_json
-from generator.core.streams import Streams
-from randomizers.footprints import Footprint, Ground
-from randomizers.traffic_flow import TrafficFlow
+from gen_data.generator.assemble.config import Config, load_config
+from gen_data.generator.assemble.pipeline_factory import (
+    open_pipeline,
+    pipeline_config,
+    scene_source,
+)
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import ConfigError, LayoutRejected
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.core.streams import Streams
+from gen_data.randomizers.footprints import Footprint, Ground
+from gen_data.randomizers.traffic_flow import TrafficFlow
 
 SMALL = ("sensors[0].size_px=[64, 32]", "sensors[0].channels=[rgb, depth, instance]")
 STEPS, STEP_S = 40, 0.1
@@ -92,12 +96,12 @@ def test_nothing_collides_in_random_streets(seed: int) -> None:
 
     assert len(scene.tracks) >= 2
     for k in range(STEPS):
-        assert not overlapping(at(scene, STEP_S * k)), f"at {STEP_S * k:.1f} s"
+        assert not overlapping(scene_at(scene, STEP_S * k)), f"at {STEP_S * k:.1f} s"
 
 
 def test_what_moves_stands_on_the_ground() -> None:
     """Vehicles' lowest points are at the height of the lane under them, within the crossfall."""
-    scene = at(scene_of(1), 2.0)
+    scene = scene_at(scene_of(1), 2.0)
     driving = [p for lane in scene.lanes if lane.kind == "driving" for p in lane.center_m]
     points = np.array(driving)
     cars = [b for b in scene.bodies if b.group == "traffic" or b.name == "ego"]
@@ -120,8 +124,12 @@ def test_time_goes_both_ways() -> None:
     """The scene at 1 s is the same from the beginning and from later on."""
     scene = scene_of(1)
 
-    assert canonical_json(at(at(scene, 3.0), 1.0)) == canonical_json(at(scene, 1.0))
-    assert canonical_json(at(at(scene, 3.0), 0.0)) == canonical_json(at(at(scene, 2.0), 0.0))
+    assert canonical_json(scene_at(scene_at(scene, 3.0), 1.0)) == canonical_json(
+        scene_at(scene, 1.0)
+    )
+    assert canonical_json(scene_at(scene_at(scene, 3.0), 0.0)) == canonical_json(
+        scene_at(scene_at(scene, 2.0), 0.0)
+    )
 
 
 def test_signals_change_and_say_so() -> None:
@@ -145,7 +153,7 @@ def test_who_slows_down_shows_brake_lights() -> None:
     for seed in (1, 2, 3):
         scene = scene_of(seed)
         for k in range(2, STEPS - 2, 3):
-            now = at(scene, STEP_S * k)
+            now = scene_at(scene, STEP_S * k)
             by_id = {i.instance_id: i for i in now.instances}
             for body in now.bodies:
                 facts = dict(by_id[body.instance_id].attributes) if body.instance_id else {}

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdLux, UsdSemantics, UsdShade, UsdUtils, UsdValidation
 
-from exporters.usd import Usd as UsdExporter
-from generator.assets.library import Library, open_library
-from generator.core.capture import Capture, Channel
-from generator.core.instants import at
-from generator.core.interfaces import DatasetInfo
-from generator.core.motion import Change
-from generator.core.sample import Sample
-from generator.core.scene import Scene
-from generator.renderers.warp import WarpRenderer
+from gen_data.exporters.usd import Usd as UsdExporter
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.capture import Capture, Channel
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.motion import StateChange
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from tests.usd.worlds import STEP_S, STEPS, exported, off_centre_camera, table_world
 
 
@@ -69,7 +69,7 @@ def test_the_stages_camera_reproduces_the_label_boxes(
 ) -> None:
     """Points seen through the stage's camera span the rendered silhouettes within half a pixel."""
     camera = off_centre_camera()
-    scene = at(table_world(library), step * STEP_S)
+    scene = scene_at(table_world(library), step * STEP_S)
     reading = WarpRenderer(library, "cpu").render(scene, camera, frozenset({Channel.AMODAL}))
     k = camera.intrinsics
 
@@ -132,7 +132,7 @@ def test_materials_of_a_body_replace_those_of_its_mesh(sequence: Any) -> None:
 def test_a_body_that_changes_its_look_shows_one_at_a_time(library: Library, tmp_path: Path) -> None:
     """A step of a walk: another mesh from an instant on."""
     scene = table_world(library)
-    scene = replace(scene, changes=(Change(STEP_S, "clutter/2", "ball?seed=5"),))
+    scene = replace(scene, changes=(StateChange(STEP_S, "clutter/2", "ball?seed=5"),))
     stage = Usd.Stage.Open(str(exported(scene, library, tmp_path, steps=STEPS)))
     looks = stage.GetPrimAtPath("/World/clutter_2/clutter_2").GetChildren()
     shown = [
@@ -148,7 +148,7 @@ def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_p
     here = exported(table_world(library), library, tmp_path / "a", format=kind)
     program = (
         "import sys; from pathlib import Path\n"
-        "from generator.assets.library import open_library\n"
+        "from gen_data.generator.assets.library import open_library\n"
         "from tests.usd.worlds import exported, table_world\n"
         "cache, packs = Path(sys.argv[1]) / 'cache', Path('/nonexistent')\n"
         "library = open_library(cache_dir=cache, packs=packs)\n"
@@ -177,7 +177,16 @@ def test_a_sequence_is_written_where_it_begins(library: Library, tmp_path: Path)
     scene = table_world(library)
     info = DatasetInfo("t", 7, 6, 1, (), (), steps_per_scene=3, step_s=STEP_S)
     samples = [
-        Sample(k, k // 3, 0, "train", at(scene, k % 3 * STEP_S), Capture({}), {}, step_index=k % 3)
+        Sample(
+            k,
+            k // 3,
+            0,
+            "train",
+            scene_at(scene, k % 3 * STEP_S),
+            Capture({}),
+            {},
+            step_index=k % 3,
+        )
         for k in range(6)
     ]
     exporter = UsdExporter().with_assets(library)

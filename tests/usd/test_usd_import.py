@@ -10,12 +10,12 @@ import pytest
 from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 
-from generator.assets.library import Library, open_library
-from generator.core.capture import Channel
-from generator.core.errors import AssetError
-from generator.core.scene import Scene
-from generator.renderers.warp import WarpRenderer
-from scene_templates.usd_stage import UsdStage
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.scene_templates.usd_stage import UsdStage
 from tests.usd.worlds import exported, table_world
 
 QUAD = [(0, 0, 0), (100, 0, 0), (100, 50, 0), (0, 50, 0)]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from exporters.usd import Usd
-from generator.assets.library import Library
-from generator.core.capture import Capture
-from generator.core.geometry import Material
-from generator.core.interfaces import DatasetInfo, Modality, SensorInfo
-from generator.core.intrinsics import Intrinsics
-from generator.core.motion import Track
-from generator.core.sample import Sample
-from generator.core.scene import Body, Camera, Environment, Instance, Light, Scene
-from generator.core.se3 import SE3, look_at
+from gen_data.exporters.usd import Usd
+from gen_data.generator.assets.library import Library
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.capture import Capture
+from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Light, Scene
+from gen_data.generator.core.se3 import SE3, look_at
 
 STEPS, STEP_S = 3, 0.1
 RED = Material(base_color=(0.7, 0.05, 0.05), roughness=0.3)
@@ -62,7 +62,7 @@ def table_world(library: Library) -> Scene:
         lights=lights,
         cameras=(off_centre_camera(),),
         environment=Environment(luminance_cd_m2=80.0, yaw_rad=0.4),
-        tracks=(Track("clutter/0", STEP_S, way),),
+        tracks=(Trajectory("clutter/0", STEP_S, way),),
     )
 
 

@@ -7,11 +7,17 @@ import re
 import numpy as np
 import pytest
 
-from generator.assets.vehicles import FAMILIES, TEXTURES
-from generator.assets.vehicles.plates import GLYPHS, SEEDS, plate_id, plate_text, with_seed
-from generator.core.geometry import Material
-from generator.core.scene import Body, ObjectGroup, Scene
-from randomizers.vehicle_paint import VehiclePaint
+from gen_data.generator.assets.vehicles import FAMILIES, TEXTURES
+from gen_data.generator.assets.vehicles.plates import (
+    GLYPHS,
+    SEEDS,
+    plate_id,
+    plate_text,
+    reseed_plate,
+)
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.scene import Body, ObjectGroup, Scene
+from gen_data.randomizers.vehicle_paint import VehiclePaint
 from tests.randomizers.doubles import FakeAssets, rng_of
 from tests.vehicles.test_vehicle_families import variant
 
@@ -99,5 +105,5 @@ def test_every_vehicle_gets_a_plate_of_its_own() -> None:
 
     assert len(set(plates())) >= 5
     assert len(set(plates(plates=False))) == 1
-    assert with_seed("texture/oak?seed=3", 9) == "texture/oak?seed=3"
-    assert with_seed(plate_id(4, rows=2), 77) == plate_id(77, rows=2)
+    assert reseed_plate("texture/oak?seed=3", 9) == "texture/oak?seed=3"
+    assert reseed_plate(plate_id(4, rows=2), 77) == plate_id(77, rows=2)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from generator.assets.procedural.family import Solid
-from generator.assets.vehicles import FAMILIES
-from generator.core.geometry import MeshData
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.vehicles import FAMILIES
+from gen_data.generator.core.asset_types import MeshData
 from tests.scenery.rays import cast
 
 Array = NDArray[np.float64]

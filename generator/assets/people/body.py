@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.errors import AssetError
+from gen_data.generator.core.errors import AssetError
 
 FORMAT = 1
 """Raised whenever an older ``body.npz`` can no longer be read."""
@@ -60,7 +60,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Body:
+class BodyTemplate:
     """A template body. All arrays are read-only.
 
     Attributes:
@@ -109,7 +109,7 @@ class Body:
         return self.bones.index(name)
 
 
-def load(path: Path) -> Body:
+def load(path: Path) -> BodyTemplate:
     """The body stored in a file by ``save``.
 
     Raises:
@@ -128,7 +128,7 @@ def load(path: Path) -> Body:
         raise AssetError(f"{path}: the people pack cannot be read ({error}); {remedy}") from error
 
 
-def save(body: Body, path: Path) -> None:
+def save(body: BodyTemplate, path: Path) -> None:
     """Store a body; the same body gives the same bytes."""
     sizes = [len(body.faces.get(zone, ())) for zone in ZONES]
     faces = [body.faces[zone] for zone in ZONES if zone in body.faces]
@@ -147,18 +147,18 @@ def save(body: Body, path: Path) -> None:
     np.savez_compressed(path, allow_pickle=False, **arrays)
 
 
-def four_strongest(weights: Array) -> tuple[Indices, Array]:
+def strongest_weights(weights: Array) -> tuple[Indices, Array]:
     """Bones and shares, shape [points, 4] each, from a full table [points, bones]."""
     order = np.argsort(-weights, axis=1, kind="stable")[:, :BONES_PER_POINT]
     shares = np.take_along_axis(weights, order, axis=1)
     return order, shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-9)
 
 
-def _body(arrays: Mapping[str, NDArray[Any]]) -> Body:
+def _body(arrays: Mapping[str, NDArray[Any]]) -> BodyTemplate:
     weights = arrays["weights"].astype(np.float64)
     ends = np.cumsum(arrays["zone_sizes"])[:-1]
     faces = dict(zip(ZONES, np.split(arrays["faces"].astype(np.int64), ends), strict=True))
-    body = Body(
+    body = BodyTemplate(
         bones=tuple(str(name) for name in arrays["bones"]),
         parents=arrays["parents"].astype(np.int64),
         points_m=arrays["points_m"].astype(np.float64),

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from generator.assets.people.body import Array, Body, Indices
-from generator.assets.people.person import Person
-from generator.assets.people.skinning import vertex_normals
-from generator.assets.people.wardrobe import Outfit
-from generator.core.geometry import Material
-from generator.core.se3 import Vec3
+from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
+from gen_data.generator.assets.people.person import Person
+from gen_data.generator.assets.people.skinning import vertex_normals
+from gen_data.generator.assets.people.wardrobe import Outfit
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import Vec3
 
 Profile = Sequence[tuple[float, float]]
 """(height in the template [m], distance from the body [m]), heights rising."""
@@ -58,8 +58,8 @@ def layers(person: Person) -> tuple[Layer, ...]:
     )
 
 
-def displaced(
-    body: Body, layer: Layer, points_m: Array, phases: Array
+def displace_layer(
+    body: BodyTemplate, layer: Layer, points_m: Array, phases: Array
 ) -> tuple[Indices, Array, Indices, Indices]:
     """One layer on a body that is not posed yet.
 

@@ -16,21 +16,27 @@ from typing import Any
 
 import numpy as np
 
-from generator.assets.people import zones
-from generator.assets.people.body import (
+from gen_data.generator.assets.people import body_regions
+from gen_data.generator.assets.people.body import (
     BONES_PER_POINT,
     DELTA_M,
     FILE,
     LANDMARKS,
     ZONES,
     Array,
-    Body,
+    BodyTemplate,
     Indices,
-    four_strongest,
     save,
+    strongest_weights,
 )
-from generator.assets.people.cutting import Rows, cut, grid_faces, rows_of, thinned
-from generator.core.errors import AssetError
+from gen_data.generator.assets.people.mesh_simplify import (
+    MeshRows,
+    grid_faces,
+    make_rows,
+    simplify_region,
+    split_region,
+)
+from gen_data.generator.core.errors import AssetError
 
 _RIG = "game_engine"
 _SEXES = ("female", "male")
@@ -75,7 +81,7 @@ def convert(source: Path, target: Path) -> None:
     save(body, target / FILE)
 
 
-def _body(base: _Base) -> Body:
+def _body(base: _Base) -> BodyTemplate:
     bones = tuple(base.bones)
     parts = [_thinned(rows) for rows in _parts(base)]
     heads = np.stack([base.values[bone["points"]].mean(axis=0) for bone in base.bones.values()])
@@ -90,12 +96,12 @@ def _body(base: _Base) -> Body:
     columns = 3 + 3 * len(base.targets)
     weights = values[:, columns:].copy()
     weights[: len(bones)] = np.eye(len(bones))
-    weight_bones, shares = four_strongest(weights)
+    weight_bones, shares = strongest_weights(weights)
     deltas = values[:, 3:columns].reshape(len(values), -1, 3).transpose(1, 0, 2)
     parents = [
         bones.index(bone["parent"]) if bone["parent"] else -1 for bone in base.bones.values()
     ]
-    return Body(
+    return BodyTemplate(
         bones=bones,
         parents=np.array(parents),
         points_m=values[:, :3],
@@ -107,29 +113,31 @@ def _body(base: _Base) -> Body:
     )
 
 
-def _parts(base: _Base) -> Iterator[Rows]:
+def _parts(base: _Base) -> Iterator[MeshRows]:
     """The pieces of the template, cut into zones; "" is dropped."""
-    yield _cut(base, ("body",), "face", zones.BODY)
-    yield _cut(base, ("helper-l-eye", "helper-r-eye"), "eyes", zones.EYES)
-    yield _cut(base, ("helper-tights",), "hips", zones.TIGHTS)
-    yield _spanned(base, _cut(base, ("helper-skirt",), "skirt_top", zones.SKIRT))
-    yield _divided(_curtain(base), zones.HAIR)
+    yield _cut(base, ("body",), "face", body_regions.BODY)
+    yield _cut(base, ("helper-l-eye", "helper-r-eye"), "eyes", body_regions.EYES)
+    yield _cut(base, ("helper-tights",), "hips", body_regions.TIGHTS)
+    yield _spanned(base, _cut(base, ("helper-skirt",), "skirt_top", body_regions.SKIRT))
+    yield _divided(_curtain(base), body_regions.HAIR)
 
 
-def _cut(base: _Base, groups: Sequence[str], zone: str, cuts: Sequence[zones.Cut]) -> Rows:
+def _cut(
+    base: _Base, groups: Sequence[str], zone: str, cuts: Sequence[body_regions.Cut]
+) -> MeshRows:
     faces = np.concatenate([base.groups[group] for group in groups])
-    return _divided(rows_of(base.values, faces, zone), cuts)
+    return _divided(make_rows(base.values, faces, zone), cuts)
 
 
-def _curtain(base: _Base) -> Rows:
+def _curtain(base: _Base) -> MeshRows:
     """Long hair as one sheet behind the ears.
 
     The base mesh's own hair is made of strips that hang over the face and part when they are
     moved; the sheet takes over the shapes and weights of its nearest vertices.
     """
-    turn = np.linspace(-1.0, 1.0, zones.CURTAIN_COLUMNS) * zones.CURTAIN_REACH_RAD
-    z, length, width = (column[:, None] for column in np.array(zones.CURTAIN_M).T)
-    x = zones.CURTAIN_X_M - length * np.cos(turn)
+    turn = np.linspace(-1.0, 1.0, body_regions.CURTAIN_COLUMNS) * body_regions.CURTAIN_REACH_RAD
+    z, length, width = (column[:, None] for column in np.array(body_regions.CURTAIN_M).T)
+    x = body_regions.CURTAIN_X_M - length * np.cos(turn)
     places = np.stack(np.broadcast_arrays(x, width * np.sin(turn), z), axis=2).reshape(-1, 3)
     strands = base.values[np.unique(base.groups["helper-hair"])]
     squared = ((places[:, None] - strands[None, :, :3]) ** 2).sum(axis=2)
@@ -137,10 +145,10 @@ def _curtain(base: _Base) -> Rows:
     nearest = np.argsort(squared, axis=1, kind="stable")[:, :_STRANDS]
     values = strands[nearest].mean(axis=1)
     values[:, :3] = places
-    return rows_of(values, grid_faces(len(z), zones.CURTAIN_COLUMNS), "hair")
+    return make_rows(values, grid_faces(len(z), body_regions.CURTAIN_COLUMNS), "hair")
 
 
-def _spanned(base: _Base, rows: Rows) -> Rows:
+def _spanned(base: _Base, rows: MeshRows) -> MeshRows:
     """A skirt whose middle follows both legs, so that it does not part between them."""
     first = 3 + 3 * len(base.targets)
     left, right = (first + list(base.bones).index(f"thigh_{side}") for side in "lr")
@@ -148,23 +156,23 @@ def _spanned(base: _Base, rows: Rows) -> Rows:
     both = values[:, left] + values[:, right]
     share = np.clip(0.5 + values[:, 1] / (2.0 * _SKIRT_SPAN_M), 0.0, 1.0)
     values[:, left], values[:, right] = share * both, (1.0 - share) * both
-    return Rows(values, rows.faces, rows.zones)
+    return MeshRows(values, rows.faces, rows.zones)
 
 
-def _divided(rows: Rows, cuts: Sequence[zones.Cut]) -> Rows:
+def _divided(rows: MeshRows, cuts: Sequence[body_regions.Cut]) -> MeshRows:
     for step in cuts:
-        rows = cut(rows, step.zone, step.into, step.level)
+        rows = split_region(rows, step.zone, step.into, step.level)
     return rows
 
 
-def _thinned(rows: Rows) -> Rows:
+def _thinned(rows: MeshRows) -> MeshRows:
     """Each zone with its number of triangles, and no row that nothing uses."""
-    for zone, faces in zones.MAX_FACES.items():
+    for zone, faces in body_regions.MAX_FACES.items():
         if (rows.zones == zone).sum() > faces:
-            rows = thinned(rows, zone, faces)
+            rows = simplify_region(rows, zone, faces)
     keep = np.isin(rows.zones, ZONES)
     used, local = np.unique(rows.faces[keep], return_inverse=True)
-    return Rows(rows.values[used], local.reshape(-1, 3), rows.zones[keep])
+    return MeshRows(rows.values[used], local.reshape(-1, 3), rows.zones[keep])
 
 
 def _landmarks(base: _Base) -> Array:
@@ -181,9 +189,12 @@ def _landmarks(base: _Base) -> Array:
         return mean
 
     x, y, z = positions.T
-    at_ear = np.hypot(x - zones.EAR_XZ_M[0], z - zones.EAR_XZ_M[1]) < zones.EAR_RADIUS_M
+    at_ear = (
+        np.hypot(x - body_regions.EAR_XZ_M[0], z - body_regions.EAR_XZ_M[1])
+        < body_regions.EAR_RADIUS_M
+    )
     made = {
-        "nose": extreme(np.where(z > zones.CHIN_Z_M, x, -1.0)),
+        "nose": extreme(np.where(z > body_regions.CHIN_Z_M, x, -1.0)),
         "left_eye": eye("helper-l-eye"),
         "right_eye": eye("helper-r-eye"),
         "left_ear": base.values[skin[at_ear & (y > 0.0)]].mean(axis=0),

@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
-from generator.assets.paths import packs_dir
-from generator.assets.people.body import FILE, Body, load
-from generator.assets.people.build import Figure, built, dressed
-from generator.assets.people.person import drawn_person
-from generator.assets.people.simple import simple_body
-from generator.assets.procedural.family import Solid
+from gen_data.generator.assets.paths import packs_dir
+from gen_data.generator.assets.people.analytic_body import simple_body
+from gen_data.generator.assets.people.body import FILE, BodyTemplate, load
+from gen_data.generator.assets.people.person import draw_person
+from gen_data.generator.assets.people.person_mesh import Figure, build_person, dress_person
+from gen_data.generator.assets.procedural.family import Solid
 
 _FIGURES = 64
 """Kept in memory: as many as one scene shows, half a megabyte each."""
@@ -23,20 +23,20 @@ def pack_file() -> Path:
 
 def person(seed: int, pose: str, phase: float) -> Solid:
     """A person from the pack. Raises AssetError if the pack cannot be read."""
-    return built(drawn_person(seed, pose, phase), _figure(seed, str(pack_file())))
+    return build_person(draw_person(seed, pose, phase), _figure(seed, str(pack_file())))
 
 
 def simple_person(seed: int, pose: str, phase: float) -> Solid:
     """A person from formulas."""
-    return built(drawn_person(seed, pose, phase), _figure(seed, ""))
+    return build_person(draw_person(seed, pose, phase), _figure(seed, ""))
 
 
 @lru_cache(maxsize=_FIGURES)
 def _figure(seed: int, path: str) -> Figure:
     """Whoever walks takes many poses in one figure."""
-    return dressed(drawn_person(seed), _body(path) if path else simple_body())
+    return dress_person(draw_person(seed), _body(path) if path else simple_body())
 
 
 @lru_cache(maxsize=2)
-def _body(path: str) -> Body:
+def _body(path: str) -> BodyTemplate:
     return load(Path(path))

@@ -7,14 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, cast
 
-from generator.assets.people.gait import BEHAVIOURS, PHASES, POSES, PoseName
-from generator.assets.people.wardrobe import Outfit, drawn_outfit
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Facts
-from generator.assets.procedural.materials import jittered, linear
-from generator.core.errors import did_you_mean
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
+from gen_data.generator.assets.people.animation import BEHAVIOURS, PHASES, POSES, PoseName
+from gen_data.generator.assets.people.wardrobe import Outfit, draw_outfit
+from gen_data.generator.assets.procedural.family import Facts
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.core.errors import did_you_mean
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
 
 Sex = Literal["female", "male"]
 AgeGroup = Literal["child", "adult", "senior"]
@@ -61,7 +66,7 @@ class Person:
     step: int
 
 
-def drawn_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
+def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     """The person of a seed.
 
     Args:
@@ -74,8 +79,8 @@ def drawn_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     """
     if pose and pose not in POSES:
         raise ValueError(f"pose '{pose}' is none of {', '.join(POSES)}{did_you_mean(pose, POSES)}")
-    rng = rng_of("person", seed)
-    sex: Sex = "female" if chance(0.5, rng) else "male"
+    rng = variant_rng("person", seed)
+    sex: Sex = "female" if is_drawn(0.5, rng) else "male"
     age_group = _drawn_age(rng)
     height_m = _drawn_height_m(sex, age_group, rng)
     tone = min(int(rng.random() * len(_SKIN)), len(_SKIN) - 1)
@@ -87,10 +92,10 @@ def drawn_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
         age_group=age_group,
         height_m=height_m,
         figure=figure,
-        skin=jittered(linear(_SKIN[tone]), 0.07, rng),
+        skin=jitter_color(hex_to_linear(_SKIN[tone]), 0.07, rng),
         hair=_drawn_hair(age_group, tone, rng),
-        haircut=pick(_HAIRCUTS[sex][: 3 if age_group == "child" else None], rng),
-        outfit=drawn_outfit(sex, age_group == "child", rng),
+        haircut=choose(_HAIRCUTS[sex][: 3 if age_group == "child" else None], rng),
+        outfit=draw_outfit(sex, age_group == "child", rng),
         pose=action,
         step=step,
     )
@@ -98,7 +103,7 @@ def drawn_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
 
 def facts(seed: int, pose: str, phase: float) -> Facts:
     """What labels say of the person of a seed."""
-    person = drawn_person(seed, pose, phase)
+    person = draw_person(seed, pose, phase)
     return Facts(
         "child" if person.age_group == "child" else "adult",
         {
@@ -121,7 +126,7 @@ def _drawn_age(rng: Rng) -> AgeGroup:
 def _drawn_height_m(sex: Sex, age_group: AgeGroup, rng: Rng) -> float:
     """A height [m], whole centimetres."""
     if age_group == "child":
-        return round(between(*_CHILD_M, rng), 2)
+        return round(uniform_between(*_CHILD_M, rng), 2)
     mean, deviation = _HEIGHT_M[sex]
     # Irwin and Hall: twelve uniforms add up to nearly a normal, exactly alike everywhere.
     normal = sum(float(rng.random()) for _ in range(12)) - 6.0
@@ -138,17 +143,21 @@ def _drawn_figure(
         grown = 0.75 * max(0.0, (height_m - 1.3) / (_CHILD_M[1] - 1.3))
         figure |= {"child": 1.0 - grown, "young": grown}
     else:
-        old = between(0.55, 1.0, rng) if age_group == "senior" else between(0.0, 0.35, rng)
+        old = (
+            uniform_between(0.55, 1.0, rng)
+            if age_group == "senior"
+            else uniform_between(0.0, 0.35, rng)
+        )
         figure |= {"old": old, "young": 1.0 - old}
-    figure |= _three("muscle", between(-0.5, 0.6 if sex == "male" else 0.2, rng))
-    figure |= _three("weight", between(-0.7, 0.8, rng) if age_group != "child" else -0.1)
+    figure |= _three("muscle", uniform_between(-0.5, 0.6 if sex == "male" else 0.2, rng))
+    figure |= _three("weight", uniform_between(-0.7, 0.8, rng) if age_group != "child" else -0.1)
     if age_group != "child":
         mean, _ = _HEIGHT_M[sex]
         tall = max(-0.6, min(0.6, (height_m - mean) / 0.3))
         figure |= {"maxheight": max(0.0, tall), "minheight": max(0.0, -tall)}
     main = ("caucasian", "asian", "african")[0 if tone < 2 else 1 if tone < 4 else 2]
-    other = pick(("caucasian", "asian", "african"), rng)
-    share = between(0.0, 0.4, rng)
+    other = choose(("caucasian", "asian", "african"), rng)
+    share = uniform_between(0.0, 0.4, rng)
     figure[main] = 1.0 - share
     figure[other] = figure.get(other, 0.0) + share
     return figure
@@ -164,16 +173,18 @@ def _three(word: str, value: float) -> dict[str, float]:
 
 
 def _drawn_hair(age_group: AgeGroup, tone: int, rng: Rng) -> Vec3:
-    if age_group == "senior" and chance(0.8, rng):
-        return jittered(linear(pick(_GREY, rng)), 0.1, rng)
+    if age_group == "senior" and is_drawn(0.8, rng):
+        return jitter_color(hex_to_linear(choose(_GREY, rng)), 0.1, rng)
     # Fair hair belongs to fair skin.
-    return jittered(linear(pick(_HAIR[: 8 if tone < 2 else 4 if tone < 4 else 2], rng)), 0.12, rng)
+    return jitter_color(
+        hex_to_linear(choose(_HAIR[: 8 if tone < 2 else 4 if tone < 4 else 2], rng)), 0.12, rng
+    )
 
 
 def _drawn_action(seed: int, pose: str, phase: float) -> tuple[PoseName, int]:
     """Pose and step; they have a stream of their own, so that the same person can do anything."""
-    rng = rng_of("person/pose", seed)
-    drawn = pick(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3, rng)
+    rng = variant_rng("person/pose", seed)
+    drawn = choose(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3, rng)
     step = min(int(rng.random() * PHASES), PHASES - 1)
     if not math.isfinite(phase):
         raise ValueError("phase is no number")

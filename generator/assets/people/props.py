@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.assets.people.body import Array, Body, Indices
-from generator.assets.people.person import Person
-from generator.assets.people.skinning import vertex_normals
-from generator.core.geometry import Material
+from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
+from gen_data.generator.assets.people.person import Person
+from gen_data.generator.assets.people.skinning import vertex_normals
+from gen_data.generator.core.asset_types import Material
 
 _PHONE = Material((0.012, 0.012, 0.014), 0.15, role="bag")
 
@@ -25,8 +25,8 @@ class Prop:
     materials: tuple[Material, ...]
 
 
-def carried(
-    person: Person, body: Body, posed_m: Array, transforms: Array, scale: float
+def make_props(
+    person: Person, body: BodyTemplate, posed_m: Array, transforms: Array, scale: float
 ) -> tuple[Prop, ...]:
     """Everything a person carries.
 

@@ -10,14 +10,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from generator.assets.people.body import Array, Body, Indices
+from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
 
 Rotations = Mapping[str, Array]
 """``{bone: rotation [3, 3] from the template to the pose, in the body's frame}``; bones that are
 not named turn with their parent."""
 
 
-def bone_transforms(body: Body, heads_m: Array, rotations: Rotations) -> Array:
+def bone_transforms(body: BodyTemplate, heads_m: Array, rotations: Rotations) -> Array:
     """Where each bone takes what belongs to it, float64 [bones, 3, 4].
 
     Args:
@@ -38,7 +38,7 @@ def bone_transforms(body: Body, heads_m: Array, rotations: Rotations) -> Array:
     return np.concatenate([turns, shifts[:, :, None]], axis=2)
 
 
-def skinned(points_m: Array, bones: Indices, weights: Array, transforms: Array) -> Array:
+def skin_points(points_m: Array, bones: Indices, weights: Array, transforms: Array) -> Array:
     """Points moved by their bones.
 
     Args:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from generator.assets.procedural.draw import between, chance, pick
-from generator.assets.procedural.materials import jittered, linear
-from generator.core.geometry import Material
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
+from gen_data.generator.assets.procedural.variant_rng import choose, is_drawn, uniform_between
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
 
 _DARK = ("#1b1c1f", "#23262e", "#2c2f36", "#1d2740", "#26324a", "#39404d", "#3b3530")
 _JACKETS = (*_DARK, "#1b1c1f", "#4a5260", "#4d4a3a", "#5a4636", "#7c7468", "#6e1f24", "#35506e")
@@ -69,55 +69,55 @@ class Outfit:
     hat_material: Material
 
 
-def drawn_outfit(sex: str, child: bool, rng: Rng) -> Outfit:
+def draw_outfit(sex: str, child: bool, rng: Rng) -> Outfit:
     """An outfit that suits."""
     woman = sex == "female"
     tops = ("jacket",) * 5 + ("shirt",) * 4 + ("tshirt",) * 3 + ("coat",) * (0 if child else 3)
-    top = pick(tops + ("dress",) * (2 if woman else 0), rng)
+    top = choose(tops + ("dress",) * (2 if woman else 0), rng)
     bottoms = ("trousers",) * 9 + ("shorts",) * (2 if top in ("tshirt", "shirt") else 0)
-    bottom = pick(bottoms + ("skirt",) * (3 if woman else 0), rng)
+    bottom = choose(bottoms + ("skirt",) * (3 if woman else 0), rng)
     if top == "dress":
         bottom = "none"
     outer = _top(top, child, rng)
-    open_front = top in ("jacket", "coat") and chance(0.6, rng)
-    reach = pick((1, 1, 1, 2, 2, 2, 3), rng)
+    open_front = top in ("jacket", "coat") and is_drawn(0.6, rng)
+    reach = choose((1, 1, 1, 2, 2, 2, 3), rng)
     return Outfit(
         top=top,
         bottom=bottom,
         skirt_zones=min(reach, 2) if top == "coat" else reach,
-        sleeves=top in ("shirt", "jacket", "coat") or (top == "dress" and chance(0.4, rng)),
-        bag=pick(("", "", "", "backpack", "handbag" if woman and not child else ""), rng),
-        hat=top in ("jacket", "coat") and chance(0.2, rng),
-        stockings=top == "coat" or chance(0.5, rng),
+        sleeves=top in ("shirt", "jacket", "coat") or (top == "dress" and is_drawn(0.4, rng)),
+        bag=choose(("", "", "", "backpack", "handbag" if woman and not child else ""), rng),
+        hat=top in ("jacket", "coat") and is_drawn(0.2, rng),
+        stockings=top == "coat" or is_drawn(0.5, rng),
         top_material=outer,
         front_material=_top("shirt", child, rng) if open_front else outer,
         bottom_material=_bottom(bottom, rng),
-        shoe_material=_plain(_SHOES, between(0.35, 0.7, rng), "shoes", rng),
-        bag_material=_plain(_BAGS, between(0.45, 0.8, rng), "bag", rng),
+        shoe_material=_plain(_SHOES, uniform_between(0.35, 0.7, rng), "shoes", rng),
+        bag_material=_plain(_BAGS, uniform_between(0.45, 0.8, rng), "bag", rng),
         hat_material=_plain((*_DARK, *_TOPS), 0.95, "hat", rng),
     )
 
 
 def _top(kind: str, child: bool, rng: Rng) -> Material:
     if kind in ("jacket", "coat"):
-        colors = _BRIGHT if chance(0.35 if child else 0.07, rng) else _JACKETS
-        return _plain(colors, between(0.55, 0.9, rng), "top", rng)
+        colors = _BRIGHT if is_drawn(0.35 if child else 0.07, rng) else _JACKETS
+        return _plain(colors, uniform_between(0.55, 0.9, rng), "top", rng)
     pattern, seed = float(rng.random()), float(rng.random())
     if kind != "tshirt" and pattern < 0.12:
         return _patterned(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22, "top")
     if pattern < 0.12:
         return _patterned(_STRIPES[int(seed * len(_STRIPES))], 0.3, "top")
-    colors = _BRIGHT if chance(0.4 if child else 0.1, rng) else _TOPS
-    return _plain(colors, between(0.75, 0.95, rng), "top", rng)
+    colors = _BRIGHT if is_drawn(0.4 if child else 0.1, rng) else _TOPS
+    return _plain(colors, uniform_between(0.75, 0.95, rng), "top", rng)
 
 
 def _bottom(kind: str, rng: Rng) -> Material:
-    colors = _SKIRTS if kind == "skirt" else _DENIM if chance(0.42, rng) else _TROUSERS
-    return _plain(colors, between(0.75, 0.95, rng), "bottom", rng)
+    colors = _SKIRTS if kind == "skirt" else _DENIM if is_drawn(0.42, rng) else _TROUSERS
+    return _plain(colors, uniform_between(0.75, 0.95, rng), "bottom", rng)
 
 
 def _plain(colors: Sequence[str], roughness: float, role: str, rng: Rng) -> Material:
-    color: Vec3 = jittered(linear(pick(colors, rng)), 0.12, rng)
+    color: Vec3 = jitter_color(hex_to_linear(choose(colors, rng)), 0.12, rng)
     return Material(base_color=color, roughness=roughness, specular=0.35, role=role)
 
 

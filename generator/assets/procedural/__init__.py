@@ -5,6 +5,6 @@ A new generator is one function and one line of ``families.yaml``; it is importe
 
 from __future__ import annotations
 
-from generator.assets.procedural.family import load_families
+from gen_data.generator.assets.procedural.family import load_families
 
 FAMILIES, TEXTURES, ENVIRONMENTS = load_families(__name__)

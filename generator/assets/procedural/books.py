@@ -6,14 +6,23 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import jittered, linear, printed
-from generator.assets.procedural.mesh import Array, Patch, centred, joined
-from generator.assets.procedural.shapes import Point2, UvRect, grid, rounded_box
-from generator.core.geometry import Material
-from generator.core.se3 import Vec3
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
+    hex_to_linear,
+    jitter_color,
+    printed_material,
+)
+from gen_data.generator.assets.procedural.patches import (
+    Array,
+    Patch,
+    join_patches,
+    make_centred_solid,
+)
+from gen_data.generator.assets.procedural.surface_shapes import Point2, UvRect, grid, rounded_box
+from gen_data.generator.assets.procedural.variant_rng import is_drawn, uniform_between, variant_rng
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import Vec3
 
 COVER_ATLAS: Mapping[str, UvRect] = {
     "back": (0.002, 0.002, 0.438, 0.998),
@@ -32,17 +41,17 @@ _FORMATS = (
 
 def book_size_m(seed: int) -> tuple[float, float, float]:
     """Length along the spine, width and thickness."""
-    rng = rng_of("book/size", seed)
+    rng = variant_rng("book/size", seed)
     length, width = _FORMATS[seed % len(_FORMATS)]
-    scale = between(0.97, 1.03, rng)
-    return (length * scale, width * scale, between(0.012, 0.042, rng))
+    scale = uniform_between(0.97, 1.03, rng)
+    return (length * scale, width * scale, uniform_between(0.012, 0.042, rng))
 
 
 def book(seed: int) -> Solid:
     """A paperback or hardcover. Slots: cover, pages."""
-    rng = rng_of("book", seed)
+    rng = variant_rng("book", seed)
     length, width, thickness = book_size_m(seed)
-    hard = chance(0.5, rng)
+    hard = is_drawn(0.5, rng)
     board = 0.0028 if hard else 0.0006
     margin = 0.003 if hard else 0.0
     bow = min(0.004, 0.3 * thickness) if hard else 0.0006
@@ -50,11 +59,11 @@ def book(seed: int) -> Solid:
     inside = margin + board + bow
     block = rounded_box((length - 2 * margin, width - inside, thickness - 2 * board), 0.0003, 1)
     pages = block.painted(1).moved(y=0.5 * (board + bow - margin))
-    paper = Material(jittered(linear("#e9e2cf"), 0.05, rng), 0.85)
-    print_ = printed(f"texture/book_cover?seed={seed}", between(0.25, 0.6, rng))
+    paper = Material(jitter_color(hex_to_linear("#e9e2cf"), 0.05, rng), 0.85)
+    print_ = printed_material(f"texture/book_cover?seed={seed}", uniform_between(0.25, 0.6, rng))
     half = (0.5 * length, 0.5 * width, 0.5 * thickness)
     low = (-half[0], -half[1], -half[2])
-    return centred([cover, pages], (print_, paper), [hulls.box(low, half)])
+    return make_centred_solid([cover, pages], (print_, paper), [collision_hulls.box(low, half)])
 
 
 def _cover(size_m: Vec3, board: float, bow: float) -> Patch:
@@ -81,7 +90,7 @@ def _cover(size_m: Vec3, board: float, bow: float) -> Patch:
     patches = [_band(span, length, u) for span, u in zip(spans, us, strict=True)]
     rest = [*inner, outer[0]]
     patches.append(_band([outer[-1], *rest], length, np.full(len(rest) + 1, side[0])))
-    return joined([*patches, *_rims(outer, inner, length)])
+    return join_patches([*patches, *_rims(outer, inner, length)])
 
 
 def _band(points: Sequence[Point2], length: float, u: Array) -> Patch:

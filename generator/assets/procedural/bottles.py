@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, pick, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import (
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
     CAPS,
     STEEL,
-    jittered,
-    linear,
-    metal,
-    plastic,
-    printed,
+    hex_to_linear,
+    jitter_color,
+    metal_material,
+    plastic_material,
+    printed_material,
 )
-from generator.assets.procedural.mesh import Patch, centred
-from generator.assets.procedural.shapes import Point2, fillet, lathe
-from generator.core.geometry import Material
+from gen_data.generator.assets.procedural.patches import Patch, make_centred_solid
+from gen_data.generator.assets.procedural.surface_shapes import Point2, fillet, lathe
+from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.core.asset_types import Material
 
 # Width by height of the unrolled label, which the drawing of its texture goes by.
 LABEL_ASPECT = 2.6
@@ -142,10 +142,10 @@ BOTTLES: Mapping[str, _BottleStyle] = {
 
 def bottle(seed: int) -> Solid:
     """A bottle of one of the styles in ``BOTTLES``. Slots: body, label, cap."""
-    rng = rng_of("bottle", seed)
+    rng = variant_rng("bottle", seed)
     style = BOTTLES[tuple(BOTTLES)[seed % len(BOTTLES)]]
-    height, radius = between(*style.height_m, rng), between(*style.radius_m, rng)
-    neck_z = height * between(*style.neck_share, rng)
+    height, radius = uniform_between(*style.height_m, rng), uniform_between(*style.radius_m, rng)
+    neck_z = height * uniform_between(*style.neck_share, rng)
     z0, z1 = height * style.label_share[0], min(height * style.label_share[1], neck_z - 0.01)
     shoulder = [
         (style.neck_m + r * (radius - style.neck_m), z1 + t * (neck_z - z1))
@@ -169,19 +169,22 @@ def bottle(seed: int) -> Solid:
         (0.97 * cap_radius, height),
     ]
     flat = np.array([1.0, style.depth, 1.0])
-    parts = [hull * flat for hull in hulls.stack(_climbing(stages))]
-    body = Material(jittered(linear(pick(style.colors, rng)), 0.1, rng), between(*style.gloss, rng))
+    parts = [hull * flat for hull in collision_hulls.stack(_climbing(stages))]
+    body = Material(
+        jitter_color(hex_to_linear(choose(style.colors, rng)), 0.1, rng),
+        uniform_between(*style.gloss, rng),
+    )
     if style.clear:
         body = replace(body, roughness=0.04, transmission=1.0, ior=_WATER_IOR, thin=False)
-    label = printed(f"texture/label?seed={seed}", between(0.35, 0.6, rng))
+    label = printed_material(f"texture/label?seed={seed}", uniform_between(0.35, 0.6, rng))
     flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
-    return centred(flattened, (body, label, plastic(rng, style.caps)), parts)
+    return make_centred_solid(flattened, (body, label, plastic_material(rng, style.caps)), parts)
 
 
 def jar(seed: int) -> Solid:
     """A filled preserving jar with a twist-off lid. Slots: body, label, lid."""
-    rng = rng_of("jar", seed)
-    radius, height = between(0.031, 0.043, rng), between(0.085, 0.14, rng)
+    rng = variant_rng("jar", seed)
+    radius, height = uniform_between(0.031, 0.043, rng), uniform_between(0.085, 0.14, rng)
     top, lid_radius, mouth = height - 0.014, 0.9 * radius, 0.86 * radius
     upper = [(radius, 0.8 * height), (mouth, top - 0.003), (mouth, top + 0.004)]
     patches = [
@@ -189,9 +192,19 @@ def jar(seed: int) -> Solid:
         lathe([(mouth, top + 0.004), (0.0, top + 0.004)], 32, 0),
         _lid(lid_radius, top, height),
     ]
-    glass = Material(jittered(linear(pick(_FILLINGS, rng)), 0.15, rng), between(0.06, 0.12, rng))
-    label = printed(f"texture/label?seed={seed + 1000}", between(0.45, 0.65, rng))
-    lid = pick((metal((0.83, 0.69, 0.35), 0.3), metal(STEEL, 0.3), plastic(rng, CAPS)), rng)
+    glass = Material(
+        jitter_color(hex_to_linear(choose(_FILLINGS, rng)), 0.15, rng),
+        uniform_between(0.06, 0.12, rng),
+    )
+    label = printed_material(f"texture/label?seed={seed + 1000}", uniform_between(0.45, 0.65, rng))
+    lid = choose(
+        (
+            metal_material((0.83, 0.69, 0.35), 0.3),
+            metal_material(STEEL, 0.3),
+            plastic_material(rng, CAPS),
+        ),
+        rng,
+    )
     stages = [
         (0.92 * radius, 0.0),
         (radius, 0.008),
@@ -199,7 +212,7 @@ def jar(seed: int) -> Solid:
         (lid_radius, top),
         (lid_radius, height),
     ]
-    return centred(patches, (glass, label, lid), hulls.stack(stages))
+    return make_centred_solid(patches, (glass, label, lid), collision_hulls.stack(stages))
 
 
 def _labelled(radius: float, label: Point2, upper: list[Point2], radii: list[float]) -> list[Patch]:

@@ -7,12 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import ALUMINIUM, STEEL, metal, printed
-from generator.assets.procedural.mesh import Patch, centred
-from generator.assets.procedural.shapes import Point2, circle, extruded, fillet, lathe
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
+    ALUMINIUM,
+    STEEL,
+    metal_material,
+    printed_material,
+)
+from gen_data.generator.assets.procedural.patches import Patch, make_centred_solid
+from gen_data.generator.assets.procedural.surface_shapes import (
+    Point2,
+    circle,
+    extrude,
+    fillet,
+    lathe,
+)
+from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,25 +60,25 @@ def label_aspect(seed: int) -> float:
 
 def can(seed: int) -> Solid:
     """A drink can or food can. Slots: print, metal, tab."""
-    rng = rng_of("can", seed)
+    rng = variant_rng("can", seed)
     size = can_size(seed)
     r, h = size.radius_m, size.height_m
     texture = f"texture/can_label?seed={seed}"
     if size.food:
-        print_ = printed(texture, between(0.5, 0.7, rng))
+        print_ = printed_material(texture, uniform_between(0.5, 0.7, rng))
         patches, stages = _food_can(r, h)
         lid: list[Patch] = []
     else:
-        print_ = printed(texture, between(0.25, 0.38, rng), 0.35)
+        print_ = printed_material(texture, uniform_between(0.25, 0.38, rng), 0.35)
         patches, stages = _drink_can(r, h)
         lid = _tab(0.68 * r)
         lid = [piece.moved(z=h - 0.0045) for piece in lid]
     materials = (
         print_,
-        metal(STEEL if size.food else ALUMINIUM, between(0.22, 0.35, rng)),
-        metal(ALUMINIUM, 0.3),
+        metal_material(STEEL if size.food else ALUMINIUM, uniform_between(0.22, 0.35, rng)),
+        metal_material(ALUMINIUM, 0.3),
     )
-    return centred([*patches, *lid], materials, hulls.stack(stages))
+    return make_centred_solid([*patches, *lid], materials, collision_hulls.stack(stages))
 
 
 def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
@@ -133,6 +144,6 @@ def _tab(length: float) -> list[Patch]:
     hole = circle(1.0, 10) * np.array([0.22 * length, 0.17 * length]) + np.array(
         [0.18 * length, 0.0]
     )
-    plate = extruded(ring_, 0.0012, 0.0003, [hole], 2)
+    plate = extrude(ring_, 0.0012, 0.0003, [hole], 2)
     rivet = lathe([(0.0, 0.0), (0.0035, 0.0), (0.0033, 0.002), (0.0, 0.0022)], 12, 2)
     return [plate.moved(x=0.18 * length), rivet.moved(x=-0.12 * length)]

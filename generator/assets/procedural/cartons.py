@@ -7,13 +7,33 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import CAPS, plastic, printed
-from generator.assets.procedural.mesh import Patch, centred, joined, rotated
-from generator.assets.procedural.shapes import UvRect, fillet, grid, lathe, rounded_box
-from generator.core.se3 import Vec3
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
+    CAPS,
+    plastic_material,
+    printed_material,
+)
+from gen_data.generator.assets.procedural.patches import (
+    Patch,
+    join_patches,
+    make_centred_solid,
+    rotate,
+)
+from gen_data.generator.assets.procedural.surface_shapes import (
+    UvRect,
+    fillet,
+    grid,
+    lathe,
+    rounded_box,
+)
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.core.se3 import Vec3
 
 # Where each face of a carton lies in its image: four sides above, top and bottom below.
 CARTON_ATLAS: Mapping[str, UvRect] = {
@@ -38,52 +58,52 @@ _CARTONS: tuple[tuple[float, float, float], ...] = (
 
 def carton_size_m(seed: int) -> Vec3:
     """Depth (X), width (Y) and height of a carton; its front faces +X."""
-    rng = rng_of("carton/size", seed)
-    x, y, z = (side * between(0.92, 1.08, rng) for side in _CARTONS[seed % len(_CARTONS)])
+    rng = variant_rng("carton/size", seed)
+    x, y, z = (side * uniform_between(0.92, 1.08, rng) for side in _CARTONS[seed % len(_CARTONS)])
     return (x, y, z)
 
 
 def milk_size_m(seed: int) -> Vec3:
     """Depth, width and height of a milk carton without its gable."""
-    rng = rng_of("milk_carton/size", seed)
-    side = between(0.066, 0.075, rng)
-    return (side, side, side * pick((1.4, 2.4, 2.7), rng))
+    rng = variant_rng("milk_carton/size", seed)
+    side = uniform_between(0.066, 0.075, rng)
+    return (side, side, side * choose((1.4, 2.4, 2.7), rng))
 
 
 def carton(seed: int) -> Solid:
     """A printed folding box; its front faces +X. Slot: print."""
-    rng = rng_of("carton", seed)
+    rng = variant_rng("carton", seed)
     size = carton_size_m(seed)
     body = rounded_box(size, 0.0012, 1, uv=CARTON_ATLAS)
     half = tuple(0.5 * side for side in size)
-    print_ = printed(f"texture/carton?seed={seed}", between(0.35, 0.65, rng))
+    print_ = printed_material(f"texture/carton?seed={seed}", uniform_between(0.35, 0.65, rng))
     low, high = (-half[0], -half[1], -half[2]), (half[0], half[1], half[2])
-    return centred([body], (print_,), [hulls.box(low, high)])
+    return make_centred_solid([body], (print_,), [collision_hulls.box(low, high)])
 
 
 def milk_carton(seed: int) -> Solid:
     """A gable-top carton with a screw cap; its front faces +X. Slots: print, cap."""
-    rng = rng_of("milk_carton", seed)
+    rng = variant_rng("milk_carton", seed)
     x, y, z = milk_size_m(seed)
     body = rounded_box((x, y, z), 0.0015, 1, uv=CARTON_ATLAS).moved(z=z / 2)
     rise, fin = 0.33 * x, 0.016
     roof = _gable(x, y, rise, fin).moved(z=z)
-    print_ = printed(f"texture/milk_label?seed={seed}", between(0.35, 0.5, rng))
-    patches, parts = [body, roof], [hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
-    if chance(0.7, rng):
+    print_ = printed_material(f"texture/milk_label?seed={seed}", uniform_between(0.35, 0.5, rng))
+    patches, parts = [body, roof], [collision_hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
+    if is_drawn(0.7, rng):
         tilt = math.atan2(rise, 0.5 * x)
         at = (0.27 * x, 0.0, z + 0.46 * rise)
         patches.append(_screw_cap().rotated("y", tilt).moved(*at))
-        cap = hulls.frustum((0.013, -0.004), (0.013, 0.009), 12)
-        parts.append(rotated(cap, "y", tilt) + np.array(at))
+        cap = collision_hulls.frustum((0.013, -0.004), (0.013, 0.009), 12)
+        parts.append(rotate(cap, "y", tilt) + np.array(at))
     ridge = z + rise
     prism = np.array(
         [(sx * 0.5 * x, sy * 0.5 * y, z) for sx in (-1, 1) for sy in (-1, 1)]
         + [(sx * 0.002, sy * 0.5 * y, ridge) for sx in (-1, 1) for sy in (-1, 1)]
     )
-    fin_hull = hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
+    fin_hull = collision_hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
     parts += [prism, fin_hull]
-    return centred(patches, (print_, plastic(rng, CAPS)), parts)
+    return make_centred_solid(patches, (print_, plastic_material(rng, CAPS)), parts)
 
 
 def _screw_cap() -> Patch:
@@ -121,4 +141,4 @@ def _gable(x: float, y: float, rise: float, fin: float) -> Patch:
         n = len(corners)
         uvs = np.broadcast_to(np.array([u0 + 0.1, 0.5 * v1]), (n, 3, 2))
         made.append(Patch(np.array(corners), uvs.copy(), np.zeros(n, dtype=np.int64)))
-    return joined(made)
+    return join_patches(made)

@@ -12,14 +12,23 @@ from itertools import pairwise
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import STAINLESS, metal, plastic
-from generator.assets.procedural.mesh import Array, Patch, centred, joined
-from generator.assets.procedural.shapes import fan, grid, spline
-from generator.core.geometry import Material
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
+    STAINLESS,
+    metal_material,
+    plastic_material,
+)
+from gen_data.generator.assets.procedural.patches import (
+    Array,
+    Patch,
+    join_patches,
+    make_centred_solid,
+)
+from gen_data.generator.assets.procedural.surface_shapes import fan, grid, spline
+from gen_data.generator.assets.procedural.variant_rng import is_drawn, uniform_between, variant_rng
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.streams import Rng
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +53,9 @@ class _Station:
 
 def spoon(seed: int) -> Solid:
     """A table, dessert or coffee spoon. Slots: head, handle."""
-    rng = rng_of("spoon", seed)
-    size = (1.0, 0.86, 0.66)[seed % 3] * between(0.96, 1.04, rng)
-    wide, tail = between(0.93, 1.07, rng), between(0.85, 1.2, rng)
+    rng = variant_rng("spoon", seed)
+    size = (1.0, 0.86, 0.66)[seed % 3] * uniform_between(0.96, 1.04, rng)
+    wide, tail = uniform_between(0.93, 1.07, rng), uniform_between(0.85, 1.2, rng)
     bowl = [
         (-32, 3.0, 12.0, 0.5),
         (-22, 12.0, 9.5, 4.0),
@@ -63,12 +72,12 @@ def spoon(seed: int) -> Solid:
 
 def fork(seed: int) -> Solid:
     """A table or dessert fork with three or four tines. Slots: head, handle."""
-    rng = rng_of("fork", seed)
-    size = (1.0, 0.86)[seed % 2] * between(0.97, 1.03, rng)
+    rng = variant_rng("fork", seed)
+    size = (1.0, 0.86)[seed % 2] * uniform_between(0.97, 1.03, rng)
     tail, half, count = (
-        between(0.85, 1.2, rng),
-        between(11.5, 13.0, rng),
-        3 if chance(0.25, rng) else 4,
+        uniform_between(0.85, 1.2, rng),
+        uniform_between(11.5, 13.0, rng),
+        3 if is_drawn(0.25, rng) else 4,
     )
     head = [
         _Station(40, 4.0, 4.0, 14.5, 2.2),
@@ -103,9 +112,9 @@ def fork(seed: int) -> Solid:
 
 def knife(seed: int) -> Solid:
     """A table knife lying on its side, edge towards -Y. Slots: blade, handle."""
-    rng = rng_of("knife", seed)
-    size = between(0.94, 1.06, rng)
-    grip, tip = between(0.9, 1.15, rng), between(0.0, 5.0, rng)
+    rng = variant_rng("knife", seed)
+    size = uniform_between(0.94, 1.06, rng)
+    grip, tip = uniform_between(0.9, 1.15, rng), uniform_between(0.0, 5.0, rng)
     handle = [
         _Station(-112, 3.0, 3.0, 3.2, 3.4),
         _Station(-108, 8.0 * grip, 8.0 * grip, 3.4, 5.0),
@@ -128,7 +137,7 @@ def knife(seed: int) -> Solid:
 
 def _handle(tail: float, neck_z: float, neck_x: float, rng: Rng) -> list[_Station]:
     """From the broad end on the table to the slender raised neck."""
-    end = between(8.0, 10.5, rng) * tail
+    end = uniform_between(8.0, 10.5, rng) * tail
     return [
         _Station(-98, 0.35 * end, 0.35 * end, 3.4, 1.4),
         _Station(-95, 0.75 * end, 0.75 * end, 3.0, 1.9),
@@ -150,21 +159,21 @@ def _sheet(stations: Sequence[_Station], count: int, across: int = 6) -> Patch:
     xs = np.broadcast_to(x, y.shape)
     top, bottom = (np.stack([xs, y, middle + s * half], axis=2) for s in (1.0, -1.0))
     loop = np.concatenate([top, bottom[:, ::-1], top[:, :1]], axis=1)
-    return joined([grid(loop), fan(loop[0, :0:-1]), fan(loop[-1, :-1])])
+    return join_patches([grid(loop), fan(loop[0, :0:-1]), fan(loop[-1, :-1])])
 
 
 def _cutlery(sheets: list[Patch], size: float, cut_mm: float, rng: Rng) -> Solid:
     """The finished piece: scaled to metres, slot 1 behind the cut, collision in slices."""
     scale = 0.001 * size
-    patch = joined(sheets)
+    patch = join_patches(sheets)
     behind = patch.corners_m.mean(axis=1)[:, 0] < cut_mm - 6.0
     patch = Patch(patch.corners_m * scale, patch.uvs, behind.astype(np.int64))
-    steel = metal(STAINLESS, between(0.12, 0.28, rng))
-    handle: Material = plastic(rng) if chance(0.2, rng) else steel
+    steel = metal_material(STAINLESS, uniform_between(0.12, 0.28, rng))
+    handle: Material = plastic_material(rng) if is_drawn(0.2, rng) else steel
     low, high = patch.bounds_m()
     edges = np.linspace(float(low[0]), float(high[0]), 8)
-    parts = [hulls.extreme(_slice(patch, a, b)) for a, b in pairwise(edges.tolist())]
-    return centred([patch], (steel, handle), parts)
+    parts = [collision_hulls.extreme(_slice(patch, a, b)) for a, b in pairwise(edges.tolist())]
+    return make_centred_solid([patch], (steel, handle), parts)
 
 
 def _slice(patch: Patch, a: float, b: float) -> Array:

@@ -10,7 +10,13 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from generator.core.geometry import ConvexParts, Float32, Keypoint, MeshData, TextureData
+from gen_data.generator.core.asset_types import (
+    ConvexParts,
+    Float32,
+    Keypoint,
+    MeshData,
+    TextureData,
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -29,7 +35,7 @@ class Solid:
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
+class Provenance:
     """Where an asset comes from, and on which terms."""
 
     licence: str
@@ -37,7 +43,7 @@ class Origin:
     source: str
 
 
-OURS = Origin("Apache-2.0", "gen-data contributors", "gen-data (procedural)")
+OURS = Provenance("Apache-2.0", "gen-data contributors", "gen-data (procedural)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +91,7 @@ class Family:
     build: Callable[..., Solid]
     facts: Callable[..., Facts] | None = None
     stored: bool = True
-    origin: Origin = OURS
+    origin: Provenance = OURS
 
 
 @dataclass(frozen=True)
@@ -103,7 +109,7 @@ class TextureFamily:
     version: int
     build: Callable[..., TextureData]
     parameters: Mapping[str, object] = field(default_factory=dict)
-    origin: Origin = OURS
+    origin: Provenance = OURS
 
 
 @dataclass(frozen=True)
@@ -125,7 +131,7 @@ class EnvironmentFamily:
     build: Callable[..., Float32]
     parameters: Mapping[str, object] = field(default_factory=dict)
     stored: bool = True
-    origin: Origin = OURS
+    origin: Provenance = OURS
 
 
 @dataclass(frozen=True)

@@ -7,24 +7,30 @@ from collections.abc import Callable
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import linear, printed
-from generator.assets.procedural.mesh import Array, Patch, centred
-from generator.assets.procedural.shapes import ball, circle, evenly, spline, sweep
-from generator.core.geometry import Material
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear, printed_material
+from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid
+from gen_data.generator.assets.procedural.surface_shapes import (
+    ball,
+    circle,
+    space_evenly,
+    spline,
+    sweep,
+)
+from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.streams import Rng
 
-_STALK = Material(linear("#5a4329"), 0.8)
+_STALK = Material(hex_to_linear("#5a4329"), 0.8)
 
 
 def apple(seed: int) -> Solid:
     """An apple with dimples and a stalk. Slots: skin, stalk."""
-    rng = rng_of("apple", seed)
-    radius, slim = between(0.034, 0.042, rng), between(0.9, 1.02, rng)
+    rng = variant_rng("apple", seed)
+    radius, slim = uniform_between(0.034, 0.042, rng), uniform_between(0.9, 1.02, rng)
     lumps = _lumps(5, 0.025, rng)
-    pinch = between(0.28, 0.36, rng)
+    pinch = uniform_between(0.28, 0.36, rng)
 
     def shape(d: Array) -> Array:
         z = d[..., 2]
@@ -34,20 +40,20 @@ def apple(seed: int) -> Solid:
         return np.stack([r * d[..., 0], r * d[..., 1], slim * r * z], axis=2)
 
     dip = radius * slim * (1 - pinch) * 1.07
-    skin = printed(f"texture/apple_skin?seed={seed}", between(0.25, 0.4, rng))
-    stalk = _stalk((0.0, 0.0, dip - 0.002), between(0.012, 0.02, rng), 0.0013, rng)
+    skin = printed_material(f"texture/apple_skin?seed={seed}", uniform_between(0.25, 0.4, rng))
+    stalk = _stalk((0.0, 0.0, dip - 0.002), uniform_between(0.012, 0.02, rng), 0.0013, rng)
     body = ball(shape, 22, 28)
-    return centred(
+    return make_centred_solid(
         [body, stalk.painted(1)],
         (skin, _STALK),
-        [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)],
+        [collision_hulls.extreme(body.corners_m), collision_hulls.extreme(stalk.corners_m, 16)],
     )
 
 
 def orange(seed: int) -> Solid:
     """An orange with the scar of its stalk. Slots: peel, stalk."""
-    rng = rng_of("orange", seed)
-    radius, flat = between(0.034, 0.042, rng), between(0.93, 1.0, rng)
+    rng = variant_rng("orange", seed)
+    radius, flat = uniform_between(0.034, 0.042, rng), uniform_between(0.93, 1.0, rng)
     lumps = _lumps(4, 0.012, rng)
 
     def shape(d: Array) -> Array:
@@ -56,18 +62,20 @@ def orange(seed: int) -> Solid:
         r = radius * (1 - dent + lumps(d))
         return np.stack([r * d[..., 0], r * d[..., 1], flat * r * z], axis=2)
 
-    peel = printed(f"texture/citrus_peel?seed={seed}", between(0.4, 0.55, rng))
+    peel = printed_material(f"texture/citrus_peel?seed={seed}", uniform_between(0.4, 0.55, rng))
     body = ball(shape, 24, 36)
     button = ball(lambda d: 0.0035 * d * np.array([1.0, 1.0, 0.4]), 6, 10).painted(1)
     button = button.moved(z=radius * flat * 0.955)
-    green = Material(linear("#6d7a3a"), 0.8)
-    return centred([body, button], (peel, green), [hulls.extreme(body.corners_m)])
+    green = Material(hex_to_linear("#6d7a3a"), 0.8)
+    return make_centred_solid(
+        [body, button], (peel, green), [collision_hulls.extreme(body.corners_m)]
+    )
 
 
 def lemon(seed: int) -> Solid:
     """A lemon lying along X, pointed at one end. Slot: peel."""
-    rng = rng_of("lemon", seed)
-    radius, long = between(0.025, 0.03, rng), between(1.25, 1.45, rng)
+    rng = variant_rng("lemon", seed)
+    radius, long = uniform_between(0.025, 0.03, rng), uniform_between(1.25, 1.45, rng)
     lumps = _lumps(5, 0.025, rng)
 
     def shape(d: Array) -> Array:
@@ -77,16 +85,18 @@ def lemon(seed: int) -> Solid:
         x = radius * long * (z + tip * np.sign(z))
         return np.stack([x, r * d[..., 1], -r * d[..., 0]], axis=2)
 
-    peel = printed(f"texture/citrus_peel?seed={seed + 1000}", between(0.35, 0.5, rng))
+    peel = printed_material(
+        f"texture/citrus_peel?seed={seed + 1000}", uniform_between(0.35, 0.5, rng)
+    )
     body = ball(shape, 24, 24)
-    return centred([body], (peel,), [hulls.extreme(body.corners_m)])
+    return make_centred_solid([body], (peel,), [collision_hulls.extreme(body.corners_m)])
 
 
 def pear(seed: int) -> Solid:
     """A pear standing upright. Slots: skin, stalk."""
-    rng = rng_of("pear", seed)
-    radius, height = between(0.03, 0.036, rng), between(0.085, 0.105, rng)
-    neck, lean = between(0.42, 0.52, rng), between(-0.006, 0.006, rng)
+    rng = variant_rng("pear", seed)
+    radius, height = uniform_between(0.03, 0.036, rng), uniform_between(0.085, 0.105, rng)
+    neck, lean = uniform_between(0.42, 0.52, rng), uniform_between(-0.006, 0.006, rng)
     lumps = _lumps(4, 0.03, rng)
 
     def shape(d: Array) -> Array:
@@ -100,23 +110,29 @@ def pear(seed: int) -> Solid:
         up = 0.5 * height * (z + dent)
         return np.stack([r * unit[..., 0] + lean * t**2, r * unit[..., 1], up], axis=2)
 
-    skin = printed(f"texture/pear_skin?seed={seed}", between(0.35, 0.5, rng))
+    skin = printed_material(f"texture/pear_skin?seed={seed}", uniform_between(0.35, 0.5, rng))
     body = ball(shape, 24, 24)
-    stalk = _stalk((lean, 0.0, 0.5 * height - 0.002), between(0.014, 0.022, rng), 0.0014, rng)
+    stalk = _stalk(
+        (lean, 0.0, 0.5 * height - 0.002), uniform_between(0.014, 0.022, rng), 0.0014, rng
+    )
     points = body.corners_m.reshape(-1, 3)
     lower, upper = points[points[:, 2] < 0.12 * height], points[points[:, 2] > 0.02 * height]
-    return centred(
+    return make_centred_solid(
         [body, stalk.painted(1)],
         (skin, _STALK),
-        [hulls.extreme(lower), hulls.extreme(upper), hulls.extreme(stalk.corners_m, 16)],
+        [
+            collision_hulls.extreme(lower),
+            collision_hulls.extreme(upper),
+            collision_hulls.extreme(stalk.corners_m, 16),
+        ],
     )
 
 
 def banana(seed: int) -> Solid:
     """A banana lying on its side, bent in the plane of the ground. Slot: peel."""
-    rng = rng_of("banana", seed)
-    length, thick = between(0.17, 0.21, rng), between(0.0165, 0.0195, rng)
-    bend = between(0.9, 1.35, rng)
+    rng = variant_rng("banana", seed)
+    length, thick = uniform_between(0.17, 0.21, rng), uniform_between(0.0165, 0.0195, rng)
+    bend = uniform_between(0.9, 1.35, rng)
     arc = np.linspace(-0.5 * bend, 0.5 * bend, 25)
     radius = length / bend
     path = np.stack([radius * np.sin(arc), radius * (1 - np.cos(arc)), np.zeros_like(arc)], axis=1)
@@ -131,12 +147,12 @@ def banana(seed: int) -> Solid:
     edge = 1.0 + 0.045 * np.cos(5 * turn) + 0.008 * np.cos(10 * turn)
     section = thick * edge[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     skin = sweep(path, section, scale=_smoothed(girth))
-    peel = printed(f"texture/banana_peel?seed={seed}", between(0.4, 0.55, rng))
+    peel = printed_material(f"texture/banana_peel?seed={seed}", uniform_between(0.4, 0.55, rng))
     parts = []
     for a, b in ((0, 4), (4, 9), (9, 15), (15, 20), (20, 24)):
         ring = np.concatenate([_ring_of(skin, path, i) for i in (a, (a + b) // 2, b)])
-        parts.append(hulls.extreme(ring))
-    return centred([skin], (peel,), parts)
+        parts.append(collision_hulls.extreme(ring))
+    return make_centred_solid([skin], (peel,), parts)
 
 
 def _ring_of(skin: Patch, path: Array, i: int) -> Array:
@@ -169,8 +185,10 @@ def _lumps(count: int, size: float, rng: Rng) -> Callable[[Array], Array]:
 def _stalk(foot: tuple[float, float, float], length: float, thick: float, rng: Rng) -> Patch:
     """A bent, tapering twig."""
     x, y, z = foot
-    lean = between(-0.4, 0.4, rng) * length
-    path = evenly(spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24), 6)
+    lean = uniform_between(-0.4, 0.4, rng) * length
+    path = space_evenly(
+        spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24), 6
+    )
     return sweep(
         path, circle(thick, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5])
     )

@@ -12,19 +12,31 @@ from itertools import pairwise
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import (
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
-    metal,
-    painted,
-    patterned,
+    metal_material,
+    painted_material,
+    patterned_material,
 )
-from generator.assets.procedural.mesh import Array, Patch, in_place, joined
-from generator.assets.procedural.shapes import along_grain, block, circle, fan, grid, lathe
-from generator.core.errors import AssetError, did_you_mean
-from generator.core.geometry import Material
-from generator.core.se3 import Vec3
+from gen_data.generator.assets.procedural.patches import (
+    Array,
+    Patch,
+    join_patches,
+    make_solid_in_place,
+)
+from gen_data.generator.assets.procedural.surface_shapes import (
+    block,
+    circle,
+    fan,
+    grid,
+    lathe,
+    map_along_grain,
+)
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.se3 import Vec3
 
 Box = tuple[Vec3, Vec3]
 
@@ -72,22 +84,26 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
     Raises:
         AssetError: if a size or the style is not usable.
     """
-    x, y, z = checked_size("table", size_m, 0.2)
+    x, y, z = check_size("table", size_m, 0.2)
     _known("table", "style", style, TABLE_STYLES)
     thick = 0.03 if style != "bench" else 0.04
     top = (-x / 2, -y / 2, z - thick), (x / 2, y / 2, z)
     frame = {"legs": _four_legs, "trestle": _trestles, "bench": _bench}[style](x, y, z - thick)
     patches = [
-        along_grain(block(*top, 0.003), 0.9),
-        *(along_grain(block(low, high, 0.002, 1), 0.5) for low, high in frame),
+        map_along_grain(block(*top, 0.003), 0.9),
+        *(map_along_grain(block(low, high, 0.002, 1), 0.5) for low, high in frame),
     ]
-    wood = patterned("texture/wood_grain?seed=1", 0.0, 0.45)
+    wood = patterned_material("texture/wood_grain?seed=1", 0.0, 0.45)
     legs = (
-        painted("#3b4046", 0.4)
+        painted_material("#3b4046", 0.4)
         if style == "bench"
-        else patterned("texture/wood_grain?seed=1", 0.0, 0.5)
+        else patterned_material("texture/wood_grain?seed=1", 0.0, 0.5)
     )
-    return in_place(patches, (wood, legs), [hulls.box(*top), *(hulls.box(*f) for f in frame)])
+    return make_solid_in_place(
+        patches,
+        (wood, legs),
+        [collision_hulls.box(*top), *(collision_hulls.box(*f) for f in frame)],
+    )
 
 
 def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookcase") -> Solid:
@@ -101,7 +117,7 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
     Raises:
         AssetError: if a size, the style or the number of levels is not usable.
     """
-    x, y, z = checked_size("shelf", size_m, 0.1)
+    x, y, z = check_size("shelf", size_m, 0.1)
     _known("shelf", "style", style, SHELF_STYLES)
     t = _BOARD_M
     boards = [
@@ -117,12 +133,14 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
             ((-x / 2 + t, y / 2 - 0.008, _PLINTH_M - t), (x / 2 - t, y / 2 - 0.002, z)),
         ]
     patches = [
-        *(along_grain(block(*b, 0.0015), 0.6) for b in boards),
-        *(along_grain(block(*f, 0.0015, 1), 0.6) for f in frame),
+        *(map_along_grain(block(*b, 0.0015), 0.6) for b in boards),
+        *(map_along_grain(block(*f, 0.0015, 1), 0.6) for f in frame),
     ]
-    wood = patterned("texture/wood_grain?seed=8", 0.0, 0.45)
-    posts = painted("#2f3338", 0.4) if style == "rack" else wood
-    return in_place(patches, (wood, posts), [hulls.box(*b) for b in (*boards, *frame)])
+    wood = patterned_material("texture/wood_grain?seed=8", 0.0, 0.45)
+    posts = painted_material("#2f3338", 0.4) if style == "rack" else wood
+    return make_solid_in_place(
+        patches, (wood, posts), [collision_hulls.box(*b) for b in (*boards, *frame)]
+    )
 
 
 def shelf_levels_m(size_m: Vec3, levels: int) -> tuple[float, ...]:
@@ -160,7 +178,7 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
     Raises:
         AssetError: if a size or the colour is not usable.
     """
-    x, y, z = checked_size("bin", size_m, 0.06)
+    x, y, z = check_size("bin", size_m, 0.06)
     rim = 0.012
     shell = _bin_shell(x, y, z, rim)
     ribs = [block(low, high, 0.001) for low, high in _bin_ribs(x, y, z, rim)]
@@ -172,8 +190,10 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
         ((-x / 2, y / 2 - w, 0.0), (x / 2, y / 2, z)),
         ((-x / 2, -y / 2, 0.0), (x / 2, y / 2, _BIN_WALL_M)),
     ]
-    return in_place(
-        [shell, *ribs], (painted(_color("bin", color), 0.5),), [hulls.box(*wall) for wall in walls]
+    return make_solid_in_place(
+        [shell, *ribs],
+        (painted_material(_color("bin", color), 0.5),),
+        [collision_hulls.box(*wall) for wall in walls],
     )
 
 
@@ -193,11 +213,13 @@ def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> Solid:
     Raises:
         AssetError: if a size or the colour is not usable.
     """
-    x, y, z = checked_size("box", size_m, 0.001)
+    x, y, z = check_size("box", size_m, 0.001)
     corners = (-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)
     bevel = min(0.002, 0.1 * min(x, y, z))
-    return in_place(
-        [block(*corners, bevel)], (painted(_color("box", color), 0.6),), [hulls.box(*corners)]
+    return make_solid_in_place(
+        [block(*corners, bevel)],
+        (painted_material(_color("box", color), 0.6),),
+        [collision_hulls.box(*corners)],
     )
 
 
@@ -207,7 +229,7 @@ def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
     Raises:
         AssetError: if a size is not usable.
     """
-    x, y, z = checked_size("pedestal", size_m, 0.05)
+    x, y, z = check_size("pedestal", size_m, 0.05)
     t = min(0.02, 0.2 * z)
     plates = [((-x / 2, -y / 2, z0), (x / 2, y / 2, z0 + t)) for z0 in (0.0, z - t)]
     body = (-0.38 * x, -0.38 * y, t), (0.38 * x, 0.38 * y, z - t)
@@ -219,8 +241,10 @@ def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
         for sy in (-1, 1)
     ]
     patches = [block(*body, 0.006), *(block(*p, 0.002, 1) for p in plates), *bolts]
-    materials = (painted("#d7d9d8", 0.4), metal((0.45, 0.46, 0.48), 0.42))
-    return in_place(patches, materials, [hulls.box(*body), *(hulls.box(*p) for p in plates)])
+    materials = (painted_material("#d7d9d8", 0.4), metal_material((0.45, 0.46, 0.48), 0.42))
+    return make_solid_in_place(
+        patches, materials, [collision_hulls.box(*body), *(collision_hulls.box(*p) for p in plates)]
+    )
 
 
 def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
@@ -229,7 +253,7 @@ def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
     Raises:
         AssetError: if a size is not usable.
     """
-    x, y, z = checked_size("gantry", size_m, 0.3)
+    x, y, z = check_size("gantry", size_m, 0.3)
     w = 0.04
     posts = [_post(sx * x / 2, sy * y / 2, w, z) for sx in (-1, 1) for sy in (-1, 1)]
     rails = [
@@ -250,8 +274,10 @@ def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
         for sx in (-1, 1)
         for sy in (-1, 1)
     ]
-    materials = (metal(ALUMINIUM, 0.45), painted("#26282b", 0.5))
-    return in_place([*patches, *feet], materials, [hulls.box(*bar) for bar in bars])
+    materials = (metal_material(ALUMINIUM, 0.45), painted_material("#26282b", 0.5))
+    return make_solid_in_place(
+        [*patches, *feet], materials, [collision_hulls.box(*bar) for bar in bars]
+    )
 
 
 def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
@@ -260,10 +286,12 @@ def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
     Raises:
         AssetError: if a size is not usable.
     """
-    x, y, _ = checked_size("plane", (*size_m, 1.0), 0.1)
+    x, y, _ = check_size("plane", (*size_m, 1.0), 0.1)
     ground = rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0))
-    slab = hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0))
-    return in_place([ground], (patterned("texture/concrete?seed=0", 2.0, 0.8),), [slab])
+    slab = collision_hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0))
+    return make_solid_in_place(
+        [ground], (patterned_material("texture/concrete?seed=0", 2.0, 0.8),), [slab]
+    )
 
 
 def light_panel(
@@ -281,7 +309,7 @@ def light_panel(
     Raises:
         AssetError: if a size or the shape is not usable.
     """
-    x, y, z = checked_size("light_panel", (*size_m[:2], depth_m), 0.005)
+    x, y, z = check_size("light_panel", (*size_m[:2], depth_m), 0.005)
     _known("light_panel", "shape", shape, PANEL_SHAPES)
     if shape == "disk":
         y = x
@@ -290,10 +318,10 @@ def light_panel(
         back = lathe([(0.5 * x, 0.0), (0.5 * x, z), (0.0, z)], 64)
     else:
         front = rectangle((-x / 2, -y / 2, 0.0), (0.0, y, 0.0), (x, 0.0, 0.0)).painted(1)
-        back = joined(_plain_shell(x, y, z))
+        back = join_patches(_plain_shell(x, y, z))
     lamp = Material((0.8, 0.8, 0.8), 0.9, specular=0.2, role="lamp")
-    hull = hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
-    return in_place([back, front], (painted("#d9dadb", 0.5), lamp), [hull])
+    hull = collision_hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
+    return make_solid_in_place([back, front], (painted_material("#d9dadb", 0.5), lamp), [hull])
 
 
 def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str = "white") -> Solid:
@@ -307,7 +335,7 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
     Raises:
         AssetError: if a size or the colour is not usable.
     """
-    x, y, z = checked_size("backdrop", size_m, 0.1)
+    x, y, z = check_size("backdrop", size_m, 0.1)
     r = min(radius_m, 0.9 * y, 0.9 * z)
     turn = np.linspace(0.0, 0.5 * math.pi, 17)
     ys = np.concatenate([[-y / 2], y / 2 - r + r * np.sin(turn), [y / 2]])
@@ -315,11 +343,11 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
     rows = [np.stack([np.full(len(ys), s * x / 2), ys, zs], axis=1) for s in (-1.0, 1.0)]
     sheet = grid(np.stack(rows, axis=1))
     parts = [
-        hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
-        hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
+        collision_hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
+        collision_hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
         *_cove(x, y, r),
     ]
-    return in_place([sheet], (painted(_color("backdrop", color), 0.85),), parts)
+    return make_solid_in_place([sheet], (painted_material(_color("backdrop", color), 0.85),), parts)
 
 
 def _four_legs(x: float, y: float, z: float) -> list[Box]:
@@ -387,7 +415,7 @@ def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:
     ]
     loops = [_rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
     rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in loops])
-    return joined([grid(rows), fan(loops[0][::-1]), fan(loops[-1])])
+    return join_patches([grid(rows), fan(loops[0][::-1]), fan(loops[-1])])
 
 
 def _bin_ribs(x: float, y: float, z: float, rim: float) -> list[Box]:
@@ -472,7 +500,7 @@ def rectangle(corner: Vec3, right: Vec3, up: Vec3) -> Patch:
     return grid(np.stack([np.stack([c, c + r]), np.stack([c + u, c + r + u])]))
 
 
-def checked_size(name: str, size_m: Sequence[float], least: float) -> Vec3:
+def check_size(name: str, size_m: Sequence[float], least: float) -> Vec3:
     """The size as floats. Raises AssetError if a side is below ``least`` or above 100 m."""
     if len(size_m) != 3 or not all(least <= float(v) <= 100.0 for v in size_m):
         raise AssetError(

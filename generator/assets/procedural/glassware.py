@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, pick, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.mesh import centred
-from generator.assets.procedural.shapes import fillet, lathe
-from generator.core.geometry import Material
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.patches import make_centred_solid
+from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe
+from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
 
 # What one wall leaves of white light; soda-lime glass has a touch of green.
 _TINTS: tuple[Vec3, ...] = (
@@ -24,10 +24,10 @@ _TINTS: tuple[Vec3, ...] = (
 
 def tumbler(seed: int) -> Solid:
     """A drinking glass with a thick bottom. Slots: glass."""
-    rng = rng_of("tumbler", seed)
-    height, top = between(0.085, 0.145, rng), between(0.03, 0.042, rng)
-    bottom, wall = top * between(0.74, 0.98, rng), between(0.0016, 0.0026, rng)
-    floor = between(0.006, 0.013, rng)
+    rng = variant_rng("tumbler", seed)
+    height, top = uniform_between(0.085, 0.145, rng), uniform_between(0.03, 0.042, rng)
+    bottom, wall = top * uniform_between(0.74, 0.98, rng), uniform_between(0.0016, 0.0026, rng)
+    floor = uniform_between(0.006, 0.013, rng)
     inner = bottom - wall + (top - bottom) * floor / height
     profile = fillet(
         [
@@ -43,19 +43,19 @@ def tumbler(seed: int) -> Solid:
         [0.0, 0.0, 0.0, 0.003, 0.45 * wall, 0.45 * wall, 0.005, 0.0],
         4,
     )
-    base = hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
-    walls = hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
-    return centred([lathe(profile, 48)], (_glass(rng),), [base, *walls])
+    base = collision_hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
+    walls = collision_hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
+    return make_centred_solid([lathe(profile, 48)], (_glass(rng),), [base, *walls])
 
 
 def wine_glass(seed: int) -> Solid:
     """A goblet on a stem. Slots: glass."""
-    rng = rng_of("wine_glass", seed)
-    foot, stem = between(0.032, 0.038, rng), between(0.0035, 0.0045, rng)
-    height, belly = between(0.17, 0.22, rng), between(0.034, 0.044, rng)
-    rim, wall = belly * between(0.72, 0.9, rng), between(0.0012, 0.0018, rng)
-    low = height * between(0.38, 0.48, rng)
-    wide = low + (height - low) * between(0.38, 0.5, rng)
+    rng = variant_rng("wine_glass", seed)
+    foot, stem = uniform_between(0.032, 0.038, rng), uniform_between(0.0035, 0.0045, rng)
+    height, belly = uniform_between(0.17, 0.22, rng), uniform_between(0.034, 0.044, rng)
+    rim, wall = belly * uniform_between(0.72, 0.9, rng), uniform_between(0.0012, 0.0018, rng)
+    low = height * uniform_between(0.38, 0.48, rng)
+    wide = low + (height - low) * uniform_between(0.38, 0.5, rng)
     outer = [(stem, low - 0.008), (0.62 * belly, low + 0.008), (belly, wide), (rim, height)]
     inner = [
         (rim - wall, height),
@@ -70,13 +70,13 @@ def wine_glass(seed: int) -> Solid:
     levels = [_around(rim, wall, height), _around(belly, wall, wide)]
     floor = (0.5 * belly, 0.62 * belly, low + 0.008)
     parts = [
-        hulls.frustum((foot, 0.0), (foot, 0.003)),
-        hulls.frustum((stem, 0.003), (stem, low - 0.008)),
-        hulls.frustum((stem, low - 0.008), (0.62 * belly, low + 0.008)),
-        *hulls.ring(floor, levels[1], 10),
-        *hulls.ring(levels[1], levels[0], 10),
+        collision_hulls.frustum((foot, 0.0), (foot, 0.003)),
+        collision_hulls.frustum((stem, 0.003), (stem, low - 0.008)),
+        collision_hulls.frustum((stem, low - 0.008), (0.62 * belly, low + 0.008)),
+        *collision_hulls.ring(floor, levels[1], 10),
+        *collision_hulls.ring(levels[1], levels[0], 10),
     ]
-    return centred([lathe(profile, 32)], (_glass(rng),), parts)
+    return make_centred_solid([lathe(profile, 32)], (_glass(rng),), parts)
 
 
 def _around(radius: float, wall: float, z: float) -> tuple[float, float, float]:
@@ -84,4 +84,4 @@ def _around(radius: float, wall: float, z: float) -> tuple[float, float, float]:
 
 
 def _glass(rng: Rng) -> Material:
-    return Material(pick(_TINTS, rng), roughness=0.04, transmission=1.0, ior=1.52, thin=False)
+    return Material(choose(_TINTS, rng), roughness=0.04, transmission=1.0, ior=1.52, thin=False)

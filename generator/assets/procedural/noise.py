@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.geometry import Float32
-from generator.core.streams import Rng
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.streams import Rng
 
 SIZE_PX = 512
 
@@ -112,7 +112,7 @@ def worley(cells: Cells, rng: Rng, jitter: float = 1.0, size_px: int = SIZE_PX) 
     return Worley(np.sqrt(nearest), np.sqrt(second), number, down * across)
 
 
-def warped(image: Float32, dy_px: Float32, dx_px: Float32) -> Float32:
+def warp_image(image: Float32, dy_px: Float32, dx_px: Float32) -> Float32:
     """The image sampled (nearest pixel, wrapping) at displaced places."""
     rows, columns = image.shape[:2]
     y = (np.arange(rows)[:, None] + np.round(dy_px).astype(np.int64)) % rows
@@ -121,7 +121,7 @@ def warped(image: Float32, dy_px: Float32, dx_px: Float32) -> Float32:
     return sampled
 
 
-def blurred(image: Float32, passes: int = 1) -> Float32:
+def blur_image(image: Float32, passes: int = 1) -> Float32:
     """A [1 2 1] / 4 blur in both directions, wrapping, repeated."""
     for _ in range(passes):
         for axis in (0, 1):

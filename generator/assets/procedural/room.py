@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.furniture import checked_size, rectangle
-from generator.assets.procedural.materials import STAINLESS, metal, painted, patterned
-from generator.assets.procedural.mesh import Patch, in_place
-from generator.assets.procedural.shapes import block
-from generator.core.geometry import Material
-from generator.core.se3 import Vec3
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.furniture import check_size, rectangle
+from gen_data.generator.assets.procedural.material_presets import (
+    STAINLESS,
+    metal_material,
+    painted_material,
+    patterned_material,
+)
+from gen_data.generator.assets.procedural.patches import Patch, make_solid_in_place
+from gen_data.generator.assets.procedural.surface_shapes import block
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import Vec3
 
 
 def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Solid:
@@ -26,7 +31,7 @@ def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Soli
     Raises:
         AssetError: if a size is not usable.
     """
-    x, y, z = checked_size("room", size_m, 1.0)
+    x, y, z = check_size("room", size_m, 1.0)
     has_door = door > 0 and y > 1.6 and z > 2.2
     has_window = window > 0 and x > 2.0 and z > 2.0
     patches = [
@@ -48,20 +53,22 @@ def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Soli
         ((-x / 2, -y / 2 - t, 0.0), (x / 2, -y / 2, z)),
         ((-x / 2, y / 2, 0.0), (x / 2, y / 2 + t, z)),
     ]
-    return in_place(patches, _room_materials(), [hulls.box(*slab) for slab in slabs])
+    return make_solid_in_place(
+        patches, _room_materials(), [collision_hulls.box(*slab) for slab in slabs]
+    )
 
 
 def _room_materials() -> tuple[Material, ...]:
     pane = Material((0.6, 0.7, 0.8), 0.08, emission_cd_m2=(230.0, 255.0, 290.0))
     return (
-        patterned("texture/wood_planks?seed=0", 1.6, 0.45),
-        painted("#f2f1ed", 0.9),
-        patterned("texture/plaster?seed=3", 1.5, 0.9),
-        painted("#eceae4", 0.5),
-        painted("#e9e7e1", 0.45),
-        painted("#f3f2ee", 0.4),
+        patterned_material("texture/wood_planks?seed=0", 1.6, 0.45),
+        painted_material("#f2f1ed", 0.9),
+        patterned_material("texture/plaster?seed=3", 1.5, 0.9),
+        painted_material("#eceae4", 0.5),
+        painted_material("#e9e7e1", 0.45),
+        painted_material("#f3f2ee", 0.4),
         pane,
-        metal(STAINLESS, 0.3),
+        metal_material(STAINLESS, 0.3),
     )
 
 

@@ -6,72 +6,90 @@ import math
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import (
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
-    ceramic,
-    jittered,
-    lighter,
-    linear,
-    plastic,
+    ceramic_material,
+    hex_to_linear,
+    jitter_color,
+    lighten,
+    plastic_material,
 )
-from generator.assets.procedural.mesh import Array, Patch, centred
-from generator.assets.procedural.shapes import Point2, circle, evenly, fillet, lathe, sweep
-from generator.core.geometry import Material
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid
+from gen_data.generator.assets.procedural.surface_shapes import (
+    Point2,
+    circle,
+    fillet,
+    lathe,
+    space_evenly,
+    sweep,
+)
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.streams import Rng
 
 
 def mug(seed: int) -> Solid:
     """A mug with its handle towards +X. Slots: outside, inside, handle."""
-    rng = rng_of("mug", seed)
-    height, top = between(0.085, 0.108, rng), between(0.037, 0.044, rng)
-    bottom = top * pick((1.0, 1.0, 0.94, 0.84), rng)
-    wall = between(0.0035, 0.0048, rng)
-    bulge = pick((0.0, 0.0, 0.0, 0.004), rng)
+    rng = variant_rng("mug", seed)
+    height, top = uniform_between(0.085, 0.108, rng), uniform_between(0.037, 0.044, rng)
+    bottom = top * choose((1.0, 1.0, 0.94, 0.84), rng)
+    wall = uniform_between(0.0035, 0.0048, rng)
+    bulge = choose((0.0, 0.0, 0.0, 0.004), rng)
     profile = _cup_profile(top, bottom, height, wall, bulge)
     path = _handle_path(top, bottom, height, wall, bulge, rng)
-    across = between(0.0045, 0.006, rng), between(0.0065, 0.0095, rng)
+    across = uniform_between(0.0045, 0.006, rng), uniform_between(0.0065, 0.0095, rng)
     section = circle(1.0, 12) * np.array(across)
     handle = sweep(path, section, scale=_flared(len(path)), slot=2)
-    outside = ceramic(rng)
-    inside = Material(lighter(outside.base_color, between(0.5, 0.95, rng)), outside.roughness)
-    grip = inside if chance(0.15, rng) else outside
-    rings = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    outside = ceramic_material(rng)
+    inside = Material(
+        lighten(outside.base_color, uniform_between(0.5, 0.95, rng)), outside.roughness
+    )
+    grip = inside if is_drawn(0.15, rng) else outside
+    rings = collision_hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
     if bulge > 0:
         middle = 0.5 * (top + bottom) + bulge
         rings = [
-            *hulls.ring((bottom - wall, bottom, wall), (middle - wall, middle, 0.5 * height), 8),
-            *hulls.ring((middle - wall, middle, 0.5 * height), (top - wall, top, height), 9),
+            *collision_hulls.ring(
+                (bottom - wall, bottom, wall), (middle - wall, middle, 0.5 * height), 8
+            ),
+            *collision_hulls.ring(
+                (middle - wall, middle, 0.5 * height), (top - wall, top, height), 9
+            ),
         ]
-    base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
-    grip_hulls = hulls.tube(path[[0, 4, 9, 13, 18, 22]], 0.8 * across[1])
-    return centred(
+    base = collision_hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
+    grip_hulls = collision_hulls.tube(path[[0, 4, 9, 13, 18, 22]], 0.8 * across[1])
+    return make_centred_solid(
         [*_two_sided(profile, 32), handle], (outside, inside, grip), [base, *rings, *grip_hulls]
     )
 
 
 def cup(seed: int) -> Solid:
     """A tumbler of opaque plastic. Slots: outside, inside."""
-    rng = rng_of("cup", seed)
-    height, top = between(0.08, 0.13, rng), between(0.034, 0.042, rng)
-    bottom, wall = top * between(0.72, 0.9, rng), between(0.0018, 0.0028, rng)
+    rng = variant_rng("cup", seed)
+    height, top = uniform_between(0.08, 0.13, rng), uniform_between(0.034, 0.042, rng)
+    bottom, wall = top * uniform_between(0.72, 0.9, rng), uniform_between(0.0018, 0.0028, rng)
     profile = _cup_profile(top, bottom, height, wall, 0.0)
-    outside = plastic(rng)
-    inside = outside if chance(0.6, rng) else plastic(rng, ("#f0f0ec", "#e8e4da"))
-    walls = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
-    base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
-    return centred(_two_sided(profile, 32), (outside, inside), [base, *walls])
+    outside = plastic_material(rng)
+    inside = outside if is_drawn(0.6, rng) else plastic_material(rng, ("#f0f0ec", "#e8e4da"))
+    walls = collision_hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    base = collision_hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
+    return make_centred_solid(_two_sided(profile, 32), (outside, inside), [base, *walls])
 
 
 def bowl(seed: int) -> Solid:
     """A bowl on a foot ring. Slots: outside, inside."""
-    rng = rng_of("bowl", seed)
-    radius = between(0.06, 0.125, rng)
-    height = radius * between(0.75, 1.0, rng) * (0.85 if radius > 0.1 else 1.0)
-    foot, lift = radius * between(0.45, 0.55, rng), between(0.004, 0.009, rng)
-    wall, fullness = between(0.003, 0.005, rng), between(0.55, 0.85, rng)
+    rng = variant_rng("bowl", seed)
+    radius = uniform_between(0.06, 0.125, rng)
+    height = radius * uniform_between(0.75, 1.0, rng) * (0.85 if radius > 0.1 else 1.0)
+    foot, lift = radius * uniform_between(0.45, 0.55, rng), uniform_between(0.004, 0.009, rng)
+    wall, fullness = uniform_between(0.003, 0.005, rng), uniform_between(0.55, 0.85, rng)
     outer = _bowl_curve(foot, radius, lift, height, fullness)
     inner = _offset(outer, wall)
     profile = [
@@ -84,27 +102,29 @@ def bowl(seed: int) -> Solid:
         *((float(r), float(z)) for r, z in inner[::-1]),
         (0.0, float(inner[0, 1])),
     ]
-    outside = ceramic(rng)
-    inside = outside if chance(0.5, rng) else ceramic(rng, ("#f4f1ea", "#e9e4d8", "#d9dfe2"))
+    outside = ceramic_material(rng)
+    inside = (
+        outside if is_drawn(0.5, rng) else ceramic_material(rng, ("#f4f1ea", "#e9e4d8", "#d9dfe2"))
+    )
     # The floor lies about as high as the wall's outside after a fifth of its curve.
     levels = []
     for i, z in ((2, float(outer[2, 1])), (5, float(outer[5, 1])), (9, height + 0.5 * wall)):
         levels.append((float(np.interp(z, inner[:, 1], inner[:, 0])), float(outer[i, 0]), z))
     parts = [
-        hulls.frustum((foot, 0.0), (levels[0][1], levels[0][2])),
-        *hulls.ring(levels[0], levels[1], 9),
-        *hulls.ring(levels[1], levels[2], 14),
+        collision_hulls.frustum((foot, 0.0), (levels[0][1], levels[0][2])),
+        *collision_hulls.ring(levels[0], levels[1], 9),
+        *collision_hulls.ring(levels[1], levels[2], 14),
     ]
-    return centred(_two_sided(profile, 40), (outside, inside), parts)
+    return make_centred_solid(_two_sided(profile, 40), (outside, inside), parts)
 
 
 def plate(seed: int) -> Solid:
     """A flat plate with a raised rim. Slots: outside, inside."""
-    rng = rng_of("plate", seed)
-    radius = pick((0.085, 0.105, 0.13, 0.14), rng) * between(0.97, 1.03, rng)
-    rise, wall = between(0.016, 0.026, rng), between(0.0035, 0.005, rng)
-    well, foot = radius * between(0.6, 0.72, rng), radius * between(0.5, 0.58, rng)
-    step = rise * between(0.45, 0.7, rng)
+    rng = variant_rng("plate", seed)
+    radius = choose((0.085, 0.105, 0.13, 0.14), rng) * uniform_between(0.97, 1.03, rng)
+    rise, wall = uniform_between(0.016, 0.026, rng), uniform_between(0.0035, 0.005, rng)
+    well, foot = radius * uniform_between(0.6, 0.72, rng), radius * uniform_between(0.5, 0.58, rng)
+    step = rise * uniform_between(0.45, 0.7, rng)
     upper = fillet(
         [
             (radius, rise),
@@ -130,11 +150,13 @@ def plate(seed: int) -> Solid:
         3,
     )
     profile = [*lower, (radius + 0.4 * wall, rise - 0.4 * wall), *upper]
-    outside = ceramic(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
+    outside = ceramic_material(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
     inside = (
         outside
-        if chance(0.7, rng)
-        else Material(jittered(linear(pick(GLAZES, rng)), 0.08, rng), outside.roughness)
+        if is_drawn(0.7, rng)
+        else Material(
+            jitter_color(hex_to_linear(choose(GLAZES, rng)), 0.08, rng), outside.roughness
+        )
     )
     rim = [
         (well - 0.004, 0.0015),
@@ -143,9 +165,9 @@ def plate(seed: int) -> Solid:
         (radius + 0.4 * wall, rise),
         (radius + 0.4 * wall, rise - 0.8 * wall),
     ]
-    walls = hulls.wedges(rim, 20)
-    base = hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
-    return centred(_two_sided(profile, 48), (outside, inside), [base, *walls])
+    walls = collision_hulls.wedges(rim, 20)
+    base = collision_hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
+    return make_centred_solid(_two_sided(profile, 48), (outside, inside), [base, *walls])
 
 
 def _two_sided(profile: list[Point2], segments: int) -> list[Patch]:
@@ -193,22 +215,22 @@ def _handle_path(
     top: float, bottom: float, height: float, wall: float, bulge: float, rng: Rng
 ) -> Array:
     """Centre line of a handle in the plane y = 0; its ends are inside the wall."""
-    high, low = height * between(0.78, 0.86, rng), height * between(0.16, 0.26, rng)
-    reach = between(0.026, 0.036, rng)
+    high, low = height * uniform_between(0.78, 0.86, rng), height * uniform_between(0.16, 0.26, rng)
+    reach = uniform_between(0.026, 0.036, rng)
 
     def wall_at(z: float) -> float:
         t = z / height
         bow = bulge * (1.0 - abs(2.0 * t - 1.0))
         return bottom + (top - bottom) * t + bow - 0.5 * wall
 
-    belly, square = between(-0.25, 0.0, rng), between(0.45, 0.75, rng)
+    belly, square = uniform_between(-0.25, 0.0, rng), uniform_between(0.45, 0.75, rng)
     turn = np.linspace(0.5 * math.pi, -0.5 * math.pi, 181)
     # A superellipse: it leaves the wall level and bulges less below where belly is negative.
     out = np.maximum(np.cos(turn), 0.0) ** square * (1.0 + 0.5 * belly * (1.0 - np.sin(turn)))
     z = low + (high - low) * 0.5 * (1.0 + np.sin(turn))
     x = np.array([wall_at(float(h)) for h in z]) + reach * out
     x[[0, -1]] = wall_at(high), wall_at(low)
-    return evenly(np.stack([x, np.zeros_like(x), z], axis=1), 23)
+    return space_evenly(np.stack([x, np.zeros_like(x), z], axis=1), 23)
 
 
 def _flared(count: int) -> Array:

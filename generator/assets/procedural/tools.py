@@ -6,25 +6,30 @@ import math
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import (
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
     BLACK_OXIDE,
     PLASTICS,
     STEEL,
     WOODS,
     ZINC,
-    jittered,
-    linear,
-    metal,
-    plastic,
+    hex_to_linear,
+    jitter_color,
+    metal_material,
+    plastic_material,
 )
-from generator.assets.procedural.mesh import Array, Patch, centred, joined, rotated
-from generator.assets.procedural.shapes import (
+from gen_data.generator.assets.procedural.patches import (
+    Array,
+    Patch,
+    join_patches,
+    make_centred_solid,
+    rotate,
+)
+from gen_data.generator.assets.procedural.surface_shapes import (
     circle,
     cone,
-    extruded,
+    extrude,
     fan,
     fillet,
     grid,
@@ -32,23 +37,29 @@ from generator.assets.procedural.shapes import (
     rounded_box,
     sweep,
 )
-from generator.core.geometry import Material
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.core.asset_types import Material
 
 _LAID = 0.5 * math.pi
 
 
 def screwdriver(seed: int) -> Solid:
     """A screwdriver with a fluted handle, slotted or pointed tip. Slots: handle, steel, ring."""
-    rng = rng_of("screwdriver", seed)
-    radius, grip = between(0.011, 0.016, rng), between(0.085, 0.115, rng)
-    blade, shaft = between(0.06, 0.15, rng), between(0.0025, 0.0038, rng)
-    handle = _fluted_handle(radius, grip, pick((0, 6, 6, 8), rng))
+    rng = variant_rng("screwdriver", seed)
+    radius, grip = uniform_between(0.011, 0.016, rng), uniform_between(0.085, 0.115, rng)
+    blade, shaft = uniform_between(0.06, 0.15, rng), uniform_between(0.0025, 0.0038, rng)
+    handle = _fluted_handle(radius, grip, choose((0, 6, 6, 8), rng))
     end = grip + blade
     pieces = [
         handle,
         cone((shaft, grip - 0.01), (shaft, end - 0.012), 16, 1),
         cone((0.45 * radius, grip - 0.001), (0.42 * radius, grip + 0.004), 20, 2),
-        _flat_tip(shaft, end) if chance(0.5, rng) else _pointed_tip(shaft, end),
+        _flat_tip(shaft, end) if is_drawn(0.5, rng) else _pointed_tip(shaft, end),
     ]
     profile = [
         (0.55 * radius, 0.0),
@@ -57,36 +68,48 @@ def screwdriver(seed: int) -> Solid:
         (0.7 * radius, 0.82 * grip),
         (0.6 * radius, grip),
     ]
-    parts = [*hulls.stack(profile, 16), hulls.frustum((shaft, grip), (shaft, end), 12)]
-    materials = (plastic(rng), metal(ZINC, between(0.2, 0.35, rng)), plastic(rng, ("#202124",)))
-    return centred(
+    parts = [
+        *collision_hulls.stack(profile, 16),
+        collision_hulls.frustum((shaft, grip), (shaft, end), 12),
+    ]
+    materials = (
+        plastic_material(rng),
+        metal_material(ZINC, uniform_between(0.2, 0.35, rng)),
+        plastic_material(rng, ("#202124",)),
+    )
+    return make_centred_solid(
         [piece.rotated("y", _LAID) for piece in pieces],
         materials,
-        [rotated(part, "y", _LAID) for part in parts],
+        [rotate(part, "y", _LAID) for part in parts],
     )
 
 
 def hammer(seed: int) -> Solid:
     """A joiner's hammer with wooden or plastic handle. Slots: handle, head."""
-    rng = rng_of("hammer", seed)
-    length, size = between(0.26, 0.33, rng), between(0.9, 1.1, rng)
+    rng = variant_rng("hammer", seed)
+    length, size = uniform_between(0.26, 0.33, rng), uniform_between(0.9, 1.1, rng)
     handle = _hammer_handle(length)
     head, head_hulls = _hammer_head()
-    wood = Material(jittered(linear(pick(WOODS[:4], rng)), 0.1, rng), 0.55)
-    grip = wood if chance(0.6, rng) else plastic(rng, PLASTICS)
-    steel = pick((metal(STEEL, 0.35), metal(BLACK_OXIDE, 0.45)), rng)
+    wood = Material(jitter_color(hex_to_linear(choose(WOODS[:4], rng)), 0.1, rng), 0.55)
+    grip = wood if is_drawn(0.6, rng) else plastic_material(rng, PLASTICS)
+    steel = choose((metal_material(STEEL, 0.35), metal_material(BLACK_OXIDE, 0.45)), rng)
     at = length - 0.005
     share = handle.corners_m[:, :, 0].mean(axis=1) / length
-    parts = [hulls.extreme(handle.corners_m[abs(share - m) < 0.2], 40) for m in (0.18, 0.5, 0.8)]
+    parts = [
+        collision_hulls.extreme(handle.corners_m[abs(share - m) < 0.2], 40)
+        for m in (0.18, 0.5, 0.8)
+    ]
     parts += [hull * size + np.array([at, 0.0, 0.0]) for hull in head_hulls]
-    return centred([handle, head.scaled(size, size, size).moved(at)], (grip, steel), parts)
+    return make_centred_solid(
+        [handle, head.scaled(size, size, size).moved(at)], (grip, steel), parts
+    )
 
 
 def wrench(seed: int) -> Solid:
     """A combination wrench: open jaw at +X, ring at -X. Slot: steel."""
-    rng = rng_of("wrench", seed)
-    across = pick((0.010, 0.012, 0.013, 0.015, 0.017, 0.019), rng)
-    length = across * between(10.5, 12.5, rng)
+    rng = variant_rng("wrench", seed)
+    across = choose((0.010, 0.012, 0.013, 0.015, 0.017, 0.019), rng)
+    length = across * uniform_between(10.5, 12.5, rng)
     thick, bar = 0.33 * across + 0.0012, 0.36 * across + 0.0015
     head, ring = 1.12 * across, 0.8 * across
     centre = np.array([length - head, 0.0])
@@ -100,22 +123,27 @@ def wrench(seed: int) -> Solid:
     )
     bevel = 0.12 * thick
     patches = [
-        extruded(_turned(_jaw(across, head)) + centre, thick, bevel).moved(z=-0.5 * thick),
-        extruded(shank, 0.8 * thick, 0.3 * thick).moved(z=-0.4 * thick),
-        extruded(circle(ring, 32), 1.3 * thick, bevel, [circle(0.57 * across, 24)]).moved(
+        extrude(_turned(_jaw(across, head)) + centre, thick, bevel).moved(z=-0.5 * thick),
+        extrude(shank, 0.8 * thick, 0.3 * thick).moved(z=-0.4 * thick),
+        extrude(circle(ring, 32), 1.3 * thick, bevel, [circle(0.57 * across, 24)]).moved(
             z=-0.65 * thick
         ),
     ]
-    finish = pick(
-        (metal((0.72, 0.73, 0.74), 0.18), metal(STEEL, 0.35), metal(BLACK_OXIDE, 0.4)), rng
+    finish = choose(
+        (
+            metal_material((0.72, 0.73, 0.74), 0.18),
+            metal_material(STEEL, 0.35),
+            metal_material(BLACK_OXIDE, 0.4),
+        ),
+        rng,
     )
     h = 0.5 * thick
     parts = [
         *(_slab(_turned(piece) + centre, h) for piece in _jaw_pieces(across, head)),
         _slab(shank, 0.8 * h),
-        *hulls.ring((0.57 * across, ring, -1.3 * h), (0.57 * across, ring, 1.3 * h), 8),
+        *collision_hulls.ring((0.57 * across, ring, -1.3 * h), (0.57 * across, ring, 1.3 * h), 8),
     ]
-    return centred(patches, (finish,), parts)
+    return make_centred_solid(patches, (finish,), parts)
 
 
 def _jaw(across: float, radius: float) -> Array:
@@ -165,7 +193,7 @@ def _fluted_handle(radius: float, length: float, flutes: int) -> Patch:
     z = np.broadcast_to(length * t[:, None], r.shape)
     rows = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=2)
     rows = np.concatenate([rows, rows[:, :1]], axis=1)
-    return joined([grid(rows), fan(rows[0, :0:-1]), fan(rows[-1, :-1])])
+    return join_patches([grid(rows), fan(rows[0, :0:-1]), fan(rows[-1, :-1])])
 
 
 def _pointed_tip(radius: float, end: float) -> Patch:
@@ -205,11 +233,11 @@ def _hammer_head() -> tuple[Patch, list[Array]]:
     face = lathe(fillet(profile, [0.0, 0.0, 0.004, 0.003, 0.0015, 0.0], 2), 24)
     peen = _peen()
     parts = [
-        hulls.box((-0.015, -0.018, -0.013), (0.015, 0.018, 0.013)),
-        rotated(hulls.frustum((0.0138, 0.015), (0.0138, 0.058), 16), "x", -_LAID),
-        hulls.extreme(peen.corners_m, 24),
+        collision_hulls.box((-0.015, -0.018, -0.013), (0.015, 0.018, 0.013)),
+        rotate(collision_hulls.frustum((0.0138, 0.015), (0.0138, 0.058), 16), "x", -_LAID),
+        collision_hulls.extreme(peen.corners_m, 24),
     ]
-    return joined([eye, face.rotated("x", -_LAID), peen]).painted(1), parts
+    return join_patches([eye, face.rotated("x", -_LAID), peen]).painted(1), parts
 
 
 def _flat_tip(radius: float, end: float) -> Patch:
@@ -236,4 +264,4 @@ def _peen() -> Patch:
             [(a * wide, -y, b * thin) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]
         )
     loops = np.array(rows)
-    return joined([grid(loops), fan(loops[0, :0:-1]), fan(loops[-1, :-1])])
+    return join_patches([grid(loops), fan(loops[0, :0:-1]), fan(loops[-1, :-1])])

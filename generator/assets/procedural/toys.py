@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import (
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
     PLASTICS,
     WOODS,
-    ceramic,
-    jittered,
-    linear,
-    plastic,
-    printed,
+    ceramic_material,
+    hex_to_linear,
+    jitter_color,
+    plastic_material,
+    printed_material,
 )
-from generator.assets.procedural.mesh import centred, in_place
-from generator.assets.procedural.shapes import ball as sphere
-from generator.assets.procedural.shapes import fillet, lathe, rounded_box, spline
-from generator.core.geometry import Material
+from gen_data.generator.assets.procedural.patches import make_centred_solid, make_solid_in_place
+from gen_data.generator.assets.procedural.surface_shapes import ball as sphere
+from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe, rounded_box, spline
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.core.asset_types import Material
 
 _SHAPES = (
     (0.04, 0.04, 0.04),
@@ -32,31 +37,35 @@ _SHAPES = (
 
 def block(seed: int) -> Solid:
     """A wooden or plastic building block. Slot: body."""
-    rng = rng_of("block", seed)
-    x, y, z = (side * between(0.95, 1.05, rng) for side in _SHAPES[seed % len(_SHAPES)])
-    bare = chance(0.25, rng)
+    rng = variant_rng("block", seed)
+    x, y, z = (side * uniform_between(0.95, 1.05, rng) for side in _SHAPES[seed % len(_SHAPES)])
+    bare = is_drawn(0.25, rng)
     paint = (
-        Material(jittered(linear(pick(WOODS, rng)), 0.08, rng), 0.6)
+        Material(jitter_color(hex_to_linear(choose(WOODS, rng)), 0.08, rng), 0.6)
         if bare
-        else plastic(rng, PLASTICS[:8])
+        else plastic_material(rng, PLASTICS[:8])
     )
     body = rounded_box((x, y, z), 0.0025, 2)
-    return centred([body], (paint,), [hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))])
+    return make_centred_solid(
+        [body], (paint,), [collision_hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))]
+    )
 
 
 def ball(seed: int) -> Solid:
     """A tennis, rubber, beach, basket or foot ball; the small ones are toys. Slot: cover."""
-    rng = rng_of("ball", seed)
+    rng = variant_rng("ball", seed)
     kind = ball_kind(seed)
-    radius = {"tennis": 0.0334, "rubber": between(0.02, 0.035, rng)}.get(
-        kind, between(0.05, 0.09, rng)
+    radius = {"tennis": 0.0334, "rubber": uniform_between(0.02, 0.035, rng)}.get(
+        kind, uniform_between(0.05, 0.09, rng)
     )
-    rough = {"tennis": 0.9, "basket": 0.65}.get(kind, between(0.3, 0.5, rng))
+    rough = {"tennis": 0.9, "basket": 0.65}.get(kind, uniform_between(0.3, 0.5, rng))
     body = sphere(lambda d: radius * d, 22, 36)
-    cover = printed(f"texture/ball_cover?seed={seed}", rough)
+    cover = printed_material(f"texture/ball_cover?seed={seed}", rough)
     # One small hull has flat sides that a ball would rest on; four that are turned have not.
-    parts = [hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)]
-    return centred([body], (cover,), parts)
+    parts = [
+        collision_hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)
+    ]
+    return make_centred_solid([body], (cover,), parts)
 
 
 def plain_sphere(diameter_m: float = 0.2) -> Solid:
@@ -70,7 +79,7 @@ def plain_sphere(diameter_m: float = 0.2) -> Solid:
     radius = 0.5 * diameter_m
     body = sphere(lambda d: radius * d, 48, 96).moved(0.0, 0.0, radius)
     surface = Material((0.5, 0.5, 0.5), 0.5)
-    return in_place([body], (surface,), [hulls.extreme(body.corners_m)])
+    return make_solid_in_place([body], (surface,), [collision_hulls.extreme(body.corners_m)])
 
 
 def ball_kind(seed: int) -> str:
@@ -80,8 +89,8 @@ def ball_kind(seed: int) -> str:
 
 def candle(seed: int) -> Solid:
     """A pillar candle with a wick. Slots: wax, wick."""
-    rng = rng_of("candle", seed)
-    radius, height = between(0.022, 0.04, rng), between(0.05, 0.15, rng)
+    rng = variant_rng("candle", seed)
+    radius, height = uniform_between(0.022, 0.04, rng), uniform_between(0.05, 0.15, rng)
     wax = fillet(
         [
             (0.0, 0.0),
@@ -104,23 +113,25 @@ def candle(seed: int) -> Solid:
         1,
     )
     colors = ("#f1e8d2", "#e9dcc0", "#a83a34", "#3f5a4a", "#d9a441", "#7d8fa3", "#c58b8b")
-    material = Material(jittered(linear(pick(colors, rng)), 0.05, rng), between(0.4, 0.6, rng))
-    return centred(
+    material = Material(
+        jitter_color(hex_to_linear(choose(colors, rng)), 0.05, rng), uniform_between(0.4, 0.6, rng)
+    )
+    return make_centred_solid(
         [lathe(wax, 32), wick],
         (material, Material((0.02, 0.02, 0.02), 0.9)),
         [
-            hulls.frustum((radius, 0.0), (radius, height)),
-            hulls.frustum((0.001, height), (0.001, height + 0.0075), 6),
+            collision_hulls.frustum((radius, 0.0), (radius, height)),
+            collision_hulls.frustum((0.001, height), (0.001, height + 0.0075), 6),
         ],
     )
 
 
 def vase(seed: int) -> Solid:
     """A ceramic vase, hollow to look at. Slots: outside, inside."""
-    rng = rng_of("vase", seed)
-    height, belly = between(0.15, 0.27, rng), between(0.04, 0.06, rng)
-    foot, neck = belly * between(0.55, 0.75, rng), belly * between(0.3, 0.6, rng)
-    mouth, widest = neck * between(1.1, 1.6, rng), between(0.3, 0.55, rng)
+    rng = variant_rng("vase", seed)
+    height, belly = uniform_between(0.15, 0.27, rng), uniform_between(0.04, 0.06, rng)
+    foot, neck = belly * uniform_between(0.55, 0.75, rng), belly * uniform_between(0.3, 0.6, rng)
+    mouth, widest = neck * uniform_between(1.1, 1.6, rng), uniform_between(0.3, 0.55, rng)
     curve = spline(
         [
             (foot, 0.004),
@@ -135,14 +146,14 @@ def vase(seed: int) -> Solid:
     inner = [(float(r) - wall, float(z)) for r, z in curve[::-1] if z > 0.02]
     outer = [(float(r), float(z)) for r, z in curve]
     profile = [(0.0, 0.001), (foot - 0.004, 0.001), (foot - 0.003, 0.0), (foot, 0.0), *outer]
-    outside = ceramic(rng, GLAZES)
+    outside = ceramic_material(rng, GLAZES)
     inside = Material(outside.base_color, 0.4)
     stages = [(foot, 0.0), *outer[2:16:2], (mouth, height + 0.0015)]
-    return centred(
+    return make_centred_solid(
         [
             lathe(profile, 32),
             lathe([outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)], 32, 1),
         ],
         (outside, inside),
-        hulls.stack(stages),
+        collision_hulls.stack(stages),
     )

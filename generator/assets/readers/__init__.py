@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
-from generator.assets.folder import Folder
-from generator.assets.readers.gltf import read_gltf
-from generator.assets.readers.obj import read_obj
-from generator.assets.readers.ply import read_ply
-from generator.assets.readers.source import Source, check_face_count
-from generator.assets.readers.stl import read_stl
-from generator.assets.readers.usd import read_usd
-from generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.readers.gltf import read_gltf
+from gen_data.generator.assets.readers.mesh_source import MeshSource, check_face_count
+from gen_data.generator.assets.readers.obj import read_obj
+from gen_data.generator.assets.readers.ply import read_ply
+from gen_data.generator.assets.readers.stl import read_stl
+from gen_data.generator.assets.readers.usd import read_usd
+from gen_data.generator.core.errors import AssetError, did_you_mean
 
-__all__ = ["MESH_SUFFIXES", "Source", "read_mesh"]
+__all__ = ["MESH_SUFFIXES", "MeshSource", "read_mesh"]
 
-_READERS: dict[str, Callable[[Folder, str, bool], Source]] = {
+_READERS: dict[str, Callable[[Folder, str, bool], MeshSource]] = {
     ".glb": read_gltf,
     ".gltf": read_gltf,
     ".obj": read_obj,
@@ -30,7 +30,7 @@ _READERS: dict[str, Callable[[Folder, str, bool], Source]] = {
 MESH_SUFFIXES = frozenset(_READERS)
 
 
-def read_mesh(folder: Folder, relative: str, *, materials: bool = True) -> Source:
+def read_mesh(folder: Folder, relative: str, *, materials: bool = True) -> MeshSource:
     """Triangles of a mesh file, read according to its suffix.
 
     Args:

@@ -19,13 +19,19 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.assets.folder import Folder
-from generator.assets.images import decode
-from generator.assets.readers.gltf_materials import Images, gltf_material
-from generator.assets.readers.source import MAX_FACES, Source
-from generator.assets.soup import Float64, Int64, Slot, Soup, joined
-from generator.core.errors import AssetError
-from generator.core.geometry import UInt8
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.image_decoding import decode_image
+from gen_data.generator.assets.readers.gltf_materials import Images, gltf_material
+from gen_data.generator.assets.readers.mesh_source import MAX_FACES, MeshSource
+from gen_data.generator.assets.triangle_soup import (
+    Float64,
+    Int64,
+    MaterialSlot,
+    TriangleSoup,
+    join_soups,
+)
+from gen_data.generator.core.asset_types import UInt8
+from gen_data.generator.core.errors import AssetError
 
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -46,7 +52,7 @@ class _Document:
     images: dict[str, bytes] = field(default_factory=dict)
 
 
-def read_gltf(folder: Folder, relative: str, materials: bool) -> Source:
+def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
     """Triangles of the default scene of a glTF file, in its own axes (Y up).
 
     Raises:
@@ -56,7 +62,10 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> Source:
     try:
         document = _document(folder, relative, data)
         described = _list(document, "materials")
-        slots = (*(_slot(document, m) if materials else Slot() for m in described), Slot())
+        slots = (
+            *(_slot(document, m) if materials else MaterialSlot() for m in described),
+            MaterialSlot(),
+        )
         parts = [
             part
             for matrix, mesh in _placed_meshes(document)
@@ -69,7 +78,7 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> Source:
         ) from None
     if not parts:
         raise AssetError(f"{folder.root / relative}: holds no triangles; export it with its mesh")
-    return Source(joined(parts), document.images)
+    return MeshSource(join_soups(parts), document.images)
 
 
 def _document(folder: Folder, relative: str, data: bytes) -> _Document:
@@ -160,8 +169,8 @@ def _product(a: Float64, b: Float64) -> Float64:
 
 
 def _primitives(
-    document: _Document, mesh: Mapping[str, Any], matrix: Float64, slots: tuple[Slot, ...]
-) -> list[Soup]:
+    document: _Document, mesh: Mapping[str, Any], matrix: Float64, slots: tuple[MaterialSlot, ...]
+) -> list[TriangleSoup]:
     soups = []
     for primitive in mesh["primitives"]:
         if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
@@ -171,7 +180,9 @@ def _primitives(
     return soups
 
 
-def _primitive(document: _Document, primitive: Mapping[str, Any], slot: Slot) -> Soup:
+def _primitive(
+    document: _Document, primitive: Mapping[str, Any], slot: MaterialSlot
+) -> TriangleSoup:
     attributes = primitive["attributes"]
     positions = _accessor(document, attributes["POSITION"], 3).astype(np.float64)
     if "indices" in primitive:
@@ -189,7 +200,7 @@ def _primitive(document: _Document, primitive: Mapping[str, Any], slot: Slot) ->
         # glTF counts rows of the image from the top.
         uvs = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1)
     zeros = np.zeros(len(faces), dtype=np.int64)
-    return Soup(
+    return TriangleSoup(
         corners=positions[faces],
         uvs=None if uvs is None else uvs[faces],
         normals=None if normals is None else normals[faces],
@@ -266,17 +277,17 @@ def _from_uri(document: _Document, uri: str) -> bytes:
         raise ValueError("a data URI that is not base64") from None
 
 
-def _slot(document: _Document, description: Mapping[str, Any]) -> Slot:
+def _slot(document: _Document, description: Mapping[str, Any]) -> MaterialSlot:
     place = f"{document.folder.root / document.relative}"
 
     def pixels(name: str) -> UInt8:
         encoded = document.images.get(name) or document.folder.read(name)
-        return decode(encoded, f"{place}#{name}", alpha=True)
+        return decode_image(encoded, f"{place}#{name}", alpha=True)
 
     name = str(description.get("name", ""))
     images = Images(lambda reference: _image(document, reference), cache(pixels))
     try:
-        return Slot(name, gltf_material(description, images), from_file=True)
+        return MaterialSlot(name, gltf_material(description, images), from_file=True)
     except ValueError as error:
         raise ValueError(f"material '{name[:40]}': {error}") from None
 

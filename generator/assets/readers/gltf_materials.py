@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from generator.assets.maps import Maps
-from generator.assets.readers.source import EVEN, at_least, fraction
-from generator.core.geometry import Material, UInt8
+from gen_data.generator.assets.readers.mesh_source import EVEN, clamp_min, fraction
+from gen_data.generator.assets.texture_maps import TextureMaps
+from gen_data.generator.core.asset_types import Material, UInt8
 
 _GONE = 8
 """What is covered less than this [1/255] in a blended image is a hole."""
@@ -51,8 +51,8 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
     coat = further.get("KHR_materials_clearcoat", {})
     clear = further.get("KHR_materials_transmission", {})
     thickness = float(further.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0))
-    ior = at_least(1.0, further.get("KHR_materials_ior", {}).get("ior", 1.5), "ior")
-    maps = Maps(
+    ior = clamp_min(1.0, further.get("KHR_materials_ior", {}).get("ior", 1.5), "ior")
+    maps = TextureMaps(
         albedo=_named(pbr, "baseColorTexture", images),
         alpha=cover,
         normal=_named(description, "normalTexture", images),
@@ -138,9 +138,9 @@ def _emission(
 ) -> tuple[tuple[float, float, float], str]:
     """Luminance [cd/m^2] (nits, as KHR_materials_emissive_strength counts) and its image."""
     strength = further.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
-    strength = at_least(0.0, strength, "emissiveStrength")
+    strength = clamp_min(0.0, strength, "emissiveStrength")
     factors = description.get("emissiveFactor", (0.0, 0.0, 0.0))
-    red, green, blue = (at_least(0.0, c, "emissiveFactor") * strength for c in factors)
+    red, green, blue = (clamp_min(0.0, c, "emissiveFactor") * strength for c in factors)
     glows = max(red, green, blue) > 0.0
     return (red, green, blue), _named(description, "emissiveTexture", images) if glows else ""
 

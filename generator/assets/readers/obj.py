@@ -14,19 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from generator.assets.folder import Folder
-from generator.assets.maps import Maps
-from generator.assets.readers.source import (
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.readers.mesh_source import (
     MAX_FACES,
-    Source,
-    at_least,
+    MeshSource,
+    clamp_min,
     fraction,
-    linear_of_srgb,
-    roughness_of_shininess,
+    shininess_to_roughness,
+    srgb_to_linear,
 )
-from generator.assets.soup import Float64, Int64, Slot, Soup
-from generator.core.errors import AssetError
-from generator.core.geometry import Material
+from gen_data.generator.assets.texture_maps import TextureMaps
+from gen_data.generator.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.errors import AssetError
 
 
 @dataclass
@@ -45,7 +45,7 @@ class _Statements:
     libraries: list[str] = field(default_factory=list)
 
 
-def read_obj(folder: Folder, relative: str, materials: bool) -> Source:
+def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
     """Triangles of an OBJ file with the materials of its MTL files.
 
     Polygons are cut into fans. Each ``o`` (or, where there is none, each ``g``) is a group.
@@ -63,7 +63,7 @@ def read_obj(folder: Folder, relative: str, materials: bool) -> Source:
         raise AssetError(
             f"{folder.root / relative}: malformed OBJ ({error}); export it again"
         ) from None
-    return Source(soup)
+    return MeshSource(soup)
 
 
 def _statements(text: str) -> _Statements:
@@ -114,7 +114,7 @@ def _absolute(token: str, s: _Statements) -> str:
     return "/".join(parts)
 
 
-def _soup(s: _Statements, slots: tuple[Slot, ...]) -> Soup:
+def _soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup:
     sizes = np.array(s.polygon_sizes, dtype=np.int64)
     if (sizes < 3).any():
         raise ValueError("a face with fewer than three corners")
@@ -127,7 +127,7 @@ def _soup(s: _Statements, slots: tuple[Slot, ...]) -> Soup:
     texcoords = _table(s.texcoords, 2, "vt")
     normals = _table(s.normals, 3, "vn")
     groups = s.polygon_objects if max(s.polygon_objects, default=0) else s.polygon_groups
-    return Soup(
+    return TriangleSoup(
         corners=_looked_up(positions, indices[..., 0], "vertex", required=True),
         uvs=_looked_up(texcoords, indices[..., 1], "vt") if len(texcoords) else None,
         normals=_looked_up(normals, indices[..., 2], "vn")
@@ -176,7 +176,7 @@ def _looked_up(table: Float64, indices: Int64, name: str, *, required: bool = Fa
     return looked_up
 
 
-def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[Slot, ...]:
+def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[MaterialSlot, ...]:
     defined: dict[str, Material] = {}
     missing = ""
     for library in s.libraries:
@@ -186,14 +186,14 @@ def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[Slot, ...]:
         else:
             missing = path
     return tuple(
-        Slot(
+        MaterialSlot(
             name,
             _untinted(defined[name]),
             from_file=True,
             declared_color=defined[name].base_color,
         )
         if name in defined
-        else Slot(name, missing_library=missing if name else "")
+        else MaterialSlot(name, missing_library=missing if name else "")
         for name in s.materials
     )
 
@@ -203,7 +203,7 @@ class _Definition:
     """What an MTL file says of one material."""
 
     material: Material = field(default_factory=Material)
-    maps: Maps = field(default_factory=Maps)
+    maps: TextureMaps = field(default_factory=TextureMaps)
     dissolved: bool = False
 
     def finished(self) -> Material:
@@ -255,14 +255,14 @@ def _add(known: _Definition, key: str, rest: str, refer: Callable[[str], str]) -
     numbers = [float(x) for x in rest.split()]
     if key == "Kd":
         red, green, blue = (numbers * 3)[:3]
-        color = linear_of_srgb((red, green, blue))
+        color = srgb_to_linear((red, green, blue))
         known.material = replace(known.material, base_color=color)
     elif key == "Ke":
-        red, green, blue = (at_least(0.0, c, key) for c in (numbers * 3)[:3])
+        red, green, blue = (clamp_min(0.0, c, key) for c in (numbers * 3)[:3])
         known.material = replace(known.material, emission_cd_m2=(red, green, blue))
     elif key == "Ns":
         if numbers[0] > 0.0:
-            roughness = roughness_of_shininess(numbers[0])
+            roughness = shininess_to_roughness(numbers[0])
             known.material = replace(known.material, roughness=roughness)
     elif key == "Ni":
         # Less than 1 is how exporters say that they do not know.

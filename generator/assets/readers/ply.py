@@ -8,16 +8,16 @@ import warnings
 
 import numpy as np
 
-from generator.assets.folder import Folder
-from generator.assets.readers.source import Source
-from generator.assets.soup import Soup
-from generator.core.errors import AssetError
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.readers.mesh_source import MeshSource
+from gen_data.generator.assets.triangle_soup import TriangleSoup
+from gen_data.generator.core.errors import AssetError
 
 _MAX_HEADER_BYTES = 65536
 _ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)\s*$", re.MULTILINE)
 
 
-def read_ply(folder: Folder, relative: str, _materials: bool) -> Source:
+def read_ply(folder: Folder, relative: str, _materials: bool) -> MeshSource:
     """Triangles of a PLY file; colours per vertex are ignored.
 
     Raises:
@@ -32,7 +32,7 @@ def read_ply(folder: Folder, relative: str, _materials: bool) -> Source:
     # Every element of every list takes a byte at least: a larger count is a lie.
     if not all(c.isdigit() and len(c) < 12 and int(c) <= len(data) for c in counts):
         raise AssetError(f"{path}: its header claims more than it holds; export it again")
-    return Source(Soup.of(_triangles(data, str(path))))
+    return MeshSource(TriangleSoup.of(_triangles(data, str(path))))
 
 
 def _triangles(data: bytes, path: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.folder import Folder
-from generator.assets.readers.source import Source, check_face_count
-from generator.assets.soup import Float64, Soup
-from generator.core.errors import AssetError
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.readers.mesh_source import MeshSource, check_face_count
+from gen_data.generator.assets.triangle_soup import Float64, TriangleSoup
+from gen_data.generator.core.errors import AssetError
 
 _HEADER_BYTES = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl(folder: Folder, relative: str, _materials: bool) -> Source:
+def read_stl(folder: Folder, relative: str, _materials: bool) -> MeshSource:
     """Triangles of an STL file; its facet normals carry no information and are ignored.
 
     Raises:
@@ -25,13 +25,13 @@ def read_stl(folder: Folder, relative: str, _materials: bool) -> Source:
     if len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + _RECORD.itemsize * count:
         check_face_count(count, str(folder.root / relative))
         records = np.frombuffer(data, dtype=_RECORD, offset=_HEADER_BYTES)
-        return Source(Soup.of(records["corners"].astype(np.float64)))
+        return MeshSource(TriangleSoup.of(records["corners"].astype(np.float64)))
     corners = _ascii(data) if data.lstrip()[:5].lower() == b"solid" else None
     if corners is None:
         raise AssetError(
             f"{folder.root / relative}: neither a whole binary nor an ASCII STL; export it again"
         )
-    return Source(Soup.of(corners))
+    return MeshSource(TriangleSoup.of(corners))
 
 
 def _ascii(data: bytes) -> Float64 | None:

@@ -16,27 +16,27 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from generator.assets.folder import Folder
-from generator.assets.images import decode
-from generator.assets.maps import Maps
-from generator.assets.readers.source import EVEN, Source
-from generator.assets.soup import Slot, Soup, joined
-from generator.core.errors import AssetError
-from generator.core.geometry import Material, UInt8
-from generator.usd.looks import SurfaceLook
-from generator.usd.reading import SUFFIXES, OpenStage, Piece, layer_references
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.image_decoding import decode_image
+from gen_data.generator.assets.readers.mesh_source import EVEN, MeshSource
+from gen_data.generator.assets.texture_maps import TextureMaps
+from gen_data.generator.assets.triangle_soup import MaterialSlot, TriangleSoup, join_soups
+from gen_data.generator.core.asset_types import Material, UInt8
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.usd.material_reader import BoundMaterial
+from gen_data.generator.usd.stage_reader import SUFFIXES, OpenStage, StagePart, layer_references
 
 ARCHIVE = ".usdz"
 
 
-def read_usd(folder: Folder, relative: str, materials: bool) -> Source:
+def read_usd(folder: Folder, relative: str, materials: bool) -> MeshSource:
     """Triangles of all visible meshes of a stage, in metres, Z up.
 
     Raises:
         AssetError: if it is malformed or holds no mesh, refers to what is missing or outside the
             folder, or has a material that is not read.
     """
-    with opened(folder, relative) as stage:
+    with open_stage(folder, relative) as stage:
         return stage.source(stage.pieces(), materials=materials)
 
 
@@ -53,27 +53,29 @@ class StageFile:
     folder: Folder
     packed: bool
 
-    def pieces(self) -> tuple[Piece, ...]:
+    def pieces(self) -> tuple[StagePart, ...]:
         """Its visible meshes."""
         return self.stage.pieces()
 
-    def source(self, pieces: tuple[Piece, ...], *, materials: bool = True) -> Source:
+    def source(self, pieces: tuple[StagePart, ...], *, materials: bool = True) -> MeshSource:
         """Triangles of some of its meshes, each a group."""
         images: dict[str, bytes] = {}
         soups = []
         for piece in pieces:
             mesh = self.stage.mesh(piece)
-            slots = tuple(self._slot(k, images) if materials else Slot() for k in mesh.looks)
+            slots = tuple(
+                self._slot(k, images) if materials else MaterialSlot() for k in mesh.looks
+            )
             zeros = np.zeros(len(mesh.corners), dtype=np.int64)
-            soup = Soup(mesh.corners, mesh.uvs, mesh.normals, mesh.face_slots, zeros, slots)
+            soup = TriangleSoup(mesh.corners, mesh.uvs, mesh.normals, mesh.face_slots, zeros, slots)
             soups.append(soup.transformed(piece.T_stage_prim[:3]))
-        return Source(joined(soups), images)
+        return MeshSource(join_soups(soups), images)
 
-    def _slot(self, look: SurfaceLook, images: dict[str, bytes]) -> Slot:
+    def _slot(self, look: BoundMaterial, images: dict[str, bytes]) -> MaterialSlot:
         roughness, rough_map = self._mapped(look.material.roughness, look.roughness_image)
         metallic, metal_map = self._mapped(look.material.metallic, look.metallic_image)
         material = self._veiled(look)
-        maps = Maps(
+        maps = TextureMaps(
             albedo=self._name(look.texture),
             alpha=self._channel(look.cover_image),
             normal=self._name(look.normal_image),
@@ -86,7 +88,7 @@ class StageFile:
         material = replace(material, roughness=roughness, metallic=metallic, texture=maps.name())
         if self.packed:
             images |= {name: self.folder.read(name) for name in maps.images()}
-        return Slot(look.name, material, from_file=True)
+        return MaterialSlot(look.name, material, from_file=True)
 
     def _mapped(self, value: float, image: tuple[str, int]) -> tuple[float, str]:
         """A number and the channel that multiplies it, or what an even channel makes of it."""
@@ -97,7 +99,7 @@ class StageFile:
             return round(value * float(channel.mean()) / 255.0, 4), ""
         return value, self._channel(image)
 
-    def _veiled(self, look: SurfaceLook) -> Material:
+    def _veiled(self, look: BoundMaterial) -> Material:
         """The material under the mean of an image of its opacity."""
         if not look.veil_image[0]:
             return look.material
@@ -112,7 +114,7 @@ class StageFile:
         """One channel of an image; white where a fourth is asked for and there is none."""
         path, channel = image
         data = self.folder.read(self._name(path))
-        pixels = decode(data, f"{self.stage.place}: {path}", alpha=True)
+        pixels = decode_image(data, f"{self.stage.place}: {path}", alpha=True)
         whole = channel < pixels.shape[2]
         return pixels[..., channel] if whole else np.full(pixels.shape[:2], 255, np.uint8)
 
@@ -138,7 +140,7 @@ class StageFile:
 
 
 @contextmanager
-def opened(folder: Folder, relative: str) -> Iterator[StageFile]:
+def open_stage(folder: Folder, relative: str) -> Iterator[StageFile]:
     """A stage, open while the block lasts.
 
     Raises:

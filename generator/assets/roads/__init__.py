@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 
-from generator.assets.procedural.family import Family, Lazy, TextureFamily
-from generator.roads.junction import JunctionShape
-from generator.roads.parking import ParkingShape
-from generator.roads.profile import RoadShape
+from gen_data.generator.assets.procedural.family import Family, Lazy, TextureFamily
+from gen_data.generator.roads.cross_section import RoadShape
+from gen_data.generator.roads.junction_shape import JunctionShape
+from gen_data.generator.roads.parking_shape import ParkingShape
 
 
 def _surface(name: str, **parameters: object) -> Family:
-    build = Lazy(f"generator.assets.roads.{name}:{name}")
+    build = Lazy(f"gen_data.generator.assets.roads.{name}:{name}")
     return Family(name, name, ("street",), 0, 0.0, False, 1, parameters, build)
 
 
 def _texture(name: str, variants: int = 4, **parameters: object) -> TextureFamily:
-    build = Lazy(f"generator.assets.roads.textures:{name}")
+    build = Lazy(f"gen_data.generator.assets.roads.road_textures:{name}")
     return TextureFamily(name, ("ground", "street"), variants, 1, build, parameters)
 
 

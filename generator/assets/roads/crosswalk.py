@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.mesh import in_place
-from generator.assets.roads.deck import PAINT_LIFT_M
-from generator.assets.roads.markings import ZEBRA_BAR_M
-from generator.assets.roads.materials import street_materials
-from generator.assets.roads.road import deck_of
-from generator.roads.profile import RoadShape
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.patches import make_solid_in_place
+from gen_data.generator.assets.roads.deck import PAINT_LIFT_M
+from gen_data.generator.assets.roads.markings import ZEBRA_BAR_M
+from gen_data.generator.assets.roads.road import make_deck
+from gen_data.generator.assets.roads.road_materials import street_materials
+from gen_data.generator.roads.cross_section import RoadShape
 
 
 def crosswalk(
@@ -33,7 +33,7 @@ def crosswalk(
         shape: Fields of ``RoadShape``.
     """
     profile = RoadShape(**shape)
-    deck = deck_of(profile, seed, wear, "paving", "grass")
+    deck = make_deck(profile, seed, wear, "paving", "grass")
     low, high = -profile.carriageway_m(-1), profile.carriageway_m(1)
     span = (station_m - 0.5 * width_m, station_m + 0.5 * width_m)
     columns = deck.t_m[(deck.t_m > low + 0.4) & (deck.t_m < high - 0.4)]
@@ -51,4 +51,4 @@ def crosswalk(
     top = deck.at(s, t).reshape(-1, 3)
     hull = np.concatenate([top, top - np.array([0.0, 0.0, 0.02])])
     materials = tuple(street_materials(seed, wear, "paving", "grass").values())
-    return in_place(patches, materials, [hull])
+    return make_solid_in_place(patches, materials, [hull])

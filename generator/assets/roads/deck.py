@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from generator.assets.procedural.mesh import Array, Patch
-from generator.assets.roads.materials import SCALES_M
-from generator.roads.geometry import ReferenceLine
+from gen_data.generator.assets.procedural.patches import Array, Patch
+from gen_data.generator.assets.roads.road_materials import SCALES_M
+from gen_data.generator.roads.reference_line import ReferenceLine
 
 PAINT_LIFT_M = 0.003
 SAGITTA_M = 0.008

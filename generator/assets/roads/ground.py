@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.mesh import in_place
-from generator.assets.roads.deck import surface
-from generator.assets.roads.materials import GROUNDS, ground_material
-from generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.patches import make_solid_in_place
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
+from gen_data.generator.assets.roads.deck import surface
+from gen_data.generator.assets.roads.road_materials import GROUNDS, ground_material
+from gen_data.generator.core.errors import AssetError, did_you_mean
 
 _CELLS = 56
 
@@ -41,11 +41,11 @@ def ground(
     even = np.linspace(-1.0, 1.0, _CELLS + 1)
     graded = even * (0.25 + 0.75 * even * even)
     x, y = np.meshgrid(0.5 * size_m[0] * graded, 0.5 * size_m[1] * graded, indexing="ij")
-    drawn = rng_of("ground", seed).random((_CELLS + 1, _CELLS + 1))
+    drawn = variant_rng("ground", seed).random((_CELLS + 1, _CELLS + 1))
     soft = 0.25 * sum(np.roll(drawn, shift, axis) for axis in (0, 1) for shift in (0, 1))
     z = -relief_m * (1.0 - np.clip(soft, 0.0, 1.0))
     plan = np.stack([x, y], axis=2)
     patch = surface(np.stack([x, y, z], axis=2), plan, "ground", 0)
     low, high = (-0.5 * size_m[0], -0.5 * size_m[1]), (0.5 * size_m[0], 0.5 * size_m[1])
-    slab = hulls.box((*low, -relief_m - 0.5), (*high, 0.0))
-    return in_place([patch], (ground_material(cover, seed),), [slab])
+    slab = collision_hulls.box((*low, -relief_m - 0.5), (*high, 0.0))
+    return make_solid_in_place([patch], (ground_material(cover, seed),), [slab])

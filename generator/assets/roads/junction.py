@@ -9,26 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.mesh import Array, Patch, in_place
-from generator.assets.roads.deck import PAINT_LIFT_M, surface
-from generator.assets.roads.markings import NARROW_M, ZEBRA_BAR_M
-from generator.assets.roads.materials import SCALES_M, street_materials
-from generator.roads.junction import (
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
+from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
+from gen_data.generator.assets.roads.markings import NARROW_M, ZEBRA_BAR_M
+from gen_data.generator.assets.roads.road_materials import SCALES_M, street_materials
+from gen_data.generator.roads.cross_section import (
+    APRON_DROPS,
+    APRON_FALL_M,
+    APRON_M,
+    APRON_STEPS,
+    KERB_WIDTH_M,
+)
+from gen_data.generator.roads.junction_shape import (
     CROSSWALK_M,
     STOP_LINE_M,
     Fan,
     JunctionShape,
     arm_points,
     corner,
-    fan_of,
-)
-from generator.roads.profile import (
-    APRON_DROPS,
-    APRON_FALL_M,
-    APRON_M,
-    APRON_STEPS,
-    KERB_WIDTH_M,
+    make_fan,
 )
 
 _CELL_M = 0.6
@@ -57,14 +57,14 @@ def junction(
     profile = JunctionShape(**shape)
     materials = street_materials(seed, wear, paving, ground)
     slots = {name: k for k, name in enumerate(materials)}
-    fan = fan_of(profile)
+    fan = make_fan(profile)
     patches = [_carriageway(fan, slots["asphalt"])]
     for number in range(len(profile.arms_rad())):
         if profile.sidewalk_m > 0.0:
             patches += _corner(profile, number, slots)
         patches.append(_land(profile, number, slots["ground"]))
         patches += _markings(profile, fan, number, crossings, slots["marking"])
-    return in_place(patches, tuple(materials.values()), _hulls(profile, fan))
+    return make_solid_in_place(patches, tuple(materials.values()), _hulls(profile, fan))
 
 
 def _carriageway(fan: Fan, slot: int) -> Patch:

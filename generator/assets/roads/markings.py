@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from generator.assets.procedural.mesh import Patch
-from generator.assets.roads.deck import PAINT_LIFT_M, Deck
-from generator.roads.profile import RoadShape, Strip, strips
+from gen_data.generator.assets.procedural.patches import Patch
+from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, Deck
+from gen_data.generator.roads.cross_section import RoadShape, Strip, strips
 
 NARROW_M, BROAD_M = 0.12, 0.25
 STOP_LINE_M, ZEBRA_BAR_M = 0.5, 0.5
@@ -55,7 +55,7 @@ def stripes(
     return made
 
 
-def painted(deck: Deck, stripe: Stripe, length_m: float) -> list[Patch]:
+def paint_stripe(deck: Deck, stripe: Stripe, length_m: float) -> list[Patch]:
     """The patches of a line from end to end of a road."""
     half = 0.5 * stripe.width_m
     across = (stripe.t_m - half, stripe.t_m + half)

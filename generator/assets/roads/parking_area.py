@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.mesh import Patch, in_place
-from generator.assets.roads.deck import PAINT_LIFT_M, surface
-from generator.assets.roads.markings import NARROW_M
-from generator.assets.roads.materials import street_materials
-from generator.core.se3 import Vec3
-from generator.roads.parking import EDGE_M, ParkingShape
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.patches import Patch, make_solid_in_place
+from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
+from gen_data.generator.assets.roads.markings import NARROW_M
+from gen_data.generator.assets.roads.road_materials import street_materials
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.roads.parking_shape import EDGE_M, ParkingShape
 
 _APRON_M, _APRON_Z_M = 4.0, -0.12
 
@@ -43,8 +43,8 @@ def parking_area(
     patches.append(_skirt(x, y, slots["ground"]))
     for low, high in _lines(profile):
         patches.append(_rectangle(low, high, PAINT_LIFT_M, "marking", slots["marking"]))
-    slab = hulls.box((-x, -y, -0.3), (x, y, 0.0))
-    return in_place(patches, tuple(materials.values()), [slab])
+    slab = collision_hulls.box((-x, -y, -0.3), (x, y, 0.0))
+    return make_solid_in_place(patches, tuple(materials.values()), [slab])
 
 
 def _whole(shape: dict[str, Any]) -> dict[str, int]:

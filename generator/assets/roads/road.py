@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, chance, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.mesh import Array, Patch, in_place
-from generator.assets.procedural.shapes import block
-from generator.assets.roads.deck import Deck, surface
-from generator.assets.roads.markings import bay_lines, painted, stripes
-from generator.assets.roads.materials import street_materials
-from generator.core.streams import Rng
-from generator.roads.profile import (
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
+from gen_data.generator.assets.procedural.surface_shapes import block
+from gen_data.generator.assets.procedural.variant_rng import is_drawn, uniform_between, variant_rng
+from gen_data.generator.assets.roads.deck import Deck, surface
+from gen_data.generator.assets.roads.markings import bay_lines, paint_stripe, stripes
+from gen_data.generator.assets.roads.road_materials import street_materials
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
     APRON_M,
@@ -63,15 +63,15 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
         shape: Fields of ``RoadShape``.
     """
     profile = RoadShape(**shape)
-    deck = deck_of(profile, seed, wear, paving, ground)
-    rng = rng_of("road", seed)
+    deck = make_deck(profile, seed, wear, paving, ground)
+    rng = variant_rng("road", seed)
     patches = [
         *_carriageway(deck, profile),
         *(p for side in (1, -1) for p in _beside(deck, profile, side, apron_m)),
         *(
             patch
             for stripe in stripes(profile, markings, edge_lines, dash_m, line_m)
-            for patch in painted(deck, stripe, profile.length_m)
+            for patch in paint_stripe(deck, stripe, profile.length_m)
         ),
         *_wear(deck, profile, wear, rng),
         *_covers(deck, profile, rng),
@@ -83,10 +83,10 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
         if rails[0 if side > 0 else 1]:
             patches += _guard_rail(deck, profile, side)
     materials = tuple(street_materials(seed, wear, paving, ground).values())
-    return in_place(patches, materials, _hulls(deck, profile))
+    return make_solid_in_place(patches, materials, _hulls(deck, profile))
 
 
-def deck_of(profile: RoadShape, seed: int, wear: float, paving: str, ground: str) -> Deck:
+def make_deck(profile: RoadShape, seed: int, wear: float, paving: str, ground: str) -> Deck:
     """The surface of a road with the ruts that traffic has worn into it."""
     t = np.array(sorted({round(v, 6) for v in _columns(profile)}))
     z = height_m(profile, t)
@@ -171,9 +171,9 @@ def _wear(deck: Deck, profile: RoadShape, wear: float, rng: Rng) -> Iterator[Pat
     """Mended patches and sealed cracks."""
     low, high = -profile.carriageway_m(-1), profile.carriageway_m(1)
     for _ in range(round(wear * profile.length_m / 18.0)):
-        length, width = between(0.8, 5.0, rng), between(0.6, 1.6, rng)
-        s = between(0.3, max(0.4, profile.length_m - length - 0.3), rng)
-        t = between(low + 0.1, high - width - 0.1, rng)
+        length, width = uniform_between(0.8, 5.0, rng), uniform_between(0.6, 1.6, rng)
+        s = uniform_between(0.3, max(0.4, profile.length_m - length - 0.3), rng)
+        t = uniform_between(low + 0.1, high - width - 0.1, rng)
         if s + length > profile.length_m or high - low < width + 0.3:
             continue
         seam = 0.025
@@ -195,16 +195,18 @@ def _crossed(deck: Deck, across: tuple[float, float]) -> tuple[float, ...]:
 def _crack(deck: Deck, length_m: float, low: float, high: float, rng: Rng) -> Patch:
     """A sealed crack: across the road, or wandering along it."""
     count = 14
-    steps = np.array([between(-1.0, 1.0, rng) for _ in range(count)])
-    if chance(0.45, rng):
-        t = np.linspace(low + 0.1, low + 0.1 + (high - low - 0.2) * between(0.3, 1.0, rng), count)
-        s = between(1.0, max(1.1, length_m - 1.0), rng) + 0.12 * np.cumsum(steps)
+    steps = np.array([uniform_between(-1.0, 1.0, rng) for _ in range(count)])
+    if is_drawn(0.45, rng):
+        t = np.linspace(
+            low + 0.1, low + 0.1 + (high - low - 0.2) * uniform_between(0.3, 1.0, rng), count
+        )
+        s = uniform_between(1.0, max(1.1, length_m - 1.0), rng) + 0.12 * np.cumsum(steps)
     else:
-        reach = min(between(2.0, 10.0, rng), 0.8 * length_m)
-        s = between(0.2, length_m - reach - 0.1, rng) + np.linspace(0.0, reach, count)
-        t = between(low + 0.6, high - 0.6, rng) + 0.1 * np.cumsum(steps)
+        reach = min(uniform_between(2.0, 10.0, rng), 0.8 * length_m)
+        s = uniform_between(0.2, length_m - reach - 0.1, rng) + np.linspace(0.0, reach, count)
+        t = uniform_between(low + 0.6, high - 0.6, rng) + 0.1 * np.cumsum(steps)
     s, t = np.clip(s, 0.05, length_m - 0.05), np.clip(t, low + 0.05, high - 0.05)
-    return deck.path(s, t, between(0.015, 0.05, rng), "tar", 0.002)
+    return deck.path(s, t, uniform_between(0.015, 0.05, rng), "tar", 0.002)
 
 
 def _covers(deck: Deck, profile: RoadShape, rng: Rng) -> Iterator[Patch]:
@@ -214,18 +216,18 @@ def _covers(deck: Deck, profile: RoadShape, rng: Rng) -> Iterator[Patch]:
     for side in (1, -1):
         row = strips(profile, side)
         driving = [strip for strip in row if strip.kind == "driving"]
-        s = between(6.0, 30.0, rng)
+        s = uniform_between(6.0, 30.0, rng)
         while driving and s < profile.length_m - 1.0:
-            t = driving[0].middle_m + between(-0.5, 0.5, rng)
+            t = driving[0].middle_m + uniform_between(-0.5, 0.5, rng)
             yield deck.disc(s, t, 0.40, "tar", 0.0022)
             yield deck.disc(s, t, 0.3125, "manhole", 0.003)
-            s += between(28.0, 55.0, rng)
-        s = between(4.0, 12.0, rng)
+            s += uniform_between(28.0, 55.0, rng)
+        s = uniform_between(4.0, 12.0, rng)
         while any(strip.kind == "kerb" for strip in row) and s < profile.length_m - 1.0:
             gutter = profile.carriageway_m(side)
             t0, t1 = sorted((side * (gutter - 0.34), side * (gutter - 0.02)))
             yield deck.ribbon((s, s + 0.5), (t0, t1), "drain", 0.004)
-            s += between(18.0, 30.0, rng)
+            s += uniform_between(18.0, 30.0, rng)
 
 
 def _guard_rail(deck: Deck, profile: RoadShape, side: int) -> Iterator[Patch]:

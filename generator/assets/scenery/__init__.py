@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from generator.assets.procedural.family import load_families
+from gen_data.generator.assets.procedural.family import load_families
 
 FAMILIES, TEXTURES, _ = load_families(__name__)

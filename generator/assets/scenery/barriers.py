@@ -10,17 +10,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, pick, rng_of
-from generator.assets.procedural.family import Facts, Solid
-from generator.assets.procedural.materials import painted, patterned
-from generator.assets.procedural.mesh import Patch
-from generator.assets.procedural.shapes import block, extruded, grid
-from generator.assets.scenery.forms import facing, post, solid
-from generator.assets.scenery.furniture import GALVANISED
-from generator.core.errors import AssetError, did_you_mean
-from generator.core.geometry import Material
-from generator.core.se3 import Vec3
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.material_presets import (
+    painted_material,
+    patterned_material,
+)
+from gen_data.generator.assets.procedural.patches import Patch
+from gen_data.generator.assets.procedural.surface_shapes import block, extrude, grid
+from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
+from gen_data.generator.assets.scenery.street_furniture import GALVANISED
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.se3 import Vec3
 
 BARRIERS = ("guard_rail", "jersey", "construction")
 FENCES = ("pickets", "panel", "wall", "mesh")
@@ -40,9 +43,9 @@ def barrier_facts(seed: int, style: str) -> Facts:
 def fence(seed: int, style: str) -> Solid:
     """A fence or garden wall section of 2-3 m."""
     kind = fence_facts(seed, style).subcategory
-    rng = rng_of("fence", seed)
-    half, h = 0.5 * between(2.0, 3.0, rng), between(0.9, 1.4, rng)
-    hull = hulls.box((-0.06, -half, 0.0), (0.06, half, h))
+    rng = variant_rng("fence", seed)
+    half, h = 0.5 * uniform_between(2.0, 3.0, rng), uniform_between(0.9, 1.4, rng)
+    hull = collision_hulls.box((-0.06, -half, 0.0), (0.06, half, h))
     if kind == "wall":
         return _garden_wall(half, h, seed)
     posts = [
@@ -52,29 +55,32 @@ def fence(seed: int, style: str) -> Solid:
         bars = np.linspace(-half + 0.14, half - 0.14, round(2 * half / 0.13))
         parts = [block((0.03, y - 0.04, 0.06), (0.05, y + 0.04, h)) for y in bars]
         parts += [block((-0.01, -half, z), (0.03, half, z + 0.07)) for z in (0.25, h - 0.3)]
-        wood = patterned(
-            "texture/wood_grain?seed=5", 1.2, 0.8, pick(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)), rng)
+        wood = patterned_material(
+            "texture/wood_grain?seed=5",
+            1.2,
+            0.8,
+            choose(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)), rng),
         )
-        return solid([*posts, *parts], (wood,), [hull])
+        return make_solid([*posts, *parts], (wood,), [hull])
     if kind == "panel":
         panel = block((-0.015, -half + 0.08, 0.08), (0.015, half - 0.08, h + 0.3))
         tall = [
             block((-0.04, y - 0.04, 0.0), (0.04, y + 0.04, h + 0.34))
             for y in (-half + 0.04, half - 0.04)
         ]
-        wood = patterned("texture/wood_planks?seed=2", 1.4, 0.8, (0.7, 0.66, 0.62))
-        return solid(
-            [panel, *(p.painted(1) for p in tall)], (wood, painted("#5b4a3c", 0.7)), [hull]
+        wood = patterned_material("texture/wood_planks?seed=2", 1.4, 0.8, (0.7, 0.66, 0.62))
+        return make_solid(
+            [panel, *(p.painted(1) for p in tall)], (wood, painted_material("#5b4a3c", 0.7)), [hull]
         )
     wires = [
-        facing(0.0, (y - 0.004, y + 0.004), (0.05, h))
+        facing_rectangle(0.0, (y - 0.004, y + 0.004), (0.05, h))
         for y in np.arange(-half + 0.1, half - 0.05, 0.06)
     ]
     wires += [
         block((-0.008, -half, z), (0.008, half, z + 0.012)) for z in np.linspace(0.06, h - 0.03, 5)
     ]
-    paint = painted(pick(("#2f4236", "#3b3d3f"), rng), 0.5)
-    return solid([*posts, *wires], (paint,), [hull])
+    paint = painted_material(choose(("#2f4236", "#3b3d3f"), rng), 0.5)
+    return make_solid([*posts, *wires], (paint,), [hull])
 
 
 def fence_facts(seed: int, style: str) -> Facts:
@@ -102,16 +108,16 @@ def _guard_rail(seed: int) -> Solid:
     back = np.array([[(0.096 + x, y, z) for y in (half, -half)] for x, z in wave])
     posts = [block((-0.05, y - 0.03, 0.0), (0.05, y + 0.03, 0.72)) for y in (-1.0, 1.0)]
     spacers = [block((0.05, y - 0.05, 0.52), (0.1, y + 0.05, 0.68)) for y in (-1.0, 1.0)]
-    hull = hulls.box((-0.05, -half, 0.0), (0.18, half, 0.75))
+    hull = collision_hulls.box((-0.05, -half, 0.0), (0.18, half, 0.75))
     parts = [grid(rows), grid(back), *posts, *spacers]
-    shade = patterned("texture/brushed_metal?seed=1", 1.0, 0.6, (0.62, 0.63, 0.64))
-    return solid(parts, (shade if seed % 2 else GALVANISED,), [hull])
+    shade = patterned_material("texture/brushed_metal?seed=1", 1.0, 0.6, (0.62, 0.63, 0.64))
+    return make_solid(parts, (shade if seed % 2 else GALVANISED,), [hull])
 
 
 def _jersey(seed: int) -> Solid:
     """A concrete safety shape, 2 m long: foot 0.6 m, 0.8-0.9 m high."""
-    rng = rng_of("barrier/jersey", seed)
-    half, h = 1.0, between(0.8, 0.9, rng)
+    rng = variant_rng("barrier/jersey", seed)
+    half, h = 1.0, uniform_between(0.8, 0.9, rng)
     section = np.array(
         [
             (0.0, -0.3),
@@ -124,23 +130,23 @@ def _jersey(seed: int) -> Solid:
             (0.0, 0.3),
         ]
     )
-    prism = extruded(section, 2 * half, 0.008).rotated("y", -0.5 * np.pi)
+    prism = extrude(section, 2 * half, 0.008).rotated("y", -0.5 * np.pi)
     # The section's first axis has become Z, the extrusion runs along -X: turn it to Y.
     lying = prism.rotated("z", 0.5 * np.pi)
     low, high = lying.bounds_m()
     x, y, _ = (0.5 * (low + high)).tolist()
     body = lying.moved(-x, -y, -float(low[2]))
-    concrete = patterned("texture/concrete?seed=3", 2.0, 0.92, (0.95, 0.94, 0.92))
-    hull = hulls.extreme(body.corners_m, 32)
-    return solid([body], (concrete,), [hull])
+    concrete = patterned_material("texture/concrete?seed=3", 2.0, 0.92, (0.95, 0.94, 0.92))
+    hull = collision_hulls.extreme(body.corners_m, 32)
+    return make_solid([body], (concrete,), [hull])
 
 
 def _construction(seed: int) -> Solid:
     """A work-site barrier: a red and white board on two feet, lamps on some."""
-    rng = rng_of("barrier/construction", seed)
-    half, z, fields = 0.5 * between(1.2, 2.0, rng), 0.85, 8
+    rng = variant_rng("barrier/construction", seed)
+    half, z, fields = 0.5 * uniform_between(1.2, 2.0, rng), 0.85, 8
     boards = []
-    for low in ((z, z + 0.2), (0.25, 0.35))[: pick((1, 2, 2), rng)]:
+    for low in ((z, z + 0.2), (0.25, 0.35))[: choose((1, 2, 2), rng)]:
         boards += _striped(half, low, fields)
     legs = [
         block((-0.02, y - 0.02, 0.05), (0.01, y + 0.02, 1.1)) for y in (-half + 0.15, half - 0.15)
@@ -153,13 +159,13 @@ def _construction(seed: int) -> Solid:
     for y in (-half + 0.15, half - 0.15) if seed % 2 else ():
         parts.append(post(0.075, (1.1, 1.26), (0.0, y, 0.0), 12).painted(4))
     slots = (
-        painted("#b9261c", 0.4),
-        painted("#e8e7e2", 0.4),
+        painted_material("#b9261c", 0.4),
+        painted_material("#e8e7e2", 0.4),
         GALVANISED,
-        painted("#242526", 0.85),
+        painted_material("#242526", 0.85),
         Material((0.85, 0.42, 0.05), roughness=0.2, role="lamp"),
     )
-    return solid(parts, slots, [hulls.box((-0.4, -half, 0.0), (0.4, half, z + 0.2))])
+    return make_solid(parts, slots, [collision_hulls.box((-0.4, -half, 0.0), (0.4, half, z + 0.2))])
 
 
 def _striped(half: float, z_m: tuple[float, float], fields: int) -> list[Patch]:
@@ -188,6 +194,6 @@ def _garden_wall(half: float, h: float, seed: int) -> Solid:
         else ("plaster", 5, 2.5, (0.62, 0.58, 0.5))
     )
     name, k, scale, color = kind
-    skin = patterned(f"texture/{name}?seed={k}", scale, 0.92, color)
-    stone = patterned("texture/concrete?seed=3", 1.5, 0.9)
-    return solid([body, cap], (skin, stone), [hulls.box(low, (0.12, half, h))])
+    skin = patterned_material(f"texture/{name}?seed={k}", scale, 0.92, color)
+    stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
+    return make_solid([body, cap], (skin, stone), [collision_hulls.box(low, (0.12, half, h))])

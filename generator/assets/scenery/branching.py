@@ -12,11 +12,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.assets.procedural.mesh import Array, Indices, Patch, joined, settled
-from generator.assets.procedural.noise import uniform
-from generator.assets.procedural.shapes import circle, sweep
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.noise import uniform
+from gen_data.generator.assets.procedural.patches import (
+    Array,
+    Indices,
+    Patch,
+    join_patches,
+    round_values,
+)
+from gen_data.generator.assets.procedural.surface_shapes import circle, sweep
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
 
 _PIPE_EXPONENT = 2.3
 _ROUNDS_MAX = 70
@@ -65,7 +71,9 @@ def points_in(lobes: Sequence[Lobe], count: int, rng: Rng) -> Array:
     return np.concatenate(found)
 
 
-def grown(trunk_m: Array, attractors_m: Array, step_m: float, base_radius_m: float) -> Skeleton:
+def grow_skeleton(
+    trunk_m: Array, attractors_m: Array, step_m: float, base_radius_m: float
+) -> Skeleton:
     """A tree that grows from the top of a trunk towards attraction points."""
     nodes = [*trunk_m]
     parents = [*range(-1, len(trunk_m) - 1)]
@@ -108,7 +116,7 @@ def wood(skeleton: Skeleton, thinnest_m: float, stride: int = 2) -> Patch:
         sides = 8 if r[0] > 0.1 else 5 if r[0] > 0.035 else 3
         up = (1.0, 0.0, 0.0) if abs(path[1, 2] - path[0, 2]) > 0.05 else (0.0, 0.0, 1.0)
         tubes.append(sweep(path, circle(1.0, sides), up=up, scale=r, capped=sides > 3))
-    return joined(tubes)
+    return join_patches(tubes)
 
 
 def _nearest(points: Array, nodes: Array, start: int) -> tuple[Indices, Array]:
@@ -134,7 +142,7 @@ def _shoots(
         direction = mean[k] / length + 0.25 * before / np.sqrt((before**2).sum())
         position = nodes[k] + step_m * direction / np.sqrt((direction**2).sum())
         # A coarse grid: no last bit may decide which node is nearest in a later round.
-        position = np.round(settled(position), 4)
+        position = np.round(round_values(position), 4)
         if float(((nodes - position) ** 2).sum(axis=1).min()) > (0.4 * step_m) ** 2:
             shoots.append((k, position))
     return shoots

@@ -11,16 +11,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Facts, Solid
-from generator.assets.procedural.mesh import Patch, joined
-from generator.assets.procedural.shapes import block
-from generator.assets.scenery import facade, roofs
-from generator.assets.scenery.designs import Design, design, materials_of
-from generator.assets.scenery.facade import BASE, FACADE, METAL, TRIM, Opening
-from generator.assets.scenery.forms import post, quad, solid
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import block
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.assets.scenery import facade, roofs
+from gen_data.generator.assets.scenery.basic_shapes import make_solid, post, quad
+from gen_data.generator.assets.scenery.building_designs import (
+    Design,
+    building_materials,
+    draw_design,
+)
+from gen_data.generator.assets.scenery.facade import BASE, FACADE, METAL, TRIM, Opening
+from gen_data.generator.core.streams import Rng
 
 _DOOR_M = (1.15, 2.5)
 _EAVES_M = 0.45
@@ -28,39 +37,43 @@ _EAVES_M = 0.45
 
 def building(seed: int, style: str) -> Solid:
     """A building of a style; see ``facade`` for its material slots."""
-    plan = design(style, seed)
-    rng = rng_of(f"building/{style}/details", seed)
+    plan = draw_design(style, seed)
+    rng = variant_rng(f"building/{style}/details", seed)
     turned = ((0.0, _front(plan, rng), plan.depth_m), (math.pi, _back(plan, rng), plan.depth_m))
     ends = [(k * 0.5 * math.pi, _side(plan, rng), plan.width_m) for k in (1, -1)]
     walls = [wall.moved(0.5 * across).rotated("z", turn) for turn, wall, across in (*turned, *ends)]
     x, y = 0.5 * plan.depth_m, 0.5 * plan.width_m
     floor = quad([(-x, -y, 0.0), (-x, y, 0.0), (x, y, 0.0), (x, -y, 0.0)], BASE)
     roof = _roof(plan, rng).moved(z=plan.eaves_m)
-    hull = hulls.box((-x, -y, 0.0), (x, y, plan.eaves_m + 0.5))
-    return solid([*walls, floor, roof], materials_of(plan, seed), [hull])
+    hull = collision_hulls.box((-x, -y, 0.0), (x, y, plan.eaves_m + 0.5))
+    return make_solid([*walls, floor, roof], building_materials(plan, seed), [hull])
 
 
 def building_facts(seed: int, style: str) -> Facts:
     """Style and number of floors, without building it."""
-    return Facts(style, {"floors": str(design(style, seed).floors)})
+    return Facts(style, {"floors": str(draw_design(style, seed).floors)})
 
 
 def garage(seed: int) -> Solid:
     """A garage for one or two cars; the doors face +X."""
-    rng = rng_of("garage", seed)
-    doors, deep, high = pick((1, 1, 2), rng), between(5.6, 6.5, rng), between(2.5, 2.9, rng)
+    rng = variant_rng("garage", seed)
+    doors, deep, high = (
+        choose((1, 1, 2), rng),
+        uniform_between(5.6, 6.5, rng),
+        uniform_between(2.5, 2.9, rng),
+    )
     half = 0.5 * (doors * 3.0 + 0.2)
-    plan = design("house", seed)
+    plan = draw_design("house", seed)
     holes = [
         Opening((-half + 0.35 + 3.0 * k, -half + 2.85 + 3.0 * k), (0.02, 2.15), 0.12)
         for k in range(doors)
     ]
-    front = [facade.perforated((-half, half), (0.0, high), holes)]
+    front = [facade.cut_openings((-half, half), (0.0, high), holes)]
     front += [facade.garage_door(hole) for hole in holes]
-    plain = facade.perforated((-half, half), (0.0, high))
-    side = facade.perforated((-0.5 * deep, 0.5 * deep), (0.0, high))
+    plain = facade.cut_openings((-half, half), (0.0, high))
+    side = facade.cut_openings((-0.5 * deep, 0.5 * deep), (0.0, high))
     walls = [
-        joined(front).moved(0.5 * deep),
+        join_patches(front).moved(0.5 * deep),
         plain.moved(0.5 * deep).rotated("z", math.pi),
         side.moved(half).rotated("z", 0.5 * math.pi),
         side.moved(half).rotated("z", -0.5 * math.pi),
@@ -68,8 +81,8 @@ def garage(seed: int) -> Solid:
     x = 0.5 * deep
     floor = quad([(-x, -half, 0.0), (-x, half, 0.0), (x, half, 0.0), (x, -half, 0.0)], BASE)
     roof = block((-x - 0.05, -half - 0.05, high), (x + 0.12, half + 0.05, high + 0.16), slot=METAL)
-    hull = hulls.box((-x, -half, 0.0), (x, half, high + 0.16))
-    return solid([*walls, floor, roof], materials_of(plan, seed), [hull])
+    hull = collision_hulls.box((-x, -half, 0.0), (x, half, high + 0.16))
+    return make_solid([*walls, floor, roof], building_materials(plan, seed), [hull])
 
 
 def _front(plan: Design, rng: Rng) -> Patch:
@@ -79,14 +92,14 @@ def _front(plan: Design, rng: Rng) -> Patch:
     holes, upper = _upper(plan, rng)
     parts = [ground, *upper, *_bands(plan, rng)]
     if plan.floors > 1:
-        parts.append(facade.perforated((-half, half), (plan.ground_m, plan.eaves_m), holes))
-    return joined(parts)
+        parts.append(facade.cut_openings((-half, half), (plan.ground_m, plan.eaves_m), holes))
+    return join_patches(parts)
 
 
 def _dwelling(plan: Design, rng: Rng) -> Patch:
     """A ground floor of windows and one entrance."""
     half, entrance = 0.5 * plan.width_m, int(rng.random() * plan.bays)
-    plinth = 0.15 if plan.style in ("modern", "commercial") else pick((0.35, 0.5, 0.6), rng)
+    plinth = 0.15 if plan.style in ("modern", "commercial") else choose((0.35, 0.5, 0.6), rng)
     w, h = plan.window_m
     holes, parts = [], []
     for k, y in enumerate(_bay_centres(plan)):
@@ -102,16 +115,16 @@ def _dwelling(plan: Design, rng: Rng) -> Patch:
             parts.append(_dressed(plan, hole, rng))
         holes.append(hole)
     slot = BASE if plan.trimmed else FACADE
-    wall = facade.perforated((-half, half), (0.0, plan.ground_m), holes, slot, (plinth, BASE))
-    return joined([wall, *parts])
+    wall = facade.cut_openings((-half, half), (0.0, plan.ground_m), holes, slot, (plinth, BASE))
+    return join_patches([wall, *parts])
 
 
 def _shops(plan: Design, rng: Rng) -> Patch:
     """A ground floor of display windows, shop doors, signs and awnings."""
     half, margin = 0.5 * plan.width_m, 0.45
-    count = max(2, round((plan.width_m - 2 * margin) / between(2.8, 3.6, rng)))
+    count = max(2, round((plan.width_m - 2 * margin) / uniform_between(2.8, 3.6, rng)))
     pitch = (plan.width_m - 2 * margin) / count
-    top = plan.ground_m - between(1.0, 1.25, rng)
+    top = plan.ground_m - uniform_between(1.0, 1.25, rng)
     doors = {int(rng.random() * count), count - 1}
     slot = BASE if plan.trimmed else FACADE
     holes, parts = [], []
@@ -122,36 +135,36 @@ def _shops(plan: Design, rng: Rng) -> Patch:
             hole = Opening((y0, y1), (0.03, top), 0.3)
             parts.append(facade.door(hole, rng, slot))
         else:
-            hole = Opening((y0, y1), (0.03, top), 0.18, upright=pick((1, 2), rng))
+            hole = Opening((y0, y1), (0.03, top), 0.18, upright=choose((1, 2), rng))
             parts.append(facade.shop_front(hole, rng, slot))
         holes.append(hole)
-    wall = facade.perforated((-half, half), (0.0, plan.ground_m), holes, slot)
-    return joined([wall, *parts, *_shop_signs(plan, top, rng)])
+    wall = facade.cut_openings((-half, half), (0.0, plan.ground_m), holes, slot)
+    return join_patches([wall, *parts, *_shop_signs(plan, top, rng)])
 
 
 def _shop_signs(plan: Design, top_m: float, rng: Rng) -> list[Patch]:
     """A name above the windows of one or two shops, and awnings."""
     half = 0.5 * plan.width_m - 0.5
-    split = between(-0.2, 0.2, rng) * plan.width_m if plan.width_m > 13.0 else half
+    split = uniform_between(-0.2, 0.2, rng) * plan.width_m if plan.width_m > 13.0 else half
     parts = []
     for y0, y1 in ((-half, split - 0.3), (split + 0.3, half)):
         if y1 - y0 < 3.0:
             continue
-        long = min(y1 - y0, between(3.0, 5.0, rng))
+        long = min(y1 - y0, uniform_between(3.0, 5.0, rng))
         middle = 0.5 * (y0 + y1)
         z = (top_m + 0.12, top_m + 0.12 + 0.18 * long)
         # Signs are four times as wide as they are high, or so.
         z = (z[0], min(z[1], plan.ground_m - 0.1))
         parts.append(facade.sign_board((middle - 0.5 * long, middle + 0.5 * long), z))
-        if chance(0.4, rng):
-            parts.append(facade.awning((y0, y1), top_m + 0.08, between(0.9, 1.3, rng)))
+        if is_drawn(0.4, rng):
+            parts.append(facade.awning((y0, y1), top_m + 0.08, uniform_between(0.9, 1.3, rng)))
     return parts
 
 
 def _upper(plan: Design, rng: Rng) -> tuple[list[Opening], list[Patch]]:
     """Windows of the upper floors, all in line, and balconies before some of them."""
     centres = _bay_centres(plan)
-    first, out_m = int(rng.random() * plan.bays), between(1.1, 1.4, rng)
+    first, out_m = int(rng.random() * plan.bays), uniform_between(1.1, 1.4, rng)
     mirrored = plan.bays - 1 - first
     outside = {first, mirrored if abs(mirrored - first) > 1 else first}
     holes, parts = [], []
@@ -176,7 +189,7 @@ def _upper(plan: Design, rng: Rng) -> tuple[list[Opening], list[Patch]]:
 
 def _oriel(plan: Design, y: float, rng: Rng) -> Patch:
     """A bay that stands out over all upper floors, with a window on each."""
-    half, out_m = 0.46 * plan.width_m / plan.bays, between(0.6, 0.9, rng)
+    half, out_m = 0.46 * plan.width_m / plan.bays, uniform_between(0.6, 0.9, rng)
     levels = [plan.ground_m + k * plan.storey_m for k in range(plan.floors - 1)]
     w = min(1.25 * plan.window_m[0], 2.0 * half - 0.4)
     holes = [_window(plan, y, z + plan.sill_m, (w, plan.window_m[1])) for z in levels]
@@ -203,9 +216,9 @@ def _dressed(plan: Design, hole: Opening, rng: Rng, *, bare: bool = False) -> Pa
         parts.append(facade.lintel(hole))
     if plan.shutters == "leaves" and not bare and _room_beside(plan) > 0.5 * hole.width_m:
         parts.append(facade.leaves(hole))
-    if plan.shutters == "roller" and chance(0.35, rng):
-        parts.append(facade.roller(hole, pick((0.2, 0.35, 0.6, 0.96), rng)))
-    return joined(parts)
+    if plan.shutters == "roller" and is_drawn(0.35, rng):
+        parts.append(facade.roller(hole, choose((0.2, 0.35, 0.6, 0.96), rng)))
+    return join_patches(parts)
 
 
 def _bands(plan: Design, rng: Rng) -> list[Patch]:
@@ -220,16 +233,16 @@ def _bands(plan: Design, rng: Rng) -> list[Patch]:
         parts.append(block((0.0, -half, top - 0.42), (0.14, half, top - 0.3), slot=TRIM))
         parts.append(block((0.0, -half, top - 0.3), (0.3, half, top - 0.08), slot=TRIM))
     if plan.roof != "flat":
-        side = pick((-1.0, 1.0), rng) * (half - 0.15)
+        side = choose((-1.0, 1.0), rng) * (half - 0.15)
         pipe = post(0.05, (0.0, plan.eaves_m - 0.1), (0.08, side, 0.0), 6)
         parts.append(pipe.painted(METAL))
     return parts
 
 
 def _canopy(plan: Design, y: float, top: float, rng: Rng) -> list[Patch]:
-    if plan.trimmed or not chance(0.5, rng):
+    if plan.trimmed or not is_drawn(0.5, rng):
         return []
-    low, high = (0.0, y - 0.85, top + 0.1), (between(0.8, 1.1, rng), y + 0.85, top + 0.2)
+    low, high = (0.0, y - 0.85, top + 0.1), (uniform_between(0.8, 1.1, rng), y + 0.85, top + 0.2)
     return [block(low, high, slot=METAL)]
 
 
@@ -242,7 +255,7 @@ def _side(plan: Design, rng: Rng) -> Patch:
     """A side wall: blank where the next house of the row stands."""
     if not plan.sided:
         half = 0.5 * plan.depth_m
-        return facade.perforated((-half, half), (0.0, plan.eaves_m))
+        return facade.cut_openings((-half, half), (0.0, plan.eaves_m))
     return _plain_wall(plan, plan.depth_m, 2, rng)
 
 
@@ -256,25 +269,31 @@ def _plain_wall(plan: Design, width_m: float, bays: int, rng: Rng) -> Patch:
             y = -half + width_m * (k + 0.5) / bays
             hole = Opening((y - 0.5 * w, y + 0.5 * w), (level + 0.9, level + 0.9 + h), 0.12)
             holes.append(hole)
-    wall = facade.perforated((-half, half), (0.0, plan.eaves_m), holes)
-    return joined([wall, *(facade.window(hole, rng) for hole in holes)])
+    wall = facade.cut_openings((-half, half), (0.0, plan.eaves_m), holes)
+    return join_patches([wall, *(facade.window(hole, rng) for hole in holes)])
 
 
 def _roof(plan: Design, rng: Rng) -> Patch:
     if plan.roof == "flat":
         unit = roofs.unit(
-            between(-0.2, 0.1, rng) * plan.depth_m,
-            between(-0.25, 0.25, rng) * plan.width_m,
-            (between(2.0, 3.5, rng), between(2.5, 4.0, rng), between(1.2, 2.4, rng)),
+            uniform_between(-0.2, 0.1, rng) * plan.depth_m,
+            uniform_between(-0.25, 0.25, rng) * plan.width_m,
+            (
+                uniform_between(2.0, 3.5, rng),
+                uniform_between(2.5, 4.0, rng),
+                uniform_between(1.2, 2.4, rng),
+            ),
         )
-        return joined([roofs.flat(plan.depth_m, plan.width_m, between(0.35, 0.8, rng)), unit])
+        return join_patches(
+            [roofs.flat(plan.depth_m, plan.width_m, uniform_between(0.35, 0.8, rng)), unit]
+        )
     if plan.roof == "hip":
         pitch, depth_m = 0.85 * plan.pitch_rad, min(plan.depth_m, plan.width_m)
         shell = roofs.hip(plan.depth_m, plan.width_m, pitch, 0.32)
         ridge = 0.5 * depth_m * math.tan(pitch)
-        return joined([shell, roofs.chimney(-0.5, 0.4, (0.6 * ridge, ridge + 0.6))])
+        return join_patches([shell, roofs.chimney(-0.5, 0.4, (0.6 * ridge, ridge + 0.6))])
     if plan.roof == "mansard":
-        rise = between(2.5, 2.9, rng)
+        rise = uniform_between(2.5, 2.9, rng)
         profile = roofs.mansard_profile(plan.depth_m, rise, 0.3)
         slope = 0.36
     else:
@@ -284,9 +303,9 @@ def _roof(plan: Design, rng: Rng) -> Patch:
         return _gable_front(plan, rng)
     shell = roofs.over_profile(profile, plan.width_m, plan.verge_m, 0.24)
     ridge = max(z for _, z in profile)
-    y = between(-0.3, 0.3, rng) * plan.width_m
-    stack = roofs.chimney(-0.8, y, (ridge - 1.4, ridge + between(0.5, 0.9, rng)))
-    return joined([shell, stack, *_dormers(plan, slope, rng)])
+    y = uniform_between(-0.3, 0.3, rng) * plan.width_m
+    stack = roofs.chimney(-0.8, y, (ridge - 1.4, ridge + uniform_between(0.5, 0.9, rng)))
+    return join_patches([shell, stack, *_dormers(plan, slope, rng)])
 
 
 def _gable_front(plan: Design, rng: Rng) -> Patch:
@@ -297,7 +316,7 @@ def _gable_front(plan: Design, rng: Rng) -> Patch:
     low = 0.22 * ridge
     attic = facade.attic_window((-0.55, 0.55), (low, low + min(1.3, 0.4 * ridge)), rng)
     stack = roofs.chimney(-0.2 * plan.depth_m, 0.6, (ridge - 1.4, ridge + 0.6))
-    return joined([shell.rotated("z", 0.5 * math.pi), attic.moved(0.5 * plan.depth_m), stack])
+    return join_patches([shell.rotated("z", 0.5 * math.pi), attic.moved(0.5 * plan.depth_m), stack])
 
 
 def _dormers(plan: Design, slope: float, rng: Rng) -> list[Patch]:

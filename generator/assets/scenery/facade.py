@@ -13,11 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, chance, pick
-from generator.assets.procedural.mesh import Patch, joined
-from generator.assets.procedural.shapes import block, grid
-from generator.assets.scenery.forms import Span, facing, quad
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import block, grid
+from gen_data.generator.assets.procedural.variant_rng import choose, is_drawn, uniform_between
+from gen_data.generator.assets.scenery.basic_shapes import Span, facing_rectangle, quad
+from gen_data.generator.core.streams import Rng
 
 (
     FACADE,
@@ -68,7 +68,7 @@ class Opening:
         return self.z_m[1] - self.z_m[0]
 
 
-def perforated(
+def cut_openings(
     y_m: Span,
     z_m: Span,
     openings: Sequence[Opening] = (),
@@ -91,11 +91,11 @@ def perforated(
     for z0, z1 in pairwise(z.tolist()):
         row = base[1] if base and z1 <= base[0] + 1e-9 else slot
         cells += [
-            facing(0.0, (y0, y1), (z0, z1), row)
+            facing_rectangle(0.0, (y0, y1), (z0, z1), row)
             for y0, y1 in pairwise(y.tolist())
             if not any(_holds(o, 0.5 * (y0 + y1), 0.5 * (z0 + z1)) for o in openings)
         ]
-    return joined(cells)
+    return join_patches(cells)
 
 
 def reveal(opening: Opening, depth_m: float, slot: int = FACADE) -> Patch:
@@ -108,7 +108,7 @@ def reveal(opening: Opening, depth_m: float, slot: int = FACADE) -> Patch:
 def window(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
     """Reveal, frame with bars, and panes; behind some of them hang curtains."""
     depth_m = opening.recess_m + GLASS_SETBACK_M
-    return joined(
+    return join_patches(
         [
             reveal(opening, depth_m, slot),
             frame(opening),
@@ -122,44 +122,51 @@ def frame(opening: Opening, slot: int = FRAME) -> Patch:
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
     x, w = -opening.recess_m, min(_FRAME_WIDTH_M, 0.2 * opening.width_m)
     parts = [
-        facing(x, (y0, y0 + w), (z0, z1), slot),
-        facing(x, (y1 - w, y1), (z0, z1), slot),
-        facing(x, (y0 + w, y1 - w), (z0, z0 + w), slot),
-        facing(x, (y0 + w, y1 - w), (z1 - w, z1), slot),
+        facing_rectangle(x, (y0, y0 + w), (z0, z1), slot),
+        facing_rectangle(x, (y1 - w, y1), (z0, z1), slot),
+        facing_rectangle(x, (y0 + w, y1 - w), (z0, z0 + w), slot),
+        facing_rectangle(x, (y0 + w, y1 - w), (z1 - w, z1), slot),
     ]
     for k in range(1, opening.upright):
         middle = y0 + opening.width_m * k / opening.upright
-        parts.append(facing(x, (middle - 0.5 * w, middle + 0.5 * w), (z0 + w, z1 - w), slot))
+        parts.append(
+            facing_rectangle(x, (middle - 0.5 * w, middle + 0.5 * w), (z0 + w, z1 - w), slot)
+        )
     for k in range(1, opening.level):
         # Transoms sit high: the lower sash is the tall one.
         middle = z0 + opening.height_m * (0.42 + 0.58 * k / opening.level)
         parts.append(
-            facing(x + 0.004, (y0 + w, y1 - w), (middle - 0.4 * w, middle + 0.4 * w), slot)
+            facing_rectangle(
+                x + 0.004, (y0 + w, y1 - w), (middle - 0.4 * w, middle + 0.4 * w), slot
+            )
         )
-    return joined(parts)
+    return join_patches(parts)
 
 
 def panes(opening: Opening, rng: Rng, x: float) -> Patch:
     """Glass: dark where a room lies behind, lighter where a curtain hangs."""
     (y0, y1), z = opening.y_m, opening.z_m
-    glass, curtain = pick((GLASS, GLASS, GLASS_TOO), rng), pick((CURTAIN, CURTAIN_TOO), rng)
-    drawn = pick(("open", "open", "sides", "all", "blind"), rng)
+    glass, curtain = choose((GLASS, GLASS, GLASS_TOO), rng), choose((CURTAIN, CURTAIN_TOO), rng)
+    drawn = choose(("open", "open", "sides", "all", "blind"), rng)
     if drawn == "sides":
-        w = between(0.12, 0.3, rng) * opening.width_m
+        w = uniform_between(0.12, 0.3, rng) * opening.width_m
         strips = ((y0, y0 + w, curtain), (y0 + w, y1 - w, glass), (y1 - w, y1, curtain))
-        return joined([facing(x, (a, b), z, slot) for a, b, slot in strips])
+        return join_patches([facing_rectangle(x, (a, b), z, slot) for a, b, slot in strips])
     if drawn == "blind":
-        level = z[1] - between(0.15, 0.6, rng) * opening.height_m
-        return joined(
-            [facing(x, (y0, y1), (z[0], level), glass), facing(x, (y0, y1), (level, z[1]), curtain)]
+        level = z[1] - uniform_between(0.15, 0.6, rng) * opening.height_m
+        return join_patches(
+            [
+                facing_rectangle(x, (y0, y1), (z[0], level), glass),
+                facing_rectangle(x, (y0, y1), (level, z[1]), curtain),
+            ]
         )
-    return facing(x, (y0, y1), z, curtain if drawn == "all" else glass)
+    return facing_rectangle(x, (y0, y1), z, curtain if drawn == "all" else glass)
 
 
 def sill(opening: Opening, out_m: float = 0.05, slot: int = TRIM) -> Patch:
     """A ledge below a window; its back lies in the recess."""
     (y0, y1), z0 = opening.y_m, opening.z_m[0]
-    return joined(
+    return join_patches(
         [
             block((0.0, y0 - 0.06, z0 - 0.06), (out_m, y1 + 0.06, z0 + 0.005), slot=slot),
             quad(_level(z0 + 0.005, (-opening.recess_m, 0.0), (y0, y1)), slot),
@@ -177,7 +184,7 @@ def leaves(opening: Opening) -> Patch:
     """Hinged shutters, folded back against the wall on both sides."""
     (y0, y1), z = opening.y_m, opening.z_m
     w = 0.5 * opening.width_m
-    return joined(
+    return join_patches(
         [
             block((0.005, a, z[0]), (0.045, b, z[1]), slot=AWNING)
             for a, b in ((y0 - w, y0 - 0.02), (y1 + 0.02, y1 + w))
@@ -200,16 +207,16 @@ def door(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
     x = -opening.recess_m
     head = min(z1 - 0.12, z0 + 2.15)
     inset = 0.2 * opening.width_m
-    field = GLASS if chance(0.5, rng) else DOOR
-    low = z0 + (0.25 if field == GLASS and chance(0.5, rng) else 1.0)
+    field = GLASS if is_drawn(0.5, rng) else DOOR
+    low = z0 + (0.25 if field == GLASS and is_drawn(0.5, rng) else 1.0)
     step = block((x, y0, 0.0), (0.25, y1, z0 + 0.01), slot=BASE)
-    return joined(
+    return join_patches(
         [
             *([step] if z0 > 0.05 else []),
             reveal(opening, opening.recess_m + GLASS_SETBACK_M, slot),
-            facing(x, (y0, y1), (z0, head), DOOR),
-            facing(x, (y0, y1), (head, head + 0.06), FRAME),
-            facing(x - GLASS_SETBACK_M, (y0, y1), (head + 0.06, z1), GLASS),
+            facing_rectangle(x, (y0, y1), (z0, head), DOOR),
+            facing_rectangle(x, (y0, y1), (head, head + 0.06), FRAME),
+            facing_rectangle(x - GLASS_SETBACK_M, (y0, y1), (head + 0.06, z1), GLASS),
             block((x, y0 + inset, low), (x + 0.012, y1 - inset, head - 0.2), slot=field),
             block((x, y1 - 0.16, z0 + 0.95), (x + 0.06, y1 - 0.12, z0 + 1.2), slot=METAL),
         ]
@@ -219,17 +226,17 @@ def door(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
 def shop_front(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
     """A display window: stall riser, frame, large panes."""
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
-    riser = z0 + between(0.12, 0.5, rng)
+    riser = z0 + uniform_between(0.12, 0.5, rng)
     glazed = Opening((y0, y1), (riser, z1), opening.recess_m, opening.upright, opening.level)
     depth_m = opening.recess_m + GLASS_SETBACK_M
-    shown = [(GLASS, z1), (pick((GLASS_TOO, CURTAIN), rng), riser + 0.28 * (z1 - riser))]
-    return joined(
+    shown = [(GLASS, z1), (choose((GLASS_TOO, CURTAIN), rng), riser + 0.28 * (z1 - riser))]
+    return join_patches(
         [
             reveal(opening, depth_m, slot),
-            facing(-opening.recess_m, (y0, y1), (z0, riser), FRAME),
+            facing_rectangle(-opening.recess_m, (y0, y1), (z0, riser), FRAME),
             frame(glazed),
-            facing(-depth_m, (y0, y1), (shown[1][1], z1), shown[0][0]),
-            facing(-depth_m, (y0, y1), (riser, shown[1][1]), shown[1][0]),
+            facing_rectangle(-depth_m, (y0, y1), (shown[1][1], z1), shown[0][0]),
+            facing_rectangle(-depth_m, (y0, y1), (riser, shown[1][1]), shown[1][0]),
         ]
     )
 
@@ -239,7 +246,7 @@ def garage_door(opening: Opening, slot: int = FACADE) -> Patch:
     z0, z1 = opening.z_m
     rows = 5
     panels = [
-        facing(
+        facing_rectangle(
             -opening.recess_m + (0.0 if k % 2 else 0.012),
             opening.y_m,
             (z0 + (z1 - z0) * k / rows, z0 + (z1 - z0) * (k + 1) / rows - 0.012),
@@ -247,20 +254,22 @@ def garage_door(opening: Opening, slot: int = FACADE) -> Patch:
         )
         for k in range(rows)
     ]
-    back = facing(-opening.recess_m - 0.01, opening.y_m, opening.z_m, METAL)
-    return joined([reveal(opening, opening.recess_m + 0.01, slot), back, *panels])
+    back = facing_rectangle(-opening.recess_m - 0.01, opening.y_m, opening.z_m, METAL)
+    return join_patches([reveal(opening, opening.recess_m + 0.01, slot), back, *panels])
 
 
 def railing(y_m: Span, z0: float, x: float, height_m: float = 0.95, pitch_m: float = 0.14) -> Patch:
     """Upright bars between two rails, in the plane x."""
     count = max(2, round((y_m[1] - y_m[0]) / pitch_m))
     at = np.linspace(y_m[0] + 0.02, y_m[1] - 0.02, count)
-    bars = [facing(x, (y - 0.008, y + 0.008), (z0 + 0.08, z0 + height_m), METAL) for y in at]
+    bars = [
+        facing_rectangle(x, (y - 0.008, y + 0.008), (z0 + 0.08, z0 + height_m), METAL) for y in at
+    ]
     rails = [
         block((x - 0.02, y_m[0], z), (x + 0.02, y_m[1], z + 0.035), slot=METAL)
         for z in (z0 + 0.06, z0 + height_m)
     ]
-    return joined([*bars, *rails])
+    return join_patches([*bars, *rails])
 
 
 def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
@@ -273,22 +282,22 @@ def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
             block((0.0, y0, z0), (out_m - t, y0 + t, z0 + 0.95), slot=AWNING),
             block((0.0, y1 - t, z0), (out_m - t, y1, z0 + 0.95), slot=AWNING),
         ]
-        return joined([slab, *sides])
+        return join_patches([slab, *sides])
     side = railing((-out_m + 0.04, 0.0), z0, 0.0, pitch_m=0.2).rotated("z", 0.5 * math.pi)
     ends = [side.moved(y=y) for y in (y0 + 0.02, y1 - 0.02)]
-    return joined([slab, railing(y_m, z0, out_m - 0.04), *ends])
+    return join_patches([slab, railing(y_m, z0, out_m - 0.04), *ends])
 
 
 def oriel(y_m: Span, z_m: Span, out_m: float, openings: Sequence[Opening], rng: Rng) -> Patch:
     """A box before the wall, with windows in its front, a corbel below and a lid."""
     (y0, y1), (z0, z1) = y_m, z_m
-    front = [perforated(y_m, z_m, openings), *(window(o, rng) for o in openings)]
+    front = [cut_openings(y_m, z_m, openings), *(window(o, rng) for o in openings)]
     front += [sill(o) for o in openings]
     lid = block((0.0, y0 - 0.08, z1), (out_m + 0.1, y1 + 0.08, z1 + 0.14), slot=TRIM)
     corbel = block((0.0, y0 + 0.1, z0 - 0.3), (0.7 * out_m, y1 - 0.1, z0), slot=TRIM)
-    return joined(
+    return join_patches(
         [
-            joined(front).moved(out_m),
+            join_patches(front).moved(out_m),
             quad([(0.0, y0, z0), (out_m, y0, z0), (out_m, y0, z1), (0.0, y0, z1)]),
             quad([(out_m, y1, z0), (0.0, y1, z0), (0.0, y1, z1), (out_m, y1, z1)]),
             quad([(0.0, y0, z0), (0.0, y1, z0), (out_m, y1, z0), (out_m, y0, z0)], TRIM),
@@ -304,27 +313,27 @@ def attic_window(y_m: Span, z_m: Span, rng: Rng) -> Patch:
     bars = [((y0, y0 + 0.08), z_m), ((y1 - 0.08, y1), z_m)]
     bars += [((y0 + 0.08, y1 - 0.08), span) for span in ((z0, z0 + 0.08), (z1 - 0.08, z1))]
     frames = [block((0.0, a, c), (0.06, b, d), slot=FRAME) for (a, b), (c, d) in bars]
-    return joined([*frames, panes(Opening(y_m, z_m, 0.0), rng, 0.012)])
+    return join_patches([*frames, panes(Opening(y_m, z_m, 0.0), rng, 0.012)])
 
 
 def awning(y_m: Span, z1: float, out_m: float) -> Patch:
     """A cloth roof over a shop window, with a short valance."""
     (y0, y1), low = y_m, z1 - 0.32 * out_m
     cloth = [(0.02, y0, z1), (out_m, y0, low), (out_m, y1, low), (0.02, y1, z1)]
-    lip = facing(out_m, y_m, (low - 0.18, low), AWNING)
+    lip = facing_rectangle(out_m, y_m, (low - 0.18, low), AWNING)
     ends = [
         quad([(0.02, y, z1 - 0.12), (out_m, y, low - 0.18), (out_m, y, low), (0.02, y, z1)], AWNING)
         for y in (y0, y1)
     ]
-    return joined([quad(cloth, AWNING), lip, *ends])
+    return join_patches([quad(cloth, AWNING), lip, *ends])
 
 
 def sign_board(y_m: Span, z_m: Span, out_m: float = 0.1) -> Patch:
     """A shop's name on a board; the whole image lies on its front."""
     low, high = (0.0, y_m[0], z_m[0]), (out_m, y_m[1], z_m[1])
     board = block(low, high, slot=METAL)
-    face = facing(out_m + 0.004, y_m, z_m, SIGN)
-    return joined([board, face])
+    face = facing_rectangle(out_m + 0.004, y_m, z_m, SIGN)
+    return join_patches([board, face])
 
 
 def _holds(opening: Opening, y: float, z: float) -> bool:

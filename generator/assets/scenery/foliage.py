@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.assets.procedural.mesh import GRID_M, Array, Indices, settled
-from generator.assets.procedural.noise import uniform
-from generator.core.geometry import Material, MeshData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.noise import uniform
+from gen_data.generator.assets.procedural.patches import GRID_M, Array, Indices, round_values
+from gen_data.generator.core.asset_types import Material, MeshData
+from gen_data.generator.core.streams import Rng
 
 OUTWARD = 0.78
 """Share of the outward direction in a leaf's normal; the rest is its own."""
@@ -54,7 +54,7 @@ def leaf_mesh(sprays: Sprays, materials: Sequence[Material], width: float, rng: 
     )
     # Nothing grows into the ground.
     corners[..., 2] = np.maximum(corners[..., 2], 0.0)
-    corners = np.round(settled(corners) / GRID_M) * GRID_M
+    corners = np.round(round_values(corners) / GRID_M) * GRID_M
     own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     inward = (own * sprays.outward).sum(axis=1) < 0.0
     corners[inward] = corners[inward][:, ::-1]
@@ -64,7 +64,7 @@ def leaf_mesh(sprays: Sprays, materials: Sequence[Material], width: float, rng: 
     return MeshData(
         vertices_m=corners.reshape(-1, 3).astype(np.float32),
         faces=np.arange(3 * n, dtype=np.int32).reshape(-1, 3),
-        normals=(np.round(settled(np.repeat(normals, 3, axis=0)), 6) + 0.0).astype(np.float32),
+        normals=(np.round(round_values(np.repeat(normals, 3, axis=0)), 6) + 0.0).astype(np.float32),
         uvs=np.zeros((3 * n, 2), dtype=np.float32),
         face_slots=sprays.slots.astype(np.int32),
         materials=tuple(materials),
@@ -117,7 +117,7 @@ def sprays_about(anchors_m: Array, centre_m: Array, habit: Habit, rng: Rng) -> S
     return Sprays(at, outward, along, length, slots)
 
 
-def merged(first: MeshData, second: MeshData) -> MeshData:
+def merge_meshes(first: MeshData, second: MeshData) -> MeshData:
     """Both meshes as one; the second's slots follow the first's."""
     return MeshData(
         vertices_m=np.concatenate([first.vertices_m, second.vertices_m]),

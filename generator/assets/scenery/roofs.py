@@ -13,9 +13,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from generator.assets.procedural.mesh import Array, Patch, joined
-from generator.assets.procedural.shapes import block, fan
-from generator.assets.scenery.facade import (
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import block, fan
+from gen_data.generator.assets.scenery.basic_shapes import Span, post, quad
+from gen_data.generator.assets.scenery.facade import (
     BASE,
     CHIMNEY,
     FACADE,
@@ -23,13 +24,12 @@ from generator.assets.scenery.facade import (
     ROOF,
     TRIM,
     Opening,
+    cut_openings,
     frame,
     panes,
-    perforated,
     reveal,
 )
-from generator.assets.scenery.forms import Span, post, quad
-from generator.core.streams import Rng
+from gen_data.generator.core.streams import Rng
 
 TILE_REPEAT_M = 1.8
 Point = tuple[float, float]
@@ -86,7 +86,7 @@ def over_profile(profile: Sequence[Point], width_m: float, verge_m: float, thick
     for (x, z), sign in ((profile[0], 1.0), (profile[-1], -1.0)):
         rows = [(x, -sign * y, z - thick_m), (x, sign * y, z - thick_m)]
         parts.append(quad([*rows, (x, sign * y, z), (x, -sign * y, z)], METAL))
-    return joined([*parts, *_gables(profile, width_m, thick_m)])
+    return join_patches([*parts, *_gables(profile, width_m, thick_m)])
 
 
 def hip(depth_m: float, width_m: float, pitch_rad: float, eaves_m: float) -> Patch:
@@ -106,9 +106,9 @@ def hip(depth_m: float, width_m: float, pitch_rad: float, eaves_m: float) -> Pat
         np.array([ROOF]),
     )
     side = _slope_mapped(side, axis=0, v_top=slope, z_m=(low, top))
-    half = joined([front, side])
+    half = join_patches([front, side])
     rim = block((-x, -y, low - thick), (x, y, low - 0.001), slot=METAL)
-    return joined([half, half.rotated("z", math.pi), rim])
+    return join_patches([half, half.rotated("z", math.pi), rim])
 
 
 def flat(depth_m: float, width_m: float, parapet_m: float) -> Patch:
@@ -122,7 +122,7 @@ def flat(depth_m: float, width_m: float, parapet_m: float) -> Patch:
         parts.append(block((x0, y0, 0.0), (x1, y1, parapet_m), slot=FACADE))
         low, high = (x0 - a, y0 - b, parapet_m), (x1 + a, y1 + b, parapet_m + 0.05)
         parts.append(block(low, high, slot=METAL))
-    return joined(parts)
+    return join_patches(parts)
 
 
 def chimney(x: float, y: float, z_m: Span) -> Patch:
@@ -131,7 +131,7 @@ def chimney(x: float, y: float, z_m: Span) -> Patch:
     stack = block((x - w, y - w, z_m[0]), (x + w, y + w, z_m[1]), slot=CHIMNEY)
     plate = block((x - w - 0.06, y - w - 0.06, z_m[1]), (x + w + 0.06, y + w + 0.06, z_m[1] + 0.08))
     pot = post(0.11, (z_m[1] + 0.08, z_m[1] + 0.35), (x, y, 0.0), 8)
-    return joined([stack, plate.painted(TRIM), pot.painted(METAL)])
+    return join_patches([stack, plate.painted(TRIM), pot.painted(METAL)])
 
 
 def dormer(x: float, y: float, z0: float, reach_m: float, rng: Rng) -> Patch:
@@ -146,9 +146,9 @@ def dormer(x: float, y: float, z0: float, reach_m: float, rng: Rng) -> Patch:
     """
     w, h = 0.75, 1.45
     hole = Opening((-0.5, 0.5), (0.2, 1.35), 0.08)
-    front = joined(
+    front = join_patches(
         [
-            perforated((-w, w), (0.0, h), (hole,), TRIM),
+            cut_openings((-w, w), (0.0, h), (hole,), TRIM),
             reveal(hole, 0.11, TRIM),
             frame(hole),
             panes(hole, rng, -0.11),
@@ -161,7 +161,7 @@ def dormer(x: float, y: float, z0: float, reach_m: float, rng: Rng) -> Patch:
         corners = [low, (x, ys, z0), high, (x - reach_m, ys, z0 + h)]
         cheeks.append(quad(corners[::-1] if side > 0 else corners, ROOF))
     lid = block((x - reach_m, y - w - 0.12, z0 + h), (x + 0.18, y + w + 0.12, z0 + h + 0.12))
-    return joined([front, *cheeks, lid.painted(METAL)])
+    return join_patches([front, *cheeks, lid.painted(METAL)])
 
 
 def unit(x: float, y: float, size_m: tuple[float, float, float]) -> Patch:

@@ -6,17 +6,22 @@ import math
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Solid
-from generator.assets.procedural.materials import linear, patterned
-from generator.assets.procedural.mesh import Array, Patch, finished, joined
-from generator.assets.procedural.noise import uniform
-from generator.assets.procedural.shapes import ball, block, rounded_box
-from generator.assets.scenery.foliage import Habit, leaf_mesh, merged, sprays_about
-from generator.assets.scenery.trees import leaf_greens
-from generator.core.geometry import ConvexParts, Material
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear, patterned_material
+from gen_data.generator.assets.procedural.noise import uniform
+from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import ball, block, rounded_box
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.assets.scenery.foliage import Habit, leaf_mesh, merge_meshes, sprays_about
+from gen_data.generator.assets.scenery.trees import leaf_greens
+from gen_data.generator.core.asset_types import ConvexParts, Material
+from gen_data.generator.core.streams import Rng
 
 _GREENS = (
     ("#26331d", "#344527", "#455833", "#586c42"),
@@ -28,38 +33,48 @@ _FLOWERS = ("#b33a4a", "#d8c7d9", "#d9b23a", "#9a4f9c", "#e6e2dc")
 
 def hedge(seed: int) -> Solid:
     """A clipped hedge along Y, 1.5-4 m long. Slots: core, then shades of leaf."""
-    rng = rng_of("hedge", seed)
-    size = (between(0.5, 0.9, rng), between(1.5, 4.0, rng), between(0.8, 1.8, rng))
+    rng = variant_rng("hedge", seed)
+    size = (
+        uniform_between(0.5, 0.9, rng),
+        uniform_between(1.5, 4.0, rng),
+        uniform_between(0.8, 1.8, rng),
+    )
     core = rounded_box((size[0] - 0.1, size[1] - 0.08, size[2] - 0.05), 0.12, 2)
     core = core.moved(z=0.5 * (size[2] - 0.05))
     anchors = _skin(size, 700, rng)
     middle = np.array([0.0, 0.0, 0.4 * size[2]])
-    hull = hulls.box((-0.5 * size[0], -0.5 * size[1], 0.0), (0.5 * size[0], 0.5 * size[1], size[2]))
+    hull = collision_hulls.box(
+        (-0.5 * size[0], -0.5 * size[1], 0.0), (0.5 * size[0], 0.5 * size[1], size[2])
+    )
     return _leafy(core, anchors, middle, 2600, 0.1, hull, rng)
 
 
 def bush(seed: int) -> Solid:
     """A free-growing shrub, 0.7-1.8 m high. Slots: core, then shades of leaf."""
-    rng = rng_of("bush", seed)
-    h = between(0.7, 1.8, rng)
+    rng = variant_rng("bush", seed)
+    h = uniform_between(0.7, 1.8, rng)
     lobes = []
     for k in range(5):
-        turn = 2.0 * math.pi * (k + between(-0.3, 0.3, rng)) / 5
-        r = between(0.24, 0.36, rng) * h
-        away = between(0.2, 0.34, rng) * h if k else 0.0
-        z = max(r, between(0.35, 0.62, rng) * h)
+        turn = 2.0 * math.pi * (k + uniform_between(-0.3, 0.3, rng)) / 5
+        r = uniform_between(0.24, 0.36, rng) * h
+        away = uniform_between(0.2, 0.34, rng) * h if k else 0.0
+        z = max(r, uniform_between(0.35, 0.62, rng) * h)
         lobes.append((away * math.cos(turn), away * math.sin(turn), z, r))
-    core = joined([_round(x, y, z, 0.82 * r) for x, y, z, r in lobes])
+    core = join_patches([_round(x, y, z, 0.82 * r) for x, y, z, r in lobes])
     anchors = np.concatenate([_shell(x, y, z, r, 90, rng) for x, y, z, r in lobes])
-    hull = hulls.frustum((0.45 * h, 0.0), (0.4 * h, 0.9 * h), 12)
+    hull = collision_hulls.frustum((0.45 * h, 0.0), (0.4 * h, 0.9 * h), 12)
     middle = np.array([0.0, 0.0, 0.3 * h])
     return _leafy(core, anchors, middle, 2400, 0.12 + 0.03 * h, hull, rng)
 
 
 def planter(seed: int) -> Solid:
     """A tub or trough with a plant, flowering in some. Slots: tub, soil and core, leaves."""
-    rng = rng_of("planter", seed)
-    w, long, h = between(0.45, 0.6, rng), between(0.6, 1.4, rng), between(0.4, 0.6, rng)
+    rng = variant_rng("planter", seed)
+    w, long, h = (
+        uniform_between(0.45, 0.6, rng),
+        uniform_between(0.6, 1.4, rng),
+        uniform_between(0.4, 0.6, rng),
+    )
     tub = [
         block((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h - 0.05), 0.012),
         block(
@@ -70,25 +85,25 @@ def planter(seed: int) -> Solid:
     ]
     spots = max(2, round(long / 0.35))
     heads = [
-        (0.0, (k + 0.5) * long / spots - 0.5 * long, h + 0.08, between(0.18, 0.26, rng))
+        (0.0, (k + 0.5) * long / spots - 0.5 * long, h + 0.08, uniform_between(0.18, 0.26, rng))
         for k in range(spots)
     ]
-    core = joined([*(_round(*head[:3], 0.8 * head[3]).painted(1) for head in heads), *tub])
+    core = join_patches([*(_round(*head[:3], 0.8 * head[3]).painted(1) for head in heads), *tub])
     anchors = np.concatenate([_shell(*head, 60, rng) for head in heads])
     anchors = anchors[anchors[:, 2] > h]
-    hull = hulls.box((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h))
+    hull = collision_hulls.box((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h))
     stuff = (
-        patterned("texture/concrete?seed=3", 1.5, 0.9, (0.8, 0.78, 0.75)),
-        patterned("texture/wood_grain?seed=5", 1.2, 0.8, (0.5, 0.42, 0.36)),
+        patterned_material("texture/concrete?seed=3", 1.5, 0.9, (0.8, 0.78, 0.75)),
+        patterned_material("texture/wood_grain?seed=5", 1.2, 0.8, (0.5, 0.42, 0.36)),
     )
     greens = _shades(rng)
-    if chance(0.6, rng):
-        blossom = Material(linear(pick(_FLOWERS, rng)), roughness=0.8, role="leaf")
+    if is_drawn(0.6, rng):
+        blossom = Material(hex_to_linear(choose(_FLOWERS, rng)), roughness=0.8, role="leaf")
         greens = (*greens[:3], blossom)
-    mesh = finished(core, (pick(stuff, rng), _core_material(greens)), 50.0)
+    mesh = finish_mesh(core, (choose(stuff, rng), _core_material(greens)), 50.0)
     sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), Habit(620, 0.095, 0.07), rng)
     return Solid(
-        merged(mesh, leaf_mesh(sprays, greens, 0.7, rng)), ConvexParts((np.round(hull, 6),))
+        merge_meshes(mesh, leaf_mesh(sprays, greens, 0.7, rng)), ConvexParts((np.round(hull, 6),))
     )
 
 
@@ -96,14 +111,14 @@ def _leafy(
     core: Patch, anchors: Array, middle: Array, count: int, length: float, hull: Array, rng: Rng
 ) -> Solid:
     greens = _shades(rng)
-    mesh = finished(core, (_core_material(greens),), 70.0)
+    mesh = finish_mesh(core, (_core_material(greens),), 70.0)
     sprays = sprays_about(anchors, middle, Habit(count, length, 0.6 * length), rng)
     leaves = leaf_mesh(sprays, greens, 0.7, rng)
-    return Solid(merged(mesh, leaves), ConvexParts((np.round(hull, 6),)))
+    return Solid(merge_meshes(mesh, leaves), ConvexParts((np.round(hull, 6),)))
 
 
 def _shades(rng: Rng) -> tuple[Material, ...]:
-    return leaf_greens(pick(_GREENS, rng), rng)
+    return leaf_greens(choose(_GREENS, rng), rng)
 
 
 def _core_material(greens: tuple[Material, ...]) -> Material:

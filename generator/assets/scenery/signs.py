@@ -13,16 +13,16 @@ from typing import Literal
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, rng_of
-from generator.assets.procedural.family import Facts, Solid
-from generator.assets.procedural.materials import painted
-from generator.assets.procedural.mesh import Array, Patch, joined
-from generator.assets.procedural.shapes import circle, grid
-from generator.assets.scenery.forms import post, solid
-from generator.assets.scenery.furniture import GALVANISED
-from generator.core.errors import AssetError, did_you_mean
-from generator.core.geometry import Material
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.material_presets import painted_material
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import circle, grid
+from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.scenery.basic_shapes import make_solid, post
+from gen_data.generator.assets.scenery.street_furniture import GALVANISED
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.errors import AssetError, did_you_mean
 
 Shape = Literal["disc", "octagon", "triangle", "yield", "diamond", "square", "wide"]
 Kind = Literal["regulatory", "mandatory", "warning", "information"]
@@ -84,12 +84,12 @@ def traffic_sign(seed: int, sign: str) -> Solid:
     """
     name = sign_name(seed, sign)
     made = SIGNS[name]
-    rng = rng_of("traffic_sign", seed)
+    rng = variant_rng("traffic_sign", seed)
     outline = plate_outline(made.shape) * made.size_m
     half_high = float(outline[:, 1].max())
     foot = float(-outline[:, 1].min())
     # Over a pavement the lower edge hangs 2.0-2.2 m high, so that people walk below.
-    centre_z = between(2.0, 2.2, rng) + foot
+    centre_z = uniform_between(2.0, 2.2, rng) + foot
     face = _plate(outline, made.size_m).moved(0.045, 0.0, centre_z)
     pole = post(0.03, (0.0, centre_z + half_high - 0.02), sides=10).painted(2)
     image = Material(
@@ -99,8 +99,8 @@ def traffic_sign(seed: int, sign: str) -> Solid:
         printed=True,
         role="sign",
     )
-    hull = hulls.frustum((0.03, 0.0), (0.03, centre_z + half_high - 0.02), 8)
-    return solid([face, pole], (image, painted("#8c8f90", 0.6), GALVANISED), [hull])
+    hull = collision_hulls.frustum((0.03, 0.0), (0.03, centre_z + half_high - 0.02), 8)
+    return make_solid([face, pole], (image, painted_material("#8c8f90", 0.6), GALVANISED), [hull])
 
 
 def traffic_sign_facts(seed: int, sign: str) -> Facts:
@@ -150,7 +150,7 @@ def _plate(outline: Array, size_m: float) -> Patch:
     face = Patch(corners, uvs, np.zeros(n, dtype=np.int64))
     rear = Patch(corners * np.array([0.0, 1.0, 1.0]), uvs, np.zeros(n, dtype=np.int64)).flipped()
     rim = grid(np.stack([np.concatenate([ring, ring[:1]]) for ring in (back, front)]))
-    return joined([face, rear.painted(1), rim.painted(1)])
+    return join_patches([face, rear.painted(1), rim.painted(1)])
 
 
 def _blunted(corners: Array, radius: float) -> Array:

@@ -11,17 +11,29 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Facts, Solid
-from generator.assets.procedural.materials import painted
-from generator.assets.procedural.mesh import Patch, joined
-from generator.assets.procedural.shapes import block, circle, fan, grid, lathe, rounded_box
-from generator.assets.scenery.forms import post, solid, tube
-from generator.assets.scenery.furniture import GALVANISED
-from generator.core.errors import AssetError, did_you_mean
-from generator.core.geometry import Material
-from generator.core.se3 import Vec3
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.material_presets import painted_material
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import (
+    block,
+    circle,
+    fan,
+    grid,
+    lathe,
+    rounded_box,
+)
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.assets.scenery.basic_shapes import make_solid, post, tube
+from gen_data.generator.assets.scenery.street_furniture import GALVANISED
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.se3 import Vec3
 
 MOUNTS = ("pole", "mast_arm")
 HOUSING, POLE, BOARD = 0, 1, 2
@@ -60,24 +72,28 @@ def traffic_light(seed: int, mount: str) -> Solid:
     Raises:
         AssetError: for an unknown mount.
     """
-    rng = rng_of("traffic_light", seed)
+    rng = variant_rng("traffic_light", seed)
     arm = _mount(seed, mount) == "mast_arm"
-    lens_m = 0.15 if arm else pick((0.1, 0.1, 0.15), rng)
-    low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(0.11, 0.0, between(2.15, 2.5, rng))
+    lens_m = 0.15 if arm else choose((0.1, 0.1, 0.15), rng)
+    low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(
+        0.11, 0.0, uniform_between(2.15, 2.5, rng)
+    )
     radius = 0.09 if arm else 0.055
-    top = between(5.6, 6.2, rng) if arm else float(low.bounds_m()[1][2]) + 0.1
+    top = uniform_between(5.6, 6.2, rng) if arm else float(low.bounds_m()[1][2]) + 0.1
     parts = [low, post(radius, (0.0, top), sides=12).painted(POLE)]
     if arm:
-        reach = between(3.5, 5.5, rng)
+        reach = uniform_between(3.5, 5.5, rng)
         path = [(0.0, 0.0, top - 0.1), (0.0, -0.6 * reach, top + 0.05), (0.0, -reach, top + 0.1)]
         high = head(VEHICLE_LENSES, lens_m)
         plate = _backboard(high)
         parts += [tube(path, 0.055, 8).painted(POLE)]
         parts += [part.moved(0.1, -reach + 0.25, top - 0.75) for part in (high, plate)]
-    elif chance(0.35, rng):
+    elif is_drawn(0.35, rng):
         parts.append(_backboard(low))
-    hull = hulls.frustum((radius, 0.0), (radius, top), 10)
-    return solid(parts, _materials(VEHICLE_LENSES, pick(("#262829", "#2f4236"), rng)), [hull])
+    hull = collision_hulls.frustum((radius, 0.0), (radius, top), 10)
+    return make_solid(
+        parts, _materials(VEHICLE_LENSES, choose(("#262829", "#2f4236"), rng)), [hull]
+    )
 
 
 def traffic_light_facts(seed: int, mount: str) -> Facts:
@@ -87,15 +103,15 @@ def traffic_light_facts(seed: int, mount: str) -> Facts:
 
 def pedestrian_signal(seed: int) -> Solid:
     """A red and green signal for people, with a push button. Slots as above."""
-    rng = rng_of("pedestrian_signal", seed)
-    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, between(2.1, 2.3, rng))
+    rng = variant_rng("pedestrian_signal", seed)
+    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, uniform_between(2.1, 2.3, rng))
     top = float(signal.bounds_m()[1][2]) + 0.1
     button = rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
     parts = [signal, button, post(0.052, (0.0, top), sides=12).painted(POLE)]
-    hull = hulls.frustum((0.052, 0.0), (0.052, top), 10)
+    hull = collision_hulls.frustum((0.052, 0.0), (0.052, top), 10)
     materials = list(_materials(PEDESTRIAN_LENSES, "#262829"))
-    materials[BOARD] = painted("#d9a520", 0.5)
-    return solid(parts, materials, [hull])
+    materials[BOARD] = painted_material("#d9a520", 0.5)
+    return make_solid(parts, materials, [hull])
 
 
 def head(lenses: Sequence[str], lens_m: float) -> Patch:
@@ -117,7 +133,7 @@ def head(lenses: Sequence[str], lens_m: float) -> Patch:
             lens.moved(x, 0.0, z).painted(_FIRST_LENS + k),
             _visor(1.08 * lens_m, 1.7 * lens_m).moved(x - 0.002, 0.0, z),
         ]
-    return joined(parts)
+    return join_patches(parts)
 
 
 def _bulge(radius: float) -> Patch:
@@ -129,7 +145,7 @@ def _bulge(radius: float) -> Patch:
 def _figure(radius: float, role: str) -> Patch:
     """The luminous figure of a signal for people: its head, and convex pieces of its body."""
     pieces = [circle(0.17, 12, (0.0, 0.62)), *(np.array(piece) for piece in FIGURES[role])]
-    return joined(fan(np.column_stack([np.full(len(p), 0.006), radius * p])) for p in pieces)
+    return join_patches(fan(np.column_stack([np.full(len(p), 0.006), radius * p])) for p in pieces)
 
 
 def _visor(radius: float, reach: float) -> Patch:
@@ -150,12 +166,12 @@ def _backboard(signal: Patch) -> Patch:
         (x + 0.003, low[1] - rim + 0.03, low[2] - rim + 0.03),
         (x + 0.013, high[1] + rim - 0.03, high[2] + rim - 0.03),
     )
-    return joined([outer.painted(BOARD), inner.painted(HOUSING)])
+    return join_patches([outer.painted(BOARD), inner.painted(HOUSING)])
 
 
 def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
     lit = (Material(_OFF[role], roughness=0.25, specular=0.5, role=role) for role in lenses)
-    return (painted(housing, 0.5), GALVANISED, painted("#e9e8e3", 0.4), *lit)
+    return (painted_material(housing, 0.5), GALVANISED, painted_material("#e9e8e3", 0.4), *lit)
 
 
 def _mount(seed: int, mount: str) -> str:

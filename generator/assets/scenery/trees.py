@@ -8,18 +8,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, pick, rng_of
-from generator.assets.procedural.family import Facts, Solid
-from generator.assets.procedural.materials import jittered, linear
-from generator.assets.procedural.mesh import Array, Patch, finished
-from generator.assets.procedural.noise import uniform
-from generator.assets.procedural.shapes import circle, sweep
-from generator.assets.scenery.branching import Lobe, Skeleton, grown, points_in, wood
-from generator.assets.scenery.foliage import Habit, Sprays, leaf_mesh, merged, sprays_about
-from generator.core.errors import AssetError, did_you_mean
-from generator.core.geometry import ConvexParts, Material, MeshData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
+from gen_data.generator.assets.procedural.noise import uniform
+from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh
+from gen_data.generator.assets.procedural.surface_shapes import circle, sweep
+from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.scenery.branching import (
+    Lobe,
+    Skeleton,
+    grow_skeleton,
+    points_in,
+    wood,
+)
+from gen_data.generator.assets.scenery.foliage import (
+    Habit,
+    Sprays,
+    leaf_mesh,
+    merge_meshes,
+    sprays_about,
+)
+from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
+from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.streams import Rng
 
 SPECIES = ("broad", "round", "columnar", "birch", "young", "conifer")
 
@@ -74,7 +86,7 @@ def tree(seed: int, species: str, leaves: float) -> Solid:
         )
     if not 0.0 <= leaves <= 1.0:
         raise AssetError(f"tree: leaves={leaves} is not a share between 0 and 1")
-    rng = rng_of(f"tree/{species}", seed)
+    rng = variant_rng(f"tree/{species}", seed)
     return _conifer(rng) if species == "conifer" else _broadleaf(_SHAPES[species](rng), leaves, rng)
 
 
@@ -87,19 +99,19 @@ def _broadleaf(shape: Shape, leaves: float, rng: Rng) -> Solid:
     trunk = _trunk(shape, rng)
     points = points_in(shape.lobes, _ATTRACTORS, rng)
     step_m = min(max(0.1, _STEP * max(lobe.axes_m[0] for lobe in shape.lobes)), 0.35)
-    skeleton = grown(trunk, points, step_m, shape.trunk_m)
+    skeleton = grow_skeleton(trunk, points, step_m, shape.trunk_m)
     bark = _bark(shape.bark)
     # Thin twigs hide behind leaves; without leaves they are the crown.
     thinnest = 0.0 if leaves < 0.05 else 0.2 * shape.trunk_m
-    mesh = finished(_flared(wood(skeleton, thinnest, 2)), (bark,), 60.0)
-    hull = hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
+    mesh = finish_mesh(_flared(wood(skeleton, thinnest, 2)), (bark,), 60.0)
+    hull = collision_hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
     count = round(_LEAVES * leaves)
     if count:
         greens = leaf_greens(shape.green, rng)
         sprays = _crown(shape, skeleton, count, len(greens), rng)
-        mesh = merged(mesh, leaf_mesh(sprays, greens, _LEAF_WIDTH, rng))
+        mesh = merge_meshes(mesh, leaf_mesh(sprays, greens, _LEAF_WIDTH, rng))
     else:
-        mesh = merged(mesh, _bare_twigs(shape, skeleton, bark, rng))
+        mesh = merge_meshes(mesh, _bare_twigs(shape, skeleton, bark, rng))
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
 
@@ -151,8 +163,8 @@ def _flared(patch: Patch) -> Patch:
 
 def _conifer(rng: Rng) -> Solid:
     """A spruce: whorls of drooping branches along a straight trunk, evergreen."""
-    height, base_m = between(6.0, 12.0, rng), between(0.1, 0.17, rng)
-    clear, spread = between(0.2, 0.9, rng), between(0.17, 0.24, rng) * height
+    height, base_m = uniform_between(6.0, 12.0, rng), uniform_between(0.1, 0.17, rng)
+    clear, spread = uniform_between(0.2, 0.9, rng), uniform_between(0.17, 0.24, rng) * height
     line = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * height), (0.0, 0.0, height)])
     trunk = sweep(line, circle(base_m, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.0, 0.5, 0.08]))
     whorls = 20
@@ -162,8 +174,10 @@ def _conifer(rng: Rng) -> Solid:
         z = clear + (height - clear) * share**0.9
         reach = spread * (1.0 - share) ** 0.85 + 0.12
         for k in range(9):
-            turn = 2.0 * math.pi * (k + 0.5 * (level % 2) + 0.5 * between(-0.5, 0.5, rng)) / 9
-            fans.append(_fan(z, turn, reach * between(0.75, 1.1, rng), 0.5 - share, rng))
+            turn = (
+                2.0 * math.pi * (k + 0.5 * (level % 2) + 0.5 * uniform_between(-0.5, 0.5, rng)) / 9
+            )
+            fans.append(_fan(z, turn, reach * uniform_between(0.75, 1.1, rng), 0.5 - share, rng))
     places, growth, reach_m = (np.concatenate(part) for part in zip(*fans, strict=True))
     # The lowest sprays rest on the ground.
     growth[:, 2] = np.maximum(growth[:, 2], (0.03 - places[:, 2]) / reach_m)
@@ -173,8 +187,10 @@ def _conifer(rng: Rng) -> Solid:
     slots = np.clip(np.floor(depth * 3.2 + uniform(len(depth), rng) - 0.5), 0, 3).astype(np.int64)
     sprays = Sprays(places, outward, growth, reach_m, slots)
     greens = leaf_greens(("#1f2b1c", "#2a3a25", "#35472d", "#425537"), rng)
-    mesh = merged(finished(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng))
-    hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
+    mesh = merge_meshes(
+        finish_mesh(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng)
+    )
+    hull = collision_hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
 
@@ -199,13 +215,15 @@ def _fan(z: float, turn: float, reach: float, sag: float, rng: Rng) -> tuple[Arr
 
 def _bark(code: str) -> Material:
     texture = "texture/bark?seed=0"
-    return Material(linear(code), roughness=0.95, texture=texture, texture_scale_m=0.8, role="bark")
+    return Material(
+        hex_to_linear(code), roughness=0.95, texture=texture, texture_scale_m=0.8, role="bark"
+    )
 
 
 def leaf_greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
     """Shades of leaf that vary together from tree to tree."""
-    r, g, b = jittered((1.0, 1.0, 1.0), 0.0, rng)
-    warm, level = between(0.85, 1.18, rng), between(0.85, 1.15, rng)
+    r, g, b = jitter_color((1.0, 1.0, 1.0), 0.0, rng)
+    warm, level = uniform_between(0.85, 1.18, rng), uniform_between(0.85, 1.15, rng)
     return tuple(
         Material(
             (level * warm * c[0] * r, level * c[1] * g, level * c[2] * b),
@@ -213,7 +231,7 @@ def leaf_greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
             specular=0.35,
             role="leaf",
         )
-        for c in (linear(code) for code in codes)
+        for c in (hex_to_linear(code) for code in codes)
     )
 
 
@@ -226,55 +244,55 @@ def _lobed(radius: float, height: float, centre_z: float, count: int, rng: Rng) 
     """A crown of one body and several overlapping boughs around it."""
     lobes = [Lobe((0.0, 0.0, centre_z), (0.72 * radius, 0.72 * radius, 0.42 * height))]
     for k in range(count):
-        turn = 2.0 * math.pi * (k + between(-0.3, 0.3, rng)) / count
-        away, r = between(0.42, 0.6, rng) * radius, between(0.4, 0.55, rng) * radius
-        z = centre_z + between(-0.24, 0.26, rng) * height
+        turn = 2.0 * math.pi * (k + uniform_between(-0.3, 0.3, rng)) / count
+        away, r = uniform_between(0.42, 0.6, rng) * radius, uniform_between(0.4, 0.55, rng) * radius
+        z = centre_z + uniform_between(-0.24, 0.26, rng) * height
         lobes.append(Lobe((away * math.cos(turn), away * math.sin(turn), z), (r, r, 0.8 * r)))
     return tuple(lobes)
 
 
 def _broad(rng: Rng) -> Shape:
-    height, clear = between(8.5, 12.0, rng), between(2.9, 3.6, rng)
+    height, clear = uniform_between(8.5, 12.0, rng), uniform_between(2.9, 3.6, rng)
     crown = height - clear + 0.3
-    radius = crown * between(0.42, 0.54, rng)
+    radius = crown * uniform_between(0.42, 0.54, rng)
     lobes = _lobed(radius, crown, height - 0.52 * crown, 7, rng)
-    green = pick((_LIME, _MAPLE), rng)
-    return Shape(height, clear, between(0.16, 0.26, rng), lobes, green, "#7d7263")
+    green = choose((_LIME, _MAPLE), rng)
+    return Shape(height, clear, uniform_between(0.16, 0.26, rng), lobes, green, "#7d7263")
 
 
 def _round(rng: Rng) -> Shape:
-    height, clear = between(5.0, 6.5, rng), between(2.2, 2.6, rng)
+    height, clear = uniform_between(5.0, 6.5, rng), uniform_between(2.2, 2.6, rng)
     r = 0.5 * (height - clear + 0.2)
     lobes = (Lobe((0.0, 0.0, height - r), (1.02 * r, 1.02 * r, r)),)
-    return Shape(height, clear, between(0.1, 0.15, rng), lobes, _MAPLE, "#75695b")
+    return Shape(height, clear, uniform_between(0.1, 0.15, rng), lobes, _MAPLE, "#75695b")
 
 
 def _columnar(rng: Rng) -> Shape:
-    height, clear = between(8.0, 12.0, rng), between(1.6, 2.4, rng)
+    height, clear = uniform_between(8.0, 12.0, rng), uniform_between(1.6, 2.4, rng)
     crown = height - clear + 0.3
-    r = crown * between(0.15, 0.21, rng)
+    r = crown * uniform_between(0.15, 0.21, rng)
     lobes = tuple(
         Lobe((0.0, 0.0, clear + crown * z), (w * r, w * r, 0.24 * crown))
         for z, w in ((0.22, 0.85), (0.48, 1.0), (0.74, 0.72))
     )
-    return Shape(height, clear, between(0.13, 0.19, rng), lobes, _LIME, "#7a7062", 0.0)
+    return Shape(height, clear, uniform_between(0.13, 0.19, rng), lobes, _LIME, "#7a7062", 0.0)
 
 
 def _birch(rng: Rng) -> Shape:
-    height, clear = between(8.0, 11.5, rng), between(2.0, 3.0, rng)
+    height, clear = uniform_between(8.0, 11.5, rng), uniform_between(2.0, 3.0, rng)
     crown = height - clear + 0.3
-    radius = crown * between(0.26, 0.34, rng)
+    radius = crown * uniform_between(0.26, 0.34, rng)
     lobes = _lobed(radius, crown, height - 0.5 * crown, 5, rng)
-    return Shape(height, clear, between(0.1, 0.15, rng), lobes, _BIRCH, "#cfccc4", 0.7)
+    return Shape(height, clear, uniform_between(0.1, 0.15, rng), lobes, _BIRCH, "#cfccc4", 0.7)
 
 
 def _young(rng: Rng) -> Shape:
-    height, clear = between(3.6, 4.8, rng), between(1.8, 2.2, rng)
+    height, clear = uniform_between(3.6, 4.8, rng), uniform_between(1.8, 2.2, rng)
     r = 0.5 * (height - clear)
-    wide = between(0.55, 0.75, rng)
+    wide = uniform_between(0.55, 0.75, rng)
     lobes = (Lobe((0.0, 0.0, height - r), (wide * r, wide * r, r)),)
-    green = pick((_LIME, _MAPLE, _BIRCH), rng)
-    return Shape(height, clear, between(0.04, 0.06, rng), lobes, green, "#80746a")
+    green = choose((_LIME, _MAPLE, _BIRCH), rng)
+    return Shape(height, clear, uniform_between(0.04, 0.06, rng), lobes, green, "#80746a")
 
 
 _SHAPES: dict[str, Callable[[Rng], Shape]] = {

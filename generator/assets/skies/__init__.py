@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from generator.assets.procedural.family import EnvironmentFamily, Lazy
+from gen_data.generator.assets.procedural.family import EnvironmentFamily, Lazy
 
 ENVIRONMENTS: Mapping[str, EnvironmentFamily] = {
     # Not offered for selection: a sky without the sun that belongs to it is wrong.
@@ -13,7 +13,7 @@ ENVIRONMENTS: Mapping[str, EnvironmentFamily] = {
         ("outdoor",),
         0,
         1,
-        Lazy("generator.assets.skies.sky:sky"),
+        Lazy("gen_data.generator.assets.skies.sky:sky"),
         {
             "sun_altitude_deg": 40.0,
             "turbidity": 2.5,

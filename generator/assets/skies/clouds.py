@@ -12,10 +12,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.assets.procedural.draw import rng_of
-from generator.assets.procedural.noise import fbm, perlin, smoothstep
-from generator.core.geometry import Float32
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.noise import fbm, perlin, smoothstep
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.streams import Rng
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def cloud_layer(
 @lru_cache(maxsize=2)
 def _layer(cloudiness: float, sun_altitude_rad: float, seed: int) -> tuple[Float32, ...]:
     """The layer, and its halvings; read-only."""
-    cover, light = _seen_from_below(cloudiness, sun_altitude_rad, rng_of("sky", seed))
+    cover, light = _seen_from_below(cloudiness, sun_altitude_rad, variant_rng("sky", seed))
     return tuple(_halvings(np.stack([cover, cover * light], axis=-1)))
 
 

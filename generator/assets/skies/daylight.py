@@ -17,8 +17,8 @@ import math
 
 import numpy as np
 
-from generator.core.colorimetry import luminance
-from generator.core.se3 import Vec3
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.se3 import Vec3
 
 SOLAR_ILLUMINANCE_LUX = 127_500.0
 """Outside the atmosphere, on a surface that faces the sun (IES RP-21)."""

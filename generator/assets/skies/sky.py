@@ -16,12 +16,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.assets.procedural.environments import directions, normalised
-from generator.assets.procedural.noise import smoothstep
-from generator.assets.skies import daylight
-from generator.assets.skies.clouds import cloud_layer
-from generator.core.colorimetry import REC709_FROM_XYZ, REC709_LUMINANCE, luminance
-from generator.core.geometry import Float32
+from gen_data.generator.assets.procedural.environments import normalize_luminance, pixel_directions
+from gen_data.generator.assets.procedural.noise import smoothstep
+from gen_data.generator.assets.skies import daylight
+from gen_data.generator.assets.skies.clouds import cloud_layer
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.colorimetry import REC709_FROM_XYZ, REC709_LUMINANCE, luminance
 
 Array = NDArray[np.float64]
 Image = TypeVar("Image", NDArray[np.float64], NDArray[np.float32])
@@ -109,7 +109,7 @@ def sky(
         ValueError: a parameter is outside its range.
     """
     known = SkyModel(seed, sun_altitude_deg, turbidity, cloudiness, ground_albedo, model)
-    return normalised(luminance_cd_m2(known, _ROWS))
+    return normalize_luminance(luminance_cd_m2(known, _ROWS))
 
 
 def sun_lux(model: SkyModel) -> float:
@@ -134,7 +134,7 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
         ValueError: a parameter is outside its range.
     """
     _check(model)
-    d = directions(rows)
+    d = pixel_directions(rows)
     above, below = d[: rows // 2], d[rows // 2 :]
     if model.model == "preetham":
         zenith = daylight.preetham_zenith_cd_m2(model.sun_altitude_rad, model.turbidity)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from generator.assets.procedural.family import Family, Lazy, TextureFamily
+from gen_data.generator.assets.procedural.family import Family, Lazy, TextureFamily
 
 
 def _vehicle(name: str, variants: int, mass_kg: float, module: str, **parameters: object) -> Family:

@@ -8,20 +8,25 @@ from itertools import pairwise
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Facts, Solid
-from generator.assets.procedural.materials import linear
-from generator.assets.procedural.mesh import Array, Patch, joined
-from generator.assets.procedural.shapes import block, circle, cone, lathe, sweep
-from generator.assets.scenery.forms import solid
-from generator.assets.vehicles import rider as people
-from generator.assets.vehicles.materials import Slot, materials
-from generator.assets.vehicles.rider import Seat, blob, limb
-from generator.assets.vehicles.shell import unmapped
-from generator.core.geometry import Keypoint, Material
-from generator.core.se3 import Vec3
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import block, circle, cone, lathe, sweep
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.assets.scenery.basic_shapes import make_solid
+from gen_data.generator.assets.vehicles import rider as people
+from gen_data.generator.assets.vehicles.body_shell import drop_uvs
+from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot, materials
+from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
 
 STYLES = ("city", "mountain", "road")
 
@@ -65,10 +70,10 @@ _FRAMES = {
 
 def bicycle(seed: int) -> Solid:
     """A bicycle that stands upright with nobody on it."""
-    rng = rng_of("bicycle", seed)
+    rng = variant_rng("bicycle", seed)
     frame = _FRAMES[_style(seed)]
-    parts = _machine(_style(seed), frame, between(0.0, 2.0 * math.pi, rng), rng)
-    paint = linear(pick(_PAINTS, rng))
+    parts = _machine(_style(seed), frame, uniform_between(0.0, 2.0 * math.pi, rng), rng)
+    paint = hex_to_linear(choose(_PAINTS, rng))
     return _solid(parts, frame, materials(rng, paint), 1.0)
 
 
@@ -79,12 +84,12 @@ def bicycle_facts(seed: int) -> Facts:
 
 def cyclist(seed: int) -> Solid:
     """A bicycle with its rider."""
-    rng = rng_of("cyclist", seed)
-    frame, turn = _FRAMES[_style(seed)], between(0.0, 2.0 * math.pi, rng)
+    rng = variant_rng("cyclist", seed)
+    frame, turn = _FRAMES[_style(seed)], uniform_between(0.0, 2.0 * math.pi, rng)
     parts = _machine(_style(seed), frame, turn, rng)
     parts += people.rider(_seat(frame, turn), rng)
-    paint = linear(pick(_PAINTS, rng))
-    finish = materials(rng, paint, clothes=people.drawn_clothes(rng))
+    paint = hex_to_linear(choose(_PAINTS, rng))
+    finish = materials(rng, paint, clothes=people.draw_clothes(rng))
     return _solid(parts, frame, finish, 1.7)
 
 
@@ -96,24 +101,24 @@ def cyclist_facts(seed: int) -> Facts:
 def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
     """A thin wheel about the origin, its axle along Y."""
     ring = circle(tyre_m, 6) + np.array([radius_m - tyre_m, 0.0])
-    tyre = lathe([*map(tuple, ring), tuple(ring[0])], 24, Slot.TYRE)
+    tyre = lathe([*map(tuple, ring), tuple(ring[0])], 24, VehicleSlot.TYRE)
     rim = lathe(
         [(radius_m - 1.7 * tyre_m - 0.014, h) for h in (0.6 * tyre_m, -0.6 * tyre_m)]
         + [(radius_m - 1.4 * tyre_m, h) for h in (-0.7 * tyre_m, 0.7 * tyre_m)]
         + [(radius_m - 1.7 * tyre_m - 0.014, 0.6 * tyre_m)],
         24,
-        Slot.RIM,
+        VehicleSlot.RIM,
     )
-    hub = cone((0.022, -0.035), (0.022, 0.035), 6, Slot.CHROME)
+    hub = cone((0.022, -0.035), (0.022, 0.035), 6, VehicleSlot.CHROME)
     wires = []
     for k in range(spokes):
         turn = 2.0 * math.pi * k / spokes
         end = (radius_m - 2.2 * tyre_m) * np.array([math.cos(turn), math.sin(turn), 0.0])
         start = np.array([0.02 * end[1], -0.02 * end[0], 0.03 * (-1) ** k])
         wires.append(
-            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=Slot.CHROME)
+            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=VehicleSlot.CHROME)
         )
-    return joined([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
+    return join_patches([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
 
 
 def _style(seed: int) -> str:
@@ -129,10 +134,10 @@ def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top:
         Keypoint("taillight", (frame.saddle[0] - 0.14, 0.0, frame.saddle[1] - 0.1), 0.06),
     )
     hull = [
-        hulls.box((-reach, -0.05, 0.0), (reach, 0.05, 0.7)),
-        hulls.box((-0.45, -0.28, 0.25), (0.45, 0.28, top)),
+        collision_hulls.box((-reach, -0.05, 0.0), (reach, 0.05, 0.7)),
+        collision_hulls.box((-0.45, -0.28, 0.25), (0.45, 0.28, top)),
     ]
-    return solid([unmapped(part) for part in parts], finish, hull, points)
+    return make_solid([drop_uvs(part) for part in parts], finish, hull, points)
 
 
 def _machine(style: str, frame: _Frame, turn_rad: float, rng: Rng) -> list[Patch]:
@@ -141,17 +146,17 @@ def _machine(style: str, frame: _Frame, turn_rad: float, rng: Rng) -> list[Patch
     parts = [wheel.moved(sign * frame.axle, 0.0, frame.wheel_m) for sign in (1.0, -1.0)]
     parts += [*_tubes(frame), *_bars(style, frame), *_drive(frame, turn_rad)]
     x, z = frame.saddle
-    parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), Slot.TRIM))
-    parts.append(limb([_at((x + 0.1, z)), _at((x + 0.15, z))], (0.03, 0.016), Slot.TRIM))
+    parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), VehicleSlot.TRIM))
+    parts.append(limb([_at((x + 0.1, z)), _at((x + 0.15, z))], (0.03, 0.016), VehicleSlot.TRIM))
     x, z = frame.head
-    parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), Slot.HEADLIGHT))
+    parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), VehicleSlot.HEADLIGHT))
     x, z = frame.saddle
-    parts.append(blob((x - 0.14, 0.0, z - 0.1), (0.018, 0.03, 0.025), Slot.TAILLIGHT))
+    parts.append(blob((x - 0.14, 0.0, z - 0.1), (0.018, 0.03, 0.025), VehicleSlot.TAILLIGHT))
     if style == "city":
         parts += [_mudguard(frame, 1.0, (0.2, 2.0)), _mudguard(frame, -1.0, (0.8, 3.3))]
         parts += _rack(frame)
-        if chance(0.5, rng):
-            parts.append(block((0.3, -0.18, 0.98), (0.55, 0.18, 1.18), 0.02, Slot.TRIM))
+        if is_drawn(0.5, rng):
+            parts.append(block((0.3, -0.18, 0.98), (0.55, 0.18, 1.18), 0.02, VehicleSlot.TRIM))
     return parts
 
 
@@ -160,8 +165,8 @@ def _tubes(frame: _Frame) -> list[Patch]:
     step = crank + frame.step * (seat - crank)
     radius = 0.017
     bars = [(crank, seat), (step, head - 0.12 * (head - fork)), (crank, fork), (head, fork)]
-    parts = [limb(bar, (radius, radius), Slot.PAINT, 6) for bar in bars]
-    parts.append(limb([seat, _at(frame.saddle)], (0.013, 0.013), Slot.CHROME, 6))
+    parts = [limb(bar, (radius, radius), VehicleSlot.PAINT, 6) for bar in bars]
+    parts.append(limb([seat, _at(frame.saddle)], (0.013, 0.013), VehicleSlot.CHROME, 6))
     for sign in (1.0, -1.0):
         out = np.array([0.0, sign * 0.055, 0.0])
         rear = np.array([-frame.axle, sign * 0.065, frame.wheel_m])
@@ -171,14 +176,14 @@ def _tubes(frame: _Frame) -> list[Patch]:
             (seat + 0.3 * out, rear),
             (fork + out, front),
         ):
-            parts.append(limb([start, end], (0.012, 0.009), Slot.PAINT, 5))
+            parts.append(limb([start, end], (0.012, 0.009), VehicleSlot.PAINT, 5))
     return parts
 
 
 def _bars(style: str, frame: _Frame) -> list[Patch]:
     x, y, z = frame.grip
     stem = np.array([frame.head[0] - 0.01, 0.0, z - (0.0 if style == "road" else 0.03)])
-    parts = [limb([_at(frame.head), stem], (0.014, 0.014), Slot.CHROME, 6)]
+    parts = [limb([_at(frame.head), stem], (0.014, 0.014), VehicleSlot.CHROME, 6)]
     for sign in (1.0, -1.0):
         grip = np.array([x, sign * y, z])
         corner = np.array([stem[0] + 0.06, sign * (y - 0.04), z])
@@ -191,10 +196,12 @@ def _bars(style: str, frame: _Frame) -> list[Patch]:
                 grip + np.array([0.01, 0.0, -0.11]),
                 grip + np.array([-0.1, 0.0, -0.13]),
             ]
-        parts.append(limb(path, (0.012,) * len(path), Slot.TRIM, 5))
+        parts.append(limb(path, (0.012,) * len(path), VehicleSlot.TRIM, 5))
         tip = grip + np.array([-0.09, sign * 0.02, 0.0])
         if style != "road":
-            parts.append(limb([grip + 0.5 * (grip - tip), tip], (0.016, 0.016), Slot.TRIM, 6))
+            parts.append(
+                limb([grip + 0.5 * (grip - tip), tip], (0.016, 0.016), VehicleSlot.TRIM, 6)
+            )
     return parts
 
 
@@ -206,26 +213,26 @@ def _pedals(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
 
 
 def _drive(frame: _Frame, turn_rad: float) -> list[Patch]:
-    ring = lathe([(0.0, -0.004), (0.09, -0.004), (0.09, 0.004), (0.0, 0.004)], 16, Slot.TRIM)
+    ring = lathe([(0.0, -0.004), (0.09, -0.004), (0.09, 0.004), (0.0, 0.004)], 16, VehicleSlot.TRIM)
     x, z = frame.crank
     parts = [ring.rotated("x", 0.5 * math.pi).moved(x, -0.05, z)]
     for sign, pedal in zip((1.0, -1.0), _pedals(frame, turn_rad), strict=True):
         axle, (px, py, pz) = np.array([x, sign * 0.07, z]), pedal
         arm = [axle, np.array([px, sign * 0.07, pz])]
-        parts.append(limb(arm, (0.012, 0.01), Slot.CHROME, 5))
+        parts.append(limb(arm, (0.012, 0.01), VehicleSlot.CHROME, 5))
         parts.append(
             block(
                 (px - 0.045, py - 0.045, pz - 0.012),
                 (px + 0.045, py + 0.045, pz + 0.012),
                 0.0,
-                Slot.TRIM,
+                VehicleSlot.TRIM,
             )
         )
     rear = np.array([-frame.axle, -0.05, frame.wheel_m])
     for up in (1.0, -1.0):
         near, far = (np.array([0.0, 0.0, up * r]) for r in (0.085, 0.035))
         chain = [np.array([x, -0.05, z]) + near, rear + far]
-        parts.append(limb(chain, (0.005, 0.005), Slot.TRIM, 4))
+        parts.append(limb(chain, (0.005, 0.005), VehicleSlot.TRIM, 4))
     return parts
 
 
@@ -241,18 +248,18 @@ def _mudguard(frame: _Frame, sign: float, arc_rad: tuple[float, float]) -> Patch
         axis=1,
     )
     section = np.array([(0.004, 0.0), (-0.006, 0.028), (-0.006, -0.028)])
-    return joined(
-        sweep(np.array(pair), section, up=(0.0, 0.0, 1.0), slot=Slot.PAINT)
+    return join_patches(
+        sweep(np.array(pair), section, up=(0.0, 0.0, 1.0), slot=VehicleSlot.PAINT)
         for pair in pairwise(path)
     )
 
 
 def _rack(frame: _Frame) -> list[Patch]:
     x, z = -frame.axle, 2.0 * frame.wheel_m + 0.07
-    top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, Slot.TRIM)
+    top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, VehicleSlot.TRIM)
     stays = [
         limb([np.array([x, s * 0.07, frame.wheel_m]), np.array([x - 0.1, s * 0.06, z])],
-             (0.006, 0.006), Slot.TRIM, 4)
+             (0.006, 0.006), VehicleSlot.TRIM, 4)
         for s in (1.0, -1.0)
     ]  # fmt: skip
     return [top, *stays]

@@ -7,25 +7,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from generator.assets.procedural import hulls
-from generator.assets.procedural.mesh import Array, Patch, joined
-from generator.assets.procedural.shapes import Point2, block, rounded_box
-from generator.assets.vehicles import shell
-from generator.assets.vehicles.materials import SIDES, Slot
-from generator.assets.vehicles.shell import (
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import Point2, block, rounded_box
+from gen_data.generator.assets.vehicles import body_shell
+from gen_data.generator.assets.vehicles.body_shell import (
+    BodyOutline,
     Curve,
     Level,
-    Plan,
     Row,
-    above,
-    along,
-    below,
-    between,
-    painted_where,
+    assign_slot,
+    level_above,
+    level_below,
+    level_between,
     rows_between,
+    stations_along,
 )
-from generator.assets.vehicles.wheels import Axles
-from generator.core.geometry import Keypoint
+from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, VehicleSlot
+from gen_data.generator.assets.vehicles.wheels import Axles
+from gen_data.generator.core.asset_types import Keypoint
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Design:
 
     def shoulder(self) -> Curve:
         """Height of the edge between side and hood, belt and boot lid."""
-        return shell.through(
+        return body_shell.smooth_height(
             [
                 (self.x(1.0), self.tail_m - 0.01),
                 (self.x(0.9), self.tail_m),
@@ -137,13 +137,15 @@ _HOUSE = (
 
 def bodywork(design: Design, steer_deg: float) -> Patch:
     """Everything, both sides."""
-    ring = shell.plan(*design.body_ends, sides=20)
+    ring = body_shell.plan(*design.body_ends, sides=20)
     plain = _lower(design, ring)
     lower, wells = design.axles.wells(_lower_paint(design, ring, plain), design.half_m)
     gaps = _gaps(design, design.axles.wells(plain, design.half_m)[0])
-    half = joined([lower, *wells, *gaps, _house(design), *_fitted(design)])
+    half = join_patches([lower, *wells, *gaps, _house(design), *_fitted(design)])
     middle = [*_plates(design), *design.axles.wheels(steer_deg)]
-    return joined([shell.whole(half, SIDES), *(shell.unmapped(p) for p in middle)])
+    return join_patches(
+        [body_shell.mirror_half(half, SIDES), *(body_shell.drop_uvs(p) for p in middle)]
+    )
 
 
 def collision(design: Design) -> list[Array]:
@@ -155,9 +157,9 @@ def collision(design: Design) -> list[Array]:
         design.x(0.5 * (design.roof_end + design.rear_base)),
     )
     return [
-        hulls.box((-x, -y, design.clearance_m), (x, y, design.belt_m)),
-        hulls.box((rear, -house, design.belt_m), (front, house, design.height_m)),
-        hulls.box((axles.rear_m - axles.radius_m, -0.9 * y, 0.0),
+        collision_hulls.box((-x, -y, design.clearance_m), (x, y, design.belt_m)),
+        collision_hulls.box((rear, -house, design.belt_m), (front, house, design.height_m)),
+        collision_hulls.box((axles.rear_m - axles.radius_m, -0.9 * y, 0.0),
                   (axles.front_m + axles.radius_m, 0.9 * y, design.clearance_m)),
     ]  # fmt: skip
 
@@ -169,14 +171,14 @@ def keypoints(design: Design) -> tuple[Keypoint, ...]:
     return design.axles.keypoints((x - 0.2, 0.74 * y, head), (-x + 0.14, 0.8 * y, tail))
 
 
-def _lower(design: Design, ring: Plan) -> Patch:
+def _lower(design: Design, ring: BodyOutline) -> Patch:
     x, y = 0.5 * design.length_m, design.half_m
     rows = [Row(rise, x - front, -x + rear, share * y) for rise, front, rear, share in _LOWER]
 
     def floor(at: Array) -> Array:
         return np.full_like(at, design.clearance_m)
 
-    body = shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
+    body = body_shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
     # What lies under the glass house is never seen.
     hidden = np.all(
         (body.uvs[..., 1] >= 1.0)
@@ -185,78 +187,100 @@ def _lower(design: Design, ring: Plan) -> Patch:
         & (body.corners_m[..., 1] < 0.8 * y),
         axis=1,
     )
-    return shell.taken(body, ~hidden)
+    return body_shell.take_triangles(body, ~hidden)
 
 
-def _lower_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
+def _lower_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
     """Bumpers, lamps, grille and the gaps around doors and lids."""
     x, floor = 0.5 * design.length_m, design.clearance_m
     sill = floor + (0.15 if design.cladding else 0.07)
-    patch = painted_where(patch, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
-    patch = painted_where(patch, Slot.TRIM, *rows_between(0.0, 2.0), below("z", sill))
+    patch = assign_slot(patch, VehicleSlot.UNDERBODY, *rows_between(-2.0, 0.0))
+    patch = assign_slot(patch, VehicleSlot.TRIM, *rows_between(0.0, 2.0), level_below("z", sill))
     if design.cladding:
         axles = design.axles
         for x_m in (axles.front_m, axles.rear_m):
-            arch = shell.round_x_z(x_m, axles.radius_m, axles.arch_m + 0.055, 0.4)
-            patch = painted_where(patch, Slot.TRIM, *rows_between(0.0, 1.0), arch)
+            arch = body_shell.round_x_z(x_m, axles.radius_m, axles.arch_m + 0.055, 0.4)
+            patch = assign_slot(patch, VehicleSlot.TRIM, *rows_between(0.0, 1.0), arch)
     patch = _front_paint(design, ring, patch)
     patch = _rear_paint(design, ring, patch)
-    hood = between("x", x - 0.3, design.x(design.cowl) + 0.1)
-    return painted_where(patch, Slot.TRIM, *rows_between(0.975, 0.988), *hood)
+    hood = level_between("x", x - 0.3, design.x(design.cowl) + 0.1)
+    return assign_slot(patch, VehicleSlot.TRIM, *rows_between(0.975, 0.988), *hood)
 
 
 def _gaps(design: Design, plain: Patch) -> list[Patch]:
     """The lines around the doors."""
-    sides = (rows_between(0.1, 0.99)[0], rows_between(0.1, 0.99)[1], above("y", 0.5))
-    return [shell.gap(plain, design.x(share), 0.009, Slot.TRIM, *sides) for share in design.seams]
+    sides = (rows_between(0.1, 0.99)[0], rows_between(0.1, 0.99)[1], level_above("y", 0.5))
+    return [
+        body_shell.gap(plain, design.x(share), 0.009, VehicleSlot.TRIM, *sides)
+        for share in design.seams
+    ]
 
 
-def _front_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
+def _front_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
     x, z, y = 0.5 * design.length_m, design.lamp_m[0], design.half_m
-    front = above("x", x - 0.8)
+    front = level_above("x", x - 0.8)
     outer = ring.front(0.93) + 0.03
-    bezel = (front, *along(ring.front(0.44), outer), *between("z", z - 0.085, z + 0.075),
-             above("z", z - 0.17, 0.13 / y, "y"))  # fmt: skip
-    patch = painted_where(patch, Slot.TRIM, *bezel)
-    lens = (front, *along(ring.front(0.52), ring.front(0.93) + 0.022),
-            *between("z", z - 0.055, z + 0.066))  # fmt: skip
-    patch = painted_where(patch, Slot.HEADLIGHT, *lens)
-    turn = (front, *along(ring.front(0.8), ring.front(0.93) + 0.01),
-            *between("z", z - 0.055, z - 0.025))  # fmt: skip
-    patch = painted_where(patch, Slot.INDICATOR_LEFT, *turn)
-    grille = (front, below("y", 0.4 * y), *between("z", z - 0.11, z + 0.04))
-    patch = painted_where(patch, Slot.TRIM, *grille)
-    intake = (front, below("y", 0.68 * y), *between("z", design.clearance_m + 0.08, z - 0.28))
-    return painted_where(patch, Slot.TRIM, *intake)
+    bezel = (
+        front,
+        *stations_along(ring.front(0.44), outer),
+        *level_between("z", z - 0.085, z + 0.075),
+        level_above("z", z - 0.17, 0.13 / y, "y"),
+    )
+    patch = assign_slot(patch, VehicleSlot.TRIM, *bezel)
+    lens = (front, *stations_along(ring.front(0.52), ring.front(0.93) + 0.022),
+            *level_between("z", z - 0.055, z + 0.066))  # fmt: skip
+    patch = assign_slot(patch, VehicleSlot.HEADLIGHT, *lens)
+    turn = (front, *stations_along(ring.front(0.8), ring.front(0.93) + 0.01),
+            *level_between("z", z - 0.055, z - 0.025))  # fmt: skip
+    patch = assign_slot(patch, VehicleSlot.INDICATOR_LEFT, *turn)
+    grille = (front, level_below("y", 0.4 * y), *level_between("z", z - 0.11, z + 0.04))
+    patch = assign_slot(patch, VehicleSlot.TRIM, *grille)
+    intake = (
+        front,
+        level_below("y", 0.68 * y),
+        *level_between("z", design.clearance_m + 0.08, z - 0.28),
+    )
+    return assign_slot(patch, VehicleSlot.TRIM, *intake)
 
 
-def _rear_paint(design: Design, ring: Plan, patch: Patch) -> Patch:
+def _rear_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
     x, z, y = 0.5 * design.length_m, design.lamp_m[1], design.half_m
-    rear = below("x", -x + 0.6)
+    rear = level_below("x", -x + 0.6)
     low, high = (z - 0.22, z + 0.2) if design.upright_lamps else (z - 0.09, z + 0.08)
     inner = 0.78 if design.upright_lamps else 0.5
-    reach = (rear, *along(ring.rear(0.93) - 0.02, ring.rear(inner)), *rows_between(0.1, 0.985))
-    patch = painted_where(patch, Slot.TAILLIGHT, *reach, *between("z", low, high))
-    stop = (rear, *along(ring.rear(0.93) - 0.02, ring.rear(0.5 * inner + 0.4)))
-    patch = painted_where(
+    reach = (
+        rear,
+        *stations_along(ring.rear(0.93) - 0.02, ring.rear(inner)),
+        *rows_between(0.1, 0.985),
+    )
+    patch = assign_slot(patch, VehicleSlot.TAILLIGHT, *reach, *level_between("z", low, high))
+    stop = (rear, *stations_along(ring.rear(0.93) - 0.02, ring.rear(0.5 * inner + 0.4)))
+    patch = assign_slot(
         patch,
-        Slot.BRAKELIGHT,
+        VehicleSlot.BRAKELIGHT,
         *stop,
         *rows_between(0.1, 0.985),
-        *between("z", low, 0.5 * (low + high)),
+        *level_between("z", low, 0.5 * (low + high)),
     )
-    wink = (rear, *along(ring.rear(0.9), ring.rear(0.5 * inner + 0.4)))
-    height = between("z", low, low + 0.28 * (high - low))
-    patch = painted_where(patch, Slot.INDICATOR_LEFT, *wink, *rows_between(0.1, 0.985), *height)
-    lid = (rear, below("y", 0.7 * y), *between("z", z - 0.335, z - 0.327))
-    patch = painted_where(patch, Slot.TRIM, *lid)
-    skirt = (rear, below("y", 0.72 * y), below("z", design.clearance_m + 0.17), *rows_between(0, 2))
-    return painted_where(patch, Slot.TRIM, *skirt)
+    wink = (rear, *stations_along(ring.rear(0.9), ring.rear(0.5 * inner + 0.4)))
+    height = level_between("z", low, low + 0.28 * (high - low))
+    patch = assign_slot(
+        patch, VehicleSlot.INDICATOR_LEFT, *wink, *rows_between(0.1, 0.985), *height
+    )
+    lid = (rear, level_below("y", 0.7 * y), *level_between("z", z - 0.335, z - 0.327))
+    patch = assign_slot(patch, VehicleSlot.TRIM, *lid)
+    skirt = (
+        rear,
+        level_below("y", 0.72 * y),
+        level_below("z", design.clearance_m + 0.17),
+        *rows_between(0, 2),
+    )
+    return assign_slot(patch, VehicleSlot.TRIM, *skirt)
 
 
 def _house(design: Design) -> Patch:
     """Glass house and roof."""
-    ring = shell.plan(*design.house_ends, sides=10)
+    ring = body_shell.plan(*design.house_ends, sides=10)
     crown, shoulder = 0.035, design.shoulder()
     wide = design.waist_share * design.half_m
     narrow = design.roof_share * design.half_m
@@ -268,32 +292,32 @@ def _house(design: Design) -> Patch:
     ]  # fmt: skip
     top = design.height_m - crown
     middle = 0.55 * x[1] + 0.45 * x[2]
-    roof = shell.through([(x[3], top - 0.05), (x[2], top - 0.035), (middle, top),
+    roof = body_shell.smooth_height([(x[3], top - 0.05), (x[2], top - 0.035), (middle, top),
                           (x[1], top - 0.03), (x[0], top - 0.06)])  # fmt: skip
 
     def base(at: Array) -> Array:
         return shoulder(at) - 0.03
 
-    house = shell.stack(ring, rows, base, roof, crown_m=crown, lid_rows=2)
-    _, house, _ = shell.split(house, lambda p: -p.uvs[..., 1])
+    house = body_shell.stack(ring, rows, base, roof, crown_m=crown, lid_rows=2)
+    _, house, _ = body_shell.split_patch(house, lambda p: -p.uvs[..., 1])
     return _glazed(design, ring, house)
 
 
-def _glazed(design: Design, ring: Plan, house: Patch) -> Patch:
+def _glazed(design: Design, ring: BodyOutline, house: Patch) -> Patch:
     glass: list[tuple[Level, ...]] = [
-        (*along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91)),
+        (*stations_along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91)),
     ]
     if design.rear_window:
-        glass.append((*along(ring.rear(0.8), 2.0), *rows_between(0.16, 0.87)))
+        glass.append((*stations_along(ring.rear(0.8), 2.0), *rows_between(0.16, 0.87)))
     start = ring.front(0.92) + 0.035
-    sides = (*along(start, ring.rear(0.92) - 0.03), *rows_between(0.09, 0.9),
-             above("x", design.x(design.windows_to), -0.25, "z"))  # fmt: skip
+    sides = (*stations_along(start, ring.rear(0.92) - 0.03), *rows_between(0.09, 0.9),
+             level_above("x", design.x(design.windows_to), -0.25, "z"))  # fmt: skip
     glass.append(sides)
     for levels in glass:
-        house = painted_where(house, Slot.GLASS, *levels)
+        house = assign_slot(house, VehicleSlot.GLASS, *levels)
     for share in design.pillars:
-        post = between("x", design.x(share) - 0.035, design.x(share) + 0.035)
-        house = painted_where(house, Slot.TRIM, *post, *sides)
+        post = level_between("x", design.x(share) - 0.035, design.x(share) + 0.035)
+        house = assign_slot(house, VehicleSlot.TRIM, *post, *sides)
     return house
 
 
@@ -303,26 +327,34 @@ def _fitted(design: Design) -> Iterable[Patch]:
     y = design.half_m
     mirror_x = design.x(design.cowl + 0.42 * (design.header - design.cowl))
     z = float(shoulder(np.array(mirror_x))) + 0.1
-    yield rounded_box((0.13, 0.2, 0.14), 0.045, 1).moved(mirror_x, y + 0.07, z).painted(Slot.PAINT)
+    yield (
+        rounded_box((0.13, 0.2, 0.14), 0.045, 1)
+        .moved(mirror_x, y + 0.07, z)
+        .painted(VehicleSlot.PAINT)
+    )
     face = block((mirror_x - 0.07, y - 0.01, z - 0.05), (mirror_x - 0.06, y + 0.15, z + 0.05))
-    yield face.painted(Slot.CHROME)
+    yield face.painted(VehicleSlot.CHROME)
     yield block(
-        (mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM
+        (mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, VehicleSlot.TRIM
     )
     for share in design.seams[1:]:
         x = design.x(share) + 0.16
         z = float(shoulder(np.array(x))) - 0.13
-        yield block((x - 0.1, 0.95 * y, z), (x + 0.1, y + 0.012, z + 0.03), 0.0, Slot.PAINT)
+        yield block((x - 0.1, 0.95 * y, z), (x + 0.1, y + 0.012, z + 0.03), 0.0, VehicleSlot.PAINT)
     if design.rails:
         front, rear = design.x(design.header + 0.05), design.x(design.roof_end - 0.04)
         at = design.roof_share * y - 0.06
         top = design.height_m
-        yield block((rear, at - 0.015, top - 0.06), (front, at + 0.015, top), 0.0, Slot.CHROME)
+        yield block(
+            (rear, at - 0.015, top - 0.06), (front, at + 0.015, top), 0.0, VehicleSlot.CHROME
+        )
 
 
 def _plates(design: Design) -> Iterable[Patch]:
     x = 0.5 * design.length_m
     z = design.lamp_m[0] - 0.2
-    yield block((x - 0.03, -0.26, z - 0.055), (x + 0.008, 0.26, z + 0.055), 0.0, Slot.PLATE)
+    yield block((x - 0.03, -0.26, z - 0.055), (x + 0.008, 0.26, z + 0.055), 0.0, VehicleSlot.PLATE)
     z = design.lamp_m[1] - 0.2 if not design.upright_lamps else design.lamp_m[1] - 0.3
-    yield block((-x - 0.002, -0.26, z - 0.055), (-x + 0.05, 0.26, z + 0.055), 0.0, Slot.PLATE)
+    yield block(
+        (-x - 0.002, -0.26, z - 0.055), (-x + 0.05, 0.26, z + 0.055), 0.0, VehicleSlot.PLATE
+    )

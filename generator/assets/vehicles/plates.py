@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from generator.assets.procedural.draw import pick, rng_of
-from generator.assets.procedural.materials import srgb
-from generator.assets.procedural.textures import artwork as art
-from generator.core.geometry import TextureData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
+from gen_data.generator.assets.procedural.textures import artwork as art
+from gen_data.generator.assets.procedural.variant_rng import choose, variant_rng
+from gen_data.generator.core.asset_types import TextureData
+from gen_data.generator.core.streams import Rng
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -57,8 +57,8 @@ _STROKE = 0.95
 
 def plate_text(seed: int) -> str:
     """What stands on a plate; groups are separated by a space."""
-    rng = rng_of("licence_plate", seed)
-    pattern = pick(_PATTERNS, rng)
+    rng = variant_rng("licence_plate", seed)
+    pattern = choose(_PATTERNS, rng)
     return "".join(_drawn(place, rng) for place in pattern)
 
 
@@ -67,7 +67,7 @@ def plate_id(seed: int, rows: int) -> str:
     return f"{FAMILY}?rows={rows}&seed={seed}"
 
 
-def with_seed(texture: str, seed: int) -> str:
+def reseed_plate(texture: str, seed: int) -> str:
     """The id of another plate of the same size; other textures stay as they are."""
     if not texture.startswith(FAMILY + "?"):
         return texture
@@ -83,7 +83,9 @@ def licence_plate(seed: int, rows: int) -> TextureData:
     """
     if rows not in _DRAWN_PX:
         raise ValueError(f"a licence plate has 1 or 2 rows, not {rows}")
-    ground, ink = (srgb(c) for c in pick(_SCHEMES, rng_of("licence_plate/colors", seed)))
+    ground, ink = (
+        hex_to_srgb8(c) for c in choose(_SCHEMES, variant_rng("licence_plate/colors", seed))
+    )
     width, height = _DRAWN_PX[rows]
     image = art.canvas(width, height, ground)
     draw = art.pen(image)
@@ -93,7 +95,7 @@ def licence_plate(seed: int, rows: int) -> TextureData:
     pitch = height / rows
     for k, line in enumerate(lines):
         _write(draw, line, ink, width, k * pitch, pitch)
-    return art.squeezed(image, *_SIZE_PX[rows])
+    return art.resize_texture(image, *_SIZE_PX[rows])
 
 
 def _write(
@@ -126,4 +128,4 @@ def _strokes(letter: str) -> Iterator[list[tuple[int, int]]]:
 def _drawn(place: str, rng: Rng) -> str:
     if place == " ":
         return place
-    return pick(_LETTERS if place == "L" else _DIGITS, rng)
+    return choose(_LETTERS if place == "L" else _DIGITS, rng)

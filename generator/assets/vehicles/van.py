@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.family import Facts, Solid
-from generator.assets.procedural.materials import linear
-from generator.assets.scenery.forms import solid
-from generator.assets.vehicles.bodywork import Design, bodywork, collision, keypoints
-from generator.assets.vehicles.materials import drawn_paint, materials
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.assets.scenery.basic_shapes import make_solid
+from gen_data.generator.assets.vehicles.bodywork import Design, bodywork, collision, keypoints
+from gen_data.generator.assets.vehicles.vehicle_materials import draw_paint, materials
+from gen_data.generator.core.streams import Rng
 
 STYLES = ("panel_van", "minibus", "high_roof")
 
@@ -59,13 +64,13 @@ _DESIGNS = {
 
 def van(seed: int, steer_deg: float) -> Solid:
     """A van. Slots and keypoints as every vehicle's; positive steering turns to the left."""
-    rng = rng_of("van", seed)
+    rng = variant_rng("van", seed)
     design = _drawn(_DESIGNS[_style(seed)], rng)
     draw = float(rng.random())
-    white, fleet = linear("#e6e7e6"), linear(pick(_FLEET, rng))
-    paint = white if draw < 0.55 else (fleet if draw < 0.75 else drawn_paint(rng))
+    white, fleet = hex_to_linear("#e6e7e6"), hex_to_linear(choose(_FLEET, rng))
+    paint = white if draw < 0.55 else (fleet if draw < 0.75 else draw_paint(rng))
     finish = materials(rng, paint)
-    return solid([bodywork(design, steer_deg)], finish, collision(design), keypoints(design))
+    return make_solid([bodywork(design, steer_deg)], finish, collision(design), keypoints(design))
 
 
 def van_facts(seed: int, **_: object) -> Facts:
@@ -79,13 +84,13 @@ def _style(seed: int) -> str:
 
 def _drawn(design: Design, rng: Rng) -> Design:
     """The design stretched and raised a little."""
-    long, high = 1.0 + between(-0.05, 0.08, rng), 1.0 + between(-0.015, 0.05, rng)
+    long, high = 1.0 + uniform_between(-0.05, 0.08, rng), 1.0 + uniform_between(-0.015, 0.05, rng)
     return replace(
         design,
         length_m=design.length_m * long,
         height_m=design.height_m * high,
         wheelbase_m=design.wheelbase_m * long,
         front_axle_m=design.front_axle_m * long,
-        cladding=chance(0.4, rng),
-        wheel_radius_m=design.wheel_radius_m + between(-0.01, 0.01, rng),
+        cladding=is_drawn(0.4, rng),
+        wheel_radius_m=design.wheel_radius_m + uniform_between(-0.01, 0.01, rng),
     )

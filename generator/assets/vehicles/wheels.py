@@ -9,12 +9,12 @@ from itertools import product
 
 import numpy as np
 
-from generator.assets.procedural.mesh import Array, Patch, joined
-from generator.assets.procedural.shapes import block, circle, fan, lathe
-from generator.assets.vehicles.materials import Slot
-from generator.assets.vehicles.shell import round_x_z, split
-from generator.core.geometry import Keypoint
-from generator.core.se3 import Vec3
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import block, circle, fan, lathe
+from gen_data.generator.assets.vehicles.body_shell import round_x_z, split_patch
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot
+from gen_data.generator.core.asset_types import Keypoint
+from gen_data.generator.core.se3 import Vec3
 
 _SEGMENTS = 18
 _WELL_M = 0.32
@@ -29,14 +29,14 @@ def wheel(radius_m: float, width_m: float, spokes: int, rim_share: float = 0.68)
     back = [(0.9 * rim, 0.2 * half), (0.0, 0.2 * half)]
     hub = [(0.2 * rim, 0.2 * half), (0.19 * rim, 0.8 * half), (0.0, 0.84 * half)]
     parts = [
-        lathe(tread, _SEGMENTS, Slot.TYRE),
-        lathe(lip, _SEGMENTS, Slot.RIM),
-        lathe(back, _SEGMENTS, Slot.UNDERBODY),
-        lathe(hub, 10, Slot.RIM),
+        lathe(tread, _SEGMENTS, VehicleSlot.TYRE),
+        lathe(lip, _SEGMENTS, VehicleSlot.RIM),
+        lathe(back, _SEGMENTS, VehicleSlot.UNDERBODY),
+        lathe(hub, 10, VehicleSlot.RIM),
         *_spokes(rim, half, spokes),
     ]
     # A lathe's axle is Z: turned so that its top faces +Y, and a corner of the tread down.
-    return joined(parts).rotated("z", 0.5 * math.pi).rotated("x", -0.5 * math.pi)
+    return join_patches(parts).rotated("z", 0.5 * math.pi).rotated("x", -0.5 * math.pi)
 
 
 def _spokes(rim: float, half: float, count: int) -> list[Patch]:
@@ -44,7 +44,7 @@ def _spokes(rim: float, half: float, count: int) -> list[Patch]:
     if count == 0:
         plate = [(0.92 * rim, 0.55 * half), (0.62 * rim, 0.75 * half), (0.55 * rim, 0.45 * half),
                  (0.0, 0.45 * half)]  # fmt: skip
-        return [lathe(plate, _SEGMENTS, Slot.RIM)]
+        return [lathe(plate, _SEGMENTS, VehicleSlot.RIM)]
     width = 1.25 * rim / (count + 1.5)
     bar = block((0.12 * rim, -0.5 * width, 0.45 * half), (0.92 * rim, 0.5 * width, 0.82 * half))
     # The lower face is never seen.
@@ -52,7 +52,7 @@ def _spokes(rim: float, half: float, count: int) -> list[Patch]:
         bar.corners_m[:, 1] - bar.corners_m[:, 0], bar.corners_m[:, 2] - bar.corners_m[:, 0]
     )
     kept = (up[:, 2] > -1e-12) & (np.abs(up[:, 0]) < 1e-12)
-    seen = Patch(bar.corners_m[kept], bar.uvs[kept], bar.slots[kept]).painted(Slot.RIM)
+    seen = Patch(bar.corners_m[kept], bar.uvs[kept], bar.slots[kept]).painted(VehicleSlot.RIM)
     return [seen.rotated("z", 2 * math.pi * (k + 0.25) / count) for k in range(count)]
 
 
@@ -86,7 +86,7 @@ class Axles:
         for (x, steered), sign in product(
             ((self.front_m, True), (self.rear_m, False)), (1.0, -1.0)
         ):
-            one = made if steered or not self.twin else joined([made, inner])
+            one = made if steered or not self.twin else join_patches([made, inner])
             side = one if sign > 0 else one.rotated("z", math.pi)
             turn = math.radians(steer_deg) if steered else 0.0
             yield side.rotated("z", turn).moved(x, sign * self.hub_y_m, self.radius_m)
@@ -97,7 +97,7 @@ class Axles:
         made = []
         for x in (self.front_m, self.rear_m):
             hub = (x, self.radius_m)
-            _, patch, edge = split(patch, round_x_z(*hub, self.arch_m, inner))
+            _, patch, edge = split_patch(patch, round_x_z(*hub, self.arch_m, inner))
             if len(edge):
                 made.append(_well(edge, hub, self.arch_m, inner))
         return patch, made
@@ -130,4 +130,4 @@ def _well(edge_m: Array, hub_m: tuple[float, float], radius_m: float, inner_y_m:
     liner = Patch(corners, np.zeros((len(corners), 3, 2)), np.zeros(len(corners), dtype=np.int64))
     x, z = circle(radius_m, 14, hub_m).T
     wall = fan(np.stack([x, np.full_like(x, inner_y_m), np.maximum(z, 0.16)], axis=1)[::-1])
-    return joined([liner, wall]).painted(Slot.UNDERBODY)
+    return join_patches([liner, wall]).painted(VehicleSlot.UNDERBODY)

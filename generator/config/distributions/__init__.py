@@ -7,9 +7,14 @@ values: ``Uniform(0.1, 0.9).draw(rng)``. Models declare fields as ``Scalar``, ``
 
 from __future__ import annotations
 
-from generator.config.distributions.base import DISTRIBUTIONS, Distribution, Malformed, Numeric
-from generator.config.distributions.discrete import Choice, Constant, Probability, Sequence
-from generator.config.distributions.fields import (
+from gen_data.generator.config.distributions.base import (
+    DISTRIBUTIONS,
+    Distribution,
+    Malformed,
+    Numeric,
+)
+from gen_data.generator.config.distributions.discrete import Choice, Constant, Probability, Sequence
+from gen_data.generator.config.distributions.fields import (
     Bounds,
     Chance,
     Count,
@@ -22,10 +27,15 @@ from generator.config.distributions.fields import (
     Rotation,
     Scalar,
     UnitInterval,
-    bounded,
+    with_bounds,
 )
-from generator.config.distributions.numeric import LogUniform, Normal, Uniform, UniformInteger
-from generator.config.distributions.space import (
+from gen_data.generator.config.distributions.numeric import (
+    LogUniform,
+    Normal,
+    Uniform,
+    UniformInteger,
+)
+from gen_data.generator.config.distributions.space import (
     AboutZ,
     Box,
     Cap,
@@ -69,5 +79,5 @@ __all__ = [
     "Uniform",
     "UniformInteger",
     "UnitInterval",
-    "bounded",
+    "with_bounds",
 ]

@@ -16,15 +16,15 @@ from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, Validation
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from typing_extensions import dataclass_transform
 
-from generator.config.scalars import abbreviated, number, shown
-from generator.core.errors import did_you_mean
-from generator.core.plugins import PluginTable
+from gen_data.generator.config.yaml_scalars import abbreviate, format_number, quote_value
+from gen_data.generator.core.errors import did_you_mean
+from gen_data.generator.core.plugins import PluginTable
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
     from pydantic_core import ErrorDetails
 
-    from generator.core.streams import Rng
+    from gen_data.generator.core.streams import Rng
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -32,22 +32,22 @@ T_co = TypeVar("T_co", covariant=True)
 DISTRIBUTIONS: PluginTable[Distribution[Any]] = PluginTable(
     "distribution",
     {
-        "constant": "generator.config.distributions.discrete:Constant",
-        "choice": "generator.config.distributions.discrete:Choice",
-        "sequence": "generator.config.distributions.discrete:Sequence",
-        "probability": "generator.config.distributions.discrete:Probability",
-        "uniform": "generator.config.distributions.numeric:Uniform",
-        "log_uniform": "generator.config.distributions.numeric:LogUniform",
-        "normal": "generator.config.distributions.numeric:Normal",
-        "uniform_integer": "generator.config.distributions.numeric:UniformInteger",
-        "quaternion_wxyz": "generator.config.distributions.space:QuaternionWxyz",
-        "euler_deg": "generator.config.distributions.space:EulerDeg",
-        "so3": "generator.config.distributions.space:So3",
-        "about_z": "generator.config.distributions.space:AboutZ",
-        "sphere": "generator.config.distributions.space:Sphere",
-        "cap": "generator.config.distributions.space:Cap",
-        "box": "generator.config.distributions.space:Box",
-        "shell": "generator.config.distributions.space:Shell",
+        "constant": "gen_data.generator.config.distributions.discrete:Constant",
+        "choice": "gen_data.generator.config.distributions.discrete:Choice",
+        "sequence": "gen_data.generator.config.distributions.discrete:Sequence",
+        "probability": "gen_data.generator.config.distributions.discrete:Probability",
+        "uniform": "gen_data.generator.config.distributions.numeric:Uniform",
+        "log_uniform": "gen_data.generator.config.distributions.numeric:LogUniform",
+        "normal": "gen_data.generator.config.distributions.numeric:Normal",
+        "uniform_integer": "gen_data.generator.config.distributions.numeric:UniformInteger",
+        "quaternion_wxyz": "gen_data.generator.config.distributions.space:QuaternionWxyz",
+        "euler_deg": "gen_data.generator.config.distributions.space:EulerDeg",
+        "so3": "gen_data.generator.config.distributions.space:So3",
+        "about_z": "gen_data.generator.config.distributions.space:AboutZ",
+        "sphere": "gen_data.generator.config.distributions.space:Sphere",
+        "cap": "gen_data.generator.config.distributions.space:Cap",
+        "box": "gen_data.generator.config.distributions.space:Box",
+        "shell": "gen_data.generator.config.distributions.space:Shell",
     },
 )
 
@@ -139,7 +139,7 @@ class Distribution(ABC, Generic[T_co]):
             return make()
         if not names:
             raise Malformed(
-                f"{cls.name} takes no argument, got {shown(argument)}; write {cls.name} alone"
+                f"{cls.name} takes no argument, got {quote_value(argument)}; write {cls.name} alone"
             )
         if cls.needs:
             return make(*_require_items(argument, len(names), f"{cls.name} needs {cls.needs}"))
@@ -147,7 +147,9 @@ class Distribution(ABC, Generic[T_co]):
             return make(argument)
         if not isinstance(argument, Mapping):
             listed = ", ".join(names.values())
-            raise Malformed(f"{cls.name} needs a mapping with {listed}, got {shown(argument)}")
+            raise Malformed(
+                f"{cls.name} needs a mapping with {listed}, got {quote_value(argument)}"
+            )
         return make(**argument)
 
     def argument(self) -> Any:
@@ -249,18 +251,18 @@ Vector = Annotated[tuple[float, float, float], sized(3, "expected three numbers 
 read_number = reader(float)
 
 
-def read(value: Any, kind: Kind[T]) -> Distribution[T]:
+def read_distribution(value: Any, kind: Kind[T]) -> Distribution[T]:
     """The distribution a plain value stands for: a constant, a name, or a one-key mapping.
 
     Raises:
         Malformed: if it stands for none, or for one that does not fit the kind.
     """
     if isinstance(value, Distribution):
-        return read(value.to_yaml(), kind)
+        return read_distribution(value.to_yaml(), kind)
     if isinstance(value, Mapping):
         return _read_mapping(value, kind)
     if isinstance(value, str) and kind.name != "name":
-        known = names_of(kind.name)
+        known = distribution_names(kind.name)
         if value in known and distribution(value).bare:
             return distribution(value).from_yaml(None, kind)
         if did_you_mean(value, known):
@@ -271,7 +273,7 @@ def read(value: Any, kind: Kind[T]) -> Distribution[T]:
 
 
 def _read_mapping(value: Mapping[str, Any], kind: Kind[T]) -> Distribution[T]:
-    known = names_of(kind.name)
+    known = distribution_names(kind.name)
     if len(value) != 1:
         raise Malformed(
             f"a distribution is a mapping with one key, got {len(value)} keys; "
@@ -292,13 +294,13 @@ def below(error: Malformed, *path: str | int) -> Malformed:
 
 
 def _unknown(name: str, kind: Kind[Any], path: tuple[str, ...] = ()) -> Malformed:
-    known = names_of(kind.name)
+    known = distribution_names(kind.name)
     if name in known:
         return Malformed(f"'{name}' needs an argument; write {{{name}: ...}}")
     if name in DISTRIBUTIONS:
         fact = f"distribution '{name}' does not give {kind.expected}"
     else:
-        fact = f"unknown distribution '{abbreviated(name)}'"
+        fact = f"unknown distribution '{abbreviate(name)}'"
     return Malformed(
         f"{fact}; expected one of {', '.join(known)}{did_you_mean(name, known)}",
         path,
@@ -314,7 +316,7 @@ def distribution(name: str) -> type[Distribution[Any]]:
 
 
 @cache
-def names_of(kind: str) -> tuple[str, ...]:
+def distribution_names(kind: str) -> tuple[str, ...]:
     """Names of the distributions over one kind of value, in the order of the table."""
     ordered = (
         *DISTRIBUTIONS.entries,
@@ -326,10 +328,12 @@ def names_of(kind: str) -> tuple[str, ...]:
 def require_order(name: str, low: float, high: float, *path: str) -> None:
     """Raise Malformed, at a path, unless ``low <= high``."""
     if not low <= high:
-        raise Malformed(f"{name} needs low <= high, got [{number(low)}, {number(high)}]", path)
+        raise Malformed(
+            f"{name} needs low <= high, got [{format_number(low)}, {format_number(high)}]", path
+        )
 
 
-def stable(value: float) -> float:
+def round_significant(value: float) -> float:
     """The value on a grid of 12 significant digits.
 
     exp(), sin() and their like differ in the last bit between C libraries and processors; on the
@@ -345,7 +349,7 @@ def to_plain(value: Any) -> Any:
 
 def _require_items(value: Any, count: int, expectation: str) -> list[Any] | tuple[Any, ...]:
     if not isinstance(value, (list, tuple)) or len(value) != count:
-        raise Malformed(f"{expectation}, got {shown(value)}")
+        raise Malformed(f"{expectation}, got {quote_value(value)}")
     return value
 
 
@@ -364,7 +368,7 @@ def _malformed(error: ValidationError, cls: type[Distribution[Any]] | None = Non
         known = list(cls.field_names().values())
         key = str(path[-1])
         return Malformed(
-            f"unknown key {shown(key)} of {cls.name}; expected {', '.join(known)}"
+            f"unknown key {quote_value(key)} of {cls.name}; expected {', '.join(known)}"
             f"{did_you_mean(key, known)}",
             path,
             at_key=True,
@@ -378,7 +382,7 @@ def _wrong_number(detail: ErrorDetails) -> str:
     if detail["type"] == "finite_number":
         return f"expected a finite number, got {detail['input']}"
     expected = "a whole number" if detail["type"].startswith("int") else "a number"
-    return f"expected {expected}, got {shown(detail['input'])}"
+    return f"expected {expected}, got {quote_value(detail['input'])}"
 
 
 def _without_titles(schema: Any) -> Any:

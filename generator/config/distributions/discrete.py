@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from pydantic import Field
 
-from generator.config.distributions.base import (
+from gen_data.generator.config.distributions.base import (
     Kind,
     Malformed,
     Numeric,
@@ -21,10 +21,10 @@ from generator.config.distributions.base import (
     read_number,
     to_plain,
 )
-from generator.config.scalars import flow, number, shown
+from gen_data.generator.config.yaml_scalars import format_number, quote_value, to_flow_yaml
 
 if TYPE_CHECKING:
-    from generator.core.streams import Rng
+    from gen_data.generator.core.streams import Rng
 
 EVERY_KIND = ("number", "whole number", "name", "flag", "rotation", "direction", "position")
 
@@ -84,7 +84,7 @@ class Choice(Numeric[T_co], name="choice", kinds=EVERY_KIND):
         weighted = isinstance(values, Mapping)
         if isinstance(values, Mapping):
             # Documents that are kept have their keys sorted: draws must not depend on it.
-            values = dict(sorted(values.items(), key=lambda item: shown(item[0])))
+            values = dict(sorted(values.items(), key=lambda item: quote_value(item[0])))
         weights = values.values() if isinstance(values, Mapping) else [1.0] * len(values)
         object.__setattr__(self, "values", _freeze(values))
         object.__setattr__(self, "weights", tuple(read_number(w) for w in weights))
@@ -94,7 +94,8 @@ class Choice(Numeric[T_co], name="choice", kinds=EVERY_KIND):
         for value, weight in zip(self.values, self.weights, strict=True):
             if weight < 0:
                 raise Malformed(
-                    f"choice needs weights >= 0, got {number(weight)} for {shown(value)}",
+                    f"choice needs weights >= 0, got {format_number(weight)} for "
+                    f"{quote_value(value)}",
                     (str(value),) if weighted else (),
                 )
         if not self._cumulative[-1] > 0:
@@ -138,7 +139,7 @@ class Choice(Numeric[T_co], name="choice", kinds=EVERY_KIND):
         if len(set(self.weights)) == 1:
             return to_plain(self.values)
         return {
-            v if isinstance(v, str) else flow(v): w
+            v if isinstance(v, str) else to_flow_yaml(v): w
             for v, w in zip(self.values, self.weights, strict=True)
         }
 
@@ -220,7 +221,7 @@ class Probability(Numeric[bool], name="probability", kinds=("flag",)):
     def __post_init__(self) -> None:
         """Refuse numbers that are no probability."""
         if not 0 <= self.p <= 1:
-            raise Malformed(f"probability needs a number in [0, 1], got {number(self.p)}")
+            raise Malformed(f"probability needs a number in [0, 1], got {format_number(self.p)}")
 
     def draw(self, rng: Rng) -> bool:
         """One value."""
@@ -241,7 +242,7 @@ class Probability(Numeric[bool], name="probability", kinds=("flag",)):
 
 def _read_items(argument: Any, name: str, kind: Kind[Any]) -> list[Any]:
     if not isinstance(argument, (list, tuple)):
-        raise Malformed(f"{name} needs a list of values, got {shown(argument)}")
+        raise Malformed(f"{name} needs a list of values, got {quote_value(argument)}")
     items = []
     for number_, item in enumerate(argument):
         try:

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import TypeAdapter
 from pydantic_core import PydanticCustomError, core_schema
 
-from generator.config.distributions.base import (
+from gen_data.generator.config.distributions.base import (
     Distribution,
     Kind,
     Malformed,
     Numeric,
     Vector,
     distribution,
-    names_of,
-    read,
+    distribution_names,
+    read_distribution,
     read_number,
     reader,
 )
-from generator.config.distributions.space import UnitQuaternion, UnitVector
-from generator.config.scalars import number, resolve, shown
-from generator.core.se3 import Quaternion, Vec3
+from gen_data.generator.config.distributions.space import UnitQuaternion, UnitVector
+from gen_data.generator.config.yaml_scalars import format_number, quote_value, resolve_scalar
+from gen_data.generator.core.se3 import Quaternion, Vec3
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -55,11 +55,11 @@ class FieldOf:
     ) -> dict[str, Any]:
         """A constant, or any one-key mapping of a distribution that fits."""
         del schema, handler
-        return json_schema_of(self.kind)
+        return distribution_schema(self.kind)
 
     def _read(self, value: Any) -> Distribution[Any]:
         try:
-            return read(value, self.kind)
+            return read_distribution(value, self.kind)
         except Malformed as error:
             raise custom_error(error) from None
 
@@ -88,11 +88,11 @@ class Bounds:
     def __str__(self) -> str:
         """Interval notation, or a comparison where one end is free: ``(1, 170)``, ``>= 0``."""
         if math.isinf(self.high):
-            return f"{'>' if self.open_low else '>='} {number(self.low)}"
+            return f"{'>' if self.open_low else '>='} {format_number(self.low)}"
         if math.isinf(self.low):
-            return f"{'<' if self.open_high else '<='} {number(self.high)}"
+            return f"{'<' if self.open_high else '<='} {format_number(self.high)}"
         left, right = "(" if self.open_low else "[", ")" if self.open_high else "]"
-        return f"{left}{number(self.low)}, {number(self.high)}{right}"
+        return f"{left}{format_number(self.low)}, {format_number(self.high)}{right}"
 
     def check(self, value: Any) -> Any:
         """The value itself. Raises Malformed unless all it can be lies within."""
@@ -103,14 +103,15 @@ class Bounds:
         if low in self and high in self:
             return value
         if low == high:
-            raise Malformed(f"{number(low)} is not {self.within()}")
+            raise Malformed(f"{format_number(low)} is not {self.within()}")
         outside = low if low not in self else high
         if math.isinf(outside):
             raise Malformed(
                 f"{value.name} has no limits, but every value must be {self.within()}; add a clip"
             )
         raise Malformed(
-            f"{value.name} can give {number(outside)}, but every value must be {self.within()}"
+            f"{value.name} can give {format_number(outside)}, but every value must be "
+            f"{self.within()}"
         )
 
     def __get_pydantic_core_schema__(
@@ -152,9 +153,9 @@ def custom_error(error: Malformed) -> PydanticCustomError:
     return PydanticCustomError("fact", "{fact}", context)
 
 
-def json_schema_of(kind: Kind[Any]) -> dict[str, Any]:
+def distribution_schema(kind: Kind[Any]) -> dict[str, Any]:
     """JSON Schema of a field that holds a distribution over ``kind``."""
-    names = names_of(kind.name)
+    names = distribution_names(kind.name)
     options: list[dict[str, Any]] = []
     bare = [name for name in names if distribution(name).bare]
     if bare:
@@ -181,7 +182,7 @@ def _plain(
 
     def read_plain(value: Any) -> Any:
         if type(value) not in types:
-            raise Malformed(f"expected {expected}, got {shown(value)}{hint(value)}")
+            raise Malformed(f"expected {expected}, got {quote_value(value)}{hint(value)}")
         return read_number(value) if float in types else value
 
     return read_plain
@@ -190,7 +191,7 @@ def _plain(
 def _range_hint(name: str) -> Callable[[Any], str]:
     def hint(value: Any) -> str:
         is_range = isinstance(value, (list, tuple)) and len(value) == 2
-        return f" (did you mean {{{name}: {shown(value)}}}?)" if is_range else ""
+        return f" (did you mean {{{name}: {quote_value(value)}}}?)" if is_range else ""
 
     return hint
 
@@ -207,7 +208,7 @@ def _flag_hint(value: Any) -> str:
 def _as_key(kind_read: Any) -> Any:
     def read_key(text: str) -> Any:
         try:
-            value = resolve(text)
+            value = resolve_scalar(text)
         except ValueError as error:
             raise Malformed(str(error)) from None
         return kind_read(value)
@@ -216,7 +217,9 @@ def _as_key(kind_read: Any) -> Any:
 
 
 def _no_key(text: str) -> Any:
-    raise Malformed(f"weights by value need a number or a name, got {shown(text)}; use a list")
+    raise Malformed(
+        f"weights by value need a number or a name, got {quote_value(text)}; use a list"
+    )
 
 
 def _spatial(name: str, expected: str, annotation: Any, example: list[float]) -> Kind[Any]:
@@ -274,6 +277,6 @@ Positive = Annotated[Scalar, Bounds(low=0, open_low=True)]
 """A Scalar that stays > 0."""
 
 
-def bounded(field: Any, low: float, high: float) -> Any:
+def with_bounds(field: Any, low: float, high: float) -> Any:
     """``Annotated[field, Bounds(low, high)]``, for types that are made at run time."""
     return Annotated[field, Bounds(low, high)]

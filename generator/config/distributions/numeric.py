@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, WithJsonSchema
 
-from generator.config.distributions.base import (
+from gen_data.generator.config.distributions.base import (
     Malformed,
     Numeric,
     parameters,
     require_order,
+    round_significant,
     sized,
-    stable,
 )
-from generator.config.scalars import number
+from gen_data.generator.config.yaml_scalars import format_number
 
 if TYPE_CHECKING:
-    from generator.core.streams import Rng
+    from gen_data.generator.core.streams import Rng
 
 _STANDARD = NormalDist()
 _LEAST_PROBABILITY = 1e-280
@@ -71,7 +71,7 @@ class LogUniform(
         if not self.low > 0 or not self.high > 0:
             raise Malformed(
                 f"log_uniform needs low > 0 and high > 0, "
-                f"got [{number(self.low)}, {number(self.high)}]"
+                f"got [{format_number(self.low)}, {format_number(self.high)}]"
             )
         require_order(self.name, self.low, self.high)
 
@@ -81,7 +81,7 @@ class LogUniform(
         if self.low == self.high:
             return self.low
         log_low = math.log(self.low)
-        value = stable(math.exp(log_low + (math.log(self.high) - log_low) * u))
+        value = round_significant(math.exp(log_low + (math.log(self.high) - log_low) * u))
         return min(max(value, self.low), self.high)
 
     def mean(self) -> float:
@@ -117,7 +117,7 @@ class Normal(Numeric[float], name="normal", kinds=("number",)):
     def __post_init__(self) -> None:
         """Refuse a negative deviation, and a clip range that holds no probability."""
         if self.stddev < 0:
-            raise Malformed(f"normal needs stddev >= 0, got {number(self.stddev)}")
+            raise Malformed(f"normal needs stddev >= 0, got {format_number(self.stddev)}")
         if self.clip is not None:
             self._refuse_empty(*self.clip)
 
@@ -130,8 +130,9 @@ class Normal(Numeric[float], name="normal", kinds=("number",)):
             empty = self.stddev == 0 and not low <= self.center <= high
         if empty:
             raise Malformed(
-                f"normal with mean {number(self.center)} and stddev {number(self.stddev)} never "
-                f"falls into clip [{number(low)}, {number(high)}]"
+                f"normal with mean {format_number(self.center)} and stddev "
+                f"{format_number(self.stddev)} never "
+                f"falls into clip [{format_number(low)}, {format_number(high)}]"
             )
 
     def draw(self, rng: Rng) -> float:
@@ -143,7 +144,7 @@ class Normal(Numeric[float], name="normal", kinds=("number",)):
             return min(max(self.center, low), high)
         below, above, sign = self._tail()
         z = sign * _STANDARD.inv_cdf(min(below + (above - below) * u, 1 - 2.0**-53))
-        return min(max(stable(self.center + self.stddev * z), low), high)
+        return min(max(round_significant(self.center + self.stddev * z), low), high)
 
     def mean(self) -> float:
         """Expected value, that of the truncated distribution where there is a clip."""

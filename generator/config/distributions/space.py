@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, Field
 
-from generator.config.distributions.base import (
+from gen_data.generator.config.distributions.base import (
     Distribution,
     Malformed,
     Vector,
     parameters,
     require_order,
+    round_significant,
     sized,
-    stable,
 )
-from generator.config.scalars import number
-from generator.core.se3 import Quaternion, Vec3, multiply_quaternions, rotate_by_quaternion
+from gen_data.generator.config.yaml_scalars import format_number
+from gen_data.generator.core.se3 import Quaternion, Vec3, multiply_quaternions, rotate_by_quaternion
 
 if TYPE_CHECKING:
-    from generator.core.streams import Rng
+    from gen_data.generator.core.streams import Rng
 
 
 def _unit(parts: tuple[float, ...], noun: str) -> tuple[float, ...]:
@@ -98,10 +98,10 @@ class So3(Distribution[Quaternion], name="so3", kinds=("rotation",), bare=True):
         u1, u2, u3 = rng.random(), 2 * math.pi * rng.random(), 2 * math.pi * rng.random()
         a, b = math.sqrt(1 - u1), math.sqrt(u1)
         return (
-            stable(b * math.cos(u3)),
-            stable(a * math.sin(u2)),
-            stable(a * math.cos(u2)),
-            stable(b * math.sin(u3)),
+            round_significant(b * math.cos(u3)),
+            round_significant(a * math.sin(u2)),
+            round_significant(a * math.cos(u2)),
+            round_significant(b * math.sin(u3)),
         )
 
 
@@ -156,13 +156,13 @@ class Cap(Distribution[Vec3], name="cap", kinds=("direction",)):
         """Refuse an impossible angle."""
         if not 0 <= self.half_angle_deg <= 180:
             raise Malformed(
-                f"cap needs half_angle_deg in [0, 180], got {number(self.half_angle_deg)}",
+                f"cap needs half_angle_deg in [0, 180], got {format_number(self.half_angle_deg)}",
                 ("half_angle_deg",),
             )
 
     def draw(self, rng: Rng) -> Vec3:
         """One unit vector."""
-        rim = stable(math.cos(math.radians(self.half_angle_deg)))
+        rim = round_significant(math.cos(math.radians(self.half_angle_deg)))
         return rotate_by_quaternion(_from_z(self.axis), _on_sphere(rim, 1.0, rng))
 
 
@@ -216,12 +216,12 @@ class Shell(Distribution[Vec3], name="shell", kinds=("position",)):
         """Refuse reversed or impossible ranges."""
         require_order("shell radius_m", *self.radius_m, "radius_m")
         if self.radius_m[0] < 0:
-            fact = f"shell needs radius_m >= 0, got {number(self.radius_m[0])}"
+            fact = f"shell needs radius_m >= 0, got {format_number(self.radius_m[0])}"
             raise Malformed(fact, ("radius_m",))
         low, high = self.elevation_deg
         require_order("shell elevation_deg", low, high, "elevation_deg")
         if low < -90 or high > 90:
-            given = f"[{number(low)}, {number(high)}]"
+            given = f"[{format_number(low)}, {format_number(high)}]"
             fact = f"shell needs elevation_deg within [-90, 90], got {given}"
             raise Malformed(fact, ("elevation_deg",))
 
@@ -229,8 +229,8 @@ class Shell(Distribution[Vec3], name="shell", kinds=("position",)):
         """One position [m]."""
         inner, outer = self.radius_m
         cubed = inner**3 + (outer**3 - inner**3) * rng.random()
-        radius_m = min(max(stable(cubed ** (1 / 3)), inner), outer)
-        low, high = (stable(math.sin(math.radians(v))) for v in self.elevation_deg)
+        radius_m = min(max(round_significant(cubed ** (1 / 3)), inner), outer)
+        low, high = (round_significant(math.sin(math.radians(v))) for v in self.elevation_deg)
         x, y, z = _on_sphere(low, high, rng)
         cx, cy, cz = self.center_m
         return cx + radius_m * x, cy + radius_m * y, cz + radius_m * z
@@ -241,7 +241,11 @@ def _on_sphere(sine_low: float, sine_high: float, rng: Rng) -> Vec3:
     z = min(sine_low + (sine_high - sine_low) * rng.random(), sine_high)
     azimuth_rad = 2 * math.pi * rng.random()
     ring = math.sqrt(max(0.0, 1 - z * z))
-    return stable(ring * math.cos(azimuth_rad)), stable(ring * math.sin(azimuth_rad)), z
+    return (
+        round_significant(ring * math.cos(azimuth_rad)),
+        round_significant(ring * math.sin(azimuth_rad)),
+        z,
+    )
 
 
 def _from_z(axis: Vec3) -> Quaternion:
@@ -256,4 +260,4 @@ def _from_z(axis: Vec3) -> Quaternion:
 def _half_turn_deg(angle_deg: float) -> tuple[float, float]:
     """Cosine and sine of half the angle."""
     half_rad = math.radians(0.5 * angle_deg)
-    return stable(math.cos(half_rad)), stable(math.sin(half_rad))
+    return round_significant(math.cos(half_rad)), round_significant(math.sin(half_rad))

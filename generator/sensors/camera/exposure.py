@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field, model_validator
 
-from generator.config.strict import Strict
-from generator.core.colorimetry import luminance
-from generator.core.geometry import Float32
-from generator.core.se3 import Array
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.se3 import Array
 
 _MIDDLE_GREY = 0.18
 # A 30th of a second at f/1.4 and ISO 3200, to snow in the sun: beyond, an automatic exposure stays

@@ -7,7 +7,7 @@ import math
 import cv2
 import numpy as np
 
-from generator.core.geometry import Float32
+from gen_data.generator.core.asset_types import Float32
 
 _GHOSTS = (
     (-0.35, 0.02, (0.5, 1.0, 0.6)),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.core.geometry import Float32
-from generator.sensors.camera.pyramid import bilinear, blur, enlarge, halve
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.sensors.camera.pyramid import bilinear, blur, enlarge, halve
 
 # Scales of the veil, in halvings of the image: a narrow core and a wide skirt, after the point
 # spread of eyes and cameras, which falls with the square of the angle.

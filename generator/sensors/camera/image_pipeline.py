@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from generator.config.distributions import (
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
     NonNegative,
@@ -18,27 +19,26 @@ from generator.config.distributions import (
     Scalar,
     UnitInterval,
 )
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.geometry import Float32
-from generator.core.interfaces import Renderer
-from generator.core.scene import Camera, Scene, Weather
-from generator.core.streams import Rng
-from generator.sensors.camera import isp, optics
-from generator.sensors.camera.exposure import (
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.interfaces import Renderer
+from gen_data.generator.core.scene import Camera, Scene, Weather
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.camera import isp, optics
+from gen_data.generator.sensors.camera.exposure import (
     ExposureControl,
     ExposureSettings,
     exposure_settings,
     metered_ev100,
     saturation_cd_m2,
 )
-from generator.sensors.camera.flare import add_flare
-from generator.sensors.camera.glare import add_glare
-from generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
-from generator.sensors.camera.jpeg import through_jpeg
-from generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
-from generator.sensors.camera.presets import camera_preset
-from generator.sensors.camera.tone import Tone, display_values, to_bytes, toned_bytes
+from gen_data.generator.sensors.camera.flare import add_flare
+from gen_data.generator.sensors.camera.glare import add_glare
+from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
+from gen_data.generator.sensors.camera.jpeg import through_jpeg
+from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
+from gen_data.generator.sensors.camera.presets import camera_preset
+from gen_data.generator.sensors.camera.tone import Tone, display_values, to_bytes, toned_bytes
 
 NONE = Constant(0.0)
 Row = tuple[float, float, float]
@@ -199,7 +199,7 @@ def capture_photograph(
     channels: frozenset[Channel],
     pipeline: ImagePipeline,
     rng: Rng,
-) -> Reading:
+) -> SensorReading:
     """The renderer's channels of a camera and, if RGB is asked for, its photograph."""
     if Channel.RGB not in channels:
         return renderer.render(scene, camera, channels)

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from generator.config.distributions import NonNegative
-from generator.config.distributions.discrete import Constant
-from generator.config.strict import Strict
-from generator.core.colorimetry import luminance
-from generator.core.geometry import Float32
-from generator.core.streams import Rng, Streams
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.distributions import NonNegative
+from gen_data.generator.config.distributions.discrete import Constant
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.streams import Rng, Streams
 
 Pattern = Literal["rggb", "bggr", "grbg", "gbrg", "mono"]
 

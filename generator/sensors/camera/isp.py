@@ -7,9 +7,9 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from generator.core.colorimetry import luminance
-from generator.core.geometry import Float32
-from generator.sensors.camera.image_sensor import Pattern
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.sensors.camera.image_sensor import Pattern
 
 Demosaic = Literal["bilinear", "edge_aware"]
 

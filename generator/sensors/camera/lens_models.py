@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from generator.config.strict import Strict
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import COEFFICIENTS, PINHOLE, Lens
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import COEFFICIENTS, PINHOLE, Lens
 
 FieldDeg = Annotated[float, Field(gt=0, le=360)]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.geometry import Float32
+from gen_data.generator.core.asset_types import Float32
 
 
 def halve(image: Float32, times: int) -> Float32:

@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from generator.config.strict import Strict
-from generator.core.shutter import INSTANT, Shutter
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.shutter import INSTANT, Shutter
 
 
 class ExposureTime(Strict):
@@ -37,7 +37,7 @@ class RollingShutter(Strict):
     direction: Literal["down", "up"] = "down"
 
 
-def shutter_of(exposure: ExposureTime | None, rolling: RollingShutter | None) -> Shutter:
+def make_shutter(exposure: ExposureTime | None, rolling: RollingShutter | None) -> Shutter:
     """What a camera's settings amount to."""
     if exposure is None and rolling is None:
         return INSTANT

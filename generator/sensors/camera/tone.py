@@ -24,9 +24,9 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.colorimetry import srgb_encode
-from generator.core.geometry import Float32
-from generator.core.se3 import Array
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.colorimetry import srgb_encode
+from gen_data.generator.core.se3 import Array
 
 Tone = Literal["filmic", "knee", "log", "srgb", "linear"]
 Real = TypeVar("Real", bound=np.floating[Any])

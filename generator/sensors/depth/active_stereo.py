@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from generator.config.strict import Strict
-from generator.core.geometry import Float32
-from generator.core.stereo import disparity_px, seen_by_both
-from generator.core.streams import Rng
-from generator.sensors.depth.dots import Dots
-from generator.sensors.depth.view import Measured, View
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.stereo import disparity_px, is_seen_by_both
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.depth.dot_pattern import Dots
+from gen_data.generator.sensors.depth.view import Measured, View
 
 UInt8 = NDArray[np.uint8]
 
@@ -98,7 +98,7 @@ class ActiveStereo(Strict):
             focal_baseline = view.focal_px * away_m
             depths_m = (z_m, view.z_depth_m(self.projector_m))
             pair_px = (disparity_px(depth_m, focal_baseline) for depth_m in depths_m)
-            lux *= seen_by_both(*pair_px, beyond=True)
+            lux *= is_seen_by_both(*pair_px, beyond=True)
         return np.asarray(light + lux * met.reflectance[..., 0] / np.float32(np.pi), np.float32)
 
     def _photo(self, exposed: Float32, rng: Rng) -> UInt8:
@@ -133,12 +133,12 @@ class ActiveStereo(Strict):
         found = matcher.compute(*wide)[:, most_px:].astype(np.float32) / np.float32(1 << BITS)
         columns = np.arange(left.shape[1], dtype=np.float32)
         found = np.where((found > 0) & (columns >= found), found, np.float32(0.0))
-        fine = refined(left, right, found, block)
+        fine = refine_disparity(left, right, found, block)
         per_px = np.float32(self.steps_per_px)
         return np.asarray(np.rint(fine * per_px) / per_px, np.float32)
 
 
-def refined(left: UInt8, right: UInt8, found: Float32, block_px: int) -> Float32:
+def refine_disparity(left: UInt8, right: UInt8, found: Float32, block_px: int) -> Float32:
     """Disparities to a small part of a pixel, float32 [h, w]; 0 = none.
 
     Lucas and Kanade, "An Iterative Image Registration Technique", IJCAI 1981: the shift under which

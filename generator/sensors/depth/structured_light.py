@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from generator.config.strict import Strict
-from generator.core.geometry import Float32
-from generator.core.stereo import disparity_px, seen_by_both
-from generator.core.streams import Rng
-from generator.sensors.depth.dots import Dots
-from generator.sensors.depth.view import Lit, Measured, View, smooth_noise
-from generator.sensors.scanning import Seen
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.stereo import disparity_px, is_seen_by_both
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.depth.dot_pattern import Dots
+from gen_data.generator.sensors.depth.view import Lit, Measured, View, smooth_noise
+from gen_data.generator.sensors.lidar.scan_pattern import Sensitivity
 
 Mask = NDArray[np.bool_]
 
@@ -60,8 +60,8 @@ class StructuredLight(Strict):
     baseline_m: float = Field(0.075, ge=-2, le=2)
     step_px: float = Field(0.125, ge=0, le=4)
     noise: float = Field(1.0, ge=0, le=100)
-    seen: Seen = Seen(reflectance=0.05, range_m=4.0)
-    blinded: Seen = Seen(reflectance=1.0, range_m=0.3)
+    seen: Sensitivity = Sensitivity(reflectance=0.05, range_m=4.0)
+    blinded: Sensitivity = Sensitivity(reflectance=1.0, range_m=0.3)
     grazing_deg: float = Field(82.0, gt=0, le=90)
     window_share: float = Field(0.4, ge=0, le=1)
     dots: Dots = Dots()
@@ -78,7 +78,7 @@ class StructuredLight(Strict):
             focal_baseline = view.focal_px * self.baseline_m
             there_m = view.z_depth_m(self.baseline_m)
             here_px, there_px = (disparity_px(d, focal_baseline) for d in (z_m, there_m))
-            lit = seen_by_both(here_px, there_px, beyond=True) & self._recognised(here_px)
+            lit = is_seen_by_both(here_px, there_px, beyond=True) & self._recognised(here_px)
         signal = met.reflectance[..., 0] / np.square(met.range_m[..., 0])
         answered = self._answers(signal * (1.0 + SIGNAL_SPREAD * speckle))
         angle = np.arccos(np.clip(met.cosine[..., 0], 0.0, 1.0))

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from generator.config.strict import Strict
-from generator.core.geometry import Float32
-from generator.core.streams import Rng
-from generator.sensors.depth.view import Lit, Measured, View
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.depth.view import Lit, Measured, View
 
 LIGHT_M_S = 299_792_458.0
 SUBRAYS = 7
@@ -86,7 +86,7 @@ class TimeOfFlight(Strict):
             cosine, sine = samples[0] - samples[2], samples[3] - samples[1]
             phases.append(np.arctan2(sine, cosine) % np.float32(TURN))
             amplitude += 0.5 * np.hypot(cosine, sine) / len(self.modulation_mhz)
-        range_m, disagreement = unwrapped(np.stack(phases), self.modulation_mhz)
+        range_m, disagreement = unwrap_phases(np.stack(phases), self.modulation_mhz)
         ok &= (amplitude >= self.least) & (disagreement <= self.disagreement_rad)
         forward = view.camera.intrinsics.pixel_rays()[..., 2].astype(np.float32)
         z_m = np.where(ok, range_m * forward, np.float32(np.inf))
@@ -122,7 +122,7 @@ class TimeOfFlight(Strict):
         return np.asarray(electrons + sigma * noise, np.float32)
 
 
-def unwrapped(phases: Float32, modulation_mhz: tuple[int, ...]) -> tuple[Float32, Float32]:
+def unwrap_phases(phases: Float32, modulation_mhz: tuple[int, ...]) -> tuple[Float32, Float32]:
     """Distances on which phases agree best, and how much they disagree, root mean square [rad].
 
     Args:

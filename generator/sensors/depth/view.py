@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.core.capture import Beams, Channel
-from generator.core.colorimetry import luminance
-from generator.core.geometry import Float32
-from generator.core.interfaces import Renderer
-from generator.core.scene import Camera, Lidar, Scene
-from generator.core.se3 import SE3
-from generator.core.streams import Rng
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.capture import Channel, LidarRays
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.interfaces import Renderer
+from gen_data.generator.core.scene import Camera, Lidar, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Rng
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,7 +37,7 @@ class Lit:
     Attributes:
         range_m: Along the ray, [h, w, subrays]; inf.
         z_m: Along the optical axis; inf.
-        reflectance: As of ``Echoes``: in the infrared, incidence included; 0.
+        reflectance: As of ``LidarHits``: in the infrared, incidence included; 0.
         cosine: Of the angle of incidence; 0.
     """
 
@@ -76,7 +76,7 @@ class View:
         shape = (lens.height_px, lens.width_px)
         rays = np.nan_to_num(lens.pixel_rays()).reshape(-1, 3).astype(np.float32)
         pose = self.beside(right_m).T_world_camera
-        beams = Beams(rays, 1.0 / lens.fx_px, subrays, np.inf)
+        beams = LidarRays(rays, 1.0 / lens.fx_px, subrays, np.inf)
         seen = self.renderer.scan(self.scene, Lidar(self.camera.name, "", SE3(), pose), beams)
         shape3 = (*shape, subrays)
         z_m = seen.range_m * rays[:, 2:]

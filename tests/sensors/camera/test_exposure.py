@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from generator.sensors.camera.exposure import metered_ev100, saturation_cd_m2
+from gen_data.generator.sensors.camera.exposure import metered_ev100, saturation_cd_m2
 
 
 def test_the_saturation_luminance_is_that_of_iso_12232() -> None:

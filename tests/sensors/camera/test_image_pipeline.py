@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from generator.assemble.spec import load_config
-from generator.config.renaming import RenamedKeyWarning
-from generator.core.capture import Channel, Reading
-from generator.core.errors import ConfigError
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.scene import Camera, Scene, Weather
-from generator.core.se3 import SE3
-from generator.core.streams import Rng, Streams
-from generator.sensors.camera.image_pipeline import (
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.config.renaming import RenamedKeyWarning
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.scene import Camera, Scene, Weather
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.sensors.camera.image_pipeline import (
     STAGES,
     ImagePipeline,
     capture_photograph,
     develop,
 )
-from generator.sensors.camera.presets import camera_names
-from generator.sensors.camera.tone import display_values, to_bytes
+from gen_data.generator.sensors.camera.presets import camera_names
+from gen_data.generator.sensors.camera.tone import display_values, to_bytes
 
 LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
 CAMERA = Camera("eye", SE3(), LENS, ev100=8.0)
@@ -49,10 +49,10 @@ class Rendering:
     def __init__(self, radiance: Any) -> None:
         self.radiance, self.asked = radiance, frozenset[Channel]()
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """All channels are that image."""
         self.asked = channels
-        return Reading(camera.name, camera, dict.fromkeys(channels, self.radiance))
+        return SensorReading(camera.name, camera, dict.fromkeys(channels, self.radiance))
 
     def scan(self, *_: Any) -> Any:
         raise NotImplementedError
@@ -141,7 +141,7 @@ def test_renderers_are_asked_for_radiance_and_only_for_the_depth_that_is_needed(
     """RGB is the camera's; radiance is not kept unless it was asked for."""
     renderer = Rendering(speckled())
 
-    def captured(*channels: Channel) -> Reading:
+    def captured(*channels: Channel) -> SensorReading:
         return capture_photograph(
             Scene("t"), renderer, CAMERA, frozenset(channels), ImagePipeline(), rng()
         )

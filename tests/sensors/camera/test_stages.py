@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from generator.config.distributions import Constant
-from generator.core.intrinsics import Intrinsics
-from generator.core.lens import Lens
-from generator.core.scene import Camera, Weather
-from generator.core.se3 import SE3
-from generator.core.streams import Rng, Streams
-from generator.sensors.camera import isp, optics
-from generator.sensors.camera.exposure import ExposureControl, exposure_settings
-from generator.sensors.camera.image_pipeline import ImagePipeline, develop
-from generator.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
-from generator.sensors.camera.jpeg import through_jpeg
-from generator.sensors.camera.presets import camera_names
-from generator.sensors.camera.tone import to_bytes
+from gen_data.generator.config.distributions import Constant
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.scene import Camera, Weather
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.sensors.camera import isp, optics
+from gen_data.generator.sensors.camera.exposure import ExposureControl, exposure_settings
+from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, develop
+from gen_data.generator.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
+from gen_data.generator.sensors.camera.jpeg import through_jpeg
+from gen_data.generator.sensors.camera.presets import camera_names
+from gen_data.generator.sensors.camera.tone import to_bytes
 
 FAR = np.full((48, 64), np.inf)
 EYE = Camera("eye", SE3(), Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0), ev100=8.0)

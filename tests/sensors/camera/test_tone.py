@@ -8,8 +8,8 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from generator.core.streams import Streams
-from generator.sensors.camera.tone import (
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.sensors.camera.tone import (
     Tone,
     display_values,
     filmic,

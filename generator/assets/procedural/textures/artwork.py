@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from generator.assets.procedural.draw import between
-from generator.assets.procedural.shapes import UvRect
-from generator.core.geometry import TextureData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.surface_shapes import UvRect
+from gen_data.generator.assets.procedural.variant_rng import uniform_between
+from gen_data.generator.core.asset_types import TextureData
+from gen_data.generator.core.streams import Rng
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -47,7 +47,7 @@ def pixels(image: Image, box: Box) -> tuple[int, int, int, int]:
     return (int(box[0] * w), int(box[1] * h), int(box[2] * w), int(box[3] * h))
 
 
-def squeezed(image: Image, w: int, h: int) -> TextureData:
+def resize_texture(image: Image, w: int, h: int) -> TextureData:
     """The whole image as a texture of another size."""
     from PIL.Image import Resampling
 
@@ -97,7 +97,7 @@ def lines(image: Image, box: Box, ink: Color, ground: Color, rng: Rng) -> None:
     for y in range(y0, y1 - pitch, pitch):
         x = float(x0)
         while x < x1 - 6:
-            word = between(4, 22, rng)
+            word = uniform_between(4, 22, rng)
             draw.rectangle(
                 [x, y, min(x + word, x1), y + max(1, pitch // 3)],
                 fill=blend(ink, ground, 0.25),
@@ -116,7 +116,7 @@ def table(image: Image, box: Box, ink: Color, rng: Rng) -> None:
         draw.line([x0, y, x1, y], fill=(40, 40, 40), width=1)
         h = max(1, (y1 - y0) // rows // 4)
         draw.rectangle(
-            [x0 + 4, y + h, x0 + 4 + between(0.2, 0.5, rng) * (x1 - x0), y + 2 * h],
+            [x0 + 4, y + h, x0 + 4 + uniform_between(0.2, 0.5, rng) * (x1 - x0), y + 2 * h],
             fill=(60, 60, 60),
         )
         draw.rectangle([x1 - 0.2 * (x1 - x0), y + h, x1 - 4, y + 2 * h], fill=(60, 60, 60))
@@ -130,10 +130,10 @@ def barcode(image: Image, box: Box, rng: Rng) -> None:
     x, end, unit = x0 + 0.08 * (x1 - x0), x1 - 0.08 * (x1 - x0), max(1.0, (x1 - x0) / 75)
     foot = y1 - 0.18 * (y1 - y0)
     while x < end:
-        bar, gap = unit * int(between(1, 4, rng)), unit * int(between(1, 4, rng))
+        bar, gap = unit * int(uniform_between(1, 4, rng)), unit * int(uniform_between(1, 4, rng))
         draw.rectangle([x, y0 + 0.08 * (y1 - y0), x + bar - 1, foot], fill=(15, 15, 15))
         x += bar + gap
-    digits = "".join(str(int(between(0, 10, rng))) for _ in range(13))
+    digits = "".join(str(int(uniform_between(0, 10, rng))) for _ in range(13))
     text(
         image,
         (x0 / image.width + 0.02, foot / image.height, x1 / image.width - 0.02, y1 / image.height),

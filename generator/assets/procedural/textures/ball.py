@@ -6,18 +6,23 @@ import math
 
 import numpy as np
 
-from generator.assets.procedural import toys
-from generator.assets.procedural.draw import pick, rng_of
-from generator.assets.procedural.noise import (
+from gen_data.generator.assets.procedural import toys
+from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     fbm,
     rows_and_columns,
     smoothstep,
     worley,
 )
-from generator.assets.procedural.textures.images import color, drawn_color, mixed, texture
-from generator.core.geometry import Float32, TextureData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.textures.texture_images import (
+    color,
+    draw_color,
+    mix_colors,
+    texture,
+)
+from gen_data.generator.assets.procedural.variant_rng import choose, variant_rng
+from gen_data.generator.core.asset_types import Float32, TextureData
+from gen_data.generator.core.streams import Rng
 
 _BRIGHT = ("#d7261e", "#f2a71b", "#f7d423", "#2e9e4f", "#1f6fb5", "#7b3fa0", "#f0f0ec", "#12a3a3")
 # Distance from the centre to the pentagons and hexagons of a truncated icosahedron of edge 1
@@ -27,12 +32,10 @@ _PENTAGON, _HEXAGON = 2.32744, 2.26728
 
 def ball_cover(seed: int) -> TextureData:
     """The cover of ``toys.ball`` of the same seed."""
-    rng = rng_of("ball_cover", seed)
+    rng = variant_rng("ball_cover", seed)
     kind = toys.ball_kind(seed)
     if kind == "rubber":
-        return texture(
-            drawn_color(_BRIGHT, 0.05, rng) * (1 + 0.02 * fbm((8, 8), 3, rng))[..., None]
-        )
+        return texture(draw_color(_BRIGHT, 0.05, rng) * (1 + 0.02 * fbm((8, 8), 3, rng))[..., None])
     make = {"tennis": _tennis, "beach": _beach, "basket": _basket, "foot": _foot}[kind]
     return texture(make(_directions(), rng))
 
@@ -51,15 +54,15 @@ def _tennis(d: Float32, rng: Rng) -> Float32:
     turn = np.arctan2(d[..., 1], d[..., 0])
     seam = smoothstep(0.075, 0.05, np.abs(d[..., 2] - 0.55 * np.cos(2 * turn)))
     felt = color("#c5d833") * (0.92 + 0.09 * fbm((96, 96), 2, rng))[..., None]
-    return mixed(felt, color("#eceee0"), seam)
+    return mix_colors(felt, color("#eceee0"), seam)
 
 
 def _beach(d: Float32, rng: Rng) -> Float32:
     """Six gores in two or three colours, white caps."""
-    colors = np.stack([drawn_color(_BRIGHT, 0.04, rng) for _ in range(pick((2, 3), rng))])
+    colors = np.stack([draw_color(_BRIGHT, 0.04, rng) for _ in range(choose((2, 3), rng))])
     gore = np.floor(np.arctan2(d[..., 1], d[..., 0]) / (math.pi / 3)).astype(np.int64) + 3
     cap = smoothstep(0.955, 0.96, np.abs(d[..., 2]))
-    return mixed(colors[gore % len(colors)], color("#f2f2ee"), cap)
+    return mix_colors(colors[gore % len(colors)], color("#f2f2ee"), cap)
 
 
 def _basket(d: Float32, rng: Rng) -> Float32:
@@ -69,10 +72,9 @@ def _basket(d: Float32, rng: Rng) -> Float32:
     line = smoothstep(0.03, 0.02, np.minimum(np.minimum(np.abs(x), np.abs(z)), bow))
     pebble = worley((64, 128), rng).nearest
     leather = (
-        drawn_color(("#c8682a", "#b5571f", "#d07a38"), 0.04, rng)
-        * (1.04 - 0.12 * pebble)[..., None]
+        draw_color(("#c8682a", "#b5571f", "#d07a38"), 0.04, rng) * (1.04 - 0.12 * pebble)[..., None]
     )
-    return mixed(leather, color("#1d1815"), line)
+    return mix_colors(leather, color("#1d1815"), line)
 
 
 def _foot(d: Float32, rng: Rng) -> Float32:
@@ -94,10 +96,10 @@ def _foot(d: Float32, rng: Rng) -> Float32:
     reach = np.einsum("hwk,fk->hwf", d, heights.astype(np.float32), optimize=False)
     two = np.sort(reach, axis=2)[..., -2:]
     dark = (reach.argmax(axis=2) < 12).astype(np.float32)
-    patch = drawn_color(("#1b1b1d", "#1b1b1d", "#1f4f9a", "#a8242a"), 0.03, rng)
-    albedo = mixed(np.broadcast_to(color("#efefec"), (SIZE_PX, SIZE_PX, 3)), patch, dark)
+    patch = draw_color(("#1b1b1d", "#1b1b1d", "#1f4f9a", "#a8242a"), 0.03, rng)
+    albedo = mix_colors(np.broadcast_to(color("#efefec"), (SIZE_PX, SIZE_PX, 3)), patch, dark)
     seam = smoothstep(0.006, 0.002, two[..., 1] - two[..., 0])
-    return mixed(albedo, color("#3a3a3c"), 0.8 * seam)
+    return mix_colors(albedo, color("#3a3a3c"), 0.8 * seam)
 
 
 def _dot(points: np.ndarray[tuple[int, ...], np.dtype[np.float64]], i: int, j: int) -> float:

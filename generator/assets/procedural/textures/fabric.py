@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.noise import (
+from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
-    blurred,
+    blur_image,
     fbm,
     perlin,
     rows_and_columns,
     smoothstep,
     uniform,
-    warped,
+    warp_image,
     worley,
 )
-from generator.assets.procedural.textures.images import drawn_color, mixed, texture
-from generator.core.geometry import Float32, TextureData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.textures.texture_images import (
+    draw_color,
+    mix_colors,
+    texture,
+)
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.core.asset_types import Float32, TextureData
+from gen_data.generator.core.streams import Rng
 
 _CLOTH = (
     "#e8e3d8",
@@ -51,9 +60,9 @@ _HIDES = ("#5a3825", "#2a1d17", "#8a5a34", "#1c1b1b", "#a87a4f", "#6b2a22", "#c9
 
 def fabric(seed: int) -> TextureData:
     """Plain or twill weave, plain-coloured, striped or checked; 0.15 m per repeat."""
-    rng = rng_of("fabric", seed)
-    yarns = pick((32, 64, 64), rng)
-    twill = chance(0.4, rng)
+    rng = variant_rng("fabric", seed)
+    yarns = choose((32, 64, 64), rng)
+    twill = is_drawn(0.4, rng)
     y, x = rows_and_columns()
     wave_y, wave_x = 0.5 * fbm((8, 8), 2, rng) / yarns, 0.5 * fbm((8, 8), 2, rng) / yarns
     v, u = (y + wave_y) * yarns, (x + wave_x) * yarns
@@ -74,29 +83,29 @@ def fabric(seed: int) -> TextureData:
 
 def carpet(seed: int) -> TextureData:
     """Cut or looped pile; 0.5 m per repeat."""
-    rng = rng_of("carpet", seed)
-    cells = pick((64, 96, 128), rng)
+    rng = variant_rng("carpet", seed)
+    cells = choose((64, 96, 128), rng)
     tufts = worley((cells, cells), rng, 0.9)
-    base, fleck = drawn_color(_CARPETS, 0.06, rng), drawn_color(_CARPETS, 0.06, rng)
-    spread = between(0.1, 0.4, rng)
+    base, fleck = draw_color(_CARPETS, 0.06, rng), draw_color(_CARPETS, 0.06, rng)
+    spread = uniform_between(0.1, 0.4, rng)
     tone = tufts.of_each(1 + spread * (uniform(tufts.count, rng) - 0.5))
-    flecked = tufts.of_each((uniform(tufts.count, rng) < pick((0.0, 0.0, 0.15, 0.4), rng)) * 0.7)
+    flecked = tufts.of_each((uniform(tufts.count, rng) < choose((0.0, 0.0, 0.15, 0.4), rng)) * 0.7)
     lying = fbm((3, 3), 4, rng)
     depth = smoothstep(0.95, 0.15, tufts.nearest)
-    albedo = mixed(np.broadcast_to(base, (SIZE_PX, SIZE_PX, 3)), fleck, flecked)
+    albedo = mix_colors(np.broadcast_to(base, (SIZE_PX, SIZE_PX, 3)), fleck, flecked)
     albedo = albedo * (tone * (0.55 + 0.45 * depth) * (1 + 0.06 * lying))[..., None]
     return texture(albedo, None, 2.5 * depth + 0.5 * tone)
 
 
 def leather(seed: int) -> TextureData:
     """Grained leather; 0.2 m per repeat."""
-    rng = rng_of("leather", seed)
-    cells = pick((28, 40, 56), rng)
+    rng = variant_rng("leather", seed)
+    cells = choose((28, 40, 56), rng)
     grain = worley((cells, cells), rng, 0.95)
     bend = 6.0 * fbm((8, 8), 3, rng)
-    crease = warped(grain.second - grain.nearest, bend, np.roll(bend, 171, axis=1))
-    pebble = blurred(smoothstep(0.02, 0.3, crease))
-    base = drawn_color(_HIDES, 0.08, rng)
+    crease = warp_image(grain.second - grain.nearest, bend, np.roll(bend, 171, axis=1))
+    pebble = blur_image(smoothstep(0.02, 0.3, crease))
+    base = draw_color(_HIDES, 0.08, rng)
     worn = 0.08 * fbm((3, 3), 4, rng) + 0.03 * fbm((64, 64), 2, rng)
     albedo = base * (0.72 + 0.28 * pebble + worn)[..., None]
     return texture(albedo, 0.95 - 0.25 * pebble, 2.2 * pebble + 0.3 * fbm((64, 64), 2, rng))
@@ -104,10 +113,10 @@ def leather(seed: int) -> TextureData:
 
 def cardboard(seed: int) -> TextureData:
     """Brown corrugated board; 0.5 m per repeat."""
-    rng = rng_of("cardboard", seed)
-    base = drawn_color(("#b08a5e", "#a67f55", "#bd9a6d", "#c7a57b", "#9c774e"), 0.05, rng)
+    rng = variant_rng("cardboard", seed)
+    base = draw_color(("#b08a5e", "#a67f55", "#bd9a6d", "#c7a57b", "#9c774e"), 0.05, rng)
     _, x = rows_and_columns()
-    flutes = np.sin(2 * np.pi * pick((64, 80), rng) * x) + 0 * x.T
+    flutes = np.sin(2 * np.pi * choose((64, 80), rng) * x) + 0 * x.T
     clouds, fine = fbm((4, 4), 4, rng), fbm((128, 128), 2, rng)
     fibres = np.abs(perlin((40, 170), rng)) + np.abs(perlin((170, 40), rng))
     specks = smoothstep(0.62, 0.8, perlin((120, 120), rng))
@@ -118,9 +127,9 @@ def cardboard(seed: int) -> TextureData:
 
 def _yarn_colors(yarns: int, rng: Rng) -> tuple[Float32, Float32]:
     """Colour of each warp and each weft yarn, shape [yarns, 3]."""
-    first, second = drawn_color(_CLOTH, 0.06, rng), drawn_color(_CLOTH, 0.06, rng)
-    kind = pick(("plain", "plain", "melange", "stripes", "check"), rng)
-    band = pick((yarns // 4, yarns // 8), rng)
+    first, second = draw_color(_CLOTH, 0.06, rng), draw_color(_CLOTH, 0.06, rng)
+    kind = choose(("plain", "plain", "melange", "stripes", "check"), rng)
+    band = choose((yarns // 4, yarns // 8), rng)
     number = np.arange(yarns)
     banded = (number // band % 2 == 0).astype(np.float32)[:, None]
     striped = (first * (1 - banded) + second * banded).astype(np.float32)

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, rng_of
-from generator.assets.procedural.noise import SIZE_PX, fbm, perlin, rows_and_columns, smoothstep
-from generator.assets.procedural.textures.images import color, drawn_color, mixed, texture
-from generator.core.geometry import Float32, TextureData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.noise import (
+    SIZE_PX,
+    fbm,
+    perlin,
+    rows_and_columns,
+    smoothstep,
+)
+from gen_data.generator.assets.procedural.textures.texture_images import (
+    color,
+    draw_color,
+    mix_colors,
+    texture,
+)
+from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.core.asset_types import Float32, TextureData
+from gen_data.generator.core.streams import Rng
 
 _METALS = ("#c6c7c8", "#b7b9bb", "#d5d6d7", "#c9b27c", "#a8aaad", "#8f9194", "#c48f6b")
 _PAINTS = (
@@ -27,7 +38,7 @@ _PAINTS = (
 
 def brushed_metal(seed: int) -> TextureData:
     """Brushed sheet, strokes across the image; 0.3 m per repeat."""
-    rng = rng_of("brushed_metal", seed)
+    rng = variant_rng("brushed_metal", seed)
     strokes = sum(
         (
             weight * perlin(cells, rng)
@@ -36,29 +47,29 @@ def brushed_metal(seed: int) -> TextureData:
         start=np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32),
     )
     clouds = fbm((2, 3), 4, rng)
-    base = drawn_color(_METALS, 0.05, rng)
-    shade = 1 + between(0.05, 0.11, rng) * strokes + 0.03 * clouds
+    base = draw_color(_METALS, 0.05, rng)
+    shade = 1 + uniform_between(0.05, 0.11, rng) * strokes + 0.03 * clouds
     return texture(base * shade[..., None], 0.75 + 0.2 * strokes + 0.08 * clouds, 0.7 * strokes)
 
 
 def painted_metal(seed: int) -> TextureData:
     """Lacquered sheet with chips, scratches and grime; 0.6 m per repeat."""
-    rng = rng_of("painted_metal", seed)
-    paint = drawn_color(_PAINTS, 0.06, rng)
+    rng = variant_rng("painted_metal", seed)
+    paint = draw_color(_PAINTS, 0.06, rng)
     peel, grime = fbm((90, 90), 2, rng), smoothstep(0.0, 0.9, fbm((3, 3), 5, rng, 0.6))
-    wear = between(0.55, 0.95, rng)
+    wear = uniform_between(0.55, 0.95, rng)
     flakes = fbm((7, 7), 6, rng, 0.62) + 0.25 * fbm((2, 2), 2, rng)
     bare = smoothstep(wear, wear + 0.05, flakes)
     rim = smoothstep(wear - 0.09, wear - 0.02, flakes) * (1 - bare)
-    rust = mixed(color("#5b3420"), color("#8c5a36"), 0.5 + 0.5 * fbm((32, 32), 3, rng))
+    rust = mix_colors(color("#5b3420"), color("#8c5a36"), 0.5 + 0.5 * fbm((32, 32), 3, rng))
     steel = np.broadcast_to(color("#6f7072"), (SIZE_PX, SIZE_PX, 3))
-    metal = mixed(steel, rust, smoothstep(-0.3, 0.6, fbm((9, 9), 4, rng)))
+    metal = mix_colors(steel, rust, smoothstep(-0.3, 0.6, fbm((9, 9), 4, rng)))
     scratches = _scratches(rng)
     albedo = paint * (1 + 0.015 * peel - 0.13 * grime)[..., None]
-    albedo = mixed(
+    albedo = mix_colors(
         albedo, np.minimum(paint * 1.5 + 0.12, 0.9), np.maximum(0.35 * rim, 0.5 * scratches)
     )
-    albedo = mixed(albedo, metal, bare)
+    albedo = mix_colors(albedo, metal, bare)
     rough = 0.55 + 0.2 * grime + 0.4 * bare + 0.15 * scratches
     return texture(albedo, rough, 0.35 * peel - 1.5 * bare - 0.5 * scratches)
 
@@ -67,7 +78,7 @@ def _scratches(rng: Rng) -> Float32:
     """Thin arcs in [0, 1], periodic."""
     y, x = rows_and_columns()
     total = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
-    for _ in range(int(between(8, 26, rng))):
+    for _ in range(int(uniform_between(8, 26, rng))):
         cy, cx, turn, length, bow = (float(t) for t in rng.random(5))
         s, c = np.sin(2 * np.pi * turn), np.cos(2 * np.pi * turn)
         dy, dx = (y - cy + 0.5) % 1.0 - 0.5, (x - cx + 0.5) % 1.0 - 0.5

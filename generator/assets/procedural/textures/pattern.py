@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, pick, rng_of
-from generator.assets.procedural.noise import (
+from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     fbm,
     rows_and_columns,
@@ -15,29 +14,30 @@ from generator.assets.procedural.noise import (
     uniform,
     worley,
 )
-from generator.assets.procedural.textures.images import mixed, ramp, texture
-from generator.core.geometry import Float32, TextureData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.textures.texture_images import mix_colors, ramp, texture
+from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.core.asset_types import Float32, TextureData
+from gen_data.generator.core.streams import Rng
 
 
 def checker(seed: int) -> TextureData:
     """Two-coloured squares; any scale."""
-    rng = rng_of("checker", seed)
-    count = 2 * pick((1, 2, 3, 4, 6, 8), rng)
+    rng = variant_rng("checker", seed)
+    count = 2 * choose((1, 2, 3, 4, 6, 8), rng)
     y, x = rows_and_columns()
     odd = (np.floor(y * count) + np.floor(x * count)) % 2
     first, second = _contrast(rng)
-    return texture(mixed(np.broadcast_to(first, (SIZE_PX, SIZE_PX, 3)), second, odd))
+    return texture(mix_colors(np.broadcast_to(first, (SIZE_PX, SIZE_PX, 3)), second, odd))
 
 
 def stripes(seed: int) -> TextureData:
     """Straight stripes of two to four colours, upright, level or diagonal; any scale."""
-    rng = rng_of("stripes", seed)
+    rng = variant_rng("stripes", seed)
     y, x = rows_and_columns()
-    down, across = pick(((0, 1), (1, 0), (1, 1), (-1, 1)), rng)
-    position = pick((2, 3, 4, 6, 9), rng) * (down * y + across * x)
+    down, across = choose(((0, 1), (1, 0), (1, 1), (-1, 1)), rng)
+    position = choose((2, 3, 4, 6, 9), rng) * (down * y + across * x)
     position = position - np.floor(position)
-    colors = [_vivid(rng) for _ in range(pick((2, 2, 3, 4), rng))]
+    colors = [_vivid(rng) for _ in range(choose((2, 2, 3, 4), rng))]
     edges = np.cumsum(0.3 + uniform(len(colors), rng))
     band = np.searchsorted(edges[:-1] / edges[-1], position, side="right")
     return texture(np.stack(colors)[band])
@@ -45,33 +45,33 @@ def stripes(seed: int) -> TextureData:
 
 def perlin_noise(seed: int) -> TextureData:
     """Colourful clouds; any scale."""
-    rng = rng_of("perlin_noise", seed)
-    cells = pick((2, 3, 5, 8, 12), rng)
-    field = fbm((cells, cells), pick((1, 3, 6), rng), rng)
+    rng = variant_rng("perlin_noise", seed)
+    cells = choose((2, 3, 5, 8, 12), rng)
+    field = fbm((cells, cells), choose((1, 3, 6), rng), rng)
     field = 0.5 + 0.5 * np.clip(field / (2.2 * field.std()), -1, 1)
-    count = pick((2, 3, 4), rng)
+    count = choose((2, 3, 4), rng)
     return texture(ramp([(i / (count - 1), _vivid(rng)) for i in range(count)], field))
 
 
 def voronoi_noise(seed: int) -> TextureData:
     """Cells of random colours, some with borders; any scale."""
-    rng = rng_of("voronoi_noise", seed)
-    cells = pick((4, 6, 9, 14, 22), rng)
+    rng = variant_rng("voronoi_noise", seed)
+    cells = choose((4, 6, 9, 14, 22), rng)
     points = worley((cells, cells), rng)
-    palette = np.stack([_vivid(rng) for _ in range(pick((3, 5, 8), rng))])
+    palette = np.stack([_vivid(rng) for _ in range(choose((3, 5, 8), rng))])
     which = (uniform(points.count, rng) * len(palette)).astype(np.int64)
     albedo = points.of_each(palette[which].astype(np.float64))
-    shade = pick((0.0, 0.4), rng) * points.nearest
-    border = pick((0.0, 0.0, 1.0), rng) * smoothstep(0.1, 0.03, points.second - points.nearest)
-    return texture(mixed(albedo * (1 - shade)[..., None], _vivid(rng), border))
+    shade = choose((0.0, 0.4), rng) * points.nearest
+    border = choose((0.0, 0.0, 1.0), rng) * smoothstep(0.1, 0.03, points.second - points.nearest)
+    return texture(mix_colors(albedo * (1 - shade)[..., None], _vivid(rng), border))
 
 
 def _vivid(rng: Rng) -> Float32:
     """A colour that is even over hue, from grey to saturated and from dark to light."""
     hue, saturation, value = (
         6.0 * float(rng.random()),
-        between(0.1, 1.0, rng),
-        between(0.12, 0.97, rng),
+        uniform_between(0.1, 1.0, rng),
+        uniform_between(0.12, 0.97, rng),
     )
     channels = [
         value * (1 - saturation * min(max(abs(math.remainder(hue - shift, 6.0)) - 1.0, 0.0), 1.0))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, chance, pick, rng_of
-from generator.assets.procedural.noise import (
+from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
-    blurred,
+    blur_image,
     fbm,
     perlin,
     rows_and_columns,
@@ -15,14 +14,20 @@ from generator.assets.procedural.noise import (
     uniform,
     worley,
 )
-from generator.assets.procedural.textures.images import (
+from gen_data.generator.assets.procedural.textures.texture_images import (
     color,
-    drawn_color,
-    mixed,
+    draw_color,
+    mix_colors,
     texture,
 )
-from generator.core.geometry import Float32, TextureData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.core.asset_types import Float32, TextureData
+from gen_data.generator.core.streams import Rng
 
 _MARBLES = (
     ("#eceae6", "#8d8f94"),
@@ -52,49 +57,54 @@ _TILES = (
 
 def marble(seed: int) -> TextureData:
     """Polished marble; 0.8 m per repeat."""
-    rng = rng_of("marble", seed)
+    rng = variant_rng("marble", seed)
     ground, vein_color = (color(code) for code in _MARBLES[seed % len(_MARBLES)])
     clouds = fbm((3, 3), 5, rng)
     veins = np.zeros_like(clouds)
     for cells, width, weight in (((2, 2), 0.06, 1.0), ((4, 3), 0.045, 0.6), ((8, 8), 0.03, 0.35)):
         ridge = np.abs(_folded(cells, rng))
         presence = smoothstep(-0.25, 0.5, fbm((2, 2), 2, rng))
-        thickness = width * between(0.6, 1.6, rng)
+        thickness = width * uniform_between(0.6, 1.6, rng)
         veins = np.maximum(veins, weight * presence / (1 + (ridge / thickness) ** 2))
-    albedo = mixed(ground, vein_color, 0.28 * smoothstep(-0.3, 0.9, clouds) + 0.75 * veins)
+    albedo = mix_colors(ground, vein_color, 0.28 * smoothstep(-0.3, 0.9, clouds) + 0.75 * veins)
     return texture(albedo + 0.012 * fbm((64, 64), 2, rng)[..., None], 0.9 + 0.1 * veins)
 
 
 def terrazzo(seed: int) -> TextureData:
     """Stone chips in cement, ground flat; 0.6 m per repeat."""
-    rng = rng_of("terrazzo", seed)
-    ground = drawn_color(
+    rng = variant_rng("terrazzo", seed)
+    ground = draw_color(
         ("#d9d5cc", "#c5c3be", "#e7e2d6", "#6d6e70", "#b8a999", "#dadfdd"), 0.06, rng
     )
-    palette = [color(pick(_CHIPS, rng)) for _ in range(pick((2, 3, 4), rng))]
+    palette = [color(choose(_CHIPS, rng)) for _ in range(choose((2, 3, 4), rng))]
     albedo = ground + 0.02 * fbm((16, 16), 4, rng)[..., None]
     chips_everywhere = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
     for cells, share in ((9, 0.75), (18, 0.7), (36, 0.5), (70, 0.35)):
         points = worley((cells, cells), rng)
-        kept = uniform(points.count, rng) < share * between(0.6, 1.0, rng)
+        kept = uniform(points.count, rng) < share * uniform_between(0.6, 1.0, rng)
         size = 0.12 + 0.2 * uniform(points.count, rng)
         inside = smoothstep(0.0, 0.08, points.second - points.nearest - points.of_each(size))
         chip = inside * points.of_each(kept.astype(np.float64)) * (1 - chips_everywhere)
         which = (uniform(points.count, rng) * len(palette)).astype(np.int64)
         tints = np.stack(palette)[which] * (0.85 + 0.3 * uniform((points.count, 1), rng))
-        albedo = mixed(albedo, points.of_each(tints), chip)
+        albedo = mix_colors(albedo, points.of_each(tints), chip)
         chips_everywhere = np.maximum(chips_everywhere, chip)
     return texture(albedo, 1.0 - 0.25 * chips_everywhere)
 
 
 def concrete(seed: int) -> TextureData:
     """Cast or screeded concrete with pores and stains; 2 m per repeat."""
-    rng = rng_of("concrete", seed)
-    base = drawn_color(("#9a9a97", "#aaa8a2", "#8a8b8c", "#b7b3aa", "#7c7d7e"), 0.08, rng)
+    rng = variant_rng("concrete", seed)
+    base = draw_color(("#9a9a97", "#aaa8a2", "#8a8b8c", "#b7b3aa", "#7c7d7e"), 0.08, rng)
     clouds, fine = fbm((3, 3), 6, rng, 0.6), fbm((48, 48), 4, rng, 0.7)
     stains = smoothstep(0.1, 0.8, fbm((2, 2), 5, rng, 0.6))
     pores = _pores(40, 0.32, 0.2, rng) + _pores(90, 0.3, 0.12, rng)
-    shade = 1 + between(0.05, 0.12, rng) * clouds + 0.05 * fine - between(0.02, 0.14, rng) * stains
+    shade = (
+        1
+        + uniform_between(0.05, 0.12, rng) * clouds
+        + 0.05 * fine
+        - uniform_between(0.02, 0.14, rng) * stains
+    )
     albedo = base * shade[..., None]
     albedo = albedo * (1 - 0.45 * np.clip(pores, 0, 1))[..., None]
     return texture(albedo, 0.9 - 0.12 * stains, 0.5 * fine + 0.8 * clouds - 2.0 * pores)
@@ -102,7 +112,7 @@ def concrete(seed: int) -> TextureData:
 
 def plaster(seed: int) -> TextureData:
     """Painted wall plaster, smooth to rough-cast; 1.5 m per repeat."""
-    rng = rng_of("plaster", seed)
+    rng = variant_rng("plaster", seed)
     codes = (
         "#efece4",
         "#f3f1ec",
@@ -115,59 +125,63 @@ def plaster(seed: int) -> TextureData:
         "#b9c4cb",
         "#d8d4cd",
     )
-    base = drawn_color(codes, 0.04, rng)
+    base = draw_color(codes, 0.04, rng)
     grain = fbm((40, 40), 4, rng, 0.75)
     strokes = fbm((6, 9), 5, rng, 0.6)
-    rough = between(0.15, 1.0, rng)
+    rough = uniform_between(0.15, 1.0, rng)
     shade = 1 + 0.02 * strokes + 0.035 * rough * grain
     return texture(base * shade[..., None], None, rough * 1.6 * grain + 1.2 * strokes)
 
 
 def brick(seed: int) -> TextureData:
     """A wall in running bond; 1 m per repeat."""
-    rng = rng_of("brick", seed)
-    courses, per_course = pick(((12, 4), (14, 5), (10, 4)), rng)
+    rng = variant_rng("brick", seed)
+    courses, per_course = choose(((12, 4), (14, 5), (10, 4)), rng)
     edge, number = _courses(courses, per_course, 0.5, rng)
-    joint = between(2.5, 4.5, rng)
+    joint = uniform_between(2.5, 4.5, rng)
     wobble = 1.2 * fbm((24, 24), 3, rng)
     face = smoothstep(joint, joint + 2.0, edge + wobble)
     bricks = courses * per_course
-    base = drawn_color(_BRICKS, 0.08, rng)
-    other = drawn_color(_BRICKS, 0.08, rng)
-    pick_other = (uniform(bricks, rng) < between(0.0, 0.35, rng)).astype(np.float64)
+    base = draw_color(_BRICKS, 0.08, rng)
+    other = draw_color(_BRICKS, 0.08, rng)
+    pick_other = (uniform(bricks, rng) < uniform_between(0.0, 0.35, rng)).astype(np.float64)
     tone = 0.72 + 0.33 * uniform(bricks, rng)
     tints = (base + (other - base) * pick_other[:, None]) * tone[:, None]
     grit = fbm((48, 48), 4, rng, 0.7)
     albedo = (
         tints.astype(np.float32)[number] * (1 + 0.13 * grit + 0.1 * fbm((5, 5), 3, rng))[..., None]
     )
-    mortar = drawn_color(("#b9b2a6", "#cfcabf", "#8d8a85", "#d9d3c5"), 0.06, rng)
+    mortar = draw_color(("#b9b2a6", "#cfcabf", "#8d8a85", "#d9d3c5"), 0.06, rng)
     mortar_image = mortar * (1 + 0.08 * fbm((64, 64), 3, rng))[..., None]
     height = 4.0 * face + 0.8 * grit + (uniform(bricks, rng).astype(np.float32)[number]) * face
-    return texture(mixed(mortar_image, albedo, face), 0.95 - 0.1 * face, blurred(height))
+    return texture(mix_colors(mortar_image, albedo, face), 0.95 - 0.1 * face, blur_image(height))
 
 
 def tiles(seed: int) -> TextureData:
     """Ceramic tiles with grout: square, subway or checkered; 1 m per repeat."""
-    rng = rng_of("tiles", seed)
-    kind = pick(("square", "square", "subway", "checkered"), rng)
+    rng = variant_rng("tiles", seed)
+    kind = choose(("square", "square", "subway", "checkered"), rng)
     courses, per_course = {"square": (4, 4), "subway": (10, 5), "checkered": (6, 6)}[kind]
     if kind == "square":
-        courses = per_course = pick((3, 4, 5, 8), rng)
+        courses = per_course = choose((3, 4, 5, 8), rng)
     edge, number = _courses(courses, per_course, 0.5 if kind == "subway" else 0.0, rng)
-    joint = between(1.5, 3.0, rng)
+    joint = uniform_between(1.5, 3.0, rng)
     face = smoothstep(joint, joint + 1.5, edge)
-    first, second = drawn_color(_TILES, 0.05, rng), drawn_color(_TILES, 0.05, rng)
+    first, second = draw_color(_TILES, 0.05, rng), draw_color(_TILES, 0.05, rng)
     odd = (number // per_course + number % per_course) % 2 if kind == "checkered" else 0 * number
     tone = (0.96 + 0.08 * uniform(courses * per_course, rng)).astype(np.float32)[number]
-    albedo = mixed(np.broadcast_to(first, (*odd.shape, 3)), second, odd.astype(np.float32))
-    if chance(0.5, rng):
-        albedo = albedo * (1 + between(0.02, 0.07, rng) * fbm((6, 6), 5, rng, 0.6))[..., None]
+    albedo = mix_colors(np.broadcast_to(first, (*odd.shape, 3)), second, odd.astype(np.float32))
+    if is_drawn(0.5, rng):
+        albedo = (
+            albedo * (1 + uniform_between(0.02, 0.07, rng) * fbm((6, 6), 5, rng, 0.6))[..., None]
+        )
     albedo = albedo * tone[..., None]
-    grout = drawn_color(("#cfcbc3", "#9b9994", "#e6e3dc", "#6b6a68"), 0.05, rng)
+    grout = draw_color(("#cfcbc3", "#9b9994", "#e6e3dc", "#6b6a68"), 0.05, rng)
     grout_image = grout * (1 + 0.06 * perlin((64, 64), rng))[..., None]
     pillow = smoothstep(joint, joint + 9.0, edge)
-    return texture(mixed(grout_image, albedo, face), 1.0 - 0.6 * face, 2.0 * face + 0.6 * pillow)
+    return texture(
+        mix_colors(grout_image, albedo, face), 1.0 - 0.6 * face, 2.0 * face + 0.6 * pillow
+    )
 
 
 def _folded(cells: tuple[int, int], rng: Rng) -> Float32:

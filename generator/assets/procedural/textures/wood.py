@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, pick, rng_of
-from generator.assets.procedural.noise import (
+from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     fbm,
     perlin,
@@ -13,9 +12,10 @@ from generator.assets.procedural.noise import (
     smoothstep,
     uniform,
 )
-from generator.assets.procedural.textures.images import color, mixed, texture
-from generator.core.geometry import Float32, TextureData
-from generator.core.streams import Rng
+from gen_data.generator.assets.procedural.textures.texture_images import color, mix_colors, texture
+from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.core.asset_types import Float32, TextureData
+from gen_data.generator.core.streams import Rng
 
 # Light and dark wood of: oak, beech, pine, walnut, cherry, ash, teak, wenge, birch.
 _SPECIES = (
@@ -33,20 +33,20 @@ _SPECIES = (
 
 def wood_grain(seed: int) -> TextureData:
     """One board; 0.4 m per repeat."""
-    rng = rng_of("wood_grain", seed)
+    rng = variant_rng("wood_grain", seed)
     rings, fibre = _grain(rng)
     light, dark = (color(code) for code in _SPECIES[seed % len(_SPECIES)])
-    albedo = mixed(light, dark, 0.75 * rings + 0.35 * fibre)
+    albedo = mix_colors(light, dark, 0.75 * rings + 0.35 * fibre)
     return texture(albedo, 0.85 + 0.15 * fibre, -0.8 * fibre - 0.3 * rings)
 
 
 def wood_planks(seed: int) -> TextureData:
     """Boards laid side by side, ends staggered; 1.2 m per repeat."""
-    rng = rng_of("wood_planks", seed)
+    rng = variant_rng("wood_planks", seed)
     rings, fibre = _grain(rng)
     light, dark = (color(code) for code in _SPECIES[seed % len(_SPECIES)])
-    rows = pick((4, 6, 8, 8, 10), rng)
-    per_row = pick((1, 2, 2, 3), rng)
+    rows = choose((4, 6, 8, 8, 10), rng)
+    per_row = choose((1, 2, 2, 3), rng)
     y, x = rows_and_columns()
     row = np.floor(y * rows).astype(np.int64) + np.zeros_like(x, dtype=np.int64)
     along = (x + uniform(rows, rng).astype(np.float32)[row]) * per_row
@@ -58,13 +58,13 @@ def wood_planks(seed: int) -> TextureData:
     )
     rings, fibre = rings[at], fibre[at]
     tone = (uniform(rows * per_row, rng).astype(np.float32) - 0.5)[plank]
-    albedo = mixed(light, dark, 0.6 * rings + 0.3 * fibre + 0.35 * tone)
-    albedo *= (1.0 + between(0.05, 0.2, rng) * tone)[..., None]
+    albedo = mix_colors(light, dark, 0.6 * rings + 0.3 * fibre + 0.35 * tone)
+    albedo *= (1.0 + uniform_between(0.05, 0.2, rng) * tone)[..., None]
     side = np.abs(y * rows - np.round(y * rows)) * SIZE_PX / rows
     end = np.abs(along - np.round(along)) * SIZE_PX / per_row
-    width = between(1.0, 2.2, rng)
+    width = uniform_between(1.0, 2.2, rng)
     gap = 1 - smoothstep(0.3 * width, width, np.minimum(side, end))
-    albedo = mixed(albedo, 0.25 * dark, 0.85 * gap)
+    albedo = mix_colors(albedo, 0.25 * dark, 0.85 * gap)
     rough = 0.8 + 0.15 * fibre + 0.2 * gap
     return texture(albedo, rough, -0.5 * fibre - 2.0 * gap)
 
@@ -72,13 +72,13 @@ def wood_planks(seed: int) -> TextureData:
 def _grain(rng: Rng) -> tuple[Float32, Float32]:
     """Growth rings and fibres, both in about [0, 1]."""
     y, _ = rows_and_columns()
-    count = pick((6, 9, 12, 16), rng)
+    count = choose((6, 9, 12, 16), rng)
     # Quarter-sawn boards have straight lines, flat-sawn ones wander.
-    bend = between(0.4, 2.2, rng)
+    bend = uniform_between(0.4, 2.2, rng)
     phase = count * y + bend * fbm((3, 1), 2, rng) + 0.1 * fbm((40, 4), 2, rng)
     ring = phase - np.floor(phase)
     # Early wood is wide and pale, late wood a thin dark line that ends abruptly.
-    rings = ring ** np.float32(between(1.2, 3.0, rng)) * (1 - smoothstep(0.93, 1.0, ring))
+    rings = ring ** np.float32(uniform_between(1.2, 3.0, rng)) * (1 - smoothstep(0.93, 1.0, ring))
     streaks = np.abs(perlin((128, 4), rng)) + 0.5 * np.abs(perlin((256, 8), rng))
     pores = smoothstep(0.5, 0.85, perlin((170, 17), rng) + 0.25 * rings)
     rings = rings * (0.6 + 0.4 * smoothstep(-0.5, 0.5, fbm((4, 2), 2, rng)))

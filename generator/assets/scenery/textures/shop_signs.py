@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from generator.assets.procedural.draw import pick, rng_of
-from generator.assets.procedural.materials import srgb
-from generator.assets.procedural.textures import artwork as art
-from generator.core.geometry import TextureData
+from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
+from gen_data.generator.assets.procedural.textures import artwork as art
+from gen_data.generator.assets.procedural.variant_rng import choose, variant_rng
+from gen_data.generator.core.asset_types import TextureData
 
 _TRADES = (
     "BAKERY",
@@ -35,13 +35,13 @@ _SCHEMES = (
 
 def shop_sign(seed: int) -> TextureData:
     """A word on a coloured board about five times as wide as high."""
-    rng = rng_of("shop_sign", seed)
-    ground, ink, line = (srgb(code) for code in pick(_SCHEMES, rng))
+    rng = variant_rng("shop_sign", seed)
+    ground, ink, line = (hex_to_srgb8(code) for code in choose(_SCHEMES, rng))
     image = art.canvas(1024, 200, ground)
     draw = art.pen(image)
-    if pick((True, False), rng):
+    if choose((True, False), rng):
         draw.rectangle([14, 14, 1009, 185], outline=line, width=6)
     else:
         draw.rectangle([0, 176, 1024, 190], fill=line)
     art.text(image, (0.12, 0.18, 0.88, 0.8), _TRADES[seed % len(_TRADES)], ink, 1)
-    return art.squeezed(image, 512, 128)
+    return art.resize_texture(image, 512, 128)

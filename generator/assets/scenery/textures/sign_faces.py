@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, rng_of
-from generator.assets.procedural.noise import fbm, smoothstep
-from generator.assets.procedural.textures import artwork as art
-from generator.assets.scenery.signs import plate_outline, sign_name
-from generator.core.geometry import TextureData
+from gen_data.generator.assets.procedural.noise import fbm, smoothstep
+from gen_data.generator.assets.procedural.textures import artwork as art
+from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.scenery.signs import plate_outline, sign_name
+from gen_data.generator.core.asset_types import TextureData
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -74,10 +74,10 @@ def traffic_sign(seed: int, sign: str) -> TextureData:
     name = sign_name(seed, sign)
     face = Face(art.canvas(_DRAWN_PX, _DRAWN_PX, WHITE))
     FACES[name](face)
-    clean = art.squeezed(face.image, SIZE_PX, SIZE_PX).albedo.astype(np.float32)
-    rng = rng_of("traffic_sign/dirt", seed)
+    clean = art.resize_texture(face.image, SIZE_PX, SIZE_PX).albedo.astype(np.float32)
+    rng = variant_rng("traffic_sign/dirt", seed)
     streaks = smoothstep(0.1, 0.9, fbm((3, 24), 4, rng, size_px=SIZE_PX))
-    dirt = 1.0 - between(0.02, 0.1, rng) * streaks
+    dirt = 1.0 - uniform_between(0.02, 0.1, rng) * streaks
     return TextureData(np.round(clean * dirt[..., None]).astype(np.uint8))
 
 

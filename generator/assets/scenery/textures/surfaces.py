@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.procedural.draw import between, rng_of
-from generator.assets.procedural.noise import (
-    blurred,
+from gen_data.generator.assets.procedural.noise import (
+    blur_image,
     fbm,
     rows_and_columns,
     smoothstep,
     uniform,
-    warped,
+    warp_image,
     worley,
 )
-from generator.assets.procedural.textures.images import texture
-from generator.core.geometry import TextureData
+from gen_data.generator.assets.procedural.textures.texture_images import texture
+from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.core.asset_types import TextureData
 
 
 def roof_tiles(seed: int) -> TextureData:
     """Clay or concrete tiles, the eaves below; 1.8 m per repeat."""
-    rng = rng_of("roof_tiles", seed)
+    rng = variant_rng("roof_tiles", seed)
     courses, per_course = (6, 8) if seed % 2 == 0 else (8, 10)
     y, x = rows_and_columns()
     row = np.floor(y * courses).astype(np.int64)
@@ -39,12 +39,12 @@ def roof_tiles(seed: int) -> TextureData:
     height = 5.0 * roll + 5.0 * down - 3.0 * joint
     lichen = 0.1 * smoothstep(0.3, 0.9, fbm((7, 7), 5, rng))
     albedo = shade[..., None] * np.array([1.0, 0.98, 0.96]) + lichen[..., None]
-    return texture(albedo.astype(np.float32), None, blurred(height.astype(np.float32)), 0.6)
+    return texture(albedo.astype(np.float32), None, blur_image(height.astype(np.float32)), 0.6)
 
 
 def ashlar(seed: int) -> TextureData:
     """Dressed stone blocks with thin joints; 2.4 m per repeat."""
-    rng = rng_of("ashlar", seed)
+    rng = variant_rng("ashlar", seed)
     courses, per_course = 6, 4
     y, x = rows_and_columns()
     row = np.floor(y * courses).astype(np.int64)
@@ -65,21 +65,21 @@ def ashlar(seed: int) -> TextureData:
 
 def bark(seed: int) -> TextureData:
     """Furrowed bark, the trunk upright; 0.8 m per repeat."""
-    rng = rng_of("bark", seed)
+    rng = variant_rng("bark", seed)
     bend = 14.0 * fbm((5, 4), 4, rng)
     ridge = np.abs(fbm((4, 12), 4, rng, 0.55))
-    furrow = smoothstep(0.2, 0.02, warped(ridge, 0 * bend, bend))
+    furrow = smoothstep(0.2, 0.02, warp_image(ridge, 0 * bend, bend))
     fine = fbm((16, 64), 3, rng)
-    depth = between(0.45, 0.65, rng)
+    depth = uniform_between(0.45, 0.65, rng)
     shade = (0.8 + 0.1 * fbm((4, 4), 4, rng) + 0.1 * fine) * (1 - depth * furrow)
     albedo = shade[..., None] * np.array([1.0, 0.97, 0.93])
     height = 1.2 * fine - 5.0 * furrow
-    return texture(albedo.astype(np.float32), None, blurred(height.astype(np.float32)))
+    return texture(albedo.astype(np.float32), None, blur_image(height.astype(np.float32)))
 
 
 def foliage(seed: int) -> TextureData:
     """Dense small leaves, as of a clipped hedge; 0.8 m per repeat."""
-    rng = rng_of("foliage", seed)
+    rng = variant_rng("foliage", seed)
     shade = np.full((512, 512), 0.12, dtype=np.float32)
     height = np.zeros((512, 512), dtype=np.float32)
     for cells, level in ((14, 0.35), (20, 0.6), (26, 0.95)):
@@ -90,4 +90,4 @@ def foliage(seed: int) -> TextureData:
         shade = (shade * (1 - leaf) + leaf * tone * (1.0 - 0.5 * points.nearest)).astype(np.float32)
         height = height * (1 - leaf) + leaf * np.float32(4.0 * level)
     albedo = shade[..., None] * np.array([0.95, 1.0, 0.9])
-    return texture(albedo.astype(np.float32), None, blurred(height))
+    return texture(albedo.astype(np.float32), None, blur_image(height))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from generator.config.document import load
-from generator.sensors.presets import known_preset, preset_names, preset_path
+from gen_data.generator.config.yaml_tree import load_yaml
+from gen_data.generator.sensors.device_presets import check_preset, preset_names, preset_path
 
 
 def camera_names() -> tuple[str, ...]:
@@ -21,6 +21,6 @@ def camera_preset(name: str) -> dict[str, Any]:
     Raises:
         ValueError: there is no such preset.
     """
-    plain = load(preset_path(__name__, known_preset(__name__, name))).plain()
+    plain = load_yaml(preset_path(__name__, check_preset(__name__, name))).plain()
     assert isinstance(plain, dict)
     return plain

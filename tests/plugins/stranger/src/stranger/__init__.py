@@ -1,1 +1,1 @@
-"""One plug-in of every kind, written from the Protocols of ``generator.core.interfaces`` alone."""
+"""One plug-in of every kind, written from the Protocols of ``core.interfaces`` alone."""

@@ -7,11 +7,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Reading
-from generator.core.interfaces import Annotator
-from generator.core.sample import ObjectTruth
-from generator.core.scene import Scene
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.interfaces import Annotator
+from gen_data.generator.core.sample import ObjectTruth
+from gen_data.generator.core.scene import Scene
 
 
 class Distance(Strict):
@@ -20,7 +20,7 @@ class Distance(Strict):
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["stranger_distance"] = "stranger_distance"
 
-    def annotate(self, scene: Scene, reading: Reading, truth: ObjectTruth) -> ObjectTruth:
+    def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``extra["stranger_distance"]`` [m]."""
         eye_m = np.array(reading.camera.T_world_camera.translation_m)
         there_m = np.array(truth.instance.T_world_instance.translation_m)

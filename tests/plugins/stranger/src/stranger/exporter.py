@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
-from generator.config.strict import Strict
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
-from generator.core.sample import Sample
-from generator.core.serial import canonical_json
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.serialization import canonical_json
 
 
 class Lines(Strict):

@@ -8,12 +8,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.config.strict import Strict
-from generator.core.capture import Beams, Channel, Echoes, Reading, Silhouette
-from generator.core.errors import ConfigError
-from generator.core.interfaces import AssetLibrary, Renderer, RendererSettings
-from generator.core.scene import Camera, Instance, Lidar, Scene
-from generator.core.se3 import SE3
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading, Silhouette
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetLibrary, Renderer, RendererSettings
+from gen_data.generator.core.scene import Camera, Instance, Lidar, Scene
+from gen_data.generator.core.se3 import SE3
 
 Image = NDArray[Any]
 
@@ -40,7 +40,7 @@ class Boxes:
     def __init__(self, luminance_cd_m2: float) -> None:
         self._luminance = luminance_cd_m2
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> Reading:
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """Every requested channel, from the nearest box on each pixel's ray."""
         pinhole = camera.intrinsics
         if not pinhole.straight:
@@ -56,9 +56,9 @@ class Boxes:
             outlines = {i.instance_id: _silhouette(i, camera) for i in scene.instances}
         lit = channels & {Channel.RGB, Channel.RADIANCE}
         ev100 = (camera.ev100 or 5.0) if lit else None
-        return Reading(camera.name, camera, images, outlines, scene.time_s, ev100)
+        return SensorReading(camera.name, camera, images, outlines, scene.time_s, ev100)
 
-    def scan(self, scene: Scene, lidar: Lidar, beams: Beams) -> Echoes:
+    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
         """The nearest box on each beam, white and seen square on."""
         hits = _nearest(scene.instances, lidar.T_world_lidar, beams.directions.astype(np.float64))
         range_m = np.where(hits["z"] > beams.range_max_m, np.inf, hits["z"])[:, None]
@@ -68,7 +68,7 @@ class Boxes:
             return np.repeat(np.where(there, values, 0).astype(dtype), beams.subrays, axis=1)
 
         ones = np.ones_like(range_m)
-        return Echoes(
+        return LidarHits(
             np.repeat(range_m.astype(np.float32), beams.subrays, axis=1),
             column(ones, "f4"),
             column(ones, "f4"),

@@ -7,12 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from generator.config.strict import Strict
-from generator.core.capture import Channel, Table
-from generator.core.interfaces import Modality, Renderer, Sensor, SensorInfo
-from generator.core.scene import Device, Scene
-from generator.core.streams import Rng
-from generator.core.tables import TIME, Column, columns_dtype
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, Measurements
+from gen_data.generator.core.interfaces import Modality, Renderer, Sensor, SensorInfo
+from gen_data.generator.core.measurement_dtypes import TIME, Column, columns_dtype
+from gen_data.generator.core.scene import Device, Scene
+from gen_data.generator.core.streams import Rng
 
 COLUMNS = (TIME, Column("luminance_cd_m2", "<f8", "mean over the image, with noise"))
 
@@ -42,7 +42,7 @@ class LightMeter(Strict):
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
-    ) -> Table:
+    ) -> Measurements:
         """One row."""
         del channels
         seen = renderer.render(scene, scene.camera(self.camera), frozenset({Channel.RADIANCE}))
@@ -50,7 +50,7 @@ class LightMeter(Strict):
         rows = np.zeros(1, columns_dtype(COLUMNS))
         rows["time_s"] = scene.time_s
         rows["luminance_cd_m2"] = mean * (1.0 + self.noise * rng.standard_normal())
-        return Table(self.name, scene.device(self.name), rows, scene.time_s)
+        return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
 
 
 PLUGIN: type[Sensor] = LightMeter

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from generator.assets.procedural.family import Origin, TextureFamily
-from generator.core.geometry import TextureData
+from gen_data.generator.assets.procedural.family import Provenance, TextureFamily
+from gen_data.generator.core.asset_types import TextureData
 
 
 def stripes(seed: int) -> TextureData:
@@ -21,5 +21,5 @@ STRIPES = TextureFamily(
     variants=2,
     version=1,
     build=stripes,
-    origin=Origin("CC0-1.0", "A stranger", "stranger"),
+    origin=Provenance("CC0-1.0", "A stranger", "stranger"),
 )

@@ -1,0 +1,253 @@
+"""PNG files of the image channels: what is written, exactly, and with which encoder settings.
+
+====================  =====================  =====================================================
+channel               PNG                    value; value for "nothing"
+====================  =====================  =====================================================
+rgb                   8-bit RGB              sRGB
+depth, range          16-bit grey            ``round(metres / depth_scale_m)``, half to even;
+                                             0 = nothing, or farther than 65535 units
+instance, part,       16-bit grey            the id; 0
+category
+normals               8-bit RGB              ``round((n + 1) / 2 * 255)``; (128, 128, 128)
+object_coordinates    16-bit RGB             ``round(c * 65535)``; 0
+measured_depth        16-bit grey            as depth
+infrared              16-bit grey            as it is
+disparity,            16-bit grey            ``round(256 * pixels)``, as KITTI's stereo benchmark
+disparity_visible                            has it; 0 = nothing, or 256 px and more
+flow_forward,         16-bit RGB             ``round(64 * pixels) + 32768`` to the right and
+flow_backward                                down, then 1, as KITTI's flow benchmark has it;
+                                             (0, 0, 0) = none, or 512 px and more
+flow_occluded_...     8-bit grey             255 = hidden, or not in the image; 0 = seen
+scene_flow            16-bit RGB             ``round(metres / depth_scale_m) + 32768`` per axis;
+                                             (0, 0, 0) = nothing, or beyond 32767 units
+====================  =====================  =====================================================
+
+Rows are filtered by what lies to the left, ids by what lies above, and compressed at the level
+where more milliseconds stop saving bytes.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.exporters.measurement_tables import write_table
+from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.point_cloud_io import write_cloud
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError, SampleError, StorageError
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.sample import Sample
+
+UInt16 = NDArray[np.uint16]
+
+DEPTH_UNITS_MAX = 65_535
+"""Largest value of a 16-bit depth image."""
+
+FLOW_UNITS_PER_PX = 64
+SIGNED_ZERO = 32_768
+"""Value of 0 in 16-bit images of what may be negative."""
+
+NO_NORMAL = 128
+"""Value of all three components in images of normals where there is no surface."""
+
+ENCODING = {
+    Channel.RGB: (RowFilter.SUB, 1),
+    Channel.Z_DEPTH: (RowFilter.SUB, 1),
+    Channel.RANGE: (RowFilter.SUB, 1),
+    Channel.INSTANCE: (RowFilter.UP, 2),
+    Channel.PART: (RowFilter.UP, 2),
+    Channel.CATEGORY: (RowFilter.UP, 2),
+    Channel.NORMALS: (RowFilter.SUB, 1),
+    Channel.OBJECT_COORDINATES: (RowFilter.SUB, 1),
+    Channel.MEASURED_DEPTH: (RowFilter.SUB, 1),
+    Channel.INFRARED: (RowFilter.SUB, 1),
+    Channel.DISPARITY: (RowFilter.SUB, 1),
+    Channel.DISPARITY_VISIBLE: (RowFilter.SUB, 1),
+    Channel.FLOW_FORWARD: (RowFilter.SUB, 1),
+    Channel.FLOW_BACKWARD: (RowFilter.SUB, 1),
+    Channel.FLOW_OCCLUDED_FORWARD: (RowFilter.UP, 2),
+    Channel.FLOW_OCCLUDED_BACKWARD: (RowFilter.UP, 2),
+    Channel.SCENE_FLOW: (RowFilter.SUB, 1),
+}
+"""Row filter and compression level of each channel, measured on rendered images."""
+
+
+def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
+    """Write every image channel of a sample that the data set keeps to its ``media_path``.
+
+    Laser scans go to their ``cloud_path``, rows of devices to their ``table_path``. A sensor that
+    does not read at this sample has no file.
+
+    Raises:
+        ConfigError: if a channel is no image.
+        SampleError: if a depth is negative or NaN.
+    """
+    for sensor in info.cameras:
+        reading = sample.capture.readings.get(sensor)
+        if reading is None:
+            continue
+        for channel in info.media[sensor]:
+            path = media_path(shard_dir, sensor, channel, sample.index)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(encode_channel(channel, reading.channels[channel], info.depth_scale_m))
+    for lidar in info.lidars:
+        if lidar in sample.capture.clouds:
+            write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
+    for device in info.devices:
+        if device in sample.capture.tables:
+            write_table(sample.capture.tables[device], shard_dir, sample.index)
+
+
+def encode_channel(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:
+    """The PNG file of one channel, as the table at the top of this module says.
+
+    Args:
+        channel: What the image shows.
+        image: As listed at ``Channel``.
+        depth_scale_m: Metres per unit of depth and range images.
+
+    Raises:
+        ConfigError: if the channel is no image.
+        SampleError: if a depth is negative or NaN.
+    """
+    if channel not in ENCODING:
+        known = ", ".join(c.value for c in ENCODING)
+        raise ConfigError(f"channel '{channel.value}' cannot be written as an image; use {known}")
+    row_filter, level = ENCODING[channel]
+    return encode_png(_pixels(channel, image, depth_scale_m), row_filter, level)
+
+
+def read_image(path: Path, channel: Channel, depth_scale_m: float) -> NDArray[Any]:
+    """One channel as a sensor saw it, from its PNG (rounded): the inverse of ``encode_channel``.
+
+    Args:
+        path: Of the file.
+        channel: What the image shows.
+        depth_scale_m: Metres per unit of depth and range images.
+
+    Returns:
+        The array as listed at ``Channel``; its values for "nothing" are restored.
+
+    Raises:
+        StorageError: the file is missing or no PNG.
+    """
+    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise StorageError(f"{path}: missing or no PNG file; make the data set again")
+    if pixels.ndim == 3:
+        pixels = np.ascontiguousarray(pixels[..., ::-1])
+    return _values(channel, pixels, depth_scale_m)
+
+
+def _values(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
+    """Physical values of the pixels of a PNG."""
+    match channel:
+        case Channel.Z_DEPTH | Channel.RANGE | Channel.MEASURED_DEPTH:
+            return np.where(pixels > 0, pixels * depth_scale_m, np.inf).astype(np.float32)
+        case Channel.DISPARITY | Channel.DISPARITY_VISIBLE:
+            return np.asarray(pixels / 256.0, np.float32)
+        case Channel.FLOW_FORWARD | Channel.FLOW_BACKWARD:
+            return _signed_values(pixels, 1.0 / FLOW_UNITS_PER_PX)[..., :2]
+        case Channel.SCENE_FLOW:
+            return _signed_values(pixels, depth_scale_m)
+        case Channel.FLOW_OCCLUDED_FORWARD | Channel.FLOW_OCCLUDED_BACKWARD:
+            return np.asarray(pixels > 0, np.uint8)
+        case Channel.NORMALS:
+            unit = np.where(pixels == NO_NORMAL, 0.0, pixels / 127.5 - 1.0)
+            length = np.linalg.norm(unit, axis=-1, keepdims=True)
+            np.divide(unit, length, out=unit, where=length > 0.0)
+            return np.asarray(unit, np.float32)
+        case Channel.OBJECT_COORDINATES:
+            return np.asarray(pixels / 65_535.0, np.float32)
+        case _:
+            return pixels
+
+
+def _signed_values(pixels: NDArray[Any], unit: float) -> NDArray[np.float32]:
+    """The inverse of ``_signed_units``: NaN where all three values are 0."""
+    values = (pixels.astype(np.float64) - SIGNED_ZERO) * unit
+    return np.where((pixels == 0).all(axis=-1, keepdims=True), np.nan, values).astype(np.float32)
+
+
+def depth_units(depth_m: NDArray[np.floating], depth_scale_m: float) -> UInt16:
+    """Depth in units of ``depth_scale_m``, half to even; 0 = nothing or out of range.
+
+    Raises:
+        SampleError: if a depth is negative or NaN.
+    """
+    if not (depth_m >= 0).all():
+        raise SampleError("a depth image holds a negative number or NaN; 'nothing' must be inf")
+    units: NDArray[np.float64] = np.divide(depth_m, depth_scale_m, dtype=np.float64)
+    np.rint(units, out=units)
+    units[units > DEPTH_UNITS_MAX] = 0
+    return units.astype(np.uint16)
+
+
+def disparity_units(disparity_px: NDArray[np.floating]) -> UInt16:
+    """Disparity in 1/256 px, half to even; 0 = nothing or out of range.
+
+    A disparity that would round to 0 becomes 1: it is there.
+    """
+    units = np.rint(disparity_px * 256.0)
+    units = np.where(disparity_px > 0.0, np.maximum(units, 1.0), 0.0)
+    return np.where(units > DEPTH_UNITS_MAX, 0.0, units).astype(np.uint16)
+
+
+def flow_units(flow_px: NDArray[np.floating]) -> UInt16:
+    """Flow in 1/64 px from 32768, and 1 where there is any, uint16 [h, w, 3]; else 0."""
+    units = _signed_units(flow_px, 1.0 / FLOW_UNITS_PER_PX)
+    valid = (units > 0).any(axis=-1, keepdims=True)
+    return np.concatenate([units, valid.astype(np.uint16)], axis=-1)
+
+
+def _signed_units(values: NDArray[np.floating], unit: float) -> UInt16:
+    """Vectors [..., n] in units from 32768, half to even; all 0 for NaN or out of range."""
+    units = np.rint(np.divide(values, unit, dtype=np.float64))
+    # NaN compares false.
+    known = (np.abs(units) < SIGNED_ZERO).all(axis=-1, keepdims=True)
+    return np.where(known, units + SIGNED_ZERO, 0.0).astype(np.uint16)
+
+
+def link_or_copy(source: Path, target: Path) -> None:
+    """Give a file a second name, as a hard link where the file system allows it.
+
+    The target's folder is made where it is missing; the target must not exist.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(source, target)
+    except (FileExistsError, FileNotFoundError):
+        raise
+    except OSError:  # another file system, one without links, or too many links to the file
+        shutil.copyfile(source, target)
+
+
+def _pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
+    convert: dict[Channel, Callable[[], NDArray[Any]]] = {
+        Channel.RGB: lambda: image,
+        Channel.Z_DEPTH: lambda: depth_units(image, depth_scale_m),
+        Channel.RANGE: lambda: depth_units(image, depth_scale_m),
+        Channel.MEASURED_DEPTH: lambda: depth_units(image, depth_scale_m),
+        Channel.DISPARITY: lambda: disparity_units(image),
+        Channel.DISPARITY_VISIBLE: lambda: disparity_units(image),
+        Channel.FLOW_FORWARD: lambda: flow_units(image),
+        Channel.FLOW_BACKWARD: lambda: flow_units(image),
+        Channel.FLOW_OCCLUDED_FORWARD: lambda: image * np.uint8(255),
+        Channel.FLOW_OCCLUDED_BACKWARD: lambda: image * np.uint8(255),
+        Channel.SCENE_FLOW: lambda: _signed_units(image, depth_scale_m),
+        Channel.NORMALS: lambda: np.rint((image + 1.0) * 0.5 * 255.0).astype(np.uint8),
+        # Boxes are rounded to a micrometre: a surface may lie that much outside [0, 1], and
+        # 65536 would wrap to 0.
+        Channel.OBJECT_COORDINATES: lambda: np.rint(np.clip(image, 0, 1) * 65_535).astype(
+            np.uint16
+        ),
+    }
+    return convert.get(channel, lambda: image)()

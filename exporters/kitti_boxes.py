@@ -1,0 +1,115 @@
+"""Boxes that turn about a camera's y axis only, and which laser points lie in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.boxes import OrientedBox
+from gen_data.generator.core.se3 import Array, Vec3
+
+BORDER_M = 0.029
+"""How far on the wrong side of a box's face a point may be: 3 cm, less rounding."""
+_ENDS = np.array([(i, j, k) for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (0.0, -1.0)])
+"""Corners in units of length, width and height."""
+
+
+@dataclass(frozen=True, slots=True)
+class UprightBox:
+    """A box whose height is along the camera's y axis: what a KITTI label can say.
+
+    Attributes:
+        size_hwl_m: Extent along y, along the box's z, along the box's x.
+        bottom_m: Centre of the face with the largest y, camera frame.
+        heading_rad: Rotation about +y of the box's x axis; 0 = along the camera's x.
+    """
+
+    size_hwl_m: Vec3
+    bottom_m: Vec3
+    heading_rad: float
+
+    def corners(self) -> Array:
+        """The eight corners in the camera frame [m], shape [8, 3]."""
+        height, width, length = self.size_hwl_m
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        along, across = _ENDS[:, 0] * length, _ENDS[:, 1] * width
+        ends = np.stack([along * c + across * s, _ENDS[:, 2] * height, across * c - along * s], -1)
+        return np.asarray(self.bottom_m) + ends
+
+    def depths_m(self, points_m: Array) -> Array:
+        """How deep points [n, 3] of the camera frame lie inside; negative outside."""
+        height, width, length = self.size_hwl_m
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        x, y, z = (points_m - self.bottom_m).T
+        along, across = c * x - s * z, s * x + c * z
+        sides = (0.5 * length - np.abs(along), 0.5 * width - np.abs(across))
+        depths: Array = np.minimum.reduce([*sides, -y, height + y])
+        return depths
+
+
+@lru_cache(1024)
+def upright_box(box: OrientedBox) -> UprightBox:
+    """The smallest upright box, headed like the object's x axis, around an oriented box.
+
+    Where that axis is vertical, the heading is that of the y axis less a quarter turn.
+    """
+    corners = box.corners()
+    rotation = box.T_frame_box.rotation()
+    x, z = float(rotation[0, 0]), float(rotation[2, 0])
+    if x * x + z * z < 1e-12:
+        x, z = float(rotation[2, 1]), -float(rotation[0, 1])
+    norm = math.sqrt(x * x + z * z)
+    x, z = x / norm, z / norm
+    along = corners[:, 0] * x + corners[:, 2] * z
+    across = corners[:, 2] * x - corners[:, 0] * z
+    middle_along = 0.5 * float(along.min() + along.max())
+    middle_across = 0.5 * float(across.min() + across.max())
+    return UprightBox(
+        size_hwl_m=(
+            float(np.ptp(corners[:, 1])),
+            float(np.ptp(across)),
+            float(np.ptp(along)),
+        ),
+        bottom_m=(
+            middle_along * x - middle_across * z,
+            float(corners[:, 1].max()),
+            middle_along * z + middle_across * x,
+        ),
+        heading_rad=math.atan2(-z, x),
+    )
+
+
+def members_in_box(
+    ids: NDArray[np.int64], p_camera: Array, boxes: Mapping[int, UprightBox]
+) -> NDArray[np.int64]:
+    """The instance that each point belongs to: that of the box it lies in; 0 = none.
+
+    An instance loses what it reflected and what lies more than ``BORDER_M`` outside its box, and
+    gains what is as deep inside and belongs to no other. Instances without a box keep their points.
+
+    Args:
+        ids: What reflected each point [n].
+        p_camera: The points in the camera frame [n, 3].
+        boxes: By instance.
+    """
+    members: NDArray[np.int64] = ids.copy()
+    for instance_id, box in boxes.items():
+        (mine,) = np.nonzero(ids == instance_id)
+        members[mine[box.depths_m(p_camera[mine]) < -BORDER_M]] = 0
+    boxed = np.zeros(1 + max([0, *boxes, int(ids.max(initial=0))]), np.bool_)
+    boxed[list(boxes)] = True
+    free = np.flatnonzero(~boxed[members])
+    # Coordinate by coordinate, most of all points are settled by the first.
+    x, y, z = (p_camera[:, k].take(free) for k in range(3))
+    for instance_id, box in boxes.items():
+        reach_m, (x0, y0, z0) = math.hypot(*box.size_hwl_m), box.bottom_m
+        near = np.flatnonzero(np.abs(x - x0) < reach_m)
+        near = near[(np.abs(y[near] - y0) < reach_m) & (np.abs(z[near] - z0) < reach_m)]
+        at = free[near]
+        members[at[box.depths_m(p_camera[at]) > BORDER_M]] = instance_id
+    return members

@@ -1,0 +1,65 @@
+"""Laser scans on disk: one NumPy file of ``POINT`` records per sweep, written before any label.
+
+``numpy.load`` reads them; every field is described at ``gen_data.generator.core.capture.POINT``.
+Exporters make their own files from these.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.capture import POINT, PointCloud
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.interfaces import cloud_path
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Lidar
+from gen_data.generator.core.se3 import Array
+
+
+def write_cloud(cloud: PointCloud, shard_dir: Path, index: int) -> None:
+    """Write one sweep to its ``cloud_path``."""
+    path = cloud_path(shard_dir, cloud.sensor, index)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("wb") as file:
+        np.lib.format.write_array(file, cloud.points, version=(1, 0), allow_pickle=False)
+
+
+def scanner_at_sweep(sample: Sample, lidar: str) -> Lidar:
+    """A laser scanner at the instant of its sweep; as in the scene if it has not read."""
+    cloud = sample.capture.clouds.get(lidar)
+    return cloud.lidar if cloud is not None else sample.scene.lidar(lidar)
+
+
+def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
+    """Points of one sweep as they were written.
+
+    Raises:
+        StorageError: if the file is missing or damaged.
+    """
+    path = cloud_path(shard_dir, sensor, index)
+    try:
+        points: NDArray[np.void] = np.load(path, allow_pickle=False)
+    except (OSError, ValueError) as error:
+        raise StorageError(f"{path}: cannot be read ({error}); make the data set again") from error
+    if points.dtype != POINT:
+        raise StorageError(f"{path}: holds no laser points; make the data set again")
+    return points
+
+
+def xyzi_bytes(points: NDArray[np.void]) -> bytes:
+    """KITTI's ``.bin``: little-endian float32 x, y, z, intensity, point by point."""
+    return np.column_stack([points["position_m"], points["intensity"]]).astype("<f4").tobytes()
+
+
+def T_camera_lidar(sample: Sample, camera: str, lidar: str) -> Array:  # noqa: N802
+    """Lidar coordinates to camera coordinates, 4 x 4.
+
+    On one rig it is what the rig says, whatever instants the two read at.
+    """
+    view, scanner = sample.truth[camera].camera, scanner_at_sweep(sample, lidar)
+    if view.rig and view.rig == scanner.rig:
+        return (view.T_rig_camera.inverse() @ scanner.T_rig_lidar).matrix()
+    return (view.T_world_camera.inverse() @ scanner.T_world_lidar).matrix()

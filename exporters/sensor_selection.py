@@ -1,0 +1,91 @@
+"""Which sensor of a data set a format is about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import DatasetInfo, cloud_path
+from gen_data.generator.core.sample import Sample
+
+
+def rgb_cameras(info: DatasetInfo) -> tuple[str, ...]:
+    """Names of the cameras that write the rgb channel, sorted."""
+    return tuple(s for s in info.cameras if Channel.RGB in info.media[s])
+
+
+def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
+    """The camera of that name; for an empty name the first that writes the rgb channel.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    known = rgb_cameras(info)
+    if not wanted and known:
+        return known[0]
+    if wanted in known:
+        return wanted
+    raise ConfigError(
+        f"exporter '{exporter}': camera '{wanted}' is no sensor that writes the rgb channel; "
+        f"expected one of: {_join_names(known)}{did_you_mean(wanted, known)}"
+    )
+
+
+def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> None:
+    """Refuse lenses that a format of rectified images cannot tell.
+
+    Raises:
+        ConfigError: naming the first camera that is no pinhole.
+    """
+    for camera in cameras:
+        model = info.sensor(camera).lens
+        if model != "pinhole":
+            raise ConfigError(
+                f"exporter '{exporter}': camera '{camera}' has a lens of the model '{model}', but "
+                "the format holds rectified images; use a pinhole, or export this one as coco"
+            )
+
+
+def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
+    """The same for formats that can describe no other camera than a pinhole.
+
+    Raises:
+        ConfigError: there is none, or it has another lens.
+    """
+    camera = rgb_camera(info, wanted, exporter)
+    check_pinholes(info, [camera], exporter)
+    return camera
+
+
+def laser_scanner(info: DatasetInfo, wanted: str, exporter: str) -> str:
+    """The laser scanner of that name; for an empty name the first, or none, which is empty.
+
+    Raises:
+        ConfigError: there is none of that name.
+    """
+    if wanted and wanted not in info.lidars:
+        raise ConfigError(
+            f"exporter '{exporter}': there is no lidar '{wanted}'; expected one of: "
+            f"{_join_names(info.lidars)}{did_you_mean(wanted, info.lidars)}"
+        )
+    return wanted or next(iter(info.lidars), "")
+
+
+def has_scans(shard_dir: Path, lidar: str, index: int) -> bool:
+    """Whether a laser scanner read at a sample."""
+    return bool(lidar) and cloud_path(shard_dir, lidar, index).exists()
+
+
+def instant_s(sample: Sample, sensor: str) -> float:
+    """When a sensor read [s]; the sample's own instant where it did not."""
+    capture = sample.capture
+    for seen in (capture.readings.get(sensor), capture.clouds.get(sensor)):
+        if seen is not None:
+            return seen.time_s
+    return sample.scene.time_s
+
+
+def _join_names(names: Sequence[str]) -> str:
+    return ", ".join(names) or "none"

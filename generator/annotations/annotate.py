@@ -1,0 +1,135 @@
+"""The truth about one image or sample: what is in it, and what the annotators say of that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from pydantic import Field
+
+from gen_data.generator.annotations.consistency_checks import check_truth
+from gen_data.generator.annotations.instance_extents import find_extents
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import (
+    Annotator,
+    AnyAnnotator,
+    AssetLibrary,
+    FrameAnnotator,
+    ImageAnnotator,
+)
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene_time import ego_rig, rig_twist
+
+
+class Thresholds(Strict):
+    """Which instances are annotated in an image; the others stay in the id images.
+
+    Instances without a visible pixel are never annotated, unless ``include_invisible``.
+    """
+
+    min_visible_px: int = Field(16, ge=1)
+    """Fewest visible pixels."""
+    min_visible_fraction: float = Field(0.0, ge=0.0, le=1.0)
+    """Smallest visible share of the silhouette; above 0 it needs the annotation visibility."""
+    min_box_px: int = Field(3, ge=1)
+    """Shortest side of the visible box."""
+    include_invisible: bool = False
+    """Annotate every instance, hidden ones too; the other thresholds then do not apply."""
+
+
+def annotate_reading(
+    scene: Scene,
+    reading: SensorReading,
+    annotators: Sequence[AnyAnnotator],
+    thresholds: Thresholds,
+    assets: AssetLibrary,
+) -> ImageTruth:
+    """Annotations of one reading: of its objects, and of the image as a whole.
+
+    Raises:
+        SampleError, ConfigError: see ``annotate_objects``.
+    """
+    truth = annotate_objects(scene, reading, annotators, thresholds)
+    for annotator in annotators:
+        if isinstance(annotator, ImageAnnotator):
+            truth = annotator.annotate_image(scene, assets, reading, truth)
+    return truth
+
+
+def annotate_ego(
+    scenes: Mapping[str, Scene], annotators: Sequence[AnyAnnotator], assets: AssetLibrary
+) -> EgoTruth | None:
+    """Annotations of one sample as a whole; None where nothing annotates it.
+
+    Args:
+        scenes: As ``FrameAnnotator`` has them.
+        annotators: All of the data set.
+        assets: Geometry.
+    """
+    of_frames = [a for a in annotators if isinstance(a, FrameAnnotator)]
+    if not of_frames:
+        return None
+    scene = scenes[""]
+    rig = ego_rig(scene)
+    truth = EgoTruth()
+    if rig is not None:
+        truth = EgoTruth(rig.name, scene.rig_pose(rig.name).rounded(), rig_twist(scene, rig))
+    for annotator in of_frames:
+        truth = annotator.annotate_frame(scenes, assets, truth)
+    return truth
+
+
+def annotate_objects(
+    scene: Scene, reading: SensorReading, annotators: Sequence[AnyAnnotator], thresholds: Thresholds
+) -> ImageTruth:
+    """Annotations of the objects in one reading, in order of instance id.
+
+    Annotators that are about no single object are passed over.
+
+    Raises:
+        SampleError: if the labels of an instance contradict each other or the images.
+        ConfigError: if a threshold needs an annotation that is not made.
+    """
+    of_objects = [a for a in annotators if isinstance(a, Annotator)]
+    if not of_objects:
+        return ImageTruth(reading.camera, ())
+    seen = find_extents(reading.channels[Channel.INSTANCE])
+    instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
+    objects = []
+    for instance in instances:
+        extent = seen.get(instance.instance_id)
+        if extent is None and not thresholds.include_invisible:
+            continue
+        truth = ObjectTruth(
+            instance,
+            visible_px=extent.visible_px if extent else 0,
+            box=extent.box if extent else None,
+        )
+        for annotator in of_objects:
+            truth = annotator.annotate(scene, reading, truth)
+        check_truth(reading, truth)
+        if is_listed(truth, thresholds):
+            objects.append(truth)
+    return ImageTruth(reading.camera, tuple(objects))
+
+
+def is_listed(truth: ObjectTruth, thresholds: Thresholds) -> bool:
+    """Whether an object shows enough of itself to be annotated.
+
+    Raises:
+        ConfigError: if ``min_visible_fraction`` is set and the visible fraction is not known.
+    """
+    if thresholds.include_invisible:
+        return True
+    if truth.box is None or truth.visible_px < thresholds.min_visible_px:
+        return False
+    if min(truth.box.width_px, truth.box.height_px) < thresholds.min_box_px:
+        return False
+    if thresholds.min_visible_fraction > 0 and truth.visible_fraction is None:
+        raise ConfigError(
+            "min_visible_fraction: the visible share of objects is not known; "
+            "add 'visibility' to annotations or set it to 0"
+        )
+    return (truth.visible_fraction or 0.0) >= thresholds.min_visible_fraction

@@ -1,0 +1,116 @@
+"""Triangles on a grid seen from above: which cells they cover, and how high they lie there.
+
+A cell is covered where its centre is, as label pixels of images are decided by theirs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.se3 import SE3, Array
+
+Float32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A square of cells; row 0 is farthest along X, column 0 farthest along Y.
+
+    Attributes:
+        T_world_grid: Frame of the grid, its origin in the square's middle, Z up.
+        cell_m: Side of a cell.
+        count: Cells along each side.
+    """
+
+    T_world_grid: SE3
+    cell_m: float
+    count: int
+
+    def cells(self, p_world: Array) -> Array:
+        """Continuous (row, column) and height [m] of points, shape [..., 3]; half = a centre."""
+        p = self.T_world_grid.inverse().apply(p_world)
+        middle = 0.5 * self.count
+        return np.stack(
+            [middle - p[..., 0] / self.cell_m, middle - p[..., 1] / self.cell_m, p[..., 2]], axis=-1
+        )
+
+
+def heights_m(grid: Grid, triangles_m: Array) -> Float32:
+    """Height over the grid's origin of the highest triangle at every cell; -inf where none is.
+
+    Args:
+        grid: Where.
+        triangles_m: Corners in the world [n, 3, 3].
+    """
+    high = np.full((grid.count, grid.count), -np.inf, np.float32)
+    corners = _near(grid, triangles_m)
+    row, first, last, owner = _spans(corners, grid.count)
+    counts = last - first
+    rows = np.repeat(row, counts)
+    offsets = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    columns = np.repeat(first, counts) + offsets
+    slope = _slopes(corners)[np.repeat(owner, counts)]
+    origin = corners[np.repeat(owner, counts), 0]
+    z = origin[:, 2] + slope[:, 0] * (rows + 0.5 - origin[:, 0])
+    z += slope[:, 1] * (columns + 0.5 - origin[:, 1])
+    np.maximum.at(high.reshape(-1), rows * grid.count + columns, z.astype(np.float32))
+    return high
+
+
+def covered_cells(grid: Grid, triangles_m: Array) -> NDArray[np.bool_]:
+    """Cells whose centres lie under any of the triangles [n, 3, 3], world."""
+    row, first, last, _ = _spans(_near(grid, triangles_m), grid.count)
+    # One more column, so that a span may end behind the last cell.
+    steps = np.zeros((grid.count, grid.count + 1), np.int32)
+    np.add.at(steps, (row, first), 1)
+    np.add.at(steps, (row, last), -1)
+    mask: NDArray[np.bool_] = np.cumsum(steps, axis=1)[:, :-1] > 0
+    return mask
+
+
+def _near(grid: Grid, triangles_m: Array) -> Array:
+    """The triangles that may touch the grid, as (row, column, height) [n, 3, 3]."""
+    corners = grid.cells(triangles_m)
+    low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
+    near: Array = corners[((high > 0.0) & (low < grid.count)).all(axis=1)]
+    return near
+
+
+def _spans(
+    corners: Array, count: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Rows of cells under triangles: row, first column, column behind the last one, triangle."""
+    top = np.maximum(np.ceil(corners[..., 0].min(axis=1) - 0.5), 0).astype(np.intp)
+    bottom = np.minimum(np.floor(corners[..., 0].max(axis=1) - 0.5), count - 1).astype(np.intp)
+    rows_of = np.maximum(bottom - top + 1, 0)
+    owner = np.repeat(np.arange(len(corners)), rows_of)
+    row = np.arange(len(owner)) - np.repeat(np.cumsum(rows_of) - rows_of, rows_of) + top[owner]
+    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    for k in range(3):
+        a, b = corners[owner, k], corners[owner, (k + 1) % 3]
+        rise = b[:, 0] - a[:, 0]
+        share = np.divide(row + 0.5 - a[:, 0], rise, out=np.full(len(row), -1.0), where=rise != 0.0)
+        crossing = a[:, 1] + share * (b[:, 1] - a[:, 1])
+        crosses = (share >= 0.0) & (share <= 1.0)
+        left = np.where(crosses, np.minimum(left, crossing), left)
+        right = np.where(crosses, np.maximum(right, crossing), right)
+    kept = left <= right
+    row, owner, left, right = row[kept], owner[kept], left[kept], right[kept]
+    first = np.clip(np.ceil(left - 0.5), 0, count).astype(np.intp)
+    last = np.clip(np.floor(right - 0.5) + 1, 0, count).astype(np.intp)
+    some = last > first
+    return row[some], first[some], last[some], owner[some]
+
+
+def _slopes(corners: Array) -> Array:
+    """Rise per cell along rows and columns of every triangle [n, 2]; 0 where it stands upright."""
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    flat = np.abs(area) > 1e-12
+    inverse = np.divide(1.0, area, out=np.zeros_like(area), where=flat)
+    along_rows = (u[:, 2] * v[:, 1] - v[:, 2] * u[:, 1]) * inverse
+    along_columns = (v[:, 2] * u[:, 0] - u[:, 2] * v[:, 0]) * inverse
+    return np.stack([along_rows, along_columns], axis=1)

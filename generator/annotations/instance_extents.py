@@ -1,0 +1,101 @@
+"""Pixels of instances: one pass over the id image, then work on crops only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.boxes import BoxPx
+from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
+from gen_data.generator.core.errors import SampleError
+from gen_data.generator.core.sample import ObjectTruth
+from gen_data.generator.core.scene import Instance
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """How many pixels show one id, and the tight box around them."""
+
+    visible_px: int
+    box: BoxPx
+
+
+def find_extents(ids: NDArray[np.uint16]) -> dict[int, Extent]:
+    """Pixel count and tight box of every id but 0 in an id image, shape [height, width].
+
+    The image is cut into horizontal runs of equal ids first: everything after that costs by the
+    number of runs (thousands), not by the number of pixels or of objects.
+    """
+    height, width = ids.shape
+    flat = ids.ravel()
+    changes = np.ones(flat.size, dtype=bool)
+    np.not_equal(flat[1:], flat[:-1], out=changes[1:])
+    changes[::width] = True
+    starts = np.flatnonzero(changes)
+    lengths = np.diff(starts, append=flat.size)
+    seen = flat[starts] != 0
+    starts, lengths = starts[seen], lengths[seen]
+    owners = flat[starts].astype(np.intp)
+    rows, columns = np.divmod(starts, width)
+
+    n = int(owners.max(initial=0)) + 1
+    low = np.full((2, n), max(height, width))
+    high = np.zeros((2, n), dtype=low.dtype)
+    np.minimum.at(low[0], owners, columns)
+    np.minimum.at(low[1], owners, rows)
+    np.maximum.at(high[0], owners, columns + lengths)
+    np.maximum.at(high[1], owners, rows + 1)
+    counts = np.zeros(n, dtype=np.intp)
+    np.add.at(counts, owners, lengths)
+    return {
+        int(k): Extent(
+            int(counts[k]), BoxPx(int(low[0, k]), int(low[1, k]), int(high[0, k]), int(high[1, k]))
+        )
+        for k in np.flatnonzero(counts)
+    }
+
+
+def crop(image: NDArray[np.generic], box: BoxPx) -> NDArray[np.generic]:
+    """The part of an image that a box inside it covers, as a view."""
+    return image[box.y_min : box.y_max, box.x_min : box.x_max]
+
+
+def visible_mask(reading: SensorReading, truth: ObjectTruth) -> NDArray[np.bool_]:
+    """The object's visible pixels inside its box, bool [box height, box width]."""
+    if truth.box is None:
+        return np.zeros((0, 0), dtype=bool)
+    ids = crop(reading.channels[Channel.INSTANCE], truth.box)
+    mask: NDArray[np.bool_] = ids == truth.instance.instance_id
+    return mask
+
+
+def find_silhouette(reading: SensorReading, instance: Instance) -> Silhouette:
+    """The instance as if nothing stood before it.
+
+    Raises:
+        SampleError: if the renderer returned none.
+    """
+    silhouette = reading.silhouettes.get(instance.instance_id)
+    if silhouette is None:
+        raise SampleError(
+            f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': the "
+            "renderer returned no silhouette of it although the amodal channel was asked for"
+        )
+    return silhouette
+
+
+def silhouette_box(silhouette: Silhouette) -> BoxPx | None:
+    """The box that a silhouette fills, possibly outside the image; None when it is empty."""
+    height, width = silhouette.mask.shape
+    if height == 0 or width == 0:
+        return None
+    x, y = silhouette.x_px, silhouette.y_px
+    return BoxPx(x, y, x + width, y + height)
+
+
+def silhouette_crop(silhouette: Silhouette, box: BoxPx) -> NDArray[np.bool_]:
+    """The silhouette's pixels inside a box that lies within the silhouette's own, as a view."""
+    x, y = silhouette.x_px, silhouette.y_px
+    return silhouette.mask[box.y_min - y : box.y_max - y, box.x_min - x : box.x_max - x]

@@ -1,0 +1,470 @@
+"""Config: a whole configuration, read, merged with its template, and validated."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from pydantic import Field, model_validator
+
+from gen_data.generator.annotations.annotate import Thresholds
+from gen_data.generator.assemble.documents import load_config_document, resolve_document
+from gen_data.generator.assemble.plugin_tables import (
+    ANNOTATIONS,
+    ELEMENTS,
+    EXPORTERS,
+    RANDOMIZERS,
+    RENDERERS,
+    SENSORS,
+    make_plugin,
+)
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.paths import find_path
+from gen_data.generator.config.problems import Problems
+from gen_data.generator.config.shared_values import (
+    draw_shared,
+    probe_values,
+    refers,
+    resolve_shared,
+    varying_place,
+)
+from gen_data.generator.config.validation import validate
+from gen_data.generator.config.yaml_tree import Node, parse_yaml
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.interfaces import (
+    AnyAnnotator,
+    Element,
+    Exporter,
+    Randomizer,
+    RendererSettings,
+    Sensor,
+)
+from gen_data.generator.core.plugins import PluginTable
+from gen_data.generator.core.scene import SharedValue
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.physics import PhysicsConfig
+from gen_data.generator.pipeline.splits import Assignment
+
+SHARD_SIZE = 20
+"""Small enough that few samples are redone after a crash and that all workers stay busy."""
+
+DEFAULT_RENDERER = "warp"
+
+P = TypeVar("P")
+
+
+class Splits(Strict):
+    """Shares of the scenes; all views of a scene are in one split."""
+
+    train: float = Field(0.8, ge=0, le=1)
+    val: float = Field(0.1, ge=0, le=1)
+    test: float = Field(0.1, ge=0, le=1)
+    assign: Assignment = Field(
+        "random",
+        description="random: every scene draws its split; round_robin: splits take turns, so that "
+        "small data sets have scenes in all of them.",
+    )
+
+    @model_validator(mode="after")
+    def _sums_to_one(self) -> Splits:
+        total = self.train + self.val + self.test
+        if abs(total - 1.0) > 1e-9:
+            raise ValueError(f"shares must sum to 1, got {total:g}")
+        return self
+
+
+class AssetFolders(Strict):
+    """Assets besides those that come with the dependencies."""
+
+    folders: tuple[str, ...] = Field((), description="Folders of OBJ, GLB, PLY, STL or URDF files.")
+
+
+class GeneralSettings(Strict):
+    """A configuration without its plug-ins."""
+
+    seed: int = Field(0, ge=0, lt=2**63, description="Seed of the data set; 0 is a seed.")
+    views_per_scene: int = Field(
+        1, ge=1, le=10_000, description="Views that share one settled scene."
+    )
+    steps_per_scene: int = Field(
+        1, ge=1, le=10_000, description="Instants of every view: samples that follow in time."
+    )
+    step_s: float = Field(0.1, gt=0, le=10, description="Time between two instants [s].")
+    shard_size: int = Field(
+        SHARD_SIZE, ge=1, le=100_000, description="Samples that are committed together."
+    )
+    depth_scale_m: float = Field(
+        0.0001, gt=0, le=1, description="Metres per unit of 16-bit depth images."
+    )
+    template: str = Field("", description="Name of a scene template.")
+    physics: PhysicsConfig = PhysicsConfig()
+    labels: Thresholds = Thresholds()
+    splits: Splits = Splits()
+    assets: AssetFolders = AssetFolders()
+
+
+@dataclass(frozen=True)
+class SceneConfig:
+    """The part of a configuration that one scene is built and drawn from, shared values filled in.
+
+    Attributes:
+        shared: Names and values, sorted by name.
+    """
+
+    shared: tuple[tuple[str, SharedValue], ...]
+    elements: tuple[Element, ...]
+    randomizers: tuple[Randomizer, ...]
+    sensors: tuple[Sensor, ...]
+
+
+VARYING: Mapping[str, PluginTable[Any]] = {
+    "elements": ELEMENTS,
+    "randomizers": RANDOMIZERS,
+    "sensors": SENSORS,
+}
+"""Lists that may depend on shared values, and the plug-ins they hold."""
+
+PLUGIN_LISTS: Mapping[str, PluginTable[Any]] = {
+    **VARYING,
+    "exporters": EXPORTERS,
+}
+"""Lists of plug-ins with a ``type``."""
+
+CONSTANT = {
+    "elements": ("type", "name"),
+    "randomizers": ("type", "name"),
+    "sensors": (
+        "type",
+        "name",
+        "model",
+        "size_px",
+        "channels",
+        "stereo_with",
+        "rate_hz",
+        "rotation_hz",
+        "time_offset_s",
+        "lens.model",
+    ),
+}
+"""Lists that may depend on shared values, and the fields of their items that may not.
+
+What all samples of a data set have in common, such as the size of its images, is no matter of a
+scene.
+"""
+
+
+@dataclass(frozen=True)
+class Config:
+    """A validated configuration; picklable.
+
+    Attributes:
+        name: Of the configuration; names the default output folder.
+        resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
+            the same Config again.
+        render: Settings of the renderer.
+        exporters: Plug-ins, in order.
+        annotations: Annotators by name, in order.
+        probes: Configurations of scenes that between them show what scenes can be; one where
+            nothing is shared.
+        document: The merged document; configurations of scenes are made from it.
+    """
+
+    name: str
+    resolved: Mapping[str, Any]
+    general: GeneralSettings
+    render: RendererSettings
+    annotations: Mapping[str, AnyAnnotator]
+    exporters: tuple[Exporter, ...]
+    probes: tuple[SceneConfig, ...]
+    document: Node = field(compare=False)
+
+    @property
+    def elements(self) -> tuple[Element, ...]:
+        """The template elements of the first scene."""
+        return self.probes[0].elements
+
+    @property
+    def randomizers(self) -> tuple[Randomizer, ...]:
+        """The randomizers of the first scene."""
+        return self.probes[0].randomizers
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The sensors of the first scene; those of others differ in parameters only."""
+        return self.probes[0].sensors
+
+    def plugins(self) -> Iterator[object]:
+        """Every plug-in that it is made of."""
+        yield self.render
+        yield from (*self.annotations.values(), *self.exporters)
+        for config in self.probes:
+            yield from (*config.elements, *config.randomizers, *config.sensors)
+
+    def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
+        """The shared values of one scene, sorted by name."""
+        section = self.document.get("shared")
+        if section is None or not section.content:
+            return ()
+        return tuple(sorted(draw_shared(section, streams).items()))
+
+    def scene_config(self, shared: tuple[tuple[str, SharedValue], ...]) -> SceneConfig:
+        """The configuration of a scene with these shared values.
+
+        Raises:
+            ConfigError: they make something invalid.
+        """
+        return _scene_config(self.document, dict(shared)) if shared else self.probes[0]
+
+    @property
+    def asset_folders(self) -> tuple[Path, ...]:
+        """Where the user keeps assets."""
+        listed = self.document.get("assets", "folders")
+        nodes = listed.content if listed is not None and isinstance(listed.content, tuple) else ()
+        return tuple(
+            find_path(node.text, node.position, f"assets.folders[{k}]", "folder", is_folder=True)
+            for k, node in enumerate(nodes)
+        )
+
+    @property
+    def split_shares(self) -> dict[str, float]:
+        """Share of each split that has one, in order."""
+        splits = self.general.splits
+        shares = {"train": splits.train, "val": splits.val, "test": splits.test}
+        return {name: share for name, share in shares.items() if share > 0}
+
+
+def load_config(
+    source: str,
+    *,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    without: Sequence[str] = (),
+) -> Config:
+    """The configuration of that path or shipped name.
+
+    Raises:
+        ConfigError: telling everything that is wrong, each with its place.
+    """
+    if seed is not None and seed < 0:
+        raise ConfigError(f"--seed: {seed} is negative; expected 0 or more")
+    document = resolve_document(
+        load_config_document(source), seed=seed, overrides=overrides, without=without
+    )
+    return _config(document, Path(source).stem)
+
+
+def load_source_config(
+    source: str,
+    *,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    without: Sequence[str] = (),
+) -> Config:
+    """Like ``load_config``; a data set's folder stands for the configuration it was made with."""
+    plan = Path(source) / "plan.json"
+    if not plan.is_file():
+        return load_config(source, seed=seed, overrides=overrides, without=without)
+    try:
+        kept = json.loads(plan.read_bytes())
+        text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
+    document = parse_yaml(text, str(plan))
+    return _config(
+        resolve_document(document, seed=seed, overrides=overrides, without=without), name
+    )
+
+
+def parse_config(
+    text: str,
+    name: str,
+    *,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    without: Sequence[str] = (),
+) -> Config:
+    """The configuration in a YAML text; ``name`` is what messages call it.
+
+    Raises:
+        ConfigError: telling everything that is wrong, each with its place.
+    """
+    document = parse_yaml(text, name)
+    document = resolve_document(document, seed=seed, overrides=overrides, without=without)
+    return _config(document, name.strip("<>"))
+
+
+def _config(document: Node, name: str) -> Config:
+    assert isinstance(document.content, Mapping)
+    problems = Problems()
+    apart = {*PLUGIN_LISTS, "annotations", "shared", "render"}
+    head_node = Node(
+        document.position,
+        {key: node for key, node in document.content.items() if key not in apart},
+        document.key_positions,
+    )
+    head = validate(head_node, GeneralSettings, problems)
+    for key, node in document.content.items():
+        if key not in ("shared", *VARYING) and refers(node):
+            fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
+            problems.add(node.position, key, fact)
+    render = _renderer_settings(document.content["render"], problems)
+    exporters = _plugins(document.content["exporters"], "exporters", EXPORTERS, problems)
+    annotations = _annotations(document.content["annotations"], problems)
+    if not document.content["sensors"].content and not len(problems):
+        problems.add(document.position, "sensors", "at least one sensor is needed")
+    for key, names in CONSTANT.items():
+        _refuse_varying(document.content[key], key, names)
+    probes_ = _probed(document, head.seed if head else 0, problems)
+    problems.raise_if_any()
+    assert head is not None
+    assert render is not None
+    config = Config(
+        name,
+        document.plain(),
+        head,
+        render,
+        annotations,
+        tuple(exporter for exporter in exporters if exporter is not None),
+        probes_,
+        document,
+    )
+    _ = config.asset_folders  # A folder that is missing is refused before anything runs.
+    return config
+
+
+def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
+    """Raises ConfigError where a field depends on shared values that all scenes have in common."""
+    fact = "is the same in all scenes of a data set; "
+    fact += "expected a value that does not depend on shared ones"
+    problems = Problems()
+    for number, item in enumerate(listed.content if isinstance(listed.content, tuple) else ()):
+        for name in names:
+            place = varying_place(item, name)
+            if place == item.position:
+                problems.add(place, f"{key}[{number}]", fact)
+            elif place is not None:
+                problems.add(place, f"{key}[{number}].{name}", fact)
+    problems.raise_if_any()
+
+
+def _probed(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, ...]:
+    """Configurations of all that shared values can be, each once; each fault is reported once."""
+    section = document.get("shared")
+    every = list(probe_values(section, seed)) if section is not None and section.content else [{}]
+    configs: list[SceneConfig] = []
+    for shared in every:
+        found = Problems()
+        config = _scene_config_or_problems(document, shared, found)
+        if len(found):
+            problems.extend(found)
+            break
+        if config not in configs:
+            configs.append(config)
+    return tuple(configs)
+
+
+def _scene_config(document: Node, shared: Mapping[str, SharedValue]) -> SceneConfig:
+    problems = Problems()
+    config = _scene_config_or_problems(document, shared, problems)
+    problems.raise_if_any()
+    return config
+
+
+def _scene_config_or_problems(
+    document: Node, shared: Mapping[str, SharedValue], problems: Problems
+) -> SceneConfig:
+    lists = {}
+    for key in VARYING:
+        listed = document.get(key)
+        assert listed is not None
+        lists[key] = resolve_shared(listed, shared, key) if refers(listed) else listed
+    return SceneConfig(
+        tuple(sorted(shared.items())),
+        _named_plugins(lists["elements"], "elements", ELEMENTS, problems),
+        _named_plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems),
+        _named_plugins(lists["sensors"], "sensors", SENSORS, problems),
+    )
+
+
+def _plugins(
+    listed: Node, key: str, table: PluginTable[P], problems: Problems
+) -> tuple[P | None, ...]:
+    """Each item read as the plug-in that its ``type`` names; None where that is impossible."""
+    if not isinstance(listed.content, tuple):
+        problems.add(listed.position, key, f"expected a list of {table.kind}s")
+        return ()
+    return tuple(
+        _plugin(node, f"{key}[{number}]", table, problems)
+        for number, node in enumerate(listed.content)
+    )
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+N = TypeVar("N", bound=_Named)
+
+
+def _named_plugins(
+    listed: Node, key: str, table: PluginTable[N], problems: Problems
+) -> tuple[N, ...]:
+    """The same for plug-ins with names, which must be unique."""
+    made = _plugins(listed, key, table, problems)
+    names: set[str] = set()
+    for number, plugin in enumerate(made):
+        if plugin is not None and plugin.name in names:
+            assert isinstance(listed.content, tuple)
+            node = listed.content[number]
+            fact = f"the name '{plugin.name}' is taken; expected a name of its own"
+            problems.add((node.get("name") or node).position, f"{key}[{number}].name", fact)
+        if plugin is not None:
+            names.add(plugin.name)
+    return tuple(plugin for plugin in made if plugin is not None)
+
+
+def _plugin(node: Node, field: str, table: PluginTable[P], problems: Problems) -> P | None:
+    tag = node.get(table.tag)
+    if tag is None or not isinstance(tag.content, str):
+        where = node.position if tag is None else tag.position
+        fact = f"expected a {table.kind}: one of {', '.join(table)}"
+        problems.add(where, f"{field}.{table.tag}", fact)
+        return None
+    try:
+        return make_plugin(table, tag.content, node, problems, field)
+    except ConfigError as refused:
+        problems.add(tag.position, f"{field}.{table.tag}", str(refused))
+        return None
+
+
+def _renderer_settings(node: Node, problems: Problems) -> RendererSettings | None:
+    """The section ``render``; without ``renderer`` it is that of the default renderer."""
+    if node.get(RENDERERS.tag) is not None:
+        return _plugin(node, "render", RENDERERS, problems)
+    return make_plugin(RENDERERS, DEFAULT_RENDERER, node, problems, "render")
+
+
+def _annotations(listed: Node, problems: Problems) -> dict[str, AnyAnnotator]:
+    """Annotators by name; an item is a name, or a mapping with it as ``type`` and parameters."""
+    items = listed.content if isinstance(listed.content, tuple) else (listed,)
+    made: dict[str, AnyAnnotator] = {}
+    for number, node in enumerate(items):
+        field = f"annotations[{number}]"
+        kind = node.get("type") or node
+        name = kind.content
+        if not isinstance(name, str) or name not in ANNOTATIONS:
+            fact = f"unknown annotation {name!r}; expected one of {', '.join(ANNOTATIONS)}"
+            fact += did_you_mean(str(name), ANNOTATIONS)
+            problems.add(kind.position, field, fact)
+        elif kind is not node and name in made:
+            problems.add(node.position, field, f"the annotation '{name}' is listed twice")
+        else:
+            entry = Node(node.position, {"type": node}) if kind is node else node
+            annotator = _plugin(entry, field, ANNOTATIONS, problems)
+            if annotator is not None:
+                made.setdefault(name, annotator)
+    return made

@@ -1,0 +1,106 @@
+"""JSON Schema of a configuration: what editors complete and check against."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gen_data.generator.assemble.config import (
+    CONSTANT,
+    DEFAULT_RENDERER,
+    PLUGIN_LISTS,
+    VARYING,
+    GeneralSettings,
+)
+from gen_data.generator.assemble.inheritance import ALL, NAMED
+from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, RENDERERS
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.schema import json_schema, with_shared_values
+from gen_data.generator.core.plugins import PluginTable
+
+INHERITED = {
+    "type": "object",
+    "description": "Changes to the inherited item of this name.",
+    "required": ["name"],
+    "properties": {"type": False},
+}
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def config_schema() -> dict[str, Any]:
+    """Schema of a whole configuration, every plug-in of every table included."""
+    definitions: dict[str, Any] = {}
+    schema = _hoisted(json_schema(GeneralSettings), definitions)
+    properties = schema["properties"]
+    for key, table in PLUGIN_LISTS.items():
+        properties[key] = {
+            "type": "array",
+            "items": {"oneOf": [INHERITED, *(_plugin(table, n, definitions) for n in table)]},
+        }
+    properties["render"] = {
+        "description": "How images are made.",
+        "anyOf": [_plugin(RENDERERS, name, definitions) for name in RENDERERS],
+    }
+    # A configuration overrides its template's elements by name; a template lists them.
+    properties["elements"] = {
+        "description": "Overrides by element name, or the whole list of elements.",
+        "anyOf": [{"type": "object"}, properties["elements"]],
+    }
+    properties["shared"] = {
+        "type": "object",
+        "description": "Values drawn once per scene that elements and randomizers refer to.",
+    }
+    properties["extends"] = {
+        "type": "string",
+        "description": "Configuration that this one is laid over: a path or a shipped name.",
+    }
+    names = {"anyOf": [{"const": ALL}, {"type": "array", "items": {"type": "string"}}]}
+    properties["without"] = {
+        "type": "object",
+        "description": "Names of what is not inherited, by section.",
+        "properties": dict.fromkeys(NAMED, names),
+        "additionalProperties": False,
+    }
+    properties["annotations"] = {
+        "type": "array",
+        "items": {"oneOf": [{"enum": list(ANNOTATIONS)}, *_parametric(definitions)]},
+        "description": "What is computed about every object, image and sample.",
+    }
+    return {
+        "$schema": DRAFT,
+        **schema,
+        "title": "gen-data configuration",
+        "$defs": dict(sorted(definitions.items())),
+    }
+
+
+def _parametric(definitions: dict[str, Any]) -> list[dict[str, str]]:
+    """Annotators that have parameters, which may be written as mappings."""
+    return [
+        _plugin(ANNOTATIONS, name, definitions)
+        for name in ANNOTATIONS
+        if _model(ANNOTATIONS, name).model_fields.keys() - {ANNOTATIONS.tag}
+    ]
+
+
+def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> dict[str, str]:
+    schema = json_schema(_model(table, name))
+    varying = next((key for key, known in VARYING.items() if known is table), None)
+    if varying is not None:
+        schema = with_shared_values(schema, CONSTANT[varying])
+    schema = _hoisted(schema, definitions)
+    if (table, name) != (RENDERERS, DEFAULT_RENDERER):
+        # The tag chooses the plug-in, so it has to be written even where its field has a default.
+        schema["required"] = sorted({table.tag, *schema.get("required", ())})
+    definitions[f"{table.kind}.{name}"] = schema
+    return {"$ref": f"#/$defs/{table.kind}.{name}"}
+
+
+def _model(table: PluginTable[Any], name: str) -> type[Strict]:
+    model: type[Strict] = table.load(name)
+    return model
+
+
+def _hoisted(schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
+    """The schema with its own definitions moved to the common ones."""
+    definitions.update(schema.pop("$defs", {}))
+    return schema

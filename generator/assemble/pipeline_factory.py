@@ -1,0 +1,249 @@
+"""From a Config to a running Pipeline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
+
+import cv2
+
+from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
+from gen_data.generator.assemble.config import Config, SceneConfig
+from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
+from gen_data.generator.assemble.reference_checks import check_references
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.config.places import find_text
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError, UnknownAsset
+from gen_data.generator.core.interfaces import (
+    AnyAnnotator,
+    AssetIndex,
+    DatasetInfo,
+    Exporter,
+    Modality,
+    Randomizer,
+    Sensor,
+    SensorInfo,
+)
+from gen_data.generator.core.scene import Scene, SharedValue
+from gen_data.generator.physics import open_engine
+from gen_data.generator.pipeline import Pipeline
+from gen_data.generator.pipeline.pipeline import PipelineConfig, SceneSource
+from gen_data.generator.sensors.mounting import check_not_buried, stride, within_steps
+from gen_data.scene_templates.builder import build_scene
+
+NOMINAL_SCENES_KEPT = 32
+
+
+@dataclass(frozen=True)
+class PipelineFactory:
+    """Makes the same Pipeline in any process; picklable.
+
+    Attributes:
+        n: Number of samples of the data set, as exporters are told.
+        extra_channels: Channels to render beyond what sensors and annotators need.
+    """
+
+    config: Config
+    n: int
+    extra_channels: frozenset[Channel] = frozenset()
+
+    def __call__(self) -> Pipeline:
+        """A pipeline, to be used as a context manager."""
+        # One process, one core: workers fill the others.
+        cv2.setNumThreads(1)
+        config = self.config
+        library = open_library(config.asset_folders)
+        resolved = pipeline_config(config, library, self.n, self.categories, self.extra_channels)
+        return Pipeline(
+            resolved,
+            library,
+            open_physics=partial(open_engine, library, config.general.physics),
+            open_renderer=partial(config.render.open, library),
+        )
+
+    @cached_property
+    def nominal(self) -> tuple[Scene, ...]:
+        """Nominal scenes that between them hold whatever a scene may hold.
+
+        Raises:
+            ConfigError: a randomizer names what neither they nor the assets have.
+        """
+        library = open_library(self.config.asset_folders)
+        scenes = tuple(nominal_scene(self.config, scene, library) for scene in self.config.probes)
+        check_references(self.config, scenes, library)
+        return scenes
+
+    @cached_property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names of all categories that a sample may contain."""
+        return collect_categories(self.nominal, open_library(self.config.asset_folders))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Other processes are told the categories, which take a second to find out."""
+        categories = self.categories
+        told = {name: value for name, value in self.__dict__.items() if name != "nominal"}
+        return {**told, "categories": categories}
+
+
+def open_pipeline(config: Config, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
+    """A pipeline to look at samples with, outside any data set."""
+    return PipelineFactory(config, n=1, extra_channels=extra_channels)()
+
+
+def pipeline_config(
+    config: Config,
+    library: Library,
+    n: int,
+    categories: tuple[str, ...],
+    extra_channels: frozenset[Channel],
+) -> PipelineConfig:
+    """Everything that samples depend on, resolved.
+
+    Raises:
+        ConfigError: when parts do not fit together, such as an exporter whose images no sensor
+            writes.
+    """
+    _check_durations(config)
+    annotators = annotators_of(config)
+    info = dataset_info(config, n, categories)
+    return PipelineConfig(
+        info=info,
+        open_scene=scene_source(config, library),
+        channels=frozenset().union(*(a.channels for a in annotators), extra_channels),
+        image_truth=partial(
+            annotate_reading,
+            annotators=annotators,
+            thresholds=config.general.labels,
+            assets=library,
+        ),
+        frame_truth=partial(annotate_ego, annotators=annotators, assets=library),
+        split_shares=config.split_shares,
+        split_assignment=config.general.splits.assign,
+        layout_attempts_max=config.general.physics.layout_attempts_max,
+        exporters=_exporters(config, info, library),
+        strides=_strides(info),
+    )
+
+
+def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> DatasetInfo:
+    """Facts about the data set of a configuration."""
+    return DatasetInfo(
+        name=config.name,
+        seed=config.general.seed,
+        n=n,
+        views_per_scene=config.general.views_per_scene,
+        categories=categories,
+        sensors=tuple(sorted((s.describe() for s in config.sensors), key=lambda s: s.name)),
+        depth_scale_m=config.general.depth_scale_m,
+        steps_per_scene=config.general.steps_per_scene,
+        step_s=config.general.step_s,
+    )
+
+
+def _check_durations(config: Config) -> None:
+    """Raises ConfigError if a sequence is longer than the motion in it."""
+    steps, step_s = config.general.steps_per_scene, config.general.step_s
+    lasts_s = (steps - 1) * step_s
+    for scene in config.probes:
+        for randomizer in scene.randomizers:
+            duration_s = randomizer.motion_duration_s
+            if duration_s is not None and duration_s < lasts_s - 1e-9:
+                raise ConfigError(
+                    f"randomizers.{randomizer.name}.duration_s: {duration_s:g} s is shorter than "
+                    f"the sequences, {steps} steps of {step_s:g} s; "
+                    f"expected at least {lasts_s:g}"
+                )
+
+
+def _strides(info: DatasetInfo) -> dict[str, int]:
+    """Steps from one reading of a sensor to the next; devices may read several times per step."""
+    return {
+        s.name: stride(s.name, s.rate_hz, info.step_s)
+        for s in info.sensors
+        if s.modality is not Modality.DEVICE or not within_steps(s.rate_hz, info.step_s)
+    }
+
+
+def scene_source(config: Config, assets: AssetIndex) -> SceneSource:
+    """The nominal scene and the randomizers of given streams; the last few are remembered."""
+
+    @lru_cache(maxsize=NOMINAL_SCENES_KEPT)
+    def made(
+        shared: tuple[tuple[str, SharedValue], ...],
+    ) -> tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]:
+        of_scene = config.scene_config(shared)
+        nominal = nominal_scene(config, of_scene, assets)
+        return nominal, of_scene.randomizers, of_scene.sensors
+
+    return lambda streams: made(config.shared(streams))
+
+
+def nominal_scene(config: Config, of_scene: SceneConfig, assets: AssetIndex) -> Scene:
+    """The template's scene with every sensor mounted.
+
+    Raises:
+        ConfigError: an element or a sensor has no place in it.
+    """
+    try:
+        scene = build_scene(config.general.template or config.name, of_scene.elements, assets)
+    except UnknownAsset as error:
+        place = find_text(config.document, error.asset_id)
+        if place is None:
+            raise
+        raise UnknownAsset(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
+    scene = replace(scene, shared=of_scene.shared, step_s=config.general.step_s)
+    for sensor in of_scene.sensors:
+        scene = sensor.mount(scene)
+        info = sensor.describe()
+        _check_mounted(scene, info)
+        if info.needs_clear_view:
+            check_not_buried(scene, info.name, assets)
+    return scene
+
+
+def _check_mounted(scene: Scene, info: SensorInfo) -> None:
+    """Raises ConfigError if a plug-in's ``mount`` and ``describe`` contradict each other."""
+    mounted = {
+        Modality.CAMERA: [camera.name for camera in scene.cameras],
+        Modality.LIDAR: [lidar.name for lidar in scene.lidars],
+        Modality.DEVICE: [device.name for device in scene.devices],
+    }
+    if info.name not in mounted[info.modality]:
+        raise ConfigError(
+            f"sensor '{info.name}': describe() names a {info.modality.value}, but mount() adds no"
+            f" {info.modality.value} of this name to the scene"
+        )
+
+
+def collect_categories(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...]:
+    """Sorted names of all categories that a sample may contain."""
+    placed = {i.category for scene in scenes for i in scene.instances if i.annotated}
+    possible = {
+        assets.get(asset_id).category
+        for scene in scenes
+        for group in scene.groups
+        if group.annotated
+        for asset_id in group.assets
+    }
+    return tuple(sorted(placed | possible))
+
+
+def annotators_of(config: Config) -> Sequence[AnyAnnotator]:
+    """The configuration's, then those that exporters need besides."""
+    annotators = dict(config.annotations)
+    for exporter in config.exporters:
+        for name in sorted(exporter.needs - annotators.keys()):
+            annotators[name] = default_plugin(ANNOTATIONS, name)
+    return list(annotators.values())
+
+
+def _exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
+    exporters: dict[str, Exporter] = {}
+    for exporter in config.exporters:
+        if exporter.type in exporters:
+            raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
+        exporter.check(info)
+        exporters[exporter.type] = exporter.with_assets(library)
+    return exporters

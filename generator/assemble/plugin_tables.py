@@ -1,0 +1,88 @@
+"""Every plug-in table of the project, by kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar, cast
+
+import gen_data.generator.annotations
+from gen_data import exporters, randomizers, scene_templates
+from gen_data.generator import renderers, sensors
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.problems import Problems
+from gen_data.generator.config.validation import validate
+from gen_data.generator.config.yaml_tree import Node
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.plugins import PluginTable, package_of, third_party
+
+ELEMENTS = scene_templates.TABLE
+RANDOMIZERS = randomizers.TABLE
+SENSORS = sensors.TABLE
+ANNOTATIONS = gen_data.generator.annotations.TABLE
+EXPORTERS = exporters.TABLE
+RENDERERS = renderers.TABLE
+
+TABLES: Mapping[str, PluginTable[Any]] = {
+    table.kind: table
+    for table in (ELEMENTS, RANDOMIZERS, SENSORS, ANNOTATIONS, EXPORTERS, RENDERERS)
+}
+"""For what treats all kinds alike: ``gen-data describe`` and the JSON Schema."""
+
+ASSET_FAMILY = "asset_family"
+"""Kind of the plug-ins that the asset library loads by itself."""
+
+P = TypeVar("P")
+
+
+def make_plugin(
+    table: PluginTable[P], name: str, node: Node, problems: Problems, field: str
+) -> P | None:
+    """The plug-in of that name, made from its entry in YAML; None where there was a problem.
+
+    Raises:
+        ConfigError: the name is unknown, or its class is no plug-in of this kind.
+    """
+    model = cast("type[Strict]", table.load(name))
+    return cast("P | None", validate(node, model, problems, field))
+
+
+def default_plugin(table: PluginTable[P], name: str) -> P:
+    """The plug-in of that name with nothing but defaults.
+
+    Raises:
+        ConfigError: the name is unknown, or its class is no plug-in of this kind.
+    """
+    return table.load(name)()
+
+
+def third_party_packages(plugins: Iterable[object]) -> dict[str, str]:
+    """``{name: version}`` of the installed packages that some plug-ins come from.
+
+    Packages with asset families are always among them: their families take part in every selection
+    by tags.
+    """
+    classes = {f"{type(p).__module__}:{type(p).__qualname__}" for p in plugins}
+    found = [e for kind in TABLES for e in third_party(kind).values() if e.value in classes]
+    entries = (*found, *third_party(ASSET_FAMILY).values())
+    packages = sorted({package_of(entry) for entry in entries})
+    return {name: version for name, _, version in (p.partition(" ") for p in packages)}
+
+
+def find_plugin(name: str) -> tuple[str, type]:
+    """Kind and class of a plug-in by its name, or by ``kind/name`` where a name is used twice.
+
+    Raises:
+        ConfigError: unknown, or more than one kind has it.
+    """
+    kind, _, short = name.rpartition("/")
+    hits = [k for k, t in TABLES.items() if short in t and kind in ("", k)]
+    if len(hits) == 1:
+        return hits[0], TABLES[hits[0]].load(short)
+    if hits:
+        raise ConfigError(
+            f"'{name}' is a name of several: " + ", ".join(f"{k}/{short}" for k in hits)
+        )
+    known = [n for t in TABLES.values() for n in t]
+    raise ConfigError(
+        f"unknown plug-in '{name}'{did_you_mean(short, known)}; see gen-data describe"
+    )

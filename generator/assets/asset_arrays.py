@@ -1,0 +1,77 @@
+"""Meshes, collision parts and images to plain arrays and back, bit by bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import numpy as np
+
+from gen_data.generator.assets.asset_cache import Arrays
+from gen_data.generator.assets.importer import ImportedMesh
+from gen_data.generator.core.asset_types import (
+    ConvexParts,
+    Keypoint,
+    Material,
+    MeshData,
+    TextureData,
+    UInt8,
+)
+from gen_data.generator.core.serialization import canonical_json, from_plain
+
+_MESH_ARRAYS = ("vertices_m", "faces", "normals", "uvs", "face_slots")
+_IMAGE = "image/"
+
+
+def pack_imported(imported: ImportedMesh) -> Arrays:
+    """Plain arrays that hold an imported asset."""
+    arrays: Arrays = {f"{_IMAGE}{name}": image for name, image in imported.images.items()}
+    if imported.mesh is not None:
+        arrays |= {name: getattr(imported.mesh, name) for name in _MESH_ARRAYS}
+        arrays["materials"] = _text(canonical_json(imported.mesh.materials))
+    if imported.collision is not None:
+        parts = imported.collision.parts_m
+        arrays["part_sizes"] = np.array([len(part) for part in parts], dtype=np.int64)
+        arrays["parts_m"] = np.concatenate(parts) if parts else np.zeros((0, 3))
+    if imported.keypoints:
+        arrays["keypoints"] = _text(canonical_json(imported.keypoints))
+    return arrays
+
+
+def unpack_imported(arrays: Arrays) -> ImportedMesh:
+    """The imported asset that plain arrays hold. Raises KeyError or ValueError if they do not."""
+    mesh = collision = None
+    if "materials" in arrays:
+        materials = json.loads(arrays["materials"].tobytes())
+        mesh = MeshData(
+            **{name: arrays[name] for name in _MESH_ARRAYS},
+            materials=from_plain(tuple[Material, ...], materials),
+        )
+    if "part_sizes" in arrays:
+        ends = np.cumsum(arrays["part_sizes"])[:-1]
+        collision = ConvexParts(tuple(np.split(arrays["parts_m"], ends)))
+    images: Mapping[str, UInt8] = {
+        name.removeprefix(_IMAGE): array for name, array in arrays.items() if _IMAGE in name
+    }
+    keypoints: tuple[Keypoint, ...] = ()
+    if "keypoints" in arrays:
+        keypoints = from_plain(tuple[Keypoint, ...], json.loads(arrays["keypoints"].tobytes()))
+    return ImportedMesh(mesh, collision, images, keypoints)
+
+
+_FURTHER = ("roughness", "normal", "metallic", "occlusion", "emission", "alpha")
+
+
+def pack_texture(texture: TextureData) -> Arrays:
+    """Plain arrays that hold a texture."""
+    further = {name: getattr(texture, name) for name in _FURTHER}
+    return {"albedo": texture.albedo, **{k: v for k, v in further.items() if v is not None}}
+
+
+def unpack_texture(arrays: Arrays) -> TextureData:
+    """The texture that plain arrays hold. Raises KeyError if they do not."""
+    return TextureData(arrays["albedo"], **{name: arrays.get(name) for name in _FURTHER})
+
+
+def _text(text: str) -> UInt8:
+    return np.frombuffer(text.encode(), dtype=np.uint8)

@@ -1,0 +1,107 @@
+"""Asset ids: ``family?key=value&key=value`` or a plain path such as ``pybullet/teddy``.
+
+Values are numbers, lists of numbers separated by commas, or words. The canonical form has its keys
+sorted and its numbers in their shortest form, so that equal assets have equal ids.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gen_data.generator.core.errors import AssetError
+
+ParameterValue = float | int | str | tuple[float, ...]
+
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-+]*(/[A-Za-z0-9_][A-Za-z0-9_.\-+ ]*)*")
+_KEY = re.compile(r"[a-z][a-z0-9_]*")
+_INTEGER = re.compile(r"[-+]?[0-9]{1,18}")
+_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
+_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*")
+_MAX_LENGTH = 400
+
+
+@dataclass(frozen=True)
+class AssetId:
+    """A parsed asset id.
+
+    Attributes:
+        name: What stands before ``?``.
+        parameters: What stands after it; empty for plain ids.
+    """
+
+    name: str
+    parameters: Mapping[str, ParameterValue] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """The canonical form."""
+        if not self.parameters:
+            return self.name
+        pairs = (
+            f"{key}={format_parameter(self.parameters[key])}" for key in sorted(self.parameters)
+        )
+        return f"{self.name}?{'&'.join(pairs)}"
+
+
+def parse_asset_id(text: str) -> AssetId:
+    """The asset id that a text spells.
+
+    Raises:
+        AssetError: if it is malformed.
+    """
+    name, question_mark, query = text.partition("?")
+    if len(text) > _MAX_LENGTH or not _NAME.fullmatch(name):
+        raise AssetError(
+            f"asset '{text[:60]}': not an asset id; expected a name such as 'pybullet/teddy' or "
+            "'mug?seed=3'"
+        )
+    parameters: dict[str, ParameterValue] = {}
+    for pair in query.split("&") if question_mark else ():
+        key, equals, value = pair.partition("=")
+        if not equals or not _KEY.fullmatch(key):
+            raise AssetError(f"asset '{text}': '{pair}' is not of the form key=value")
+        if key in parameters:
+            raise AssetError(f"asset '{text}': '{key}' is given twice")
+        parameters[key] = _value(text, key, value)
+    return AssetId(name, parameters)
+
+
+def canonical_id(text: str) -> str:
+    """The canonical form of an asset id. Raises AssetError if it is malformed."""
+    return str(parse_asset_id(text)) if "?" in text else text
+
+
+def format_parameter(value: ParameterValue) -> str:
+    """A parameter as an id spells it; numbers in the shortest form that reads back equal."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, tuple):
+        return ",".join(format_parameter(item) for item in value)
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    return repr(value)
+
+
+def _value(text: str, key: str, value: str) -> ParameterValue:
+    if "," in value:
+        items = [_number(item) for item in value.split(",")]
+        if None not in items:
+            return tuple(float(item) for item in items if item is not None)
+    elif (number := _number(value)) is not None:
+        return number
+    elif _WORD.fullmatch(value):
+        return value
+    raise AssetError(
+        f"asset '{text}': {key}='{value}' is neither a number, nor numbers with commas, nor a word"
+    )
+
+
+def _number(text: str) -> float | int | None:
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    if _NUMBER.fullmatch(text):
+        number = float(text)
+        return number if math.isfinite(number) else None
+    return None

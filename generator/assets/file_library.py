@@ -1,0 +1,324 @@
+"""Assets that lie in files: pybullet's, those of installed packs, and the user's."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.assets.asset_arrays import pack_imported, unpack_imported
+from gen_data.generator.assets.asset_cache import FORMAT, Arrays, DiskCache, Store, content_key
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.content_hashes import ContentHashes
+from gen_data.generator.assets.folder_index import (
+    ROAD_SUFFIX,
+    Entry,
+    IndexedAsset,
+    MeshEntry,
+    RobotEntry,
+    TextureEntry,
+    list_assets,
+    read_index,
+    user_folder,
+)
+from gen_data.generator.assets.image_decoding import decode_image, decode_radiance
+from gen_data.generator.assets.importer import VERSION, ImportedMesh, import_link, import_object
+from gen_data.generator.assets.installed_packs import pack_assets
+from gen_data.generator.assets.opendrive_files import import_road_network, road_network_lanes
+from gen_data.generator.assets.robot_models import robot_model
+from gen_data.generator.assets.texture_maps import compose_texture, find_maps
+from gen_data.generator.assets.urdf import Urdf, read_urdf
+from gen_data.generator.assets.usd_stages import is_stage, stage_model
+from gen_data.generator.core.asset_types import (
+    Asset,
+    Float32,
+    RobotModel,
+    Symmetry,
+    TextureData,
+    UInt8,
+)
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Lane, StageModel
+
+_BUILT_IN = Path(__file__).with_name("pybullet.yaml")
+
+T = TypeVar("T", bound=np.generic)
+
+
+class FileLibrary:
+    """The part of the library that is read from folders.
+
+    Ids are those of the indices; ``<robot>/<link>`` is a robot's link, ``<stage>/<piece>`` a
+    stage's mesh, and ``<asset>#<image>`` an image that an asset's materials refer to.
+    """
+
+    def __init__(
+        self, packs: Path, user_roots: Sequence[Path], disk: DiskCache, store: Store
+    ) -> None:
+        self._packs = packs
+        self._user_roots = tuple(user_roots)
+        self._store = store
+        self._digests = ContentHashes(disk)
+        self._listed: dict[str, IndexedAsset] | None = None
+        self._urdfs: dict[str, Urdf] = {}
+        self._stages: dict[str, StageModel] = {}
+        self._hashed: dict[str, dict[str, str]] = {}
+        self._keys: dict[str, str] = {}
+
+    def names(self) -> Iterator[str]:
+        """Every id."""
+        yield from self._entries()
+
+    def user_counts(self) -> Counter[str]:
+        """Number of assets in the user's folders, by kind."""
+        return Counter(one.kind for one in self._entries().values() if one.root in self._user_roots)
+
+    def __contains__(self, asset_id: str) -> bool:
+        """Whether an asset, a robot's link or a stage's piece has that id."""
+        return asset_id in self._entries() or self._part(asset_id) is not None
+
+    def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
+        """All assets of a kind that carry every tag."""
+        for one in self._entries().values():
+            if one.kind == kind and tags.issubset(one.tags()):
+                yield self._asset(one)
+        self._digests.save()
+
+    def get(self, asset_id: str) -> Asset:
+        """The asset, or a robot's link or a stage's piece as an object of its own."""
+        part = self._part(asset_id)
+        if part is None:
+            asset = self._asset(self._entries()[asset_id])
+        else:
+            whole = self._asset(part[0])
+            asset = replace(whole, asset_id=asset_id, kind="object")
+        self._digests.save()
+        return asset
+
+    def imported(self, asset_id: str) -> ImportedMesh:
+        """Geometry of an object, of a robot's link or of a stage's piece."""
+        part = self._part(asset_id)
+        one = part[0] if part else self._entries()[asset_id]
+        entry, folder = one.entry, Folder(one.root)
+        name = part[1] if part else ""
+
+        def compute() -> Arrays:
+            if isinstance(entry, RobotEntry):
+                made = import_link(folder, entry, one.asset_id, self._urdf(one), name)
+            elif _is_road_network(entry):
+                made = import_road_network(folder, entry.file)
+            elif isinstance(entry, MeshEntry):
+                made = import_object(folder, entry, one.asset_id, name)
+            else:
+                raise AssetError(f"asset '{asset_id}': is no object but one of kind {one.kind}")
+            self._check_unchanged(one, folder)
+            return pack_imported(made)
+
+        if isinstance(entry, RobotEntry) and not part:
+            links = ", ".join(f"{asset_id}/{n}" for n in list(self._urdf(one).links)[:2])
+            raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
+        key = content_key({"asset": self._key(one), "link": name})
+        return self._store.get(key, compute, unpack_imported)
+
+    def lanes(self, asset_id: str) -> tuple[Lane, ...]:
+        """Lanes of a road network; empty for anything else."""
+        one = self._entries().get(asset_id)
+        if one is None or not _is_road_network(one.entry):
+            return ()
+        folder = Folder(one.root)
+        lanes = road_network_lanes(folder, one.entry.file)
+        self._check_unchanged(one, folder)
+        return lanes
+
+    def robot(self, asset_id: str) -> RobotModel:
+        """Kinematics of a robot."""
+        one = self._entries()[asset_id]
+        if not isinstance(one.entry, RobotEntry):
+            raise AssetError(f"asset '{asset_id}': is no robot but one of kind {one.kind}")
+        return robot_model(asset_id, self._urdf(one), one.entry, str(one.root / one.entry.file))
+
+    def stage(self, asset_id: str) -> StageModel:
+        """What a stage holds."""
+        one = self._entries()[asset_id]
+        entry = one.entry
+        if not isinstance(entry, MeshEntry) or not is_stage(entry):
+            raise AssetError(f"asset '{asset_id}': is no stage; give a .usd, .usda, .usdc or .usdz")
+        if asset_id not in self._stages:
+            folder = Folder(one.root)
+            self._stages[asset_id] = stage_model(folder, entry, asset_id)
+            self._check_unchanged(one, folder)
+        return self._stages[asset_id]
+
+    def texture(self, texture_id: str) -> TextureData:
+        """Images of a listed texture, or of a mesh's material (``<asset>#<image>``)."""
+        owner, _, name = texture_id.partition("#")
+        part = self._part(owner)
+        one = part[0] if part else self._entries()[owner]
+        folder = Folder(one.root)
+        if not name:
+            if not isinstance(one.entry, TextureEntry):
+                raise AssetError(f"asset '{owner}': is no texture but one of kind {one.kind}")
+            name = one.entry.texture_name()
+        maps = find_maps(name)
+        if maps is not None:
+            return compose_texture(
+                maps, lambda image: self._image(owner, one, folder, image, alpha=True)
+            )
+        pixels = self._image(owner, one, folder, name, alpha=False)
+        return TextureData(np.ascontiguousarray(pixels[..., :3]))
+
+    def _image(
+        self, owner: str, one: IndexedAsset, folder: Folder, name: str, *, alpha: bool
+    ) -> UInt8:
+        """Pixels of an image inside a mesh file or beside it."""
+        if one.kind == "object" and name in (images := self.imported(owner).images):
+            return images[name]
+        place = str(folder.root / name)
+        return self._of_file(
+            folder, name, place, "rgba" if alpha else "albedo",
+            lambda: decode_image(folder.read(name), place, alpha=alpha),
+        )  # fmt: skip
+
+    def environment(self, asset_id: str) -> Float32:
+        """Pixels of a panorama."""
+        one = self._entries()[asset_id]
+        if one.kind != "environment":
+            raise AssetError(f"asset '{asset_id}': is no environment but one of kind {one.kind}")
+        folder, name = Folder(one.root), one.entry.file
+        place = str(folder.root / name)
+        return self._of_file(
+            folder, name, place, "radiance", lambda: decode_radiance(folder.read(name), place)
+        )  # fmt: skip
+
+    def _of_file(
+        self, folder: Folder, name: str, place: str, what: str, compute: Callable[[], NDArray[T]]
+    ) -> NDArray[T]:
+        """What an image file says, in the store under the hash of its bytes."""
+        if not folder.exists(name):
+            raise AssetError(f"{place}: no such image; put it there or correct what refers to it")
+        digests = self._digests.of(folder, name)
+        key: dict[str, object] = {"format": FORMAT, "image": digests[name]}
+        if what == "rgba":
+            key["channels"] = what
+        return self._store.get(
+            content_key(key), lambda: {what: compute()}, lambda arrays: arrays[what]
+        )
+
+    def _entries(self) -> dict[str, IndexedAsset]:
+        if self._listed is None:
+            self._listed = {}
+            for one in _everything(self._packs, self._user_roots):
+                if one.asset_id in self._listed:
+                    raise AssetError(
+                        f"asset '{one.asset_id}': both {self._listed[one.asset_id].root} and "
+                        f"{one.root} have it; rename one of them"
+                    )
+                self._listed[one.asset_id] = one
+        return self._listed
+
+    def _part(self, asset_id: str) -> tuple[IndexedAsset, str] | None:
+        """Robot and link of an id ``<robot>/<link>``, stage and piece of ``<stage>/<piece>``."""
+        whole, slash, part = asset_id.rpartition("/")
+        one = self._entries().get(whole) if slash else None
+        if one is None or asset_id in self._entries():
+            return None
+        if one.kind == "robot":
+            return (one, part) if part in self._urdf(one).links else None
+        if not is_stage(one.entry):
+            return None
+        return (one, part) if part in {p.name for p in self.stage(whole).pieces} else None
+
+    def _urdf(self, one: IndexedAsset) -> Urdf:
+        if one.asset_id not in self._urdfs:
+            self._urdfs[one.asset_id] = read_urdf(Folder(one.root), one.entry.file)
+        return self._urdfs[one.asset_id]
+
+    def _asset(self, one: IndexedAsset) -> Asset:
+        entry = one.entry
+        return Asset(
+            asset_id=one.asset_id,
+            kind=one.kind,
+            category=one.category(),
+            tags=one.tags(),
+            licence=one.origin.licence,
+            author=one.origin.author,
+            source=one.origin.source,
+            sha256=self._key(one),
+            mass_kg=entry.mass_kg if isinstance(entry, MeshEntry) else 0.0,
+            stackable=isinstance(entry, MeshEntry) and entry.stackable,
+            subcategory=entry.subcategory if isinstance(entry, MeshEntry) else "",
+            attributes=tuple(sorted(entry.attributes.items()))
+            if isinstance(entry, MeshEntry)
+            else (),
+            symmetries=_symmetries(entry),
+        )
+
+    def _key(self, one: IndexedAsset) -> str:
+        """Hash of the files and of everything that the import does with them."""
+        if one.asset_id not in self._keys:
+            self._keys[one.asset_id] = content_key(
+                {
+                    "format": FORMAT,
+                    "version": VERSION,
+                    "id": one.asset_id,
+                    "entry": one.entry.model_dump(
+                        exclude={"licence", "author", "source"}, exclude_defaults=True
+                    ),
+                    "files": self._files(one),
+                }
+            )
+        return self._keys[one.asset_id]
+
+    def _files(self, one: IndexedAsset) -> dict[str, str]:
+        """Digests of an asset's files as they were when it was first asked for."""
+        if one.asset_id not in self._hashed:
+            folder = Folder(one.root)
+            self._hashed[one.asset_id] = {
+                name: digest
+                for file in one.entry.files()
+                for name, digest in self._digests.of(folder, file).items()
+            }
+        return self._hashed[one.asset_id]
+
+    def _check_unchanged(self, one: IndexedAsset, folder: Folder) -> None:
+        """What was parsed is what was hashed."""
+        known = self._files(one)
+        for name, digest in folder.digests.items():
+            if known.get(name, digest) != digest:
+                raise AssetError(f"{folder.root / name}: changed while it was read; start again")
+
+
+def _symmetries(entry: Entry) -> tuple[Symmetry, ...]:
+    found = []
+    for symmetry in entry.symmetries if isinstance(entry, MeshEntry) else ():
+        x, y, z = symmetry.direction()
+        length = math.sqrt(x * x + y * y + z * z)
+        axis = (x / length, y / length, z / length)
+        found.append(Symmetry(axis, symmetry.fold or 0, symmetry.offset_m))
+    return tuple(found)
+
+
+def _is_road_network(entry: Entry) -> bool:
+    return isinstance(entry, MeshEntry) and entry.file.lower().endswith(ROAD_SUFFIX)
+
+
+def _everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:
+    yield from list_assets(read_index(_BUILT_IN), _pybullet_data())
+    yield from pack_assets(packs)
+    for root in user_roots:
+        yield from user_folder(root)
+
+
+def _pybullet_data() -> Path:
+    """Where pybullet's data lies; found without importing it."""
+    spec = importlib.util.find_spec("pybullet_data")
+    if spec is None or spec.origin is None:
+        raise AssetError("pybullet_data: not installed; pip install pybullet")
+    return Path(spec.origin).parent

@@ -1,0 +1,217 @@
+"""Where the template of the people pack is cut into zones, and how finely each is kept.
+
+Coordinates are those of the base shape in the template frame [m]; they were read off its joints
+and its outline. Both halves are cut alike, by ``|y|``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gen_data.generator.assets.people.body import Array
+from gen_data.generator.assets.people.mesh_simplify import Level
+
+EAR_XZ_M = (0.045, 0.715)
+EAR_RADIUS_M = 0.015
+CHIN_Z_M = 0.62
+
+_SHOULDER_M = np.array([0.015, 0.168, 0.525])
+_ELBOW_M = np.array([0.013, 0.313, 0.349])
+_WRIST_M = np.array([0.176, 0.431, 0.245])
+_ARM_RADIUS_M = 0.075
+_SHORT_SLEEVE_M = 0.14
+"""From the shoulder along the upper arm to the hem of a short sleeve."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """One step: the part of a zone where the level is positive becomes another zone."""
+
+    zone: str
+    into: str
+    level: Level
+
+
+def _above(z_m: float, slope: float = 0.0) -> Level:
+    """Height over a plane that passes (x = 0, z) and rises towards the front."""
+    return lambda p: np.asarray(p[:, 2] - z_m - slope * p[:, 0])
+
+
+def _below(z_m: float, slope: float = 0.0) -> Level:
+    return lambda p: np.asarray(z_m + slope * p[:, 0] - p[:, 2])
+
+
+def _arm_beyond(distance_m: float) -> Level:
+    """Positive on the arms beyond a distance from the shoulder."""
+
+    def level(p: Array) -> Array:
+        p = _one_side(p)
+        along = _along(p, _SHOULDER_M, _ELBOW_M) - distance_m
+        upper = _to_segment(p, _SHOULDER_M, _ELBOW_M)
+        lower = _to_segment(p, _ELBOW_M, _WRIST_M)
+        return np.minimum(along, _ARM_RADIUS_M - np.minimum(upper, lower))
+
+    return level
+
+
+def _beyond_wrist(shift_m: float) -> Level:
+    def level(p: Array) -> Array:
+        p = _one_side(p)
+        return np.minimum(_along(p, _WRIST_M, 2 * _WRIST_M - _ELBOW_M) - shift_m, p[:, 1] - 0.3)
+
+    return level
+
+
+def _mouth_inside(p: Array) -> Array:
+    """Positive behind the lips and within the cheeks."""
+    p = _one_side(p)
+    sides = np.minimum(0.034 - p[:, 1], np.minimum(p[:, 2] - 0.636, 0.7 - p[:, 2]))
+    front = 0.149 - 40.0 * p[:, 1] ** 2 - p[:, 0]
+    return np.minimum(np.minimum(sides, front), p[:, 0] - 0.05)
+
+
+def _above_hairline(p: Array) -> Array:
+    x = (-0.05, 0.0, 0.026, 0.034, 0.076, 0.086, 0.11, 0.15, 0.17)
+    z = (0.642, 0.655, 0.69, 0.742, 0.745, 0.768, 0.792, 0.801, 0.805)
+    return np.asarray(p[:, 2] - np.interp(p[:, 0], x, z))
+
+
+def _neck_hole(p: Array) -> Array:
+    """Positive within the neckline of a garment."""
+    return np.minimum(0.074 - np.hypot(p[:, 0] - 0.012, p[:, 1]), p[:, 2] - 0.545 + 0.5 * p[:, 0])
+
+
+def _inside_lapel(sign: float) -> Level:
+    """Positive on the chest to one side of a lapel of an open jacket."""
+
+    def level(p: Array) -> Array:
+        half = np.interp(p[:, 2], (0.13, 0.3, 0.52), (0.016, 0.024, 0.062))
+        return np.minimum(half + sign * p[:, 1], p[:, 0] - 0.03)
+
+    return level
+
+
+def _shoulders(p: Array) -> Array:
+    """Positive on the skin outside of every neckline."""
+    return np.minimum(np.hypot(p[:, 0] - 0.012, p[:, 1]) - 0.098, 0.6 - p[:, 2])
+
+
+def _ellipse(y_m: float, z_m: float, half_y_m: float, half_z_m: float, bend: float = 0.0) -> Level:
+    """Positive within an upright ellipse on the front of the head, one on either side."""
+
+    def level(p: Array) -> Array:
+        p = _one_side(p)
+        y = (p[:, 1] - y_m) / half_y_m
+        z = (p[:, 2] - z_m + bend * (p[:, 1] - y_m) ** 2) / half_z_m
+        return np.minimum((1.0 - np.hypot(y, z)) * half_z_m, p[:, 0] - 0.1)
+
+    return level
+
+
+def _one_side(p: Array) -> Array:
+    return np.stack([p[:, 0], np.abs(p[:, 1]), p[:, 2]], axis=1)
+
+
+def _along(p: Array, a: Array, b: Array) -> Array:
+    axis = (b - a) / np.sqrt(((b - a) ** 2).sum())
+    return np.asarray(((p - a) * axis).sum(axis=1))
+
+
+def _to_segment(p: Array, a: Array, b: Array) -> Array:
+    t = ((p - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum()
+    nearest = a + np.clip(t, 0.0, 1.0)[:, None] * (b - a)
+    return np.asarray(np.sqrt(((p - nearest) ** 2).sum(axis=1)))
+
+
+HAIRLINE = Cut("face", "scalp", _above_hairline)
+SHOULDERS = Cut("face", "", _shoulders)
+WAIST = Cut("hips", "torso", _above(0.13))
+# One lapel after the other: a level that bends within a triangle would be cut raggedly.
+FRONT = (
+    Cut("torso", "lapel", _inside_lapel(1.0)),
+    Cut("lapel", "front", _inside_lapel(-1.0)),
+    Cut("lapel", "torso", lambda p: np.ones(len(p))),
+)
+THIGH = Cut("legs", "upper_legs", _above(-0.385))
+KNEE = Cut("thighs", "shins", _below(-0.31))
+CUFF = Cut("shins", "ankles", _below(-0.7))
+SOLE = Cut("shoes", "soles", _below(-0.803))
+
+BODY: Sequence[Cut] = (
+    Cut("face", "hands", _beyond_wrist(-0.02)),
+    Cut("face", "arms", _arm_beyond(_SHORT_SLEEVE_M - 0.04)),
+    Cut("face", "legs", _below(-0.15)),
+    Cut("legs", "", _below(-0.75)),
+    THIGH,
+    Cut("face", "", _below(0.535, -0.3)),
+    SHOULDERS,
+    Cut("face", "", _mouth_inside),
+    HAIRLINE,
+    Cut("face", "brows", _ellipse(0.033, 0.752, 0.022, 0.0042, 4.0)),
+    Cut("face", "lips", _ellipse(0.0, 0.6615, 0.025, 0.0105)),
+)
+EYES: Sequence[Cut] = (Cut("eyes", "irises", lambda p: np.asarray(p[:, 0] - 0.1375)),)
+TIGHTS: Sequence[Cut] = (
+    Cut("hips", "sleeves", _arm_beyond(_SHORT_SLEEVE_M)),
+    WAIST,
+    Cut("torso", "", _neck_hole),
+    *FRONT,
+    Cut("hips", "thighs", _below(-0.01)),
+    KNEE,
+    CUFF,
+    Cut("ankles", "shoes", _below(-0.752, 0.25)),
+    SOLE,
+)
+SKIRT: Sequence[Cut] = (
+    Cut("skirt_top", "skirt_middle", _below(-0.24)),
+    Cut("skirt_middle", "skirt_end", _below(-0.45)),
+    Cut("skirt_end", "", _below(-0.62)),
+)
+HAIR: Sequence[Cut] = (Cut("hair", "hair_end", _below(0.57)),)
+
+CURTAIN_M = (
+    (0.785, 0.079, 0.082),
+    (0.75, 0.084, 0.088),
+    (0.71, 0.086, 0.092),
+    (0.67, 0.086, 0.095),
+    (0.63, 0.086, 0.099),
+    (0.6, 0.088, 0.104),
+    (0.57, 0.095, 0.109),
+    (0.53, 0.11, 0.112),
+    (0.49, 0.119, 0.112),
+    (0.44, 0.123, 0.106),
+)
+"""Long hair: height, half length and half width of the ellipses that it hangs along."""
+CURTAIN_X_M = 0.03
+CURTAIN_REACH_RAD = 1.75
+"""From the back of the head to the hair's front edge, behind the ears."""
+CURTAIN_COLUMNS = 15
+
+MAX_FACES = {
+    "face": 1200,
+    "scalp": 220,
+    "brows": 24,
+    "lips": 40,
+    "eyes": 80,
+    "irises": 32,
+    "hands": 560,
+    "arms": 260,
+    "legs": 220,
+    "upper_legs": 120,
+    "torso": 600,
+    "front": 80,
+    "sleeves": 280,
+    "hips": 240,
+    "thighs": 240,
+    "shins": 220,
+    "ankles": 80,
+    "shoes": 320,
+    "soles": 120,
+    "skirt_top": 240,
+    "skirt_middle": 140,
+    "skirt_end": 140,
+}
+"""Triangles of a zone, both sides together; a zone with fewer keeps what it has."""

@@ -1,0 +1,130 @@
+"""From joint angles to a rotation per bone.
+
+Limbs are given the direction they shall have, whatever the template's own pose is: a bone is first
+turned so that it hangs straight down and then swung from there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gen_data.generator.assets.people.animation import Arm, Leg, Stance
+from gen_data.generator.assets.people.body import Array, BodyTemplate
+from gen_data.generator.assets.people.skinning import Rotations
+
+_FINGERS = ("index", "middle", "ring", "pinky")
+_STANCE_IN_DEG = 3.0
+"""Thighs lean inward, so that the feet are nearer to each other than the hips."""
+_TOES_OUT_DEG = 6.0
+
+
+def bone_rotations(body: BodyTemplate, heads_m: Array, stance: Stance) -> Rotations:
+    """The rotation of every bone that a stance turns.
+
+    Args:
+        body: Whose bones.
+        heads_m: Bone heads before the pose [m], shape [bones, 3].
+        stance: Joint angles.
+    """
+    rotations: dict[str, Array] = {
+        "pelvis": _yaw(stance.twist),
+        "spine_01": _yaw(stance.twist / 3.0) @ _pitch(-stance.lean / 2.0),
+        "spine_02": _yaw(-stance.twist / 3.0) @ _pitch(-stance.lean),
+        "spine_03": _yaw(-stance.twist) @ _pitch(-stance.lean),
+        "neck_01": _pitch(-(stance.lean + stance.nod) / 2.0),
+        "head": _pitch(-stance.nod),
+    }
+    for side, sign, leg, arm in (
+        ("l", 1.0, stance.left_leg, stance.left_arm),
+        ("r", -1.0, stance.right_leg, stance.right_arm),
+    ):
+        rotations |= _leg(body, heads_m, side, sign, leg)
+        rotations |= _arm(body, heads_m, side, sign, arm, rotations["spine_03"])
+    return rotations
+
+
+def _leg(body: BodyTemplate, heads_m: Array, side: str, sign: float, leg: Leg) -> Rotations:
+    thigh = _direction(body, heads_m, f"thigh_{side}", f"calf_{side}")
+    calf = _direction(body, heads_m, f"calf_{side}", f"foot_{side}")
+    inward = np.array([0.0, -sign * math.sin(math.radians(_STANCE_IN_DEG)), -1.0])
+    foot = leg.hip - leg.knee + leg.ankle
+    out = _yaw(sign * _TOES_OUT_DEG)
+    return {
+        f"thigh_{side}": _pitch(leg.hip) @ _between(thigh, inward),
+        f"calf_{side}": _pitch(leg.hip - leg.knee) @ _between(calf, inward * (1.0, 0.5, 1.0)),
+        f"foot_{side}": out @ _pitch(foot),
+        f"ball_{side}": out @ _pitch(foot + leg.toes),
+    }
+
+
+def _arm(
+    body: BodyTemplate, heads_m: Array, side: str, sign: float, arm: Arm, trunk: Array
+) -> Rotations:
+    down = np.array([0.0, 0.0, -1.0])
+    upper = _between(_direction(body, heads_m, f"upperarm_{side}", f"lowerarm_{side}"), down)
+    fore_direction = upper @ _direction(body, heads_m, f"lowerarm_{side}", f"hand_{side}")
+    fore = _between(fore_direction, down) @ upper
+    out = trunk @ _roll(sign * arm.out)
+    bend = _yaw(-sign * arm.inward) @ _pitch(arm.elbow)
+    lower = out @ _pitch(arm.swing) @ bend @ fore
+    return {
+        f"upperarm_{side}": out @ _pitch(arm.swing) @ upper,
+        f"lowerarm_{side}": lower,
+        **_fingers(body, heads_m, side, sign * arm.curl, lower),
+    }
+
+
+def _fingers(
+    body: BodyTemplate, heads_m: Array, side: str, curl: float, hand: Array
+) -> dict[str, Array]:
+    """Fingers bent about the line of the knuckles."""
+    across = _direction(body, heads_m, f"index_01_{side}", f"pinky_01_{side}")
+    made: dict[str, Array] = {}
+    for finger in _FINGERS:
+        for k in (1, 2, 3):
+            made[f"{finger}_0{k}_{side}"] = hand @ _about(across, k * curl)
+    return made
+
+
+def _direction(body: BodyTemplate, heads_m: Array, start: str, end: str) -> Array:
+    return _unit(heads_m[body.bone(end)] - heads_m[body.bone(start)])
+
+
+def _pitch(angle_deg: float) -> Array:
+    """Turns front upward and down forward."""
+    return _about(np.array([0.0, -1.0, 0.0]), angle_deg)
+
+
+def _yaw(angle_deg: float) -> Array:
+    """Turns front to the left."""
+    return _about(np.array([0.0, 0.0, 1.0]), angle_deg)
+
+
+def _roll(angle_deg: float) -> Array:
+    """Turns down to the left."""
+    return _about(np.array([1.0, 0.0, 0.0]), angle_deg)
+
+
+def _about(axis: Array, angle_deg: float) -> Array:
+    """Rotation about a unit axis (Rodrigues 1840)."""
+    angle = math.radians(angle_deg)
+    x, y, z = axis
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
+    return rotation
+
+
+def _between(start: Array, end: Array) -> Array:
+    """The smallest rotation that turns one direction into another; not for opposite ones."""
+    a, b = _unit(start), _unit(end)
+    x, y, z = np.cross(a, b)
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Array = np.eye(3) + k + (k @ k) / (1.0 + float((a * b).sum()))
+    return rotation
+
+
+def _unit(vector: Array) -> Array:
+    unit: Array = vector / math.sqrt(float((vector * vector).sum()))
+    return unit

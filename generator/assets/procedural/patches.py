@@ -1,0 +1,221 @@
+"""From loose triangles to a finished mesh.
+
+Generators make ``Patch`` objects: triangles without shared vertices, which are moved and joined
+freely. ``finish_mesh`` welds them, computes normals that are smooth except across creases, and
+splits vertices where normals or texture coordinates differ.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# Vertices nearer than this are one vertex, and vertices are stored on this grid, so that the last
+# bits of sine and cosine, which differ between processors, do not reach the mesh.
+GRID_M = 1e-6
+CREASE_DEG = 38.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Patch:
+    """Triangles without shared vertices, counter-clockwise seen from outside.
+
+    Attributes:
+        corners_m: float64 [n, 3 corners, 3].
+        uvs: float64 [n, 3 corners, 2], (0, 0) at the image's bottom left.
+        slots: int64 [n], material slot of each triangle.
+    """
+
+    corners_m: Array
+    uvs: Array
+    slots: Indices
+
+    def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Patch:
+        """The patch translated [m]."""
+        return replace(self, corners_m=self.corners_m + np.array([x, y, z]))
+
+    def rotated(self, axis: str, angle_rad: float) -> Patch:
+        """The patch turned about the axis ``x``, ``y`` or ``z`` by the right-hand rule."""
+        return replace(self, corners_m=rotate(self.corners_m, axis, angle_rad))
+
+    def painted(self, slot: int) -> Patch:
+        """The patch with all triangles in one material slot."""
+        return replace(self, slots=np.full(len(self.slots), slot, dtype=np.int64))
+
+    def scaled(self, x: float, y: float, z: float) -> Patch:
+        """The patch scaled along the axes; factors are positive."""
+        return replace(self, corners_m=self.corners_m * np.array([x, y, z]))
+
+    def flipped(self) -> Patch:
+        """The patch seen from its other side."""
+        return replace(self, corners_m=self.corners_m[:, ::-1], uvs=self.uvs[:, ::-1])
+
+    def bounds_m(self) -> tuple[Array, Array]:
+        """Smallest and largest coordinates, shape [3] each."""
+        flat = self.corners_m.reshape(-1, 3)
+        return flat.min(axis=0), flat.max(axis=0)
+
+
+def rotate(points: Array, axis: str, angle_rad: float) -> Array:
+    """Points, shape [..., 3], turned about a coordinate axis by the right-hand rule."""
+    i = "xyz".index(axis)
+    j, k = (i + 1) % 3, (i + 2) % 3
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    turned: Array = points.copy()
+    turned[..., j] = c * points[..., j] - s * points[..., k]
+    turned[..., k] = s * points[..., j] + c * points[..., k]
+    return turned
+
+
+def join_patches(patches: Iterable[Patch]) -> Patch:
+    """One patch of all triangles."""
+    parts = tuple(patches)
+    return Patch(
+        np.concatenate([p.corners_m for p in parts]),
+        np.concatenate([p.uvs for p in parts]),
+        np.concatenate([p.slots for p in parts]),
+    )
+
+
+def make_centred_solid(
+    patches: Iterable[Patch],
+    materials: Sequence[Material],
+    hulls_m: Iterable[Array],
+    crease_deg: float = CREASE_DEG,
+) -> Solid:
+    """A solid whose origin is the centre of its bounding box."""
+    patch = join_patches(patches)
+    low, high = patch.bounds_m()
+    # On the vertex grid, so that the shift does not change which vertices coincide.
+    x, y, z = (round(float(v) / GRID_M) * GRID_M for v in round_values(0.5 * (low + high)))
+    moved = patch.moved(-x, -y, -z)
+    hulls = tuple(hull - np.array([x, y, z]) for hull in hulls_m)
+    return make_solid_in_place((moved,), materials, hulls, crease_deg)
+
+
+def make_solid_in_place(
+    patches: Iterable[Patch],
+    materials: Sequence[Material],
+    hulls_m: Iterable[Array],
+    crease_deg: float = CREASE_DEG,
+) -> Solid:
+    """A solid in the frame it was made in (furniture: the centre of the footprint on the floor)."""
+    mesh = finish_mesh(join_patches(patches), materials, crease_deg)
+    return Solid(
+        mesh, ConvexParts(tuple(np.round(round_values(hull), 6) + 0.0 for hull in hulls_m))
+    )
+
+
+def finish_mesh(patch: Patch, materials: Sequence[Material], crease_deg: float) -> MeshData:
+    """The mesh of a patch, with normals smooth across edges that bend less than ``crease_deg``."""
+    cells = np.round(round_values(patch.corners_m) / GRID_M).astype(np.int64)
+    corners, keep = _whole_triangles(cells)
+    cells, uvs, slots = cells[keep], round_values(patch.uvs[keep]), patch.slots[keep]
+    normals = round_values(_corner_normals(cells.reshape(-1, 3), corners, crease_deg))
+    key = np.concatenate(
+        [
+            cells.reshape(-1, 3),
+            np.round(normals * 2048).astype(np.int64),
+            np.round(uvs.reshape(-1, 2) * 65536).astype(np.int64),
+        ],
+        axis=1,
+    )
+    first, inverse = _unique_rows(key)
+    return MeshData(
+        vertices_m=(cells.reshape(-1, 3)[first] * GRID_M).astype(np.float32),
+        faces=inverse.reshape(-1, 3).astype(np.int32),
+        # Adding zero turns -0.0 into 0.0: the sign of nothing differs between processors too.
+        normals=(np.round(normals[first], 6) + 0.0).astype(np.float32),
+        uvs=(np.round(uvs.reshape(-1, 2)[first], 6) + 0.0).astype(np.float32),
+        face_slots=slots.astype(np.int32),
+        materials=tuple(materials),
+    )
+
+
+def round_values(values: Array) -> Array:
+    """Values without their last bits, which sine, cosine and powers leave to the processor.
+
+    Rounding twice, here and to a coarser grid, gives the same for values that lie exactly between
+    two points of that grid, as a symmetric shape's do.
+    """
+    rounded: Array = np.round(values, 10)
+    return rounded
+
+
+def _whole_triangles(cells: Indices) -> tuple[Array, NDArray[np.bool_]]:
+    """Corners of the triangles that have an area [grid cells], and which those are."""
+    corners = cells.astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(axis=1) for i in range(3)], 0)
+    # Height below half a cell: a triangle that rounding has flattened to a line.
+    keep = np.sqrt((cross**2).sum(axis=1)) > 0.5 * np.sqrt(longest) + 1e-9
+    return corners[keep], keep
+
+
+def _corner_normals(cells: Indices, corners: Array, crease_deg: float) -> Array:
+    """Unit normal per corner: the mean over the faces that meet there without a crease.
+
+    Weighted by the angle of each face at the vertex (Thürmer and Wüthrich, "Computing vertex
+    normals from polygonal facets", J. Graphics Tools 3(1), 1998) and by its area, so that a flat
+    face stays flat next to a small bevel.
+    """
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face_normals = np.repeat(_unit(cross), 3, axis=0)
+    weighted = np.repeat(cross, 3, axis=0) * _corner_angles(corners).reshape(-1, 1)
+    _, vertex = _unique_rows(cells)
+    order = np.argsort(vertex, kind="stable")
+    counts = np.bincount(vertex)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    fan = counts[vertex[order]]
+    mine = np.repeat(order, fan)
+    steps = np.arange(fan.sum()) - np.repeat(np.cumsum(fan) - fan, fan)
+    theirs = order[np.repeat(starts[vertex[order]], fan) + steps]
+    smooth = (face_normals[mine] * face_normals[theirs]).sum(axis=1) > math.cos(
+        math.radians(crease_deg)
+    )
+    sums = [
+        np.bincount(mine[smooth], weighted[theirs[smooth], axis], len(cells)) for axis in range(3)
+    ]
+    return _unit(np.stack(sums, axis=1))
+
+
+def _corner_angles(corners: Array) -> Array:
+    """Interior angles [rad], shape [n, 3]."""
+    angles = []
+    for i in range(3):
+        a = _unit(corners[:, (i + 1) % 3] - corners[:, i])
+        b = _unit(corners[:, (i + 2) % 3] - corners[:, i])
+        angles.append(np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0)))
+    return np.stack(angles, axis=1)
+
+
+def _unit(vectors: Array) -> Array:
+    lengths = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
+    unit: Array = vectors / np.maximum(lengths, 1e-300)
+    return unit
+
+
+def _unique_rows(rows: Indices) -> tuple[Indices, Indices]:
+    """First index of each distinct row, and each row's number; in order of first appearance."""
+    order = np.lexsort(rows.T[::-1])
+    ranked = rows[order]
+    new = np.concatenate([[True], (ranked[1:] != ranked[:-1]).any(axis=1)])
+    group = np.cumsum(new) - 1
+    # lexsort is stable: the first of each run is the first appearance.
+    first = order[new]
+    number = np.zeros(len(rows), dtype=np.int64)
+    number[order] = group
+    appearance = np.argsort(first, kind="stable")
+    rank = np.zeros(len(first), dtype=np.int64)
+    rank[appearance] = np.arange(len(first))
+    return first[appearance], rank[number]

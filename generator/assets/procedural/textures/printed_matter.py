@@ -1,0 +1,462 @@
+"""Printed matter: labels, folding boxes and book covers with invented names.
+
+These belong to one object and follow its UVs. Drawn at the proportions of the object and then
+squeezed into the image, so that letters look right on the object.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from gen_data.generator.assets.procedural import cans, cartons
+from gen_data.generator.assets.procedural.bottles import LABEL_ASPECT
+from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
+from gen_data.generator.assets.procedural.textures import artwork as art
+from gen_data.generator.assets.procedural.textures.artwork import Box, Color, Place
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.core.asset_types import TextureData
+from gen_data.generator.core.streams import Rng
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
+
+_FRUIT = ((200, 40, 40), (240, 150, 30), (120, 40, 110), (235, 200, 50), (110, 160, 50))
+# Ground, second colour, accent, ink.
+_SCHEMES = (
+    ("#f6f2e7", "#c8202f", "#f2b705", "#2a1a14"),
+    ("#12355b", "#f2f2ee", "#e94f37", "#f2f2ee"),
+    ("#1f7a4d", "#f3f0df", "#f2c14e", "#f3f0df"),
+    ("#f4d35e", "#d1495b", "#2e4057", "#2e2420"),
+    ("#ffffff", "#0f6fb8", "#7ac143", "#12324a"),
+    ("#c1121f", "#fdf0d5", "#f2b705", "#fdf0d5"),
+    ("#3d2a5c", "#e7c6ff", "#f7b801", "#ffffff"),
+    ("#f7ede2", "#84a59d", "#f28482", "#3a3a3a"),
+    ("#111417", "#c9a24b", "#8d1b24", "#f0e9d8"),
+    ("#e76f51", "#264653", "#f4e3b2", "#fff6e0"),
+    ("#9fd3e6", "#ffffff", "#e63946", "#1d3557"),
+    ("#f2a6c0", "#ffffff", "#7a1f4b", "#5a1236"),
+    ("#5c3a21", "#e8c99b", "#d98e04", "#fff1d6"),
+    ("#0b8f8c", "#ffffff", "#ffd23f", "#ffffff"),
+    ("#ff8c1a", "#ffffff", "#3a2a8c", "#2b1a10"),
+    ("#dfe5e8", "#4a5a66", "#d62828", "#1f2a30"),
+)
+_STARTS = (
+    "Sol",
+    "Ver",
+    "Kin",
+    "Bra",
+    "Lun",
+    "Mar",
+    "Tol",
+    "Fen",
+    "Ori",
+    "Zan",
+    "Pel",
+    "Gra",
+    "Nor",
+    "Cas",
+    "Dul",
+    "Ha",
+    "Riv",
+    "Ost",
+    "Quil",
+    "Tam",
+)
+_ENDS = (
+    "ara",
+    "ello",
+    "ix",
+    "on",
+    "ita",
+    "berg",
+    "ova",
+    "ette",
+    "um",
+    "ino",
+    "ay",
+    "eva",
+    "or",
+    "ula",
+    "ano",
+    "is",
+    "enda",
+    "ik",
+    "ora",
+    "ey",
+)
+_PRODUCTS = (
+    "CRISPY FLAKES",
+    "GREEN TEA",
+    "TOMATO SOUP",
+    "SEA SALT",
+    "ORANGE & LIME",
+    "DARK ROAST",
+    "WHOLE OATS",
+    "RED BEANS",
+    "FRESH CITRUS",
+    "CLASSIC COLA",
+    "PEACH ICED TEA",
+    "BASIL PESTO",
+    "CORN & PEAS",
+    "WILD BERRY",
+    "COCOA CRUNCH",
+    "SPARKLING",
+    "HONEY NUT",
+    "SOFT CARE",
+    "MOUNTAIN",
+    "GINGER ALE",
+)
+_NOTES = (
+    "new recipe",
+    "no added sugar",
+    "since 1926",
+    "100% natural",
+    "family size",
+    "extra fresh",
+    "original",
+    "with real fruit",
+    "crunchy!",
+    "light",
+)
+_VOLUMES = ("330 ml", "500 ml", "750 ml", "1 L")
+_WEIGHTS = ("250 g", "375 g", "400 g", "500 g")
+_PRAISE = ("A quiet triumph", "Impossible to put down", "Warm and wise", "The book of the year")
+_TITLES = (
+    "THE LONG",
+    "A QUIET",
+    "WINTER",
+    "THE LAST",
+    "BEYOND THE",
+    "NORTH OF",
+    "THE PAPER",
+    "SEVEN",
+    "NIGHT",
+    "THE GLASS",
+)
+_SUBJECTS = (
+    "HARBOUR",
+    "GARDEN",
+    "RIVER",
+    "MACHINE",
+    "LETTERS",
+    "ISLAND",
+    "ORCHARD",
+    "SIGNAL",
+    "HOUSE",
+    "MEADOW",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Design:
+    """What all faces of one product share."""
+
+    ground: Color
+    second: Color
+    accent: Color
+    ink: Color
+    brand: str
+    product: str
+    note: str
+    size: str
+    layout: int
+    picture: int
+    bold: int
+
+
+def label(seed: int) -> TextureData:
+    """Wrap-around label of a bottle or jar; the front is in the middle. 512 x 256."""
+    rng = variant_rng("label", seed)
+    image = _wrap(
+        int(art.SIZE_PX * 1.5),
+        LABEL_ASPECT,
+        _design(seed, rng, _VOLUMES),
+        rng,
+    )
+    return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX // 2)
+
+
+def can_label(seed: int) -> TextureData:
+    """All around a can; the front is in the middle."""
+    rng = variant_rng("can_label", seed)
+    sizes = _WEIGHTS if cans.can_size(seed).food else ("330 ml", "500 ml")
+    image = _wrap(int(art.SIZE_PX * 1.5), cans.label_aspect(seed), _design(seed, rng, sizes), rng)
+    return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX)
+
+
+def carton(seed: int) -> TextureData:
+    """The six faces of a folding box, laid out by ``cartons.CARTON_ATLAS``."""
+    return _box_print("carton", seed, cartons.carton_size_m(seed))
+
+
+def milk_label(seed: int) -> TextureData:
+    """The faces of a milk carton, laid out by ``cartons.CARTON_ATLAS``."""
+    return _box_print("milk_label", seed, cartons.milk_size_m(seed))
+
+
+def book_cover(seed: int) -> TextureData:
+    """Back, spine and front of a book, laid out by ``books.COVER_ATLAS``."""
+    from gen_data.generator.assets.procedural import books
+
+    rng = variant_rng("book_cover", seed)
+    words = choose(_TITLES, rng), choose(_SUBJECTS, rng)
+    design = replace(_design(seed, rng), product=" ".join(words), note=choose(_PRAISE, rng))
+    length, width, thickness = books.book_size_m(seed)
+    scale = 560.0 / length
+    h = int(length * scale)
+    faces = {
+        "front": _front_cover(int(width * scale), h, words, design, rng),
+        "spine": _spine(max(24, int(thickness * scale)), h, design),
+        "back": _back_cover(int(width * scale), h, design, rng),
+    }
+    return art.atlas(faces, books.COVER_ATLAS, design.ground)
+
+
+def _design(seed: int, rng: Rng, sizes: Sequence[str] = _WEIGHTS) -> _Design:
+    ground, second, accent, ink = (hex_to_srgb8(code) for code in _SCHEMES[seed % len(_SCHEMES)])
+    if is_drawn(0.3, rng):
+        second, accent = accent, second
+    name = choose(_STARTS, rng) + choose(_ENDS, rng)
+    return _Design(
+        ground,
+        second,
+        accent,
+        ink,
+        brand=name.upper() if is_drawn(0.5, rng) else name,
+        product=choose(_PRODUCTS, rng),
+        note=choose(_NOTES, rng),
+        size=choose(sizes, rng),
+        layout=int(uniform_between(0, 5, rng)),
+        picture=int(uniform_between(0, 5, rng)),
+        bold=int(uniform_between(1, 5, rng)),
+    )
+
+
+def _box_print(name: str, seed: int, size_m: tuple[float, float, float]) -> TextureData:
+    rng = variant_rng(name, seed)
+    design = _design(seed, rng)
+    depth, width, height = size_m
+    scale = 460.0 / max(size_m)
+    w, d, h = (max(24, int(side * scale)) for side in (width, depth, height))
+    faces = {
+        "front": _front(w, h, design, rng),
+        "back": _front(w, h, design, variant_rng(f"{name}/back", seed)),
+        "left": _info(d, h, design, rng),
+        "right": _side(d, h, design, rng),
+        "top": art.canvas(w, d, design.second) if name == "milk_label" else _strip(w, d, design),
+        "bottom": _strip(w, d, design),
+    }
+    return art.atlas(faces, cartons.CARTON_ATLAS, design.ground)
+
+
+def _wrap(width: int, aspect: float, design: _Design, rng: Rng) -> Image:
+    """Front in the middle, information half on each end; the ends meet in the plain ground."""
+    height = max(48, int(width / aspect))
+    canvas = art.canvas(width, height, design.ground)
+    # What is seen at once of a cylinder is less than half of it.
+    front = _front(int(0.42 * width), height, design, rng)
+    canvas.paste(front, (int(0.29 * width), 0))
+    end = int(0.25 * width)
+    canvas.paste(_info(end, height, design, rng), (int(0.74 * width), 0))
+    canvas.paste(_side(end, height, design, rng), (int(0.01 * width), 0))
+    _bands(canvas, design)
+    return canvas
+
+
+def _front(w: int, h: int, design: _Design, rng: Rng) -> Image:
+    """The face that sells: ground, picture, brand, product, note, size."""
+    image = art.canvas(w, h, design.ground)
+    _ground(image, design, rng)
+    tall = h > 0.8 * w
+    brand = (0.1, 0.06, 0.9, 0.24) if tall else (0.05, 0.08, 0.62, 0.42)
+    product = (0.12, 0.345, 0.88, 0.42) if tall else (0.05, 0.5, 0.6, 0.66)
+    picture = (0.2, 0.46, 0.8, 0.88) if tall else (0.64, 0.12, 0.97, 0.88)
+    _picture(image, picture, design, rng)
+    on_ground = design.layout in (0, 3)
+    if design.layout in (1, 4):
+        art.panel(image, brand, design.second)
+    art.text(
+        image,
+        brand,
+        design.brand,
+        design.ink if on_ground else _readable(design, design.second),
+        design.bold,
+    )
+    art.text(image, product, design.product, design.ink, 1)
+    note = (0.05, 0.9, 0.5, 0.97) if tall else (0.05, 0.76, 0.4, 0.88)
+    size = (0.68, 0.91, 0.95, 0.97) if tall else (0.44, 0.78, 0.6, 0.88)
+    art.text(image, note, design.note, design.ink, 0)
+    art.text(image, size, design.size, design.ink, 1)
+    if tall and is_drawn(0.5, rng):
+        art.burst(image, (0.85, 0.5), 0.11 * w, design.accent, design.ground)
+    return image
+
+
+def _ground(image: Image, design: _Design, rng: Rng) -> None:
+    """Gradient, split, wave, diagonal or plain."""
+    w, h = image.size
+    draw = art.pen(image)
+    if design.layout == 0:
+        art.gradient(image, design.ground, art.blend(design.ground, design.second, 0.45))
+    elif design.layout == 1:
+        draw.rectangle([0, 0, w, int(0.31 * h)], fill=design.second)
+    elif design.layout == 2:
+        bend, phase = uniform_between(0.01, 0.035, rng), uniform_between(0.0, 6.0, rng)
+        edge = [(x, h * (0.27 + bend * math.sin(phase + 5.0 * x / w))) for x in range(0, w + 8, 4)]
+        draw.polygon([(0, 0), (w + 8, 0), *edge[::-1]], fill=design.second)
+        draw.line([(x, y + 0.015 * h) for x, y in edge], fill=design.accent, width=max(2, h // 60))
+    elif design.layout == 3:
+        draw.polygon([(0, h), (w, 0.62 * h), (w, h)], fill=design.accent)
+        draw.polygon([(0, h), (w, 0.72 * h), (w, h)], fill=design.second)
+    else:
+        draw.ellipse([-0.35 * w, -0.35 * h, 1.35 * w, 0.33 * h], fill=design.second)
+
+
+def _picture(image: Image, box: Box, design: _Design, rng: Rng) -> None:
+    """A simple picture of what is inside."""
+    x0, y0, x1, y1 = art.pixels(image, box)
+    radius = min(x1 - x0, y1 - y0) // 2
+    draw = (_bowl, _fruits, _leaves, _landscape, _rings)[design.picture]
+    draw(art.pen(image), ((x0 + x1) // 2, (y0 + y1) // 2), radius, design, rng)
+
+
+def _bowl(pen: ImageDraw, at: Place, r: float, design: _Design, rng: Rng) -> None:
+    """A bowl heaped with flakes."""
+    cx, cy = at
+    rim = art.blend(design.accent, (255, 255, 255), 0.5)
+    pen.ellipse([cx - r, cy - 0.35 * r, cx + r, cy + 0.25 * r], fill=rim)
+    for _ in range(26):
+        turn, reach = uniform_between(0, 2 * math.pi, rng), uniform_between(0, 0.8, rng) * r
+        x, y = cx + reach * math.cos(turn), cy - 0.1 * r + 0.28 * reach * math.sin(turn)
+        shade = art.blend((214, 150, 60), (120, 60, 20), uniform_between(0.0, 0.7, rng))
+        pen.ellipse([x - 0.13 * r, y - 0.09 * r, x + 0.13 * r, y + 0.09 * r], fill=shade)
+    pen.pieslice([cx - r, cy - 0.95 * r, cx + r, cy + 0.95 * r], 2, 178, fill=design.accent)
+
+
+def _fruits(pen: ImageDraw, at: Place, r: float, _: _Design, rng: Rng) -> None:
+    """Three fruits in a heap."""
+    for dx, dy in ((-0.42, 0.2), (0.4, 0.25), (0.0, -0.25)):
+        art.fruit(pen, (at[0] + dx * r, at[1] + dy * r), 0.5 * r, choose(_FRUIT, rng))
+
+
+def _leaves(pen: ImageDraw, at: Place, r: float, _: _Design, rng: Rng) -> None:
+    """A rosette of leaves."""
+    foot = at[0], at[1] + 0.5 * r
+    for i in range(7):
+        turn = math.pi * (i / 6 + 1)
+        tip = foot[0] + r * math.cos(turn), foot[1] + r * math.sin(turn)
+        art.leaf(pen, foot, tip, art.blend((60, 130, 60), (20, 80, 40), uniform_between(0, 1, rng)))
+
+
+def _landscape(pen: ImageDraw, at: Place, r: float, design: _Design, _: Rng) -> None:
+    """A sun over hills."""
+    cx, cy = at
+    pen.ellipse([cx - 0.5 * r, cy - 0.9 * r, cx + 0.5 * r, cy + 0.1 * r], fill=design.accent)
+    for i in range(3):
+        top = cy + 0.3 * i * r
+        hills = [
+            (x, top + 0.14 * r * math.sin(3.0 * x / max(r, 1.0) + 2 * i))
+            for x in range(int(cx - r), int(cx + r) + 1, 3)
+        ]
+        grass = art.blend((150, 190, 90), (30, 90, 60), 0.2 + 0.3 * i)
+        pen.polygon([(cx - r, cy + r), *hills, (cx + r, cy + r)], fill=grass)
+
+
+def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: Rng) -> None:
+    """Concentric rings."""
+    cx, cy = at
+    for i in range(5, 0, -1):
+        s = r * i / 5
+        pen.ellipse(
+            [cx - s, cy - s, cx + s, cy + s], fill=design.accent if i % 2 else design.second
+        )
+
+
+def _info(w: int, h: int, design: _Design, rng: Rng) -> Image:
+    """Small print, a table of nutrition and a bar code."""
+    image = art.canvas(w, h, art.blend(design.ground, (255, 255, 255), 0.25))
+    paper = art.blend(design.ground, (255, 255, 255), 0.25)
+    ink = (25, 25, 28) if sum(paper) > 330 else (240, 240, 240)
+    art.text(image, (0.08, 0.03, 0.92, 0.11), design.brand, ink, 1)
+    art.lines(image, (0.08, 0.14, 0.92, 0.32), ink, paper, rng)
+    art.table(image, (0.08, 0.36, 0.92, 0.66), ink, rng)
+    art.barcode(image, (0.1, 0.72, 0.9, 0.95), rng)
+    return image
+
+
+def _side(w: int, h: int, design: _Design, rng: Rng) -> Image:
+    """Brand upright along the side, some small print below."""
+    image = art.canvas(w, h, design.second)
+    ink = _readable(design, design.second)
+    turned = art.canvas(int(0.62 * h), max(8, int(0.7 * w)), design.second)
+    art.text(turned, (0.0, 0.1, 1.0, 0.9), design.brand, ink, design.bold)
+    image.paste(turned.rotate(90, expand=True), (int(0.15 * w), int(0.04 * h)))
+    art.lines(image, (0.1, 0.72, 0.9, 0.95), ink, design.second, rng)
+    return image
+
+
+def _strip(w: int, h: int, design: _Design) -> Image:
+    image = art.canvas(w, h, design.second)
+    art.text(
+        image, (0.1, 0.2, 0.9, 0.8), design.brand, _readable(design, design.second), design.bold
+    )
+    return image
+
+
+def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: Rng) -> Image:
+    image = art.canvas(w, h, design.ground)
+    _ground(image, design, rng)
+    _picture(image, (0.12, 0.4, 0.88, 0.82), design, rng)
+    art.panel(image, (0.06, 0.07, 0.94, 0.35), design.ground)
+    art.text(image, (0.1, 0.09, 0.9, 0.2), words[0], design.ink, 2)
+    art.text(image, (0.1, 0.22, 0.9, 0.34), words[1], design.ink, 3)
+    art.panel(image, (0.0, 0.87, 1.0, 0.97), design.second)
+    art.text(
+        image,
+        (0.2, 0.895, 0.8, 0.945),
+        f"{design.brand} {choose(_ENDS, rng).title()}",
+        _readable(design, design.second),
+        1,
+    )
+    return image
+
+
+def _spine(w: int, h: int, design: _Design) -> Image:
+    """Title along the spine, read from the top down."""
+    strip = art.canvas(h, w, design.second)
+    ink = _readable(design, design.second)
+    art.text(strip, (0.06, 0.2, 0.6, 0.8), design.product, ink, 1)
+    art.text(strip, (0.68, 0.25, 0.94, 0.75), design.brand, ink, 1)
+    return strip.rotate(-90, expand=True)
+
+
+def _back_cover(w: int, h: int, design: _Design, rng: Rng) -> Image:
+    image = art.canvas(w, h, design.ground)
+    art.text(image, (0.1, 0.08, 0.9, 0.15), f"“{design.note}”", design.ink, 1)
+    art.lines(image, (0.1, 0.2, 0.9, 0.62), design.ink, design.ground, rng)
+    art.barcode(image, (0.52, 0.8, 0.92, 0.94), rng)
+    return image
+
+
+def _bands(image: Image, design: _Design) -> None:
+    """Lines along both edges, all around."""
+    w, h = image.size
+    draw = art.pen(image)
+    t = max(2, h // 40)
+    for y in (0, h - t):
+        draw.rectangle([0, y, w, y + t], fill=design.accent)
+
+
+def _readable(design: _Design, ground: Color) -> Color:
+    """The design's colour that stands out most from a ground."""
+    options: Sequence[Color] = (design.ink, design.ground, (255, 255, 255), (20, 20, 22))
+    return max(options, key=lambda c: abs(art.brightness(c) - art.brightness(ground)))

@@ -1,0 +1,254 @@
+"""Assets that are computed: families of objects, textures and environments."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from typing import Any, TypeVar
+
+from gen_data.generator.assets.asset_arrays import (
+    pack_imported,
+    pack_texture,
+    unpack_imported,
+    unpack_texture,
+)
+from gen_data.generator.assets.asset_cache import Arrays, Store, content_key
+from gen_data.generator.assets.asset_ids import AssetId, ParameterValue, format_parameter
+from gen_data.generator.assets.importer import ImportedMesh
+from gen_data.generator.assets.procedural.family import (
+    EnvironmentFamily,
+    Facts,
+    Family,
+    TextureFamily,
+)
+from gen_data.generator.core.asset_types import Asset, Float32, TextureData
+from gen_data.generator.core.bounded_cache import Sized
+from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
+from gen_data.generator.core.plugins import loaded, package_of, third_party
+
+VERSION = 2
+"""Raised whenever what all families are made with gives other geometry."""
+_MAX_SEED = 2**31 - 1
+_PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
+
+AnyFamily = Family | TextureFamily | EnvironmentFamily
+TABLES = (
+    "gen_data.generator.assets.procedural",
+    "gen_data.generator.assets.roads",
+    "gen_data.generator.assets.scenery",
+    "gen_data.generator.assets.vehicles",
+    "gen_data.generator.assets.people",
+    "gen_data.generator.assets.skies",
+)
+"""Packages with tables ``FAMILIES``, ``TEXTURES`` or ``ENVIRONMENTS``."""
+KIND = "asset_family"
+"""Third-party packages add families through the entry-point group ``gen_data.asset_family``."""
+S = TypeVar("S", bound=Sized)
+
+
+class ProceduralLibrary:
+    """The part of the library that needs no file. Names are what ids say before ``?``."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._families: dict[str, AnyFamily] = {
+            _PREFIXES[_kind(family)] + name: family
+            for table in _tables()
+            for name, family in table.items()
+        }
+        self._packages: dict[str, str] = {}
+        for name, family, package in _third_party():
+            full_name = _PREFIXES[_kind(family)] + name
+            if full_name not in self._families:
+                self._families[full_name] = family
+                self._packages[full_name] = package
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a family of that name."""
+        return name in self._families
+
+    def names(self) -> Iterator[str]:
+        """Every id that is offered for selection, and the families that need parameters."""
+        for name, family in self._families.items():
+            yield from (
+                (f"{name}?seed={k}" for k in range(family.variants))
+                if (family.variants)
+                else (name,)
+            )
+
+    def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
+        """Assets offered for selection that are of a kind and carry every tag."""
+        for name, family in self._families.items():
+            if _kind(family) == kind and tags.issubset(_tags(name, family)):
+                for k in range(family.variants):
+                    yield self.get(AssetId(name, {"seed": k}))
+
+    def get(self, asset_id: AssetId) -> Asset:
+        """The asset of an id whose name is known. Raises AssetError on wrong parameters."""
+        family = self._families[asset_id.name]
+        facts = _facts(asset_id, family)
+        origin = family.origin
+        return Asset(
+            asset_id=str(asset_id),
+            kind=_kind(family),
+            category=family.category if isinstance(family, Family) else family.name,
+            tags=_tags(asset_id.name, family),
+            licence=origin.licence,
+            author=origin.author,
+            source=origin.source,
+            sha256=self._key(asset_id, family),
+            mass_kg=family.mass_kg if isinstance(family, Family) else 0.0,
+            stackable=isinstance(family, Family) and family.stackable,
+            subcategory=facts.subcategory,
+            attributes=tuple(sorted(facts.attributes.items())),
+        )
+
+    def imported(self, asset_id: AssetId) -> ImportedMesh:
+        """Geometry of an object."""
+        family = self._families[asset_id.name]
+        if not isinstance(family, Family):
+            raise AssetError(f"asset '{asset_id}': is no object but one of kind {_kind(family)}")
+
+        def compute() -> ImportedMesh:
+            solid = family.build(**_arguments(asset_id, family))
+            return ImportedMesh(solid.mesh, solid.collision, {}, solid.keypoints)
+
+        return self._result(asset_id, family, compute, pack_imported, unpack_imported)
+
+    def texture(self, asset_id: AssetId) -> TextureData:
+        """Images of a texture."""
+        family = self._families[asset_id.name]
+        if not isinstance(family, TextureFamily):
+            raise AssetError(f"asset '{asset_id}': is no texture but one of kind {_kind(family)}")
+        return self._result(
+            asset_id,
+            family,
+            lambda: family.build(**_arguments(asset_id, family)),
+            pack_texture,
+            unpack_texture,
+        )
+
+    def environment(self, asset_id: AssetId) -> Float32:
+        """Pixels of an environment."""
+        family = self._families[asset_id.name]
+        if not isinstance(family, EnvironmentFamily):
+            raise AssetError(
+                f"asset '{asset_id}': is no environment but one of kind {_kind(family)}"
+            )
+        return self._result(
+            asset_id,
+            family,
+            lambda: family.build(**_arguments(asset_id, family)),
+            lambda radiance: {"radiance": radiance},
+            lambda arrays: arrays["radiance"],
+        )
+
+    def _result(
+        self,
+        asset_id: AssetId,
+        family: AnyFamily,
+        compute: Callable[[], S],
+        packed: Callable[[S], Arrays],
+        unpacked: Callable[[Arrays], S],
+    ) -> S:
+        key = self._key(asset_id, family)
+        offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
+        stored = offered or isinstance(family, TextureFamily) or family.stored
+        try:
+            if not stored:
+                return self._store.computed(key, compute)
+            return self._store.get(key, lambda: packed(compute()), unpacked)
+        except ValueError as error:
+            raise AssetError(f"asset '{asset_id}': cannot be made: {error}") from error
+
+    def _key(self, asset_id: AssetId, family: AnyFamily) -> str:
+        arguments = _arguments(asset_id, family)
+        parameters = {name: format_parameter(value) for name, value in arguments.items()}
+        content = {
+            "family": asset_id.name,
+            "version": [VERSION, family.version],
+            "parameters": parameters,
+        }
+        if asset_id.name in self._packages:
+            # Another release of a package, or another package, may use the same version number.
+            content["package"] = self._packages[asset_id.name]
+        return content_key(content)
+
+
+def _tables() -> Iterator[Mapping[str, AnyFamily]]:
+    for name in TABLES:
+        module = importlib.import_module(name)
+        for table in ("FAMILIES", "TEXTURES", "ENVIRONMENTS"):
+            yield getattr(module, table, {})
+
+
+@cache
+def _third_party() -> tuple[tuple[str, AnyFamily, str], ...]:
+    """Name, family and package of every entry point of the group ``gen_data.asset_family``.
+
+    Raises:
+        ConfigError: one of them cannot be imported, or is no family.
+    """
+    found = []
+    for name, entry in sorted(third_party(KIND).items()):
+        family = loaded(entry.value, f"{KIND} '{name}'")
+        if not isinstance(family, (Family, TextureFamily, EnvironmentFamily)):
+            raise ConfigError(
+                f"{KIND} '{name}': {entry.value} is no Family, TextureFamily or EnvironmentFamily;"
+                " see gen_data.generator.assets.procedural.family"
+            )
+        found.append((name, family, package_of(entry)))
+    return tuple(found)
+
+
+def _facts(asset_id: AssetId, family: AnyFamily) -> Facts:
+    if not isinstance(family, Family) or family.facts is None:
+        return Facts()
+    return family.facts(**_arguments(asset_id, family))
+
+
+def _kind(family: AnyFamily) -> Any:
+    if isinstance(family, Family):
+        return "object"
+    return "texture" if isinstance(family, TextureFamily) else "environment"
+
+
+def _tags(name: str, family: AnyFamily) -> tuple[str, ...]:
+    """Its own tags, its name and its category as one word."""
+    category = family.category if isinstance(family, Family) else family.name
+    words = {*family.tags, name.rpartition("/")[2], category.replace(" ", "_"), "procedural"}
+    return tuple(sorted(words))
+
+
+def _arguments(asset_id: AssetId, family: AnyFamily) -> dict[str, Any]:
+    """Every parameter of a family's function, from the id or by default.
+
+    Raises:
+        AssetError: if the id has a parameter that the family has not, or of another type.
+    """
+    defaults: dict[str, Any] = dict(family.parameters)
+    if family.variants or not isinstance(family, Family):
+        defaults.setdefault("seed", 0)
+    for key, value in asset_id.parameters.items():
+        if key not in defaults:
+            raise AssetError(
+                f"asset '{asset_id}': '{asset_id.name}' has no parameter '{key}'"
+                f"{did_you_mean(key, defaults)}; expected {', '.join(sorted(defaults)) or 'none'}"
+            )
+        defaults[key] = _like(asset_id, key, value, defaults[key])
+    return defaults
+
+
+def _like(asset_id: AssetId, key: str, value: ParameterValue, default: Any) -> ParameterValue:
+    """The value, if it is of the default's type; whole numbers serve as fractions."""
+    if key == "seed" and not (isinstance(value, int) and 0 <= value <= _MAX_SEED):
+        raise AssetError(f"asset '{asset_id}': seed is not a whole number from 0 to {_MAX_SEED}")
+    if isinstance(default, tuple):
+        if isinstance(value, tuple) and len(value) == len(default):
+            return value
+        raise AssetError(f"asset '{asset_id}': {key} expects {len(default)} numbers with commas")
+    if isinstance(default, str) != isinstance(value, str) or isinstance(value, tuple):
+        expected = "a word" if isinstance(default, str) else "a number"
+        raise AssetError(f"asset '{asset_id}': {key} expects {expected}")
+    return float(value) if isinstance(default, float) and isinstance(value, int) else value

@@ -1,0 +1,392 @@
+"""Street furniture. Sizes after manufacturers' catalogues and the standards named below.
+
+Everything stands on the origin; what has a front shows it to +X.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.material_presets import (
+    metal_material,
+    painted_material,
+    patterned_material,
+)
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import block, cone, lathe, rounded_box
+from gen_data.generator.assets.procedural.variant_rng import (
+    choose,
+    is_drawn,
+    uniform_between,
+    variant_rng,
+)
+from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post, tube
+from gen_data.generator.core.asset_types import Keypoint, Material
+
+GALVANISED = metal_material((0.42, 0.43, 0.44), 0.55)
+_ANTHRACITE = painted_material("#3b3d3f", 0.5)
+_IRON_PAINTS = ("#2f3234", "#3b3d3f", "#2f4236", "#55585a")
+
+
+def street_light(seed: int) -> Solid:
+    """A lamp on a mast of 6-8 m. Slots: mast, lamp. Keypoint ``lamp``."""
+    rng = variant_rng("street_light", seed)
+    height, reach = uniform_between(6.0, 8.0, rng), uniform_between(0.8, 1.8, rng)
+    mast = lathe(
+        [(0.0, 0.0), (0.085, 0.0), (0.085, 1.1), (0.06, 1.16), (0.038, height), (0.0, height)], 12
+    )
+    style = choose(("arm", "arm", "curved", "top"), rng)
+    if style == "top":
+        head, lens, at = _post_top(height)
+    else:
+        head, lens, at = _arm_head(height, reach, rise=0.5 if style == "curved" else 0.12)
+    finish = GALVANISED if is_drawn(0.5, rng) else painted_material(choose(_IRON_PAINTS, rng), 0.5)
+    glass = Material((0.75, 0.76, 0.74), roughness=0.2, role="lamp")
+    hull = collision_hulls.frustum((0.085, 0.0), (0.04, height), 12)
+    lamp = Keypoint("lamp", at, 0.1)
+    return make_solid([mast, head, lens.painted(1)], (finish, glass), [hull], (lamp,))
+
+
+def litter_bin(seed: int) -> Solid:
+    """A litter bin on a post, or standing. Slots: body, post, liner."""
+    rng = variant_rng("litter_bin", seed)
+    color = painted_material(
+        choose(("#3a5a40", "#d9702b", "#44484a", "#2f3234", "#6b7073"), rng), 0.45
+    )
+    dark = painted_material("#161718", 0.8)
+    if is_drawn(0.5, rng):
+        r, h = uniform_between(0.16, 0.21, rng), uniform_between(0.45, 0.55, rng)
+        z = 0.95 - h + 0.15
+        shell = [(0.0, z), (0.85 * r, z), (r, z + h), (0.9 * r, z + h), (0.9 * r, z + h - 0.08)]
+        body = lathe([*shell, (0.0, z + h - 0.08)], 18).moved(r + 0.04)
+        mast = post(0.03, (0.0, 1.2), sides=8)
+        parts = [body, mast.painted(1), _bracket(r, z).painted(1)]
+        hull = collision_hulls.frustum((r, z), (r, z + h), 12) + np.array([r + 0.04, 0.0, 0.0])
+        return make_solid(parts, (color, GALVANISED, dark), [hull])
+    r, h = uniform_between(0.22, 0.3, rng), uniform_between(0.75, 0.95, rng)
+    profile = [(0.0, 0.0), (0.9 * r, 0.0), (r, 0.06), (r, h), (0.9 * r, h), (0.88 * r, h - 0.12)]
+    body = lathe([*profile, (0.0, h - 0.12)], 20)
+    hood = lathe([(0.0, h + 0.16), (r, h + 0.16), (r, h + 0.19), (0.0, h + 0.26)], 20)
+    stays = [post(0.012, (h - 0.02, h + 0.17), (0.93 * r * x, 0.93 * r * y, 0.0), 5)
+             for x, y in ((1, 0), (-0.5, 0.866), (-0.5, -0.866))]  # fmt: skip
+    parts = [body, hood, *(stay.painted(1) for stay in stays)]
+    return make_solid(
+        parts, (color, GALVANISED, dark), [collision_hulls.frustum((r, 0.0), (r, h), 12)]
+    )
+
+
+def bench(seed: int) -> Solid:
+    """A park bench, sat on from +X. Slots: slats, frame."""
+    rng = variant_rng("bench", seed)
+    half, seat = 0.5 * uniform_between(1.5, 2.0, rng), uniform_between(0.42, 0.46, rng)
+    parts = []
+    for k in range(4):
+        x = -0.18 + 0.115 * k
+        parts.append(block((x, -half, seat - 0.03), (x + 0.09, half, seat), 0.008))
+    if is_drawn(0.75, rng):
+        for k in range(3):
+            z, x = seat + 0.14 + 0.12 * k, -0.24 - 0.03 * k
+            parts.append(block((x, -half, z), (x + 0.03, half, z + 0.09), 0.008))
+    for y in (-half + 0.2, half - 0.2):
+        legs = [
+            block((-0.2, y - 0.03, 0.0), (-0.14, y + 0.03, seat - 0.03)),
+            block((0.18, y - 0.03, 0.0), (0.24, y + 0.03, seat - 0.03)),
+            block((-0.2, y - 0.03, seat - 0.09), (0.24, y + 0.03, seat - 0.03)),
+            tube(
+                [(-0.19, y, seat - 0.05), (-0.27, y, seat + 0.2), (-0.31, y, seat + 0.48)], 0.022, 6
+            ),
+        ]
+        parts += [leg.painted(1) for leg in legs]
+    wood = patterned_material(
+        f"texture/wood_grain?seed={choose((2, 5), rng)}", 1.2, 0.7, (0.75, 0.72, 0.7)
+    )
+    hull = collision_hulls.box((-0.34, -half, 0.0), (0.27, half, seat))
+    return make_solid(parts, (wood, painted_material(choose(_IRON_PAINTS, rng), 0.5)), [hull])
+
+
+def hydrant(seed: int) -> Solid:
+    """A pillar hydrant with two outlets (EN 14384). Slots: body, caps."""
+    rng = variant_rng("hydrant", seed)
+    h = uniform_between(0.75, 0.95, rng)
+    profile = [
+        (0.0, 0.0),
+        (0.16, 0.0),
+        (0.16, 0.04),
+        (0.105, 0.06),
+        (0.1, 0.62 * h),
+        (0.135, 0.65 * h),
+    ]
+    profile += [
+        (0.135, 0.72 * h),
+        (0.11, 0.74 * h),
+        (0.1, 0.9 * h),
+        (0.05, 0.97 * h),
+        (0.0, 0.97 * h),
+    ]
+    body = lathe(profile, 18)
+    outlet = lathe(
+        [(0.0, 0.0), (0.045, 0.0), (0.045, 0.1), (0.06, 0.1), (0.06, 0.16), (0.0, 0.16)], 12
+    )
+    outlets = [
+        outlet.rotated("x", turn).moved(0.0, y, 0.8 * h)
+        for turn, y in ((-0.5 * math.pi, 0.06), (0.5 * math.pi, -0.06))
+    ]
+    front = outlet.scaled(1.3, 1.3, 1.0).rotated("y", 0.5 * math.pi).moved(0.06, 0.0, 0.5 * h)
+    cap = cone((0.03, 0.96 * h), (0.03, h), 6)
+    paint = choose(("#b3201b", "#b3201b", "#c9a227", "#2c5c94"), rng)
+    caps = choose(("#b3201b", "#c8cacb", "#d0cfc8"), rng)
+    parts = [body, front.painted(1), cap.painted(1), *(o.painted(1) for o in outlets)]
+    hull = collision_hulls.frustum((0.15, 0.0), (0.12, h), 12)
+    return make_solid(parts, (painted_material(paint, 0.4), painted_material(caps, 0.4)), [hull])
+
+
+def bollard(seed: int) -> Solid:
+    """A bollard: iron with a cap, steel with a reflecting band, or stone. Slots: body, band."""
+    rng = variant_rng("bollard", seed)
+    h, kind = uniform_between(0.8, 1.0, rng), _bollard_kind(seed)
+    if kind == "stone":
+        r = uniform_between(0.13, 0.18, rng)
+        body = lathe(
+            [(0.0, 0.0), (r, 0.0), (0.92 * r, 0.7 * h), (0.6 * r, 0.82 * h), (0.0, 0.86 * h)], 18
+        )
+        stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9, (0.9, 0.88, 0.85))
+        return make_solid(
+            [body], (stone,), [collision_hulls.frustum((r, 0.0), (0.9 * r, 0.8 * h), 12)]
+        )
+    r = uniform_between(0.035, 0.055, rng)
+    if kind == "iron":
+        r = 1.4 * r
+        profile = [(0.0, 0.0), (1.5 * r, 0.0), (1.5 * r, 0.12), (r, 0.16), (0.85 * r, 0.85 * h)]
+        profile += [
+            (1.1 * r, 0.87 * h),
+            (1.1 * r, 0.9 * h),
+            (0.6 * r, 0.91 * h),
+            (0.95 * r, 0.96 * h),
+            (0.0, h),
+        ]
+        parts = [lathe(profile, 16)]
+    else:
+        band = lathe(
+            [
+                (r + 0.001, 0.72 * h),
+                (r + 0.003, 0.73 * h),
+                (r + 0.003, 0.84 * h),
+                (r + 0.001, 0.85 * h),
+            ],
+            14,
+        )
+        parts = [
+            lathe([(0.0, 0.0), (r, 0.0), (r, h - 0.01), (0.8 * r, h), (0.0, h)], 14),
+            band.painted(1),
+        ]
+    paint = painted_material(choose((*_IRON_PAINTS, "#7b7f82"), rng), 0.45)
+    stripe = painted_material(choose(("#b3201b", "#e8e7e2"), rng), 0.35)
+    return make_solid(parts, (paint, stripe), [collision_hulls.frustum((1.2 * r, 0.0), (r, h), 12)])
+
+
+def bollard_facts(seed: int) -> Facts:
+    """Its kind."""
+    return Facts(_bollard_kind(seed))
+
+
+def traffic_cone(seed: int) -> Solid:
+    """A traffic cone with two white sleeves (EN 13422). Slots: orange, white, foot."""
+    rng = variant_rng("cone", seed)
+    h = choose((0.5, 0.75, 0.75), rng)
+    half = 0.27 * h + 0.06
+    profile = [
+        (0.235 * h * (1 - t) + 0.045 * h * t, 0.04 + t * (h - 0.04))
+        for t in (0.0, 0.28, 0.48, 0.62, 0.82, 1.0)
+    ]
+    pieces = []
+    for k in range(5):
+        pieces.append(lathe(profile[k : k + 2], 20, slot=1 if k in (1, 3) else 0))
+    tip = lathe(
+        [profile[-1], (0.6 * profile[-1][0], h), (0.5 * profile[-1][0], h - 0.05), (0.0, h - 0.05)],
+        20,
+    )
+    foot = rounded_box((2 * half, 2 * half, 0.04), 0.012, 1).moved(z=0.02).painted(2)
+    orange, white = painted_material("#e2561b", 0.6), painted_material("#e6e6e2", 0.4)
+    base = painted_material(choose(("#c94d1a", "#232425"), rng), 0.8)
+    hull = [
+        collision_hulls.frustum((0.235 * h, 0.04), (0.045 * h, h), 12),
+        collision_hulls.box((-half, -half, 0.0), (half, half, 0.04)),
+    ]
+    return make_solid([*pieces, tip, foot], (orange, white, base), hull)
+
+
+def post_box(seed: int) -> Solid:
+    """A letter box on two legs or on a wall post. Slots: body, flap, legs."""
+    rng = variant_rng("post_box", seed)
+    w, d, h = (
+        uniform_between(0.45, 0.6, rng),
+        uniform_between(0.3, 0.4, rng),
+        uniform_between(0.6, 0.75, rng),
+    )
+    z = uniform_between(0.65, 0.8, rng)
+    body = rounded_box((d, w, h), 0.03, 2).moved(z=z + 0.5 * h)
+    x = 0.5 * d
+    flap = block((x, -0.4 * w, z + 0.68 * h), (x + 0.03, 0.4 * w, z + 0.82 * h), 0.008).painted(1)
+    plate = facing_rectangle(x + 0.003, (-0.25 * w, 0.25 * w), (z + 0.25 * h, z + 0.5 * h), 1)
+    legs = [block((-0.04, y - 0.03, 0.0), (0.04, y + 0.03, z + 0.05)) for y in (-0.3 * w, 0.3 * w)]
+    color, trim = choose(
+        (("#e0b21c", "#2b2b2b"), ("#b3201b", "#d8d6cf"), ("#274b8f", "#e0dfda")), rng
+    )
+    parts = [body, flap, plate, *(leg.painted(2) for leg in legs)]
+    hull = collision_hulls.box((-x, -0.5 * w, 0.0), (x, 0.5 * w, z + h))
+    return make_solid(
+        parts, (painted_material(color, 0.4), painted_material(trim, 0.5), GALVANISED), [hull]
+    )
+
+
+def bus_stop(seed: int) -> Solid:
+    """A shelter, open to +X, with a seat. Slots: frame, glass, roof, seat, panel."""
+    rng = variant_rng("bus_stop", seed)
+    half, d, h = (
+        0.5 * uniform_between(3.2, 4.2, rng),
+        uniform_between(1.3, 1.6, rng),
+        uniform_between(2.35, 2.55, rng),
+    )
+    x = 0.5 * d
+    posts = [block((px - 0.03, y - 0.03, 0.0), (px + 0.03, y + 0.03, h))
+             for px in (-x, x - 0.25) for y in (-half, -half / 3, half / 3, half)
+             if px < 0 or abs(y) > 0.9 * half]  # fmt: skip
+    panes = [
+        block(
+            (-x - 0.006, -half + 2 * half * k / 3 + 0.05, 0.25),
+            (-x + 0.006, -half + 2 * half * (k + 1) / 3 - 0.05, h - 0.2),
+        )
+        for k in range(3)
+    ]
+    panes.append(block((-x + 0.05, half - 0.006, 0.25), (x - 0.3, half + 0.006, h - 0.2)))
+    roof = block((-x - 0.1, -half - 0.1, h), (x + 0.1, half + 0.1, h + 0.1), 0.02)
+    seat = block((-x + 0.15, -0.6 * half, 0.42), (-x + 0.5, 0.6 * half, 0.46), 0.01)
+    feet = [
+        block((-x + 0.3, y - 0.03, 0.0), (-x + 0.36, y + 0.03, 0.42))
+        for y in (-0.4 * half, 0.4 * half)
+    ]
+    panel = block((-x + 0.05, -half - 0.05, 0.3), (x - 0.3, -half + 0.05, 2.1), 0.01)
+    poster = [
+        facing_rectangle(0.0, (-0.5, 0.5), (0.4, 2.0)).rotated("z", turn).moved(-0.15, -half + side)
+        for turn, side in ((0.5 * math.pi, 0.055), (-0.5 * math.pi, -0.055))
+    ]
+    glass = Material((0.9, 0.95, 0.93), roughness=0.05, transmission=1.0, role="glass")
+    parts = [*posts, *(p.painted(1) for p in panes), roof.painted(2), seat.painted(3), *feet, panel]
+    parts += [p.painted(4) for p in poster]
+    wood = patterned_material("texture/wood_grain?seed=2", 1.2, 0.7, (0.8, 0.75, 0.7))
+    art = Material(
+        (1, 1, 1),
+        roughness=0.35,
+        texture=f"texture/book_cover?seed={seed % 32}",
+        printed=True,
+        role="sign",
+    )
+    walls = [
+        collision_hulls.box((-x - 0.03, -half, 0.0), (-x + 0.03, half, h)),
+        collision_hulls.box((-x, -half, h), (x, half, h + 0.1)),
+    ]
+    frame = painted_material(choose(_IRON_PAINTS, rng), 0.45)
+    return make_solid(parts, (frame, glass, painted_material("#5f6365", 0.5), wood, art), walls)
+
+
+def utility_pole(seed: int) -> Solid:
+    """A wooden pole with cross-arms and insulators. Slots: wood, insulators."""
+    rng = variant_rng("utility_pole", seed)
+    h = uniform_between(8.0, 10.0, rng)
+    pole = cone((0.14, 0.0), (0.1, h), 12)
+    parts = []
+    for z in (h - 0.3, h - 1.0)[: choose((1, 2), rng)]:
+        parts.append(block((-0.06, -0.9, z - 0.05), (0.06, 0.9, z + 0.05)))
+        for y in (-0.8, -0.35, 0.35, 0.8):
+            parts.append(post(0.035, (z + 0.05, z + 0.2), (0.0, y, 0.0), 8).painted(1))
+    bark = patterned_material("texture/bark?seed=1", 1.0, 0.9, (0.17, 0.13, 0.1))
+    hull = collision_hulls.frustum((0.14, 0.0), (0.1, h), 12)
+    return make_solid([pole, *parts], (bark, painted_material("#8b8f90", 0.3)), [hull])
+
+
+def cabinet(seed: int) -> Solid:
+    """A distribution cabinet with two doors and a lid. Slots: body, seams, plinth."""
+    rng = variant_rng("cabinet", seed)
+    w, d, h = (
+        uniform_between(0.7, 1.5, rng),
+        uniform_between(0.3, 0.45, rng),
+        uniform_between(0.95, 1.35, rng),
+    )
+    x, y = 0.5 * d, 0.5 * w
+    body = rounded_box((d, w, h - 0.15), 0.015, 1).moved(z=0.15 + 0.5 * (h - 0.15))
+    lid = block((-x - 0.02, -y - 0.02, h - 0.04), (x + 0.02, y + 0.02, h + 0.015), 0.01)
+    plinth = block((-x + 0.02, -y + 0.02, 0.0), (x - 0.02, y - 0.02, 0.16))
+    seams = [
+        facing_rectangle(x + 0.002, (k * w - 0.004, k * w + 0.004), (0.2, h - 0.08), 1)
+        for k in (0.0,)
+    ]
+    seams += [
+        facing_rectangle(x + 0.002, (-y + 0.04, y - 0.04), (z, z + 0.012), 1)
+        for z in (0.22, h - 0.1)
+    ]
+    handle = block((x, 0.05, 0.55 * h), (x + 0.025, 0.08, 0.55 * h + 0.14)).painted(1)
+    grey = painted_material(choose(("#8d9091", "#a5a79f", "#6f7a70", "#b0aea6"), rng), 0.6)
+    parts = [body, lid, plinth.painted(2), *seams, handle]
+    concrete = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
+    hull = collision_hulls.box((-x, -y, 0.0), (x, y, h))
+    return make_solid(parts, (grey, painted_material("#3b3d3f", 0.6), concrete), [hull])
+
+
+def bike_rack(seed: int) -> Solid:
+    """A row of hoops; bicycles lean against them along X. Slot: hoops."""
+    rng = variant_rng("bike_rack", seed)
+    count, pitch = choose((2, 3, 4, 5), rng), uniform_between(0.8, 1.0, rng)
+    half, h = uniform_between(0.35, 0.45, rng), uniform_between(0.75, 0.85, rng)
+    hoop = tube(
+        [(-half, 0, 0), (-half, 0, h - 0.15), (-half + 0.04, 0, h - 0.04), (-half + 0.15, 0, h),
+         (half - 0.15, 0, h), (half - 0.04, 0, h - 0.04), (half, 0, h - 0.15), (half, 0, 0)],
+        0.024,
+    )  # fmt: skip
+    at = [pitch * (k - 0.5 * (count - 1)) for k in range(count)]
+    parts = collision_hulls.box((-half, -0.025, 0.0), (half, 0.025, h))
+    shells = [parts + np.array([0.0, y, 0.0]) for y in at]
+    finish = GALVANISED if is_drawn(0.7, rng) else _ANTHRACITE
+    return make_solid([hoop.moved(y=y) for y in at], (finish,), shells)
+
+
+def _bollard_kind(seed: int) -> str:
+    return ("steel", "iron", "stone", "steel")[seed % 4]
+
+
+def _arm_head(
+    height: float, reach: float, rise: float
+) -> tuple[Patch, Patch, tuple[float, float, float]]:
+    """An arm towards +X with a flat luminaire; its lens looks down."""
+    top = height + rise
+    path = [
+        (0.0, 0.0, height - 0.3),
+        (0.05 * reach, 0.0, height),
+        (0.35 * reach, 0.0, height + 0.7 * rise),
+        (reach, 0.0, top),
+    ]
+    arm = tube(path, 0.032, 8)
+    body = rounded_box((0.62, 0.26, 0.1), 0.03, 1).moved(reach + 0.25, 0.0, top)
+    lens = block((reach + 0.02, -0.1, top - 0.062), (reach + 0.5, 0.1, top - 0.049))
+    return join_patches([arm, body]), lens, (reach + 0.26, 0.0, top - 0.06)
+
+
+def _post_top(height: float) -> tuple[Patch, Patch, tuple[float, float, float]]:
+    """A lantern on the mast's top."""
+    roof = lathe(
+        [(0.0, height + 0.42), (0.28, height + 0.42), (0.26, height + 0.46), (0.0, height + 0.56)],
+        16,
+    )
+    collar = cone((0.07, height - 0.05), (0.09, height + 0.08), 12)
+    lens = lathe(
+        [(0.0, height + 0.06), (0.09, height + 0.06), (0.19, height + 0.42), (0.0, height + 0.42)],
+        16,
+    )
+    return join_patches([roof, collar]), lens, (0.0, 0.0, height + 0.25)
+
+
+def _bracket(r: float, z: float) -> Patch:
+    return block((-0.02, -0.02, z + 0.1), (0.08 + 0.1 * r, 0.02, z + 0.14))

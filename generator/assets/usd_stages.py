@@ -1,0 +1,77 @@
+"""A whole OpenUSD stage: where its meshes are, its lights, its cameras."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import PurePosixPath
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.folder_index import Entry, MeshEntry
+from gen_data.generator.assets.importer import scale_and_shift, upright_transform
+from gen_data.generator.assets.readers.usd import ARCHIVE, open_stage
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Light, StageModel, StagePiece
+from gen_data.generator.core.se3 import SE3, rotate_by_quaternion
+from gen_data.generator.usd.stage_reader import SUFFIXES
+
+
+def is_stage(entry: Entry) -> bool:
+    """Whether an entry's file is a stage."""
+    suffix = PurePosixPath(entry.file).suffix.lower()
+    return isinstance(entry, MeshEntry) and suffix in (*SUFFIXES, ARCHIVE)
+
+
+def stage_model(folder: Folder, entry: MeshEntry, asset_id: str) -> StageModel:
+    """The stage in an entry's file, turned and scaled as the entry says.
+
+    Raises:
+        AssetError: if it cannot be read, or the entry gives a size instead of a scale.
+    """
+    place = str(folder.root / entry.file)
+    if entry.size_m is not None:
+        raise AssetError(f"{place}: a stage has no size of its own; give scale, not size_m")
+    matrix = upright_transform(entry)
+    T_model_stage = SE3.from_matrix(matrix)
+    entry = entry.model_copy(update={"origin": "center"})
+    pieces = []
+    with open_stage(folder, entry.file) as file:
+        for piece in file.pieces():
+            soup = file.source((piece,), materials=False).soup.transformed(matrix)
+            _, shift = scale_and_shift(soup, entry, f"{place}: {piece.name}")
+            x, y, z = (float(-v) for v in shift)
+            label = piece.label
+            pieces.append(
+                StagePiece(
+                    piece.name,
+                    f"{asset_id}/{piece.name}",
+                    SE3((x, y, z)),
+                    label.prim if label else "",
+                    label.category if label else "",
+                )
+            )
+        lights, cameras = file.stage.lights(), file.stage.cameras()
+    scale = entry.metres_per_unit()
+    return StageModel(
+        tuple(pieces),
+        tuple(_placed(light, T_model_stage, scale) for light in lights),
+        tuple((name, _scaled(T_model_stage @ pose, scale)) for name, pose in cameras),
+    )
+
+
+def _placed(light: Light, T_model_stage: SE3, scale: float) -> Light:
+    """The light in the model's frame; what it lights, now farther away, is as bright as before."""
+    place = _scaled(T_model_stage @ SE3(light.position_m), scale)
+    return replace(
+        light,
+        position_m=place.translation_m,
+        direction=rotate_by_quaternion(T_model_stage.quaternion_wxyz, light.direction),
+        side=rotate_by_quaternion(T_model_stage.quaternion_wxyz, light.side),
+        size_m=(light.size_m[0] * scale, light.size_m[1] * scale),
+        intensity_cd=light.intensity_cd * scale * scale,
+        radius_m=light.radius_m * scale,
+    )
+
+
+def _scaled(pose: SE3, scale: float) -> SE3:
+    x, y, z = pose.translation_m
+    return replace(pose, translation_m=(scale * x, scale * y, scale * z))

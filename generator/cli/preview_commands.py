@@ -1,0 +1,161 @@
+"""Commands that show samples: ``preview`` and ``contact-sheet``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.sample import Sample
+
+if TYPE_CHECKING:
+    from gen_data.generator.preview.overlay import Image
+    from gen_data.generator.preview.point_cloud_views import PointColors
+
+
+WRITTEN = "written"
+
+
+@click.command()
+@click.argument("source")
+@click.option("--n", "-n", type=int, default=8, show_default=True, help="Number of samples.")
+@click.option("--first", type=int, default=0, show_default=True, help="Index of the first sample.")
+@click.option("--save", type=click.Path(path_type=Path), help="Write a .rrd file instead.")
+@click.option(
+    "--points",
+    type=click.Choice(["class", "intensity"]),
+    default="class",
+    show_default=True,
+    help="What decides the colour of laser points.",
+)
+@click.option("--web", is_flag=True, help="Serve to a browser instead of the desktop viewer.")
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="With --web: the address to listen on; 0.0.0.0 shows the scene to the whole network.",
+)
+@configuration_options
+def preview(
+    source: str,
+    n: int,
+    first: int,
+    save: Path | None,
+    points: PointColors,
+    web: bool,
+    host: str,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    without: tuple[str, ...],
+) -> None:
+    """Show samples in Rerun: the 3D scene, images, scans, boxes; sequences play in seconds.
+
+    SOURCE is a configuration (a path or a shipped name), or the folder of a data set, whose
+    samples are made again from its plan.
+    """
+    from gen_data.generator.assemble.pipeline_factory import open_pipeline
+    from gen_data.generator.preview.rerun_recording import save_recording, send_samples
+    from gen_data.generator.preview.viewer import open_window, serve_web
+
+    config = ConfigurationOptions(source, seed, overrides, without).config()
+    with open_pipeline(config) as pipeline:
+        samples = _samples(pipeline.sample, first, n)
+        info = pipeline.info
+        if save is not None:
+            save_recording(save, samples, pipeline.assets, info=info, points=points)
+            click.echo(f"{save}: {n} samples; open it with: rerun {save}")
+            return
+        viewer = serve_web(host) if web else open_window()
+        if web:
+            click.echo(f"open {viewer.web_url} (Ctrl-C ends)")
+        send_samples(viewer.stream_url, samples, pipeline.assets, info=info, points=points)
+        if web:
+            with suppress(KeyboardInterrupt):
+                viewer.process.wait()
+
+
+@click.command("contact-sheet")
+@click.argument("sources", nargs=-1, required=True)
+@click.option("--n", "-n", type=int, default=48, show_default=True, help="Number of samples.")
+@click.option("--first", type=int, default=0, show_default=True, help="Index of the first sample.")
+@click.option("--step", type=int, default=1, show_default=True, help="Distance between samples.")
+@click.option(
+    "--out",
+    "-o",
+    type=click.Path(path_type=Path),
+    default=Path("contact-sheet.png"),
+    show_default=True,
+    help="The PNG to write.",
+)
+@click.option("--columns", type=int, default=0, help="Tiles in a row; 0 = a sheet of 4 to 3.")
+@click.option("--tile-px", type=int, default=320, show_default=True, help="Width of a tile.")
+@click.option(
+    "--channels",
+    default="rgb",
+    show_default=True,
+    help="Comma-separated channels of all cameras; 'written' = what each sensor itself writes.",
+)
+@click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")
+@click.option("--captions", is_flag=True, help="Write under every tile what it is.")
+@configuration_options
+def contact_sheet(
+    sources: tuple[str, ...],
+    n: int,
+    first: int,
+    step: int,
+    out: Path,
+    columns: int,
+    tile_px: int,
+    channels: str,
+    labels: bool,
+    captions: bool,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    without: tuple[str, ...],
+) -> None:
+    """Draw samples with their labels on one PNG.
+
+    SOURCES are configurations (paths or shipped names), or folders of data sets; the samples of
+    each follow those of the one before.
+    """
+    from gen_data.generator.assemble.pipeline_factory import open_pipeline
+    from gen_data.generator.preview.contact_sheet import arrange_tiles, pictures, tiles, write_sheet
+
+    own = channels == WRITTEN
+    wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))
+    images: list[Image] = []
+    for source in sources:
+        config = ConfigurationOptions(source, seed, overrides, without).config()
+        with open_pipeline(config, extra_channels=frozenset(wanted)) as pipeline:
+            samples = _samples(pipeline.sample, first, n, step)
+            info = pipeline.info
+            shown = info.media if own else dict.fromkeys(info.cameras, wanted)
+            drawn = tiles(samples, shown, labels=labels, devices=own)
+            images += pictures(drawn, tile_px, captions=captions)
+    write_sheet(arrange_tiles(images, columns), out)
+    click.echo(f"{out}: {len(images)} tiles")
+
+
+def _samples(
+    sample_at: Callable[[int], Sample], first: int, n: int, step: int = 1
+) -> Iterator[Sample]:
+    if n < 1 or first < 0 or step < 1:
+        raise ConfigError("--n and --step must be at least 1, --first at least 0")
+    for index in range(first, first + n * step, step):
+        yield sample_at(index)
+
+
+def _channel(name: str) -> Channel:
+    shown = [c.value for c in Channel if c is not Channel.AMODAL]
+    if name not in shown:
+        raise ConfigError(
+            f"--channels: unknown channel '{name}'; expected {WRITTEN}, or some of"
+            f" {', '.join(shown)}"
+        )
+    return Channel(name)

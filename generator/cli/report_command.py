@@ -1,0 +1,51 @@
+"""``gen-data report``: what a data set contains."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gen_data.generator.core.errors import StorageError
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--html", type=click.Path(path_type=Path), help="Also write a page with histograms here."
+)
+def report(folder: Path, html: Path | None) -> None:
+    """Count what a data set contains, beside what is published about KITTI.
+
+    FOLDER is a data set that was exported as coco or kitti: objects, box sizes, occlusion,
+    truncation, distances and keypoints by category; laser points, where kitti has them.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table as RichTable
+
+    from gen_data.generator.report.html_page import page
+    from gen_data.generator.report.label_files import records
+    from gen_data.generator.report.label_statistics import collect_statistics
+    from gen_data.generator.report.lidar_scans import scans
+    from gen_data.generator.report.report_tables import histograms, scan_tables, tables
+
+    found = collect_statistics(records(folder))
+    made = (*tables(found), *scan_tables(tuple(scans(folder))))
+    console = Console()
+    for table in made:
+        shown = RichTable(title=table.title, caption=table.note or None, box=box.SIMPLE_HEAD)
+        for number, name in enumerate(table.header):
+            shown.add_column(name, justify="right" if number else "left")
+        for row in table.rows:
+            shown.add_row(*row)
+        console.print(shown)
+    if html is not None:
+        try:
+            html.parent.mkdir(parents=True, exist_ok=True)
+            html.write_text(
+                page(folder.resolve().name, made, histograms(found)), encoding="utf-8", newline="\n"
+            )
+        except OSError as error:
+            raise StorageError(f"{html}: {error.strerror}") from error
+        click.echo(f"wrote {html}")

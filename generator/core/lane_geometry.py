@@ -1,0 +1,158 @@
+"""Places along lanes, and the lines at their sides."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from gen_data.generator.core.scene import Lane
+from gen_data.generator.core.se3 import SE3, Array, Vec3
+
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
+MEETING_M = 0.25
+"""Borders whose ends are nearer than this are one."""
+
+
+@dataclass(frozen=True)
+class LaneLine:
+    """A lane's centre line by arc length.
+
+    Attributes:
+        at_m: Arc length of each point, from 0.
+    """
+
+    lane: Lane
+    at_m: tuple[float, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Measure the line."""
+        points = np.asarray(self.lane.center_m, dtype=np.float64)
+        steps = np.sqrt(np.sum(np.diff(points, axis=0) ** 2, axis=1))
+        object.__setattr__(self, "at_m", tuple(np.concatenate([[0.0], np.cumsum(steps)]).tolist()))
+
+    @property
+    def length_m(self) -> float:
+        """Of the whole lane."""
+        return self.at_m[-1]
+
+    def pose(self, at_m: float, left_m: float = 0.0) -> SE3:
+        """``T_world_place``: on the ground, X in the direction of travel, Z up.
+
+        Args:
+            at_m: Arc length, clamped to the lane.
+            left_m: How far to the left of the centre line.
+        """
+        points = self.lane.center_m
+        k = min(max(bisect_right(self.at_m, at_m) - 1, 0), len(points) - 2)
+        a, b = points[k], points[k + 1]
+        span_m = self.at_m[k + 1] - self.at_m[k]
+        t = min(max((at_m - self.at_m[k]) / span_m, 0.0), 1.0)
+        yaw = math.atan2(b[1] - a[1], b[0] - a[0])
+        x, y, z = (p + t * (q - p) for p, q in zip(a, b, strict=True))
+        return SE3.about_z(yaw, (x - left_m * math.sin(yaw), y + left_m * math.cos(yaw), z))
+
+
+def pose_on_lane(
+    T_world_place: SE3,
+    lane: Lane,
+    bounds_m: tuple[Vec3, Vec3],
+    facing: Literal["along", "left"],
+    turn_rad: float = 0.0,
+) -> SE3:
+    """``T_world_body`` of something whose lowest point stands on a place of a lane.
+
+    Its middle is at the place; on a ``frontage``, its front is.
+
+    Args:
+        T_world_place: As ``LaneLine.pose`` gives it.
+        lane: Where the place is.
+        facing: Where fronts point there.
+        bounds_m: Its smallest and largest coordinates, scale included.
+        turn_rad: How far it is turned from where it should face.
+    """
+    (x0, y0, z0), (x1, y1, _) = bounds_m
+    if facing == "left":
+        turn_rad += 0.5 * math.pi
+    anchor = x1 if lane.kind == "frontage" else 0.5 * (x0 + x1)
+    return T_world_place @ SE3.about_z(turn_rad) @ SE3((-anchor, -0.5 * (y0 + y1), -z0))
+
+
+@dataclass(frozen=True, slots=True)
+class LaneBorder:
+    """The line at one side of driving lanes, painted or not.
+
+    Attributes:
+        name: Lane and side that it belongs to: ``main/forward0:left``.
+        kind: ``lane``: between lanes that run the same way; ``road``: between such that do not;
+            ``edge``: nothing drives beyond it.
+        points_m: World, on the ground, in the direction of travel of the lane it is named by.
+    """
+
+    name: str
+    kind: Literal["lane", "road", "edge"]
+    points_m: tuple[Vec3, ...]
+
+
+@lru_cache(maxsize=16)
+def lane_borders(lanes: tuple[Lane, ...]) -> tuple[LaneBorder, ...]:
+    """Borders of all driving lanes outside junctions, each once, in the order of the lanes."""
+    driving = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]
+    borders: list[LaneBorder] = []
+    alone: dict[Side, list[tuple[Vec3, Vec3]]] = {"left": [], "right": []}
+    for lane in driving:
+        for side in SIDES:
+            if side == "right" and lane.right:
+                continue
+            line = border_line(lane, side)
+            kind: Literal["lane", "road", "edge"] = "lane"
+            if not (lane.left if side == "left" else lane.right):
+                kind = "edge"
+                ends = (line[-1], line[0])
+                if _is_among(ends, alone[side]):
+                    continue
+                alone[side].append((line[0], line[-1]))
+                if _is_met(lane, driving, side, ends):
+                    kind = "road"
+            borders.append(LaneBorder(f"{lane.name}:{side}", kind, line))
+    return tuple(borders)
+
+
+def border_line(lane: Lane, side: Side) -> tuple[Vec3, ...]:
+    """The points of one side of a lane, as many as its centre line has."""
+    sign = 1.0 if side == "left" else -1.0
+    center = np.asarray(lane.center_m, dtype=np.float64)
+    half_m = 0.5 * lane.width_m * sign
+    lift = np.array([0.0, 0.0, lane.bank * half_m])
+    points = center + half_m * left_normals(center) + lift
+    return tuple((float(x), float(y), float(z)) for x, y, z in np.round(points, 6) + 0.0)
+
+
+def left_normals(line_m: Array) -> Array:
+    """Level unit vectors [n, 3] to the left of a line [n, 3] at each of its points."""
+    steps = np.diff(line_m[:, :2], axis=0)
+    steps = steps / np.sqrt((steps * steps).sum(axis=1, keepdims=True))
+    along = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+    along = along / np.sqrt((along * along).sum(axis=1, keepdims=True))
+    return np.column_stack([-along[:, 1], along[:, 0], np.zeros(len(along))])
+
+
+def _is_met(lane: Lane, driving: list[Lane], side: Side, ends: tuple[Vec3, Vec3]) -> bool:
+    """Whether an oncoming lane has the same border on the same side."""
+    for other in driving:
+        if other.road == lane.road and not (other.left if side == "left" else other.right):
+            line = border_line(other, side)
+            if other.name != lane.name and _is_among((line[0], line[-1]), [ends]):
+                return True
+    return False
+
+
+def _is_among(ends: tuple[Vec3, Vec3], others: list[tuple[Vec3, Vec3]]) -> bool:
+    return any(
+        math.dist(ends[0], a) < MEETING_M and math.dist(ends[1], b) < MEETING_M for a, b in others
+    )

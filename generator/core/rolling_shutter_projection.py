@@ -1,0 +1,102 @@
+"""Points before a rolling shutter: each is where it is when the row that shows it is exposed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.scene import Camera, Instance, Scene
+from gen_data.generator.core.se3 import IDENTITY, SE3, Array
+
+_LOOKS = 5
+"""Where a point is decides when it is seen, and that where it is: errors shrink by the speed of
+its image over that of the rows, a factor of ten or more, with every look."""
+
+
+def project_rolling_shutter(
+    scene: Scene, camera: Camera, points_m: Array, instance: Instance | None = None
+) -> tuple[Array, Array]:
+    """Where points are when the camera sees them, camera frame [m] [n, 3], and in the image [n, 2].
+
+    Args:
+        scene: At the image's instant.
+        camera: Of the scene, or its equal.
+        points_m: In the instance's frame, or fixed in the world, shape [n, 3].
+        instance: What carries the points; None = the world.
+
+    Returns:
+        NaN in the image for points that the lens does not show.
+    """
+    shutter, lens = camera.shutter, camera.intrinsics
+    p_frame = np.asarray(points_m, np.float64)
+    delays_s = np.zeros(len(p_frame))
+    for _ in range(_LOOKS if shutter.rolls else 1):
+        p_world = p_frame
+        if instance is not None:
+            carrier = _carrier_of(scene, instance)
+            R, t = _poses(scene, carrier, instance.T_world_instance, IDENTITY, delays_s)
+            p_world = np.einsum("nij,nj->ni", R, p_frame, optimize=False) + t
+        R, t = _camera_poses(scene, camera, delays_s)
+        p_camera = np.einsum("nji,nj->ni", R, p_world - t, optimize=False)
+        image_px = lens.project(p_camera)
+        v = np.clip(image_px[:, 1], 0.0, lens.height_px)
+        delays_s = np.where(np.isfinite(v), shutter.delay_s(v, lens.height_px), delays_s)
+    return p_camera, image_px
+
+
+def world_points(
+    scene: Scene, camera: Camera, p_camera_m: Array, rows: NDArray[np.integer]
+) -> Array:
+    """Where in the world points are that pixels of some rows show, [n, 3].
+
+    Args:
+        scene: At the image's instant.
+        camera: Of the scene, or its equal.
+        p_camera_m: In the camera frame of each row's instant, shape [n, 3].
+        rows: Numbers of the rows, shape [n].
+    """
+    if not camera.shutter.rolls:
+        return camera.T_world_camera.apply(p_camera_m)
+    delays_s = camera.shutter.row_delays_s(camera.intrinsics.height_px)
+    R, t = _camera_poses(scene, camera, delays_s)
+    placed: Array = np.einsum("nij,nj->ni", R[rows], p_camera_m, optimize=False) + t[rows]
+    return placed
+
+
+def _carrier_of(scene: Scene, instance: Instance) -> str:
+    """The body whose frame the instance's is; empty for robots, which stand on their bases."""
+    if any(a.instance_id == instance.instance_id for a in scene.articulations):
+        return ""
+    own = (body.name for body in scene.bodies if body.instance_id == instance.instance_id)
+    return next(own, "")
+
+
+def _camera_poses(scene: Scene, camera: Camera, delays_s: Array) -> tuple[Array, Array]:
+    if not camera.rig:
+        return _poses(scene, "", camera.T_world_camera, IDENTITY, delays_s)
+    rig = scene.rig(camera.rig)
+    T_body_camera = rig.T_body_rig @ camera.T_rig_camera
+    return _poses(scene, rig.body, camera.T_world_camera, T_body_camera, delays_s)
+
+
+def _poses(
+    scene: Scene, body: str, at_rest: SE3, T_body_frame: SE3, delays_s: Array
+) -> tuple[Array, Array]:
+    """Rotations [n, 3, 3] and origins [n, 3] in the world of a frame on a body, at instants.
+
+    Args:
+        scene: The instant that delays count from.
+        body: What carries the frame.
+        at_rest: The frame's pose if that does not move.
+        T_body_frame: Where the frame is on it.
+        delays_s: Shape [n].
+    """
+    track = scene.track(body) if body else None
+    n = len(delays_s)
+    if track is None:
+        R_world_frame = np.broadcast_to(at_rest.rotation(), (n, 3, 3))
+        return R_world_frame, np.broadcast_to(np.asarray(at_rest.translation_m), (n, 3))
+    R, t = track.poses(scene.time_s + delays_s)
+    shift = np.asarray(T_body_frame.translation_m)
+    origin = np.einsum("nij,j->ni", R, shift, optimize=False) + t
+    return np.einsum("nij,jk->nik", R, T_body_frame.rotation(), optimize=False), origin

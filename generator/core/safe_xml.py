@@ -1,0 +1,71 @@
+"""XML from strangers: bounded, and without document types, so that no entity is ever expanded."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+from gen_data.generator.core.errors import AssetError
+
+MAX_DEPTH = 64
+
+
+class PlacedElement(Element):
+    """An element that knows where it begins in its file, counted from 1."""
+
+    line: int
+    column: int
+
+
+def place_of(element: Element) -> str:
+    """``:line:column`` of an element that ``parse_xml`` made; empty for any other."""
+    return f":{element.line}:{element.column}" if isinstance(element, PlacedElement) else ""
+
+
+def parse_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: int) -> Element:
+    """The root element of a document.
+
+    Args:
+        data: The file.
+        place: What error messages call it.
+        root_tag: What its root must be.
+        kind: What such a file is called.
+        max_elements: More are refused.
+
+    Raises:
+        AssetError: if it is malformed, too large or deep, or declares a document type.
+    """
+    builder = TreeBuilder(element_factory=PlacedElement)
+    parser = expat.ParserCreate()
+    depth = count = 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, count
+        depth, count = depth + 1, count + 1
+        if depth > MAX_DEPTH or count > max_elements:
+            raise ValueError(f"more than {MAX_DEPTH} levels or {max_elements} elements")
+        element = builder.start(tag, attributes)
+        assert isinstance(element, PlacedElement)
+        element.line, element.column = parser.CurrentLineNumber, parser.CurrentColumnNumber + 1
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    def refuse(*_: Any) -> None:
+        raise ValueError("it declares a document type, which is not allowed; remove it")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+        root: Element = builder.close()
+    except (ValueError, expat.ExpatError, AssertionError) as error:
+        raise AssetError(f"{place}: malformed XML ({error}); correct it") from None
+    if root.tag != root_tag:
+        raise AssetError(
+            f"{place}: its root element is <{root.tag[:40]}>, not <{root_tag}>; give {kind}"
+        )
+    return root

@@ -1,0 +1,236 @@
+"""The same world at another instant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from gen_data.generator.core.motion import STILL, StateChange, Twist
+from gen_data.generator.core.scene import (
+    Articulation,
+    Body,
+    Camera,
+    Device,
+    Instance,
+    Lidar,
+    Light,
+    Rig,
+    Scene,
+)
+from gen_data.generator.core.se3 import SE3, Vec3, rotate_by_quaternion
+
+RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
+"""``T_camera_rig``: X forward, Y left, Z up in the camera's X right, Y down, Z forward."""
+
+EGO = "ego"
+"""Name of the rig that truth about a sample as a whole refers to."""
+
+
+def scene_at(scene: Scene, time_s: float) -> Scene:
+    """The scene at another instant: what has a track, and all that rides with it, has moved.
+
+    Bodies, joints, lights, rigs, sensors and the frames of instances follow; so do the changes
+    that have happened by then. Changes are looked up from the beginning of time, so that the way
+    there does not matter; a body whose first change lies ahead keeps what it has.
+
+    Boxes of instances of several bodies (robots) stay as they are, since their size takes geometry:
+    scenes for sensors and labels come from ``gen_data.generator.pipeline.finalize_scene.Timeline``.
+    """
+    if time_s == scene.time_s:
+        return scene
+    if not (scene.tracks or scene.changes):
+        return place_sensors(replace(scene, time_s=time_s))
+    tracks = {track.body: track for track in scene.tracks}
+    changes = _in_force(scene.changes, time_s)
+    bodies = tuple(
+        _changed(
+            replace(body, T_world_body=tracks[body.name].pose(time_s).rounded())
+            if body.name in tracks
+            else body,
+            changes.get(body.name),
+        )
+        for body in scene.bodies
+    )
+    moved = {
+        old.name: new.T_world_body @ old.T_world_body.inverse()
+        for old, new in zip(scene.bodies, bodies, strict=True)
+        if old.name in tracks
+    }
+    return place_sensors(
+        replace(
+            scene,
+            time_s=time_s,
+            bodies=bodies,
+            articulations=tuple(_moved_joints(a, time_s) for a in scene.articulations),
+            instances=_moved_instances(scene, bodies, changes, time_s),
+            lights=tuple(
+                _moved_light(light, moved[light.body]) if light.body in moved else light
+                for light in scene.lights
+            ),
+        )
+    )
+
+
+def place_sensors(scene: Scene) -> Scene:
+    """The scene with every sensor where its rig or camera carries it, on files' decimal grid."""
+    scene = replace(scene, cameras=tuple(_placed_camera(scene, c) for c in scene.cameras))
+    return replace(
+        scene,
+        lidars=tuple(_placed_lidar(scene, lidar) for lidar in scene.lidars),
+        devices=tuple(_placed_device(scene, device) for device in scene.devices),
+    )
+
+
+def add_twists(scene: Scene) -> Scene:
+    """The scene with every instance's motion at the scene's instant."""
+    tracks = {track.body: track for track in scene.tracks}
+    if not tracks:
+        return scene
+    rooted = {a.instance_id for a in scene.articulations}
+    carriers = {
+        body.instance_id: tracks[body.name]
+        for body in reversed(scene.bodies)
+        if body.name in tracks and body.instance_id not in rooted
+    }
+    twists = {k: track.twist(scene.time_s) for k, track in carriers.items()}
+    return replace(scene, instances=tuple(_moving(i, twists) for i in scene.instances))
+
+
+def _moving(instance: Instance, twists: Mapping[int, Twist]) -> Instance:
+    twist = twists.get(instance.instance_id, STILL)
+    return instance if twist == instance.twist else replace(instance, twist=twist)
+
+
+def ego_rig(scene: Scene, name: str = "") -> Rig | None:
+    """The rig of that name; by default the one called ``ego``, else the first; None if none."""
+    by_name = {rig.name: rig for rig in reversed(scene.rigs)}
+    if name:
+        return by_name.get(name)
+    return by_name.get(EGO) or next(iter(scene.rigs), None)
+
+
+def rig_twist(scene: Scene, rig: Rig) -> Twist:
+    """How a rig moves at the scene's instant: its origin, by the track of the body it rides on."""
+    track = scene.track(rig.body)
+    if track is None:
+        return STILL
+    body = track.twist(scene.time_s)
+    T_world_body = scene.body(rig.body).T_world_body
+    arm = rotate_by_quaternion(T_world_body.quaternion_wxyz, rig.T_body_rig.translation_m)
+    spin = body.angular_velocity_rad_s
+    lever = _cross(spin, arm)
+    inward = _cross(spin, lever)
+    return Twist(_sum(body.velocity_m_s, lever), _sum(body.acceleration_m_s2, inward), spin)
+
+
+def _cross(a: Vec3, b: Vec3) -> Vec3:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _sum(a: Vec3, b: Vec3) -> Vec3:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def _in_force(changes: tuple[StateChange, ...], time_s: float) -> dict[str, StateChange]:
+    """By body, the sum of all its changes so far."""
+    sums: dict[str, StateChange] = {}
+    for change in changes:
+        if change.time_s > time_s + 1e-9:
+            continue
+        before = sums.get(change.body, change)
+        facts = change.attributes
+        if before.attributes != facts:
+            facts = tuple(sorted({**dict(before.attributes), **dict(facts)}.items()))
+        sums[change.body] = StateChange(
+            change.time_s,
+            change.body,
+            change.asset or before.asset,
+            change.materials or before.materials,
+            facts,
+        )
+    return sums
+
+
+def _changed(body: Body, change: StateChange | None) -> Body:
+    if change is None:
+        return body
+    return replace(
+        body, asset=change.asset or body.asset, materials=change.materials or body.materials
+    )
+
+
+def _moved_instances(
+    scene: Scene, bodies: tuple[Body, ...], changes: dict[str, StateChange], time_s: float
+) -> tuple[Instance, ...]:
+    """Instances with the frames and facts of their first bodies."""
+    rooted = {a.instance_id for a in scene.articulations}
+    first: dict[int, Body] = {}
+    facts: dict[int, dict[str, str]] = {}
+    for body in bodies:
+        first.setdefault(body.instance_id, body)
+        if body.name in changes:
+            facts.setdefault(body.instance_id, {}).update(changes[body.name].attributes)
+    instances = []
+    for instance in scene.instances:
+        body_ = first.get(instance.instance_id)
+        if body_ is None or instance.instance_id in rooted:
+            instances.append(instance)
+            continue
+        change = changes.get(body_.name)
+        still = body_.T_world_body == instance.T_world_instance
+        if still and change is None and instance.instance_id not in facts:
+            instances.append(instance)
+            continue
+        known = {**dict(instance.attributes), **facts.get(instance.instance_id, {})}
+        instances.append(
+            replace(
+                instance,
+                T_world_instance=body_.T_world_body,
+                asset=(change.asset if change else "") or instance.asset,
+                attributes=tuple(sorted(known.items())),
+            )
+        )
+    return add_twists(replace(scene, time_s=time_s, instances=tuple(instances))).instances
+
+
+def _moved_joints(arm: Articulation, time_s: float) -> Articulation:
+    if arm.joint_track is None:
+        return arm
+    return replace(arm, joint_positions=arm.joint_track.positions(time_s))
+
+
+def _moved_light(light: Light, T_new_old: SE3) -> Light:
+    x, y, z = (T_new_old @ SE3(light.position_m)).translation_m
+    dx, dy, dz = (float(v) for v in T_new_old.rotate(light.direction))  # type: ignore[arg-type]
+    moved = replace(
+        light,
+        position_m=(round(x, 6), round(y, 6), round(z, 6)),
+        direction=(round(dx, 8), round(dy, 8), round(dz, 8)),
+    )
+    if light.kind != "rectangle":
+        return moved
+    sx, sy, sz = (float(v) for v in T_new_old.rotate(light.side))  # type: ignore[arg-type]
+    return replace(moved, side=(round(sx, 8), round(sy, 8), round(sz, 8)))
+
+
+def _placed_camera(scene: Scene, camera: Camera) -> Camera:
+    pose = camera.T_world_camera
+    if camera.rig:
+        pose = scene.rig_pose(camera.rig) @ camera.T_rig_camera
+    return replace(camera, T_world_camera=pose.rounded())
+
+
+def _placed_lidar(scene: Scene, lidar: Lidar) -> Lidar:
+    if lidar.rig:
+        T_world_rig = scene.rig_pose(lidar.rig)
+    else:
+        T_world_rig = scene.camera(lidar.camera).T_world_camera @ RIG_AXES
+    return replace(lidar, T_world_lidar=(T_world_rig @ lidar.T_rig_lidar).rounded())
+
+
+def _placed_device(scene: Scene, device: Device) -> Device:
+    if device.rig:
+        T_world_rig = scene.rig_pose(device.rig)
+    else:
+        T_world_rig = scene.camera(device.camera).T_world_camera @ RIG_AXES
+    return replace(device, T_world_device=(T_world_rig @ device.T_rig_device).rounded())

@@ -1,0 +1,134 @@
+"""The robots pack: arms of robosuite with a parallel gripper, from MJCF to URDF."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.folder_index import Finish, FolderIndex, GripperEntry, RobotEntry
+from gen_data.generator.assets.installed_packs import INDEX_NAME, TAG
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.packs.mjcf import add_bodies, read_mjcf
+
+_ROOT = "robosuite/models/assets"
+_GRIPPER = "grippers/rethink_gripper.xml"
+_FLANGE = "right_hand"
+_HAND = "gripper_base"
+_FINGERS = ("l_finger_joint", "r_finger_joint")
+_CLOSED_M = 0.01855
+"""Inner face of a finger pad from the middle at position 0 of its joint: 0.01 + 0.01725 (finger,
+tip) - 0.0047 - 0.004 (pad)."""
+_STROKE_M = 0.078
+"""Twice the pad's distance from the middle at the joint's upper limit, 0.020833."""
+_GRASP_M = 0.109
+"""From the hand's origin to robosuite's grip site."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """An arm of the package.
+
+    Attributes:
+        home: Position per joint [rad], robosuite's initial one.
+        touching: Link pairs that touch by design.
+    """
+
+    name: str
+    author: str
+    home: dict[str, float]
+    touching: tuple[tuple[str, str], ...] = ()
+
+
+ARMS = (
+    Arm(
+        name="ur5e",
+        author="Universal Robots; robosuite contributors",
+        home={
+            "shoulder_pan_joint": -0.470,
+            "shoulder_lift_joint": -1.735,
+            "elbow_joint": 2.480,
+            "wrist_1_joint": -2.275,
+            "wrist_2_joint": -1.590,
+            "wrist_3_joint": -1.991,
+        },
+    ),
+    Arm(
+        name="sawyer",
+        author="Rethink Robotics; robosuite contributors",
+        home={
+            "right_j0": 0.0,
+            "right_j1": -1.18,
+            "right_j2": 0.0,
+            "right_j3": 2.18,
+            "right_j4": 0.0,
+            "right_j5": 0.57,
+            "right_j6": -1.57,
+        },
+    ),
+)
+
+
+def convert(source: Path, target: Path) -> None:
+    """Write a URDF per arm, the meshes that it uses, and the index.
+
+    Raises:
+        AssetError: if a description is missing or not understood.
+    """
+    folder = Folder(source / _ROOT)
+    for arm in ARMS:
+        robot = Element("robot", name=arm.name)
+        files = add_bodies(robot, read_mjcf(folder, f"robots/{arm.name}/robot.xml"))
+        files += add_bodies(robot, read_mjcf(folder, _GRIPPER), _FLANGE)
+        for joint in _FINGERS:
+            _from_closed(robot, joint)
+        indent(robot)
+        (target / f"{arm.name}.urdf").write_bytes(tostring(robot, encoding="utf-8"))
+        for file in files:
+            path = target / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(folder.path(file), path)
+    index = FolderIndex(
+        licence="MIT (package robosuite)",
+        source="PyPI robosuite 1.5.2",
+        robots=tuple(_entry(arm) for arm in ARMS),
+    )
+    text = index.model_dump_json(exclude_defaults=True)
+    (target / INDEX_NAME).write_text(text, encoding="utf-8")
+
+
+def _entry(arm: Arm) -> RobotEntry:
+    fingers = dict.fromkeys(_FINGERS, _STROKE_M / 2.0)
+    return RobotEntry(
+        id=arm.name,
+        file=f"{arm.name}.urdf",
+        tags=("arm", "gripper", TAG),
+        author=arm.author,
+        home={**arm.home, **fingers},
+        gripper=GripperEntry(
+            link=_HAND,
+            grasp_offset_m=_GRASP_M,
+            finger_joints=_FINGERS,
+            stroke_m=_STROKE_M,
+        ),
+        touching=arm.touching,
+        max_faces=1500,
+        materials={"*": Finish(roughness=0.4)},
+    )
+
+
+def _from_closed(robot: Element, name: str) -> None:
+    """Count a finger's joint from closed outwards, as the project's grippers do."""
+    joint = next((j for j in robot.findall("joint") if j.get("name") == name), None)
+    origin = joint.find("origin") if joint is not None else None
+    if joint is None or origin is None:
+        raise AssetError(f"gripper: has no joint '{name}'")
+    x, y, z = (float(v) for v in origin.attrib["xyz"].split())
+    side = 1.0 if y > 0.0 else -1.0
+    origin.set("xyz", f"{x!r} {round(y - side * _CLOSED_M, 9)!r} {z!r}")
+    for tag in ("axis", "limit"):
+        joint.remove(next(iter(joint.findall(tag))))
+    SubElement(joint, "axis", xyz=f"0 {side!r} 0")
+    SubElement(joint, "limit", lower="0", upper=repr(_STROKE_M / 2.0), effort="0", velocity="0")

@@ -1,0 +1,259 @@
+"""Collision geometry prepared for the engine: boxes where exact, else hulls with room for a shell.
+
+Bullet keeps a shell of fixed thickness (its collision margin) around every hull. Each hull is
+therefore made smaller by just that: shell and hull together end where the mesh does, and nothing
+floats above its support.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import ConvexParts
+from gen_data.generator.core.se3 import SE3, Array, Vec3
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
+
+SHELL_M = 0.001
+"""Bullet's own thickness for hulls; parts of a compound cannot have another."""
+
+_SHELL_SHARE_MAX = 0.4
+"""Of a part's smallest width: a hull never shrinks to nothing."""
+_RETREAT_MAX = 1.75
+"""Just above the square root of 3, of a box's corner. Sharper tips move less than their faces ask
+for: better a gap of less than half a shell than a tip that sinks in by several.
+"""
+_SCALE_STEP = 1.05
+"""Hulls are shrunk for the nearest of these steps of scale: 25 micrometres at most are missing."""
+_BOXES_MAX = 16
+"""Primitives that pybullet takes in one compound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """One convex part about the centre of mass of the whole.
+
+    Attributes:
+        vertices_m: float64 [n, 3].
+        retreats: How each vertex moves per metre by which all faces move inward, [n, 3].
+        width_m: Smallest distance between parallel planes on both sides, over all faces.
+    """
+
+    vertices_m: Array
+    retreats: Array
+    width_m: float
+
+    def shrunken(self, depth_m: float) -> Array:
+        """Vertices with all faces moved inward by a depth, less for thin parts."""
+        return self.vertices_m + min(depth_m, _SHELL_SHARE_MAX * self.width_m) * self.retreats
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionShape:
+    """The collision geometry of one asset at scale 1.
+
+    Attributes:
+        hulls: About the centre of mass.
+        center_of_mass_m: In the asset's frame; of a solid of even density.
+        boxes: ``(centre, half extents)`` of every part, about the centre of mass, where all
+            parts are upright boxes and few; else empty.
+    """
+
+    hulls: tuple[Hull, ...]
+    center_of_mass_m: Vec3
+    boxes: tuple[tuple[Vec3, Vec3], ...]
+
+    @cached_property
+    def vertices_m(self) -> Array:
+        """Vertices of all hulls, float64 [n, 3]."""
+        return np.concatenate([hull.vertices_m for hull in self.hulls])
+
+    @cached_property
+    def half_extents_m(self) -> Array:
+        """Of the bounding box, [3]."""
+        half: Array = 0.5 * (self.vertices_m.max(axis=0) - self.vertices_m.min(axis=0))
+        return half
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of the content."""
+        digest = blake2b(digest_size=16)
+        for hull in self.hulls:
+            digest.update(hull.vertices_m.tobytes() + b"|")
+        return digest.hexdigest()
+
+    def obj(self, step: int) -> str:
+        """Wavefront OBJ at scale 1, one object per hull, shrunk for ``scale_step(scale)``."""
+        lines, first = [], 1
+        for number, hull in enumerate(self.hulls):
+            lines.append(f"o part{number}")
+            points = hull.shrunken(SHELL_M / _SCALE_STEP**step)
+            lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in points]
+            # The engine builds the hull of whatever points the faces name.
+            last = first + len(points) - 1
+            lines += [
+                f"f {k} {min(k + 1, last)} {min(k + 2, last)}" for k in range(first, last + 1, 3)
+            ]
+            first = last + 1
+        return "\n".join(lines) + "\n"
+
+    def bounds_m(self, T_world_center: SE3, scale: float) -> tuple[Array, Array]:
+        """Low and high corner in the world [m] with the centre of mass at a pose."""
+        points = T_world_center.apply(self.vertices_m * scale)
+        return points.min(axis=0), points.max(axis=0)
+
+
+def scale_step(scale: float) -> int:
+    """Number of the step of scale that is nearest to a scale; 0 for scale 1."""
+    return round(math.log(scale) / math.log(_SCALE_STEP))
+
+
+def collision_shape(parts: ConvexParts) -> CollisionShape:
+    """The shape of an asset's convex parts."""
+    measured = _measure(parts.parts_m)
+    volumes_m3 = np.array([part.volume_m3 for part in measured])
+    middles = np.stack([part.center_m for part in measured])
+    # Parts that are all flat have no volume; then every part weighs the same.
+    weights = volumes_m3 if volumes_m3.sum() > 0.0 else np.ones(len(measured))
+    center = (weights[:, None] * middles).sum(axis=0) / weights.sum()
+    x, y, z = (round(float(v), 9) for v in center)
+    offset = np.array([x, y, z])
+    hulls = tuple(Hull(part.vertices_m - offset, part.retreats, part.width_m) for part in measured)
+    boxes = [_as_box(hull.vertices_m) for hull in hulls]
+    exact = tuple(box for box in boxes if box is not None)
+    return CollisionShape(
+        hulls, (x, y, z), boxes=exact if len(exact) == len(boxes) <= _BOXES_MAX else ()
+    )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Part:
+    """One convex part as it was given, measured.
+
+    Attributes:
+        vertices_m, retreats, width_m: As a Hull's, in the asset's frame.
+        center_m: Of mass, [3].
+    """
+
+    vertices_m: Array
+    retreats: Array
+    width_m: float
+    volume_m3: float
+    center_m: Array
+
+
+def _measure(parts_m: Sequence[Array]) -> list[_Part]:
+    """Hulls of parts: all faces of all parts at once, for numpy's overhead is most of the work."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    middles = [points.mean(axis=0) for points in parts_m]
+    hulls: dict[int, ConvexHull] = {}
+    for k, part in enumerate(parts_m):
+        # Flat parts have nothing to shrink and no weight.
+        with contextlib.suppress(QhullError):
+            hulls[k] = ConvexHull(part - middles[k])
+    measured = [
+        _Part(p, np.zeros_like(p), 0.0, 0.0, m) for p, m in zip(parts_m, middles, strict=True)
+    ]
+    if not hulls:
+        return measured
+    solid = list(hulls.values())
+    first = np.cumsum([0, *(len(hull.points) for hull in solid)])
+    points = np.concatenate([hull.points for hull in solid])
+    faces = np.concatenate([hull.simplices + n for hull, n in zip(solid, first[:-1], strict=True)])
+    normals = np.concatenate([hull.equations[:, :3] for hull in solid])
+    retreats = _retreats(normals, faces, len(points))
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    volumes_m3 = np.abs(_dot(a, _cross(b, c))) / 6.0
+    moments = volumes_m3[:, None] * (a + b + c) / 4.0
+    starts = np.cumsum([0, *(len(hull.simplices) for hull in solid[:-1])])
+    volumes_m3 = np.add.reduceat(volumes_m3, starts)
+    moments = np.add.reduceat(moments, starts)
+    for n, (k, hull) in enumerate(hulls.items()):
+        kept = np.sort(hull.vertices)
+        measured[k] = _Part(
+            parts_m[k][kept],
+            retreats[first[n] + kept],
+            _width_m(hull),
+            float(volumes_m3[n]),
+            middles[k] + moments[n] / volumes_m3[n],
+        )
+    return measured
+
+
+def _width_m(hull: ConvexHull) -> float:
+    """Smallest distance between a face and the vertex farthest behind it."""
+    depths = np.einsum("kf,kn->fn", hull.equations[:, :3].T, hull.points.T, optimize=False)
+    return float((depths.max(axis=1) - depths.min(axis=1)).min())
+
+
+def _retreats(normals: Array, faces: NDArray[Any], points: int) -> Array:
+    """Where vertices go when their faces move inward by one: ``n . x = -1``, by least squares.
+
+    A trace of damping picks the shortest answer where all faces of a vertex lie in one plane.
+
+    Args:
+        normals: Of the faces, shape [f, 3].
+        faces: Their corners, shape [f, 3].
+        points: Number of points, those on no face included.
+
+    Returns:
+        Shape [points, 3].
+    """
+    corners = faces.T.reshape(-1)
+    nx, ny, nz = normals.T
+    terms = (nx * nx, nx * ny, nx * nz, ny * ny, ny * nz, nz * nz, nx, ny, nz)
+    sums = [
+        np.bincount(corners, np.tile(term, 3), points).astype(np.float64, copy=False)
+        for term in terms
+    ]
+    xx, xy, xz, yy, yz, zz, *b = sums
+    xx, yy, zz = xx + 1e-9, yy + 1e-9, zz + 1e-9
+    # Cofactors of the symmetric matrix.
+    c_xx, c_xy, c_xz = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    c_yy, c_yz, c_zz = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    scale = -1.0 / (xx * c_xx + xy * c_xy + xz * c_xz)
+    x = np.stack(
+        [
+            (c_xx * b[0] + c_xy * b[1] + c_xz * b[2]) * scale,
+            (c_xy * b[0] + c_yy * b[1] + c_yz * b[2]) * scale,
+            (c_xz * b[0] + c_yz * b[1] + c_zz * b[2]) * scale,
+        ],
+        axis=1,
+    )
+    lengths = np.sqrt(_dot(x, x))[:, None]
+    return x * np.minimum(1.0, _RETREAT_MAX / np.maximum(lengths, 1e-12))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    # Coordinate by coordinate: summing over a short last axis takes several times as long.
+    product: Array = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+    return product
+
+
+def _cross(a: Array, b: Array) -> Array:
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def _as_box(points: Array) -> tuple[Vec3, Vec3] | None:
+    """Centre and half extents of a hull whose vertices are the corners of an upright box."""
+    if len(points) != 8:
+        return None
+    low, high = points.min(axis=0), points.max(axis=0)
+    center, half = 0.5 * (low + high), 0.5 * (high - low)
+    if (np.abs(np.abs(points - center) - half) > 1e-6 * half.max()).any():
+        return None
+    (cx, cy, cz), (hx, hy, hz) = center.tolist(), half.tolist()
+    return (cx, cy, cz), (hx, hy, hz)

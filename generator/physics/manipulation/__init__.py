@@ -1,0 +1,1 @@
+"""Robot arms: inverse kinematics, motion and task planning, grasps, trajectories."""

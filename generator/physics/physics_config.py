@@ -1,0 +1,47 @@
+"""What a user may change about physics."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from gen_data.generator.config.base_model import Strict
+
+
+class PhysicsConfig(Strict):
+    """Settling: how long, how exactly, and when a layout is refused."""
+
+    time_step_s: float = Field(
+        1.0 / 240.0, gt=0.0, le=1.0 / 60.0, description="Simulated time per step [s]."
+    )
+    settle_time_s_max: float = Field(
+        4.0,
+        gt=0.0,
+        le=60.0,
+        description="Simulated time after which objects that still move are refused [s].",
+    )
+    rest_speed_m_s: float = Field(
+        0.01, gt=0.0, description="An object at rest is slower than this [m/s]."
+    )
+    rest_spin_rad_s: float = Field(
+        0.1, gt=0.0, description="An object at rest turns slower than this [rad/s]."
+    )
+    rest_time_s: float = Field(
+        0.1, gt=0.0, le=1.0, description="For how long all objects must be at rest [s]."
+    )
+    penetration_m_max: float = Field(
+        0.001, gt=0.0, description="Objects that overlap by more than this at rest are refused [m]."
+    )
+    solver_iterations: int = Field(
+        50,
+        ge=1,
+        le=1000,
+        description="Iterations of the contact solver per step; more keep tall stacks upright.",
+    )
+    guard_walls: bool = Field(
+        True,
+        description="Invisible walls keep objects from rolling off open surfaces while they "
+        "settle; what then cannot rest without them is dropped again nearer to the middle.",
+    )
+    layout_attempts_max: int = Field(
+        20, ge=1, le=1000, description="Layouts tried for one scene before it is given up."
+    )

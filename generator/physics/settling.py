@@ -1,0 +1,203 @@
+"""From bodies in the air to bodies at rest, or to the reason why not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from gen_data.generator.core.errors import Rejection
+from gen_data.generator.core.scene import Body, SupportSurface
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.physics.bullet import World
+from gen_data.generator.physics.physics_config import PhysicsConfig
+from gen_data.generator.physics.placement_surfaces import guard_walls, home_surface, is_supported
+
+_CHECK_EVERY_S = 0.05
+_LIFTS_MAX = 32
+_LIFT_M = 0.01
+_LOWERINGS_MAX = 16
+_RELEASE_GAP_M = 0.002
+_TOUCH_M = 0.001
+_ATTEMPTS_MAX = 4
+_LOST_M = 0.3
+"""This far below its lowest surface an object is not waited for any longer."""
+
+
+class Settling:
+    """Bodies that fall in a world where everything else stands still.
+
+    Args:
+        world: With all bodies in it.
+        falling: The bodies that fall.
+        surfaces: ``{body: surfaces that it may end on}``; where there are none, anywhere is fine.
+        config: Times and thresholds.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        falling: Sequence[Body],
+        surfaces: Mapping[str, tuple[SupportSurface, ...]],
+        config: PhysicsConfig,
+    ) -> None:
+        self._world = world
+        self._config = config
+        self._surfaces = surfaces
+        # Lowest first, so that each is lowered onto what lies below it; ties stay in order.
+        self._falling = sorted(falling, key=lambda body: float(world.bounds_m(body.name)[0][2]))
+        self._homes = {
+            body.name: home_surface(surfaces[body.name], *world.bounds_m(body.name))
+            for body in falling
+        }
+
+    def settle(self, fixed: Sequence[str], arms: Sequence[str]) -> Rejection | None:
+        """Let everything fall and come to rest; None when all is well.
+
+        With guard walls, what falls off nevertheless is dropped again, nearer to the middle of
+        its surface, a few times.
+        """
+        loose = self._falling
+        for attempt in range(_ATTEMPTS_MAX if self._config.guard_walls else 1):
+            for body in loose:
+                self._restart(body, pull=1.0 - 0.5**attempt)
+            self._lower(loose, fixed, arms)
+            if not self._rest_guarded():
+                return self._still_moving()
+            loose = [body for body in self._falling if not self._is_supported(body)]
+            if not loose:
+                break
+            if any(self._homes[body.name] is None for body in loose):
+                return self._fell_off()
+        return self._fell_off() if loose else self._find_rejection()
+
+    def _restart(self, body: Body, pull: float) -> None:
+        """Put a body where it started, moved towards the middle of its surface by a share."""
+        home = self._homes[body.name]
+        x, y, z = body.T_world_body.translation_m
+        if home is not None:
+            to_x, to_y, _ = home.T_world_surface.translation_m
+            x, y = x + pull * (to_x - x), y + pull * (to_y - y)
+        self._world.place(body.name, SE3((x, y, z), body.T_world_body.quaternion_wxyz))
+
+    def _rest_guarded(self) -> bool:
+        """Whether all comes to rest: first inside guard walls, then without what it leans on."""
+        guards = self._guards() if self._config.guard_walls else []
+        rests = self._come_to_rest()
+        leaning = any(
+            (one in guards or other in guards) and gap_m < _TOUCH_M
+            for one, other, gap_m in (self._world.contacts() if guards else ())
+        )
+        for name in guards:
+            self._world.remove(name)
+        return self._come_to_rest() if rests and leaning else rests
+
+    def _lower(self, loose: Sequence[Body], fixed: Sequence[str], arms: Sequence[str]) -> None:
+        """Bring each body to just above what is below it: a short fall stays where it lands."""
+        names = [body.name for body in loose]
+        movable = [*arms, *(b.name for b in self._falling if b.name not in names)]
+        for name in names:
+            home = self._homes[name]
+            if home is not None:
+                self._lift_clear(name, movable, home)
+                self._sink(name, [*fixed, *movable], home)
+            movable.append(name)
+
+    def _lift_clear(self, name: str, others: Sequence[str], home: SupportSurface) -> None:
+        """Raise a body that starts inside others until it is free, as far as there is room."""
+        below = self._below(name, others)
+        ceiling = home.T_world_surface.translation_m[2] + home.clearance_m
+        for _ in range(_LIFTS_MAX):
+            overlap = -min((self._world.gap_m(name, other, 0.0) for other in below), default=0.0)
+            rise = max(overlap, _LIFT_M)
+            if overlap < _TOUCH_M or self._world.bounds_m(name)[1][2] + rise > ceiling:
+                return
+            self._shift(name, rise)
+
+    def _sink(self, name: str, others: Sequence[str], home: SupportSurface) -> None:
+        """Conservative advancement: moving by the gap can never pass through anything."""
+        below = self._below(name, others)
+        for _ in range(_LOWERINGS_MAX):
+            low, _high = self._world.bounds_m(name)
+            height = float(low[2]) - home.T_world_surface.translation_m[2]
+            gap = min((self._world.gap_m(name, o, max(height, 0.0)) for o in below), default=0.0)
+            if gap <= _RELEASE_GAP_M:
+                return
+            self._shift(name, 0.5 * _RELEASE_GAP_M - gap)
+
+    def _below(self, name: str, others: Sequence[str]) -> list[str]:
+        """Those of the others that a vertical motion of the body may meet."""
+        low, high = self._world.bounds_m(name)
+        met = []
+        for other in others:
+            other_low, other_high = self._world.bounds_m(other)
+            if (low[:2] <= other_high[:2]).all() and (other_low[:2] <= high[:2]).all():
+                met.append(other)
+        return met
+
+    def _shift(self, name: str, rise_m: float) -> None:
+        self._world.place(name, SE3((0.0, 0.0, rise_m)) @ self._world.pose(name))
+
+    def _guards(self) -> list[str]:
+        """Put walls around every surface that something will land on."""
+        names = []
+        homes = {home.name: home for home in self._homes.values() if home is not None}
+        for home in homes.values():
+            strangers = [name for name, other in self._homes.items() if other is not home]
+            for number, (shape, pose) in enumerate(guard_walls(home)):
+                name = f"guard/{home.name}/{number}"
+                self._world.add(name, shape, pose, friction=0.0, restitution=0.0)
+                self._world.ignore(name, strangers)
+                names.append(name)
+        return names
+
+    def _come_to_rest(self) -> bool:
+        """Let time pass until nothing moves or something is lost; False when time is up first."""
+        config = self._config
+        steps = max(1, round(_CHECK_EVERY_S / config.time_step_s))
+        elapsed_s, calm_s = 0.0, 0.0
+        while elapsed_s < config.settle_time_s_max:
+            self._world.step(steps)
+            elapsed_s += steps * config.time_step_s
+            calm_s = calm_s + steps * config.time_step_s if self._is_calm() else 0.0
+            if calm_s >= config.rest_time_s - 1e-9 or any(map(self._is_lost, self._falling)):
+                return True
+        return not self._falling
+
+    def _is_calm(self) -> bool:
+        speeds = [self._world.speed(body.name) for body in self._falling]
+        return all(
+            speed < self._config.rest_speed_m_s and spin < self._config.rest_spin_rad_s
+            for speed, spin in speeds
+        )
+
+    def _is_lost(self, body: Body) -> bool:
+        heights = [s.T_world_surface.translation_m[2] for s in self._surfaces[body.name]]
+        lowest = min(heights, default=float("-inf"))
+        return self._world.pose(body.name).translation_m[2] < lowest - _LOST_M
+
+    def _is_supported(self, body: Body) -> bool:
+        surfaces = self._surfaces[body.name]
+        return not surfaces or is_supported(surfaces, *self._world.bounds_m(body.name))
+
+    def _find_rejection(self) -> Rejection | None:
+        deepest = min((gap_m for _, _, gap_m in self._world.contacts()), default=0.0)
+        return self._overlapping() if deepest < -self._config.penetration_m_max else None
+
+    def _fell_off(self) -> Rejection:
+        guard = "" if self._config.guard_walls else ", or physics.guard_walls: true"
+        return Rejection("object fell off", f"{self._fewer()}, or a larger surface{guard}")
+
+    def _still_moving(self) -> Rejection:
+        return Rejection(
+            f"still moving after {self._config.settle_time_s_max} s",
+            f"a larger physics.settle_time_s_max, or {self._fewer()}",
+        )
+
+    def _overlapping(self) -> Rejection:
+        return Rejection(
+            "objects interpenetrate",
+            f"{self._fewer()}, a larger surface, or a larger physics.penetration_m_max",
+        )
+
+    def _fewer(self) -> str:
+        groups = ", ".join(sorted({f"'{body.group}'" for body in self._falling if body.group}))
+        return f"fewer objects in {groups} (count)" if groups else "fewer dynamic bodies"

@@ -1,0 +1,121 @@
+"""From a settled scene to the scene that labels refer to: ids, instance frames, boxes, rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.scene_time import add_twists, scene_at
+from gen_data.generator.core.se3 import SE3, Array, Vec3
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """A view through time: the only source of scenes that sensors and labels refer to.
+
+    Invariant: every scene it returns follows from the view at its beginning, whatever was asked
+    before, and its instances have the frames, boxes and motion of its own instant.
+
+    Attributes:
+        view: A frozen scene at time 0, with its sensors in their places.
+        category_ids: By name of the category.
+    """
+
+    view: Scene
+    assets: AssetLibrary
+    category_ids: Mapping[str, int]
+    _known: dict[float, Scene] = field(default_factory=dict)
+
+    def at(self, time_s: float) -> Scene:
+        """The scene at an instant; each is computed once."""
+        if time_s == self.view.time_s:
+            return self.view
+        if time_s not in self._known:
+            moved = scene_at(self.view, time_s)
+            self._known[time_s] = finalize_scene(moved, self.assets, self.category_ids)
+        return self._known[time_s]
+
+
+def finalize_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
+    """The scene with every instance's category id, facts, frame, keypoints and tight box filled in.
+
+    An instance of one body has that body's frame. An instance of several bodies (a robot) has
+    the frame of its articulation's base, and the box around all its bodies' vertices.
+    """
+    members: dict[int, list[Body]] = {}
+    for body in scene.bodies:
+        members.setdefault(body.instance_id, []).append(body)
+    bases = {a.instance_id: a.T_world_base for a in scene.articulations}
+    instances = tuple(
+        _measured(
+            _known(instance, assets, category_ids),
+            members.get(instance.instance_id, []),
+            bases.get(instance.instance_id),
+            assets,
+        )
+        for instance in scene.instances
+    )
+    return add_twists(replace(scene, instances=instances))
+
+
+def _known(instance: Instance, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Instance:
+    """The instance with what its asset says about it; its own attributes win."""
+    asset = assets.get(instance.asset)
+    attributes = {**dict(asset.attributes), **dict(instance.attributes)}
+    return replace(
+        instance,
+        category_id=category_ids.get(instance.category, 0),
+        subcategory=instance.subcategory or asset.subcategory,
+        attributes=tuple(sorted(attributes.items())),
+    )
+
+
+def _measured(
+    instance: Instance, bodies: list[Body], T_world_base: SE3 | None, assets: AssetLibrary
+) -> Instance:
+    if not bodies:
+        return instance
+    if T_world_base is None and len(bodies) == 1:
+        body = bodies[0]
+        low, high = assets.bounds_m(body.asset)
+        return replace(
+            instance,
+            T_world_instance=body.T_world_body,
+            box_min_m=_scaled(low, body.scale),
+            box_max_m=_scaled(high, body.scale),
+            keypoints=tuple(
+                replace(
+                    point,
+                    position_m=_scaled(point.position_m, body.scale),
+                    radius_m=point.radius_m * body.scale,
+                )
+                for point in assets.keypoints(body.asset)
+            ),
+        )
+    T_world_instance = bodies[0].T_world_body if T_world_base is None else T_world_base
+    T_instance_world = T_world_instance.inverse()
+    lows, highs = [], []
+    for body in bodies:
+        vertices_m = assets.mesh(body.asset).vertices_m.astype(np.float64) * body.scale
+        placed = (T_instance_world @ body.T_world_body).apply(vertices_m)
+        lows.append(placed.min(axis=0))
+        highs.append(placed.max(axis=0))
+    return replace(
+        instance,
+        T_world_instance=T_world_instance,
+        box_min_m=_rounded(np.min(lows, axis=0)),
+        box_max_m=_rounded(np.max(highs, axis=0)),
+    )
+
+
+def _scaled(corner_m: Vec3, scale: float) -> Vec3:
+    return _rounded(np.asarray(corner_m) * scale)
+
+
+def _rounded(corner_m: Array) -> Vec3:
+    x, y, z = (round(float(v), 6) for v in corner_m)
+    return (x, y, z)

@@ -1,0 +1,134 @@
+"""Contact sheet: many samples, or many sensors, on one PNG."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.preview.device_views import event_view, radar_view
+from gen_data.generator.preview.overlay import Image, channel_image, draw_labels
+from gen_data.generator.preview.point_cloud_views import range_view, top_view
+
+GAP_PX = 4
+BACKGROUND = 24
+
+
+CAPTION_PX = 18
+"""Height of the strip under a tile that its caption stands on."""
+INK = (225, 225, 225)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Tile:
+    """One picture of a sheet, uint8 [h, w, 3], and what it is."""
+
+    caption: str
+    image: Image
+
+
+def tiles(
+    samples: Iterable[Sample],
+    channels: Mapping[str, Sequence[Channel]],
+    *,
+    labels: bool,
+    devices: bool = False,
+) -> Iterator[Tile]:
+    """One tile per sample, camera and channel it has, and two per scan.
+
+    Args:
+        samples: What is shown.
+        channels: Of every camera.
+        labels: Whether they are drawn on colour images.
+        devices: Whether radars and event cameras have tiles too.
+    """
+    for sample in samples:
+        aspect = 1.0
+        for name, reading in sorted(sample.capture.readings.items()):
+            aspect = reading.camera.intrinsics.width_px / reading.camera.intrinsics.height_px
+            shown = [c for c in channels[name] if c in reading.channels]
+            for channel in shown:
+                caption = name if len(shown) == 1 else f"{name} {channel.value}"
+                if labels and channel is Channel.RGB:
+                    yield Tile(caption, draw_labels(reading, sample.truth[name]))
+                else:
+                    yield Tile(caption, channel_image(reading, channel))
+        for name, cloud in sorted(sample.capture.clouds.items()):
+            yield Tile(name, top_view(cloud, sample.scene, aspect))
+            yield Tile(f"{name} range, intensity, class", range_view(cloud))
+        for name, table in sorted(sample.capture.tables.items()) if devices else ():
+            if table.device.kind == "radar":
+                yield Tile(name, radar_view(table, sample.scene, aspect))
+            elif table.device.kind == "event_camera":
+                yield Tile(name, event_view(table))
+
+
+def pictures(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:
+    """The images of tiles, ``width_px`` wide, with their captions below if asked for."""
+    return [
+        _captioned(_scaled(tile.image, width_px), tile.caption)
+        if captions
+        else _scaled(tile.image, width_px)
+        for tile in shown
+    ]
+
+
+def arrange_tiles(images: Sequence[Image], columns: int) -> Image:
+    """Tiles in rows of ``columns``, with a small gap; 0 = as many as make a sheet of 4 to 3.
+
+    Raises:
+        ConfigError: if there is no tile.
+    """
+    if not images:
+        raise ConfigError("a contact sheet needs at least one sample")
+    height = max(image.shape[0] for image in images)
+    width = max(image.shape[1] for image in images)
+    columns = columns or max(1, round(math.sqrt(len(images) * 4.0 / 3.0 * height / width)))
+    rows = math.ceil(len(images) / columns)
+    columns = min(columns, len(images))
+    sheet = np.full(
+        (rows * (height + GAP_PX) + GAP_PX, columns * (width + GAP_PX) + GAP_PX, 3),
+        BACKGROUND,
+        np.uint8,
+    )
+    for number, image in enumerate(images):
+        row, column = divmod(number, columns)
+        y, x = GAP_PX + row * (height + GAP_PX), GAP_PX + column * (width + GAP_PX)
+        sheet[y : y + image.shape[0], x : x + image.shape[1]] = image
+    return sheet
+
+
+def write_sheet(sheet: Image, path: Path) -> None:
+    """Write a sheet as PNG.
+
+    Raises:
+        StorageError: if the file cannot be written.
+    """
+    done, encoded = cv2.imencode(".png", sheet[..., ::-1])
+    if not done:
+        raise StorageError(f"{path}: the contact sheet could not be encoded")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(encoded.tobytes())
+    except OSError as error:
+        raise StorageError(f"{path}: {error.strerror}") from error
+
+
+def _captioned(image: Image, caption: str) -> Image:
+    strip: Image = np.full((CAPTION_PX, image.shape[1], 3), BACKGROUND, np.uint8)
+    face = cv2.FONT_HERSHEY_SIMPLEX
+    cv2.putText(strip, caption, (4, CAPTION_PX - 5), face, 0.42, INK, 1, cv2.LINE_AA)
+    return np.concatenate([image, strip])
+
+
+def _scaled(image: Image, width_px: int) -> Image:
+    height_px = round(image.shape[0] * width_px / image.shape[1])
+    how = cv2.INTER_AREA if width_px < image.shape[1] else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(image, (width_px, height_px), interpolation=how), np.uint8)

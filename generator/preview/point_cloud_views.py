@@ -1,0 +1,155 @@
+"""Laser scans to look at: coloured points, a view from above, and one from the scanner."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.boxes import OrientedBox
+from gen_data.generator.core.capture import PointCloud
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.preview.overlay import BOX_EDGES, Image
+from gen_data.generator.preview.palette import color_shares, id_color
+
+PointColors = Literal["class", "intensity"]
+"""What decides the colour of a point."""
+PANEL_PX = 960
+"""Width of a view from above before it is scaled to its tile."""
+AHEAD_M = 50.0
+"""Shown before and behind the scanner."""
+NEAR_M, FAR_M = 2.0, 100.0
+"""Ranges between which colours differ in the view from the scanner."""
+ROW_PX = 2
+"""Height of a ring in the view from the scanner."""
+
+GREY = (120, 120, 120)
+COLORS = {
+    "air": (255, 80, 255),
+    "asphalt": (105, 105, 112),
+    "marking": (235, 235, 235),
+    "pavement": (150, 140, 130),
+    "kerb": (170, 160, 150),
+    "grass": (90, 130, 60),
+    "leaf": (60, 170, 60),
+    "bark": (140, 100, 60),
+    "sign": (255, 210, 0),
+    "facade": (170, 110, 80),
+    "roof": (150, 70, 60),
+    "window": (90, 130, 170),
+}
+"""Of what has no category, by surface."""
+
+
+def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uint8]:
+    """SRGB colour of each point, uint8 [n, 3].
+
+    Args:
+        cloud: Whose points these are.
+        by: ``class`` is that of its category, else of its surface.
+    """
+    points = cloud.points
+    if by == "intensity":
+        # Most surfaces return little: the root tells them apart.
+        return color_shares(np.sqrt(points["intensity"]))
+    categories = points["category_id"]
+    of_category = [id_color(k) for k in range(int(categories.max(initial=0)) + 1)]
+    of_surface = [COLORS.get(name, GREY) for name in SURFACES]
+    colors: NDArray[np.uint8] = np.array(of_surface, np.uint8)[points["surface"]]
+    labelled = categories > 0
+    colors[labelled] = np.array(of_category, np.uint8)[categories[labelled]]
+    return colors
+
+
+def top_view(cloud: PointCloud, scene: Scene, aspect: float) -> Image:
+    """The scan from above, its X axis to the right, uint8 [h, w, 3]; boxes are outlined.
+
+    Args:
+        cloud: What is shown.
+        scene: Whose annotated things are outlined.
+        aspect: Width over height.
+    """
+    image = empty_view(aspect)
+    shape = image.shape
+    position_m = cloud.points["position_m"]
+    colors = point_colors(cloud)
+    column, row = pixels_from_above(position_m, image)
+    inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
+    # Higher points last: they are what is seen from above.
+    order = np.argsort(position_m[:, 2], kind="stable")
+    order = order[inside[order]]
+    image[row[order], column[order]] = colors[order]
+    outline_things(image, scene, cloud.lidar.T_world_lidar)
+    return image
+
+
+def empty_view(aspect: float) -> Image:
+    """What views from above are drawn on, uint8 [h, w, 3]."""
+    return np.zeros((max(8, round(PANEL_PX / aspect)), PANEL_PX, 3), np.uint8)
+
+
+def outline_things(image: Image, scene: Scene, T_world_sensor: SE3) -> None:
+    """Draw the boxes of annotated things from above, in place, around a sensor."""
+    T_sensor_world = T_world_sensor.inverse()
+    for thing in scene.instances:
+        if thing.annotated:
+            low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
+            x, y, z = (float(v) for v in 0.5 * (low + high))
+            length, width, height = (float(v) for v in high - low)
+            box = OrientedBox(
+                T_sensor_world @ thing.T_world_instance @ SE3((x, y, z)), (length, width, height)
+            )
+            _outline(image, box, id_color(thing.category_id))
+
+
+def range_view(cloud: PointCloud) -> Image:
+    """What the scanner sees all around: range, intensity and class, one above the other.
+
+    A row is a ring, the highest first; the middle column is straight ahead, left is left. Of
+    several points in one pixel the nearest is shown. Near is blue, far is red.
+
+    Returns:
+        uint8 [h, w, 3]; black where no point is.
+    """
+    position_m = cloud.points["position_m"].astype(np.float64)
+    range_m = np.sqrt(np.einsum("ij,ij->i", position_m, position_m))
+    turn = 0.5 - np.arctan2(position_m[:, 1], position_m[:, 0]) / (2.0 * np.pi)
+    column = np.minimum((turn * PANEL_PX).astype(np.intp), PANEL_PX - 1)
+    row = cloud.points["ring"].astype(np.intp)
+    order = np.argsort(-range_m, kind="stable")
+    share = np.log(np.maximum(range_m, 1e-6) / NEAR_M) / np.log(FAR_M / NEAR_M)
+    looks = (
+        color_shares(share),
+        *(point_colors(cloud, by) for by in get_args(PointColors)[::-1]),
+    )
+    panels = []
+    for colors in looks:
+        panel: Image = np.zeros((1 + int(row.max(initial=0)), PANEL_PX, 3), np.uint8)
+        panel[row[order], column[order]] = colors[order]
+        panels.append(np.repeat(panel, ROW_PX, axis=0))
+    return np.concatenate(panels)
+
+
+def pixels_from_above(
+    position_m: NDArray[np.floating], image: Image
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Column and row of points; X to the right, Y up, the sensor in the middle of the image."""
+    height, width = image.shape[:2]
+    scale = 0.5 * width / AHEAD_M
+    column = np.floor(0.5 * width + position_m[:, 0] * scale).astype(np.intp)
+    row = np.floor(0.5 * height - position_m[:, 1] * scale).astype(np.intp)
+    return column, row
+
+
+def _outline(image: Image, box: OrientedBox, color: tuple[int, int, int]) -> None:
+    column, row = pixels_from_above(box.corners(), image)
+    far = max(image.shape) * 4
+    if max(np.abs(column).max(), np.abs(row).max()) > far:
+        return
+    for a, b in BOX_EDGES:
+        start, end = (int(column[a]), int(row[a])), (int(column[b]), int(row[b]))
+        cv2.line(image, start, end, color, 1, cv2.LINE_AA)

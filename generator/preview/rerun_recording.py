@@ -1,0 +1,281 @@
+"""Samples as a Rerun recording: the 3D scene, the images, the scans.
+
+Timelines are ``sample``, the number of the sample, and for sequences ``time`` in seconds, on which
+sequences follow each other. What has not changed since the last sample is not sent again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import MeshData
+from gen_data.generator.core.capture import Channel, PointCloud, SensorReading
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.generator.core.sample import ImageTruth, Sample
+from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.skeletons import Skeleton, find_skeleton
+from gen_data.generator.preview.overlay import channel_image
+from gen_data.generator.preview.palette import id_color
+from gen_data.generator.preview.point_cloud_views import PointColors, point_colors
+from gen_data.generator.preview.rerun_archetypes import (
+    boxes_2d,
+    boxes_3d,
+    mesh_3d,
+    pinhole,
+    trajectory_strips,
+    transform,
+)
+
+TIMELINE = "sample"
+TIME = "time"
+APPLICATION = "gen-data"
+IN_IMAGE = {Channel.RGB, Channel.Z_DEPTH, Channel.MEASURED_DEPTH, Channel.CATEGORY}
+"""Channels that are laid over each other; all others have pictures of their own."""
+AXES_M = 0.5
+"""Length at which the axes of rigs and devices are drawn."""
+
+
+@dataclass
+class Recorder:
+    """Writes samples to one recording stream; remembers what it has already sent.
+
+    Attributes:
+        stream: Where to write.
+        info: The data set that the samples are of.
+        points: What decides the colour of a laser point.
+    """
+
+    stream: rr.RecordingStream
+    assets: AssetLibrary
+    info: DatasetInfo
+    points: PointColors = "class"
+    _sent: dict[str, tuple[Any, ...]] = field(default_factory=dict)
+    _skeletons: dict[int, Skeleton] = field(default_factory=dict)
+    _sequence: int = -1
+
+    def start(self) -> None:
+        """Log what holds for every sample: axes, category names, the layout of the views."""
+        self._name_classes()
+        self.stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self.stream.send_blueprint(_layout(self.info))
+
+    def _name_classes(self) -> None:
+        """Log names and colours of categories and, as far as they are known, their skeletons."""
+        background = rr.AnnotationInfo(id=0, label="background", color=(60, 60, 60))
+        described = [rr.ClassDescription(info=background)]
+        for k, name in enumerate(self.info.categories, 1):
+            info = rr.AnnotationInfo(id=k, label=name, color=id_color(k))
+            skeleton = self._skeletons.get(k, Skeleton(()))
+            described.append(
+                rr.ClassDescription(
+                    info=info,
+                    keypoint_annotations=[
+                        rr.AnnotationInfo(id=i, label=label, color=id_color(k))
+                        for i, label in enumerate(skeleton.names)
+                    ],
+                    keypoint_connections=skeleton.bones,
+                )
+            )
+        self.stream.log("/", rr.AnnotationContext(described), static=True)
+
+    def _learn_skeletons(self, instances: Iterable[Instance]) -> None:
+        """Name the keypoints of categories that are met for the first time, or with more points."""
+        known = dict(self._skeletons)
+        for instance in instances:
+            if instance.keypoints and instance.category_id:
+                before = known.get(instance.category_id, Skeleton(()))
+                names = (*before.names, *(point.name for point in instance.keypoints))
+                known[instance.category_id] = find_skeleton(names)
+        if known != self._skeletons:
+            self._skeletons = known
+            self._name_classes()
+
+    def record(self, sample: Sample) -> None:
+        """Log one sample at its own place in time."""
+        self._learn_skeletons(sample.scene.instances)
+        self._set_time(sample, sample.scene.time_s)
+        self._record_bodies(sample.scene)
+        self._record_frames(sample.scene)
+        self._record_ways(sample)
+        if sample.truth:
+            self.stream.log("world/boxes", boxes_3d(sample))
+        for name, reading in sorted(sample.capture.readings.items()):
+            self._set_time(sample, reading.time_s)
+            self._record_image(name, reading, sample.truth[name])
+        for name, cloud in sorted(sample.capture.clouds.items()):
+            self._set_time(sample, cloud.time_s)
+            self._record_cloud(name, cloud)
+
+    def _set_time(self, sample: Sample, time_s: float) -> None:
+        """Log what follows at an instant of the sample's sequence."""
+        self.stream.set_time(TIMELINE, sequence=sample.index)
+        if self.info.steps_per_scene > 1:
+            begins_s = (sample.index - sample.step_index) * self.info.step_s
+            self.stream.set_time(TIME, duration=round(begins_s + time_s, 9))
+
+    def _record_bodies(self, scene: Scene) -> None:
+        paths = set()
+        for body in scene.bodies:
+            path = f"world/bodies/{body.name}"
+            paths.add(path)
+            look, place = (body.asset, body.materials), (body.T_world_body, body.scale)
+            before = self._sent.get(path, (None, None))
+            self._sent[path] = (look, place)
+            if before[1] != place:
+                self.stream.log(path, transform(*place))
+            if before[0] != look:
+                self.stream.log(path, self._mesh(body))
+        for path in sorted(set(self._sent) - paths):
+            del self._sent[path]
+            self.stream.log(path, rr.Clear(recursive=False))
+
+    def _record_frames(self, scene: Scene) -> None:
+        """Log where rigs and devices are; cameras and scanners are logged as they read."""
+        frames: dict[str, SE3] = {
+            f"world/rigs/{rig.name}": scene.rig_pose(rig.name) for rig in scene.rigs
+        } | {f"world/devices/{device.name}": device.T_world_device for device in scene.devices}
+        for path, pose in frames.items():
+            self.stream.log(path, transform(pose), rr.TransformAxes3D(AXES_M))
+
+    def _record_ways(self, sample: Sample) -> None:
+        """Log where things go, once per sequence."""
+        sequence = sample.index // self.info.steps_per_scene
+        if self.info.steps_per_scene > 1 and sequence != self._sequence:
+            self._sequence = sequence
+            remaining = self.info.steps_per_scene - 1 - sample.step_index
+            until_s = sample.scene.time_s + remaining * self.info.step_s
+            self.stream.log("world/ways", trajectory_strips(sample.scene, until_s))
+
+    def _mesh(self, body: Body) -> rr.Mesh3D:
+        mesh = self.assets.mesh(body.asset)
+        return mesh_3d(mesh, self._slot_colors(body, mesh))
+
+    def _slot_colors(self, body: Body, mesh: MeshData) -> NDArray[np.uint8]:
+        """SRGB colour per material slot: base colour times the texture's mean."""
+        colors = []
+        for material in body.materials or mesh.materials:
+            linear = np.asarray(material.base_color)
+            if material.texture:
+                albedo = self.assets.texture(material.texture).albedo[::8, ::8] / 255.0
+                linear = linear * (albedo**2.2).mean(axis=(0, 1))
+            colors.append(np.clip(linear, 0, 1) ** (1 / 2.2) * 255)
+        return np.asarray(colors).astype(np.uint8)
+
+    def _record_image(self, name: str, reading: SensorReading, truth: ImageTruth) -> None:
+        path = f"world/cameras/{name}"
+        self.stream.log(path, transform(reading.camera.T_world_camera))
+        # Rerun knows no other camera: images of other lenses are shown by themselves.
+        if reading.camera.intrinsics.straight:
+            self.stream.log(f"{path}/image", pinhole(reading.camera.intrinsics))
+        for channel, data in reading.channels.items():
+            if channel is Channel.RGB:
+                self.stream.log(f"{path}/image/rgb", rr.Image(data).compress(90))
+            elif channel in (Channel.Z_DEPTH, Channel.MEASURED_DEPTH):
+                shown = np.where(np.isfinite(data), data, 0).astype(np.float32)
+                self.stream.log(f"{path}/image/{channel.value}", rr.DepthImage(shown, meter=1.0))
+            elif channel is Channel.CATEGORY:
+                categories = rr.SegmentationImage(data, opacity=0.4)
+                self.stream.log(f"{path}/image/category", categories)
+            else:
+                colored = rr.Image(channel_image(reading, channel)).compress(90)
+                self.stream.log(f"channels/{name}/{channel.value}", colored)
+        self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
+        self._record_keypoints(f"{path}/image/keypoints", truth)
+
+    def _record_keypoints(self, path: str, truth: ImageTruth) -> None:
+        # One entity per object: Rerun joins the points of one class within an entity.
+        self.stream.log(path, rr.Clear(recursive=True))
+        for item in truth.objects:
+            shown = [point for point in item.keypoints or () if point.visibility]
+            category_id = item.instance.category_id
+            if shown and category_id in self._skeletons:
+                names = self._skeletons[category_id].names
+                points = rr.Points2D(
+                    [point.image_px for point in shown],
+                    class_ids=[category_id] * len(shown),
+                    keypoint_ids=[names.index(point.name) for point in shown],
+                    radii=[-3.0 if point.visibility == 2 else -1.5 for point in shown],
+                    show_labels=False,
+                )
+                self.stream.log(f"{path}/{item.instance.instance_id}", points)
+
+    def _record_cloud(self, name: str, cloud: PointCloud) -> None:
+        path = f"world/lidars/{name}"
+        self.stream.log(path, transform(cloud.lidar.T_world_lidar))
+        colors = point_colors(cloud, self.points)
+        points = rr.Points3D(
+            cloud.points["position_m"], colors=colors, radii=rr.Radius.ui_points(1.5)
+        )
+        self.stream.log(f"{path}/points", points)
+
+
+def save_recording(
+    path: Path,
+    samples: Iterable[Sample],
+    assets: AssetLibrary,
+    *,
+    info: DatasetInfo,
+    points: PointColors = "class",
+) -> None:
+    """Write samples to a ``.rrd`` file.
+
+    Raises:
+        StorageError: if the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    except OSError as error:
+        raise StorageError(f"{path}: {error.strerror}") from error
+    stream = rr.RecordingStream(APPLICATION)
+    stream.save(path)
+    _record_all(Recorder(stream, assets, info, points), samples)
+    stream.disconnect()
+
+
+def send_samples(
+    url: str,
+    samples: Iterable[Sample],
+    assets: AssetLibrary,
+    *,
+    info: DatasetInfo,
+    points: PointColors = "class",
+) -> None:
+    """Send samples to the viewer at ``url``, one by one as they are made."""
+    stream = rr.RecordingStream(APPLICATION)
+    stream.connect_grpc(url)
+    _record_all(Recorder(stream, assets, info, points), samples)
+    stream.flush()
+
+
+def _record_all(recorder: Recorder, samples: Iterable[Sample]) -> None:
+    recorder.start()
+    for sample in samples:
+        recorder.record(sample)
+
+
+def _layout(info: DatasetInfo) -> rrb.Blueprint:
+    world = rrb.Spatial3DView(origin="world", name="scene")
+    cameras = rrb.Vertical(*(_camera_view(info, name) for name in info.cameras))
+    return rrb.Blueprint(rrb.Horizontal(world, cameras), collapse_panels=True)
+
+
+def _camera_view(info: DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
+    """The image of a camera, and tabs for the pictures of its other channels."""
+    image = rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name)
+    others = [
+        rrb.Spatial2DView(origin=f"channels/{name}/{c.value}", name=f"{name} {c.value}")
+        for c in info.media.get(name, ())
+        if c not in IN_IMAGE
+    ]
+    return rrb.Tabs(image, *others) if others else image

@@ -1,0 +1,1 @@
+"""Weather in images: fog, rain, snow and wet ground."""

@@ -1,0 +1,1 @@
+"""Fog, falling particles, wet and snowy ground, reflections in water."""

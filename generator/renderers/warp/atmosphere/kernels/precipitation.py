@@ -1,0 +1,87 @@
+"""Rain and snow in the air."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.atmosphere.kernels.fog import scattering
+from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import beam_from
+from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    View,
+    World,
+    fast_normalize,
+    floor_int,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.struct
+class Streak:
+    """The trace of one particle during the exposure, in the image.
+
+    Attributes:
+        start_px, end_px: Ends of its axis.
+        radius_px: Half its width, at least half a pixel.
+        opacity: Part of the background that it hides, in the mean over the exposure.
+        z_m: Depth.
+        p_m: Where it is, world.
+        radiance: What it shines with [cd/m^2]; filled in by ``light_streaks``.
+    """
+
+    start_px: wp.vec2
+    end_px: wp.vec2
+    radius_px: float
+    opacity: float
+    z_m: float
+    p_m: wp.vec3
+    radiance: wp.vec3
+
+
+@wp.kernel
+def light_streaks(view: View, world: World, streaks: wp.array(dtype=Streak)):
+    """Light that particles send to the camera: the sky's from all sides, and that of lamps."""
+    k = wp.tid()
+    p = streaks[k].p_m
+    d = fast_normalize(p - view.eye_m)
+    mean = world.sky.irradiance[0] * world.sky.luminance
+    c = (mean + sky_irradiance(world.sky, wp.vec3(0.0, 0.0, 1.0))) * 0.5
+    for j in range(world.lamps.shape[0]):
+        beam = beam_from(world.lamps[j], p)
+        c += beam.normal_lux * scattering(wp.dot(d, beam.direction))
+    streaks[k].radiance = c
+
+
+@wp.kernel
+def draw_streaks(
+    width: int,
+    z_m: wp.array(dtype=float),
+    streaks: wp.array(dtype=Streak),
+    first: wp.array(dtype=int),
+    listed: wp.array(dtype=int),
+    radiance: wp.array(dtype=wp.vec3),
+):
+    """Lay particles over each row of the image, where nothing nearer hides them.
+
+    Args:
+        first: Where each row's list begins, and the end of the last.
+        listed: Numbers of streaks, far ones first.
+    """
+    y = wp.tid()
+    for k in range(first[y], first[y + 1]):
+        s = listed[k]
+        a = streaks[s].start_px
+        along = streaks[s].end_px - a
+        radius = streaks[s].radius_px
+        squared = wp.max(wp.dot(along, along), 1.0e-6)
+        low = wp.min(a[0], a[0] + along[0]) - radius - 0.5
+        high = wp.max(a[0], a[0] + along[0]) + radius + 0.5
+        for x in range(wp.max(floor_int(low), 0), wp.min(floor_int(high) + 1, width)):
+            q = wp.vec2(float(x) + 0.5, float(y) + 0.5) - a
+            t = wp.clamp(wp.dot(q, along) / squared, 0.0, 1.0)
+            away = wp.length(q - along * t)
+            cover = wp.clamp(radius + 0.5 - away, 0.0, 1.0) * streaks[s].opacity
+            i = y * width + x
+            if cover > 0.0 and streaks[s].z_m < z_m[i]:
+                radiance[i] = radiance[i] * (1.0 - cover) + streaks[s].radiance * cover

@@ -1,0 +1,395 @@
+"""Water on the ground: films that mirror softly, puddles that mirror sharply.
+
+Films change slowly over the image: what they mirror is traced from points of the lattice and
+averaged around each. Puddles are traced pixel by pixel.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
+    estimate_porosity,
+    footprint,
+    fractal_noise,
+    puddle_at,
+    snow_at,
+)
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
+    Lattice,
+    cell_at,
+    cell_corner,
+    ray_origin,
+)
+from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
+from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
+from gen_data.generator.renderers.warp.scene.kernels.dielectrics import WATER_F0, fresnel_schlick
+from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
+    sky_irradiance,
+    sky_rest,
+)
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+    closest_hit,
+    precipitation_exposure,
+)
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    HOLES,
+    View,
+    World,
+    fast_normalize,
+    flat_normal,
+    pixel_direction,
+    surface_index,
+)
+from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
+from gen_data.generator.renderers.warp.visibility.kernels.distortion import project_to_pixel
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# How far mirrored rays are followed.
+MIRRORED_M = wp.constant(1.0e3)
+
+# Films smoother than this mirror like puddles.
+SHARP = wp.constant(0.02)
+# Slopes of a film on rough ground.
+FILM_SLOPE = wp.constant(0.16)
+# pi (3 - sqrt(5)): turned by it, points of a spiral cover a disk evenly (Vogel 1979).
+GOLDEN_ANGLE = wp.constant(2.39996323)
+# Points nearer to each other than this share their shelter.
+BESIDE_M = wp.constant(0.12)
+# Points to either side over which films are averaged: whole periods of the pattern of slopes.
+FILM_REACH = wp.constant(8)
+
+
+@wp.kernel
+def find_shelter(world: World, lattice: Lattice, exposed: wp.array(dtype=float)):
+    """Share of what falls that reaches each point of the lattice, by one ray each."""
+    k = wp.tid()
+    exposed[k] = 1.0
+    if lattice.body[k] >= 0 and lattice.normal[k][2] > 0.1:
+        exposed[k] = precipitation_exposure(world, lattice.origin_m[k])
+
+
+@wp.kernel
+def average_shelter(
+    lattice: Lattice, probed: wp.array(dtype=float), exposed: wp.array(dtype=float)
+):
+    """The mean of find_shelter over points beside each other on the ground."""
+    k = wp.tid()
+    column = k % lattice.width
+    row = k / lattice.width
+    total = probed[k]
+    weights = float(1.0)
+    if lattice.body[k] >= 0:
+        for v in range(wp.max(row - 1, 0), wp.min(row + 2, lattice.height)):
+            for u in range(wp.max(column - 2, 0), wp.min(column + 3, lattice.width)):
+                q = v * lattice.width + u
+                if lattice.surface[q] == lattice.surface[k]:
+                    off = lattice.p_m[q] - lattice.p_m[k]
+                    if wp.dot(off, off) < BESIDE_M * BESIDE_M:
+                        total += probed[q]
+                        weights += 1.0
+    exposed[k] = total / weights
+
+
+@wp.func
+def water_at(
+    world: World, surface: int, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float
+):
+    """How much of a point is a mirror of water, and how rough that mirror is."""
+    # Water runs off what is steeper than 60 degrees.
+    if n[2] < 0.5:
+        return wp.vec2(0.0)
+    porous = estimate_porosity(world, surface)
+    puddle = puddle_at(world, p, n, exposed, footprint_m) * porous
+    film = world.ground.wetness * wp.clamp(n[2], 0.0, 1.0) * exposed * porous
+    # A film follows the grain of the ground: half of it mirrors, and not sharply.
+    share = wp.max(puddle, 0.5 * film) * (1.0 - snow_at(world, p, n, exposed, footprint_m))
+    return wp.vec2(share, FILM_SLOPE * (1.0 - puddle) * (1.0 - puddle))
+
+
+@wp.func
+def mean_color(world: World, surface: int):
+    """A material's colour without the detail of its texture."""
+    color = world.surfaces[surface].base_color
+    texture = world.surfaces[surface].texture
+    if texture >= 0:
+        # Past the last level of any texture: its mean.
+        coarsest = make_sampler(world, texture, 30.0)
+        color = wp.cw_mul(color, texel_at(world, texture, coarsest, 0.5, 0.5, False).albedo)
+    return color
+
+
+@wp.func
+def mirrored_sky(world: World, d: wp.vec3, width: float):
+    """Sky in one direction, with the suns that are blurred over an angle."""
+    c = sky_rest(world.sky, d)
+    for j in range(world.lamps.shape[0]):
+        if world.lamps[j].kind == SUN:
+            # Gaussian over the angle: 1 - cos is half its square; width and sun add in squares.
+            away = wp.max(1.0 - wp.dot(d, -world.lamps[j].direction), 0.0)
+            spread = 0.5 * (width * width + world.lamps[j].radius * world.lamps[j].radius)
+            c += world.lamps[j].power * (wp.exp(-away / spread) / (2.0 * wp.pi * spread))
+    return c
+
+
+@wp.func
+def mirrored_body(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    radiance: wp.array(dtype=wp.vec3),
+    origin: wp.vec3,
+    d: wp.vec3,
+    t: float,
+    hit: wp.vec2i,
+    normal: wp.vec3,
+):
+    """Light of what a mirrored ray meets: as the image shows it, else without shadows."""
+    p = origin + d * t
+    q = wp.transpose(view.R_world_camera) @ (p - view.eye_m)
+    c = wp.vec3(-1.0)
+    j, depth_m = project_to_pixel(view, q)
+    if j >= 0:
+        if images.hits[j][0] == hit[0] and wp.abs(images.z_m[j] - depth_m) < 0.05 + 0.02 * depth_m:
+            c = radiance[j]
+    if c[0] < 0.0:
+        surface = surface_index(world, hit)
+        n = normal
+        if wp.dot(n, d) > 0.0:
+            n = -n
+        light = sky_irradiance(world.sky, n) * 0.7
+        for j in range(world.lamps.shape[0]):
+            beam = beam_from(world.lamps[j], p)
+            light += beam.normal_lux * (wp.max(wp.dot(n, beam.direction), 0.0) / wp.pi)
+        c = wp.cw_mul(light, mean_color(world, surface)) + world.surfaces[surface].emission_cd_m2
+    return c
+
+
+@wp.func
+def mirrored(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    radiance: wp.array(dtype=wp.vec3),
+    origin: wp.vec3,
+    d: wp.vec3,
+    width: float,
+):
+    """Radiance along a mirrored ray."""
+    m = closest_hit(world, origin, d, MIRRORED_M, HOLES)
+    if m.at[0] < 0:
+        return mirrored_sky(world, d, width)
+    normal = flat_normal(world, m.at)
+    return mirrored_body(view, world, images, radiance, origin, d, m.t, m.at, normal)
+
+
+@wp.func
+def mirrored_by(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    radiance: wp.array(dtype=wp.vec3),
+    p: wp.vec3,
+    origin: wp.vec3,
+    m: wp.vec3,
+    width: float,
+):
+    """What a facet of water with normal m mirrors [cd/m^2], reflected, and its reflectance."""
+    d = fast_normalize(p - view.eye_m)
+    # Facets that face away would mirror from below; grazing ones stay at one degree.
+    c = wp.max(-wp.dot(d, m), 0.02)
+    r = d + m * (2.0 * c)
+    # What a tilted facet mirrors downwards would be the ground it lies on.
+    r = fast_normalize(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
+    fresnel = fresnel_schlick(WATER_F0, c)
+    seen = mirrored(view, world, images, radiance, origin, r, 0.02 + width) * fresnel
+    return wp.vec4(seen[0], seen[1], seen[2], fresnel)
+
+
+@wp.kernel
+def mirror_in_films(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    lattice: Lattice,
+    radiance: wp.array(dtype=wp.vec3),
+    water: wp.array(dtype=wp.vec2),
+    films: wp.array(dtype=wp.vec4),
+):
+    """Water at the lattice's points, and one ray of what a film there mirrors.
+
+    Args:
+        water: Share of each point that is water, and how rough it is.
+        films: As mirrored_by says; not written where there is no water.
+    """
+    k = wp.tid()
+    water[k] = wp.vec2(0.0)
+    if lattice.body[k] < 0:
+        return
+    p = lattice.p_m[k]
+    n = lattice.normal[k]
+    size_m = footprint(view, p, n, float(lattice.stride))
+    wet = water_at(world, lattice.surface[k], p, n, world.ground.exposed[k], size_m)
+    # Less than a percent of a mirror is not worth its ray.
+    if wet[0] < 0.01:
+        return
+    water[k] = wet
+    # The points of any square of eight share one even spread of slopes, neighbours far from each
+    # other in it.
+    x = k % lattice.width
+    y = k / lattice.width
+    place = float(((x % 8) * 24 + (y % 8) * 19) % 64) + 0.5
+    # The root spreads points evenly over the disk of slopes, as Vogel's spiral has it.
+    slope = wp.max(wet[1], 0.25 * FILM_SLOPE) * wp.sqrt(place / 64.0)
+    tilt = wp.vec3(wp.cos(GOLDEN_ANGLE * place), wp.sin(GOLDEN_ANGLE * place), 0.0) * slope
+    seen = mirrored_by(
+        view, world, images, radiance, p, lattice.origin_m[k], fast_normalize(n + tilt), FILM_SLOPE
+    )
+    # Few rays do not find small bright lamps evenly; their lobes are shaded already.
+    limit = 30.0 * wp.max(radiance[lattice.pixel[k]])
+    limit += 4.0 * wp.max(world.sky.irradiance[0]) * world.sky.luminance
+    brightest = wp.max(wp.max(seen[0], wp.max(seen[1], seen[2])), 1.0e-9)
+    dimmed = wp.min(limit * seen[3] / brightest, 1.0)
+    films[k] = wp.vec4(seen[0] * dimmed, seen[1] * dimmed, seen[2] * dimmed, seen[3])
+
+
+@wp.kernel
+def blur_films(
+    images: GBufferRecord,
+    lattice: Lattice,
+    water: wp.array(dtype=wp.vec2),
+    films: wp.array(dtype=wp.vec4),
+    step: int,
+    spread: wp.array(dtype=wp.vec4),
+):
+    """Average over the points at one depth along a row (``step`` 1) or a column (the width)."""
+    k = wp.tid()
+    if water[k][0] == 0.0:
+        return
+    place = k % lattice.width
+    size = lattice.width
+    if step > 1:
+        place = k / lattice.width
+        size = lattice.height
+    z = images.z_m[lattice.pixel[k]]
+    total = wp.vec4(0.0)
+    weights = float(0.0)
+    for o in range(wp.max(-FILM_REACH, -place), wp.min(FILM_REACH, size - 1 - place) + 1):
+        q = k + o * step
+        if water[q][0] > 0.0 and wp.abs(images.z_m[lattice.pixel[q]] - z) < 0.2 * z:
+            # A tent: as even as a box of one period of the pattern, and without its corners.
+            w = float(FILM_REACH + 1 - wp.abs(o))
+            total += films[q] * w
+            weights += w
+    spread[k] = total * (1.0 / weights)
+
+
+@wp.struct
+class Around:
+    """Water around a pixel, mixed from points of the lattice on its surface, and what films mirror.
+
+    Attributes:
+        found: Sum of weights; 0 where no point lies on the surface.
+        film: As mirrored_by says; of points with any water.
+        films: Sum of their weights.
+    """
+
+    found: float
+    water: wp.vec2
+    exposed: float
+    film: wp.vec4
+    films: float
+
+
+@wp.func
+def around_pixel(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    lattice: Lattice,
+    water: wp.array(dtype=wp.vec2),
+    films: wp.array(dtype=wp.vec4),
+    i: int,
+):
+    """Water around pixel i."""
+    x = i % view.width
+    y = i / view.width
+    cell = cell_at(view, lattice, x, y)
+    z = images.z_m[i]
+    surface = surface_index(world, images.hits[i])
+    around = Around()
+    for k in range(4):
+        q, w = cell_corner(lattice, cell, k)
+        if lattice.body[q] >= 0 and wp.abs(images.z_m[lattice.pixel[q]] - z) < 0.1 * z:
+            # A pixel on a lattice point still takes a trace of its neighbours, if that point fails.
+            w += 1.0e-4
+            around.exposed += world.ground.exposed[q] * w
+            if lattice.surface[q] == surface:
+                around.water += water[q] * w
+                around.found += w
+            if water[q][0] > 0.0:
+                around.film += films[q] * w
+                around.films += w
+    return around
+
+
+@wp.kernel
+def mirror_in_puddles(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    lattice: Lattice,
+    radiance: wp.array(dtype=wp.vec3),
+    ripples: float,
+    water: wp.array(dtype=wp.vec2),
+    films: wp.array(dtype=wp.vec4),
+    laid: wp.array(dtype=wp.vec4),
+):
+    """What water at each pixel mirrors: traced in puddles, elsewhere from the films around.
+
+    Args:
+        ripples: Slope of waves on puddles.
+        laid: Light to be added [cd/m^2], and the part of the light below that it hides.
+    """
+    i = wp.tid()
+    laid[i] = wp.vec4(0.0)
+    hit = images.hits[i]
+    if hit[0] < 0:
+        return
+    n = images.normals[i]
+    if n[2] < 0.5:
+        return
+    around = around_pixel(view, world, images, lattice, water, films, i)
+    wet = around.water
+    way = view.R_world_camera @ pixel_direction(
+        view, float(i % view.width) + 0.5, float(i / view.width) + 0.5
+    )
+    way = way * images.z_m[i]
+    p = view.eye_m + way
+    if around.found > 0.0:
+        wet = wet * (1.0 / around.found)
+    elif around.films > 0.0:
+        size_m = footprint(view, p, n, 1.0)
+        wet = water_at(world, surface_index(world, hit), p, n, wp.min(around.exposed, 1.0), size_m)
+    if wet[0] < 0.01:
+        return
+    if wet[1] > SHARP and around.films > 0.0:
+        laid[i] = around.film * (wet[0] / around.films)
+        return
+    origin = ray_origin(world, hit, images.weights[i], p, way)
+    # Waves finer than a pixel would flicker from pixel to pixel.
+    slope = ripples * wp.min(5.0 / images.z_m[i], 1.0)
+    tilt_x = fractal_noise(p[0], p[1], 0.09, world.ground.seed + 48) * slope
+    tilt_y = fractal_noise(p[0], p[1], 0.09, world.ground.seed + 52) * slope
+    m = fast_normalize(n + wp.vec3(tilt_x, tilt_y, 0.0))
+    laid[i] = mirrored_by(view, world, images, radiance, p, origin, m, wet[1]) * wet[0]
+
+
+@wp.kernel
+def lay_water(laid: wp.array(dtype=wp.vec4), radiance: wp.array(dtype=wp.vec3)):
+    """Lay what water mirrors over what is seen."""
+    i = wp.tid()
+    c = laid[i]
+    if c[3] > 0.0:
+        radiance[i] = radiance[i] * (1.0 - c[3]) + wp.vec3(c[0], c[1], c[2])

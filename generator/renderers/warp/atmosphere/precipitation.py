@@ -1,0 +1,286 @@
+"""Rain and snow in the air, as traces in the image.
+
+Only what is large in the image is drawn one by one: the rest is haze, which presets of rain and
+snow have as fog.
+
+Sources: Marshall and Palmer, "The distribution of raindrops with size", J. Meteorology 5, 1948;
+Atlas, Srivastava and Sekhon, Reviews of Geophysics 11, 1973 (speed of drops); Sekhon and
+Srivastava, "Snow size spectra and radar reflectivity", J. Atmospheric Sciences 27, 1970; Garg and
+Nayar, "Vision and rain", IJCV 75, 2007 (opacity of streaks).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Camera, Weather
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.renderers.warp.atmosphere.kernels import precipitation
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
+
+_NEAREST_M = 0.35
+# Of the lens: what is near is out of focus by that much.
+_APERTURE_M = 0.002
+_EXPOSURE_S = (1.0 / 500.0, 1.0 / 40.0)
+_F_NUMBER = 2.0
+# White is 1.2 * 2^EV100 cd/m^2 (ISO 12232), and metering puts the light's middle at this share.
+_MIDDLE_GREY = 0.18
+_METERED_EVERY = 61
+_COUNT_MAX = 60_000
+_SPHERE_MAX = 480_000
+# Diameter of a flake over that of the drop it melts to: its density is about 0.05.
+_FLAKE = 2.7
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """Particles whose number falls exponentially with their diameter.
+
+    Attributes:
+        density_per_m3: Of particles of at least the least diameter.
+        slope_per_m: Of the distribution.
+        least_m: Smaller ones are not drawn.
+        farthest_m: Nor are those beyond.
+    """
+
+    density_per_m3: float
+    slope_per_m: float
+    least_m: float
+    farthest_m: float
+
+
+def rain(rate_mm_h: float) -> Kind:
+    """Raindrops; Marshall and Palmer: 8000 per m^3 and mm, slope 4.1 R^-0.21 per mm."""
+    slope_per_mm, least_mm = 4.1 * rate_mm_h**-0.21, 1.0
+    density = 8000.0 / slope_per_mm * math.exp(-slope_per_mm * least_mm)
+    return Kind(density, slope_per_mm * 1e3, least_mm * 1e-3, 6.0)
+
+
+def snow(rate_mm_h: float) -> Kind:
+    """Flakes; Sekhon and Srivastava: 2500 R^-0.94 per m^3 and mm, slope 2.29 R^-0.45 per mm.
+
+    Their diameters are those of the drops that flakes melt to.
+    """
+    slope_per_mm, least_mm = 2.29 * rate_mm_h**-0.45, 0.7
+    density = 2500.0 * rate_mm_h**-0.94 / slope_per_mm * math.exp(-slope_per_mm * least_mm)
+    return Kind(density, slope_per_mm * 1e3 / _FLAKE, least_mm * 1e-3 * _FLAKE, 14.0)
+
+
+def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
+    """The exposure value that a camera is set to, or one that suits the light it receives.
+
+    Args:
+        radiance: Linear RGB [cd/m^2], flat.
+        fixed_ev100: Of the camera; None = it meters for itself. Its median luminance stands for
+            what it will meter: only the length of streaks depends on it.
+    """
+    if fixed_ev100 is not None:
+        return fixed_ev100
+    levels = luminance(radiance.numpy()[::_METERED_EVERY])
+    # Black pixels, beyond a lens's field or without a background, say nothing about the light.
+    lit = levels[levels > 0.0]
+    median_cd_m2 = float(np.median(lit)) if len(lit) else 0.0
+    # On a grid, so that the last bit of a logarithm is never seen.
+    return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * _MIDDLE_GREY)) * 16.0) / 16.0
+
+
+def usual_exposure_s(ev100: float) -> float:
+    """Exposure time of a camera at ISO 100 and f/2, within what such cameras can."""
+    return float(min(max(_F_NUMBER**2 / 2.0**ev100, _EXPOSURE_S[0]), _EXPOSURE_S[1]))
+
+
+def draw_precipitation(
+    world: PackedWorld,
+    camera: Camera,
+    view: records.View,
+    z_m: wp.array,
+    radiance: wp.array,
+    stock: DeviceCache,
+) -> bool:
+    """Draw what falls over the image, in place; whether anything falls."""
+    weather = world.weather
+    if weather.rain_mm_h <= 0.0 and weather.snow_mm_h <= 0.0:
+        return False
+    exposure_s = camera.shutter.exposure_s
+    if not exposure_s:
+        exposure_s = usual_exposure_s(light_level_ev100(radiance, camera.ev100))
+    found = [
+        make_streaks(kind, camera, weather, exposure_s, name)
+        for name, rate, kind in (
+            ("rain", weather.rain_mm_h, rain(max(weather.rain_mm_h, 1e-3))),
+            ("snow", weather.snow_mm_h, snow(max(weather.snow_mm_h, 1e-3))),
+        )
+        if rate > 0.0
+    ]
+    values = np.concatenate(found)
+    if not len(values):
+        return False
+    values = values[np.argsort(-values["z_m"], kind="stable")]
+    first, listed = _rows(values, view.height)
+    streaks = wp.array(values, dtype=precipitation.Streak, device=stock.device)
+    wp.launch(
+        precipitation.light_streaks, len(values), [view, world.record, streaks], device=stock.device
+    )
+    lists = [wp.array(a, dtype=wp.int32, device=stock.device) for a in (first, listed)]
+    inputs = [view.width, z_m, streaks, *lists]
+    wp.launch(precipitation.draw_streaks, view.height, inputs, [radiance], device=stock.device)
+    return True
+
+
+def make_streaks(
+    kind: Kind, camera: Camera, weather: Weather, exposure_s: float, name: str
+) -> NDArray[np.void]:
+    """Streak records of all particles of a kind that a camera sees."""
+    k = camera.intrinsics
+    if not k.straight:
+        return trace_through_lens(kind, camera, weather, exposure_s, name)
+    T = camera.T_world_camera
+    rng = Streams(seed=weather.seed, scene=0).rng(
+        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
+    )
+    spread = (k.width_px / k.fx_px) * (k.height_px / k.fy_px) / 3.0
+    expected = kind.density_per_m3 * spread * (kind.farthest_m**3 - _NEAREST_M**3)
+    n = min(poisson(expected, rng), _COUNT_MAX)
+    u = rng.random((5, n))
+    z = np.cbrt(_NEAREST_M**3 + u[0] * (kind.farthest_m**3 - _NEAREST_M**3))
+    x = (u[1] * k.width_px - k.cx_px) / k.fx_px * z
+    y = (u[2] * k.height_px - k.cy_px) / k.fy_px * z
+    p = np.stack([x, y, z], axis=-1)
+    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
+    R_camera_world = T.rotation().T
+    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
+    way = np.einsum("ij,nj->ni", R_camera_world, way, optimize=False)
+    values = np.zeros(n, dtype=precipitation.Streak.numpy_dtype())
+    for end, side in (("start_px", -0.5), ("end_px", 0.5)):
+        q = p + side * way
+        depth = np.maximum(q[:, 2], 0.5 * _NEAREST_M)
+        values[end][:, 0] = q[:, 0] / depth * k.fx_px + k.cx_px
+        values[end][:, 1] = q[:, 1] / depth * k.fy_px + k.cy_px
+    values["z_m"] = z
+    R_world_camera = R_camera_world.T
+    values["p_m"] = np.einsum("ij,nj->ni", R_world_camera, p, optimize=False) + T.translation_m
+    _spread_out(values, diameter_m, z, k.fx_px)
+    return values
+
+
+def _spread_out(
+    values: NDArray[np.void], diameter_m: Array, depth_m: Array, px_per_rad: Array | float
+) -> None:
+    """Fill in how wide and how opaque traces are, in place."""
+    length = np.sqrt(((values["end_px"] - values["start_px"]) ** 2).sum(axis=1))
+    sharp = px_per_rad * diameter_m / depth_m
+    wide = np.maximum(sharp + px_per_rad * _APERTURE_M / depth_m, 1.0)
+    # The disc's area over that of the trace it leaves.
+    area = 0.25 * math.pi * sharp**2 / (wide * length + 0.25 * math.pi * wide**2)
+    values["opacity"] = np.minimum(area, 1.0)
+    values["radius_px"] = 0.5 * wide
+
+
+def trace_through_lens(
+    kind: Kind, camera: Camera, weather: Weather, exposure_s: float, name: str
+) -> NDArray[np.void]:
+    """As ``make_streaks``, before a lens that is no pinhole: depths are ranges.
+
+    Particles are spread over the narrowest cone that holds the image; those in it are kept.
+    """
+    k, T = camera.intrinsics, camera.T_world_camera
+    rng = Streams(seed=weather.seed, scene=0).rng(
+        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
+    )
+    least_cosine = _rim_cosine(k)
+    cube_m3 = kind.farthest_m**3 - _NEAREST_M**3
+    expected = kind.density_per_m3 * 2.0 * math.pi * (1.0 - least_cosine) / 3.0 * cube_m3
+    u = rng.random((5, min(poisson(expected, rng), _SPHERE_MAX)))
+    range_m = np.cbrt(_NEAREST_M**3 + u[0] * cube_m3)
+    cosine = 1.0 - u[1] * (1.0 - least_cosine)
+    sine, turn = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0)), 2.0 * math.pi * u[2]
+    p = np.stack([sine * np.cos(turn), sine * np.sin(turn), cosine], axis=-1) * range_m[:, None]
+    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
+    R_camera_world = T.rotation().T
+    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
+    way = np.einsum("ij,nj->ni", R_camera_world, way, optimize=False)
+    ends = np.stack([k.project(p - 0.5 * way), k.project(p + 0.5 * way)], axis=1)
+    middle = k.project(p)
+    inside = ((middle >= 0.0) & (middle < (k.width_px, k.height_px))).all(axis=1)
+    # Ends apart by half an image lie on both sides of a seam.
+    whole = np.abs(ends[:, 1] - ends[:, 0]).max(axis=1) < 0.5 * k.width_px
+    kept = np.flatnonzero(inside & whole)[:_COUNT_MAX]
+    values = np.zeros(len(kept), dtype=precipitation.Streak.numpy_dtype())
+    values["start_px"], values["end_px"] = ends[kept, 0], ends[kept, 1]
+    values["z_m"] = range_m[kept]
+    there = np.einsum("ij,nj->ni", R_camera_world.T, p[kept], optimize=False)
+    values["p_m"] = there + T.translation_m
+    _spread_out(values, diameter_m[kept], range_m[kept], _px_per_rad(k, middle[kept]))
+    return values
+
+
+def _rim_cosine(k: Intrinsics) -> float:
+    """Cosine of the widest angle to the axis in the image; -1 where its corners are dark."""
+    u, v = (np.linspace(0.0, size, 65) for size in (k.width_px, k.height_px))
+    sides = [np.stack(np.broadcast_arrays(u, end), axis=-1) for end in (0.0, float(k.height_px))]
+    sides += [np.stack(np.broadcast_arrays(end, v), axis=-1) for end in (0.0, float(k.width_px))]
+    cosines = k.rays(np.concatenate(sides))[:, 2]
+    return -1.0 if np.isnan(cosines).any() else float(max(cosines.min() - 1e-3, -1.0))
+
+
+def _px_per_rad(k: Intrinsics, places_px: Array) -> Array:
+    """Side of the square that a small square angle is in the image, shape [n]."""
+    right, below = np.array([0.5, 0.0]), np.array([0.0, 0.5])
+    across = k.rays(places_px + right) - k.rays(places_px - right)
+    down = k.rays(places_px + below) - k.rays(places_px - below)
+    area = np.cross(across, down)
+    usual = 1.0 / k.fx_px
+    angles = np.nan_to_num(np.sqrt(np.sqrt((area * area).sum(axis=1))), nan=usual)
+    scale: Array = 1.0 / np.maximum(angles, 0.05 * usual)
+    return scale
+
+
+def poisson(expected: float, rng: Rng) -> int:
+    """A Poisson number, from its normal limit where it is large."""
+    if expected > 64.0:
+        u1, u2 = (float(v) for v in rng.random(2))
+        normal = math.sqrt(-2.0 * math.log(1.0 - u1)) * math.cos(2.0 * math.pi * u2)
+        return max(round(expected + math.sqrt(expected) * normal), 0)
+    product, count, end = float(rng.random()), 0, math.exp(-expected)
+    while product > end:
+        product *= float(rng.random())
+        count += 1
+    return count
+
+
+def _velocity(name: str, diameter_m: Array, u: Array, seed: int) -> Array:
+    """World velocities [m/s], shape [n, 3]: falling, and drifting with a wind."""
+    wind = Streams(seed=seed, scene=0).rng("wind").random(2)
+    angle, gust = 2.0 * math.pi * wind[0], 3.0 * wind[1]
+    drift = gust * (0.8 + 0.4 * u)
+    if name == "rain":
+        fall = 9.65 - 10.3 * np.exp(-0.6 * diameter_m * 1e3)
+    else:
+        fall = 0.9 + 0.5 * u
+        angle = angle + 1.5 * np.sin(37.0 * u)
+    return np.stack([drift * np.cos(angle), drift * np.sin(angle), -fall], axis=-1)
+
+
+def _rows(values: NDArray[np.void], height: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The streaks that touch each row, in the order given: starts [height + 1] and numbers."""
+    ys = np.stack([values["start_px"][:, 1], values["end_px"][:, 1]])
+    margin = values["radius_px"] + 0.5
+    top = np.clip(np.floor(ys.min(axis=0) - margin), 0, height).astype(np.int64)
+    bottom = np.clip(np.ceil(ys.max(axis=0) + margin), 0, height).astype(np.int64)
+    counts = np.maximum(bottom - top, 0)
+    number = np.repeat(np.arange(len(values)), counts)
+    within = np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts)
+    row = np.repeat(top, counts) + within
+    order = np.argsort(row, kind="stable")
+    first = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=height))])
+    return first.astype(np.int32), number[order].astype(np.int32)

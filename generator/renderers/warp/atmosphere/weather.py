@@ -1,0 +1,139 @@
+"""Weather in the image: surfaces, air, what falls, and the lens.
+
+Every function returns at once where the scene's weather has nothing for it to do.
+"""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+from typing import Any
+
+import warp as wp
+
+from gen_data.generator.core.scene import LIGHT_KINDS, Weather
+from gen_data.generator.renderers.warp.atmosphere.kernels import fog as kernels
+from gen_data.generator.renderers.warp.atmosphere.kernels import water_reflections
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.realtime.kernels import lattice_lighting
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
+from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
+
+# Standard deviation of kernels.ground.patches; it is close to normal.
+_PATCH_DEVIATION = 0.513
+
+
+def expose_ground(world: PackedWorld, lattice: Lattice, stock: DeviceCache) -> None:
+    """Prepare the world's surfaces for being wet or under snow."""
+    weather = world.weather
+    if not weather.wetness + weather.puddles + weather.snow_cover:
+        return
+    points = lattice.width * lattice.height
+    probed = stock.scratch("probed shelter", points, float)
+    exposed = stock.scratch("exposed", points, float)
+    inputs = [world.record, lattice]
+    wp.launch(water_reflections.find_shelter, points, inputs, [probed], device=stock.device)
+    inputs = [lattice, probed]
+    wp.launch(water_reflections.average_shelter, points, inputs, [exposed], device=stock.device)
+    world.record.ground = ground_record(weather, exposed)
+
+
+def ground_record(weather: Weather, exposed: wp.array | None = None) -> records.GroundRecord:
+    """The Ground record: dry and bare where the weather has left nothing.
+
+    Args:
+        weather: Of the scene.
+        exposed: Share of what falls that reaches each point of a lattice, where there is one.
+    """
+    ground = records.GroundRecord()
+    ground.covered = int(weather.wetness + weather.puddles + weather.snow_cover > 0.0)
+    ground.wetness = weather.wetness
+    ground.puddles, ground.puddle_level = weather.puddles, _level(weather.puddles)
+    ground.snow_cover, ground.snow_level = weather.snow_cover, _level(weather.snow_cover)
+    ground.seed = weather.seed % (1 << 30)
+    if exposed is not None:
+        ground.exposed = exposed
+    return ground
+
+
+def fill_air(
+    world: PackedWorld,
+    view: records.View,
+    images: lattice_lighting.GBufferRecord,
+    lattice: Lattice,
+    radiance: wp.array,
+    stock: DeviceCache,
+) -> None:
+    """Reflections in water, then fog; in place."""
+    if world.weather.wetness + world.weather.puddles > 0.0:
+        _mirror(world, view, images, lattice, radiance, stock)
+    fill_fog(world, view, images, radiance, stock)
+
+
+def fill_fog(
+    world: PackedWorld,
+    view: records.View,
+    images: lattice_lighting.GBufferRecord,
+    radiance: wp.array,
+    stock: DeviceCache,
+) -> None:
+    """Dim what is seen by the fog before it, and add the fog's own light, in place."""
+    if world.weather.fog_extinction_per_m > 0.0:
+        frame = [view, world.record, images, fog_record(world.weather)]
+        columns, glow = _glow(world, view, frame, stock)
+        inputs, n = [*frame, columns, glow], view.width * view.height
+        wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=stock.device)
+
+
+def _mirror(
+    world: PackedWorld,
+    view: records.View,
+    images: lattice_lighting.GBufferRecord,
+    lattice: Lattice,
+    radiance: wp.array,
+    stock: DeviceCache,
+) -> None:
+    """Lay what water on the ground mirrors over the image, in place."""
+    device, n = stock.device, view.width * view.height
+    points = lattice.width * lattice.height
+    share = stock.scratch("water", points, wp.vec2)
+    films, rows = (stock.scratch(name, points, wp.vec4) for name in ("films", "film rows"))
+    frame = [view, world.record, images, lattice, radiance]
+    wp.launch(water_reflections.mirror_in_films, points, frame, [share, films], device=device)
+    for step, source, spread in ((1, films, rows), (lattice.width, rows, films)):
+        inputs = [images, lattice, share, source, step]
+        wp.launch(water_reflections.blur_films, points, inputs, [spread], device=device)
+    laid = stock.scratch("laid", n, wp.vec4)
+    ripples = min(0.004 * world.weather.rain_mm_h, 0.05)
+    inputs = [*frame, ripples, share, films]
+    wp.launch(water_reflections.mirror_in_puddles, n, inputs, [laid], device=device)
+    wp.launch(water_reflections.lay_water, n, [laid], [radiance], device=device)
+
+
+def _glow(
+    world: PackedWorld, view: records.View, frame: list[Any], stock: DeviceCache
+) -> tuple[int, wp.array]:
+    """Glow of lamps in fog at a lattice of points, and its columns; 0 where no lamp shines."""
+    stride = int(kernels.GLOW_STRIDE)
+    columns, rows = (-(-(size - 1) // stride) + 2 for size in (view.width, view.height))
+    glow = stock.scratch("glow", columns * rows, wp.vec3)
+    if not (world.record.lamps.numpy()["kind"] != LIGHT_KINDS.index("sun")).any():
+        return 0, glow
+    inputs = [*frame, columns]
+    wp.launch(kernels.glow_at_points, columns * rows, inputs, [glow], device=stock.device)
+    return columns, glow
+
+
+def fog_record(weather: Weather) -> kernels.Fog:
+    """The Fog record."""
+    fog = kernels.Fog()
+    fog.extinction_per_m = weather.fog_extinction_per_m
+    fog.height_m = weather.fog_height_m
+    return fog
+
+
+def _level(share: float) -> float:
+    """Level that the noise exceeds on that share of the ground."""
+    if share <= 0.0 or share >= 1.0:
+        return 9.0 if share <= 0.0 else -9.0
+    return -_PATCH_DEVIATION * NormalDist().inv_cdf(share)

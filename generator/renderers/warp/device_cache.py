@@ -1,0 +1,118 @@
+"""What a renderer keeps between frames: assets, lenses, scratch memory and the latest scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.bounded_cache import ByteCache, ObjectCache
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
+from gen_data.generator.renderers.warp.scene.device_meshes import DeviceMesh, upload_mesh
+from gen_data.generator.renderers.warp.scene.device_textures import DeviceTexture, upload_texture
+from gen_data.generator.renderers.warp.scene.environment_maps import (
+    DeviceEnvironment,
+    upload_environment,
+    upload_split,
+)
+from gen_data.generator.renderers.warp.visibility.distortion_lut import DeviceOptics, upload_optics
+
+_MESH_BYTES = 176 << 20
+_TEXTURE_BYTES = 160 << 20
+_ENVIRONMENT_BYTES = 32 << 20
+_OPTICS_BYTES = 192 << 20
+_SCRATCH_BYTES = 64 << 20
+_BODIES = 2048
+"""Bodies whose materials are remembered."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Scratch:
+    array: wp.array
+    nbytes: int
+
+
+class DeviceCache:
+    """Meshes, textures and environments on one device, each bounded in bytes.
+
+    Attributes:
+        scenes: Packed scenes: cameras and scanners look at the same one after each other.
+        looks, infrared: Records of the materials of a body, by their tuple.
+    """
+
+    def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
+        self.assets = assets
+        self.device = device
+        self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
+        self.scenes: ObjectCache[Any] = ObjectCache(1)
+        self.looks: ObjectCache[Any] = ObjectCache(_BODIES)
+        self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
+        self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
+        self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)
+        self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)
+        self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES)
+        self._scratch: ByteCache[_Scratch] = ByteCache(_SCRATCH_BYTES)
+        self._constants: dict[tuple[object, ...], wp.array] = {}
+
+    def mesh(self, asset_id: str) -> DeviceMesh:
+        """Geometry of an asset."""
+        return self._meshes.get(
+            asset_id, lambda: upload_mesh(self.assets.mesh(asset_id), self.device)
+        )
+
+    def materials(self, asset_id: str) -> tuple[Material, ...]:
+        """An asset's own materials, one per slot."""
+        return self.mesh(asset_id).materials
+
+    def texture(self, texture_id: str) -> DeviceTexture:
+        """Images of a texture."""
+        return self._textures.get(
+            texture_id, lambda: upload_texture(self.assets.texture(texture_id), self.device)
+        )
+
+    def environment(self, environment_id: str) -> DeviceEnvironment:
+        """Light of an environment."""
+        return self._environments.get(
+            environment_id,
+            lambda: upload_environment(self.assets.environment(environment_id), self.device),
+        )
+
+    def split_environment(self, environment_id: str) -> DeviceEnvironment:
+        """Light of an environment whose brightest parts are lamps."""
+        whole = self.environment(environment_id)
+        return self._environments.get(
+            f"split {environment_id}",
+            lambda: upload_split(self.assets.environment(environment_id), whole),
+        )
+
+    def optics(self, intrinsics: Intrinsics) -> DeviceOptics:
+        """Directions through the pixels of a camera that is no pinhole."""
+        return self._optics.get(repr(intrinsics), lambda: upload_optics(intrinsics, self.device))
+
+    def constant(
+        self, dtype: Any, make: Callable[..., NDArray[Any]], *arguments: object
+    ) -> wp.array:
+        """An array that a function of nothing else makes, kept for good."""
+        key = (make.__name__, *arguments)
+        if key not in self._constants:
+            self._constants[key] = wp.array(make(*arguments), dtype=dtype, device=self.device)
+        return self._constants[key]
+
+    def scratch(self, name: str, shape: int | tuple[int, ...], dtype: Any) -> wp.array:
+        """An array with left-over contents: touching fresh memory costs as much as filling it.
+
+        One name stands for one array per shape, valid until it is asked for again.
+        """
+
+        def make() -> _Scratch:
+            array = wp.zeros(shape, dtype=dtype, device=self.device)
+            return _Scratch(array, int(np.prod(shape)) * wp.types.type_size_in_bytes(dtype))
+
+        return self._scratch.get(f"{name} {shape}", make).array

@@ -1,0 +1,132 @@
+"""A camera and its world at several instants, and the bands of rows that are seen at each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.scene_packing import (
+    PackedWorld,
+    pack_view,
+    pack_world,
+    repack_moved,
+)
+from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer, find_visible
+
+if TYPE_CHECKING:
+    from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RenderContext:
+    """What all renderings have in common: assets and settings.
+
+    Attributes:
+        paths: What makes the light of the path-traced tier; None in the realtime tier.
+    """
+
+    stock: DeviceCache
+    settings: RenderSettings
+    paths: PathTracer | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CameraState:
+    """A world at one instant, without other sensors, and where the camera is then."""
+
+    scene: Scene
+    camera: Camera
+
+    @classmethod
+    def of(cls, scene: Scene, camera: Camera) -> CameraState:
+        """The scene's own instant."""
+        return cls(replace(scene, cameras=(camera,), lidars=(), devices=()), camera)
+
+    def later(self, delay_s: float) -> CameraState:
+        """The same world, and what carries the camera, at another instant."""
+        scene = scene_at(self.scene, round(self.scene.time_s + delay_s, 9))
+        return CameraState(scene, scene.cameras[0])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RowBand:
+    """Rows of an image, ``first <= row < end``, and when they are exposed."""
+
+    first: int
+    end: int
+    moment: CameraState
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CameraView:
+    """What a camera, or a band of its rows, sees; ``seen`` is valid until the next one is drawn."""
+
+    moment: CameraState
+    world: PackedWorld
+    view: records.View
+    seen: GBuffer
+
+
+def is_moving(moment: CameraState, open_s: float) -> bool:
+    """Whether anything differs between the ends of a span of time around a moment."""
+    scene = moment.scene
+    start_s, end_s = scene.time_s - 0.5 * open_s, scene.time_s + 0.5 * open_s
+    travelling = any(t.start_s < end_s and t.end_s > start_s for t in scene.tracks)
+    return travelling or any(start_s < change.time_s <= end_s for change in scene.changes)
+
+
+def render_view(
+    moment: CameraState,
+    studio: RenderContext,
+    rows: tuple[int, int] | None = None,
+    near: CameraView | None = None,
+) -> CameraView:
+    """The surfaces at all pixel centres, or at those of some rows.
+
+    Args:
+        moment: What, and from where.
+        studio: Assets and settings.
+        rows: The first, and the one after the last; None = all.
+        near: The same world at another instant: what is the same need not be packed again.
+    """
+    world = pack_moment(moment, studio, near)
+    view = pack_view(moment.camera, studio.stock)
+    if rows is not None:
+        view = crop_rows(view, *rows)
+    return CameraView(
+        moment, world, view, find_visible(world, view, studio.stock, studio.settings.visibility)
+    )
+
+
+def pack_moment(
+    moment: CameraState, studio: RenderContext, near: CameraView | None = None
+) -> PackedWorld:
+    """The world on the device; arguments as of ``render_view``."""
+    if near is not None and _same_looks(near.moment.scene, moment.scene):
+        return repack_moved(near.world, moment.scene, moment.camera, studio.stock)
+    return pack_world(moment.scene, moment.camera, studio.stock)
+
+
+def _same_looks(one: Scene, other: Scene) -> bool:
+    """Whether bodies have the same meshes and the very same materials."""
+    return all(
+        a is b or (a.asset == b.asset and a.materials is b.materials)
+        for a, b in zip(one.bodies, other.bodies, strict=True)
+    )
+
+
+def crop_rows(view: records.View, first: int, end: int) -> records.View:
+    """The view whose image is a band of rows of another's."""
+    part = records.View()
+    for name in records.View.vars:
+        setattr(part, name, getattr(view, name))
+    part.height = end - first
+    part.cy = view.cy - first
+    if view.lens != records.PINHOLE:
+        part.directions = view.directions[first * view.width : end * view.width]
+    return part

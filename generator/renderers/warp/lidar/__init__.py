@@ -1,0 +1,1 @@
+"""Laser rays through the same scene that cameras see."""

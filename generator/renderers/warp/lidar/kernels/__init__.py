@@ -1,0 +1,1 @@
+"""Laser rays: first hits, returns, mirrors and packets of rays."""

@@ -1,0 +1,178 @@
+"""Runs of rays that start and go nearly alike: which bodies any of them may meet, nearest first.
+
+Asking the hierarchy over all bodies for every single ray takes a third of a scan's time; a run of
+neighbours asks once, with intervals in the place of numbers (Boulos, Wald and Shirley, "Geometric
+and arithmetic culling methods for entire ray packets", 2006).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    componentwise_max,
+    componentwise_min,
+    max_of_two,
+    min_of_two,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Bodies that a list holds; a run that may meet more looks at all there are.
+LISTED_MAX = wp.constant(96)
+FAR_M = wp.constant(3.0e38)
+# Boxes grow by this, and distances to them shrink, so that rounding hides no body from a run.
+SLACK_M = wp.constant(1.0e-3)
+SLACK = wp.constant(1.0e-4)
+
+
+@wp.struct
+class Boxes:
+    """Boxes around bodies in the world, and room for lists of them.
+
+    Attributes:
+        lows_m, highs_m: Their corners.
+        listed: Bodies that a run may meet [row, LISTED_MAX].
+        enters_m: Least distance at which a ray of the run may enter the body's box; rising.
+    """
+
+    lows_m: wp.array(dtype=wp.vec3)
+    highs_m: wp.array(dtype=wp.vec3)
+    listed: wp.array(dtype=int, ndim=2)
+    enters_m: wp.array(dtype=float, ndim=2)
+
+
+@wp.struct
+class Bundle:
+    """Bounds of the origins and of the unit directions of a run of rays, world frame."""
+
+    origin_low_m: wp.vec3
+    origin_high_m: wp.vec3
+    way_low: wp.vec3
+    way_high: wp.vec3
+
+
+@wp.struct
+class ListedBodies:
+    """Bodies that a bundle may meet: a row of the lists; ``count`` -1 = too many for one."""
+
+    row: int
+    count: int
+
+
+@wp.func
+def no_rays():
+    """The bundle of no ray."""
+    bundle = Bundle()
+    bundle.origin_low_m = wp.vec3(FAR_M)
+    bundle.origin_high_m = wp.vec3(-FAR_M)
+    bundle.way_low = wp.vec3(FAR_M)
+    bundle.way_high = wp.vec3(-FAR_M)
+    return bundle
+
+
+@wp.func
+def with_ray(bundle: Bundle, origin_m: wp.vec3, way: wp.vec3):
+    """The bundle with one more ray."""
+    bundle.origin_low_m = componentwise_min(bundle.origin_low_m, origin_m)
+    bundle.origin_high_m = componentwise_max(bundle.origin_high_m, origin_m)
+    bundle.way_low = componentwise_min(bundle.way_low, way)
+    bundle.way_high = componentwise_max(bundle.way_high, way)
+    return bundle
+
+
+@wp.func
+def enters_slab(near_m: float, far_m: float, way_low: float, way_high: float):
+    """Least distance at which any ray can be between two planes; FAR_M = none ever is.
+
+    Args:
+        near_m, far_m: Coordinates of the planes, seen from the origins that are nearest to them.
+        way_low, way_high: Bounds of the directions' coordinate.
+    """
+    enter = float(0.0)
+    if near_m > 0.0:
+        enter = wp.where(way_high > 0.0, near_m / way_high, FAR_M)
+    elif far_m < 0.0:
+        enter = wp.where(way_low < 0.0, far_m / way_low, FAR_M)
+    return enter
+
+
+@wp.func
+def leaves_slab(near_m: float, far_m: float, way_low: float, way_high: float):
+    """Largest distance at which any ray can still be between two planes that it can reach."""
+    leave = float(FAR_M)
+    if way_low > 0.0:
+        leave = far_m / way_low
+    elif way_high < 0.0:
+        leave = near_m / way_high
+    return leave
+
+
+@wp.func
+def enters_m(bundle: Bundle, low_m: wp.vec3, high_m: wp.vec3):
+    """Least distance at which a ray of a bundle may enter a box; FAR_M where none does."""
+    slack = wp.vec3(SLACK_M)
+    a = low_m - slack - bundle.origin_high_m
+    c = high_m + slack - bundle.origin_low_m
+    low, high = bundle.way_low, bundle.way_high
+    enter = enters_slab(a[0], c[0], low[0], high[0])
+    enter = max_of_two(enter, enters_slab(a[1], c[1], low[1], high[1]))
+    enter = max_of_two(enter, enters_slab(a[2], c[2], low[2], high[2]))
+    leave = leaves_slab(a[0], c[0], low[0], high[0])
+    leave = min_of_two(leave, leaves_slab(a[1], c[1], low[1], high[1]))
+    leave = min_of_two(leave, leaves_slab(a[2], c[2], low[2], high[2]))
+    enter = enter * (1.0 - SLACK)
+    return wp.where(enter > leave * (1.0 + SLACK), FAR_M, enter)
+
+
+@wp.func
+def list_bodies(boxes: Boxes, row: int, bundle: Bundle, reach_m: float):
+    """List what a bundle may meet within reach, the nearest first."""
+    count = int(0)
+    for b in range(boxes.lows_m.shape[0]):
+        enter = enters_m(bundle, boxes.lows_m[b], boxes.highs_m[b])
+        if enter < reach_m and enter < FAR_M and count >= 0:
+            if count == LISTED_MAX:
+                count = -1
+            else:
+                k = count
+                moving = bool(True)
+                while moving:
+                    moving = False
+                    if k > 0:
+                        if boxes.enters_m[row, k - 1] > enter:
+                            boxes.enters_m[row, k] = boxes.enters_m[row, k - 1]
+                            boxes.listed[row, k] = boxes.listed[row, k - 1]
+                            k -= 1
+                            moving = True
+                boxes.enters_m[row, k] = enter
+                boxes.listed[row, k] = b
+                count += 1
+    listed = ListedBodies()
+    listed.row = row
+    listed.count = count
+    return listed
+
+
+@wp.func
+def reciprocals(way: wp.vec3):
+    """One over each coordinate; a grain in the place of zero."""
+    # 0 / 0 would be NaN where a ray lies in a box's face; this is as good as infinity.
+    x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
+    y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
+    z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
+    return wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
+
+
+@wp.func
+def ray_enters(boxes: Boxes, b: int, origin_m: wp.vec3, inverse: wp.vec3, reach_m: float):
+    """Whether a ray may enter a body's box before its reach."""
+    a = wp.cw_mul(boxes.lows_m[b] - origin_m, inverse)
+    c = wp.cw_mul(boxes.highs_m[b] - origin_m, inverse)
+    enter = max_of_two(
+        max_of_two(min_of_two(a[0], c[0]), min_of_two(a[1], c[1])), min_of_two(a[2], c[2])
+    )
+    leave = min_of_two(
+        min_of_two(max_of_two(a[0], c[0]), max_of_two(a[1], c[1])), max_of_two(a[2], c[2])
+    )
+    return leave >= 0.0 and leave >= enter and enter < reach_m

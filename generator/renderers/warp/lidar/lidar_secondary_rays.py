@@ -1,0 +1,143 @@
+"""What laser rays meet through glass and by way of mirrors.
+
+Few rays come to a pane, a mirror or a puddle; only these are followed, after all first hits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.capture import SecondaryHits
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
+from gen_data.generator.renderers.warp.scene.body_materials import BodyMaterials
+from gen_data.generator.renderers.warp.visibility.label_images import category_ids
+
+PUDDLE_MIN = 0.05
+"""Less of standing water than this mirrors nothing."""
+
+Labels = tuple[NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint8]]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class HitLabels:
+    """Tables from body and material to labels; the first entry is that of nothing."""
+
+    instances: NDArray[np.uint16]
+    categories: NDArray[np.uint16]
+    surfaces: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, scene: Scene, looks: Sequence[BodyMaterials]) -> HitLabels:
+        """Of a scene, whose bodies look like this."""
+        instances = [0, *(body.instance_id for body in scene.bodies)]
+        nothing = np.zeros(1, np.uint8)
+        return cls(
+            np.array(instances, np.uint16),
+            np.array([0, *category_ids(scene)], np.uint16),
+            np.concatenate([nothing, *(look.roles for look in looks)]),
+        )
+
+    def at(self, hits: NDArray[np.int32]) -> Labels:
+        """Instance, category and surface of (body, material) pairs [n, 2]."""
+        bodies, materials = hits[:, 0] + 1, hits[:, 1] + 1
+        return self.instances[bodies], self.categories[bodies], self.surfaces[materials]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FirstHits:
+    """First hits of all rays: ranges and (body, material) on the device, the latter also here.
+
+    Attributes:
+        normals: Where there are mirrors, on the device, lidar frame.
+        puddles: Share of each ray's end that is standing water; None where everything is dry.
+    """
+
+    ranges_m: wp.array
+    on_device: wp.array
+    normals: wp.array
+    hits: NDArray[np.int32]
+    puddles: NDArray[np.float32] | None
+
+
+def trace_secondary(
+    inputs: Sequence[Any],
+    first: FirstHits,
+    order: NDArray[np.int32] | None,
+    infrared: NDArray[np.void],
+    labels: HitLabels,
+    stock: DeviceCache,
+) -> SecondaryHits | None:
+    """What rays meet besides their first hits; None = nothing.
+
+    Args:
+        inputs: Of the kernel that found the first hits.
+        first: What it found.
+        order: Of the beams.
+        infrared: Records of the materials.
+        labels: Of the scene.
+        stock: Of the renderer.
+    """
+    material = first.hits[:, 1]
+    clear = np.append(infrared["clear"] > 0.0, False)[material]
+    mirror = np.append(infrared["mirror"] > 0.0, False)[material]
+    if first.puddles is not None:
+        mirror = mirror | (first.puddles > PUDDLE_MIN)
+    found = []
+    panes, mirrors = (_picked(which, order) for which in (clear, mirror))
+    if len(panes):
+        given = [wp.array(panes, dtype=int, device=stock.device), first.ranges_m]
+        found.append(_launched(kernels.look_through, [*inputs, *given], panes, labels, stock))
+    if len(mirrors):
+        water = np.zeros(len(mirrors), np.float32)
+        if first.puddles is not None:
+            water = np.where(first.puddles[mirrors] > PUDDLE_MIN, first.puddles[mirrors], 0.0)
+        given = [
+            wp.array(mirrors, dtype=int, device=stock.device),
+            first.ranges_m,
+            first.on_device,
+            first.normals,
+            wp.array(water, dtype=float, device=stock.device),
+        ]
+        seen = _launched(kernels.look_in_mirrors, [*inputs, *given], mirrors, labels, stock)
+        seen[3][:], seen[4][:], seen[5][:] = 0, 0, SURFACES.index("mirrored")
+        found.append(seen)
+    if not found:
+        return None
+    return SecondaryHits(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _picked(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Numbers of the rays that are marked, those of neighbouring beams after each other."""
+    if order is None or not which.any():
+        return np.flatnonzero(which).astype(np.int32)
+    subrays = len(which) // len(order)
+    rays = order if subrays == 1 else (subrays * order[:, None] + np.arange(subrays)).ravel()
+    return rays[which[rays]].astype(np.int32, copy=False)
+
+
+def _launched(
+    kernel: wp.Kernel,
+    inputs: Sequence[Any],
+    picked: NDArray[np.int32],
+    labels: HitLabels,
+    stock: DeviceCache,
+) -> list[NDArray[Any]]:
+    """The fields of SecondaryHits of picked rays that meet something."""
+    count = len(picked)
+    ranges_m, reflectances = (wp.zeros(count, dtype=float, device=stock.device) for _ in range(2))
+    hits_ = wp.zeros(count, dtype=wp.vec2i, device=stock.device)
+    outputs = [ranges_m, reflectances, hits_]
+    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=stock.device)
+    hits = hits_.numpy()
+    there = hits[:, 0] >= 0
+    seen = (ranges_m.numpy()[there], reflectances.numpy()[there])
+    return [picked[there].astype(np.int64), *seen, *labels.at(hits[there])]

@@ -1,0 +1,117 @@
+"""Bodies that move while laser pulses leave one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from gen_data.generator.core.capture import LidarRays
+from gen_data.generator.core.motion import interpolate_poses
+from gen_data.generator.core.scene import Body, Lidar, Scene
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
+from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
+
+KEYS = 9
+"""Poses over a sweep, straight between them: at 10 m/s^2 and 0.1 s within 0.2 mm."""
+
+SLACK_M = 2e-3
+"""Between keys a body may leave the boxes it has there by as much."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mover:
+    """A body that moves: its number, rotation matrices [KEYS, 3, 3] and positions [KEYS, 3]."""
+
+    number: int
+    body: Body
+    R_world_mesh: Array
+    t_world_mesh: Array
+
+
+def pack_moving_bodies(
+    scene: Scene, lidar: Lidar, beams: LidarRays, world: PackedWorld, stock: DeviceCache
+) -> tuple[PackedWorld, kernels.BodyMotion]:
+    """The world with boxes around all the ways that bodies take, and these ways."""
+    device = stock.device
+    travel = kernels.BodyMotion()
+    travel.keys = 0
+    movers = _movers(scene, beams.time_s)
+    if beams.time_s is None or not (movers or beams.origins_m is not None):
+        return world, travel
+    rows = np.full(max(len(scene.bodies), 1), -1, np.int32)
+    rows[[mover.number for mover in movers]] = np.arange(len(movers))
+    start_s, end_s = float(beams.time_s.min()), float(beams.time_s.max())
+    phases = (beams.time_s - start_s) * np.float32((KEYS - 1) / max(end_s - start_s, 1e-9))
+    origins_m = beams.origins_m
+    if origins_m is None:
+        origins_m = np.zeros((len(beams.time_s), 3), np.float32)
+    B_mesh_lidar, eye_mesh = _seen_from(lidar, movers)
+    travel.keys = KEYS
+    travel.rows = wp.array(rows, dtype=int, device=device)
+    travel.B_mesh_lidar = wp.array(B_mesh_lidar, dtype=wp.mat33, device=device)
+    travel.eye_mesh = wp.array(eye_mesh, dtype=wp.vec3, device=device)
+    travel.phases = wp.array(phases, dtype=float, device=device, copy=False)
+    travel.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device, copy=False)
+    return _enclosing(world, movers, stock), travel
+
+
+def _movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
+    """Bodies whose pose changes while pulses leave."""
+    if time_s is None or not scene.tracks:
+        return []
+    keys_s = scene.time_s + np.linspace(float(time_s.min()), float(time_s.max()), KEYS)
+    numbers = {body.name: k for k, body in enumerate(scene.bodies)}
+    tracks = [
+        track
+        for track in scene.tracks
+        if track.end_s > keys_s[0] and track.start_s < keys_s[-1] and track.body in numbers
+    ]
+    R, t = interpolate_poses(tracks, keys_s)
+    moves = (t != t[:, :1]).any(axis=(1, 2)) | (R[:, :1] != R).any(axis=(1, 2, 3))
+    moving = sorted((numbers[tracks[k].body], int(k)) for k in np.flatnonzero(moves))
+    return [Mover(number, scene.bodies[number], R[k], t[k]) for number, k in moving]
+
+
+def _seen_from(
+    lidar: Lidar, movers: list[Mover]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Directions and the origin of the lidar frame in each mover's mesh frame, at each key."""
+    if not movers:
+        return np.zeros((1, KEYS, 3, 3), np.float32), np.zeros((1, KEYS, 3), np.float32)
+    R_world_lidar = lidar.T_world_lidar.rotation()
+    R = np.stack([mover.R_world_mesh for mover in movers])
+    t = np.stack([mover.t_world_mesh for mover in movers])
+    scale = np.array([mover.body.scale for mover in movers])[:, None, None]
+    away = np.asarray(lidar.T_world_lidar.translation_m) - t
+    B = np.einsum("nkji,jl->nkil", R, R_world_lidar, optimize=False) / scale[..., None]
+    eye = np.einsum("nkji,nkj->nki", R, away, optimize=False) / scale
+    return B.astype(np.float32), eye.astype(np.float32)
+
+
+def _enclosing(world: PackedWorld, movers: list[Mover], stock: DeviceCache) -> PackedWorld:
+    """The world with boxes that hold movers wherever they are."""
+    if not movers:
+        return world
+    low_m, high_m = world.placed["low_m"].copy(), world.placed["high_m"].copy()
+    numbers = [mover.number for mover in movers]
+    meshes = [stock.mesh(mover.body.asset) for mover in movers]
+    scale = np.array([mover.body.scale for mover in movers])[:, None]
+    low, high = (
+        np.stack(corner) for corner in zip(*((m.low_m, m.high_m) for m in meshes), strict=True)
+    )
+    R = np.stack([mover.R_world_mesh for mover in movers])
+    t = np.stack([mover.t_world_mesh for mover in movers])
+    centre = t + np.einsum("nkij,nj->nki", R, 0.5 * (low + high) * scale, optimize=False)
+    half = 0.5 * (high - low) * scale
+    reach = np.einsum("nkij,nj->nki", np.abs(R), half, optimize=False) + SLACK_M
+    low_m[numbers] = (centre - reach).min(axis=1)
+    high_m[numbers] = (centre + reach).max(axis=1)
+    lows_m, highs_m = (
+        wp.array(corner, dtype=wp.vec3, device=stock.device) for corner in (low_m, high_m)
+    )
+    return replace(world, lows_m=lows_m, highs_m=highs_m)

@@ -1,0 +1,1 @@
+"""The path-traced tier: integrator, BSDF, emitters, sampler and denoiser."""

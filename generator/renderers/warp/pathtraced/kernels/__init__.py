@@ -1,0 +1,1 @@
+"""Path tracing: integrator, BSDF, emitters, sampler and guides of the denoiser."""

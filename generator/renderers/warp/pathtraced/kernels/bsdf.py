@@ -1,0 +1,301 @@
+"""What surfaces do with light, for paths: evaluated, and drawn from.
+
+All directions are in the shading frame, whose Z axis is the normal; ``v`` points to where the path
+comes from, ``l`` to where it goes on. The model is that of ``brdf``, with Smith's height-correlated
+masking as it is instead of its approximation, and a coat above it.
+
+Sources: those of ``brdf``; Heitz, "Sampling the GGX distribution of visible normals", JCGT 7(4),
+2018; Dupuy and Benyoub, "Sampling visible GGX normals with spherical caps", HPG 2023 (the same
+distribution with fewer operations); Heitz, "Understanding the masking-shadowing function in
+microfacet-based BRDFs", JCGT 3(2), 2014; Walter et al. 2007 (refraction).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.brdf import directional_albedo
+from gen_data.generator.renderers.warp.scene.kernels.colorimetry import luminance
+from gen_data.generator.renderers.warp.scene.kernels.dielectrics import fresnel_dielectric, refract
+from gen_data.generator.renderers.warp.scene.kernels.records import fast_normalize
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Smoother surfaces than this are taken for this: alpha 0.002, as in ``brdf``.
+SMOOTHEST = wp.constant(0.045)
+# Lacquers have indices about 1.5: ((n - 1) / (n + 1))^2.
+COAT_F0 = wp.constant(0.04)
+
+
+@wp.struct
+class Bsdf:
+    """What reflects at a vertex, for one direction ``v``.
+
+    Attributes:
+        v: To where the path comes from; Z > 0.
+        diffuse: Albedo of the matte layer, seen through those above it.
+        f0, f90: Reflectance of the specular layer (Schlick); its share below the coat and its
+            multiple scattering are in ``scale``.
+        ior: If not 0, the specular layer is all there is, reflects by Fresnel's equations for this
+            index instead, and lets the rest through.
+        alpha: Width of the specular lobe.
+        coat: Weight of the clear coat, multiple scattering included.
+        coat_f0: Its reflectance at normal incidence.
+        coat_alpha: Width of its lobe.
+        p_coat, p_shine: Probabilities of drawing from the coat and from the specular layer.
+    """
+
+    v: wp.vec3
+    diffuse: wp.vec3
+    f0: wp.vec3
+    f90: float
+    scale: wp.vec3
+    ior: float
+    alpha: float
+    coat: float
+    coat_f0: float
+    coat_alpha: float
+    p_coat: float
+    p_shine: float
+
+
+@wp.struct
+class Scattering:
+    """A direction that was drawn.
+
+    Attributes:
+        l: Unit.
+        weight: BSDF times cosine over density; 0 where the draw has failed and the path ends.
+        density: Per solid angle [1/sr]; below zero for what only this draw can find.
+    """
+
+    l: wp.vec3  # noqa: E741
+    weight: wp.vec3
+    density: float
+
+
+@wp.func
+def roughness_to_alpha(roughness: float):
+    """Width of a lobe."""
+    r = wp.clamp(roughness, SMOOTHEST, 1.0)
+    return r * r
+
+
+@wp.func
+def fifth(c: float):
+    """(1 - c)^5, Schlick's."""
+    d = 1.0 - c
+    d2 = d * d
+    return d2 * d2 * d
+
+
+@wp.func
+def make_bsdf(
+    table: wp.array(dtype=wp.vec2, ndim=2),
+    v: wp.vec3,
+    albedo: wp.vec3,
+    roughness: float,
+    metallic: float,
+    specular: float,
+    coat: float,
+    coat_f0: float,
+    coat_roughness: float,
+):
+    """An opaque surface.
+
+    Args:
+        table: Directional albedo of GGX lobes, see
+            gen_data.generator.renderers.warp.scene.brdf_albedo_lut.smith_albedo.
+        v: To the viewer.
+        albedo, roughness, metallic, specular: As of gen_data.generator.core.asset_types.Material.
+        coat, coat_f0, coat_roughness: Weight of the coat above it, its reflectance at normal
+            incidence, and its roughness.
+    """
+    one = wp.vec3(1.0, 1.0, 1.0)
+    n_v = v[2]
+    s = Bsdf()
+    s.v = v
+    s.alpha = roughness_to_alpha(roughness)
+    # Burley 2012: specular 0.5 is 4 %.
+    dielectric = 0.08 * specular * (1.0 - metallic)
+    s.f0 = one * dielectric + albedo * metallic
+    # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
+    s.f90 = wp.min(50.0 * wp.max(s.f0), 1.0)
+    part = directional_albedo(table, wp.sqrt(s.alpha), n_v)
+    # Turquin 2019; the floor is for entries of the table near 0.
+    s.scale = one + s.f0 * (1.0 / wp.max(part[0] + part[1], 0.05) - 1.0)
+    gloss = wp.cw_mul(s.f0 * part[0] + one * (s.f90 * part[1]), s.scale)
+    s.diffuse = wp.cw_mul(one - gloss, albedo) * (1.0 - metallic)
+    # Layers are drawn as often as they send light on, as the eye counts it.
+    shine = luminance(gloss)
+    if coat > 0.0:
+        s.coat_f0 = coat_f0
+        s.coat_alpha = roughness_to_alpha(coat_roughness)
+        above = directional_albedo(table, wp.sqrt(s.coat_alpha), n_v)
+        s.coat = coat * (1.0 + coat_f0 * (1.0 / (above[0] + above[1]) - 1.0))
+        coated = s.coat * (coat_f0 * above[0] + above[1])
+        s.scale = s.scale * (1.0 - coated)
+        s.diffuse = s.diffuse * (1.0 - coated)
+        shine = shine * (1.0 - coated)
+        s.p_coat = coated
+    total = s.p_coat + shine + luminance(s.diffuse)
+    if total > 0.0:
+        s.p_coat = s.p_coat / total
+        s.p_shine = shine / total
+    return s
+
+
+@wp.func
+def make_interface(v: wp.vec3, alpha: float, ior: float):
+    """The reflection of a dielectric, without what goes through."""
+    s = Bsdf()
+    s.v = v
+    s.alpha = alpha
+    s.ior = ior
+    s.scale = wp.vec3(1.0, 1.0, 1.0)
+    s.p_shine = 1.0
+    return s
+
+
+@wp.func
+def reflectance(s: Bsdf, v_h: float):
+    """Of the specular layer's facets."""
+    f = s.f0
+    if s.ior > 0.0:
+        r = fresnel_dielectric(v_h, s.ior)
+        f = wp.vec3(r, r, r)
+    else:
+        k = fifth(wp.min(v_h, 1.0))
+        f = f * (1.0 - k) + wp.vec3(s.f90, s.f90, s.f90) * k
+    return wp.cw_mul(f, s.scale)
+
+
+@wp.func
+def slope(alpha: float, c: float):
+    """The root in Smith's functions for one cosine."""
+    a2 = alpha * alpha
+    return wp.sqrt(a2 + (1.0 - a2) * c * c)
+
+
+@wp.func
+def facets(alpha: float, h: wp.vec3):
+    """GGX: the density of facets' normals."""
+    # By the tangent's square, which keeps its digits where the lobe is narrow.
+    a2 = alpha * alpha
+    q = (h[0] * h[0] + h[1] * h[1]) / a2 + h[2] * h[2]
+    return 1.0 / (wp.pi * a2 * q * q)
+
+
+@wp.func
+def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
+    """BSDF times cosine for one direction, and the density with which ``scatter`` draws it."""
+    n_l = l[2]
+    n_v = s.v[2]
+    diffuse = n_l * (1.0 / wp.pi)
+    f = s.diffuse * diffuse
+    density = diffuse * (1.0 - s.p_coat - s.p_shine)
+    # Matte surfaces are the most common: they skip the half vector.
+    if s.p_shine == 0.0 and s.coat == 0.0:
+        return f, density
+    h = fast_normalize(s.v + l)
+    v_h = wp.max(wp.dot(s.v, h), 0.0)
+    if s.p_shine > 0.0:
+        lobe = 0.5 * facets(s.alpha, h)
+        root = slope(s.alpha, n_v)
+        reflected = reflectance(s, v_h)
+        p = s.p_shine
+        # At an interface the lot between both ways is Fresnel's, facet by facet.
+        if s.ior > 0.0:
+            p = reflected[0]
+        f += reflected * (lobe * n_l / (n_l * root + n_v * slope(s.alpha, n_l)))
+        density += p * lobe / (n_v + root)
+    if s.coat > 0.0:
+        lobe = 0.5 * facets(s.coat_alpha, h)
+        root = slope(s.coat_alpha, n_v)
+        k = fifth(wp.min(v_h, 1.0))
+        shine = s.coat * (s.coat_f0 + (1.0 - s.coat_f0) * k) * lobe * n_l
+        shine = shine / (n_l * root + n_v * slope(s.coat_alpha, n_l))
+        f += wp.vec3(shine, shine, shine)
+        density += s.p_coat * lobe / (n_v + root)
+    return f, density
+
+
+@wp.func
+def visible_facet(v: wp.vec3, alpha: float, u: wp.vec2):
+    """A facet's normal, drawn as often as it is seen from ``v``."""
+    # Heitz 2018: stretched by alpha, a GGX surface is a hemisphere.
+    w = fast_normalize(wp.vec3(v[0] * alpha, v[1] * alpha, v[2]))
+    # Dupuy and Benyoub 2023: a spherical cap of directions gives the visible normals.
+    z = (1.0 - u[1]) * (1.0 + w[2]) - w[2]
+    r = wp.sqrt(wp.max(1.0 - z * z, 0.0))
+    angle = 2.0 * wp.pi * u[0]
+    x = r * wp.cos(angle) + w[0]
+    y = r * wp.sin(angle) + w[1]
+    # And back. Rounding may leave Z a little below 0, where no facet faces out.
+    return fast_normalize(wp.vec3(x * alpha, y * alpha, wp.max(z + w[2], 0.0)))
+
+
+@wp.func
+def around_normal(u: wp.vec2):
+    """A direction, drawn in proportion to its cosine."""
+    # Malley: evenly on a disk, lifted to the hemisphere, is in proportion to the cosine.
+    r = wp.sqrt(u[0])
+    angle = 2.0 * wp.pi * u[1]
+    return wp.vec3(r * wp.cos(angle), r * wp.sin(angle), wp.sqrt(1.0 - u[0]))
+
+
+@wp.func
+def scatter(s: Bsdf, choice: float, u: wp.vec2):
+    """A direction, drawn nearly in proportion to what it brings.
+
+    Args:
+        choice: In [0, 1), for the layer.
+        u: In [0, 1), for the direction.
+    """
+    out = Scattering()
+    if choice < s.p_coat + s.p_shine:
+        alpha = s.alpha
+        if choice < s.p_coat:
+            alpha = s.coat_alpha
+        h = visible_facet(s.v, alpha, u)
+        out.l = h * (2.0 * wp.dot(s.v, h)) - s.v
+    else:
+        out.l = around_normal(u)
+    if out.l[2] > 0.0:
+        f, density = evaluate(s, out.l)
+        out.density = density
+        if density > 0.0:
+            out.weight = f * (1.0 / density)
+    return out
+
+
+@wp.func
+def scatter_glass(s: Bsdf, lot: float, u: wp.vec2):
+    """A direction that is reflected, or goes through towards negative Z.
+
+    The weight lacks any tint. No density is told for what goes through: nothing else draws such
+    directions. Radiance is that of the outside on both sides: what is seen through a body leaves
+    it again. Masking of what goes through is separable, as by Walter.
+
+    Args:
+        lot: In [0, 1), decides between the two.
+        u: In [0, 1), for the direction.
+    """
+    out = Scattering()
+    h = visible_facet(s.v, s.alpha, u)
+    v_h = wp.min(wp.dot(s.v, h), 1.0)
+    if lot < fresnel_dielectric(v_h, s.ior):
+        out.l = h * (2.0 * v_h) - s.v
+        if out.l[2] > 0.0:
+            f, density = evaluate(s, out.l)
+            out.density = density
+            out.weight = f * (1.0 / wp.max(density, 1.0e-20))
+    else:
+        out.l = refract(-s.v, h, s.ior)
+        out.density = -1.0
+        n_l = -out.l[2]
+        if n_l > 0.0:
+            # Over the density of visible facets, all of Walter's BTDF cancels but Smith's G1 of l.
+            passed = 2.0 * n_l / (n_l + slope(s.alpha, n_l))
+            out.weight = wp.vec3(passed, passed, passed)
+    return out

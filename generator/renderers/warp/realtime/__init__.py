@@ -1,0 +1,1 @@
+"""The realtime tier: direct light, soft shadows, clear coats and glass."""

@@ -1,0 +1,84 @@
+"""Coats, glass, mirrors and further maps, over what plain shading has left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.realtime.kernels import lattice_lighting
+from gen_data.generator.renderers.warp.realtime.light_visibility import (
+    lamp_parts,
+    pixel_parts,
+    sunflower,
+)
+from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
+from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.generator.renderers.warp.visibility.kernels import edge_detection
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ListedPixels:
+    """Pixels that are shaded by themselves.
+
+    Attributes:
+        count: Their number; the arrays are longer.
+        pixels: Which ones.
+        lit: Visible part of each lamp [lamp, place in the list].
+        open_sky: Visible part of the hemisphere, [1, place].
+        exposed: Share of what falls that reaches them.
+    """
+
+    count: int
+    pixels: wp.array
+    lit: wp.array
+    open_sky: wp.array
+    exposed: wp.array
+
+
+_PARTS = 2
+"""Rays per pixel where edges are seen in a mirror or through glass."""
+
+
+def shade_layers(
+    world: PackedWorld,
+    view: records.View,
+    images: lattice_lighting.GBufferRecord,
+    listed: ListedPixels,
+    radiance: wp.array,
+    stock: DeviceCache,
+    settings: RenderSettings,
+) -> None:
+    """Shade those of the listed pixels that see layered surfaces, in place.
+
+    Where edges are seen in them or through them, by several rays.
+    """
+    # A module of its own: scenes without such surfaces neither compile nor load it.
+    from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass
+
+    device = stock.device
+    probe = clearcoat_glass.Probe()
+    probe.parts = stock.constant(wp.vec2, lamp_parts, 4, settings.shadows)
+    probe.disc = stock.constant(wp.vec2, sunflower, 4)
+    probe.radius_m = settings.ambient_occlusion_radius_m
+    probe.lit = stock.scratch("lit where rays end", listed.lit.shape, float)
+    frame = [view, world.record, images]
+    seen = [listed.pixels, listed.lit, listed.open_sky, listed.exposed, probe]
+    wp.launch(
+        clearcoat_glass.shade_layers, listed.count, [*frame, *seen], [radiance], device=device
+    )
+    if settings.antialias == 1:
+        return
+    count = wp.zeros(1, dtype=wp.int32, device=device)
+    places = stock.scratch("contrasts", view.width * view.height, wp.int32)
+    inputs = [*frame, listed.pixels, radiance]
+    wp.launch(clearcoat_glass.find_contrasts, listed.count, inputs, [count, places], device=device)
+    found = int(count.numpy()[0])
+    pixels = stock.scratch("contrast pixels", view.width * view.height, wp.int32)
+    mixed = stock.scratch("contrast colours", view.width * view.height, wp.vec3)
+    offsets = stock.constant(wp.vec2, pixel_parts, _PARTS)
+    inputs = [*frame, places, *seen, offsets]
+    wp.launch(clearcoat_glass.shade_contrasts, found, inputs, [pixels, mixed], device=device)
+    wp.launch(edge_detection.put_mixed, found, [pixels, mixed], [radiance], device=device)

@@ -1,0 +1,1 @@
+"""Light on a lattice of points, its interpolation, shadows, clear coats and glass."""

@@ -1,0 +1,769 @@
+"""Surfaces with more to them than colour, roughness and bumps: coats, glass, mirrors, more maps.
+
+Only pixels that see such a surface come here, and only scenes that have one load this module. A
+pixel's own light is computed as in
+gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting; up to three rays add what it
+mirrors and what is behind it.
+
+* A **clear coat** is a second GGX layer of reflectance 0.04; what it reflects is taken from all
+  that is below (KHR_materials_clearcoat; Filament, "Physically based rendering", 4.9). It lies
+  smoothly over the bumps of the base.
+* **Glass** reflects as Fresnel says. A thin pane passes the rest straight on, all reflections
+  between its faces summed, and tints it once; a solid refracts, and its surface tints what enters
+  by the square root of its colour and what leaves by as much.
+* **Mirrors**, that is metals, coats and glass of a roughness below MIRROR_ROUGHNESS, show what is
+  around them by one ray, shaded where it ends with lamps, their shadows and the environment; what
+  that surface mirrors is the environment. Rougher ones show the environment alone.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
+    apply_coat,
+    coat_at,
+    footprint,
+)
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import ray_origin
+from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import (
+    GBufferRecord,
+    light_at,
+    open_lobe,
+    sky_exposure_at,
+    sum_lamp_light,
+    visible_lamp_fraction,
+    visible_sky_fraction,
+)
+from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE, uv_at
+from gen_data.generator.renderers.warp.scene.kernels.brdf import make_brdf
+from gen_data.generator.renderers.warp.scene.kernels.dielectrics import (
+    fresnel_dielectric,
+    pane_reflectance,
+    pane_transmittance,
+    refract,
+)
+from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
+    sky_image,
+    sky_irradiance,
+    sky_reflection,
+    sky_rest,
+)
+from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
+    SurfaceMaterial,
+    evaluate_material,
+)
+from gen_data.generator.renderers.warp.scene.kernels.ray_offsets import passed_origin
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST, closest_hit
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    HOLES,
+    MIRROR_ROUGHNESS,
+    View,
+    World,
+    face_vertices,
+    fast_normalize,
+    first_weight,
+    flat_normal,
+    normal_at,
+    pixel_direction,
+    pixel_width,
+    seen_inside,
+    surface_index,
+    vertex_at,
+)
+from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
+    FULL,
+    make_sampler,
+    mix_texels,
+    taps_at,
+)
+from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import (
+    face_viewer,
+    make_facet,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 1})
+
+# Ambient occlusion is looked at only where more than this share of its light is seen.
+AMBIENT_SHARE = wp.constant(0.2)
+MOSTLY_CLEAR = wp.constant(0.9)
+# Neighbours on a layered surface that differ more than this are looked at more closely.
+CONTRAST = wp.constant(0.15)
+# Clear surfaces that a ray passes one after the other.
+SURFACES_MAX = wp.constant(8)
+
+
+@wp.struct
+class Probe:
+    """How surfaces that rays meet are lit.
+
+    Attributes:
+        parts: Points of the unit disc at which rays to lamps aim.
+        disc: Points of the unit disc under those of the hemisphere at which other rays aim.
+        radius_m: Of ambient occlusion.
+        lit: Scratch: visible part of each lamp where the ray of a pixel ends [lamp, pixel].
+    """
+
+    parts: wp.array(dtype=wp.vec2)
+    disc: wp.array(dtype=wp.vec2)
+    radius_m: float
+    lit: wp.array(dtype=float, ndim=2)
+
+
+@wp.struct
+class Maps:
+    """What further maps of a texture say at a point.
+
+    Attributes:
+        metallic: Factor.
+        occlusion: Share of ambient light that arrives.
+        glow: Factor on emission.
+    """
+
+    metallic: float
+    occlusion: float
+    glow: wp.vec3
+
+
+@wp.func
+def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
+    """Texels of the finest level per area of a face."""
+    texture = world.surfaces[surface].texture
+    size = float(world.textures[texture].width * world.textures[texture].height)
+    scale_m = world.surfaces[surface].texture_scale_m
+    if scale_m > 0.0:
+        wide = float(world.textures[texture].width) / scale_m
+        return wide * wide
+    b = hit[0]
+    g = world.bodies[b].geometry
+    corner = face_vertices(world, g, hit[1])
+    uv = world.geometries[g].uvs[corner[0]]
+    d1 = world.geometries[g].uvs[corner[1]] - uv
+    d2 = world.geometries[g].uvs[corner[2]] - uv
+    p = vertex_at(world, g, corner[0])
+    e1 = (vertex_at(world, g, corner[1]) - p) * world.bodies[b].scale
+    e2 = (vertex_at(world, g, corner[2]) - p) * world.bodies[b].scale
+    area_m2 = wp.max(wp.length(wp.cross(e1, e2)), 1.0e-12)
+    return wp.abs(d1[0] * d2[1] - d1[1] * d2[0]) * size / area_m2
+
+
+@wp.func
+def texture_mix(
+    texels: wp.array(dtype=wp.uint32), first: int, width: int, height: int, uv: wp.vec2
+):
+    """Four channels of one level at a point, [0, 1]."""
+    return mix_texels(texels, taps_at(first, width, height, uv[0], uv[1])) * (1.0 / FULL)
+
+
+@wp.func
+def maps_at(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprint_m: float):
+    """The further maps of a surface at a point seen that wide."""
+    maps = Maps()
+    maps.metallic = 1.0
+    maps.occlusion = 1.0
+    maps.glow = wp.vec3(1.0)
+    t = world.surfaces[surface].texture
+    if t >= 0:
+        if world.textures[t].has_shares + world.textures[t].has_glow > 0:
+            u = first_weight(weight)
+            weights = wp.vec3(1.0 - u - weight[1], u, weight[1])
+            uv = uv_at(world, surface, hit[0], hit[1], weights)
+            texels = texels_per_m2(world, surface, hit) * footprint_m * footprint_m
+            s = make_sampler(world, t, 0.5 * wp.log2(wp.max(texels, 1.0e-6)))
+            # The coarser of two levels alone where both would be mixed: these maps are smooth.
+            if world.textures[t].has_shares != 0:
+                c = texture_mix(world.textures[t].shares, s.first, s.width, s.height, uv)
+                maps.metallic = c[0]
+                maps.occlusion = c[1]
+            if world.textures[t].has_glow != 0:
+                c = texture_mix(world.textures[t].glow, s.first, s.width, s.height, uv)
+                maps.glow = wp.vec3(c[0] * c[0], c[1] * c[1], c[2] * c[2])
+    return maps
+
+
+@wp.struct
+class Meeting:
+    """Where a ray meets a surface; ``hit`` is (-1, -1) where it meets none.
+
+    Attributes:
+        t: Parameter along the ray.
+        weight: Barycentric, as surface.resolve stores them.
+        normal: Smooth, unit, turned against the ray.
+        entering: 1 where it comes from outside.
+    """
+
+    hit: wp.vec2i
+    t: float
+    weight: wp.vec2
+    normal: wp.vec3
+    entering: int
+
+
+@wp.func(**OUT_OF_LINE)
+def met(world: World, origin: wp.vec3, d: wp.vec3):
+    """The first surface along a ray."""
+    first = closest_hit(world, origin, d, FARTHEST, HOLES)
+    m = Meeting()
+    m.hit = first.at
+    m.t = first.t
+    if m.hit[0] >= 0:
+        g = world.bodies[m.hit[0]].geometry
+        corner = face_vertices(world, g, m.hit[1])
+        v = first.weight[0]
+        w = first.weight[1]
+        m.entering = wp.where(wp.dot(flat_normal(world, m.hit), d) < 0.0, 1, 0)
+        n = normal_at(world, g, corner[0]) * (1.0 - v - w) + normal_at(world, g, corner[1]) * v
+        n += normal_at(world, g, corner[2]) * w
+        side = wp.where(m.entering != 0, 1.0, -1.0)
+        m.normal = face_viewer(world.bodies[m.hit[0]].R_world_mesh @ n * side, d)
+        m.weight = wp.vec2(v + 1.0 - side, w)
+    return m
+
+
+@wp.func
+def curvature(world: World, hit: wp.vec2i):
+    """Mean curvature of a face's normals along its edges [1/m]; positive where convex.
+
+    Source: Akenine-Moeller et al., "Improved shader and texture level of detail using ray cones",
+    JCGT 2021, equation 9.
+    """
+    g = world.bodies[hit[0]].geometry
+    corner = face_vertices(world, g, hit[1])
+    total = float(0.0)
+    for k in range(3):
+        i = corner[k]
+        j = corner[(k + 1) % 3]
+        way = vertex_at(world, g, j) - vertex_at(world, g, i)
+        turn = normal_at(world, g, j) - normal_at(world, g, i)
+        total += wp.dot(turn, way) / wp.max(wp.dot(way, way), 1.0e-12)
+    return total / (3.0 * world.bodies[hit[0]].scale)
+
+
+@wp.func
+def above(r: wp.vec3, n: wp.vec3):
+    """A direction lifted over a surface that bumps have turned it into."""
+    return fast_normalize(r + n * wp.max(0.02 - wp.dot(r, n), 0.0))
+
+
+@wp.func(**OUT_OF_LINE)
+def looked_at(
+    world: World,
+    surface: int,
+    hit: wp.vec2i,
+    weight: wp.vec2,
+    n: wp.vec3,
+    width_m: float,
+    v: wp.vec3,
+):
+    """A surface with all its maps, and the further ones by themselves."""
+    look = evaluate_material(world, surface, hit, weight, n, width_m, v)
+    slant = wp.sqrt(wp.max(wp.dot(n, v), 0.05))
+    maps = maps_at(world, surface, hit, weight, width_m / slant)
+    look.metallic *= maps.metallic
+    return look, maps
+
+
+@wp.func(**OUT_OF_LINE)
+def light_of_meeting(
+    world: World,
+    probe: Probe,
+    m: Meeting,
+    look: SurfaceMaterial,
+    occlusion: float,
+    p: wp.vec3,
+    d: wp.vec3,
+    share: float,
+    clear: float,
+    k: int,
+):
+    """Light of a surface that a ray has met, towards where it came from.
+
+    Args:
+        share: Of that light in the pixel.
+        clear: Share of it that only glitters: nobody sees whether that is shaded.
+    """
+    origin = ray_origin(world, m.hit, m.weight, p, d)
+    for j in range(world.lamps.shape[0]):
+        probe.lit[j, k] = 1.0
+        if clear < MOSTLY_CLEAR:
+            probe.lit[j, k] = visible_lamp_fraction(
+                world, world.lamps[j], origin, m.normal, probe.parts
+            )
+    open_sky = occlusion
+    if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
+        open_sky *= visible_sky_fraction(world, origin, m.normal, probe.disc, probe.radius_m)
+    surface = surface_index(world, m.hit)
+    return light_at(world, surface, look, p, -d, probe.lit, open_sky, k)
+
+
+@wp.struct
+class Ray:
+    """A ray that leaves a surface.
+
+    Attributes:
+        share: Of its light, in that of the pixel.
+        roughness: Of what mirrors it: how blurred the sky is that it meets.
+        spread: Angle that it covers; ``width_m`` where it begins.
+        mirrored: 1 where it is reflected: it sees the sky even if pixels do not.
+    """
+
+    origin: wp.vec3
+    d: wp.vec3
+    share: wp.vec3
+    roughness: float
+    width_m: float
+    spread: float
+    mirrored: int
+
+
+@wp.func
+def sky_along(world: World, ray: Ray):
+    """What a ray sees that meets nothing."""
+    c = wp.vec3(0.0)
+    if ray.mirrored != 0:
+        # With the parts for which lamps stand, in their own shapes.
+        c = sky_reflection(world.sky, ray.d, ray.roughness)
+        c += sky_image(world.sky, ray.d) - sky_rest(world.sky, ray.d)
+    elif world.sky.visible != 0:
+        c = sky_image(world.sky, ray.d)
+    return c
+
+
+@wp.func
+def root_of(color: wp.vec3):
+    """The square root of a colour, channel by channel."""
+    return wp.vec3(wp.sqrt(color[0]), wp.sqrt(color[1]), wp.sqrt(color[2]))
+
+
+@wp.func
+def gone_on(
+    world: World, ray: Ray, m: Meeting, look: SurfaceMaterial, clear: float, opacity: float
+):
+    """A ray behind a surface: its direction, and its share of what is there.
+
+    Args:
+        clear: Share of the light under the specular layer that goes through.
+    """
+    surface = surface_index(world, m.hit)
+    c = wp.min(-wp.dot(ray.d, m.normal), 1.0)
+    ior = world.surfaces[surface].ior
+    onward = ray.share * (1.0 - opacity)
+    way = ray.d
+    if clear > 0.0:
+        if world.surfaces[surface].thin != 0:
+            f = fresnel_dielectric(c, ior)
+            passed = pane_transmittance(f, look.albedo)
+            onward += wp.cw_mul(ray.share, passed) * (clear * opacity)
+        else:
+            eta = wp.where(m.entering != 0, ior, 1.0 / ior)
+            way = refract(ray.d, m.normal, eta)
+            f = fresnel_dielectric(c, eta)
+            onward += wp.cw_mul(ray.share, root_of(look.albedo)) * ((1.0 - f) * clear * opacity)
+            side = wp.where(m.entering != 0, 1.0, -1.0)
+            ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, m.hit) * ray.width_m
+            if wp.dot(way, way) == 0.0:
+                # All is reflected back inside.
+                way = ray.d + m.normal * (2.0 * c)
+                onward = ray.share * (clear * opacity)
+    ray.share = onward
+    ray.d = way
+    return ray
+
+
+@wp.func
+def seen_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
+    """Radiance along a ray, behind clear surfaces too, times its share."""
+    total = wp.vec3(0.0)
+    surfaces = int(0)
+    going = bool(True)
+    while going:
+        going = False
+        m = met(world, ray.origin, ray.d)
+        if m.hit[0] < 0:
+            total += wp.cw_mul(ray.share, sky_along(world, ray))
+        else:
+            p = ray.origin + ray.d * m.t
+            ray.width_m = wp.abs(ray.width_m + ray.spread * m.t)
+            surface = surface_index(world, m.hit)
+            v = -ray.d
+            n = m.normal
+            look, maps = looked_at(world, surface, m.hit, m.weight, n, ray.width_m, v)
+            if world.ground.covered != 0:
+                lifted = ray_origin(world, m.hit, m.weight, p, ray.d)
+                exposed = sky_exposure_at(world, lifted, n)
+                coat = coat_at(world, surface, p, n, exposed, ray.width_m)
+                look = apply_coat(world, surface, look, coat, n)
+            clear = world.surfaces[surface].transmission * (1.0 - look.metallic)
+            opacity = world.surfaces[surface].opacity
+            # From inside a solid nothing but what goes on is seen.
+            if clear == 0.0 or m.entering != 0 or world.surfaces[surface].thin != 0:
+                share = wp.max(ray.share)
+                light = light_of_meeting(
+                    world, probe, m, look, maps.occlusion, p, ray.d, share, clear, k
+                )
+                own = wp.cw_mul(light.diffuse, look.albedo) * (1.0 - clear) + light.rest
+                own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow - wp.vec3(1.0))
+                total += wp.cw_mul(ray.share, own) * opacity
+            if clear > 0.0 or opacity < 1.0:
+                ray = gone_on(world, ray, m, look, clear, opacity)
+                ray.origin = passed_origin(p, ray.d, view.eye_m)
+                surfaces += 1
+                going = surfaces < SURFACES_MAX and wp.max(ray.share) > 0.002
+                if not going:
+                    total += wp.cw_mul(ray.share, sky_along(world, ray))
+    return total
+
+
+@wp.struct
+class Layers:
+    """A layered surface at a pixel.
+
+    Attributes:
+        own: Light that needs no ray [cd/m^2].
+        mirror, coat, behind: Shares of what the base and the coat mirror and of what is behind;
+            0 where no ray is needed.
+        straight: Share of what is behind it, unbent.
+        n: Normal with bumps.
+    """
+
+    own: wp.vec3
+    mirror: wp.vec3
+    coat: float
+    behind: wp.vec3
+    straight: float
+    n: wp.vec3
+
+
+@wp.func
+def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
+    """What glass mirrors and what it lets through, from outside; ``c`` is the cosine to it."""
+    f = fresnel_dielectric(c, world.surfaces[surface].ior)
+    mirrored = wp.vec3(f)
+    passed = root_of(albedo) * (1.0 - f)
+    if world.surfaces[surface].thin != 0:
+        mirrored = pane_reflectance(f, albedo)
+        passed = pane_transmittance(f, albedo)
+    return mirrored, passed
+
+
+@wp.func
+def below_coat(
+    world: World,
+    surface: int,
+    layers: Layers,
+    coat: float,
+    n: wp.vec3,
+    p: wp.vec3,
+    v: wp.vec3,
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: float,
+    k: int,
+):
+    """Layers under a clear coat of that weight, which takes what it reflects from all of them."""
+    c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
+    rough = world.surfaces[surface].coat_roughness
+    lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
+    share = coat * lacquer.gloss[0]
+    lamps = sum_lamp_light(world, lacquer, n, p, v, lit, k)
+    layers.own = layers.own * (1.0 - share) + lamps.shine * coat
+    layers.mirror = layers.mirror * (1.0 - share)
+    layers.behind = layers.behind * (1.0 - share)
+    if lacquer.roughness < MIRROR_ROUGHNESS:
+        layers.coat = share
+        layers.own -= lamps.shown * coat
+    else:
+        sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
+        layers.own += sky * (share * open_lobe(lacquer, open_sky))
+    return layers
+
+
+@wp.func(**OUT_OF_LINE)
+def layers_at(
+    world: World,
+    surface: int,
+    look: SurfaceMaterial,
+    maps: Maps,
+    bare: float,
+    n: wp.vec3,
+    p: wp.vec3,
+    v: wp.vec3,
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: float,
+    k: int,
+):
+    """A pixel's own light, and what share of it is to be found by rays.
+
+    Args:
+        bare: Part that no snow covers.
+        n: Normal without bumps.
+    """
+    layers = Layers()
+    layers.n = look.normal
+    n_v = wp.dot(look.normal, v)
+    clear = world.surfaces[surface].transmission * (1.0 - look.metallic) * bare
+    specular = look.specular
+    if clear > 0.0:
+        ior = world.surfaces[surface].ior
+        normal = (ior - 1.0) / (ior + 1.0)
+        specular = normal * normal / 0.08
+    brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, specular, n_v)
+    gloss = brdf.gloss
+    if clear > 0.0:
+        c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
+        mirrored, passed = glass_shares(world, surface, look.albedo, c)
+        gloss = gloss * (1.0 - clear) + mirrored * clear
+        layers.behind = passed * clear
+    lamps = sum_lamp_light(world, brdf, look.normal, p, v, lit, k)
+    ambient = sky_irradiance(world.sky, look.normal) * open_sky
+    diffuse = wp.cw_mul(brdf.matte, look.albedo) * (1.0 - clear)
+    layers.own = wp.cw_mul(diffuse, lamps.lux * (1.0 / wp.pi) + ambient) + lamps.shine
+    layers.own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
+    if brdf.roughness < MIRROR_ROUGHNESS and (look.metallic >= 0.5 or clear > 0.0):
+        layers.mirror = gloss
+        layers.own -= lamps.shown
+    else:
+        sky = sky_reflection(world.sky, look.normal * (2.0 * n_v) - v, brdf.roughness)
+        layers.own += wp.cw_mul(gloss, sky) * open_lobe(brdf, open_sky)
+    coat = world.surfaces[surface].coat * bare
+    if coat > 0.0:
+        layers = below_coat(world, surface, layers, coat, n, p, v, lit, open_sky, k)
+    opacity = 1.0 - (1.0 - world.surfaces[surface].opacity) * bare
+    layers.own = layers.own * opacity
+    layers.mirror = layers.mirror * opacity
+    layers.coat = layers.coat * opacity
+    layers.behind = layers.behind * opacity
+    layers.straight = 1.0 - opacity
+    return layers
+
+
+@wp.func
+def ray_of(
+    view: View,
+    world: World,
+    layers: Layers,
+    part: int,
+    hit: wp.vec2i,
+    weight: wp.vec2,
+    n: wp.vec3,
+    p: wp.vec3,
+    way: wp.vec3,
+    width_m: float,
+):
+    """The ray of one part of a layered pixel: 0 base mirror, 1 coat, 2 bent behind, 3 straight.
+
+    Its share is 0 where there is none.
+    """
+    ray = Ray()
+    surface = surface_index(world, hit)
+    d = fast_normalize(way)
+    ray.d = d
+    ray.width_m = width_m
+    ray.spread = width_m / wp.max(wp.length(way), 1.0e-6)
+    if part < 2:
+        m = n
+        ray.share = wp.vec3(layers.coat)
+        ray.roughness = world.surfaces[surface].coat_roughness
+        if part == 0:
+            m = layers.n
+            ray.share = layers.mirror
+            ray.roughness = world.surfaces[surface].roughness
+        ray.d = above(d - m * (2.0 * wp.dot(m, d)), n)
+        ray.origin = ray_origin(world, hit, weight, p, way)
+        ray.mirrored = 1
+        side = wp.where(seen_inside(weight), -1.0, 1.0)
+        ray.spread += 2.0 * side * curvature(world, hit) * width_m
+    else:
+        ray.share = wp.vec3(layers.straight)
+        if part == 2:
+            ray.share = layers.behind
+            if world.surfaces[surface].thin != 0:
+                ray.share += wp.vec3(layers.straight)
+            else:
+                ior = world.surfaces[surface].ior
+                eta = wp.where(seen_inside(weight), 1.0 / ior, ior)
+                bent = refract(d, layers.n, eta)
+                side = wp.where(seen_inside(weight), -1.0, 1.0)
+                ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, hit) * width_m
+                if wp.dot(bent, bent) > 0.0:
+                    ray.d = bent
+        elif world.surfaces[surface].thin != 0:
+            # Part of the ray behind the pane.
+            ray.share = wp.vec3(0.0)
+        ray.origin = passed_origin(p, ray.d, view.eye_m)
+    return ray
+
+
+@wp.struct
+class Point:
+    """A point of a face at a point of the image; fields as surface.resolve makes them."""
+
+    way: wp.vec3
+    weight: wp.vec2
+    normal: wp.vec3
+
+
+@wp.func
+def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
+    """Where a ray through a point of the image meets the plane of a face."""
+    facet = make_facet(world, hit)
+    d = pixel_direction(view, x_px, y_px)
+    det = wp.dot(d, facet.across)
+    inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
+    u = wp.clamp(wp.dot(d, facet.along_u) * inverse, 0.0, 1.0)
+    v = wp.clamp(wp.dot(d, facet.along_v) * inverse, 0.0, 1.0 - u)
+    side = wp.where(det < 0.0, -1.0, 1.0)
+    d_world = view.R_world_camera @ d
+    point = Point()
+    point.way = d_world * (facet.depth * inverse)
+    point.weight = wp.vec2(u + 1.0 - side, v)
+    point.normal = face_viewer((facet.n + facet.n_u * u + facet.n_v * v) * side, d_world)
+    return point
+
+
+# Two kernels call it: it is compiled once.
+@wp.func(**OUT_OF_LINE)
+def layered_radiance(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    i: int,
+    x_px: float,
+    y_px: float,
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: float,
+    exposed: float,
+    probe: Probe,
+    k: int,
+):
+    """Radiance of a layered surface that pixel i sees, at a point of the image in that pixel."""
+    hit = images.hits[i]
+    surface = surface_index(world, hit)
+    point = point_at(view, world, hit, x_px, y_px)
+    n = point.normal
+    v = fast_normalize(-point.way)
+    p = view.eye_m + point.way
+    width_m = pixel_width(view, i, images.z_m[i])
+    look, maps = looked_at(world, surface, hit, point.weight, n, width_m, v)
+    bare = float(1.0)
+    if world.ground.covered != 0:
+        coat = coat_at(world, surface, p, n, exposed, footprint(view, p, n, 1.0))
+        look = apply_coat(world, surface, look, coat, n)
+        bare = 1.0 - wp.min(coat.snow, 1.0)
+    sky = open_sky * maps.occlusion
+    layers = layers_at(world, surface, look, maps, bare, n, p, v, lit, sky, k)
+    c = layers.own
+    for part in range(4):
+        ray = ray_of(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
+        if wp.max(ray.share) > 0.0:
+            c += seen_along(view, world, probe, ray, k)
+    return c
+
+
+@wp.kernel
+def shade_layers(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    pixels: wp.array(dtype=int),
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: wp.array(dtype=float, ndim=2),
+    exposed: wp.array(dtype=float),
+    probe: Probe,
+    radiance: wp.array(dtype=wp.vec3),
+):
+    """Shade those of a list of pixels that see layered surfaces, each by itself."""
+    k = wp.tid()
+    i = pixels[k]
+    if world.surfaces[surface_index(world, images.hits[i])].layered != 0:
+        x = float(i % view.width) + 0.5
+        y = float(i / view.width) + 0.5
+        radiance[i] = layered_radiance(
+            view, world, images, i, x, y, lit, open_sky[0, k], exposed[k], probe, k
+        )
+
+
+@wp.func
+def contrast(a: wp.vec3, b: wp.vec3):
+    """How far two lights are apart, 0 to 1."""
+    light = a[1] + a[0] + a[2]
+    other = b[1] + b[0] + b[2]
+    return wp.abs(light - other) / wp.max(light + other, 1.0e-12)
+
+
+@wp.kernel
+def find_contrasts(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    pixels: wp.array(dtype=int),
+    radiance: wp.array(dtype=wp.vec3),
+    count: wp.array(dtype=int),
+    places: wp.array(dtype=int),
+):
+    """List the places in a list of those layered pixels in which edges are seen.
+
+    Args:
+        count: Length of the new list; 0 at first.
+        places: The new list, in any order.
+    """
+    k = wp.tid()
+    i = pixels[k]
+    if world.surfaces[surface_index(world, images.hits[i])].layered == 0:
+        return
+    x = i % view.width
+    y = i / view.width
+    largest = float(0.0)
+    for side in range(4):
+        u = wp.clamp(x + (side & 1) * (1 - (side & 2)), 0, view.width - 1)
+        v = wp.clamp(y + (1 - (side & 1)) * (1 - (side & 2)), 0, view.height - 1)
+        j = v * view.width + u
+        if images.hits[j][0] == images.hits[i][0]:
+            largest = wp.max(largest, contrast(radiance[i], radiance[j]))
+    if largest > CONTRAST:
+        places[wp.atomic_add(count, 0, 1)] = k
+
+
+@wp.kernel
+def shade_contrasts(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    places: wp.array(dtype=int),
+    pixels: wp.array(dtype=int),
+    lit: wp.array(dtype=float, ndim=2),
+    open_sky: wp.array(dtype=float, ndim=2),
+    exposed: wp.array(dtype=float),
+    probe: Probe,
+    offsets: wp.array(dtype=wp.vec2),
+    listed: wp.array(dtype=int),
+    mixed: wp.array(dtype=wp.vec3),
+):
+    """Radiance of pixels with contrasts: the mean over parts of each.
+
+    Args:
+        offsets: Positions within a pixel, [0, 1).
+        listed: The pixels.
+        mixed: In their order.
+    """
+    place = wp.tid()
+    k = places[place]
+    i = pixels[k]
+    x = float(i % view.width)
+    y = float(i / view.width)
+    total = wp.vec3(0.0)
+    for s in range(offsets.shape[0]):
+        total += layered_radiance(
+            view,
+            world,
+            images,
+            i,
+            x + offsets[s][0],
+            y + offsets[s][1],
+            lit,
+            open_sky[0, k],
+            exposed[k],
+            probe,
+            k,
+        )
+    listed[place] = i
+    mixed[place] = total / float(offsets.shape[0])

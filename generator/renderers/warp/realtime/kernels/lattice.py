@@ -1,0 +1,165 @@
+"""The lattice: every few pixels of every few rows, where light is gathered first.
+
+Light changes slowly along a surface. Shadows, ambient occlusion and shading are computed on the
+lattice, and every other pixel takes what lattice points on the same stretch of surface agree on.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.ray_offsets import (
+    OFFSET_M,
+    OFFSET_PER_DISTANCE,
+)
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    View,
+    World,
+    face_vertices,
+    fast_normalize,
+    first_weight,
+    normal_at,
+    pixel_direction,
+    seen_inside,
+    surface_index,
+    vertex_at,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.struct
+class Lattice:
+    """What is seen at the lattice's points, flat, row by row.
+
+    Attributes:
+        stride: Pixels from point to point. The last column and row are the image's last.
+        body: -1 where nothing is seen.
+        surface: Index of the material.
+        pixel: Index of the pixel.
+        p_m, normal: Point and smooth unit normal in the world.
+        origin_m: Where rays start that leave the surface.
+        skip: The body that cannot shade the point although it lies on it, or -1.
+    """
+
+    stride: int
+    width: int
+    height: int
+    body: wp.array(dtype=int)
+    surface: wp.array(dtype=int)
+    pixel: wp.array(dtype=int)
+    skip: wp.array(dtype=int)
+    p_m: wp.array(dtype=wp.vec3)
+    normal: wp.array(dtype=wp.vec3)
+    origin_m: wp.array(dtype=wp.vec3)
+
+
+@wp.func
+def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d_world: wp.vec3):
+    """A point just off the surface, on the curved surface that the normals speak of.
+
+    Source: Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021.
+    """
+    b = hit[0]
+    g = world.bodies[b].geometry
+    corner = face_vertices(world, g, hit[1])
+    p0 = vertex_at(world, g, corner[0])
+    p1 = vertex_at(world, g, corner[1])
+    p2 = vertex_at(world, g, corner[2])
+    side = wp.where(seen_inside(weight), -1.0, 1.0)
+    u = first_weight(weight)
+    v = weight[1]
+    w = 1.0 - u - v
+    p = p0 * w + p1 * u + p2 * v
+    n0 = normal_at(world, g, corner[0]) * side
+    n1 = normal_at(world, g, corner[1]) * side
+    n2 = normal_at(world, g, corner[2]) * side
+    shift = n0 * (w * wp.min(0.0, wp.dot(p - p0, n0)))
+    shift += n1 * (u * wp.min(0.0, wp.dot(p - p1, n1)))
+    shift += n2 * (v * wp.min(0.0, wp.dot(p - p2, n2)))
+    flat = fast_normalize(wp.cross(p1 - p0, p2 - p0)) * side
+    lift_m = OFFSET_M + OFFSET_PER_DISTANCE * wp.length(d_world)
+    return p_world + world.bodies[b].R_world_mesh @ (flat * lift_m - shift * world.bodies[b].scale)
+
+
+@wp.kernel
+def sample_lattice(
+    view: View,
+    world: World,
+    hits: wp.array(dtype=wp.vec2i),
+    z_m: wp.array(dtype=float),
+    weights: wp.array(dtype=wp.vec2),
+    normals: wp.array(dtype=wp.vec3),
+    lattice: Lattice,
+):
+    """Fill in the lattice's points."""
+    i = wp.tid()
+    x = wp.min(lattice.stride * (i % lattice.width), view.width - 1)
+    y = wp.min(lattice.stride * (i / lattice.width), view.height - 1)
+    pixel = y * view.width + x
+    hit = hits[pixel]
+    lattice.body[i] = hit[0]
+    lattice.pixel[i] = pixel
+    lattice.surface[i] = -1
+    if hit[0] < 0:
+        return
+    lattice.surface[i] = surface_index(world, hit)
+    d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+    offset = d * z_m[pixel]
+    p = view.eye_m + offset
+    lattice.p_m[i] = p
+    lattice.normal[i] = normals[pixel]
+    lattice.origin_m[i] = ray_origin(world, hit, weights[pixel], p, offset)
+    convex = world.geometries[world.bodies[hit[0]].geometry].convex
+    lattice.skip[i] = wp.where(convex != 0 and weights[pixel][0] < 1.5, hit[0], -1)
+
+
+@wp.func
+def points_agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: float):
+    """Whether two points lie on one stretch of surface; 0 or the cosine between normals."""
+    cosine = wp.dot(n, m)
+    # Normals within 26 degrees, and in each other's tangent plane: one stretch of surface.
+    if cosine < 0.9 or wp.abs(wp.dot(n, q - p)) > tolerance_m:
+        cosine = 0.0
+    return cosine
+
+
+@wp.struct
+class Cell:
+    """Where a pixel lies between four lattice points.
+
+    Attributes:
+        first: The upper left of them.
+        right, down: From it to the others, [0, 1).
+    """
+
+    first: int
+    right: float
+    down: float
+
+
+@wp.func
+def cell_at(view: View, lattice: Lattice, x: int, y: int):
+    """The cell of a pixel."""
+    column = x / lattice.stride
+    row = y / lattice.stride
+    cell = Cell()
+    cell.first = row * lattice.width + column
+    cell.right = float(x - column * lattice.stride) * step_at(lattice, x, view.width)
+    cell.down = float(y - row * lattice.stride) * step_at(lattice, y, view.height)
+    return cell
+
+
+@wp.func
+def step_at(lattice: Lattice, x: int, width: int):
+    """One pixel as a part of its cell; the last cell of a row or column may be narrower."""
+    first = x - x % lattice.stride
+    return 1.0 / float(wp.max(wp.min(lattice.stride, width - 1 - first), 1))
+
+
+@wp.func
+def cell_corner(lattice: Lattice, cell: Cell, k: int):
+    """The k-th lattice point of a cell, and its bilinear weight."""
+    wx = wp.where((k & 1) == 1, cell.right, 1.0 - cell.right)
+    wy = wp.where(k >= 2, cell.down, 1.0 - cell.down)
+    return cell.first + (k & 1) + wp.where(k >= 2, lattice.width, 0), wx * wy

@@ -1,0 +1,253 @@
+"""Which bodies may come between a stretch of surface and a lamp.
+
+Source: Haines and Wallace, "Shaft culling for efficient ray-traced radiosity", 1991.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
+from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, SUN_DISTANCE_M
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import path_along
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    LightRecord,
+    World,
+    max_of_two,
+    min_of_two,
+    to_mesh_point,
+    to_mesh_vector,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Lattice points along the edge of a tile.
+TILE = wp.constant(8)
+# Longer lists are not worth their memory: rays then use the hierarchy over all bodies.
+LIST_LENGTH = wp.constant(48)
+# Lamps that would give less of a point's light than this are left out there: half a step of eight
+# bits at most.
+FAINT_SHARE = wp.constant(0.006)
+
+
+@wp.struct
+class Tile:
+    """A ball around the points of a tile, and the plane they lie on if they do."""
+
+    count: int
+    centre_m: wp.vec3
+    radius_m: float
+    flat: int
+    normal: wp.vec3
+    height_m: float
+
+
+@wp.func
+def tile_of(lattice: Lattice, column: int, row: int):
+    """Bounds of one tile."""
+    low = wp.vec3(1.0e9)
+    high = wp.vec3(-1.0e9)
+    tile = Tile()
+    tile.flat = 1
+    tile.height_m = -1.0e9
+    lowest_m = float(1.0e9)
+    for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
+        for x in range(column * TILE, wp.min((column + 1) * TILE, lattice.width)):
+            i = y * lattice.width + x
+            if lattice.body[i] >= 0:
+                p = lattice.p_m[i]
+                low = wp.min(low, p)
+                high = wp.max(high, p)
+                if tile.count == 0:
+                    tile.normal = lattice.normal[i]
+                if wp.dot(lattice.normal[i], tile.normal) < 0.99999:
+                    tile.flat = 0
+                tile.height_m = wp.max(tile.height_m, wp.dot(p, tile.normal))
+                lowest_m = wp.min(lowest_m, wp.dot(p, tile.normal))
+                tile.count += 1
+    # Parallel surfaces at different heights may shade each other.
+    if tile.height_m - lowest_m > 1.0e-3:
+        tile.flat = 0
+    tile.centre_m = (low + high) * 0.5
+    # Rays start a little off the surface.
+    tile.radius_m = wp.length(high - low) * 0.5 + 2.0e-3
+    return tile
+
+
+@wp.struct
+class Shaft:
+    """All straight ways from a tile to a lamp, in a body's mesh frame.
+
+    Attributes:
+        start, way: From the tile's centre to the lamp's.
+        inverse: Reciprocals of ``way``.
+        radius, end_radius: Of a tube around it that holds the tile, and the lamp.
+        normal, height: Plane below which nothing shades the tile, if ``flat``.
+    """
+
+    start: wp.vec3
+    way: wp.vec3
+    inverse: wp.vec3
+    radius: float
+    end_radius: float
+    flat: int
+    normal: wp.vec3
+    height: float
+
+
+@wp.func
+def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
+    """The shaft from a tile along a way, to a ball, seen from body b."""
+    shrink = 1.0 / world.bodies[b].scale
+    shaft = Shaft()
+    shaft.start = to_mesh_point(world, b, tile.centre_m)
+    shaft.way = to_mesh_vector(world, b, way)
+    shaft.inverse = path_along(shaft.start, shaft.way).inverse
+    shaft.radius = tile.radius_m * shrink
+    shaft.end_radius = radius_m * shrink
+    shaft.flat = tile.flat
+    shaft.normal = wp.transpose(world.bodies[b].R_world_mesh) @ tile.normal
+    height_m = tile.height_m + 1.0e-4 - wp.dot(world.bodies[b].t_world_mesh, tile.normal)
+    # In the mesh's own frame, where boxes and planes need no transform each.
+    shaft.height = height_m * shrink
+    return shaft
+
+
+@wp.func
+def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
+    """The stretch of a shaft's axis that lies in a grown box; empty if it ends before it begins."""
+    margin = wp.vec3(grown, grown, grown)
+    a = wp.cw_mul(low - shaft.start - margin, shaft.inverse)
+    c = wp.cw_mul(high - shaft.start + margin, shaft.inverse)
+    t0 = max_of_two(
+        max_of_two(min_of_two(a[0], c[0]), min_of_two(a[1], c[1])), min_of_two(a[2], c[2])
+    )
+    t1 = min_of_two(
+        min_of_two(max_of_two(a[0], c[0]), max_of_two(a[1], c[1])), max_of_two(a[2], c[2])
+    )
+    return max_of_two(t0, 0.0), min_of_two(t1, 1.0)
+
+
+@wp.func
+def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
+    """Whether a box may reach into a shaft."""
+    if shaft.flat != 0:
+        top = wp.dot(shaft.normal, (low + high) * 0.5)
+        if top + wp.dot(wp.abs(shaft.normal), (high - low) * 0.5) <= shaft.height:
+            return False
+    # The shaft is as wide as its wider end, then only as wide as where the box may touch it.
+    t0, t1 = overlap(shaft, low, high, wp.max(shaft.radius, shaft.end_radius))
+    for _ in range(2):
+        if t0 <= t1:
+            widening = shaft.end_radius - shaft.radius
+            grown = shaft.radius + wp.max(widening * t0, widening * t1)
+            t0, t1 = overlap(shaft, low, high, grown)
+    return t0 <= t1
+
+
+@wp.func
+def boxes_touch(shaft: Shaft, world: World, g: int):
+    """Whether any of a mesh's boxes may reach into a shaft.
+
+    Bodies that surround the scene (a room), have holes or are long and slanted have one box that
+    touches everything; the many boxes around their faces do not.
+    """
+    found = bool(False)
+    for k in range(world.geometries[g].box_lows_m.shape[0]):
+        low = world.geometries[g].box_lows_m[k]
+        if touches(shaft, low, world.geometries[g].box_highs_m[k]):
+            found = True
+            break
+    return found
+
+
+@wp.func
+def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
+    """Whether a body may come between a tile and a ball at the end of a way."""
+    # Box against box first: it settles most cases.
+    here = wp.vec3(tile.radius_m, tile.radius_m, tile.radius_m)
+    there = wp.vec3(radius_m, radius_m, radius_m)
+    end = tile.centre_m + way
+    low = wp.min(tile.centre_m - here, end - there) - world.bodies[b].high_m
+    high = wp.max(tile.centre_m + here, end + there) - world.bodies[b].low_m
+    if wp.max(low) > 0.0 or wp.min(high) < 0.0:
+        return False
+    g = world.bodies[b].geometry
+    shaft = shaft_to(world, b, tile, way, radius_m)
+    shades = touches(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
+    if shades:
+        shades = boxes_touch(shaft, world, g)
+    return shades
+
+
+@wp.func
+def may_shade_from(world: World, b: int, tile: Tile, lamp: LightRecord):
+    """Whether a body may come between a tile and a lamp."""
+    way = lamp.position_m - tile.centre_m
+    radius_m = lamp.radius
+    if lamp.kind == SUN:
+        way = lamp.direction * -SUN_DISTANCE_M
+        radius_m = lamp.radius * SUN_DISTANCE_M
+    return may_shade(world, b, tile, way, radius_m)
+
+
+@wp.func
+def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
+    """Put a body on a list, or mark the list as too long."""
+    n = lists[tile, j, 0]
+    if n >= 0 and n < LIST_LENGTH:
+        lists[tile, j, 1 + n] = b
+        lists[tile, j, 0] = n + 1
+    else:
+        lists[tile, j, 0] = -1
+
+
+@wp.func
+def matters(lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int):
+    """Whether lamp j is more than faint at any point of a tile."""
+    found = bool(False)
+    for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
+        for x in range(column * TILE, wp.min((column + 1) * TILE, lattice.width)):
+            i = y * lattice.width + x
+            if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
+                found = True
+    return found
+
+
+@wp.kernel
+def list_occluders(
+    world: World,
+    lattice: Lattice,
+    tile_columns: int,
+    ambient_radius_m: float,
+    shares: wp.array(dtype=float, ndim=2),
+    lists: wp.array(dtype=int, ndim=3),
+):
+    """Bodies that may shade each tile from each lamp; the last list is for ambient occlusion.
+
+    A list begins with its length, which is -1 where it would be too long.
+
+    Args:
+        ambient_radius_m: Of ambient occlusion.
+        shares: Of each lamp in the light of each point [lamp, point]; lamps that are faint
+            everywhere in a tile are not asked about.
+    """
+    i = wp.tid()
+    column = i % tile_columns
+    row = i / tile_columns
+    tile = tile_of(lattice, column, row)
+    lamps = world.lamps.shape[0]
+    for j in range(lamps + 1):
+        lists[i, j, 0] = 0
+    if tile.count == 0:
+        return
+    near = tile
+    near.radius_m = tile.radius_m + ambient_radius_m
+    for j in range(lamps):
+        if matters(lattice, shares, j, column, row):
+            for b in range(world.bodies.shape[0]):
+                if may_shade_from(world, b, tile, world.lamps[j]):
+                    append(lists, i, j, b)
+    for b in range(world.bodies.shape[0]):
+        if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
+            append(lists, i, lamps, b)

@@ -1,0 +1,479 @@
+"""Soft shadows and ambient occlusion on the lattice, with as few rays as possible.
+
+1. Tiles find which bodies may shade them
+(gen_data.generator.renderers.warp.realtime.kernels.shadow_culling): most find none, and
+   no ray need be cast.
+2. Points cast one ray per lamp, every other point only where those around it differ. The sixteen
+   points of a 4 x 4 block aim at sixteen parts of the lamp (interleaved sampling, Keller and
+   Heidrich, 2001).
+3. Where all points around one agree, that is the answer. Elsewhere, in penumbrae, points cast
+   more rays, and sixteen neighbours on one surface are averaged, rows first: together they have
+   looked at all parts of the lamp, wherever they lie, so that no pattern remains.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice, points_agree
+from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
+from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
+    DISK,
+    RECTANGLE,
+    SUN,
+    SUN_DISTANCE_M,
+    beam_from,
+)
+from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+    free_path_of_listed,
+    is_occluded,
+    is_occluded_by_listed,
+    path_along,
+)
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    LightRecord,
+    View,
+    World,
+    fast_normalize,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+UNSEEN = wp.constant(-1.0)
+# Lamps that give less of a point's light than this have shadows too faint to be smoothed by rays.
+SMOOTHED_SHARE = wp.constant(0.08)
+
+
+@wp.func
+def bayer(x: int, y: int):
+    """Rank 0..15 within a 4 x 4 block such that near neighbours differ much (Bayer 1973)."""
+    q = x ^ y
+    return (q & 1) * 8 + (y & 1) * 4 + ((q >> 1) & 1) * 2 + ((y >> 1) & 1)
+
+
+@wp.func
+def make_frame(z: wp.vec3):
+    """Two unit vectors that complete a right-handed frame.
+
+    Source: Duff et al., "Building an orthonormal basis, revisited", JCGT 2017.
+    """
+    # The sign keeps the denominator between 1 and 2: no direction is singular.
+    sign = wp.where(z[2] >= 0.0, 1.0, -1.0)
+    a = -1.0 / (sign + z[2])
+    b = z[0] * z[1] * a
+    x = wp.vec3(1.0 + sign * z[0] * z[0] * a, sign * b, -sign * z[0])
+    y = wp.vec3(b, sign + z[1] * z[1] * a, -z[1])
+    return x, y
+
+
+@wp.func
+def path_to_lamp(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
+    """From a point to a part of a lamp, or to the opposite part if the first is below the horizon.
+
+    Args:
+        n: Normal of the horizon.
+        part: Of the unit disc, which stands for the lamp's outline.
+    """
+    to_lamp = lamp.position_m - origin
+    off = wp.vec3(0.0)
+    if lamp.kind == RECTANGLE:
+        q = square_of_disc(part)
+        off = lamp.along * q[0] + lamp.across * q[1]
+    elif lamp.kind == DISK:
+        off = lamp.along * part[0] + lamp.across * part[1]
+    else:
+        radius = lamp.radius
+        if lamp.kind == SUN:
+            to_lamp = lamp.direction * -SUN_DISTANCE_M
+            radius = lamp.radius * SUN_DISTANCE_M
+        x, y = make_frame(fast_normalize(to_lamp))
+        off = (x * part[0] + y * part[1]) * radius
+    # What is below the horizon sends nothing: its ray is spent on the opposite part.
+    if wp.dot(to_lamp + off, n) < 0.0:
+        off = -off
+    return to_lamp + off
+
+
+@wp.func
+def square_of_disc(part: wp.vec2):
+    """From the unit disc to the square [-1, 1] x [-1, 1], areas in proportion.
+
+    Source: the inverse of Shirley and Chiu, "A low distortion map between disk and square", Journal
+    of Graphics Tools 2, 1997.
+    """
+    radius = wp.length(part)
+    long = radius
+    if wp.abs(part[0]) >= wp.abs(part[1]):
+        short = wp.atan2(part[1], wp.abs(part[0])) * (4.0 / wp.pi) * radius
+        return wp.vec2(wp.where(part[0] < 0.0, -long, long), short)
+    short = wp.atan2(part[0], wp.abs(part[1])) * (4.0 / wp.pi) * radius
+    return wp.vec2(short, wp.where(part[1] < 0.0, -long, long))
+
+
+@wp.func
+def tile_index(lattice: Lattice, i: int, tile_columns: int):
+    """The tile a lattice point belongs to."""
+    return ((i / lattice.width) / TILE) * tile_columns + (i % lattice.width) / TILE
+
+
+@wp.func
+def settled(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
+    """What the points beside, above and below a point agree on; UNSEEN if they do not.
+
+    Each of them must be there, on the same material.
+    """
+    i = y * lattice.width + x
+    value = float(UNSEEN)
+    if x > 0 and y > 0 and x < lattice.width - 1 and y < lattice.height - 1:
+        own = lattice.surface[i]
+        value = values[j, i - 1]
+        for k in range(4):
+            q = i + wp.where(k < 2, 1, lattice.width) * wp.where((k & 1) == 0, 1, -1)
+            if lattice.surface[q] != own or values[j, q] != value:
+                value = UNSEEN
+    return value
+
+
+@wp.kernel
+def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, ndim=2)):
+    """The part of each point's light that each lamp would give if nothing shaded it [lamp, point].
+
+    UNSEEN where the lamp is behind the surface.
+    """
+    i = wp.tid()
+    if lattice.body[i] < 0:
+        return
+    n = lattice.normal[i]
+    total = wp.max(wp.max(sky_irradiance(world.sky, n)) * wp.pi, 1.0e-9)
+    for j in range(world.lamps.shape[0]):
+        beam = beam_from(world.lamps[j], lattice.origin_m[i])
+        cosine = wp.dot(beam.direction, n)
+        brightest = wp.max(beam.normal_lux)
+        lux = float(UNSEEN)
+        if cosine > -beam.spread and brightest > 0.0:
+            # Highlights at grazing angles are as bright as others.
+            lux = brightest * wp.max(cosine, 0.2)
+            total += lux
+        shares[j, i] = lux
+    for j in range(world.lamps.shape[0]):
+        if shares[j, i] > 0.0:
+            shares[j, i] = shares[j, i] / total
+
+
+@wp.func
+def mean_beside(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
+    """Mean of what the points beside, above and below a point say on its material, if any does."""
+    i = y * lattice.width + x
+    total = float(0.0)
+    found = float(0.0)
+    if x > 0 and y > 0 and x < lattice.width - 1 and y < lattice.height - 1:
+        for k in range(4):
+            q = i + wp.where(k < 2, 1, lattice.width) * wp.where((k & 1) == 0, 1, -1)
+            if lattice.surface[q] == lattice.surface[i] and values[j, q] != UNSEEN:
+                total += values[j, q]
+                found += 1.0
+    return wp.where(found > 0.0, total / wp.max(found, 1.0), UNSEEN)
+
+
+@wp.kernel
+def probe_lamps(
+    world: World,
+    lattice: Lattice,
+    tile_columns: int,
+    lists: wp.array(dtype=int, ndim=3),
+    disc: wp.array(dtype=wp.vec2),
+    shares: wp.array(dtype=float, ndim=2),
+    parity: int,
+    lit: wp.array(dtype=float, ndim=2),
+):
+    """One ray per point and lamp: 1, 0, or UNSEEN where the lamp lights nothing anyway.
+
+    Args:
+        disc: Forty-eight points of the unit disc; a point looks at one of three in a row.
+        shares: As weigh_lamps says.
+        parity: 0 to probe the black fields of a chessboard. 1, after that, for the white ones:
+            they are probed only where black ones around them differ.
+    """
+    i = wp.tid()
+    x = i % lattice.width
+    y = i / lattice.width
+    if ((x + y) & 1) != parity:
+        return
+    tile = tile_index(lattice, i, tile_columns)
+    for j in range(world.lamps.shape[0]):
+        value = float(UNSEEN)
+        if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
+            if parity == 1:
+                value = settled(lattice, lit, j, x, y)
+                if value == UNSEEN and shares[j, i] < SMOOTHED_SHARE:
+                    value = mean_beside(lattice, lit, j, x, y)
+            if value == UNSEEN:
+                value = probed(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
+        lit[j, i] = value
+
+
+@wp.func
+def probed(
+    world: World,
+    lattice: Lattice,
+    lists: wp.array(dtype=int, ndim=3),
+    tile: int,
+    i: int,
+    j: int,
+    part: wp.vec2,
+):
+    """Whether point i sees a part of lamp j."""
+    value = float(1.0)
+    if lists[tile, j, 0] != 0:
+        origin = lattice.origin_m[i]
+        path = path_along(origin, path_to_lamp(world.lamps[j], origin, lattice.normal[i], part))
+        if is_occluded_by_listed(world, lists, tile, j, lattice.skip[i], path):
+            value = 0.0
+    return value
+
+
+@wp.kernel
+def classify_blocks(
+    lattice: Lattice, values: wp.array(dtype=float, ndim=2), classes: wp.array(dtype=int, ndim=3)
+):
+    """What the points of each aligned 4 x 4 block say: bits 1 for zeros, 2 for ones, 4 for else."""
+    row, column, j = wp.tid()
+    found = int(0)
+    for y in range(4 * row, wp.min(4 * row + 4, lattice.height)):
+        k = int(y * lattice.width + 4 * column)
+        end = y * lattice.width + wp.min(4 * column + 4, lattice.width)
+        # While: Warp's ranges take longer than what is done in them.
+        while k < end:
+            value = values[j, k]
+            if value == 0.0:
+                found = found | 1
+            elif value == 1.0:
+                found = found | 2
+            elif value != UNSEEN:
+                found = found | 4
+            k += 1
+    classes[row, column, j] = found
+
+
+@wp.func
+def classes_around(classes: wp.array(dtype=int, ndim=3), x: int, y: int, j: int):
+    """What the blocks say that a window around a point touches."""
+    last_row = classes.shape[0] - 1
+    last_column = classes.shape[1] - 1
+    x0 = wp.max((x - 2) >> 2, 0)
+    y0 = wp.max((y - 2) >> 2, 0)
+    x1 = wp.min((x + 2) >> 2, last_column)
+    y1 = wp.min((y + 2) >> 2, last_row)
+    return classes[y0, x0, j] | classes[y0, x1, j] | classes[y1, x0, j] | classes[y1, x1, j]
+
+
+@wp.func
+def window_bits(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, i: int):
+    """What the points of the same material say in the window around a point."""
+    x = i % lattice.width
+    y = i / lattice.width
+    own = lattice.surface[i]
+    found = int(0)
+    for v in range(wp.max(y - 2, 0), wp.min(y + 3, lattice.height)):
+        k = int(v * lattice.width + wp.max(x - 2, 0))
+        end = v * lattice.width + wp.min(x + 3, lattice.width)
+        while k < end:
+            if lattice.surface[k] == own:
+                value = values[j, k]
+                found = found | wp.where(value == 1.0, 2, wp.where(value == 0.0, 1, 0))
+            k += 1
+    return found
+
+
+@wp.kernel
+def refine_lamps(
+    world: World,
+    lattice: Lattice,
+    tile_columns: int,
+    lists: wp.array(dtype=int, ndim=3),
+    disc: wp.array(dtype=wp.vec2),
+    shares: wp.array(dtype=float, ndim=2),
+    classes: wp.array(dtype=int, ndim=3),
+    probed: wp.array(dtype=float, ndim=2),
+    lit: wp.array(dtype=float, ndim=2),
+):
+    """Two more rays where a lamp is neither seen by all points around nor by none.
+
+    Args:
+        disc, shares: As for probe_lamps.
+    """
+    i = wp.tid()
+    x = i % lattice.width
+    y = i / lattice.width
+    tile = tile_index(lattice, i, tile_columns)
+    for j in range(world.lamps.shape[0]):
+        value = probed[j, i]
+        mixed = value != UNSEEN and (classes_around(classes, x, y, j) & 3) == 3
+        if mixed and shares[j, i] > SMOOTHED_SHARE:
+            if window_bits(lattice, probed, j, i) == 3:
+                seen = value
+                origin = lattice.origin_m[i]
+                for k in range(2):
+                    part = disc[3 * bayer(x, y) + 2 * k]
+                    way = path_to_lamp(world.lamps[j], origin, lattice.normal[i], part)
+                    path = path_along(origin, way)
+                    if not is_occluded_by_listed(world, lists, tile, j, lattice.skip[i], path):
+                        seen += 1.0
+                value = seen / 3.0
+        lit[j, i] = value
+
+
+@wp.func
+def surface_tolerance(view: View, p: wp.vec3):
+    """How far from a point's tangent plane its neighbours may be: three pixels' width."""
+    return 3.0 * view.pixel_rad * wp.length(p - view.eye_m)
+
+
+@wp.func
+def rim_weight(offset: int, half: int):
+    """Windows are 2 ``half`` wide: the points on their rims belong to them by half.
+
+    So they are centred, and hold every part of a 4 x 4 pattern equally often.
+    """
+    return wp.where(wp.abs(offset) == half, 0.5, 1.0)
+
+
+@wp.func
+def alike(lattice: Lattice, i: int, k: int, tolerance_m: float):
+    """Whether two lattice points lie on one stretch of surface."""
+    same = bool(False)
+    if lattice.surface[i] == lattice.surface[k]:
+        p = lattice.p_m[i]
+        same = (
+            points_agree(p, lattice.normal[i], lattice.p_m[k], lattice.normal[k], tolerance_m) > 0.0
+        )
+    return same
+
+
+@wp.kernel
+def sum_rows(
+    view: View,
+    lattice: Lattice,
+    classes: wp.array(dtype=int, ndim=3),
+    values: wp.array(dtype=float, ndim=2),
+    sums: wp.array(dtype=wp.vec2, ndim=2),
+):
+    """Sum and number of the values beside each point, on its own surface.
+
+    Skipped where all agree, and nothing above or below asks.
+    """
+    i = wp.tid()
+    x = i % lattice.width
+    y = i / lattice.width
+    for j in range(values.shape[0]):
+        found = classes_around(classes, x, wp.max(y - 2, 0), j)
+        found = found | classes_around(classes, x, wp.min(y + 2, lattice.height - 1), j)
+        total = wp.vec2(0.0, 0.0)
+        if lattice.surface[i] >= 0 and not (found == 1 or found == 2):  # noqa: PLR1714
+            tolerance_m = surface_tolerance(view, lattice.p_m[i])
+            k = int(i + wp.max(-x, -2))
+            end = i + wp.min(lattice.width - 1 - x, 2)
+            while k <= end:
+                value = values[j, k]
+                if value != UNSEEN and alike(lattice, i, k, tolerance_m):
+                    total += wp.vec2(value, 1.0) * rim_weight(k - i, 2)
+                k += 1
+        sums[j, i] = total
+
+
+@wp.func
+def column_sum(
+    lattice: Lattice,
+    sums: wp.array(dtype=wp.vec2, ndim=2),
+    j: int,
+    i: int,
+    half: int,
+    tolerance_m: float,
+):
+    """The sums of rows, summed above and below a point, on its own surface."""
+    y = i / lattice.width
+    total = wp.vec2(0.0, 0.0)
+    v = int(wp.max(-y, -half))
+    while v <= wp.min(lattice.height - 1 - y, half):
+        k = i + v * lattice.width
+        if alike(lattice, i, k, tolerance_m):
+            total += sums[j, k] * rim_weight(v, half)
+        v += 1
+    return total
+
+
+@wp.kernel
+def smooth_lattice(
+    view: View,
+    lattice: Lattice,
+    classes: wp.array(dtype=int, ndim=3),
+    values: wp.array(dtype=float, ndim=2),
+    sums: wp.array(dtype=wp.vec2, ndim=2),
+    smoothed: wp.array(dtype=float, ndim=2),
+):
+    """Average the values of neighbours on one surface, wherever they differ."""
+    i = wp.tid()
+    x = i % lattice.width
+    y = i / lattice.width
+    for j in range(values.shape[0]):
+        value = values[j, i]
+        if value != UNSEEN:
+            found = classes_around(classes, x, y, j)
+            if found == 1 or found == 2:  # noqa: PLR1714
+                value = float(found - 1)
+            else:
+                tolerance_m = surface_tolerance(view, lattice.p_m[i])
+                total = column_sum(lattice, sums, j, i, 2, tolerance_m)
+                if total[1] < 8.0:
+                    # Where its surface ends, part of a window has seen part of the lamp only.
+                    total = column_sum(lattice, sums, j, i, 4, tolerance_m)
+                if total[1] > 0.0:
+                    value = total[0] / total[1]
+        smoothed[j, i] = value
+
+
+@wp.kernel
+def probe_ambient(
+    world: World,
+    lattice: Lattice,
+    tile_columns: int,
+    lists: wp.array(dtype=int, ndim=3),
+    hemisphere: wp.array(dtype=wp.vec3),
+    radius_m: float,
+    open_sky: wp.array(dtype=float, ndim=2),
+):
+    """One short ray per point: 1 where it meets nothing, less the nearer the obstacle.
+
+    Args:
+        hemisphere: Sixteen directions about +Z with cosine-weighted density.
+    """
+    i = wp.tid()
+    value = float(UNSEEN)
+    if lattice.body[i] >= 0:
+        value = 1.0
+        lamps = world.lamps.shape[0]
+        tile = tile_index(lattice, i, tile_columns)
+        if lists[tile, lamps, 0] != 0:
+            n = lattice.normal[i]
+            x, y = make_frame(n)
+            h = hemisphere[bayer(i % lattice.width, i / lattice.width)]
+            way = (x * h[0] + y * h[1] + n * h[2]) * radius_m
+            path = path_along(lattice.origin_m[i], way)
+            t = free_path_of_listed(world, lists, tile, lattice.skip[i], path)
+            value = t * (2.0 - t)
+    open_sky[0, i] = value
+
+
+@wp.kernel
+def see_out(
+    world: World,
+    points: wp.array(dtype=wp.vec3),
+    ways: wp.array(dtype=wp.vec3),
+    free: wp.array(dtype=int),
+):
+    """Count the ways that are free, over all points."""
+    i = wp.tid()
+    for k in range(ways.shape[0]):
+        if not is_occluded(world, path_along(points[i], ways[k])):
+            wp.atomic_add(free, 0, 1)

@@ -1,0 +1,183 @@
+"""Shadows and ambient occlusion: what of each lamp and of the sky the lattice's points see."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.realtime.kernels import lattice as lattice_kernels
+from gen_data.generator.renderers.warp.realtime.kernels import shadow_culling, soft_shadows
+from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
+from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
+
+_STRIDE_PX = 3
+_TILE = int(shadow_culling.TILE)
+_LIST_LENGTH = int(shadow_culling.LIST_LENGTH)
+# Column of the sample in each row of a pixel, far from that of the rows beside it.
+_ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LightVisibility:
+    """What reaches the lattice's points.
+
+    Attributes:
+        lit: Visible part of each lamp, [lamps, points]; UNSEEN where it lights nothing.
+        open_sky: Visible part of the hemisphere, [1, points].
+    """
+
+    lit: wp.array
+    open_sky: wp.array
+
+
+def make_lattice(
+    world: PackedWorld, view: records.View, seen: GBuffer, stock: DeviceCache
+) -> lattice_kernels.Lattice:
+    """The lattice of a view."""
+    lattice = lattice_kernels.Lattice()
+    lattice.stride = _STRIDE_PX
+    lattice.width = (view.width - 1) // _STRIDE_PX + 2
+    lattice.height = (view.height - 1) // _STRIDE_PX + 2
+    n = lattice.width * lattice.height
+    lattice.body = stock.scratch("lattice body", n, wp.int32)
+    lattice.surface = stock.scratch("lattice surface", n, wp.int32)
+    lattice.pixel = stock.scratch("lattice pixel", n, wp.int32)
+    lattice.skip = stock.scratch("lattice skip", n, wp.int32)
+    lattice.p_m = stock.scratch("lattice p", n, wp.vec3)
+    lattice.normal = stock.scratch("lattice normal", n, wp.vec3)
+    lattice.origin_m = stock.scratch("lattice origin", n, wp.vec3)
+    inputs = [view, world.record, seen.hits, seen.z_m, seen.weights, seen.normals, lattice]
+    wp.launch(lattice_kernels.sample_lattice, n, inputs, device=stock.device)
+    return lattice
+
+
+def find_light_visibility(
+    world: PackedWorld,
+    view: records.View,
+    lattice: lattice_kernels.Lattice,
+    stock: DeviceCache,
+    settings: RenderSettings,
+) -> LightVisibility:
+    """Shadows and ambient occlusion of all points."""
+    lamps = world.record.lamps.shape[0]
+    columns = -(-lattice.width // _TILE)
+    tiles = columns * -(-lattice.height // _TILE)
+    lists = stock.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
+    radius_m = settings.ambient_occlusion_radius_m
+    points = lattice.width * lattice.height
+    shares = stock.scratch("shares", (max(lamps, 1), points), float)
+    wp.launch(
+        soft_shadows.weigh_lamps, points, [world.record, lattice], [shares], device=stock.device
+    )
+    inputs = [world.record, lattice, columns, radius_m, shares, lists]
+    wp.launch(shadow_culling.list_occluders, tiles, inputs, device=stock.device)
+    return LightVisibility(
+        _lit(world, view, lattice, lists, shares, settings, stock),
+        _open_sky(world, view, lattice, lists, columns, radius_m, stock),
+    )
+
+
+def sunflower(n: int) -> Array:
+    """Points spread evenly over the unit disc, shape [n, 2] (Vogel, Math. Biosciences 44, 1979)."""
+    k = np.arange(n)
+    radius, angle = np.sqrt((k + 0.5) / n), k * math.pi * (3.0 - math.sqrt(5.0))
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def lamp_parts(n: int, shadows: str) -> Array:
+    """Points of a lamp's disc that shadows look at, shape [n, 2]; all at its centre if hard."""
+    return sunflower(n) * (1.0 if shadows == "soft" else 0.0)
+
+
+def pixel_parts(n: int) -> Array:
+    """Sample positions in a pixel, [0, 1), shape [n, 2]: no two in one row or column (n-rooks)."""
+    columns = _ROOKS[n]
+    return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
+
+
+def cosine_hemisphere(n: int) -> Array:
+    """Unit directions about +Z whose density goes with the cosine (Malley), shape [n, 3]."""
+    disc = sunflower(n)
+    up = np.sqrt(1.0 - (disc * disc).sum(axis=1))
+    return np.concatenate([disc, up[:, None]], axis=1)
+
+
+def _lit(
+    world: PackedWorld,
+    view: records.View,
+    lattice: lattice_kernels.Lattice,
+    lists: wp.array,
+    shares: wp.array,
+    settings: RenderSettings,
+    stock: DeviceCache,
+) -> wp.array:
+    device = stock.device
+    n, lamps = lattice.width * lattice.height, world.record.lamps.shape[0]
+    probed = stock.scratch("probed", (max(lamps, 1), n), float)
+    lit = stock.scratch("lit", (max(lamps, 1), n), float)
+    if lamps == 0:
+        return lit
+    disc = stock.constant(wp.vec2, lamp_parts, 48, settings.shadows)
+    columns = -(-lattice.width // _TILE)
+    inputs = [world.record, lattice, columns, lists, disc, shares]
+    for parity in (0, 1):
+        wp.launch(soft_shadows.probe_lamps, n, [*inputs, parity], [probed], device=device)
+    classes = _classes(lattice, probed, lamps, stock)
+    wp.launch(soft_shadows.refine_lamps, n, [*inputs, classes, probed], [lit], device=device)
+    _smooth(view, lattice, lit, probed, stock)
+    return probed
+
+
+def _open_sky(
+    world: PackedWorld,
+    view: records.View,
+    lattice: lattice_kernels.Lattice,
+    lists: wp.array,
+    columns: int,
+    radius_m: float,
+    stock: DeviceCache,
+) -> wp.array:
+    n = lattice.width * lattice.height
+    probed = stock.scratch("probed sky", (1, n), float)
+    open_sky = stock.scratch("open sky", (1, n), float)
+    if radius_m == 0.0:
+        open_sky.fill_(1.0)
+        return open_sky
+    hemisphere = stock.constant(wp.vec3, cosine_hemisphere, 16)
+    inputs = [world.record, lattice, columns, lists, hemisphere, radius_m]
+    wp.launch(soft_shadows.probe_ambient, n, inputs, [probed], device=stock.device)
+    _smooth(view, lattice, probed, open_sky, stock)
+    return open_sky
+
+
+def _smooth(
+    view: records.View,
+    lattice: lattice_kernels.Lattice,
+    values: wp.array,
+    smoothed: wp.array,
+    stock: DeviceCache,
+) -> None:
+    rows, n = values.shape
+    classes = _classes(lattice, values, rows, stock)
+    sums = stock.scratch("row sums", (rows, n), wp.vec2)
+    inputs = [view, lattice, classes, values]
+    wp.launch(soft_shadows.sum_rows, n, inputs, [sums], device=stock.device)
+    wp.launch(soft_shadows.smooth_lattice, n, [*inputs, sums], [smoothed], device=stock.device)
+
+
+def _classes(
+    lattice: lattice_kernels.Lattice, values: wp.array, rows: int, stock: DeviceCache
+) -> wp.array:
+    shape = (-(-lattice.height // 4), -(-lattice.width // 4), rows)
+    classes = stock.scratch("classes", shape, wp.int32)
+    wp.launch(
+        soft_shadows.classify_blocks, shape, [lattice, values], [classes], device=stock.device
+    )
+    return classes

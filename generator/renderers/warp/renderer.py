@@ -1,0 +1,92 @@
+"""The renderer: Scene and Camera in, SensorReading out, on NVIDIA Warp."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.scene import Camera, Lidar, Scene
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.frame_context import CameraState, CameraView, RenderContext
+from gen_data.generator.renderers.warp.kernel_compilation import compile_kernels
+from gen_data.generator.renderers.warp.lidar.lidar_tracing import trace_scan
+from gen_data.generator.renderers.warp.realtime.realtime_shading import add_falling, radiance_image
+from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pack_world
+from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.generator.renderers.warp.shading_dispatch import shade_pixels, smooth_edges
+from gen_data.generator.renderers.warp.shutter_integration import expose_shutter
+from gen_data.generator.renderers.warp.visibility.amodal import render_silhouettes
+from gen_data.generator.renderers.warp.visibility.banded_gbuffer import copy_gbuffer
+from gen_data.generator.renderers.warp.visibility.gbuffer import find_visible
+from gen_data.generator.renderers.warp.visibility.label_images import label_images
+from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
+
+
+class WarpRenderer:
+    """Renders on the CPU or on a CUDA device with the same kernels.
+
+    A pure function of its arguments: what it keeps between calls are assets and scratch memory.
+    One call uses one core; run several processes to use more.
+
+    Args:
+        assets: Where meshes, textures and environments come from.
+        device: ``cpu``, ``cuda:N``, or ``auto`` for the first CUDA device if there is one.
+        settings: How radiance is computed.
+
+    Raises:
+        ConfigError: if the device does not exist, or a denoiser is asked for and not there.
+    """
+
+    def __init__(
+        self, assets: AssetLibrary, device: str = "auto", settings: RenderSettings | None = None
+    ) -> None:
+        self._device = open_device(device)
+        self._settings = settings or RenderSettings()
+        if self._settings.visibility == "raster" and not self._device.is_cpu:
+            raise ConfigError(
+                f"render.visibility: 'raster' works on the CPU only, not on '{self._device}';"
+                " choose 'auto' or 'rays'."
+            )
+        compile_kernels(self._device.alias)
+        self._stock = DeviceCache(assets, self._device)
+        self._studio = RenderContext(self._stock, self._settings)
+        if self._settings.tier == "pathtraced":
+            # Its kernels take long to compile and are of no use to the other tier.
+            from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
+
+            tracer = PathTracer(self._stock, self._settings)
+            self._studio = replace(self._studio, paths=tracer)
+
+    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
+        """Every asked channel of one camera."""
+        reading = expose_shutter(scene, camera, channels, self._studio)
+        return reading or self._at_once(scene, camera, channels)
+
+    def _at_once(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
+        """The image of one instant."""
+        world = pack_world(scene, camera, self._stock)
+        view = pack_view(camera, self._stock)
+        seen = find_visible(world, view, self._stock, self._settings.visibility)
+        if Channel.AMODAL in channels:
+            channels = channels | {Channel.INSTANCE}
+        images = label_images(scene, world, view, seen, channels)
+        if Channel.RADIANCE in channels:
+            radiance = shade_pixels(scene, camera, world, view, seen, self._studio)
+            smooth_edges(world, view, seen, radiance, self._studio)
+            add_falling(world, camera, view, seen.z_m, radiance, self._stock)
+            images[Channel.RADIANCE] = radiance_image(radiance, view)
+        outlines = {}
+        if Channel.AMODAL in channels:
+            ids = images[Channel.INSTANCE]
+            outlines = render_silhouettes(scene, camera, world, view, self._stock, seen, ids)
+        if channels & FLOW:
+            near = CameraView(CameraState.of(scene, camera), world, view, seen)
+            images |= flow_images(near, copy_gbuffer(near), channels, self._studio)
+        return SensorReading(camera.name, camera, images, outlines, scene.time_s)
+
+    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
+        """What the rays of a laser scanner's beams hit first, and how well it reflects."""
+        return trace_scan(scene, lidar, beams, self._stock)

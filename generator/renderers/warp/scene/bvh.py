@@ -1,0 +1,112 @@
+"""Trees of boxes for the rays of bvh_traverse, which says who reads them.
+
+A tree is one array of floats, in groups of eight; integers are stored as their bits.
+
+- Group 0: the root's code. A code is the number of a node's first group; or minus that of a
+  leaf's; or in trees over bodies, whose leaves are bodies, -1 - body.
+- A node has seven groups of eight lanes: low x, high x, low y, high y, low z, high z, codes.
+- A leaf of a mesh has ten: x of its faces' first corners, of their second and third, then y and z
+  likewise; and numbers of the faces.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from gen_data.generator.renderers.warp.scene.kernels import bvh_build
+
+_WIDTH = int(bvh_build.WIDTH)
+_NODE_GROUPS, _LEAF_GROUPS = 7, 10
+# Up to 2**24 boxes: eight depths of any cuts and eight of halves, each of seven more than it takes.
+_WAITING_MAX = 128
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.int32]
+
+
+def face_boxes(vertices_m: Floats, faces: Ints) -> tuple[Floats, Floats]:
+    """Low and high corners [n, 3] of boxes around the faces."""
+    # Corner by corner: reducing over the short middle axis of [n, 3, 3] takes ten times as long.
+    a, b, c = (vertices_m.take(faces[:, k], axis=0) for k in range(3))
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
+def mesh_tree(vertices_m: Floats, faces: Ints, lows_m: Floats, highs_m: Floats) -> Floats:
+    """A tree over a mesh's faces, given their boxes; triangles that a leaf lacks are points."""
+    order, nodes, codes, leaves = _grown(lows_m, highs_m, _WIDTH)
+    lanes = leaves[:, :1] + np.arange(_WIDTH, dtype=np.int32)
+    lacking = lanes >= leaves[:, 1:]
+    numbers = order[np.minimum(lanes, len(order) - 1)]
+    numbers[lacking] = -1
+    leaf_groups = np.zeros((len(leaves), _LEAF_GROUPS, _WIDTH), np.float32)
+    for k in range(3):
+        corners = vertices_m.take(faces[:, k].take(numbers), axis=0)
+        corners[lacking] = 0.0
+        leaf_groups[:, k:9:3] = corners.transpose(0, 2, 1)
+    leaf_groups[:, 9] = numbers.view(np.float32)
+    first_leaf = 1 + _NODE_GROUPS * len(nodes)
+    return _packed(nodes, codes, first_leaf + _LEAF_GROUPS * np.arange(len(leaves)), leaf_groups)
+
+
+def body_tree(lows_m: Floats, highs_m: Floats) -> Floats:
+    """A tree over bodies' boxes."""
+    order, nodes, codes, leaves = _grown(lows_m, highs_m, 1)
+    return _packed(nodes, codes, 1 + order[leaves[:, 0]], np.zeros((0, 1, _WIDTH), np.float32))
+
+
+def _packed(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
+    """One array of groups."""
+    if len(leaf_places):
+        leaf_codes = -leaf_places[np.maximum(-1 - codes, 0)]
+        codes = np.where(codes < 0, leaf_codes, 1 + _NODE_GROUPS * codes).astype(np.int32)
+    head = np.zeros((1, _WIDTH), np.int32)
+    # Everything but a single leaf begins with node 0.
+    head[0, 0] = 1 if len(nodes) else -leaf_places[0]
+    inner = np.concatenate([nodes, codes[:, None].view(np.float32)], axis=1)
+    groups = [head.view(np.float32), *(part.reshape(-1, _WIDTH) for part in (inner, tail))]
+    return np.concatenate(groups).reshape(-1)
+
+
+def _grown(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, Ints]:
+    """The order of boxes, and the nodes, codes and leaves of ``growing.grow_tree``."""
+    n = len(lows)
+    order = np.arange(n, dtype=np.int32)
+    # A node splits what is too many for a leaf: there are fewer nodes than boxes.
+    nodes = np.zeros((max(n, 1), 6, _WIDTH), np.float32)
+    codes = np.zeros((max(n, 1), _WIDTH), np.int32)
+    leaves = np.zeros((n, 2), np.int32)
+    counts = np.zeros(2, np.int32)
+    if n == 0:
+        nodes[:, ::2], nodes[:, 1::2] = bvh_build.NOWHERE, -bvh_build.NOWHERE
+        return order, nodes, codes, leaves
+    boxes = _room()
+    boxes.lows, boxes.highs = _here(lows, wp.vec3), _here(highs, wp.vec3)
+    boxes.order = _here(order, wp.int32)
+    todo = np.zeros((_WAITING_MAX, 4), np.int32)
+    outputs = [_here(nodes, wp.float32), _here(codes, wp.int32), _here(leaves, wp.vec2i)]
+    outputs.append(_here(counts, wp.int32))
+    wp.launch(bvh_build.grow_tree, 1, [boxes, leaf, _here(todo, wp.vec4i)], outputs, device="cpu")
+    return order, nodes[: counts[0]], codes[: counts[0]], leaves[: counts[1]]
+
+
+def _here(values: NDArray[np.generic], dtype: Any) -> wp.array:
+    """An array of the host's, for kernels on the CPU; it must outlive the kernels."""
+    shape = values.shape if dtype in (wp.int32, wp.float32) else values.shape[:-1]
+    return wp.array(ptr=values.ctypes.data, dtype=dtype, shape=shape, device="cpu")
+
+
+def _room() -> bvh_build.Boxes:
+    boxes = bvh_build.Boxes()
+    boxes.bin_lows, boxes.bin_highs, boxes.bin_counts, boxes.costs = _bins()
+    return boxes
+
+
+@cache
+def _bins() -> tuple[wp.array, ...]:
+    dtypes = (wp.vec3, wp.vec3, wp.int32, wp.float32)
+    return tuple(wp.empty(int(bvh_build.BINS), dtype=dtype, device="cpu") for dtype in dtypes)

@@ -1,0 +1,162 @@
+"""Textures on the device, with their mip chains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import TextureData, UInt8
+from gen_data.generator.core.colorimetry import srgb_decode
+from gen_data.generator.renderers.warp.scene.kernels.records import TextureRecord
+from gen_data.generator.renderers.warp.scene.struct_dtypes import to_record
+
+Pixels = NDArray[Any]
+
+_NO_TEXELS = np.zeros(1, np.uint32)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DeviceTexture:
+    """One texture on the device.
+
+    Attributes:
+        record: A Texture record [1].
+        keep: The device arrays that the record points to.
+        texels: One of them: packed colours of all levels, the coarsest last.
+        layered: Whether it has maps that plain surfaces do not: emission, metal, occlusion.
+        pierced: Whether it has holes.
+    """
+
+    record: NDArray[np.void]
+    keep: tuple[object, ...]
+    texels: wp.array
+    nbytes: int
+    layered: bool
+    pierced: bool
+
+
+def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
+    """A texture, ready for kernels."""
+    height, width = data.albedo.shape[:2]
+    white = np.full((height, width), 255, np.uint8)
+    albedo = data.albedo if data.alpha is None else remove_fringe(data.albedo, data.alpha)
+    sizes, texels = _texels(albedo, white if data.roughness is None else data.roughness)
+    record = TextureRecord()
+    record.height, record.width, record.levels = height, width, len(sizes)
+    images = [texels, _NO_TEXELS, _NO_TEXELS, _NO_TEXELS]
+    if data.normal is not None:
+        record.has_bumps, images[1] = 1, _means(_with_fourth(data.normal, white))
+    if data.metallic is not None or data.occlusion is not None:
+        shares = [white if share is None else share for share in (data.metallic, data.occlusion)]
+        record.has_shares, images[2] = 1, _means(cv2.merge([*shares, white, white]))
+    if data.emission is not None:
+        record.has_glow, images[3] = 1, _texels(data.emission, white)[1]
+    cover = white[:1, 0] if data.alpha is None else data.alpha.reshape(-1)
+    record.has_cover = int(data.alpha is not None)
+    on_device = [wp.array(values, dtype=wp.uint32, device=device) for values in images]
+    record.texels, record.bumps, record.shares, record.glow = on_device
+    record.cover = wp.array(cover, dtype=wp.uint8, device=device)
+    record.offsets = wp.array(np.cumsum([0, *sizes[:-1]]), dtype=wp.int32, device=device)
+    return DeviceTexture(
+        to_record(record, TextureRecord),
+        (*on_device, record.cover, record.offsets),
+        on_device[0],
+        sum(values.nbytes for values in images) + cover.nbytes,
+        layered=bool(record.has_shares or record.has_glow),
+        pierced=bool(record.has_cover),
+    )
+
+
+def remove_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
+    """Colours with holes filled from around them, so that coarser levels do not mix theirs in.
+
+    Source: Gortler et al., "The lumigraph", SIGGRAPH 1996 (pull and push).
+
+    Args:
+        albedo: [height, width, 3].
+        alpha: Coverage; below 128 there is a hole, [height, width].
+    """
+    solid = (alpha >= 128).astype(np.float32)[..., None]
+    levels = _halvings(np.concatenate([albedo * solid, solid], axis=2))
+    filled = levels[-1][..., :3] / np.maximum(levels[-1][..., 3:], 1e-6)
+    for level in levels[-2::-1]:
+        height, width = level.shape[:2]
+        wider = cv2.resize(filled, (width, height)).reshape(height, width, 3)
+        weight = level[..., 3:]
+        filled = np.where(weight > 0.0, level[..., :3] / np.maximum(weight, 1e-6), wider)
+    return np.where(solid > 0.0, albedo, np.floor(filled + 0.5)).astype(np.uint8)
+
+
+def halve_image(image: Pixels) -> Pixels:
+    """Means of 2 x 2 blocks of an image [h, w, channels]; a single row or column stays.
+
+    Odd sizes drop their last row or column: of a tiling image that is a shift nobody sees.
+    """
+    height, width = max(image.shape[0] // 2, 1), max(image.shape[1] // 2, 1)
+    even = np.ascontiguousarray(image[: 2 * height, : 2 * width])
+    smaller: Pixels = cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA)
+    return smaller.reshape(height, width, image.shape[2])
+
+
+def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint32]]:
+    """Texels per mip level, and all levels packed one after the other.
+
+    Colours are kept as square roots of linear values, which spend the eight bits as evenly for
+    the eye as sRGB does and are quick to undo. Roughness is the fourth channel: its square, the
+    width of a highlight, is what coarser levels average.
+    """
+    finest = _with_fourth(cv2.LUT(albedo, _root_of()), roughness)
+    levels = [finest]
+    if max(finest.shape[:2]) > 1:
+        squared = finest.astype(np.uint16)
+        squared *= squared
+        image = halve_image(squared).astype(np.float32) * np.float32(255.0**-2)
+        levels += [_in_bytes(cv2.sqrt(level)) for level in _halvings(image)]
+    return [level.shape[0] * level.shape[1] for level in levels], _packed(levels)
+
+
+@cache
+def _root_of() -> UInt8:
+    """Square roots of linear values by sRGB values."""
+    return np.floor(np.sqrt(srgb_decode(np.arange(256) / 255.0)) * 255.0 + 0.5).astype(np.uint8)
+
+
+def _means(finest: Pixels) -> NDArray[np.uint32]:
+    """Four channels of all mip levels, packed one after the other."""
+    levels = [finest]
+    if max(finest.shape[:2]) > 1:
+        image = halve_image(finest).astype(np.float32) * np.float32(1.0 / 255.0)
+        levels += [_in_bytes(level) for level in _halvings(image)]
+    return _packed(levels)
+
+
+def _halvings(image: Pixels) -> list[Pixels]:
+    """An image, and its halves down to one texel."""
+    images = [image]
+    while max(images[-1].shape[:2]) > 1:
+        images.append(halve_image(images[-1]))
+    return images
+
+
+def _with_fourth(three: Pixels, fourth: Pixels) -> Pixels:
+    """Three channels and one more."""
+    four: Pixels = cv2.merge([*cv2.split(three), fourth])
+    return four
+
+
+def _in_bytes(image: Pixels) -> Pixels:
+    """Values in [0, 1] as bytes, rounded."""
+    steps: Pixels = cv2.convertScaleAbs(image, alpha=255.0).reshape(image.shape)
+    return steps
+
+
+def _packed(levels: Sequence[Pixels]) -> NDArray[np.uint32]:
+    """Four bytes of each texel as one integer, level after level; the first byte lowest."""
+    return np.concatenate([level.reshape(-1) for level in levels]).view("<u4")

@@ -1,0 +1,183 @@
+"""The brightest parts of a panorama as lamps at infinity, and the panorama without them.
+
+Light from all around throws no shadows here; what a sun, a window or a softbox in a panorama gives
+does. Each such part becomes a disc in the sky with the part's flow of light, so that a surface that
+has all of it before it is lit as before: exactly, whatever the part's shape.
+
+Source, for the idea: Debevec, "A median cut algorithm for light probe sampling", SIGGRAPH 2005
+posters; here only what stands out is taken, and the rest stays an image.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.se3 import Array, Vec3
+from gen_data.generator.renderers.warp.scene.equirectangular import texel_directions
+
+LAMPS_MAX = 3
+# Rows of the image in which parts are looked for.
+_SEARCH_ROWS = 128
+# Times the mean luminance above which something is bright; a sun in its halo is found first.
+_LEVELS = (2048.0, 256.0, 32.0, 4.0)
+# Panes of one window are not farther apart than this.
+_GAP_RAD = math.radians(3.0)
+# Share of the light on a surface that faces it, and of the strongest part's, that a part gives.
+_SHARE = 0.1
+# Quantile of the luminance around a part down to which it is taken out.
+_RIM = 0.25
+# Parts with less light than this, per mean luminance, are not looked at any closer.
+_FAINT = 0.08
+# Wider parts throw shadows that are as good as none.
+_RADIUS_RAD_MAX = math.radians(25.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SkyLamp:
+    """A bright part of a panorama, in the panorama's frame.
+
+    Attributes:
+        towards: Unit vector from the scene to it.
+        power: Linear RGB illuminance of what faces it, per mean luminance of the panorama.
+        share: What part that is of all the panorama's light on such a surface.
+        angular_radius_rad: Of a disc that is as spread out.
+    """
+
+    towards: Vec3
+    power: Vec3
+    share: float
+    angular_radius_rad: float
+
+
+def remove_peaks(image: Float32) -> tuple[Float32, tuple[SkyLamp, ...]]:
+    """The panorama without its brightest parts, and those parts, the strongest first.
+
+    Without any, the panorama itself.
+
+    Args:
+        image: Equirectangular luminance of mean 1, shape [h, 2h, 3].
+    """
+    if float(_searched(image).max()) <= _LEVELS[-1]:
+        return image, ()
+    sphere = _Sphere(*texel_directions(image.shape[0]), luminance(image.astype(np.float64)))
+    rest, found = image.astype(np.float64), []
+    for level in _LEVELS:
+        for part, floor in _parts(_searched(rest), level, sphere.luminance.shape):
+            excess = _excess(rest, part, floor)
+            lamp = _lamp(excess, sphere)
+            if lamp.share > _SHARE and lamp.angular_radius_rad < _RADIUS_RAD_MAX:
+                found.append((lamp, excess))
+                rest = rest - excess
+    found.sort(key=lambda pair: -_strength(pair[0]))
+    kept = [lamp for lamp, _ in found if _strength(lamp) > _SHARE * _strength(found[0][0])]
+    kept = kept[:LAMPS_MAX]
+    for _, excess in found[len(kept) :]:
+        rest = rest + excess
+    return (rest.astype(np.float32), tuple(kept)) if kept else (image, ())
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Sphere:
+    """Unit directions and solid angles of an image's texels, and what is seen there."""
+
+    directions: Array
+    solid: Array
+    luminance: Array
+
+
+def _searched(image: Array | Float32) -> Array:
+    """Luminance at the size in which parts are looked for."""
+    height = image.shape[0]
+    if height > _SEARCH_ROWS:
+        size = (2 * _SEARCH_ROWS, _SEARCH_ROWS)
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    return luminance(image.astype(np.float64))
+
+
+def _parts(
+    small: Array, level: float, shape: tuple[int, ...]
+) -> Iterator[tuple[NDArray[np.bool_], float]]:
+    """Coherent parts brighter than a level: their masks, and the luminance around them.
+
+    Args:
+        small: What ``_searched`` says.
+        level: Times the mean.
+        shape: Of the masks.
+    """
+    bright = small > level
+    if not bright.any():
+        return
+    rows = small.shape[0]
+    reach = max(round(_GAP_RAD / math.pi * rows), 1)
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    # What is beyond one end of the image is at the other.
+    around = np.pad(bright.astype(np.uint8), ((0, 0), (reach, reach)), mode="wrap")
+    grown = np.ascontiguousarray(cv2.dilate(around, kernel)[:, reach:-reach])
+    count, labels = cv2.connectedComponents(grown, connectivity=8)
+    labels = np.asarray(_joined(labels, count), dtype=np.int32)[labels]
+    flux = small * texel_directions(rows)[1] * bright
+    totals = np.bincount(labels.reshape(-1), weights=flux.reshape(-1), minlength=count)
+    size = (shape[1], shape[0])
+    for label in np.flatnonzero(totals > _FAINT).tolist():
+        mask = labels == label
+        whole = cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+        rim = small[mask & ~bright]
+        floor = float(np.quantile(rim, _RIM)) if rim.size else float(small[mask].min())
+        yield whole.astype(bool), floor
+
+
+def _joined(labels: NDArray[np.int32], count: int) -> list[int]:
+    """The label that each label stands for where parts meet at the ends of the image."""
+    first = list(range(count))
+    for left, right in zip(labels[:, 0].tolist(), labels[:, -1].tolist(), strict=True):
+        if left and right:
+            low, high = sorted((first[left], first[right]))
+            first = [low if label == high else label for label in first]
+    return first
+
+
+def _excess(image: Array, part: NDArray[np.bool_], floor: float) -> Array:
+    """What a part is brighter than the floor, in its colours; 0 elsewhere. Shape of the image."""
+    bright = luminance(image.astype(np.float64))
+    brighter = part & (bright > floor)
+    share = np.where(brighter, 1.0 - floor / np.where(brighter, bright, 1.0), 0.0)
+    excess: Array = image * share[..., None]
+    return excess
+
+
+def _lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
+    """The disc that sends the same flow of light to the scene."""
+    weights = luminance(excess) * sphere.solid
+    flow = np.array([float((weights * sphere.directions[..., k]).sum()) for k in range(3)])
+    towards = flow / math.sqrt(float((flow * flow).sum()))
+    cosine = _cosine(towards, sphere)
+    projected = sphere.solid * cosine
+    red, green, blue = (float((excess[..., k] * projected).sum()) for k in range(3))
+    # Over a disc of radius r in the sky, 1 - cos of the angle from its middle is (1 - cos r) / 2 on
+    # average. A texel is itself as wide as that.
+    total = float(weights.sum())
+    spread = 2.0 * float((weights * (1.0 - cosine)).sum()) / total
+    texel = float((weights * sphere.solid).sum()) / total / (2.0 * math.pi)
+    radius_rad = math.acos(max(1.0 - spread - texel, -1.0))
+    lux = float((sphere.luminance * sphere.solid * np.maximum(cosine, 0.0)).sum())
+    share = float((weights * cosine).sum()) / lux
+    x, y, z = (float(v) for v in towards)
+    return SkyLamp((x, y, z), (red, green, blue), share, radius_rad)
+
+
+def _cosine(towards: Vec3 | Array, sphere: _Sphere) -> Array:
+    x, y, z = (sphere.directions[..., k] * float(towards[k]) for k in range(3))
+    cosine: Array = x + y + z
+    return cosine
+
+
+def _strength(lamp: SkyLamp) -> float:
+    return float(luminance(np.asarray(lamp.power)))

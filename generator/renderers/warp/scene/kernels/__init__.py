@@ -1,0 +1,1 @@
+"""Records and functions that all stages share: rays, materials, lights, environment."""

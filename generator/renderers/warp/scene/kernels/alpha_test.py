@@ -1,0 +1,216 @@
+"""What rays pass: holes that a texture's coverage cuts into faces, and clear faces.
+
+Coverage is that of the texture's finest level, bilinear, and below half there is a hole: labels,
+shadows and laser beams agree on where, at every distance.
+"""
+
+from __future__ import annotations
+
+import inspect
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.bvh_traverse import (
+    Found,
+    any_in_mesh,
+    first_in_mesh,
+)
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    CLEAR,
+    World,
+    face_vertices,
+    floor_int,
+    vertex_at,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Few bodies have holes: what they take is compiled once per module, not wherever it is called.
+OUT_OF_LINE = {"inline": False} if "inline" in inspect.signature(wp.func).parameters else {}
+# Rays that have passed a face go on this far behind it.
+STEP_M = wp.constant(2.0e-5)
+# Faces of one body that a ray passes at most.
+FACES_MAX = wp.constant(64)
+
+
+@wp.func
+def project_uv(p: wp.vec3, axis: int):
+    """Texture coordinates along one axis; X and Y faces keep Z upright."""
+    u = p[0]
+    v = p[2]
+    if axis == 0:
+        u = p[1]
+    elif axis == 2:
+        v = p[1]
+    return wp.vec2(u, v)
+
+
+@wp.func
+def covered_at(world: World, texture: int, uv: wp.vec2):
+    """Whether a texture's coverage is at least a half; it wraps around, rows from the top."""
+    width = world.textures[texture].width
+    height = world.textures[texture].height
+    u = wp.clamp(uv[0], -1.0e6, 1.0e6)
+    v = wp.clamp(uv[1], -1.0e6, 1.0e6)
+    x = (u - float(floor_int(u))) * float(width) - 0.5
+    y = (1.0 - (v - float(floor_int(v)))) * float(height) - 0.5
+    x0 = floor_int(x)
+    y0 = floor_int(y)
+    right = x - float(x0)
+    down = y - float(y0)
+    xa = (x0 + width) % width
+    xb = (x0 + 1 + width) % width
+    top = ((y0 + height) % height) * width
+    below = ((y0 + 1 + height) % height) * width
+    c = world.textures[texture].cover
+    upper = float(c[top + xa]) * (1.0 - right) + float(c[top + xb]) * right
+    lower = float(c[below + xa]) * (1.0 - right) + float(c[below + xb]) * right
+    return upper * (1.0 - down) + lower * down >= 127.5
+
+
+@wp.func
+def uv_at(world: World, surface: int, b: int, face: int, weights: wp.vec3):
+    """Texture coordinates at a point of a face, by UVs or along the axis that it faces most.
+
+    Args:
+        weights: Barycentric, of the face's three corners.
+    """
+    g = world.bodies[b].geometry
+    corner = face_vertices(world, g, face)
+    scale_m = world.surfaces[surface].texture_scale_m
+    uv = world.geometries[g].uvs[corner[0]] * weights[0]
+    uv += world.geometries[g].uvs[corner[1]] * weights[1]
+    uv += world.geometries[g].uvs[corner[2]] * weights[2]
+    if scale_m > 0.0:
+        p0 = vertex_at(world, g, corner[0])
+        p1 = vertex_at(world, g, corner[1])
+        p2 = vertex_at(world, g, corner[2])
+        n = wp.abs(wp.cross(p1 - p0, p2 - p0))
+        axis = int(1)
+        if n[0] > n[1] and n[0] > n[2]:
+            axis = 0
+        elif n[2] > n[1]:
+            axis = 2
+        p = p0 * weights[0] + p1 * weights[1] + p2 * weights[2]
+        uv = project_uv(p * (world.bodies[b].scale / scale_m), axis)
+    return uv
+
+
+@wp.func(**OUT_OF_LINE)
+def hole_at(world: World, b: int, face: int, weights: wp.vec3):
+    """Whether there is a hole at a point of a face."""
+    g = world.bodies[b].geometry
+    surface = world.bodies[b].first_material + world.geometries[g].face_slots[face]
+    texture = world.surfaces[surface].texture
+    hole = bool(False)
+    if texture >= 0:
+        if world.textures[texture].has_cover != 0:
+            uv = uv_at(world, surface, b, face, weights)
+            hole = not covered_at(world, texture, uv)
+    return hole
+
+
+@wp.func
+def passable(world: World, b: int, face: int, weights: wp.vec3, through: int):
+    """Whether a ray passes a point of a face.
+
+    Args:
+        through: HOLES, or HOLES and CLEAR: shadows pass clear faces as well.
+    """
+    clear = bool(False)
+    if (through & CLEAR) != 0:
+        g = world.bodies[b].geometry
+        surface = world.bodies[b].first_material + world.geometries[g].face_slots[face]
+        clear = world.surfaces[surface].transmission > 0.5 or world.surfaces[surface].opacity < 0.5
+    if not clear:
+        clear = hole_at(world, b, face, weights)
+    return clear
+
+
+@wp.struct
+class Strike:
+    """Where a ray meets a mesh.
+
+    Attributes:
+        face: -1 where it does not.
+        t: Parameter along the ray.
+        u, v: Barycentric, of the face's first and second corner.
+    """
+
+    face: int
+    t: float
+    u: float
+    v: float
+
+
+@wp.func
+def strike_of(found: Found):
+    """The same as numbers of 32 bits."""
+    strike = Strike()
+    strike.t = float(found[0])
+    strike.u = float(found[1])
+    strike.v = float(found[2])
+    strike.face = int(found[3])
+    return strike
+
+
+@wp.func(**OUT_OF_LINE)
+def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+    """The first point of a body with holes that a ray does not pass; arguments as for solid_hit."""
+    g = world.bodies[b].geometry
+    strike = Strike()
+    strike.face = -1
+    begin = float(0.0)
+    faces = int(0)
+    going = bool(True)
+    while going:
+        going = False
+        met = strike_of(
+            first_in_mesh(
+                world.geometries[g].tree,
+                world.geometries[g].mesh,
+                o + d * begin,
+                d,
+                reach - begin,
+            )
+        )
+        if met.face >= 0:
+            weights = wp.vec3(met.u, met.v, 1.0 - met.u - met.v)
+            if passable(world, b, met.face, weights, through):
+                begin += met.t * 1.000001 + STEP_M / wp.length(d)
+                faces += 1
+                going = faces < FACES_MAX
+            else:
+                strike = met
+                strike.t = begin + met.t
+    return strike
+
+
+@wp.func
+def closest_solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+    """The first point of a body that a ray does not pass.
+
+    Args:
+        o, d: The ray in the mesh frame.
+        reach: Largest parameter along it.
+        through: What it may pass, HOLES or CLEAR or both.
+    """
+    g = world.bodies[b].geometry
+    strike = Strike()
+    if (world.bodies[b].pierced & through) != 0:
+        strike = beyond_holes(world, b, o, d, reach, through)
+    else:
+        strike = strike_of(
+            first_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
+        )
+    return strike
+
+
+@wp.func
+def is_mesh_intersected(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+    """Whether a body cuts a ray that passes what ``through`` says; arguments as for solid_hit."""
+    g = world.bodies[b].geometry
+    hit = any_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
+    if hit and (world.bodies[b].pierced & through) != 0:
+        hit = beyond_holes(world, b, o, d, reach, through).face >= 0
+    return hit

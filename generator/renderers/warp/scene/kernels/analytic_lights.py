@@ -1,0 +1,348 @@
+"""Light that arrives from lamps, in photometric units.
+
+Sources: Lagarde and de Rousiers, "Moving Frostbite to PBR", SIGGRAPH 2014 course notes (units, and
+balls at the horizon); Baum, Rushmeier and Winget, "Improving radiosity solutions through the use of
+analytically determined form-factors", SIGGRAPH 1989 (polygons, after Lambert 1760); Howell, "A
+catalog of radiation heat transfer configuration factors", 1982 (discs, from elements parallel and
+upright to them); Karis, "Real shading in Unreal Engine 4", 2013, and Drobot, "Physically based area
+lights", GPU Pro 5, 2014 (mirrored lamps as one representative point).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.core.scene import LIGHT_KINDS
+from gen_data.generator.renderers.warp.scene.kernels.records import LightRecord, fast_normalize
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+SPOT = wp.constant(LIGHT_KINDS.index("spot"))
+SUN = wp.constant(LIGHT_KINDS.index("sun"))
+RECTANGLE = wp.constant(LIGHT_KINDS.index("rectangle"))
+DISK = wp.constant(LIGHT_KINDS.index("disk"))
+
+# A dipped beam, in slopes against its axis: where it is brightest, how fast it fades sideways and
+# downwards, over what height it ends at the cut-off, how steeply and how far that rises on the side
+# away from oncoming traffic, and what share of the light strays above it. Chosen to meet the points
+# of UN R112 (class B, right-hand traffic) with 9 to 14 kcd at the brightest.
+HOT_SIDE = wp.constant(0.03)
+SIDE_WIDTH = wp.constant(0.18)
+DOWN_WIDTH = wp.constant(0.045)
+CUTOFF_HALF_WIDTH = wp.constant(0.0035)
+CUTOFF_RISE = wp.constant(0.268)
+CUTOFF_RISE_MAX = wp.constant(0.02)
+STRAY = wp.constant(0.015)
+
+# Suns with a larger tangent of their radius, such as windows of a panorama, set little by little.
+WIDE_SUN = wp.constant(0.08)
+# Where a sun is taken to be; no scene is larger.
+SUN_DISTANCE_M = wp.constant(1.0e3)
+# Rectangles farther away than this many of their radii are points with a cosine, to 0.1 %.
+FAR = wp.constant(25.0)
+# A polygon as large as a disk, for horizons that cut it.
+DISK_CORNERS = wp.constant(16)
+DISK_REACH = wp.constant(1.0130016)
+
+
+@wp.func
+def is_panel(lamp: LightRecord):
+    """Whether a lamp shines from a flat front, to one side only."""
+    return lamp.kind == RECTANGLE or lamp.kind == DISK  # noqa: PLR1714
+
+
+@wp.struct
+class Beam:
+    """What one lamp sends to a point.
+
+    Attributes:
+        direction: Unit, where the light comes from: towards the lamp's centre, from a panel the
+            mean over what is seen of it.
+        distance_m: To the centre; a large number for a sun.
+        normal_lux: Illuminance on a surface that faces ``direction``.
+        spread: Radius of the lamp over its distance.
+    """
+
+    direction: wp.vec3
+    distance_m: float
+    normal_lux: wp.vec3
+    spread: float
+
+
+@wp.func
+def dipped_share(lamp: LightRecord, d: wp.vec3):
+    """Intensity of a dipped headlight in a direction, as a share of that at its brightest."""
+    right = fast_normalize(wp.cross(lamp.direction, wp.vec3(0.0, 0.0, 1.0)))
+    # Slopes of what lies beside or behind the lamp are boundless: they end in the stray light.
+    ahead = wp.max(wp.dot(d, lamp.direction), 1.0e-3)
+    side = wp.dot(d, right) / ahead
+    down = -wp.dot(d, wp.cross(right, lamp.direction)) / ahead
+    below = down - lamp.cutoff + wp.clamp(CUTOFF_RISE * side, 0.0, CUTOFF_RISE_MAX)
+    t = wp.clamp(0.5 + 0.5 * below / CUTOFF_HALF_WIDTH, 0.0, 1.0)
+    s = (side - HOT_SIDE) / SIDE_WIDTH
+    v = wp.max(below, 0.0) / DOWN_WIDTH
+    lit = t * t * (3.0 - 2.0 * t) / ((1.0 + s * s) * (1.0 + v * v))
+    return wp.max(lit, STRAY)
+
+
+@wp.func
+def beam_from(lamp: LightRecord, p_world: wp.vec3):
+    """The unobstructed beam of a lamp at a point."""
+    beam = Beam()
+    if lamp.kind == SUN:
+        beam.direction = -lamp.direction
+        beam.distance_m = SUN_DISTANCE_M
+        beam.normal_lux = lamp.power
+        beam.spread = lamp.radius
+        return beam
+    to_lamp = lamp.position_m - p_world
+    # At the lamp's own surface the inverse square law ends.
+    squared = wp.max(wp.dot(to_lamp, to_lamp), wp.max(lamp.radius * lamp.radius, 1.0e-6))
+    inverse = 1.0 / wp.sqrt(squared)
+    beam.direction = to_lamp * inverse
+    beam.distance_m = squared * inverse
+    beam.spread = lamp.radius * inverse
+    if is_panel(lamp):
+        flow = flow_from_panel(lamp, p_world)
+        share = wp.length(flow)
+        if share > 0.0:
+            beam.direction = flow * (1.0 / share)
+        beam.normal_lux = lamp.radiance * share
+        return beam
+    beam.normal_lux = lamp.power * (inverse * inverse)
+    if lamp.kind == SPOT:
+        cosine = -wp.dot(beam.direction, lamp.direction)
+        span = wp.max(lamp.cos_inner - lamp.cos_outer, 1.0e-4)
+        # As gen_data.generator.core.photometry counts it: symmetric in the cosine, so that half
+        # counts.
+        fade = wp.clamp((cosine - lamp.cos_outer) / span, 0.0, 1.0)
+        beam.normal_lux = beam.normal_lux * (fade * fade * (3.0 - 2.0 * fade))
+        if lamp.cutoff > 0.0:
+            beam.normal_lux = beam.normal_lux * dipped_share(lamp, -beam.direction)
+    return beam
+
+
+@wp.func
+def flow_from_panel(lamp: LightRecord, p_world: wp.vec3):
+    """Where a panel's light comes from, times the illuminance there per luminance; 0 behind it.
+
+    The part of it along a normal is the illuminance on any surface that has all of the panel
+    before it.
+    """
+    away = p_world - lamp.position_m
+    height = wp.dot(away, lamp.direction)
+    flow = wp.vec3(0.0)
+    if height > 0.0:
+        if lamp.kind == DISK:
+            flow = flow_from_disk(lamp, away, height)
+        else:
+            flow = flow_from_rectangle(lamp, away, height)
+    return flow
+
+
+@wp.func
+def flow_from_disk(lamp: LightRecord, away: wp.vec3, height: float):
+    """As flow_from_panel, exact; ``away`` is from the centre."""
+    beside = away - lamp.direction * height
+    r2 = lamp.radius * lamp.radius
+    s = wp.dot(away, away)
+    total = s + r2
+    root = wp.sqrt(wp.max(total * total - 4.0 * wp.dot(beside, beside) * r2, 1.0e-20))
+    # One minus almost one, in forms that lose no digits far away, and close to the disk.
+    level = 0.5 * (1.0 + (r2 - s) / root)
+    if s > r2:
+        level = 2.0 * height * height * r2 / (root * (root + s - r2))
+    upright = 2.0 * height * r2 / (root * (total + root))
+    return (lamp.direction * level + beside * upright) * -wp.pi
+
+
+@wp.func
+def flow_from_rectangle(lamp: LightRecord, away: wp.vec3, height: float):
+    """As flow_from_panel, exact unless far away; ``away`` is from the centre."""
+    s = wp.dot(away, away)
+    if s > FAR * FAR * lamp.radius * lamp.radius:
+        area_m2 = 4.0 * wp.length(lamp.along) * wp.length(lamp.across)
+        return away * (-area_m2 * height / (s * s))
+    flow = wp.vec3(0.0)
+    first = -away - lamp.along - lamp.across
+    before = first
+    for k in range(1, 5):
+        corner = first
+        if k < 4:
+            corner = corner_of_panel(lamp, k) - away
+        flow += edge_flow(before, corner)
+        before = corner
+    return flow
+
+
+@wp.func
+def corner_of_panel(lamp: LightRecord, k: int):
+    """Corner k of a panel, from its centre, clockwise for who sees it shine."""
+    u = wp.where((k & 3) >= 2, 1.0, -1.0)
+    v = wp.where(((k + 1) & 3) >= 2, 1.0, -1.0)
+    if lamp.kind == DISK:
+        angle = float(k) * (-2.0 * wp.pi / float(DISK_CORNERS))
+        u = DISK_REACH * wp.cos(angle)
+        v = DISK_REACH * wp.sin(angle)
+    return lamp.along * u + lamp.across * v
+
+
+@wp.func
+def edge_flow(a: wp.vec3, b: wp.vec3):
+    """What one edge of a polygon adds to its flow: half its angle, along the normal of its fan."""
+    normal = wp.cross(a, b)
+    sine = wp.length(normal)
+    # The angle by its tangent: the cosine of a small one has lost it.
+    return normal * (0.5 * wp.atan2(sine, wp.dot(a, b)) / wp.max(sine, 1.0e-30))
+
+
+@wp.func
+def relative_illuminance(lamp: LightRecord, beam: Beam, p_world: wp.vec3, n: wp.vec3):
+    """Illuminance on a surface with normal n, relative to that on one which faces the beam.
+
+    The cosine where all of the lamp is over the horizon, and for spheres, spots and all but wide
+    suns, which light nothing once their centre has set. Else what the part over the horizon gives:
+    disks are polygons then, right to a thousandth of what all of the disk gives.
+    """
+    cosine = wp.dot(n, beam.direction)
+    if not is_panel(lamp):
+        if lamp.kind == SUN and lamp.radius > WIDE_SUN and wp.abs(cosine) < lamp.radius:
+            sine2 = lamp.radius * lamp.radius
+            cosine = setting_ball(cosine, sine2 / (1.0 + sine2))
+        return wp.max(cosine, 0.0)
+    to_centre = lamp.position_m - p_world
+    if wp.dot(n, to_centre) < lamp.radius:
+        whole = wp.max(beam.normal_lux) / wp.max(wp.max(lamp.radiance), 1.0e-20)
+        if whole > 0.0:
+            cosine = setting_panel(lamp, to_centre, n) / whole
+    return wp.max(cosine, 0.0)
+
+
+@wp.func
+def above_horizon_fraction(lamp: LightRecord, beam: Beam, n: wp.vec3):
+    """About what share of a wide lamp is over the horizon."""
+    share = float(1.0)
+    if is_panel(lamp) or (lamp.kind == SUN and lamp.radius > WIDE_SUN):
+        share = wp.clamp(0.5 + 0.5 * wp.dot(n, beam.direction) / beam.spread, 0.0, 1.0)
+    return share
+
+
+@wp.func
+def setting_ball(cosine: float, sine2: float):
+    """As ``relative_illuminance``, for a ball at an angle whose cosine is given.
+
+    Args:
+        sine2: Squared sine of the angle that the ball's radius covers.
+    """
+    share = wp.max(cosine, 0.0)
+    if cosine * cosine < sine2:
+        sine = wp.sqrt(1.0 - cosine * cosine)
+        x = wp.sqrt(1.0 / sine2 - 1.0)
+        y = wp.clamp(-x * cosine / sine, -1.0, 1.0)
+        part = sine * wp.sqrt(1.0 - y * y)
+        lit = (cosine * wp.acos(y) - x * part) * sine2 + wp.atan2(part, x)
+        share = lit / (wp.pi * sine2)
+    return share
+
+
+@wp.func
+def setting_panel(lamp: LightRecord, to_centre: wp.vec3, n: wp.vec3):
+    """Illuminance per luminance from the part of a panel that is over the horizon."""
+    corners = wp.where(lamp.kind == DISK, DISK_CORNERS, 4)
+    first = to_centre + corner_of_panel(lamp, 0)
+    before = first
+    total = float(0.0)
+    enters = wp.vec3(0.0)
+    leaves = wp.vec3(0.0)
+    for k in range(1, corners + 1):
+        corner = first
+        if k < corners:
+            corner = to_centre + corner_of_panel(lamp, k)
+        a = wp.dot(n, before)
+        b = wp.dot(n, corner)
+        start = before
+        end = corner
+        if (a < 0.0) != (b < 0.0):
+            crossing = before + (corner - before) * (a / (a - b))
+            if a < 0.0:
+                start = crossing
+                enters = crossing
+            else:
+                end = crossing
+                leaves = crossing
+        if a >= 0.0 or b >= 0.0:
+            total += wp.dot(n, edge_flow(start, end))
+        before = corner
+    # Along the horizon, back to where it rose.
+    total += wp.dot(n, edge_flow(leaves, enters))
+    return wp.max(total, 0.0)
+
+
+@wp.func
+def towards_mirror(
+    lamp: LightRecord, beam: Beam, p_world: wp.vec3, mirrored: wp.vec3, alpha: float
+):
+    """Direction to the point of a lamp nearest to a mirrored ray.
+
+    Where the lobe of width ``alpha`` is much wider than the lamp this is the lamp's centre.
+    """
+    if is_panel(lamp):
+        return mirrored_panel(lamp, p_world, mirrored, alpha)
+    spread = beam.spread - 0.2 * alpha
+    if spread <= 0.0:
+        return beam.direction
+    to_ray = mirrored * wp.dot(beam.direction, mirrored) - beam.direction
+    part = wp.min(spread / wp.sqrt(wp.max(wp.dot(to_ray, to_ray), 1.0e-12)), 1.0)
+    return fast_normalize(beam.direction + to_ray * part)
+
+
+@wp.func
+def mirrored_panel(lamp: LightRecord, p_world: wp.vec3, mirrored: wp.vec3, alpha: float):
+    """As towards_mirror, for panels: where the ray meets the panel, or its outline."""
+    to_centre = lamp.position_m - p_world
+    approach = -wp.dot(mirrored, lamp.direction)
+    # A ray that goes along the panel meets its plane far away.
+    reach = wp.min(-wp.dot(to_centre, lamp.direction) / wp.max(approach, 1.0e-4), 1.0e4)
+    level = mirrored + lamp.direction * approach
+    beside = level * reach - to_centre - lamp.direction * wp.dot(to_centre, -lamp.direction)
+    half = wp.vec2(wp.length(lamp.along), wp.length(lamp.across))
+    shy = 0.2 * alpha * wp.length(to_centre)
+    u = wp.dot(beside, lamp.along) / half[0]
+    v = wp.dot(beside, lamp.across) / half[1]
+    limit = wp.vec2(wp.max(half[0] - shy, 0.0), wp.max(half[1] - shy, 0.0))
+    if lamp.kind == DISK:
+        inward = wp.min(limit[0] / wp.sqrt(wp.max(u * u + v * v, 1.0e-20)), 1.0)
+        u = u * inward
+        v = v * inward
+    else:
+        u = wp.clamp(u, -limit[0], limit[0])
+        v = wp.clamp(v, -limit[1], limit[1])
+    return fast_normalize(to_centre + lamp.along * (u / half[0]) + lamp.across * (v / half[1]))
+
+
+@wp.func
+def lobe_widening(lamp: LightRecord, beam: Beam, alpha: float):
+    """By how much a lamp widens a lobe of width ``alpha``.
+
+    Such that the widened lobe of a mirror is as bright as the lamp. Panels widen it along each of
+    their axes by what is seen of those.
+    """
+    wider = 0.5 * beam.spread
+    if is_panel(lamp):
+        part = wp.where(lamp.kind == DISK, 0.5, 0.5642) / beam.distance_m
+        a = wp.dot(lamp.along, beam.direction)
+        b = wp.dot(lamp.across, beam.direction)
+        x = part * wp.sqrt(wp.max(wp.dot(lamp.along, lamp.along) - a * a, 0.0))
+        y = part * wp.sqrt(wp.max(wp.dot(lamp.across, lamp.across) - b * b, 0.0))
+        wider = wp.sqrt(widened(alpha, x) * widened(alpha, y)) - alpha
+    return wider
+
+
+@wp.func
+def widened(alpha: float, spread: float):
+    """Width of a lobe together with that of a lamp.
+
+    Half-way between sum and root of squares: with those, panels would be a fifth too dim, or half
+    too bright, at roughness 0.3 to 0.6 (against quadrature).
+    """
+    return 0.5 * (alpha + spread + wp.sqrt(alpha * alpha + spread * spread))

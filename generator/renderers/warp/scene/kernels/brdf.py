@@ -1,0 +1,114 @@
+"""The metallic-roughness surface: GGX over Lambert, energy-conserving.
+
+Sources: Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007 (GGX);
+Hammon, "PBR diffuse lighting for GGX+Smith microsurfaces", GDC 2017 (height-correlated Smith
+without square roots); Burley, "Physically based shading at Disney", 2012 (parameters); Karis,
+"Real shading in Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "Practical
+multiple scattering compensation for microfacet models", 2019; Lagarde and de Rousiers, "Moving
+Frostbite to PBR", 2014 (F90).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.records import fast_normalize
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.struct
+class Brdf:
+    """A surface at a point, seen from one direction.
+
+    Attributes:
+        matte: Part of the light that the specular layer leaves to the diffuse albedo.
+        f0, f90: Specular reflectance at normal and grazing incidence.
+        gloss: Directional albedo of the specular layer, multiple scattering included.
+        boost: Multiple scattering relative to single scattering.
+        roughness: Perceptual; alpha is its square.
+        n_v: Cosine between normal and viewer.
+    """
+
+    matte: wp.vec3
+    f0: wp.vec3
+    f90: float
+    gloss: wp.vec3
+    boost: wp.vec3
+    roughness: float
+    n_v: float
+
+
+@wp.func
+def directional_albedo(table: wp.array(dtype=wp.vec2, ndim=2), roughness: float, n_v: float):
+    """Factors on F0 and on F90 of the GGX layer's reflectance under uniform light.
+
+    Args:
+        table: The factors over [0, 1] x [0, 1], ends included, roughness by row.
+    """
+    last = float(table.shape[0] - 1)
+    # The last cell ends at 1: a whisker less keeps its right neighbour inside the table.
+    x = wp.min(n_v * last, last - 0.001)
+    y = wp.min(roughness * last, last - 0.001)
+    x0 = int(x)
+    y0 = int(y)
+    fx = x - float(x0)
+    fy = y - float(y0)
+    top = table[y0, x0] * (1.0 - fx) + table[y0, x0 + 1] * fx
+    bottom = table[y0 + 1, x0] * (1.0 - fx) + table[y0 + 1, x0 + 1] * fx
+    return top * (1.0 - fy) + bottom * fy
+
+
+@wp.func
+def make_brdf(
+    table: wp.array(dtype=wp.vec2, ndim=2),
+    albedo: wp.vec3,
+    roughness: float,
+    metallic: float,
+    specular: float,
+    n_v: float,
+):
+    """The surface at a point with its view-dependent constants."""
+    s = Brdf()
+    # Alpha 0.002: in narrower lobes n_h^2 (alpha^2 - 1) + 1 has no digits left at the peak.
+    s.roughness = wp.clamp(roughness, 0.045, 1.0)
+    # Interpolated normals may turn away from the viewer; Smith's term divides by this.
+    s.n_v = wp.max(n_v, 1.0e-3)
+    # Burley 2012: specular 0.5 is 4 %, the reflectance of most plastics (index 1.5).
+    dielectric = 0.08 * specular * (1.0 - metallic)
+    s.f0 = wp.vec3(dielectric, dielectric, dielectric) + albedo * metallic
+    # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
+    s.f90 = wp.min(50.0 * wp.max(s.f0[0], wp.max(s.f0[1], s.f0[2])), 1.0)
+    part = directional_albedo(table, s.roughness, s.n_v)
+    # Turquin 2019: what single scattering loses of white light, by what it keeps.
+    loss = 1.0 / wp.max(part[0] + part[1], 0.05) - 1.0
+    s.boost = wp.vec3(1.0, 1.0, 1.0) + s.f0 * loss
+    s.gloss = wp.cw_mul(s.f0 * part[0] + wp.vec3(s.f90, s.f90, s.f90) * part[1], s.boost)
+    s.matte = wp.vec3(1.0 - s.gloss[0], 1.0 - s.gloss[1], 1.0 - s.gloss[2]) * (1.0 - metallic)
+    return s
+
+
+@wp.func
+def specular_lobe(s: Brdf, n: wp.vec3, v: wp.vec3, l: wp.vec3, n_l: float, widening: float):  # noqa: E741
+    """GGX reflection, without the cosine.
+
+    Args:
+        widening: Added to alpha for a light that is not a point, with the peak lowered to
+            keep its energy (Karis, "Real shading in Unreal Engine 4", 2013).
+    """
+    h = fast_normalize(l + v)
+    n_h = wp.min(wp.dot(n, h), 1.0)
+    alpha = s.roughness * s.roughness
+    wide = wp.min(alpha + widening, 1.0)
+    # Karis 2013: the peak falls by (alpha / wide)^2, so that a wider lobe has no more energy.
+    a2 = alpha * alpha
+    q = n_h * n_h * (a2 - 1.0) + 1.0
+    # Hammon 2017: Smith's height-correlated masking, without its two square roots.
+    g = 2.0 * n_l * s.n_v * (1.0 - alpha) + (n_l + s.n_v) * alpha
+    lobe = 0.5 * a2 * a2 / (wp.pi * q * q * wide * wide * wp.max(g, 1.0e-4))
+    c = 1.0 - wp.max(wp.dot(v, h), 0.0)
+    # Schlick 1994, with F90 in place of 1.
+    c2 = c * c
+    c5 = c2 * c2 * c
+    f = s.f0 * (1.0 - c5) + wp.vec3(s.f90, s.f90, s.f90) * c5
+    return wp.cw_mul(f, s.boost) * lobe

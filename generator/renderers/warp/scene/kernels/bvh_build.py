@@ -1,0 +1,268 @@
+"""Trees of boxes: which boxes share a node.
+
+Source: Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007, with nodes of
+eight as in Wald, Benthin and Boulos 2008: the largest part of a node is split until it has eight.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    componentwise_max,
+    componentwise_min,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+WIDTH = wp.constant(8)
+BINS = wp.constant(16)
+# Deeper nodes split in halves, so that no tree is deeper than rays have room for.
+EVEN_DEPTH = wp.constant(8)
+FARTHEST = wp.constant(3.0e38)
+# Sides of a box that no ray enters.
+NOWHERE = wp.constant(1.0e30)
+
+Bounds = wp.types.vector(length=9, dtype=wp.int32)
+Worths = wp.types.vector(length=9, dtype=wp.float32)
+
+
+@wp.struct
+class Boxes:
+    """What a tree is grown over, and room to do it in.
+
+    Attributes:
+        lows, highs: Corners [n].
+        order: Numbers of the boxes; those of a node follow each other [n].
+        bin_lows, bin_highs, bin_counts: Of one axis [BINS].
+        costs: Of what is right of a cut [BINS].
+    """
+
+    lows: wp.array(dtype=wp.vec3)
+    highs: wp.array(dtype=wp.vec3)
+    order: wp.array(dtype=wp.int32)
+    bin_lows: wp.array(dtype=wp.vec3)
+    bin_highs: wp.array(dtype=wp.vec3)
+    bin_counts: wp.array(dtype=wp.int32)
+    costs: wp.array(dtype=wp.float32)
+
+
+@wp.func
+def half_area(low: wp.vec3, high: wp.vec3):
+    """Half of a box's surface."""
+    e = high - low
+    return e[0] * e[1] + e[1] * e[2] + e[2] * e[0]
+
+
+@wp.func
+def middle(boxes: Boxes, i: int):
+    """Twice the centre of a box."""
+    # Only its order matters: halving it would be a rounding for nothing.
+    return boxes.lows[i] + boxes.highs[i]
+
+
+@wp.func
+def bin_of(x: float, origin: float, scale: float):
+    """Where a centre counts along an axis."""
+    return wp.clamp(int((x - origin) * scale), 0, BINS - 1)
+
+
+@wp.func
+def around(boxes: Boxes, begin: int, end: int):
+    """Corners of the box around a range."""
+    low = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
+    high = -low
+    i = int(begin)
+    while i < end:
+        low = componentwise_min(low, boxes.lows[boxes.order[i]])
+        high = componentwise_max(high, boxes.highs[boxes.order[i]])
+        i += 1
+    return low, high
+
+
+@wp.func
+def cut_along(
+    boxes: Boxes, begin: int, end: int, axis: int, origin: float, scale: float, leaf: int
+):
+    """(cost, number of bins on the left) of the best cut across an axis."""
+    nothing = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
+    for k in range(BINS):
+        boxes.bin_lows[k] = nothing
+        boxes.bin_highs[k] = -nothing
+        boxes.bin_counts[k] = 0
+    i = int(begin)
+    while i < end:
+        box = boxes.order[i]
+        k = bin_of(middle(boxes, box)[axis], origin, scale)
+        boxes.bin_lows[k] = componentwise_min(boxes.bin_lows[k], boxes.lows[box])
+        boxes.bin_highs[k] = componentwise_max(boxes.bin_highs[k], boxes.highs[box])
+        boxes.bin_counts[k] = boxes.bin_counts[k] + 1
+        i += 1
+    low = nothing
+    high = -nothing
+    count = int(0)
+    k = int(BINS - 1)
+    while k > 0:
+        low = componentwise_min(low, boxes.bin_lows[k])
+        high = componentwise_max(high, boxes.bin_highs[k])
+        count += boxes.bin_counts[k]
+        boxes.costs[k] = FARTHEST
+        if count > 0:
+            # Surface area heuristic: faces are met a leaf at a time, so leaves count, not faces.
+            boxes.costs[k] = half_area(low, high) * float((count + leaf - 1) / leaf)
+        k -= 1
+    best = float(FARTHEST)
+    cut = int(0)
+    low = nothing
+    high = -nothing
+    count = int(0)
+    k = int(1)
+    while k < BINS:
+        low = componentwise_min(low, boxes.bin_lows[k - 1])
+        high = componentwise_max(high, boxes.bin_highs[k - 1])
+        count += boxes.bin_counts[k - 1]
+        if count > 0 and boxes.costs[k] < FARTHEST:
+            cost = boxes.costs[k] + half_area(low, high) * float((count + leaf - 1) / leaf)
+            if cost < best:
+                best = cost
+                cut = k
+        k += 1
+    return best, cut
+
+
+@wp.func
+def split(boxes: Boxes, begin: int, end: int, leaf: int):
+    """Put a range's boxes in two groups; where the second begins."""
+    low = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
+    high = -low
+    i = int(begin)
+    while i < end:
+        low = componentwise_min(low, middle(boxes, boxes.order[i]))
+        high = componentwise_max(high, middle(boxes, boxes.order[i]))
+        i += 1
+    best = float(FARTHEST)
+    best_axis = int(-1)
+    best_cut = int(0)
+    for axis in range(3):
+        size = high[axis] - low[axis]
+        if size > 0.0:
+            scale = float(BINS) / size
+            cost, cut = cut_along(boxes, begin, end, axis, low[axis], scale, leaf)
+            if cost < best:
+                best = cost
+                best_axis = axis
+                best_cut = cut
+    if best_axis < 0:
+        return (begin + end) / 2
+    scale = float(BINS) / (high[best_axis] - low[best_axis])
+    i = int(begin)
+    j = int(end)
+    while i < j:
+        box = boxes.order[i]
+        if bin_of(middle(boxes, box)[best_axis], low[best_axis], scale) < best_cut:
+            i += 1
+        else:
+            j -= 1
+            boxes.order[i] = boxes.order[j]
+            boxes.order[j] = box
+    return i
+
+
+@wp.func
+def worth_splitting(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
+    """How much a part wants to be split: its surface, or its number where a node is deep; or -1."""
+    size = float(-1.0)
+    if end - begin > leaf:
+        size = float(end - begin)
+        if depth < EVEN_DEPTH:
+            low, high = around(boxes, begin, end)
+            size = half_area(low, high)
+    return size
+
+
+@wp.func
+def parts_of(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
+    """Where the parts of a node begin, and where the last ends; and how many they are."""
+    bounds = Bounds()
+    worths = Worths()
+    bounds[0] = begin
+    bounds[1] = end
+    parts = int(1)
+    chosen = int(0)
+    while chosen >= 0:
+        first = bounds[chosen]
+        last = bounds[chosen + 1]
+        cut = (first + last) / 2
+        if depth < EVEN_DEPTH:
+            cut = split(boxes, first, last, leaf)
+        k = int(parts)
+        while k > chosen:
+            bounds[k + 1] = bounds[k]
+            worths[k] = worths[k - 1]
+            k -= 1
+        bounds[chosen + 1] = cut
+        worths[chosen] = worth_splitting(boxes, first, cut, leaf, depth)
+        worths[chosen + 1] = worth_splitting(boxes, cut, last, leaf, depth)
+        parts += 1
+        chosen = int(-1)
+        most = float(-1.0)
+        k = int(0)
+        while k < parts < WIDTH:
+            if worths[k] > most:
+                most = worths[k]
+                chosen = k
+            k += 1
+    return bounds, parts
+
+
+@wp.kernel
+def grow_tree(
+    boxes: Boxes,
+    leaf: int,
+    todo: wp.array(dtype=wp.vec4i),
+    nodes: wp.array(dtype=float, ndim=3),
+    codes: wp.array(dtype=int, ndim=2),
+    leaves: wp.array(dtype=wp.vec2i),
+    counts: wp.array(dtype=int),
+):
+    """Grow one tree: a single thread's work.
+
+    Args:
+        leaf: Boxes in a leaf at most.
+        todo: Room for ranges that wait: (begin, end, depth, 8 * node + lane).
+        nodes: Sides of boxes: low x, high x, low y, ... [., 6, 8]; no ray enters spare lanes.
+        codes: Of each lane what is there: a node's number, or -1 - a leaf's [., 8].
+        leaves: (begin, end) in the order.
+        counts: (nodes, leaves).
+    """
+    node_count = int(0)
+    leaf_count = int(0)
+    n = boxes.order.shape[0]
+    todo[0] = wp.vec4i(0, n, 0, -1)
+    waiting = int(1)
+    while waiting > 0:
+        waiting -= 1
+        task = todo[waiting]
+        code = node_count
+        if task[1] - task[0] <= leaf:
+            leaves[leaf_count] = wp.vec2i(task[0], task[1])
+            leaf_count += 1
+            code = -leaf_count
+        else:
+            bounds, parts = parts_of(boxes, task[0], task[1], leaf, task[2])
+            for k in range(WIDTH):
+                low = wp.vec3(NOWHERE, NOWHERE, NOWHERE)
+                high = -low
+                if k < parts:
+                    low, high = around(boxes, bounds[k], bounds[k + 1])
+                    lane = WIDTH * node_count + k
+                    todo[waiting] = wp.vec4i(bounds[k], bounds[k + 1], task[2] + 1, lane)
+                    waiting += 1
+                for axis in range(3):
+                    nodes[node_count, 2 * axis, k] = low[axis]
+                    nodes[node_count, 2 * axis + 1, k] = high[axis]
+            node_count += 1
+        if task[3] >= 0:
+            codes[task[3] / WIDTH, task[3] % WIDTH] = code
+    counts[0] = node_count
+    counts[1] = leaf_count

@@ -1,0 +1,198 @@
+"""Light from all around.
+
+Sources: Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps",
+SIGGRAPH 2001; Karis, "Real shading in Unreal Engine 4", 2013 (prefiltered reflections); Cigolle et
+al., "A survey of efficient representations for independent unit vectors", JCGT 2014 (octahedral).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    EnvironmentRecord,
+    fast_normalize,
+    floor_int,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.func
+def to_sky(sky: EnvironmentRecord, d: wp.vec3):
+    """World direction to the frame of the image."""
+    return wp.vec3(
+        sky.cos_yaw * d[0] + sky.sin_yaw * d[1], sky.cos_yaw * d[1] - sky.sin_yaw * d[0], d[2]
+    )
+
+
+@wp.func
+def sky_irradiance(sky: EnvironmentRecord, n_world: wp.vec3):
+    """Irradiance over pi from the hemisphere around a normal."""
+    n = to_sky(sky, n_world)
+    c = sky.irradiance
+    e = c[0] + c[1] * n[1] + c[2] * n[2] + c[3] * n[0]
+    e += c[4] * (n[0] * n[1]) + c[5] * (n[1] * n[2]) + c[6] * (3.0 * n[2] * n[2] - 1.0)
+    e += c[7] * (n[0] * n[2]) + c[8] * (n[0] * n[0] - n[1] * n[1])
+    return wp.max(e, wp.vec3(0.0, 0.0, 0.0)) * sky.luminance
+
+
+@wp.func
+def sky_image(sky: EnvironmentRecord, d_world: wp.vec3):
+    """What is seen of the sky in one direction; any length."""
+    return panorama(sky.image, to_sky(sky, d_world)) * sky.luminance
+
+
+@wp.func
+def sky_rest(sky: EnvironmentRecord, d_world: wp.vec3):
+    """The same without what lamps stand for."""
+    return panorama(sky.rest, to_sky(sky, d_world)) * sky.luminance
+
+
+@wp.func
+def panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
+    """An equirectangular image in one direction of its own frame, bilinear; any length."""
+    d = fast_normalize(direction)
+    height = image.shape[0]
+    width = image.shape[1]
+    # Row 0 is the zenith and columns run clockwise from -X; texel centres are at halves.
+    x = (0.5 - wp.atan2(d[1], d[0]) * (0.5 / wp.pi)) * float(width) - 0.5
+    # Clamped: rounding of a unit vector may leave 1 + 1e-7, whose arc cosine is NaN.
+    y = wp.acos(wp.clamp(d[2], -1.0, 1.0)) / wp.pi * float(height) - 0.5
+    x0 = floor_int(x)
+    y0 = floor_int(y)
+    fx = x - float(x0)
+    fy = y - float(y0)
+    # Around the horizon columns wrap; rows end at the poles.
+    xa = (x0 + width) % width
+    xb = (x0 + 1 + width) % width
+    ya = wp.clamp(y0, 0, height - 1)
+    yb = wp.clamp(y0 + 1, 0, height - 1)
+    top = image[ya, xa] * (1.0 - fx) + image[ya, xb] * fx
+    bottom = image[yb, xa] * (1.0 - fx) + image[yb, xb] * fx
+    return top * (1.0 - fy) + bottom * fy
+
+
+@wp.func
+def octahedral(d: wp.vec3):
+    """Direction to the square [-1, 1] x [-1, 1]."""
+    # Onto the octahedron |x| + |y| + |z| = 1 (Meyer et al., "On floating-point normal vectors",
+    # 2010).
+    s = 1.0 / (wp.abs(d[0]) + wp.abs(d[1]) + wp.abs(d[2]))
+    x = d[0] * s
+    y = d[1] * s
+    # The lower half is folded outwards over the diagonals.
+    if d[2] < 0.0:
+        fold_x = (1.0 - wp.abs(y)) * wp.where(x >= 0.0, 1.0, -1.0)
+        y = (1.0 - wp.abs(x)) * wp.where(y >= 0.0, 1.0, -1.0)
+        x = fold_x
+    return wp.vec2(x, y)
+
+
+@wp.func
+def glossy_level(sky: EnvironmentRecord, level: int, p: wp.vec2):
+    """One prefiltered map at a point of the square; maps have a border of one texel."""
+    inner = float(sky.glossy.shape[1] - 2)
+    x = (p[0] * 0.5 + 0.5) * inner + 0.5
+    y = (p[1] * 0.5 + 0.5) * inner + 0.5
+    x0 = int(x)
+    y0 = int(y)
+    fx = x - float(x0)
+    fy = y - float(y0)
+    top = sky.glossy[level, y0, x0] * (1.0 - fx) + sky.glossy[level, y0, x0 + 1] * fx
+    bottom = sky.glossy[level, y0 + 1, x0] * (1.0 - fx) + sky.glossy[level, y0 + 1, x0 + 1] * fx
+    return top * (1.0 - fy) + bottom * fy
+
+
+@wp.func
+def sky_reflection(sky: EnvironmentRecord, d_world: wp.vec3, roughness: float):
+    """Radiance around a mirrored direction, averaged over the lobe of that roughness."""
+    levels = sky.glossy.shape[0]
+    level = roughness * float(levels) - 1.0
+    p = octahedral(to_sky(sky, d_world))
+    lower = wp.clamp(floor_int(level), 0, levels - 1)
+    upper = wp.min(lower + 1, levels - 1)
+    part = wp.clamp(level - float(lower), 0.0, 1.0)
+    rough = glossy_level(sky, lower, p)
+    if part > 0.0:
+        rough = rough * (1.0 - part) + glossy_level(sky, upper, p) * part
+    rough = rough * sky.luminance
+    if level < 0.0:
+        # Below the first map, towards the image itself.
+        rough = sky_rest(sky, d_world) * (-level) + rough * (1.0 + level)
+    return rough
+
+
+@wp.func
+def octahedral_direction(x: float, y: float):
+    """The inverse of ``octahedral``, unit length."""
+    # On the octahedron; negative in the folded corners, the lower half.
+    z = 1.0 - wp.abs(x) - wp.abs(y)
+    if z < 0.0:
+        fold_x = (1.0 - wp.abs(y)) * wp.where(x >= 0.0, 1.0, -1.0)
+        y = (1.0 - wp.abs(x)) * wp.where(y >= 0.0, 1.0, -1.0)
+        x = fold_x
+    return fast_normalize(wp.vec3(x, y, z))
+
+
+@wp.kernel
+def weigh_texels(
+    directions: wp.array(dtype=wp.vec3),
+    solid_angles: wp.array(dtype=float),
+    alpha: float,
+    size: int,
+    shares: wp.array(dtype=float, ndim=2),
+):
+    """Shares that an environment's texels have in the GGX lobe around each of a map's directions.
+
+    The lobe is that of a surface seen head-on, weighted by the cosine to the light as by Karis.
+
+    Args:
+        directions, solid_angles: Of the environment's texels.
+        size: Texels along the octahedral map's edge, without its border.
+        shares: One row per texel of the map, one column per texel of the environment.
+    """
+    texel = wp.tid()
+    x = float(texel % size) + 0.5
+    y = float(texel / size) + 0.5
+    n = octahedral_direction(x / float(size) * 2.0 - 1.0, y / float(size) * 2.0 - 1.0)
+    weight = float(0.0)
+    a2 = alpha * alpha
+    for i in range(directions.shape[0]):
+        c = wp.dot(n, directions[i])
+        share = float(0.0)
+        if c > 0.0:
+            # With the viewer along n, cos^2 of the half angle is (1 + c) / 2.
+            q = 0.5 * (1.0 + c) * (a2 - 1.0) + 1.0
+            share = c / (q * q) * solid_angles[i]
+        shares[texel, i] = share
+        weight += share
+    for i in range(directions.shape[0]):
+        shares[texel, i] = shares[texel, i] / weight
+
+
+@wp.kernel
+def prefilter(
+    shares: wp.array(dtype=float, ndim=2),
+    radiance: wp.array(dtype=wp.vec3),
+    smoothed: wp.array(dtype=wp.vec3),
+):
+    """Average an environment over the lobe around each direction of an octahedral map.
+
+    Four texels of the map per thread: their sums do not wait for each other.
+    """
+    first = 4 * wp.tid()
+    a = wp.vec3(0.0)
+    b = wp.vec3(0.0)
+    c = wp.vec3(0.0)
+    d = wp.vec3(0.0)
+    for i in range(radiance.shape[0]):
+        light = radiance[i]
+        a += light * shares[first, i]
+        b += light * shares[first + 1, i]
+        c += light * shares[first + 2, i]
+        d += light * shares[first + 3, i]
+    smoothed[first] = a
+    smoothed[first + 1] = b
+    smoothed[first + 2] = c
+    smoothed[first + 3] = d

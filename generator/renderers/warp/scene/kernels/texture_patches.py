@@ -1,0 +1,138 @@
+"""Patches: faces on which a texture is looked up quickly."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    World,
+    face_vertices,
+    fast_normalize,
+    normal_at,
+    vertex_at,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.struct
+class Patch:
+    """A face whose texture coordinates are linear in space, and whose normal is one, if ``flat``.
+
+    The coordinate u of the point at depth z along a direction d of the camera frame (with z = 1)
+    is ``u + dot(to_u, d) * z``; v likewise.
+
+    Attributes:
+        face: (body, face).
+        texels_per_m: Square root of the texels per area, of the finest mip level.
+        tangent, bitangent, normal: Frame of the normal map, world.
+    """
+
+    face: wp.vec2i
+    flat: int
+    u: float
+    v: float
+    to_u: wp.vec3
+    to_v: wp.vec3
+    texels_per_m: float
+    tangent: wp.vec3
+    bitangent: wp.vec3
+    normal: wp.vec3
+
+
+@wp.func
+def with_mapping(
+    patch: Patch, world: World, b: int, g_u: wp.vec3, c_u: float, g_v: wp.vec3, c_v: float
+):
+    """The patch with coordinates that are ``c_u + dot(g_u, p)`` at points p of the mesh frame."""
+    eye = world.bodies[b].eye_mesh
+    to_camera = wp.transpose(world.bodies[b].B_mesh_camera)
+    patch.u = c_u + wp.dot(g_u, eye)
+    patch.v = c_v + wp.dot(g_v, eye)
+    patch.to_u = to_camera @ g_u
+    patch.to_v = to_camera @ g_v
+    patch.flat = 1
+    return patch
+
+
+@wp.func
+def box_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
+    """Projected textures, where one projection is all that counts (see look.box_mapped)."""
+    squared = wp.cw_mul(n, n)
+    x = wp.vec3(1.0, 0.0, 0.0)
+    y = wp.vec3(0.0, 1.0, 0.0)
+    z = wp.vec3(0.0, 0.0, 1.0)
+    along_u = x
+    along_v = z
+    largest = squared[1]
+    if squared[0] > largest:
+        largest = squared[0]
+        along_u = y
+    if squared[2] > largest:
+        largest = squared[2]
+        along_u = x
+        along_v = y
+    # The other two weigh less than 0.004 in eighth powers.
+    if wp.dot(n, n) - largest < 0.2 * largest:
+        scale_m = world.surfaces[surface].texture_scale_m
+        texture = world.surfaces[surface].texture
+        scale = world.bodies[b].scale / scale_m
+        patch = with_mapping(patch, world, b, along_u * scale, 0.0, along_v * scale, 0.0)
+        patch.texels_per_m = float(world.textures[texture].width) / scale_m
+        patch.tangent = world.bodies[b].R_world_mesh @ along_u
+        patch.bitangent = world.bodies[b].R_world_mesh @ along_v
+    return patch
+
+
+@wp.func
+def mesh_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3i):
+    """Textures by the mesh's own UVs (see look.mesh_mapped)."""
+    g = world.bodies[b].geometry
+    p = vertex_at(world, g, corner[0])
+    e1 = vertex_at(world, g, corner[1]) - p
+    e2 = vertex_at(world, g, corner[2]) - p
+    uv0 = world.geometries[g].uvs[corner[0]]
+    d1 = world.geometries[g].uvs[corner[1]] - uv0
+    d2 = world.geometries[g].uvs[corner[2]] - uv0
+    area_uv = d1[0] * d2[1] - d1[1] * d2[0]
+    n = wp.cross(e1, e2)
+    squared = wp.dot(n, n)
+    if squared > 0.0 and area_uv != 0.0:
+        # Gradients of the barycentric weights of the second and third corner.
+        along_1 = wp.cross(e2, n) * (1.0 / squared)
+        along_2 = wp.cross(n, e1) * (1.0 / squared)
+        g_u = along_1 * d1[0] + along_2 * d2[0]
+        g_v = along_1 * d1[1] + along_2 * d2[1]
+        patch = with_mapping(
+            patch, world, b, g_u, uv0[0] - wp.dot(g_u, p), g_v, uv0[1] - wp.dot(g_v, p)
+        )
+        scale = world.bodies[b].scale
+        size = float(world.textures[texture].width * world.textures[texture].height)
+        texels_per_area = wp.abs(area_uv) * size / wp.sqrt(squared)
+        patch.texels_per_m = wp.sqrt(texels_per_area) / scale
+        tangent = world.bodies[b].R_world_mesh @ ((e1 * d2[1] - e2 * d1[1]) * wp.sign(area_uv))
+        bitangent = world.bodies[b].R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) * wp.sign(area_uv))
+        normal = patch.normal
+        patch.tangent = fast_normalize(tangent - normal * wp.dot(normal, tangent))
+        patch.bitangent = fast_normalize(bitangent - normal * wp.dot(normal, bitangent))
+    return patch
+
+
+@wp.func
+def patch_at(world: World, surface: int, hit: wp.vec2i, normal: wp.vec3):
+    """The patch of a textured (body, face), seen where its normal is ``normal``."""
+    patch = Patch()
+    patch.face = hit
+    patch.normal = normal
+    b = hit[0]
+    g = world.bodies[b].geometry
+    corner = face_vertices(world, g, hit[1])
+    n = normal_at(world, g, corner[0])
+    turn = wp.dot(n, normal_at(world, g, corner[1]))
+    turn = wp.min(turn, wp.dot(n, normal_at(world, g, corner[2])))
+    if turn > 0.9999:
+        if world.surfaces[surface].texture_scale_m > 0.0:
+            patch = box_patch(patch, world, surface, b, n)
+        else:
+            patch = mesh_patch(patch, world, world.surfaces[surface].texture, b, corner)
+    return patch

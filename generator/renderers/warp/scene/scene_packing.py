@@ -1,0 +1,382 @@
+"""A Scene and a Camera as the records that kernels read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from gen_data.generator.core.lens import LensModel
+from gen_data.generator.core.scene import (
+    LIGHT_KINDS,
+    PANEL_KINDS,
+    Body,
+    Camera,
+    Environment,
+    Light,
+    Scene,
+    Weather,
+)
+from gen_data.generator.core.se3 import Array, unit_quaternions_to_rotations
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.scene.body_materials import body_materials
+from gen_data.generator.renderers.warp.scene.bvh import body_tree
+from gen_data.generator.renderers.warp.scene.device_meshes import DeviceMesh
+from gen_data.generator.renderers.warp.scene.environment_maps import DeviceEnvironment
+from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.material_packing import (
+    cutout_bodies,
+    cutout_slots,
+    surface_records,
+)
+from gen_data.generator.renderers.warp.scene.struct_dtypes import (
+    stack_records,
+    struct_dtype,
+    to_device,
+)
+
+_LENSES: dict[LensModel, int] = {
+    "pinhole": records.PINHOLE,
+    "brown_conrady": records.BROWN_CONRADY,
+    "kannala_brandt": records.KANNALA_BRANDT,
+    "equirectangular": records.EQUIRECTANGULAR,
+}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PackedWorld:
+    """One scene on the device.
+
+    Attributes:
+        record: The World record.
+        keep: Everything on the device that the record points to.
+        placed: Body records on the host, structured array [n].
+        vertex_count: Of all bodies together.
+        weather: Of the scene.
+        layered: Whether any surface has more to it than colour, roughness and bumps.
+        lows_m, highs_m: Corners of boxes in the world around the bodies, one at least.
+    """
+
+    record: records.World
+    keep: tuple[object, ...]
+    placed: NDArray[np.void]
+    vertex_count: int
+    weather: Weather
+    layered: bool
+    lows_m: wp.array
+    highs_m: wp.array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Trees:
+    """What finds bodies for rays: fields of the World record.
+
+    Attributes:
+        tree: On CUDA empty.
+        hierarchy: On the CPU None.
+        pierced: Numbers of bodies.
+        pierced_hierarchy: None where there are none.
+    """
+
+    tree: wp.array
+    hierarchy: wp.Bvh | None
+    pierced: wp.array
+    pierced_hierarchy: wp.Bvh | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Places:
+    """Where the bodies of a scene are, whoever looks at them.
+
+    Attributes:
+        placed: Body records without what depends on the camera.
+        R_world_mesh, t_world_mesh, scale: Of the bodies, float64 [n, 3, 3], [n, 3] and [n].
+        vertex_count, lows_m, highs_m: As of PackedWorld.
+        trees: What rays find them by.
+    """
+
+    placed: NDArray[np.void]
+    R_world_mesh: Array
+    t_world_mesh: Array
+    scale: Array
+    vertex_count: int
+    lows_m: wp.array
+    highs_m: wp.array
+    trees: _Trees
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Packed:
+    """What every camera and scanner shares of one scene.
+
+    Attributes:
+        record: The World record, without bodies.
+        assets: Meshes, textures and environment that the record points to.
+        places: Where the bodies are.
+        layered: As of PackedWorld.
+    """
+
+    record: records.World
+    assets: tuple[object, ...]
+    places: _Places
+    layered: bool
+
+
+def pack_world(scene: Scene, camera: Camera, stock: DeviceCache) -> PackedWorld:
+    """The scene as one camera sees it. Cheap enough to be done for every frame."""
+    packed: _Packed = stock.scenes.get(scene, lambda: _packed(scene, stock))
+    return _before(camera, packed, scene.weather, stock)
+
+
+def repack_moved(
+    world: PackedWorld, scene: Scene, camera: Camera, stock: DeviceCache
+) -> PackedWorld:
+    """Another instant of a packed scene: the same assets and materials at other places.
+
+    Args:
+        world: As ``pack_world`` made it.
+        scene: Poses of bodies and lights may differ from those that were packed.
+        camera: Its pose may differ.
+        stock: Assets.
+    """
+    _, *assets = world.keep
+    meshes = assets[0]
+    assert isinstance(meshes, list)
+    body_meshes = [meshes[k] for k in world.placed["geometry"]]
+    places = _places(world.placed.copy(), scene.bodies, body_meshes, stock)
+    record = _copy_of(world.record)
+    record.lamps = to_device(lamp_records(scene.lights), records.LightRecord, stock.device)
+    packed = _Packed(record, tuple(assets), places, world.layered)
+    return _before(camera, packed, world.weather, stock)
+
+
+def add_own_record(world: PackedWorld) -> PackedWorld:
+    """The same world, whose lamps, ground and sky can be changed without changing the other's."""
+    return replace(world, record=_copy_of(world.record))
+
+
+def _copy_of(record: records.World) -> records.World:
+    copy = records.World()
+    for name in records.World.vars:
+        setattr(copy, name, getattr(record, name))
+    return copy
+
+
+def _before(camera: Camera, packed: _Packed, weather: Weather, stock: DeviceCache) -> PackedWorld:
+    """A packed scene with what depends on the camera."""
+    places = packed.places
+    placed = places.placed.copy()
+    if len(placed):
+        _see(placed, places, camera)
+    # A record of its own: weather and lamps are put into it for one view.
+    record = _copy_of(packed.record)
+    _fill_trees(record, places.trees)
+    record.bodies = to_device(placed, records.BodyRecord, stock.device)
+    return PackedWorld(
+        record,
+        (places.trees, *packed.assets),
+        placed,
+        places.vertex_count,
+        weather,
+        packed.layered,
+        places.lows_m,
+        places.highs_m,
+    )
+
+
+def _packed(scene: Scene, stock: DeviceCache) -> _Packed:
+    asset_ids = sorted({body.asset for body in scene.bodies})
+    place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
+    meshes = [stock.mesh(asset_id) for asset_id in asset_ids]
+    looks = body_materials(scene, stock)
+    texture_ids = sorted({texture_id for look in looks for texture_id in look.textures})
+    textures = {texture_id: stock.texture(texture_id) for texture_id in texture_ids}
+    surfaces = surface_records(looks, textures)
+    environment = stock.environment(scene.environment.image)
+    placed = np.zeros(len(scene.bodies), dtype=struct_dtype(records.BodyRecord))
+    placed["geometry"] = [place[body.asset] for body in scene.bodies]
+    counts = np.array([len(look.materials) for look in looks], dtype=np.int64)
+    placed["first_material"] = np.cumsum(counts) - counts
+    placed["pierced"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
+    body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
+    places = _places(placed, scene.bodies, body_meshes, stock)
+    device = stock.device
+    world = records.World()
+    geometries = stack_records([mesh.record for mesh in meshes], records.Geometry)
+    images = stack_records([texture.record for texture in textures.values()], records.TextureRecord)
+    world.geometries = to_device(geometries, records.Geometry, device)
+    world.surfaces = to_device(surfaces, records.MaterialRecord, device)
+    world.textures = to_device(images, records.TextureRecord, device)
+    world.lamps = to_device(lamp_records(scene.lights), records.LightRecord, device)
+    world.lobes = stock.lobes
+    world.sky = sky_record(scene.environment, environment)
+    layered = bool(surfaces["layered"].any())
+    return _Packed(world, (meshes, textures, environment), places, layered)
+
+
+def _places(
+    placed: NDArray[np.void],
+    bodies: Sequence[Body],
+    meshes: Sequence[DeviceMesh],
+    stock: DeviceCache,
+) -> _Places:
+    """Fill in where bodies are, and put a hierarchy over them."""
+    R, t, scale, vertex_count = _place(placed, bodies, meshes)
+    placed["low_m"], placed["high_m"] = _world_boxes(placed, meshes)
+    # Kernels over boxes need one; rays never meet this one.
+    nowhere = np.full((1, 3), 1e9, np.float32)
+    low = placed["low_m"] if len(placed) else nowhere
+    high = placed["high_m"] if len(placed) else nowhere
+    lows_m, highs_m = (
+        wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=stock.device)
+        for corner in (low, high)
+    )
+    trees = _trees(placed, lows_m, highs_m, stock.device)
+    return _Places(placed, R, t, scale, vertex_count, lows_m, highs_m, trees)
+
+
+def _trees(
+    placed: NDArray[np.void], lows_m: wp.array, highs_m: wp.array, device: wp.Device
+) -> _Trees:
+    low, high = (np.ascontiguousarray(placed[name]) for name in ("low_m", "high_m"))
+    tree = np.zeros(0, np.float32) if device.is_cuda else body_tree(low, high)
+    pierced = np.flatnonzero(placed["pierced"]).astype(np.int32)
+    corners = (wp.array(of[pierced], dtype=wp.vec3, device=device) for of in (low, high))
+    return _Trees(
+        wp.array(tree, dtype=wp.float32, device=device),
+        wp.Bvh(lows_m, highs_m) if device.is_cuda else None,
+        wp.array(pierced, dtype=wp.int32, device=device),
+        wp.Bvh(*corners) if len(pierced) else None,
+    )
+
+
+def _fill_trees(record: records.World, trees: _Trees) -> None:
+    record.tree, record.pierced = trees.tree, trees.pierced
+    record.hierarchy = trees.hierarchy.id if trees.hierarchy else 0
+    record.pierced_hierarchy = trees.pierced_hierarchy.id if trees.pierced_hierarchy else 0
+
+
+def pack_view(camera: Camera, stock: DeviceCache) -> records.View:
+    """The camera."""
+    k = camera.intrinsics
+    view = records.View()
+    view.width, view.height = k.width_px, k.height_px
+    view.fx, view.fy, view.cx, view.cy = k.fx_px, k.fy_px, k.cx_px, k.cy_px
+    view.inverse_fx, view.inverse_fy = 1.0 / k.fx_px, 1.0 / k.fy_px
+    view.R_world_camera = wp.mat33(camera.T_world_camera.rotation())
+    view.eye_m = wp.vec3(*camera.T_world_camera.translation_m)
+    view.pixel_rad = 1.0 / k.fx_px
+    if not k.straight:
+        view.lens = _LENSES[k.lens.model]
+        coefficients = (*k.lens.coefficients, *[0.0] * 8)[:8]
+        view.coefficients = records.Coefficients(*coefficients)
+        view.directions = stock.optics(k).directions
+    return view
+
+
+def _place(
+    values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh]
+) -> tuple[Array, Array, Array, int]:
+    """Fill in poses and vertex ranges; returns rotations, positions, scales, number of vertices."""
+    if not bodies:
+        return np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), 0
+    R = unit_quaternions_to_rotations(
+        np.array([body.T_world_body.quaternion_wxyz for body in bodies])
+    )
+    t = np.array([body.T_world_body.translation_m for body in bodies])
+    scale = np.array([body.scale for body in bodies])
+    counts = np.array([mesh.vertex_count for mesh in meshes])
+    values["first_vertex"] = np.cumsum(counts) - counts
+    values["scale"] = scale
+    values["R_world_mesh"] = R
+    values["t_world_mesh"] = t
+    values["B_mesh_world"] = R.transpose(0, 2, 1) / scale[:, None, None]
+    values["t_mesh_world"] = -np.einsum("nji,nj->ni", R, t, optimize=False) / scale[:, None]
+    return R, t, scale, int(counts.sum())
+
+
+def _see(values: NDArray[np.void], places: _Places, camera: Camera) -> None:
+    """Fill in where bodies are before a camera.
+
+    Products are taken in float64, so that a camera far from the world's origin loses nothing.
+    """
+    R_camera_world = camera.T_world_camera.rotation().T
+    away = places.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)
+    R, scale = places.R_world_mesh, places.scale
+    A = np.einsum("ij,njk->nik", R_camera_world, R, optimize=False)
+    values["A_camera_mesh"] = A * scale[:, None, None]
+    values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_camera_world, away, optimize=False)
+    values["B_mesh_camera"] = A.transpose(0, 2, 1) / scale[:, None, None]
+    values["eye_mesh"] = np.einsum("nji,nj->ni", R, -away, optimize=False) / scale[:, None]
+
+
+def _world_boxes(
+    placed: NDArray[np.void], meshes: Sequence[DeviceMesh]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    if not meshes:
+        return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)
+    scale = placed["scale"].astype(np.float64)[:, None]
+    R = placed["R_world_mesh"].astype(np.float64)
+    low = np.stack([mesh.low_m for mesh in meshes]) * scale
+    high = np.stack([mesh.high_m for mesh in meshes]) * scale
+    centre = placed["t_world_mesh"] + np.einsum("nij,nj->ni", R, (low + high) / 2, optimize=False)
+    half = np.einsum("nij,nj->ni", np.abs(R), (high - low) / 2, optimize=False)
+    # A hair of slack keeps flat boxes traversable after rounding to float32.
+    half = half + 1e-6 * (1.0 + np.abs(centre))
+    return (centre - half).astype(np.float32), (centre + half).astype(np.float32)
+
+
+def sky_record(environment: Environment, light: DeviceEnvironment) -> records.EnvironmentRecord:
+    """The Sky record of an environment."""
+    sky = records.EnvironmentRecord()
+    sky.irradiance, sky.glossy = light.irradiance, light.glossy
+    sky.image, sky.rest = light.image, light.rest
+    sky.luminance = environment.luminance_cd_m2
+    sky.cos_yaw, sky.sin_yaw = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
+    sky.visible = int(environment.visible)
+    return sky
+
+
+def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
+    """Lamp records, in the order of the lights."""
+    values = np.zeros(len(lights), dtype=struct_dtype(records.LightRecord))
+    for value, light in zip(values, lights, strict=True):
+        strength = light.illuminance_lux if light.kind == "sun" else light.intensity_cd
+        value["kind"] = LIGHT_KINDS.index(light.kind)
+        value["position_m"] = light.position_m
+        value["direction"] = light.direction
+        value["power"] = np.asarray(light.color) * strength
+        sun = light.kind == "sun"
+        value["radius"] = math.tan(light.angular_radius_rad) if sun else light.radius_m
+        value["cos_outer"] = math.cos(light.cone_rad)
+        value["cos_inner"] = math.cos(light.even * light.cone_rad)
+        value["cutoff"] = light.cutoff
+        if light.kind in PANEL_KINDS:
+            _fill_panel(value, light)
+    return values
+
+
+def _fill_panel(value: NDArray[np.void], light: Light) -> None:
+    """The fields that only panels have."""
+    normal = np.asarray(light.direction, dtype=np.float64)
+    if light.kind == "rectangle":
+        half_m = 0.5 * np.asarray(light.size_m, dtype=np.float64)
+        # Kept at right angles to the normal, whatever rounding has left of it.
+        side = np.asarray(light.side) - normal * float((normal * light.side).sum())
+        side = side / math.sqrt(float((side * side).sum()))
+        area_m2 = 4.0 * half_m[0] * half_m[1]
+        value["radius"] = math.hypot(*half_m)
+    else:
+        half_m = np.full(2, light.radius_m)
+        least = np.eye(3)[int(np.abs(normal).argmin())]
+        side = np.cross(normal, least)
+        side = side / math.sqrt(float((side * side).sum()))
+        area_m2 = math.pi * light.radius_m**2
+    value["shown"] = int(light.body != "")
+    value["along"] = side * half_m[0]
+    value["across"] = np.cross(normal, side) * half_m[1]
+    value["radiance"] = np.asarray(light.color) * (light.intensity_cd / area_m2)

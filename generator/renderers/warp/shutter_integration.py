@@ -1,0 +1,190 @@
+"""Radiance and labels of images whose rows are exposed at several instants, or for a while.
+
+The camera's shutter names the instants. Labels are those of each row's own instant, the middle of
+its exposure. Light is averaged over the exposure: time is cut into slices, every slice is rendered
+at its middle as far as rows are exposed then, and every row is the mean of its slices. Both take no
+more instants than motion in the image makes necessary.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.renderers.warp.frame_context import (
+    CameraState,
+    CameraView,
+    RenderContext,
+    RowBand,
+    is_moving,
+    render_view,
+)
+from gen_data.generator.renderers.warp.realtime.realtime_shading import add_falling, radiance_image
+from gen_data.generator.renderers.warp.scene.light_selection import main_lamp_numbers
+from gen_data.generator.renderers.warp.scene.scene_packing import add_own_record, repack_moved
+from gen_data.generator.renderers.warp.shading_dispatch import shade_pixels, smooth_edges
+from gen_data.generator.renderers.warp.visibility.amodal_rolling import rolling_silhouettes
+from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
+    BandedGBuffer,
+    RadianceFunction,
+    add_margin,
+    render_bands,
+)
+from gen_data.generator.renderers.warp.visibility.motion_bounds import (
+    ShutterSampling,
+    plan_sampling,
+    split_bands,
+)
+from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Slice:
+    """A slice of time, and the rows that are exposed in it.
+
+    Attributes:
+        band: The rows, and the slice's middle.
+        weights: Share of each row's exposure that falls into the slice, shape [rows].
+    """
+
+    band: RowBand
+    weights: Float32
+
+
+def expose_shutter(
+    scene: Scene, camera: Camera, channels: frozenset[Channel], studio: RenderContext
+) -> SensorReading | None:
+    """The image of a camera whose shutter is open for a while; None if nothing moves meanwhile."""
+    open_s = camera.shutter.open_s
+    if not open_s > 0.0:
+        return None
+    moment = CameraState.of(scene, camera)
+    if not is_moving(moment, open_s):
+        return None
+    near = render_view(moment, studio)
+    pace = plan_sampling(near)
+    bands = split_bands(near, pace)
+    if len(bands) == 1 and pace.samples == 1:
+        return None
+    near = _with_main_lamps(near, studio)
+    drawn = channels - FLOW - {Channel.AMODAL}
+    if Channel.AMODAL in channels:
+        drawn = drawn | {Channel.INSTANCE}
+    shown, images = _images(near, bands, drawn, pace, studio)
+    outlines: dict[int, Silhouette] = {}
+    if Channel.AMODAL in channels:
+        outlines = rolling_silhouettes(bands, images[Channel.INSTANCE], studio, near)
+    images |= flow_images(near, shown, channels, studio)
+    return SensorReading(camera.name, camera, images, outlines, scene.time_s)
+
+
+def _images(
+    near: CameraView,
+    bands: Sequence[RowBand],
+    channels: frozenset[Channel],
+    pace: ShutterSampling,
+    studio: RenderContext,
+) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
+    """What pixels show, labels of it and, if asked for, radiance."""
+    labels = channels - {Channel.RADIANCE}
+    if Channel.RADIANCE not in channels:
+        return render_bands(bands, labels, studio, near)
+    light = partial(integrate_light, studio=studio)
+    if pace.samples > 1:
+        shown, images = render_bands(bands, labels, studio, near)
+        mean = _averaged(split_slices(near.moment, pace.samples, pace.blurred), light, near, studio)
+    else:
+        shown, images = render_bands(bands, labels, studio, near, light)
+        mean = images[Channel.RADIANCE]
+    radiance = _on_device(mean, wp.vec3, studio)
+    depths = _on_device(shown.z_m, float, studio)
+    add_falling(near.world, near.moment.camera, near.view, depths, radiance, studio.stock)
+    return shown, images | {Channel.RADIANCE: radiance_image(radiance, near.view)}
+
+
+def split_slices(
+    middle: CameraState, samples: int, blurred: NDArray[np.bool_] | None = None
+) -> list[Slice]:
+    """Slices of time that together hold every row's exposure once.
+
+    Args:
+        middle: Of the exposure of the image.
+        samples: Slices to an exposure.
+        blurred: Rows that are worth it; the others are rendered in the slice nearest to their own
+            instant. None = all.
+    """
+    shutter, height = middle.camera.shutter, middle.camera.intrinsics.height_px
+    step_s = shutter.exposure_s / samples
+    count = max(math.ceil(round(shutter.open_s / step_s, 6)), 1)
+    offsets = (np.arange(count) - 0.5 * (count - 1)) * step_s
+    delays, half_s = shutter.row_delays_s(height), 0.5 * shutter.exposure_s
+    starts, ends = offsets[:, None] - 0.5 * step_s, offsets[:, None] + 0.5 * step_s
+    shares = np.minimum(ends, delays + half_s) - np.maximum(starts, delays - half_s)
+    # What rounding leaves of a slice is not worth rendering.
+    shares = np.where(shares > 1e-6 * step_s, shares, 0.0)
+    shares /= shares.sum(axis=0)
+    if blurred is not None:
+        nearest = np.abs(offsets[:, None] - delays).argmin(axis=0)
+        alone = np.arange(count)[:, None] == nearest
+        shares = np.where(blurred, shares, alone)
+    slices = []
+    for offset_s, share in zip(offsets, shares, strict=True):
+        rows = np.flatnonzero(share)
+        if len(rows):
+            first, end = int(rows[0]), int(rows[-1]) + 1
+            band = RowBand(first, end, middle.later(float(offset_s)))
+            slices.append(Slice(band, share[first:end].astype(np.float32)))
+    return slices
+
+
+def _averaged(
+    slices: Sequence[Slice], light: RadianceFunction, near: CameraView, studio: RenderContext
+) -> Float32:
+    """Means over slices of what comes from every pixel [cd/m^2], float32 [h, w, 3]."""
+    lens = near.moment.camera.intrinsics
+    mean = np.zeros((lens.height_px, lens.width_px, 3), np.float32)
+    for part in slices:
+        band = part.band
+        first, end = add_margin(band, lens.height_px)
+        see = near = render_view(band.moment, studio, (first, end), near)
+        own = light(see)[band.first - first : band.end - first]
+        mean[band.first : band.end] += part.weights[:, None, None] * own
+    return mean
+
+
+def integrate_light(see: CameraView, studio: RenderContext) -> Float32:
+    """What comes from every pixel, anti-aliased; valid until the next call."""
+    # What light does to the world's record is of no concern to those who start from it.
+    see = replace(see, world=add_own_record(see.world))
+    scene, camera = see.moment.scene, see.moment.camera
+    radiance = shade_pixels(scene, camera, see.world, see.view, see.seen, studio)
+    smooth_edges(see.world, see.view, see.seen, radiance, studio)
+    image: Float32 = radiance.numpy().reshape(see.view.height, see.view.width, 3)
+    return image
+
+
+def _with_main_lamps(near: CameraView, studio: RenderContext) -> CameraView:
+    """Only those lamps that matter in the middle of the exposure light the whole of it."""
+    chosen = main_lamp_numbers(near.world, near.view, near.seen, studio.settings.max_lamps)
+    if chosen is None:
+        return near
+    scene, camera = near.moment.scene, near.moment.camera
+    scene = replace(scene, lights=tuple(scene.lights[k] for k in chosen))
+    world = repack_moved(near.world, scene, camera, studio.stock)
+    return replace(near, moment=CameraState(scene, camera), world=world)
+
+
+def _on_device(image: Float32, dtype: Any, studio: RenderContext) -> wp.array:
+    """An image as kernels have it, flat."""
+    flat = image.reshape(-1, *image.shape[2:])
+    return wp.array(flat, dtype=dtype, device=studio.stock.device)

@@ -1,0 +1,1 @@
+"""Which surface every pixel shows, and the label images that follow from it."""

@@ -1,0 +1,1 @@
+"""Rasteriser, multisampling, cut-outs, silhouettes and label images."""

@@ -1,0 +1,157 @@
+"""Bodies with holes among bodies that are drawn: by rays, over what the rasteriser has left.
+
+Loaded only when a scene has such a body.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    HOLES,
+    View,
+    World,
+    pixel_direction,
+    to_mesh_point,
+    to_mesh_vector,
+)
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Window
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+FARTHEST = wp.constant(1.0e6)
+
+
+@wp.struct
+class CutoutBody:
+    """A body with holes, and the pixels that it may be seen at."""
+
+    body: int
+    window: Window
+
+
+@wp.func
+def within(window: Window, x: int, y: int):
+    """Whether a pixel lies in a window."""
+    right = x - window.x0
+    down = y - window.y0
+    return right >= 0 and right < window.width and down >= 0 and down < window.height
+
+
+@wp.func
+def nearness_of(
+    view: View, world: World, b: int, x_px: float, y_px: float, z_near_m: float, behind: float
+):
+    """1/z of a body at a point of the image, and its face; (0, -1) where it is not in front.
+
+    Args:
+        behind: 1/z of what is there already; 0 for nothing.
+    """
+    nearness = float(0.0)
+    face = int(-1)
+    d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
+    o = to_mesh_point(world, b, view.eye_m + d * z_near_m)
+    reach = float(FARTHEST)
+    if behind > 0.0:
+        reach = 1.0 / behind - z_near_m
+    answer = closest_solid_hit(world, b, o, to_mesh_vector(world, b, d), reach, HOLES)
+    if answer.face >= 0:
+        nearness = 1.0 / (answer.t + z_near_m)
+        face = answer.face
+    return nearness, face
+
+
+@wp.kernel
+def trace_centres(
+    view: View,
+    world: World,
+    bodies: wp.array(dtype=CutoutBody),
+    z_near_m: float,
+    nearness: wp.array(dtype=float),
+    hits: wp.array(dtype=wp.vec2i),
+):
+    """Z-buffer over pixel centres, as raster.draw_bodies; one row of the image per thread."""
+    y = wp.tid()
+    for k in range(bodies.shape[0]):
+        window = bodies[k].window
+        b = bodies[k].body
+        if y >= window.y0 and y < window.y0 + window.height:
+            for x in range(wp.max(window.x0, 0), wp.min(window.x0 + window.width, view.width)):
+                i = y * view.width + x
+                near, face = nearness_of(
+                    view, world, b, float(x) + 0.5, float(y) + 0.5, z_near_m, nearness[i]
+                )
+                if near > nearness[i]:
+                    nearness[i] = near
+                    hits[i] = wp.vec2i(b, face)
+
+
+@wp.kernel
+def trace_samples(
+    view: View,
+    world: World,
+    bodies: wp.array(dtype=CutoutBody),
+    z_near_m: float,
+    pixels: wp.array(dtype=int),
+    offsets: wp.array(dtype=wp.vec2),
+    nearness: wp.array(dtype=float, ndim=2),
+    hits: wp.array(dtype=wp.vec2i, ndim=2),
+):
+    """Z-buffer over samples of listed pixels, as samples.draw_samples.
+
+    Args:
+        offsets: Sample positions within a pixel, [0, 1).
+    """
+    row = wp.tid()
+    x = pixels[row] % view.width
+    y = pixels[row] / view.width
+    for k in range(bodies.shape[0]):
+        b = bodies[k].body
+        if within(bodies[k].window, x, y):
+            for s in range(offsets.shape[0]):
+                x_px = float(x) + offsets[s][0]
+                y_px = float(y) + offsets[s][1]
+                near, face = nearness_of(view, world, b, x_px, y_px, z_near_m, nearness[row, s])
+                if near > nearness[row, s]:
+                    nearness[row, s] = near
+                    hits[row, s] = wp.vec2i(b, face)
+
+
+@wp.struct
+class Outline:
+    """Where the silhouette of a body goes.
+
+    Attributes:
+        window: The pixels that the body may cover; may lie beside the image.
+        first_pixel: Of the buffer, for the first of them.
+        stride: From row to row in the buffer.
+    """
+
+    body: int
+    window: Window
+    first_pixel: int
+    stride: int
+
+
+@wp.kernel
+def trace_outlines(
+    view: View,
+    world: World,
+    outlines: wp.array(dtype=Outline),
+    z_near_m: float,
+    mask: wp.array(dtype=wp.uint8),
+):
+    """Write 1 at every pixel centre that a body covers, before a pinhole; one row per thread."""
+    k, row = wp.tid()
+    window = outlines[k].window
+    if row >= window.height:
+        return
+    for column in range(window.width):
+        i = outlines[k].first_pixel + row * outlines[k].stride + column
+        if mask[i] == wp.uint8(0):
+            x_px = float(window.x0 + column) + 0.5
+            y_px = float(window.y0 + row) + 0.5
+            near, _face = nearness_of(view, world, outlines[k].body, x_px, y_px, z_near_m, 0.0)
+            if near > 0.0:
+                mask[i] = wp.uint8(1)

@@ -1,0 +1,66 @@
+"""Silhouettes before a pinhole: where each instance would be if nothing else were there."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.records import View, World
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
+    UNSNAPPED,
+    Window,
+    clip,
+    draw_coverage,
+    fan_edges,
+    is_beyond_guard,
+    make_edges,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.struct
+class Canvas:
+    """The part of the mask buffer that an instance is drawn into.
+
+    Attributes:
+        body: Number of one of its bodies.
+        window: The pixels it covers, in image coordinates.
+        first_pixel: Where its mask begins in the buffer.
+    """
+
+    body: int
+    window: Window
+    first_pixel: int
+
+
+@wp.kernel
+def draw_silhouettes(
+    view: View,
+    world: World,
+    p_camera: wp.array(dtype=wp.vec3),
+    xy: wp.array(dtype=wp.vec2i),
+    canvases: wp.array(dtype=Canvas),
+    mask: wp.array(dtype=wp.uint8),
+):
+    """Write 1 at every pixel centre that a body covers; one body per thread.
+
+    Threads only ever write the same value, so bodies of one instance may be drawn at once.
+    """
+    canvas = canvases[wp.tid()]
+    geometry = world.geometries[world.bodies[canvas.body].geometry]
+    first = world.bodies[canvas.body].first_vertex
+    stride = canvas.window.width
+    for f in range(geometry.face_slots.shape[0]):
+        i = first + geometry.faces[3 * f]
+        j = first + geometry.faces[3 * f + 1]
+        k = first + geometry.faces[3 * f + 2]
+        if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
+            e = make_edges(xy[i], xy[j], xy[k], canvas.window)
+            if e.covers != 0:
+                draw_coverage(e, canvas.first_pixel, stride, mask)
+        elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
+            polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
+            for t in range(1, corners - 1):
+                e = fan_edges(view, polygon, t, canvas.window)
+                if e.covers != 0:
+                    draw_coverage(e, canvas.first_pixel, stride, mask)

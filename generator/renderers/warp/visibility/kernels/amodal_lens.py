@@ -1,0 +1,95 @@
+"""Silhouettes through lenses whose edges are bent: by rays, where a pinhole's are drawn."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.alpha_test import is_mesh_intersected
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    HOLES,
+    View,
+    World,
+    fast_normalize,
+    to_mesh_point,
+    to_mesh_vector,
+)
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Window
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.struct
+class AmodalWindow:
+    """The part of the canvas in which one body may be seen.
+
+    Attributes:
+        body: Its number.
+        window: The pixels, in image coordinates.
+        first_pixel: Where the first of them is in the buffer.
+        stride: From row to row in the buffer.
+    """
+
+    body: int
+    window: Window
+    first_pixel: int
+    stride: int
+
+
+@wp.func
+def canvas_direction(
+    view: View, nodes: wp.array(dtype=wp.vec4, ndim=2), stride: int, x: int, y: int
+):
+    """Unit direction through a pixel's centre in the image or beside it; 0 where nothing shows.
+
+    Args:
+        nodes: Directions at every ``stride``-th pixel centre of the canvas.
+    """
+    d = wp.vec4(0.0)
+    if x >= 0 and x < view.width and y >= 0 and y < view.height:
+        d = view.directions[y * view.width + x]
+        if d[3] == 0.0:
+            d = wp.vec4(0.0)
+    else:
+        column = (x + view.width) / stride
+        row = (y + view.height) / stride
+        right = float(x + view.width - column * stride) / float(stride)
+        down = float(y + view.height - row * stride) / float(stride)
+        a = nodes[row, column]
+        b = nodes[row, column + 1]
+        c = nodes[row + 1, column]
+        e = nodes[row + 1, column + 1]
+        if a[3] * b[3] * c[3] * e[3] > 0.0:
+            d = (a * (1.0 - right) + b * right) * (1.0 - down) + (
+                c * (1.0 - right) + e * right
+            ) * down
+    return fast_normalize(wp.vec3(d[0], d[1], d[2]))
+
+
+@wp.kernel
+def trace_silhouettes(
+    view: View,
+    world: World,
+    nodes: wp.array(dtype=wp.vec4, ndim=2),
+    stride: int,
+    t_min: float,
+    outlooks: wp.array(dtype=AmodalWindow),
+    mask: wp.array(dtype=wp.uint8),
+):
+    """Write 1 at every pixel whose ray meets a body; one row of one outlook per thread."""
+    k, row = wp.tid()
+    outlook = outlooks[k]
+    if row >= outlook.window.height:
+        return
+    b = outlook.body
+    for column in range(outlook.window.width):
+        i = outlook.first_pixel + row * outlook.stride + column
+        if mask[i] == wp.uint8(0):
+            x = outlook.window.x0 + column
+            y = outlook.window.y0 + row
+            d = view.R_world_camera @ canvas_direction(view, nodes, stride, x, y)
+            if wp.dot(d, d) > 0.5:
+                o = to_mesh_point(world, b, view.eye_m + d * t_min)
+                way = to_mesh_vector(world, b, d)
+                if is_mesh_intersected(world, b, o, way, FARTHEST, HOLES):
+                    mask[i] = wp.uint8(1)

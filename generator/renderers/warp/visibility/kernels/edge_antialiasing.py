@@ -1,0 +1,180 @@
+"""Anti-aliasing of colour where surfaces meet within a pixel.
+
+Coverage is sampled by rays at parts of the pixel; colour is taken from the pixel centres nearby
+that see the same surface, so that nothing is shaded twice.
+
+Source: Chajdas, McGuire and Luebke, "Subpixel reconstruction antialiasing", I3D 2011.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
+from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, hole_at
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    HOLES,
+    View,
+    World,
+    flat_normal,
+    is_in_view,
+    pixel_direction,
+    to_mesh_point,
+    to_mesh_vector,
+)
+from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import most_alike, nearby
+from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import make_facet
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+Vector8 = wp.types.vector(length=8, dtype=wp.float32)
+Vector8i = wp.types.vector(length=8, dtype=wp.int32)
+
+
+@wp.struct
+class Parts:
+    """What the parts of one pixel see.
+
+    Attributes:
+        nearness: 1/z of the nearest surface so far [1/m]; 0 for none.
+        source: Pixel whose centre sees the same surface and lends its colour; -1 for none.
+    """
+
+    nearness: Vector8
+    source: Vector8i
+
+
+@wp.func
+def seen_before(view: View, images: GBufferRecord, x: int, y: int, k: int):
+    """Whether an earlier of the nine pixels sees the same face as the k-th."""
+    hit = images.hits[nearby(view, x, y, k)]
+    before = bool(False)
+    for m in range(k):
+        other = images.hits[nearby(view, x, y, m)]
+        if other[0] == hit[0] and other[1] == hit[1]:
+            before = True
+    return before
+
+
+@wp.func
+def cover(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    offsets: wp.array(dtype=wp.vec2),
+    x: int,
+    y: int,
+    source: int,
+    parts: Parts,
+):
+    """Give the parts of pixel (x, y) to the face that pixel ``source`` sees where it is nearest."""
+    hit = images.hits[source]
+    facet = make_facet(world, hit)
+    pierced = (world.bodies[hit[0]].pierced & HOLES) != 0
+    for s in range(offsets.shape[0]):
+        x_px = float(x) + offsets[s][0]
+        y_px = float(y) + offsets[s][1]
+        d = pixel_direction(view, x_px, y_px)
+        det = wp.dot(d, facet.across)
+        # Barycentric weights and depth without a division: all have det for a factor.
+        side = wp.where(det < 0.0, -1.0, 1.0)
+        u = wp.dot(d, facet.along_u) * side
+        v = wp.dot(d, facet.along_v) * side
+        w = det * side
+        if u >= 0.0 and v >= 0.0 and u + v <= w and facet.depth * side > 0.0:
+            nearness = det / facet.depth
+            seen = nearness > parts.nearness[s]
+            if seen and pierced:
+                weights = wp.vec3(w - u - v, u, v) * (1.0 / w)
+                seen = not hole_at(world, hit[0], hit[1], weights)
+            if seen:
+                parts.nearness[s] = nearness
+                parts.source[s] = source
+    return parts
+
+
+@wp.func
+def traced_source(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    x: int,
+    y: int,
+    x_px: float,
+    y_px: float,
+    t_min: float,
+):
+    """The pixel around (x, y) that sees the body a ray meets first, for faces no centre sees.
+
+    A body that no centre around sees has no colour to lend: it is not looked for.
+    """
+    d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
+    origin = view.eye_m + d * t_min
+    nearest = float(FARTHEST)
+    source = int(-1)
+    normal = wp.vec3(0.0)
+    last = int(-1)
+    for k in range(9):
+        j = nearby(view, x, y, k)
+        b = images.hits[j][0]
+        if b < 0:
+            if source < 0:
+                source = j
+        elif b != last:
+            last = b
+            o = to_mesh_point(world, b, origin)
+            answer = closest_solid_hit(world, b, o, to_mesh_vector(world, b, d), nearest, HOLES)
+            if answer.face >= 0:
+                nearest = answer.t
+                source = j
+                normal = flat_normal(world, wp.vec2i(b, answer.face))
+    if nearest < FARTHEST:
+        source = most_alike(view, images, x, y, source, normal)
+    return source
+
+
+@wp.kernel
+def antialias(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    radiance: wp.array(dtype=wp.vec3),
+    pixels: wp.array(dtype=int),
+    offsets: wp.array(dtype=wp.vec2),
+    t_min: float,
+    mixed: wp.array(dtype=wp.vec3),
+):
+    """Radiance of listed pixels: the mean over parts of the pixel, in the order of the list.
+
+    Args:
+        offsets: At most eight sample positions within the pixel, [0, 1).
+        t_min: z-depth from which surfaces are seen.
+    """
+    row = wp.tid()
+    i = pixels[row]
+    mixed[row] = radiance[i]
+    if not is_in_view(view, i):
+        return
+    x = i % view.width
+    y = i / view.width
+    parts = Parts()
+    for s in range(offsets.shape[0]):
+        parts.source[s] = -1
+    for k in range(9):
+        j = nearby(view, x, y, k)
+        if images.hits[j][0] >= 0 and not seen_before(view, images, x, y, k):
+            parts = cover(view, world, images, offsets, x, y, j, parts)
+    total = wp.vec3(0.0)
+    lit = int(0)
+    for s in range(offsets.shape[0]):
+        source = parts.source[s]
+        if source < 0:
+            x_px = float(x) + offsets[s][0]
+            y_px = float(y) + offsets[s][1]
+            source = traced_source(view, world, images, x, y, x_px, y_px, t_min)
+        if source >= 0:
+            total += radiance[source]
+            lit += 1
+    if lit > 0:
+        mixed[row] = total * (1.0 / float(lit))

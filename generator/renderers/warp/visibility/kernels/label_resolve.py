@@ -1,0 +1,234 @@
+"""From (body, face) at a pixel to what lies there, and to label images."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    PINHOLE,
+    View,
+    World,
+    face_vertices,
+    fast_normalize,
+    first_weight,
+    normal_at,
+    pixel_direction,
+    vertex_at,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+
+@wp.struct
+class Facet:
+    """One triangle, made ready for many rays from the camera's centre.
+
+    For a direction d in the camera frame, with ``det = d . across``: the barycentric weights of
+    the second and third vertex are ``d . along_u / det`` and ``d . along_v / det``, the z-depth is
+    ``depth / det``, the side that is seen is the sign of ``det``.
+    Source: Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection", 1997,
+    with the products of the triangle's own vectors taken first.
+
+    Attributes:
+        z_m: z-depths of the three vertices.
+        n, n_u, n_v: Normal of the first vertex and the steps to the others, world frame.
+    """
+
+    across: wp.vec3
+    along_u: wp.vec3
+    along_v: wp.vec3
+    depth: float
+    z_m: wp.vec3
+    n: wp.vec3
+    n_u: wp.vec3
+    n_v: wp.vec3
+
+
+@wp.func
+def make_facet(world: World, hit: wp.vec2i):
+    """The facet of a (body, face)."""
+    b = hit[0]
+    g = world.bodies[b].geometry
+    corner = face_vertices(world, g, hit[1])
+    p = vertex_at(world, g, corner[0])
+    e1 = vertex_at(world, g, corner[1]) - p
+    e2 = vertex_at(world, g, corner[2]) - p
+    to_eye = world.bodies[b].eye_mesh - p
+    camera = wp.transpose(world.bodies[b].B_mesh_camera)
+    q = wp.cross(to_eye, e1)
+    f = Facet()
+    f.across = camera @ wp.cross(e2, e1)
+    f.along_u = camera @ wp.cross(e2, to_eye)
+    f.along_v = camera @ q
+    f.depth = wp.dot(e2, q)
+    A = world.bodies[b].A_camera_mesh
+    row = wp.vec3(A[2, 0], A[2, 1], A[2, 2])
+    z = wp.dot(row, p) + world.bodies[b].t_camera_mesh[2]
+    f.z_m = wp.vec3(z, z + wp.dot(row, e1), z + wp.dot(row, e2))
+    R = world.bodies[b].R_world_mesh
+    f.n = R @ normal_at(world, g, corner[0])
+    f.n_u = R @ normal_at(world, g, corner[1]) - f.n
+    f.n_v = R @ normal_at(world, g, corner[2]) - f.n
+    return f
+
+
+@wp.func
+def face_viewer(n: wp.vec3, d_world: wp.vec3):
+    """A unit normal that is not turned away from the viewer.
+
+    Interpolation may tip a normal over the horizon: it is brought back to where it is seen edge-on.
+    """
+    m = fast_normalize(n)
+    over = wp.dot(m, d_world)
+    if over > 0.0:
+        # A thousandth beyond the edge: exactly on it, rounding would decide.
+        m = fast_normalize(m - d_world * (over * 1.001 / wp.dot(d_world, d_world)))
+    return m
+
+
+@wp.kernel
+def resolve(
+    view: View,
+    world: World,
+    run: int,
+    hits: wp.array(dtype=wp.vec2i),
+    z_m: wp.array(dtype=float),
+    weights: wp.array(dtype=wp.vec2),
+    normals: wp.array(dtype=wp.vec3),
+):
+    """Depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
+
+    Weights are stored as (u, v), with 2 added to u where the inside of the triangle is seen.
+
+    Args:
+        run: Pixels in a row per thread: neighbours on one triangle share its preparation.
+        z_m: Parameters of the pixels' rays: z-depths before a pinhole, else ranges.
+    """
+    y, segment = wp.tid()
+    x = segment * run
+    end = wp.min(x + run, view.width)
+    row = y * view.width
+    while x < end:
+        hit = hits[row + x]
+        if hit[0] < 0:
+            z_m[row + x] = wp.inf
+            normals[row + x] = wp.vec3(0.0)
+            x += 1
+        else:
+            facet = make_facet(world, hit)
+            same = bool(True)
+            while same:
+                d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+                det = wp.dot(d, facet.across)
+                # Seen edge-on, by an accident of snapping; the branch below mends depth and
+                # weights.
+                inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
+                u = wp.dot(d, facet.along_u) * inverse
+                v = wp.dot(d, facet.along_v) * inverse
+                z = facet.depth * inverse
+                if u < 0.0 or v < 0.0 or u + v > 1.0:
+                    # Snapping moved an edge across this pixel's centre.
+                    u = wp.clamp(u, 0.0, 1.0)
+                    v = wp.clamp(v, 0.0, 1.0 - u)
+                    z = facet.z_m[0] * (1.0 - u - v) + facet.z_m[1] * u + facet.z_m[2] * v
+                    if view.lens != PINHOLE:
+                        z = range_of(world, hit, wp.vec2(u, v))
+                n = facet.n + facet.n_u * u + facet.n_v * v
+                side = wp.where(det < 0.0, -1.0, 1.0)
+                z_m[row + x] = z
+                weights[row + x] = wp.vec2(u + 1.0 - side, v)
+                normals[row + x] = face_viewer(n * side, view.R_world_camera @ d)
+                x += 1
+                same = False
+                if x < end:
+                    same = hits[row + x][0] == hit[0] and hits[row + x][1] == hit[1]
+
+
+@wp.kernel
+def label_ids(
+    hits: wp.array(dtype=wp.vec2i),
+    ids: wp.array(dtype=wp.uint16),
+    labels: wp.array(dtype=wp.uint16),
+):
+    """The id of the body at every pixel; ``ids[0]`` is for nothing, ``ids[1 + b]`` for b."""
+    i = wp.tid()
+    labels[i] = ids[hits[i][0] + 1]
+
+
+@wp.kernel
+def label_ranges(view: View, z_m: wp.array(dtype=float), ranges_m: wp.array(dtype=float)):
+    """Distance along the ray."""
+    i = wp.tid()
+    x = float(i % view.width) + 0.5
+    y = float(i / view.width) + 0.5
+    ranges_m[i] = z_m[i] * wp.length(pixel_direction(view, x, y))
+
+
+@wp.kernel
+def label_z_depths(view: View, ranges_m: wp.array(dtype=float), z_m: wp.array(dtype=float)):
+    """Distance along the optical axis; inf for what is not before the camera."""
+    i = wp.tid()
+    z = ranges_m[i] * view.directions[i][2]
+    # NaN, where the lens shows nothing, compares false and is nothing too.
+    if not z > 0.0:
+        z = wp.inf
+    z_m[i] = z
+
+
+@wp.kernel
+def label_normals(
+    view: View, normals: wp.array(dtype=wp.vec3), normals_camera: wp.array(dtype=wp.vec3)
+):
+    """Normals in the camera frame."""
+    i = wp.tid()
+    normals_camera[i] = wp.transpose(view.R_world_camera) @ normals[i]
+
+
+@wp.struct
+class BoxFrame:
+    """Mesh frame to the unit cube of an instance's box; ``labelled`` is 0 for the background."""
+
+    A_box_mesh: wp.mat33
+    t_box_mesh: wp.vec3
+    labelled: int
+
+
+@wp.kernel
+def label_object_coordinates(
+    world: World,
+    hits: wp.array(dtype=wp.vec2i),
+    weights: wp.array(dtype=wp.vec2),
+    frames: wp.array(dtype=BoxFrame),
+    coordinates: wp.array(dtype=wp.vec3),
+):
+    """Position within the instance's box, [0, 1] per axis."""
+    i = wp.tid()
+    b = hits[i][0]
+    p = wp.vec3(0.0)
+    if b >= 0:
+        if frames[b].labelled != 0:
+            m = mesh_point(world, hits[i], weights[i])
+            q = frames[b].A_box_mesh @ m + frames[b].t_box_mesh
+            p = wp.vec3(
+                wp.clamp(q[0], 0.0, 1.0), wp.clamp(q[1], 0.0, 1.0), wp.clamp(q[2], 0.0, 1.0)
+            )
+    coordinates[i] = p
+
+
+@wp.func
+def range_of(world: World, hit: wp.vec2i, weight: wp.vec2):
+    """Distance from the camera's centre to a point of a (body, face)."""
+    b = hit[0]
+    m = mesh_point(world, hit, weight)
+    return wp.length(world.bodies[b].A_camera_mesh @ m + world.bodies[b].t_camera_mesh)
+
+
+@wp.func
+def mesh_point(world: World, hit: wp.vec2i, weight: wp.vec2):
+    """The point of a (body, face) with stored barycentric weights, in the mesh frame."""
+    u = first_weight(weight)
+    v = weight[1]
+    g = world.bodies[hit[0]].geometry
+    corner = face_vertices(world, g, hit[1])
+    p = vertex_at(world, g, corner[0]) * (1.0 - u - v)
+    return p + vertex_at(world, g, corner[1]) * u + vertex_at(world, g, corner[2]) * v

@@ -1,0 +1,334 @@
+"""Anti-aliasing by the rasteriser: what the parts of pixels on edges see (CPU device only).
+
+Triangles are drawn once more, into samples of the pixels that edges cross; colour is taken from the
+pixel centres nearby that see the same surface, as in
+gen_data.generator.renderers.warp.visibility.kernels.edge_antialiasing.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    View,
+    World,
+    face_vertices,
+    min_of_two,
+    vertex_at,
+)
+from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import most_alike, nearby
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
+    UNSNAPPED,
+    Z_NEAR_M,
+    DepthPlane,
+    Window,
+    clip,
+    depth_plane,
+    is_beyond_guard,
+    snap_to_grid,
+    span_end,
+    span_start,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Above the nearness of any surface.
+UNLISTED = wp.constant(1.0e30)
+
+
+@wp.kernel
+def number_pixels(
+    view: View,
+    images: GBufferRecord,
+    pixels: wp.array(dtype=int),
+    numbers: wp.array(dtype=int),
+    floors: wp.array(dtype=float),
+):
+    """At every listed pixel, its place in the list, and how near a surface must be to matter.
+
+    What lies behind all that the centres around see has no colour to take.
+
+    Args:
+        floors: 1/z [1/m]; to be UNLISTED at first.
+    """
+    k = wp.tid()
+    i = pixels[k]
+    farthest = float(0.0)
+    for m in range(9):
+        j = nearby(view, i % view.width, i / view.width, m)
+        farthest = wp.max(farthest, images.z_m[j])
+    numbers[i] = k
+    floors[i] = 0.98 / farthest
+
+
+@wp.struct
+class Side:
+    """An edge function: its value at a point, steps per 1/256 px, and their reach over a pixel.
+
+    Inside is >= 0.
+    """
+
+    value: wp.int64
+    dx: wp.int64
+    dy: wp.int64
+    reach: wp.int64
+
+
+@wp.func
+def side_of(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
+    """The edge from p to q of a triangle with that signed area, seen from a snapped point."""
+    side = Side()
+    turn = wp.where(area > wp.int64(0), wp.int64(1), wp.int64(-1))
+    side.dx = wp.int64(p[1] - q[1]) * turn
+    side.dy = wp.int64(q[0] - p[0]) * turn
+    side.value = wp.int64(x - p[0]) * side.dx + wp.int64(y - p[1]) * side.dy
+    # Left and top edges own what lies on them.
+    if not (side.dx > wp.int64(0) or (side.dx == wp.int64(0) and side.dy > wp.int64(0))):
+        side.value -= wp.int64(1)
+    side.reach = wp.int64(128) * (wp.abs(side.dx) + wp.abs(side.dy))
+    return side
+
+
+@wp.func
+def span_from(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side, ec: Side):
+    """The first pixel of a row from 0 to ``last`` that edges with values a, b, c may reach."""
+    start = int(0)
+    # Shorter rows are looked at one by one.
+    if last > 8:
+        pixel = wp.int64(256)
+        start = span_start(a + ea.reach, pixel * ea.dx, start)
+        start = span_start(b + eb.reach, pixel * eb.dx, start)
+        start = span_start(c + ec.reach, pixel * ec.dx, start)
+    return start
+
+
+@wp.func
+def span_to(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side, ec: Side):
+    """The last pixel of a row from 0 to ``last`` that three edges may reach into."""
+    end = last
+    if last > 8:
+        pixel = wp.int64(256)
+        end = span_end(a + ea.reach, pixel * ea.dx, end)
+        end = span_end(b + eb.reach, pixel * eb.dx, end)
+        end = span_end(c + ec.reach, pixel * ec.dx, end)
+    return end
+
+
+@wp.func
+def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, at: wp.vec2i):
+    """Whether a triangle whose edges have values a, b, c at a point covers the one ``at`` off."""
+    right = wp.int64(at[0])
+    down = wp.int64(at[1])
+    inside = a + right * ea.dx + down * ea.dy
+    inside = inside | (b + right * eb.dx + down * eb.dy)
+    inside = inside | (c + right * ec.dx + down * ec.dy)
+    return inside >= wp.int64(0)
+
+
+@wp.func
+def draw_samples_of(
+    numbers: wp.array(dtype=int),
+    floors: wp.array(dtype=float),
+    window: Window,
+    offsets: wp.array(dtype=wp.vec2i),
+    p: wp.vec2i,
+    q: wp.vec2i,
+    r: wp.vec2i,
+    plane: DepthPlane,
+    body: int,
+    face: int,
+    nearness: wp.array(dtype=float, ndim=2),
+    hits: wp.array(dtype=wp.vec2i, ndim=2),
+):
+    """Write (body, face) into the samples of numbered pixels where a triangle is nearest."""
+    area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
+    area -= wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
+    if area == wp.int64(0):
+        return
+    x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
+    x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
+    y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
+    y_last = wp.min(wp.max(p[1], wp.max(q[1], r[1])) >> 8, window.height - 1)
+    # From the middle of the first pixel.
+    x_middle = (x_first << 8) + 128
+    y_middle = (y_first << 8) + 128
+    ea = side_of(p, q, area, x_middle, y_middle)
+    eb = side_of(q, r, area, x_middle, y_middle)
+    ec = side_of(r, p, area, x_middle, y_middle)
+    pixel = wp.int64(256)
+    slack = 0.5 * (wp.abs(plane.dx) + wp.abs(plane.dy))
+    samples = offsets.shape[0]
+    for y in range(y_first, y_last + 1):
+        rows = wp.int64(y - y_first) * pixel
+        a = ea.value + rows * ea.dy
+        b = eb.value + rows * eb.dy
+        c = ec.value + rows * ec.dy
+        start = span_from(x_last - x_first, a, b, c, ea, eb, ec)
+        end = span_to(x_last - x_first, a, b, c, ea, eb, ec)
+        a += wp.int64(start) * pixel * ea.dx
+        b += wp.int64(start) * pixel * eb.dx
+        c += wp.int64(start) * pixel * ec.dx
+        # While: Warp's ranges take longer than what is done in them.
+        x = int(x_first + start)
+        while x <= x_first + end:
+            i = y * window.width + x
+            if plane.high >= floors[i] and (
+                (a + ea.reach) | (b + eb.reach) | (c + ec.reach)
+            ) >= wp.int64(0):
+                row = plane.c + float(y) * plane.dy + float(x) * plane.dx
+                if row + slack >= floors[i]:
+                    k = numbers[i]
+                    s = int(0)
+                    while s < samples:
+                        at = offsets[s]
+                        if covers(ea, eb, ec, a, b, c, at):
+                            w = row + 0.00390625 * (
+                                float(at[0]) * plane.dx + float(at[1]) * plane.dy
+                            )
+                            w = wp.clamp(w, plane.low, plane.high)
+                            if w > nearness[k, s]:
+                                nearness[k, s] = w
+                                hits[k, s] = wp.vec2i(body, face)
+                        s += 1
+            a += pixel * ea.dx
+            b += pixel * eb.dx
+            c += pixel * ec.dx
+            x += 1
+
+
+@wp.func
+def floor_below(
+    floors: wp.array(dtype=float), window: Window, p: wp.vec2i, q: wp.vec2i, r: wp.vec2i
+):
+    """The lowest floor in a triangle's box; 0 where the box is too large to look."""
+    x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
+    x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
+    y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
+    y_last = wp.min(wp.max(p[1], wp.max(q[1], r[1])) >> 8, window.height - 1)
+    lowest = float(UNLISTED)
+    if x_first <= x_last and y_first <= y_last:
+        if (x_last - x_first) * (y_last - y_first) > 64:
+            return 0.0
+        for y in range(y_first, y_last + 1):
+            i = int(y * window.width + x_first)
+            while i <= y * window.width + x_last:
+                lowest = min_of_two(lowest, floors[i])
+                i += 1
+    return lowest
+
+
+@wp.kernel
+def draw_samples(
+    view: View,
+    window: Window,
+    world: World,
+    bodies: wp.array(dtype=int),
+    p_camera: wp.array(dtype=wp.vec3),
+    xy: wp.array(dtype=wp.vec2i),
+    numbers: wp.array(dtype=int),
+    floors: wp.array(dtype=float),
+    offsets: wp.array(dtype=wp.vec2i),
+    nearness: wp.array(dtype=float, ndim=2),
+    hits: wp.array(dtype=wp.vec2i, ndim=2),
+):
+    """Z-buffer of listed bodies over samples of numbered pixels, as draw_bodies is over centres.
+
+    Args:
+        numbers: Row of each pixel in the outputs.
+        floors: Nearness below which a pixel takes nothing; UNLISTED where it has no row.
+        offsets: Sample positions, from the middle of a pixel [1/256 px].
+        nearness: 1/z [1/m], to be 0 at first.
+        hits: Unchanged where nothing is hit.
+    """
+    b = bodies[wp.tid()]
+    geometry = world.geometries[world.bodies[b].geometry]
+    first = world.bodies[b].first_vertex
+    for f in range(geometry.face_slots.shape[0]):
+        i = first + geometry.faces[3 * f]
+        j = first + geometry.faces[3 * f + 1]
+        k = first + geometry.faces[3 * f + 2]
+        if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
+            floor = floor_below(floors, window, xy[i], xy[j], xy[k])
+            near = bool(False)
+            if floor < UNLISTED:
+                z = wp.min(p_camera[i][2], wp.min(p_camera[j][2], p_camera[k][2]))
+                near = floor * z <= 1.0
+            if near:
+                p = xy[i]
+                q = xy[j]
+                r = xy[k]
+                plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+                draw_samples_of(
+                    numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
+                )
+        elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
+            polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
+            plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+            plane.high = 1.0 / Z_NEAR_M
+            for t in range(1, corners - 1):
+                p = snap_to_grid(view, polygon[0])
+                q = snap_to_grid(view, polygon[t])
+                r = snap_to_grid(view, polygon[t + 1])
+                draw_samples_of(
+                    numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
+                )
+
+
+@wp.func
+def lender(view: View, world: World, images: GBufferRecord, x: int, y: int, hit: wp.vec2i):
+    """The pixel around (x, y) that lends its colour to a sample; -1 if none sees its body."""
+    source = int(-1)
+    same_face = bool(False)
+    others = int(0)
+    for k in range(9):
+        j = nearby(view, x, y, k)
+        if not same_face and images.hits[j][0] == hit[0]:
+            if images.hits[j][1] == hit[1] or hit[0] < 0:
+                same_face = True
+                source = j
+            else:
+                others += 1
+                if source < 0:
+                    source = j
+    if not same_face and others > 1:
+        b = hit[0]
+        corner = face_vertices(world, world.bodies[b].geometry, hit[1])
+        p = vertex_at(world, world.bodies[b].geometry, corner[0])
+        e1 = vertex_at(world, world.bodies[b].geometry, corner[1]) - p
+        e2 = vertex_at(world, world.bodies[b].geometry, corner[2]) - p
+        n = world.bodies[b].R_world_mesh @ wp.normalize(wp.cross(e1, e2))
+        source = most_alike(view, images, x, y, source, n)
+    return source
+
+
+@wp.kernel
+def mix_samples(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    radiance: wp.array(dtype=wp.vec3),
+    pixels: wp.array(dtype=int),
+    hits: wp.array(dtype=wp.vec2i, ndim=2),
+    mixed: wp.array(dtype=wp.vec3),
+):
+    """Radiance of listed pixels: the mean over their samples, in the order of the list."""
+    row = wp.tid()
+    i = pixels[row]
+    x = i % view.width
+    y = i / view.width
+    total = wp.vec3(0.0)
+    lit = int(0)
+    last = wp.vec2i(-2, -2)
+    source = int(-1)
+    for s in range(hits.shape[1]):
+        hit = hits[row, s]
+        if hit[0] != last[0] or hit[1] != last[1]:
+            source = lender(view, world, images, x, y, hit)
+            last = hit
+        if source >= 0:
+            total += radiance[source]
+            lit += 1
+    mixed[row] = radiance[i]
+    if lit > 0:
+        mixed[row] = total * (1.0 / float(lit))

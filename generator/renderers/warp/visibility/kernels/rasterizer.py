@@ -1,0 +1,399 @@
+"""Exact triangle rasteriser (CPU device only: bodies are drawn one after the other).
+
+Vertices are snapped to 1/256 px and edges evaluated in 64-bit integers with the top-left rule, so
+that triangles that share an edge neither overlap nor leave a gap. Pixels are sampled at their
+centres.
+
+Source: Pineda, "A parallel algorithm for polygon rasterization", SIGGRAPH 1988.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.records import View, World
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# What is nearer is clipped; 1/z stays below 100.
+Z_NEAR_M = wp.constant(0.01)
+# Vertices farther than this from the principal point are clipped, so that snapped coordinates
+# stay below 2^24 and edge products below 2^50. Float32 still resolves 1/256 px there.
+GUARD_PX = wp.constant(32768.0)
+# No snapped coordinate is as low: they stay below 2^24.
+UNSNAPPED = wp.constant(wp.int32(-(2**31)))
+
+Polygon = wp.types.matrix(shape=(9, 3), dtype=wp.float32)
+
+
+@wp.struct
+class Window:
+    """The rectangle of pixels that is drawn into; ``x0``, ``y0`` in the image."""
+
+    x0: int
+    y0: int
+    width: int
+    height: int
+
+
+@wp.struct
+class Edge:
+    """An edge function: its value at a first pixel, and its steps per pixel; inside is >= 0."""
+
+    value: wp.int64
+    dx: wp.int64
+    dy: wp.int64
+
+
+@wp.struct
+class Edges:
+    """The three edges of a triangle over its box of pixels, relative to the window."""
+
+    covers: int
+    x_first: int
+    x_last: int
+    y_first: int
+    y_last: int
+    a: Edge
+    b: Edge
+    c: Edge
+
+
+@wp.struct
+class DepthPlane:
+    """1/z of a triangle over the image, linear in pixels: ``c + x * dx + y * dy``, bounded."""
+
+    c: float
+    dx: float
+    dy: float
+    low: float
+    high: float
+
+
+@wp.func
+def snap_to_grid(view: View, p: wp.vec3):
+    """Image coordinates of a camera-frame point in units of 1/256 px."""
+    x = p[0] / p[2] * view.fx + view.cx
+    y = p[1] / p[2] * view.fy + view.cy
+    # Floor, not round: halves go one way on both sides of zero.
+    return wp.vec2i(int(wp.floor(x * 256.0 + 0.5)), int(wp.floor(y * 256.0 + 0.5)))
+
+
+@wp.func
+def guard_distance(view: View, p: wp.vec3, plane: int):
+    """Signed distance-like value of the five planes that bound what can be snapped."""
+    d = p[2] - Z_NEAR_M
+    if plane == 1:
+        d = p[2] * GUARD_PX - view.fx * p[0]
+    elif plane == 2:
+        d = p[2] * GUARD_PX + view.fx * p[0]
+    elif plane == 3:
+        d = p[2] * GUARD_PX - view.fy * p[1]
+    elif plane == 4:
+        d = p[2] * GUARD_PX + view.fy * p[1]
+    return d
+
+
+@wp.kernel
+def project_vertices(
+    view: View,
+    world: World,
+    bodies: wp.array(dtype=int),
+    p_camera: wp.array(dtype=wp.vec3),
+    xy: wp.array(dtype=wp.vec2i),
+):
+    """Vertices in the camera frame and on the snapped image plane, one listed body per thread."""
+    b = bodies[wp.tid()]
+    A = world.bodies[b].A_camera_mesh
+    t = world.bodies[b].t_camera_mesh
+    geometry = world.geometries[world.bodies[b].geometry]
+    first = world.bodies[b].first_vertex
+    for i in range(geometry.vertices_m.shape[0]):
+        p = A @ geometry.vertices_m[i] + t
+        q = wp.vec2i(UNSNAPPED, UNSNAPPED)
+        if (
+            p[2] >= Z_NEAR_M
+            and wp.abs(p[0]) * view.fx <= p[2] * GUARD_PX
+            and wp.abs(p[1]) * view.fy <= p[2] * GUARD_PX
+        ):
+            q = snap_to_grid(view, p)
+        p_camera[first + i] = p
+        xy[first + i] = q
+
+
+@wp.func
+def first_centre(fixed: int):
+    """First pixel whose centre is at or after a snapped coordinate."""
+    # A centre is at 256 i + 128: the shift rounds (fixed - 128) up.
+    return (fixed + 127) >> 8
+
+
+@wp.func
+def last_centre(fixed: int):
+    """Last pixel whose centre is at or before a snapped coordinate."""
+    return (fixed - 128) >> 8
+
+
+@wp.func
+def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
+    """The edge from p to q, seen from a snapped point; positive to its right (y is down)."""
+    dx = wp.int64(p[1] - q[1])
+    dy = wp.int64(q[0] - p[0])
+    edge = Edge()
+    edge.value = wp.int64(x - p[0]) * dx + wp.int64(y - p[1]) * dy
+    # Left and top edges own the centres that lie on them.
+    if not (dx > wp.int64(0) or (dx == wp.int64(0) and dy > wp.int64(0))):
+        edge.value -= wp.int64(1)
+    edge.dx = dx * wp.int64(256)
+    edge.dy = dy * wp.int64(256)
+    return edge
+
+
+@wp.func
+def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window):
+    """Edge functions of a triangle of either orientation, and the pixels it may cover."""
+    edges = Edges()
+    x_low, x_high = wp.min(p[0], wp.min(q[0], r[0])), wp.max(p[0], wp.max(q[0], r[0]))
+    y_low, y_high = wp.min(p[1], wp.min(q[1], r[1])), wp.max(p[1], wp.max(q[1], r[1]))
+    edges.x_first = wp.max(first_centre(x_low) - window.x0, 0)
+    edges.x_last = wp.min(last_centre(x_high) - window.x0, window.width - 1)
+    edges.y_first = wp.max(first_centre(y_low) - window.y0, 0)
+    edges.y_last = wp.min(last_centre(y_high) - window.y0, window.height - 1)
+    if edges.x_first > edges.x_last or edges.y_first > edges.y_last:
+        return edges
+    area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
+    area -= wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
+    # Seen edge-on, or smaller than the grid: it covers no centre.
+    if area == wp.int64(0):
+        return edges
+    x = ((edges.x_first + window.x0) << 8) + 128
+    y = ((edges.y_first + window.y0) << 8) + 128
+    if area > wp.int64(0):
+        edges.a = edge_between(p, q, x, y)
+        edges.b = edge_between(q, r, x, y)
+        edges.c = edge_between(r, p, x, y)
+    else:
+        edges.a = edge_between(q, p, x, y)
+        edges.b = edge_between(r, q, x, y)
+        edges.c = edge_between(p, r, x, y)
+    edges.covers = 1
+    return edges
+
+
+@wp.func
+def span_start(e: wp.int64, dx: wp.int64, first: int):
+    """Smallest step >= first at which ``e + step * dx >= 0``, were it the only bound."""
+    start = first
+    if e < wp.int64(0):
+        if dx > wp.int64(0):
+            # Rounded up; the limit keeps 64 bits from overflowing the step's 32.
+            start = wp.max(first, int(wp.min((dx - e - wp.int64(1)) / dx, wp.int64(1 << 30))))
+        else:
+            start = 1 << 30
+    return start
+
+
+@wp.func
+def span_end(e: wp.int64, dx: wp.int64, last: int):
+    """Largest step <= last at which ``e + step * dx >= 0``, were it the only bound."""
+    end = last
+    if dx < wp.int64(0) and e >= wp.int64(0):
+        end = wp.min(last, int(wp.min(e / -dx, wp.int64(1 << 30))))
+    return end
+
+
+@wp.func
+def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Window):
+    """1/z over the window's pixels, from the plane through three camera-frame points."""
+    plane = DepthPlane()
+    z_low = wp.min(p0[2], wp.min(p1[2], p2[2]))
+    z_high = wp.max(p0[2], wp.max(p1[2], p2[2]))
+    plane.low = 1.0 / z_high
+    # Snapping moves edges by 1/512 px: depth outside the triangle is held to its corners'.
+    plane.high = 1.0 / wp.max(z_low, 0.5 * Z_NEAR_M)
+    n = wp.cross(p1 - p0, p2 - p0)
+    d = wp.dot(n, p0)
+    if d == 0.0:
+        # Seen edge-on: covered pixels are an accident of snapping, any depth in between will do.
+        plane.c = plane.low
+        return plane
+    # 1/z is linear in the image: n . (x, y, 1) / (n . p0) for rays (x, y, 1).
+    n = n / d
+    plane.dx = n[0] * view.inverse_fx
+    plane.dy = n[1] * view.inverse_fy
+    x = (float(window.x0) + 0.5 - view.cx) * plane.dx
+    y = (float(window.y0) + 0.5 - view.cy) * plane.dy
+    plane.c = n[2] + x + y
+    return plane
+
+
+@wp.func
+def draw_nearest(
+    e: Edges,
+    plane: DepthPlane,
+    body: int,
+    face: int,
+    stride: int,
+    nearness: wp.array(dtype=float),
+    hits: wp.array(dtype=wp.vec2i),
+):
+    """Write (body, face) wherever the triangle is nearer than what is there."""
+    a = e.a.value
+    b = e.b.value
+    c = e.c.value
+    count = e.x_last - e.x_first
+    for y in range(e.y_first, e.y_last + 1):
+        first = int(0)
+        last = count
+        # Short rows are tested pixel by pixel: that is quicker than the divisions.
+        if count > 8:
+            first = span_start(a, e.a.dx, span_start(b, e.b.dx, span_start(c, e.c.dx, 0)))
+            last = span_end(a, e.a.dx, span_end(b, e.b.dx, span_end(c, e.c.dx, count)))
+        a_here = a + wp.int64(first) * e.a.dx
+        b_here = b + wp.int64(first) * e.b.dx
+        c_here = c + wp.int64(first) * e.c.dx
+        row = plane.c + float(y) * plane.dy
+        pixel = y * stride + e.x_first + first
+        # While: Warp's ranges take longer than what is done in them.
+        x = int(e.x_first + first)
+        while x <= e.x_first + last:
+            # One sign test for three edges: the sign bit of the union is set if any is.
+            if (a_here | b_here | c_here) >= wp.int64(0):
+                w = wp.clamp(row + float(x) * plane.dx, plane.low, plane.high)
+                if w > nearness[pixel]:
+                    nearness[pixel] = w
+                    hits[pixel] = wp.vec2i(body, face)
+            a_here += e.a.dx
+            b_here += e.b.dx
+            c_here += e.c.dx
+            pixel += 1
+            x += 1
+        a += e.a.dy
+        b += e.b.dy
+        c += e.c.dy
+
+
+@wp.func
+def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array(dtype=wp.uint8)):
+    """Write 1 wherever the triangle covers a pixel centre."""
+    a = e.a.value
+    b = e.b.value
+    c = e.c.value
+    count = e.x_last - e.x_first
+    for y in range(e.y_first, e.y_last + 1):
+        first = int(0)
+        last = count
+        if count > 8:
+            first = span_start(a, e.a.dx, span_start(b, e.b.dx, span_start(c, e.c.dx, 0)))
+            last = span_end(a, e.a.dx, span_end(b, e.b.dx, span_end(c, e.c.dx, count)))
+        a_here = a + wp.int64(first) * e.a.dx
+        b_here = b + wp.int64(first) * e.b.dx
+        c_here = c + wp.int64(first) * e.c.dx
+        pixel = int(first_pixel + y * stride + e.x_first + first)
+        end = pixel + last - first
+        while pixel <= end:
+            if (a_here | b_here | c_here) >= wp.int64(0):
+                mask[pixel] = wp.uint8(1)
+            a_here += e.a.dx
+            b_here += e.b.dx
+            c_here += e.c.dx
+            pixel += 1
+        a += e.a.dy
+        b += e.b.dy
+        c += e.c.dy
+
+
+@wp.func
+def clip(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
+    """The part of a triangle inside the five guard planes, as corners and their number.
+
+    Source: Sutherland and Hodgman, "Reentrant polygon clipping", CACM 17(1), 1974.
+    """
+    polygon = Polygon()
+    polygon[0] = p0
+    polygon[1] = p1
+    polygon[2] = p2
+    n = int(3)
+    for plane in range(5):
+        clipped = Polygon()
+        m = int(0)
+        for i in range(n):
+            p = polygon[i]
+            q = polygon[(i + 1) % n]
+            dp = guard_distance(view, p, plane)
+            dq = guard_distance(view, q, plane)
+            if dp >= 0.0:
+                clipped[m] = p
+                m += 1
+                if dq < 0.0:
+                    clipped[m] = p + (q - p) * (dp / (dp - dq))
+                    m += 1
+            elif dq >= 0.0:
+                # From inside to outside whichever way the edge runs: neighbours agree exactly.
+                clipped[m] = q + (p - q) * (dq / (dq - dp))
+                m += 1
+        polygon = clipped
+        n = m
+    return polygon, n
+
+
+@wp.func
+def fan_edges(view: View, polygon: Polygon, t: int, window: Window):
+    """Edges of the t-th triangle of a polygon's fan."""
+    p = snap_to_grid(view, polygon[0])
+    q = snap_to_grid(view, polygon[t])
+    r = snap_to_grid(view, polygon[t + 1])
+    return make_edges(p, q, r, window)
+
+
+@wp.func
+def is_beyond_guard(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
+    """Whether a triangle lies entirely outside one of the guard planes."""
+    outside = bool(False)
+    for plane in range(5):
+        if (
+            guard_distance(view, p0, plane) < 0.0
+            and guard_distance(view, p1, plane) < 0.0
+            and guard_distance(view, p2, plane) < 0.0
+        ):
+            outside = True
+    return outside
+
+
+@wp.kernel
+def draw_bodies(
+    view: View,
+    window: Window,
+    world: World,
+    bodies: wp.array(dtype=int),
+    p_camera: wp.array(dtype=wp.vec3),
+    xy: wp.array(dtype=wp.vec2i),
+    nearness: wp.array(dtype=float),
+    hits: wp.array(dtype=wp.vec2i),
+):
+    """Z-buffer of listed bodies: the nearest (body, face) at every pixel centre.
+
+    Args:
+        nearness: 1/z [1/m], to be 0 at first.
+        hits: Unchanged where nothing is hit.
+    """
+    b = bodies[wp.tid()]
+    geometry = world.geometries[world.bodies[b].geometry]
+    first = world.bodies[b].first_vertex
+    for f in range(geometry.face_slots.shape[0]):
+        i = first + geometry.faces[3 * f]
+        j = first + geometry.faces[3 * f + 1]
+        k = first + geometry.faces[3 * f + 2]
+        if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
+            e = make_edges(xy[i], xy[j], xy[k], window)
+            if e.covers != 0:
+                plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+                draw_nearest(e, plane, b, f, window.width, nearness, hits)
+        elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
+            polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
+            plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+            plane.high = 1.0 / Z_NEAR_M
+            for t in range(1, corners - 1):
+                e = fan_edges(view, polygon, t, window)
+                if e.covers != 0:
+                    draw_nearest(e, plane, b, f, window.width, nearness, hits)

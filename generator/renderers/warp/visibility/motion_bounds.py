@@ -1,0 +1,126 @@
+"""How fast things move in an image, and how many instants of time it therefore takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.shutter import INSTANT
+from gen_data.generator.renderers.warp.frame_context import (
+    CameraState,
+    CameraView,
+    RowBand,
+    is_moving,
+)
+from gen_data.generator.renderers.warp.visibility.banded_gbuffer import copy_gbuffer, full_band
+from gen_data.generator.renderers.warp.visibility.reprojection import (
+    find_carriers,
+    gather_points,
+    reproject,
+)
+
+BAND_PX = 0.25
+"""Nothing that is seen moves farther within a band of rows."""
+BLUR_PX = 0.3
+"""Nor within a slice of an exposure, if the camera's number of samples allows."""
+_STRIDE_PX = 4
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ShutterSampling:
+    """How an image has to be taken.
+
+    Attributes:
+        speeds_px_s: Of the fastest thing in or near each row, shape [height].
+        samples: Slices of an exposure.
+        blurred: Rows in which something moves while they are exposed, shape [height].
+    """
+
+    speeds_px_s: Array
+    samples: int
+    blurred: NDArray[np.bool_]
+
+
+def plan_sampling(see: CameraView) -> ShutterSampling:
+    """How an image is taken while the camera's shutter is open.
+
+    Args:
+        see: What the camera sees in the middle of that time.
+    """
+    middle, shown = see.moment, copy_gbuffer(see)
+    shutter = middle.camera.shutter
+    ends = [_at_once(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
+    carriers = find_carriers(middle.scene)
+    points = gather_points(shown, carriers, _STRIDE_PX)
+    before, after = (reproject(points, [end], carriers, _STRIDE_PX).image_px for end in ends)
+    way = after - before
+    length = np.where(np.isfinite(way).all(axis=-1), np.sqrt((way * way).sum(axis=-1)), 0.0)
+    vertical = np.where(length > 0.0, np.abs(way[..., 1]), 0.0)
+    speeds = _spread(length.max(axis=1) / shutter.open_s, vertical.max(axis=1), len(shown.z_m))
+    wanted = math.ceil(float(speeds.max()) * shutter.exposure_s / BLUR_PX)
+    blurred = speeds * shutter.exposure_s > BLUR_PX
+    return ShutterSampling(speeds, min(max(wanted, 1), shutter.samples), blurred)
+
+
+def split_bands(see: CameraView, pace: ShutterSampling | None = None) -> tuple[RowBand, ...]:
+    """Bands of rows within which nothing moves farther than ``BAND_PX``, each at its instant.
+
+    Args:
+        see: What the camera sees in the middle of the exposure of the image.
+        pace: Of the image; None = it is to be found out.
+    """
+    middle = see.moment
+    shutter = middle.camera.shutter
+    if not shutter.rolls or not is_moving(middle, shutter.open_s):
+        return (full_band(middle),)
+    pace = pace or plan_sampling(see)
+    per_row_s = abs(shutter.readout_s) / len(pace.speeds_px_s)
+    return make_bands(middle, band_starts(pace.speeds_px_s * per_row_s))
+
+
+def make_bands(middle: CameraState, starts: Sequence[int]) -> tuple[RowBand, ...]:
+    """Bands that begin at those rows, each at the instant of its middle."""
+    height = middle.camera.intrinsics.height_px
+    delay_s = middle.camera.shutter.delay_s
+    return tuple(
+        RowBand(first, end, middle.later(delay_s(0.5 * (first + end), height)))
+        for first, end in zip(starts, [*starts[1:], height], strict=True)
+    )
+
+
+def band_starts(motion_px: Array) -> list[int]:
+    """First rows of bands, each as high as the motion in it allows.
+
+    Args:
+        motion_px: How far things move from one row to the next, shape [height].
+    """
+    travelled = np.concatenate([[0.0], np.cumsum(motion_px)])[:-1]
+    begins: NDArray[np.bool_] = np.diff(np.floor(travelled / BAND_PX), prepend=-1.0) > 0.0
+    return [int(row) for row in np.flatnonzero(begins)]
+
+
+def _spread(speeds: Array, travels_px: Array, height: int) -> Array:
+    """The highest speed of what comes to be in each row while the shutter is open, [height].
+
+    Args:
+        speeds: In every few rows.
+        travels_px: How far the same things go up or down meanwhile.
+        height: Of the image.
+    """
+    highest = np.zeros(height)
+    reaches = np.ceil(0.5 * np.minimum(travels_px, 2.0 * height)).astype(int) + 2 * _STRIDE_PX
+    for k, (speed, reach) in enumerate(zip(speeds, reaches, strict=True)):
+        rows = slice(max(k * _STRIDE_PX - reach, 0), (k + 1) * _STRIDE_PX + reach)
+        highest[rows] = np.maximum(highest[rows], speed)
+    return highest
+
+
+def _at_once(moment: CameraState) -> RowBand:
+    """The whole image of a camera whose rows are all exposed then."""
+    camera = replace(moment.camera, shutter=INSTANT)
+    return full_band(replace(moment, camera=camera))

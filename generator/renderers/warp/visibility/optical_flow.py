@@ -1,0 +1,169 @@
+"""Where what pixels show is in the same camera's image a step later or earlier.
+
+Only whether it is hidden then takes an image of that instant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.renderers.warp.frame_context import (
+    CameraState,
+    CameraView,
+    RenderContext,
+    RowBand,
+    render_view,
+)
+from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
+    BandedGBuffer,
+    full_band,
+    render_bands,
+)
+from gen_data.generator.renderers.warp.visibility.motion_bounds import make_bands, split_bands
+from gen_data.generator.renderers.warp.visibility.reprojection import (
+    ReprojectedPoints,
+    ScenePoints,
+    deform_points,
+    find_carriers,
+    gather_points,
+    reproject,
+)
+
+FORWARD = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_OCCLUDED_FORWARD, Channel.SCENE_FLOW})
+BACKWARD = frozenset({Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_BACKWARD})
+FLOW = FORWARD | BACKWARD
+
+_NEARER = 2e-3
+"""What is nearer than a point by less, as a share of its distance, does not hide it."""
+
+
+def flow_images(
+    near: CameraView, shown: BandedGBuffer, channels: frozenset[Channel], studio: RenderContext
+) -> dict[Channel, NDArray[Any]]:
+    """All channels of flow that are asked for, as listed at Channel.
+
+    Args:
+        near: The world at the image's instant.
+        shown: What its pixels show, each row at its own.
+        channels: Of any kind.
+        studio: Assets and settings.
+    """
+    images: dict[Channel, NDArray[Any]] = {}
+    if not channels & FLOW:
+        return images
+    middle = near.moment
+    step_s = middle.scene.step_s
+    carriers = find_carriers(middle.scene)
+    points = gather_points(shown, carriers)
+    if channels & FORWARD:
+        images |= _carried(points, shown, middle.later(step_s), channels & FORWARD, near, studio)
+    if channels & BACKWARD and middle.scene.time_s < step_s - 1e-9:
+        images |= _nowhere(points.carriers.shape, channels)
+    elif channels & BACKWARD:
+        images |= _carried(points, shown, middle.later(-step_s), channels & BACKWARD, near, studio)
+    return images
+
+
+def _carried(
+    points: ScenePoints,
+    shown: BandedGBuffer,
+    then: CameraState,
+    channels: frozenset[Channel],
+    near: CameraView,
+    studio: RenderContext,
+) -> dict[Channel, NDArray[Any]]:
+    """Channels of one direction."""
+    images: dict[Channel, NDArray[Any]] = {}
+    carriers = find_carriers(then.scene)
+    bands: Sequence[RowBand] = (full_band(then),)
+    if then.camera.shutter.rolls:
+        near = render_view(then, studio, None, near)
+        bands = split_bands(near)
+    points = deform_points(points, shown, then.scene, studio.stock.assets)
+    found = reproject(points, bands, carriers)
+    for channel in sorted(channels, key=lambda c: c.value):
+        if channel in (Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD):
+            images[channel] = _flow(found)
+        elif channel is Channel.SCENE_FLOW:
+            images[channel] = _scene_flow(points, found)
+        else:
+            seen = frozenset({Channel.RANGE, Channel.NORMALS})
+            # Four times as far as bands allow is a pixel: as sharp as occlusion is told.
+            starts = [band.first for band in bands[::4]]
+            _, other = render_bands(make_bands(then, starts), seen, studio, near)
+            images[channel] = find_occluded(points, found, other, shown.intrinsics)
+    return images
+
+
+def _flow(found: ReprojectedPoints) -> Float32:
+    height, width = found.image_px.shape[:2]
+    centres = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
+    flow: Float32 = (found.image_px - centres).astype(np.float32)
+    return flow
+
+
+def _scene_flow(points: ScenePoints, found: ReprojectedPoints) -> Float32:
+    there = (points.places[..., 3] > 0.0)[..., None]
+    flow: Float32 = np.where(there, found.p_camera - points.p_camera, np.nan).astype(np.float32)
+    return flow
+
+
+def find_occluded(
+    points: ScenePoints,
+    found: ReprojectedPoints,
+    then: Mapping[Channel, NDArray[Any]],
+    camera: Intrinsics,
+) -> NDArray[np.uint8]:
+    """1 where a point is hidden in the image of then, or not in it, shape [h, w].
+
+    It is seen if one of the four pixels around it shows no surface nearer than it is; surfaces are
+    continued from the pixels' centres along their tangent planes.
+
+    Args:
+        points: Of now.
+        found: Where they are then.
+        then: Range and normals of the image of then.
+        camera: Of that image.
+    """
+    range_m, normals = then[Channel.RANGE], then[Channel.NORMALS]
+    u, v = found.image_px[..., 0], found.image_px[..., 1]
+    inside = (u >= 0) & (u < camera.width_px) & (v >= 0) & (v < camera.height_px)
+    distance = np.sqrt((found.p_camera * found.p_camera).sum(axis=-1))
+    towards = found.p_camera / np.where(distance > 0.0, distance, 1.0)[..., None]
+    limit = np.where(points.places[..., 3] > 0.0, distance * (1.0 - _NEARER), np.inf)
+    left, top = (np.floor(np.where(inside, x, 0.5) - 0.5).astype(np.intp) for x in (u, v))
+    rays = camera.pixel_rays()
+    seen = np.zeros(inside.shape, bool)
+    for across in (0, 1):
+        for down in (0, 1):
+            column = np.clip(left + across, 0, camera.width_px - 1)
+            row = np.clip(top + down, 0, camera.height_px - 1)
+            normal = normals[row, column]
+            steep = _dot(normal, rays[row, column])
+            tilt = _dot(normal, towards)
+            # Where a tangent plane is seen edge-on, it says nothing: the depth itself does.
+            usable = (tilt < -0.02) & (steep < -0.02)
+            factor = np.where(usable, steep / np.where(usable, tilt, 1.0), 1.0)
+            seen |= range_m[row, column] * np.clip(factor, 0.8, 1.25) >= limit
+    return np.asarray(~(seen & inside), np.uint8)
+
+
+def _nowhere(shape: tuple[int, ...], channels: frozenset[Channel]) -> dict[Channel, NDArray[Any]]:
+    """Backward flow before there is anything to look back on."""
+    values: dict[Channel, NDArray[Any]] = {
+        Channel.FLOW_BACKWARD: np.full((*shape, 2), np.nan, np.float32),
+        Channel.FLOW_OCCLUDED_BACKWARD: np.ones(shape, np.uint8),
+    }
+    return {channel: image for channel, image in values.items() if channel in channels}
+
+
+def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    product: NDArray[Any] = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+    return product

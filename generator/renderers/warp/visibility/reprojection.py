@@ -1,0 +1,159 @@
+"""The points that pixels show, carried along to other instants.
+
+Every point is held in the frame of what carries it, a body or the world: there is no search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.renderers.warp.frame_context import RowBand
+from gen_data.generator.renderers.warp.visibility.banded_gbuffer import BandedGBuffer
+
+_ROWS_AT_ONCE = 32
+_LOOKS = 4
+"""At a rolling shutter: where a point is decides when it is seen, and that where it is."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ScenePoints:
+    """Points of a grid of pixels, each in the frame of what carries it.
+
+    Attributes:
+        places: Homogeneous [m], [h, w, 4]: the fourth is 0 for what is at infinity. NaN where a
+            lens shows nothing.
+        carriers: 0 = the world, else a number that ``find_carriers`` gives, [h, w].
+        p_camera: The same in the camera frame of their own instant, [h, w, 3].
+    """
+
+    places: Array
+    carriers: NDArray[np.intp]
+    p_camera: Array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ReprojectedPoints:
+    """Where points are at other instants: camera frame [m] [h, w, 3], and image [px] [h, w, 2]."""
+
+    p_camera: Array
+    image_px: Array
+
+
+def find_carriers(scene: Scene) -> dict[int, int]:
+    """Numbers, from 1, of the bodies that may move or change shape, by their place in the scene."""
+    names = {track.body for track in scene.tracks} | {c.body for c in scene.changes if c.asset}
+    moving = [k for k, body in enumerate(scene.bodies) if body.name in names]
+    return {k: number for number, k in enumerate(moving, 1)}
+
+
+def gather_points(
+    shown: BandedGBuffer, carriers: Mapping[int, int], stride: int = 1
+) -> ScenePoints:
+    """The points that every few pixels show."""
+    hits = shown.hits[::stride, ::stride]
+    places = np.zeros((*hits.shape[:2], 4))
+    numbers = np.zeros(hits.shape[:2], np.intp)
+    p_camera = _seen_points(shown, stride)
+    known = np.zeros(int(hits[..., 0].max(initial=-1)) + 2, np.intp)
+    for body, number in carriers.items():
+        if body + 1 < len(known):
+            known[body + 1] = number
+    for band in shown.bands:
+        rows = slice(-(-band.first // stride), -(-band.end // stride))
+        scene, T_world_camera = band.moment.scene, band.moment.camera.T_world_camera
+        there = hits[rows, :, 0] >= 0
+        shift = np.where(there[..., None], np.asarray(T_world_camera.translation_m), 0.0)
+        place = T_world_camera.rotate(p_camera[rows]) + shift
+        numbers[rows] = known[hits[rows, :, 0] + 1]
+        for body in np.unique(hits[rows, :, 0][numbers[rows] > 0]):
+            own = hits[rows, :, 0] == body
+            place[own] = scene.bodies[body].T_world_body.inverse().apply(place[own])
+        places[rows, :, :3], places[rows, :, 3] = place, there
+    return ScenePoints(places, numbers, p_camera)
+
+
+def reproject(
+    points: ScenePoints, bands: Sequence[RowBand], carriers: Mapping[int, int], stride: int = 1
+) -> ReprojectedPoints:
+    """Where points are in an image that the same camera takes at other instants."""
+    camera = bands[0].moment.camera
+    ways = _ways(bands, carriers)
+    shape = points.carriers.shape
+    p_camera, image_px = np.zeros((*shape, 3)), np.zeros((*shape, 2))
+    band_of_row = np.repeat(np.arange(len(bands)), [band.end - band.first for band in bands])
+    for first in range(0, shape[0], _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE)
+        carrier, place = points.carriers[rows], points.places[rows]
+        row = stride * np.arange(first, first + len(carrier))[:, None] + np.zeros_like(carrier)
+        for _ in range(_LOOKS if len(bands) > 1 else 1):
+            moved = np.einsum("hwij,hwj->hwi", ways[carrier, band_of_row[row]], place)
+            image = camera.intrinsics.project(moved)
+            # What a lens does not show at one instant is looked for where it was.
+            v = np.where(np.isfinite(image[..., 1]), image[..., 1], row)
+            row = np.clip(np.floor(v), 0, len(band_of_row) - 1).astype(np.intp)
+        p_camera[rows], image_px[rows] = moved, image
+    return ReprojectedPoints(p_camera, image_px)
+
+
+def deform_points(
+    points: ScenePoints, shown: BandedGBuffer, then: Scene, assets: AssetLibrary
+) -> ScenePoints:
+    """The points on the shapes that bodies have then, as far as they have the same triangles."""
+    places = points.places.copy()
+    for band in shown.bands:
+        rows = slice(band.first, band.end)
+        numbers = shown.hits[rows, :, 0]
+        for body in np.unique(numbers[points.carriers[rows] > 0]):
+            now, other = band.moment.scene.bodies[body], then.bodies[body]
+            if now.asset == other.asset:
+                continue
+            one, two = assets.mesh(now.asset), assets.mesh(other.asset)
+            if np.array_equal(one.faces, two.faces):
+                own = numbers == body
+                corners = one.faces[shown.hits[rows, :, 1][own]]
+                steps = (two.vertices_m.astype(np.float64) - one.vertices_m)[corners] * now.scale
+                places[rows][own, :3] += _weighted(steps, shown.weights[rows][own])
+    return replace(points, places=places)
+
+
+def _seen_points(shown: BandedGBuffer, stride: int) -> Array:
+    """Points in the camera frame; directions where nothing is hit, NaN where nothing is shown."""
+    camera, z_m = shown.intrinsics, shown.z_m[::stride, ::stride].astype(np.float64)
+    depth_m = np.where(shown.hits[::stride, ::stride, 0] >= 0, z_m, 1.0)
+    if not camera.straight:
+        scaled: Array = camera.pixel_rays()[::stride, ::stride] * depth_m[..., None]
+        return scaled
+    u = np.arange(0, camera.width_px, stride) + 0.5
+    v = np.arange(0, camera.height_px, stride) + 0.5
+    x = (u[None, :] - camera.cx_px) / camera.fx_px * depth_m
+    y = (v[:, None] - camera.cy_px) / camera.fy_px * depth_m
+    return np.stack([x, y, depth_m], axis=-1)
+
+
+def _ways(bands: Sequence[RowBand], carriers: Mapping[int, int]) -> Array:
+    """From carriers' frames to the camera's, by carrier and band: [carriers + 1, bands, 3, 4]."""
+    ways = np.zeros((len(carriers) + 1, len(bands), 3, 4))
+    for k, band in enumerate(bands):
+        T_camera_world = band.moment.camera.T_world_camera.inverse()
+        ways[0, k] = T_camera_world.matrix()[:3]
+        for body, number in carriers.items():
+            pose = T_camera_world @ band.moment.scene.bodies[body].T_world_body
+            ways[number, k] = pose.matrix()[:3]
+    return ways
+
+
+def _weighted(corners: Array, weights: Float32) -> Array:
+    """Sums over the corners of triangles [n, 3, 3] with stored barycentric weights [n, 2]."""
+    u = np.where(weights[:, 0] > 1.5, weights[:, 0] - 2.0, weights[:, 0]).astype(np.float64)
+    v = weights[:, 1].astype(np.float64)
+    shares = np.stack([1.0 - u - v, u, v], axis=-1)
+    sums: Array = np.einsum("nk,nki->ni", shares, corners, optimize=False)
+    return sums

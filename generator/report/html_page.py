@@ -1,0 +1,79 @@
+"""A report as one HTML file: no script, no font, no image from anywhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+
+from gen_data.generator.report.report_tables import Histogram, Table
+
+BARS_PX = (300, 90)
+"""Width and height of the bars of one histogram."""
+
+STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; color: #1d2430; margin: 2em auto; max-width: 1100px;
+  padding: 0 1em; }
+h2 { margin: 1.8em 0 .4em; font-size: 1.15em; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: .2em .8em .2em 0; text-align: right; white-space: nowrap; }
+th { border-bottom: 1px solid #b8c0cc; font-weight: 600; }
+th:first-child, td:first-child { text-align: left; }
+p.note { color: #5b6675; margin: .3em 0; }
+div.plots { display: flex; flex-wrap: wrap; gap: 1.2em; }
+figure { margin: 0; }
+figcaption { font-size: .9em; }
+rect { fill: #3f72af; }
+text { font-size: 9px; fill: #5b6675; }
+"""
+
+
+def page(title: str, tables: Iterable[Table], histograms: Iterable[Histogram]) -> str:
+    """The whole document."""
+    body = [f"<h1>{escape(title)}</h1>", *map(_table, tables), *map(_plots, histograms)]
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head>\n<body>\n"
+        + "\n".join(body)
+        + "\n</body></html>\n"
+    )
+
+
+def _table(table: Table) -> str:
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in table.header)
+    rows = "\n".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows
+    )
+    note = f'\n<p class="note">{escape(table.note)}</p>' if table.note else ""
+    return f"<h2>{escape(table.title)}</h2>\n<table><tr>{head}</tr>\n{rows}</table>{note}"
+
+
+def _plots(histogram: Histogram) -> str:
+    figures = "\n".join(
+        f"<figure>{bars(histogram, name)}<figcaption>{escape(name)}</figcaption></figure>"
+        for name, counts in histogram.counts.items()
+        if counts.any()
+    )
+    return f'<h2>{escape(histogram.title)}</h2>\n<div class="plots">{figures}</div>'
+
+
+def bars(histogram: Histogram, name: str) -> str:
+    """One histogram as inline SVG: equally wide bars, the lower edge of each bin below it."""
+    counts = histogram.counts[name]
+    width_px, height_px = BARS_PX
+    step_px = width_px / len(counts)
+    every = -(-len(counts) // 10)
+    shapes = []
+    for k, count in enumerate(counts.tolist()):
+        tall_px = height_px * count / max(int(counts.max()), 1)
+        low, high = histogram.edges[k], histogram.edges[k + 1]
+        shapes.append(
+            f'<rect x="{k * step_px:.1f}" y="{height_px - tall_px:.1f}" '
+            f'width="{0.9 * step_px:.1f}" height="{tall_px:.1f}">'
+            f"<title>{low:g} to {high:g}: {count}</title></rect>"
+        )
+        if k % every == 0:
+            shapes.append(f'<text x="{k * step_px:.1f}" y="{height_px + 11}">{low:g}</text>')
+    return (
+        f'<svg width="{width_px}" height="{height_px + 14}" role="img" '
+        f'aria-label="{escape(histogram.title)}: {escape(name)}">{"".join(shapes)}</svg>'
+    )

@@ -1,0 +1,173 @@
+"""Labels of an exported data set, one at a time: COCO's files, or KITTI's where there are none.
+
+COCO's files are read line by line, as ``gen_data.exporters.coco`` writes them (an image or an
+annotation per line): millions of annotations are never in memory together.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from gen_data.exporters.kitti import occlusion_level, official_type
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.scene import Instance
+from gen_data.generator.core.se3 import Vec3
+
+INSTANCES = "instances_"
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """One object in one image.
+
+    Attributes:
+        image: Split and name of the image it is in.
+        kind: KITTI's type.
+        occlusion_level: KITTI's 0, 1, 2; None = not annotated.
+        truncation, visible_fraction: Shares; None = not annotated.
+        distance_m: From the camera to the box's centre, over the ground; None = not annotated.
+        size_lwh_m: Length (along X), width, height; None = not annotated.
+    """
+
+    image: tuple[str, str]
+    category: str
+    kind: str
+    width_px: float
+    height_px: float
+    occlusion_level: int | None = None
+    truncation: float | None = None
+    visible_fraction: float | None = None
+    distance_m: float | None = None
+    size_lwh_m: Vec3 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Keypoints of one object: how many are outside the image, hidden, and visible."""
+
+    category: str
+    counts: tuple[int, int, int]
+
+
+class Picture(NamedTuple):
+    """An image, with or without objects."""
+
+    split: str
+    name: str
+
+
+def records(folder: Path) -> Iterator[Picture | Label | Points]:
+    """All images, then all objects, of each file of a data set.
+
+    Args:
+        folder: Of a data set (``coco/`` or ``kitti/`` is looked for), or of one of its formats.
+
+    Raises:
+        StorageError: if no labels are found, or a file is not laid out as expected.
+    """
+    for root in (folder / "coco", folder):
+        files = sorted((root / "annotations").glob("*.json"))
+        if files:
+            for path in files:
+                yield from _of_coco(path)
+            return
+    for root in (folder / "kitti", folder):
+        if (root / "training" / "label_2").is_dir():
+            yield from _of_kitti(root)
+            return
+    raise StorageError(
+        f"{folder}: no labels here: neither coco/annotations nor kitti/training/label_2; name the "
+        "folder of a data set that was exported as coco or kitti"
+    )
+
+
+def _of_coco(path: Path) -> Iterator[Picture | Label | Points]:
+    kind, _, split = path.stem.rpartition("_")
+    names: dict[int, str] = {}
+    points = kind != INSTANCES.rstrip("_")
+    for section, row in _rows(path):
+        if section == "categories":
+            names[row["id"]] = row["name"]
+        elif section == "annotations":
+            category = names[row["category_id"]]
+            yield _points(category, row) if points else _label(split, category, row)
+        elif not points:
+            yield Picture(split, str(row["id"]))
+
+
+def _rows(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    with path.open(encoding="utf-8", newline="\n") as file:
+        head = file.readline().rstrip("\n,")
+        section = ""
+        try:
+            for category in json.loads(head + "}")["categories"]:
+                yield "categories", category
+            for line in file:
+                if line.startswith('"'):
+                    section = line.split('"')[1]
+                elif line.startswith("{"):
+                    yield section, json.loads(line.rstrip(",\n"))
+        except (ValueError, KeyError) as error:
+            raise StorageError(
+                f"{path}: not written by gen-data (an image or annotation per line): {error}"
+            ) from error
+
+
+def _label(split: str, category: str, row: dict[str, Any]) -> Label:
+    facts = {k: v for k, v in row.get("attributes", {}).items() if isinstance(v, str)}
+    instance = Instance(
+        row["id"], "", category, row["category_id"], "", attributes=tuple(sorted(facts.items()))
+    )
+    hidden = row.get("occlusion")
+    box = row.get("box3d")
+    return Label(
+        (split, str(row["image_id"])),
+        category,
+        official_type(instance),
+        row["bbox"][2],
+        row["bbox"][3],
+        None if hidden is None else occlusion_level(hidden),
+        row.get("truncation"),
+        row.get("visible_fraction"),
+        None if box is None else math.hypot(box["center_m"][0], box["center_m"][2]),
+        None if box is None else tuple(box["size_m"]),
+    )
+
+
+def _points(category: str, row: dict[str, Any]) -> Points:
+    states = row["keypoints"][2::3]
+    return Points(category, (states.count(0), states.count(1), states.count(2)))
+
+
+def _of_kitti(root: Path) -> Iterator[Picture | Label]:
+    for listing in sorted((root / "ImageSets").glob("*.txt")):
+        for frame in listing.read_text(encoding="utf-8").split():
+            yield Picture(listing.stem, frame)
+            path = root / f"training/label_2/{frame}.txt"
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+                if not line.startswith("DontCare"):
+                    yield _kitti_label(f"{path}:{number}", (listing.stem, frame), line)
+
+
+def _kitti_label(place: str, image: tuple[str, str], line: str) -> Label:
+    kind, *texts = line.split(" ")
+    try:
+        truncated, level, _, left, top, right, bottom, h, w, length, x, _, z, _ = map(float, texts)
+    except ValueError as error:
+        raise StorageError(f"{place}: not the 15 columns of a KITTI label: {error}") from error
+    return Label(
+        image,
+        kind,
+        kind,
+        right - left + 1,
+        bottom - top + 1,
+        int(level),
+        truncated,
+        distance_m=math.hypot(x, z),
+        size_lwh_m=(length, w, h),
+    )

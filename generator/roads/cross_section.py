@@ -1,0 +1,165 @@
+"""What a road looks like in cross section: strips side by side, from the middle outwards.
+
+``t`` is the distance to the left of the reference line, ``s`` the arc length along it. The lowest
+gutter is at z = 0; the carriageway rises to its crown in the middle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+import numpy as np
+
+from gen_data.generator.roads.reference_line import Array, ReferenceLine, bend_line
+
+StripKind = Literal[
+    "median", "driving", "bicycle", "shoulder", "parking", "kerb", "verge", "sidewalk"
+]
+Pair = tuple[float, float]
+
+KERB_WIDTH_M = 0.15
+APRON_M, APRON_FALL_M = 6.0, 0.1
+"""Land beside a road that belongs to it: how wide, and how far below the gutter it ends."""
+APRON_STEPS, APRON_DROPS = (0.0, 0.25, 1.0), (0.0, 0.25, 1.0)
+"""Its profile as shares of both."""
+FALL = 0.025
+"""Slope of sidewalks and verges: 2 to 2.5 % sheds rain (EAE/RASt 06, 6.1.1.2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoadShape:
+    """A road of constant cross section. Pairs are (left, right) as seen along the road.
+
+    Attributes:
+        length_m: Along the reference line, the middle of the road.
+        lanes: Numbers of lanes against and along the road's direction.
+        median_m: Strip that keeps the two directions apart.
+        bicycle_m, shoulder_m, parking_m: Widths of strips beside the lanes; 0 = none.
+        kerb_m: Height of the kerbs; 0 = none.
+        verge_m, sidewalk_m: Widths of planting strips and of sidewalks beyond them; 0 = none.
+        curvature_per_m: Of the reference line, positive to the left.
+        crown: Slope of the carriageway from the middle down to the gutters.
+        traffic: Side that is driven on, ``right`` or ``left``.
+    """
+
+    length_m: float = 100.0
+    lanes: Pair = (1.0, 1.0)
+    lane_width_m: float = 3.5
+    median_m: float = 0.0
+    bicycle_m: Pair = (0.0, 0.0)
+    shoulder_m: Pair = (0.0, 0.0)
+    parking_m: Pair = (0.0, 0.0)
+    kerb_m: float = 0.12
+    verge_m: Pair = (0.0, 0.0)
+    sidewalk_m: Pair = (2.5, 2.5)
+    curvature_per_m: float = 0.0
+    crown: float = 0.02
+    traffic: str = "right"
+
+    def line(self) -> ReferenceLine:
+        """Its reference line, from the origin along +X."""
+        return bend_line(self.length_m, self.curvature_per_m)
+
+    def lanes_on(self, side: int) -> int:
+        """Number of driving lanes left (+1) or right (-1) of the middle."""
+        return round(self.lanes[1] if self.forward(side) else self.lanes[0])
+
+    def forward(self, side: int) -> bool:
+        """Whether a side's lanes run along the road."""
+        return (side < 0) == (self.traffic == "right")
+
+    def carriageway_m(self, side: int) -> float:
+        """From the middle to the gutter."""
+        k = side_index(side)
+        beside = self.bicycle_m[k] + self.shoulder_m[k] + self.parking_m[k]
+        return 0.5 * self.median_m + self.lanes_on(side) * self.lane_width_m + beside
+
+    def crowned_m(self, side: int) -> float:
+        """From the middle to where the carriageway's fall ends: parking strips are level."""
+        return self.carriageway_m(side) - self.parking_m[side_index(side)]
+
+    def changed(self) -> dict[str, Any]:
+        """Fields that differ from their defaults."""
+        pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
+        return {name: value for name, value, default in pairs if value != default}
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """One strip of a cross section.
+
+    Attributes:
+        side: +1 left, -1 right of the reference line.
+        number: From the middle, among its kind.
+        inner_m, outer_m: Distances from the reference line, both >= 0.
+        inner_z_m, outer_z_m: Heights at them.
+    """
+
+    kind: StripKind
+    side: int
+    number: int
+    inner_m: float
+    outer_m: float
+    inner_z_m: float
+    outer_z_m: float
+
+    @property
+    def width_m(self) -> float:
+        """Across the road."""
+        return self.outer_m - self.inner_m
+
+    @property
+    def middle_m(self) -> float:
+        """``t`` of its middle."""
+        return self.side * 0.5 * (self.inner_m + self.outer_m)
+
+    @property
+    def middle_z_m(self) -> float:
+        """Height of its middle."""
+        return 0.5 * (self.inner_z_m + self.outer_z_m)
+
+
+def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
+    """The strips of one side, from the middle outwards."""
+    k = side_index(side)
+    top = shape.crown * max(shape.crowned_m(1), shape.crowned_m(-1))
+    made: list[Strip] = []
+
+    def put(kind: StripKind, width_m: float, rise_m: float, number: int = 0) -> None:
+        if width_m > 0.0:
+            inner = made[-1].outer_m if made else 0.0
+            z = made[-1].outer_z_m if made else top
+            made.append(Strip(kind, side, number, inner, inner + width_m, z, z + rise_m))
+
+    put("median", 0.5 * shape.median_m, -0.5 * shape.median_m * shape.crown)
+    for number in range(shape.lanes_on(side)):
+        put("driving", shape.lane_width_m, -shape.lane_width_m * shape.crown, number)
+    put("bicycle", shape.bicycle_m[k], -shape.bicycle_m[k] * shape.crown)
+    put("shoulder", shape.shoulder_m[k], -shape.shoulder_m[k] * shape.crown)
+    put("parking", shape.parking_m[k], 0.0)
+    beyond = shape.verge_m[k] + shape.sidewalk_m[k]
+    if beyond > 0.0 and shape.kerb_m > 0.0:
+        put("kerb", KERB_WIDTH_M, shape.kerb_m)
+    # Behind a kerb the ground rises away from it; without one it falls, and water runs off.
+    fall = FALL if shape.kerb_m > 0.0 else -FALL
+    put("verge", shape.verge_m[k], fall * shape.verge_m[k])
+    put("sidewalk", shape.sidewalk_m[k], fall * shape.sidewalk_m[k])
+    return tuple(made)
+
+
+def height_m(shape: RoadShape, t_m: Array) -> Array:
+    """Height of the surface at distances to the left of the middle; beyond the edge, the edge's."""
+    heights = np.zeros_like(t_m)
+    for side in (1, -1):
+        row = strips(shape, side)
+        at = [0.0, *(strip.outer_m for strip in row)]
+        z = [row[0].inner_z_m if row else 0.0, *(strip.outer_z_m for strip in row)]
+        here = (t_m >= 0.0) if side > 0 else (t_m < 0.0)
+        heights[here] = np.interp(np.abs(t_m[here]), at, z)
+    return heights
+
+
+def side_index(side: int) -> int:
+    """Where a side stands in a (left, right) pair."""
+    return 0 if side > 0 else 1

@@ -1,0 +1,275 @@
+"""A junction of like roads: arms from a centre, corners rounded, one path per turn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from gen_data.generator.core.scene import Lane, LaneKind
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.cross_section import FALL, KERB_WIDTH_M
+from gen_data.generator.roads.lane_graph import FURNITURE_M, world_points
+from gen_data.generator.roads.reference_line import Array
+
+CROSSWALK_M = (0.5, 3.5)
+"""Where a crosswalk lies on an arm, beyond where the corners' curves end."""
+STOP_LINE_M = (4.5, 5.0)
+SETBACK_M = 6.5
+ABSENT = -1.0
+_ARC_STEP_RAD = math.radians(7.5)
+
+
+@dataclass(frozen=True, slots=True)
+class JunctionShape:
+    """Arms with as many lanes in as out, all of one width.
+
+    Attributes:
+        arms_deg: Directions of the arms from the centre, rising; ``ABSENT`` = no such arm.
+        lanes: Per arm and direction.
+        beside_m: Width beyond the kerb that is not sidewalk (verge, or the road's parking).
+        radius_m: Of the kerb at the corners.
+    """
+
+    arms_deg: tuple[float, float, float, float] = (0.0, 90.0, 180.0, 270.0)
+    lanes: int = 1
+    lane_width_m: float = 3.5
+    kerb_m: float = 0.12
+    sidewalk_m: float = 2.5
+    beside_m: float = 0.0
+    radius_m: float = 7.0
+    crown: float = 0.02
+    traffic: str = "right"
+
+    @property
+    def half_m(self) -> float:
+        """From an arm's middle to its kerb."""
+        return self.lanes * self.lane_width_m
+
+    @property
+    def border_m(self) -> float:
+        """From the kerb's face to the outer edge of the sidewalk."""
+        return KERB_WIDTH_M + self.beside_m + self.sidewalk_m
+
+    @property
+    def top_m(self) -> float:
+        """Height of the middle over the gutters."""
+        return self.crown * self.half_m
+
+    @property
+    def edge_z_m(self) -> float:
+        """Height of the outer edge of the sidewalk."""
+        return self.kerb_m + FALL * self.sidewalk_m
+
+    def arms_rad(self) -> tuple[float, ...]:
+        """Directions of the arms there are, rising."""
+        return tuple(math.radians(arm) for arm in self.arms_deg if arm != ABSENT)
+
+    def curve_end_m(self) -> float:
+        """From the centre to where the longest corner's curve ends on its arm."""
+        ends = [self.half_m]
+        for gap in self.gaps_rad():
+            if abs(gap - math.pi) > 1e-3:
+                ends.append((self.half_m + self.radius_m) / math.tan(0.5 * gap))
+        return max(ends)
+
+    def reach_m(self) -> float:
+        """Length of every arm."""
+        return self.curve_end_m() + SETBACK_M
+
+    def gaps_rad(self) -> tuple[float, ...]:
+        """Angles from each arm to the next one counter-clockwise."""
+        arms = self.arms_rad()
+        return tuple(
+            (after - arm) % math.tau for arm, after in zip(arms, (*arms[1:], arms[0]), strict=True)
+        )
+
+    def changed(self) -> dict[str, Any]:
+        """Fields that differ from their defaults."""
+        pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
+        return {name: value for name, value, default in pairs if value != default}
+
+
+def corner(shape: JunctionShape, number: int, offset_m: float) -> Array:
+    """The line [n, 2] parallel to the kerb, from an arm's end around to the next arm's end.
+
+    Args:
+        shape: The junction.
+        number: Of the arm it starts on, on its left side seen from the centre.
+        offset_m: Distance behind the kerb's face; equal numbers of points for all distances.
+    """
+    arms, gap = shape.arms_rad(), shape.gaps_rad()[number]
+    here, after = arms[number], arms[(number + 1) % len(arms)]
+    away, reach = shape.half_m + offset_m, shape.reach_m()
+    first = _on_arm(here, reach, away)
+    last = _on_arm(after, reach, -away)
+    if abs(gap - math.pi) <= 1e-3:
+        share = np.linspace(0.0, 1.0, 9)[:, None]
+        return first + share * (last - first)
+    radius = shape.radius_m - offset_m
+    # The centre of the arc is as far from both edges as the radius says.
+    middle = _on_arm(here, (shape.half_m + shape.radius_m) / math.tan(0.5 * gap), 0.0)
+    middle = middle + (shape.half_m + shape.radius_m) * _left_of(here)
+    turn = math.pi - gap
+    count = max(2, math.ceil(turn / _ARC_STEP_RAD) + 1)
+    angles = here - 0.5 * math.pi - np.linspace(0.0, turn, count)
+    arc = middle + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return np.concatenate([first[None], arc, last[None]])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fan:
+    """The carriageway: triangles from the centre to its outline.
+
+    Attributes:
+        outline_m: Points [n, 3], counter-clockwise from the first arm's right kerb.
+        center_z_m: Height of the centre, at the origin.
+    """
+
+    outline_m: Array
+    center_z_m: float
+
+    def height_m(self, xy: Array) -> Array:
+        """Heights [n] of the surface at points [n, 2]."""
+        a, b = self.outline_m, np.roll(self.outline_m, -1, axis=0)
+        area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        u = (xy[:, :1] * b[:, 1] - xy[:, 1:] * b[:, 0]) / area
+        v = (a[:, 0] * xy[:, 1:] - a[:, 1] * xy[:, :1]) / area
+        which = np.minimum(u, v).argmax(axis=1)
+        rows = np.arange(len(xy))
+        u, v = u[rows, which], v[rows, which]
+        center = self.center_z_m
+        heights: Array = center + u * (a[which, 2] - center) + v * (b[which, 2] - center)
+        return heights
+
+
+# Every lane of a junction asks for its heights.
+@lru_cache(maxsize=16)
+def make_fan(shape: JunctionShape) -> Fan:
+    """The carriageway of a junction; its mouths have the cross section of a crowned road."""
+    parts = []
+    for number, arm in enumerate(shape.arms_rad()):
+        t = np.linspace(-shape.half_m, shape.half_m, 9)
+        mouth = np.array([_on_arm(arm, shape.reach_m(), float(v)) for v in t])
+        z = shape.crown * (shape.half_m - np.abs(t))
+        parts.append(np.column_stack([mouth, z])[:-1])
+        kerb = corner(shape, number, 0.0)[:-1]
+        parts.append(np.column_stack([kerb, np.zeros(len(kerb))]))
+    return Fan(np.concatenate(parts), shape.top_m)
+
+
+def arm_pose(shape: JunctionShape, number: int) -> SE3:
+    """The end of an arm, X pointing away from the junction."""
+    arm = shape.arms_rad()[number]
+    x, y = (float(v) for v in _on_arm(arm, shape.reach_m(), 0.0))
+    return SE3.about_z(arm, (x, y, 0.0))
+
+
+def arm_points(shape: JunctionShape, number: int, r_m: Array, t_m: Array) -> Array:
+    """Points [..., 2] at distances along an arm and to its left."""
+    arm = shape.arms_rad()[number]
+    c, s = math.cos(arm), math.sin(arm)
+    return np.stack([r_m * c - t_m * s, r_m * s + t_m * c], axis=-1)
+
+
+def junction_lanes(
+    shape: JunctionShape, name: str, T_world_junction: SE3, speed_m_s: float, crosswalks: bool
+) -> tuple[Lane, ...]:
+    """Paths of all turns, sidewalks and house fronts around the corners, and crosswalks."""
+    lanes = [
+        Lane(
+            f"{name}/{i}to{j}_{k}",
+            "driving",
+            _world(_turn(shape, i, j, k), shape, T_world_junction),
+            shape.lane_width_m,
+            road=name,
+            speed_m_s=speed_m_s,
+            junction=True,
+        )
+        for i, j, k in _turns(shape)
+    ]
+    inner = KERB_WIDTH_M + shape.beside_m
+    into = inner + min(FURNITURE_M, 0.5 * shape.sidewalk_m)
+    beside: tuple[tuple[LaneKind, float, float], ...] = (
+        ("sidewalk", inner + 0.5 * shape.sidewalk_m, shape.sidewalk_m),
+        ("furniture", into, 0.6),
+        ("frontage", shape.border_m, 0.0),
+    )
+    for number in range(len(shape.arms_rad())):
+        for kind, offset_m, width_m in beside if shape.sidewalk_m > 0.0 else ():
+            line = corner(shape, number, offset_m)
+            rise = (shape.edge_z_m - shape.kerb_m) * (offset_m - KERB_WIDTH_M)
+            z = shape.kerb_m + rise / (shape.border_m - KERB_WIDTH_M)
+            center = world_points(np.column_stack([line, np.full(len(line), z)]), T_world_junction)
+            lanes.append(Lane(f"{name}/{kind}{number}", kind, center, width_m, road=name))
+        if crosswalks:
+            lanes.append(_crosswalk(shape, name, number, T_world_junction))
+    return tuple(lanes)
+
+
+def _crosswalk(shape: JunctionShape, name: str, number: int, T_world_junction: SE3) -> Lane:
+    r = shape.curve_end_m() + 0.5 * sum(CROSSWALK_M)
+    t = np.linspace(-shape.half_m, shape.half_m, 5)
+    line = arm_points(shape, number, np.full(5, r), t)
+    return Lane(
+        f"{name}/crosswalk{number}",
+        "crosswalk",
+        _world(line, shape, T_world_junction),
+        CROSSWALK_M[1] - CROSSWALK_M[0],
+        road=name,
+        junction=True,
+    )
+
+
+def _turns(shape: JunctionShape) -> list[tuple[int, int, int]]:
+    """Arm, arm and lane of every turn: outer lanes turn to their side, inner ones to the other."""
+    arms = shape.arms_rad()
+    turns = []
+    for i, j in ((i, j) for i in range(len(arms)) for j in range(len(arms)) if i != j):
+        change = math.remainder(arms[j] - arms[i] - math.pi, math.tau)
+        to_inner = change > 0 if shape.traffic == "right" else change < 0
+        straight = abs(change) < math.radians(30.0)
+        for k in range(shape.lanes):
+            if straight or k == (0 if to_inner else shape.lanes - 1):
+                turns.append((i, j, k))
+    return turns
+
+
+def _turn(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
+    """A path [n, 2] from one arm's end to another's: the cubic nearest to a circle's arc."""
+    away = (lane + 0.5) * shape.lane_width_m * (1.0 if shape.traffic == "right" else -1.0)
+    arms = shape.arms_rad()
+    a = _on_arm(arms[start], shape.reach_m(), away)
+    b = _on_arm(arms[end], shape.reach_m(), -away)
+    inward, outward = -_along(arms[start]), _along(arms[end])
+    turn = math.remainder(arms[end] - arms[start] - math.pi, math.tau)
+    chord = math.hypot(*(b - a))
+    # Length of the handles: 4/3 tan(turn / 4) of the radius.
+    handle = (2.0 / 3.0) * chord / (1.0 + math.cos(0.5 * turn))
+    count = max(2, math.ceil(1.2 * chord / 0.8))
+    p = np.linspace(0.0, 1.0, count + 1)[:, None]
+    c0, c1 = a + handle * inward, b - handle * outward
+    path: Array = (1 - p) ** 3 * a + 3 * (1 - p) ** 2 * p * c0 + 3 * (1 - p) * p**2 * c1 + p**3 * b
+    return path
+
+
+def _world(
+    line: Array, shape: JunctionShape, T_world_junction: SE3
+) -> tuple[tuple[float, float, float], ...]:
+    return world_points(np.column_stack([line, make_fan(shape).height_m(line)]), T_world_junction)
+
+
+def _along(arm_rad: float) -> Array:
+    return np.array([math.cos(arm_rad), math.sin(arm_rad)])
+
+
+def _left_of(arm_rad: float) -> Array:
+    return np.array([-math.sin(arm_rad), math.cos(arm_rad)])
+
+
+def _on_arm(arm_rad: float, r_m: float, t_m: float) -> Array:
+    point: Array = r_m * _along(arm_rad) + t_m * _left_of(arm_rad)
+    return point

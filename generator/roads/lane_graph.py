@@ -1,0 +1,126 @@
+"""Lane graphs: what moves and stands where, and which lane follows which."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gen_data.generator.core.scene import Lane, LaneKind
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.roads.cross_section import RoadShape, Strip, strips
+from gen_data.generator.roads.reference_line import Array, ReferenceLine
+
+FURNITURE_M = 0.5
+"""Poles and bins keep this far from the kerb."""
+MEETING_M = 0.05
+MEETING_RAD = math.radians(8.0)
+"""Lanes that end and start nearer than this, in directions that differ by less, are one path."""
+_STEP_M = 2.0
+
+
+def road_lanes(
+    shape: RoadShape, name: str, T_world_road: SE3, speed_m_s: float
+) -> tuple[Lane, ...]:
+    """The lanes of a road: those that drive in its directions, the others with the street left."""
+    line = shape.line()
+    lanes: list[Lane] = []
+    for side in (1, -1):
+        word = "left" if side > 0 else "right"
+        row = strips(shape, side)
+        driving = [strip for strip in row if strip.kind == "driving"]
+        forward = shape.forward(side)
+        for strip in driving:
+            left, right = _neighbours(name, shape, side, strip.number, len(driving))
+            center = path(line, strip.middle_m, strip.middle_z_m, forward, T_world_road)
+            own = lane_name(name, side, strip.number, shape)
+            rise = (strip.inner_z_m - strip.outer_z_m) / strip.width_m
+            bank = round(rise if shape.traffic == "right" else -rise, 9) + 0.0
+            lane = Lane(own, "driving", center, strip.width_m, name, (), left, right, speed_m_s)
+            lanes.append(replace(lane, bank=bank))
+        for kind, t_m, z_m, width_m in _beside(row, side):
+            center = path(line, t_m, z_m, side < 0, T_world_road)
+            lanes.append(Lane(f"{name}/{kind}_{word}", kind, center, width_m, road=name))
+    return tuple(lanes)
+
+
+def lane_name(road: str, side: int, number: int, shape: RoadShape) -> str:
+    """Name of a driving lane: ``main/forward0`` is the one next to the middle."""
+    return f"{road}/{'forward' if shape.forward(side) else 'backward'}{number}"
+
+
+def path(
+    line: ReferenceLine, t_m: float, z_m: float, forward: bool, T_world_road: SE3
+) -> tuple[Vec3, ...]:
+    """Points of a line beside a reference line, in the world."""
+    s = stations(line, _STEP_M)
+    s = s if forward else s[::-1]
+    flat = line.points(s, np.full(len(s), t_m))
+    return world_points(np.column_stack([flat, np.full(len(s), z_m)]), T_world_road)
+
+
+def world_points(points: Array, T_world_road: SE3) -> tuple[Vec3, ...]:
+    """Points [n, 3] of a road's frame in the world, rounded to a micrometre."""
+    placed = np.round(T_world_road.apply(points), 6) + 0.0
+    return tuple((float(x), float(y), float(z)) for x, y, z in placed)
+
+
+def stations(line: ReferenceLine, step_m: float) -> Array:
+    """Evenly spaced arc lengths from start to end, at most a step apart."""
+    count = max(1, math.ceil(line.length_m / step_m - 1e-9))
+    return np.linspace(0.0, line.length_m, count + 1)
+
+
+def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
+    """The lanes, each with those as successors that start where and as it ends."""
+    starts = [
+        (lane.name, lane.kind, lane.center_m[0], _heading(lane.center_m, 0)) for lane in lanes
+    ]
+    return tuple(replace(lane, successors=tuple(_after(lane, starts))) for lane in lanes)
+
+
+def _after(lane: Lane, starts: Iterable[tuple[str, LaneKind, Vec3, float]]) -> list[str]:
+    end, heading = lane.center_m[-1], _heading(lane.center_m, -2)
+    found = {
+        name
+        for name, kind, start, direction in starts
+        if kind == lane.kind
+        and name != lane.name
+        and math.dist(end, start) < MEETING_M
+        and abs(math.remainder(direction - heading, math.tau)) < MEETING_RAD
+    }
+    return sorted(found | set(lane.successors))
+
+
+def _heading(points: Sequence[Vec3], k: int) -> float:
+    (x0, y0, _), (x1, y1, _) = points[k], points[k + 1] if k != -2 else points[-1]
+    return math.atan2(y1 - y0, x1 - x0)
+
+
+def _neighbours(name: str, shape: RoadShape, side: int, number: int, count: int) -> tuple[str, str]:
+    """Names of the lanes left and right that run the same way."""
+    # Seen along its own direction, the middle is to the left of a lane in right-hand traffic.
+    inner = lane_name(name, side, number - 1, shape) if number > 0 else ""
+    outer = lane_name(name, side, number + 1, shape) if number + 1 < count else ""
+    return (inner, outer) if shape.traffic == "right" else (outer, inner)
+
+
+def _beside(row: Sequence[Strip], side: int) -> list[tuple[LaneKind, float, float, float]]:
+    """Kind, t, height and width of the lanes of one side on which nobody drives a car."""
+    by_kind = {strip.kind: strip for strip in row}
+    made: list[tuple[LaneKind, float, float, float]] = []
+    whole: tuple[LaneKind, ...] = ("bicycle", "parking", "verge", "sidewalk")
+    for kind in whole:
+        if kind in by_kind:
+            strip = by_kind[kind]
+            made.append((kind, strip.middle_m, strip.middle_z_m, strip.width_m))
+    edge = by_kind.get("sidewalk", by_kind.get("verge"))
+    if edge is not None:
+        into = min(FURNITURE_M, 0.5 * edge.width_m)
+        z_m = edge.inner_z_m + (edge.outer_z_m - edge.inner_z_m) * into / edge.width_m
+        made.append(("furniture", side * (edge.inner_m + into), z_m, min(0.6, edge.width_m)))
+    if row:
+        made.append(("frontage", side * row[-1].outer_m, row[-1].outer_z_m, 0.0))
+    return made

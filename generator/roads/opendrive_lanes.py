@@ -1,0 +1,238 @@
+"""The lane graph of an OpenDRIVE file, about an origin in its middle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Lane, LaneKind
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.lane_graph import FURNITURE_M, world_points
+from gen_data.generator.roads.opendrive import Contact, LaneRecord, Network, Road, Section
+from gen_data.generator.roads.reference_line import Array
+
+KINDS: dict[str, LaneKind] = {
+    "driving": "driving",
+    "entry": "driving",
+    "exit": "driving",
+    "onRamp": "driving",
+    "offRamp": "driving",
+    "connectingRamp": "driving",
+    "bidirectional": "driving",
+    "bus": "driving",
+    "taxi": "driving",
+    "parking": "parking",
+    "biking": "bicycle",
+    "sidewalk": "sidewalk",
+    "walking": "sidewalk",
+}
+"""Lane types of the standard that things move or stand on; others only have a surface."""
+RAISED_M = 0.12
+"""Height of sidewalks of which the file does not tell one."""
+MAX_LINK_GAP_M = 0.1
+"""Lanes that are linked must meet this closely."""
+DEFAULT_SPEED_M_S = 13.9
+_STEP_M = 2.0
+_SIGN_KINDS = frozenset({"sidewalk", "parking"})
+"""Run with the street on their left, whatever side the traffic keeps to."""
+
+Key = tuple[str, int, int]
+
+
+def origin_m(network: Network) -> tuple[float, float]:
+    """Middle of all reference lines, in whole metres: file coordinates may be far from zero."""
+    ends = np.concatenate(
+        [road.line.points(stations(0.0, road.line.length_m, 20.0), np.zeros(1))
+         for road in network.roads.values()]
+    )  # fmt: skip
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    return (round(float(low[0] + high[0]) / 2.0), round(float(low[1] + high[1]) / 2.0))
+
+
+def stations(start_m: float, end_m: float, step_m: float) -> Array:
+    """Even arc lengths from start to end, at most a step apart."""
+    return np.linspace(start_m, end_m, max(1, math.ceil((end_m - start_m) / step_m - 1e-9)) + 1)
+
+
+def heights_m(lane: LaneRecord) -> tuple[float, float]:
+    """Heights of a lane's inner and outer edge over the road."""
+    if lane.height_m is not None:
+        return lane.height_m
+    return (RAISED_M, RAISED_M) if KINDS.get(lane.kind) == "sidewalk" else (0.0, 0.0)
+
+
+def network_lanes(network: Network) -> tuple[Lane, ...]:
+    """Every lane, in the frame whose origin is ``origin_m``.
+
+    Raises:
+        AssetError: linked lanes do not meet; the message names the road.
+    """
+    x, y = origin_m(network)
+    T_body_file = SE3((-x, -y, 0.0))
+    made: dict[Key, Lane] = {}
+    extra: list[Lane] = []
+    for road in network.roads.values():
+        for index, section in enumerate(road.sections):
+            for number in sorted(section.lanes):
+                kind = KINDS.get(section.lanes[number].kind)
+                if number != 0 and kind is not None:
+                    made[road.road_id, index, number] = _lane(
+                        road, index, section, number, T_body_file
+                    )
+            extra += _beside(road, index, section, T_body_file)
+    linked = []
+    for key, lane in made.items():
+        after = [k for k in _after(network, key) if k in made and made[k].kind == lane.kind]
+        for other in after:
+            _check_gap(network, key, lane, made[other])
+        linked.append(_with_links(network, lane, key, after, made))
+    return (*linked, *extra)
+
+
+def runs_forward(road: Road, number: int, kind: str) -> bool:
+    """Whether a lane runs along its road's direction."""
+    left_hand = road.left_hand and KINDS[kind] not in _SIGN_KINDS
+    return (number < 0) != left_hand
+
+
+@dataclass(frozen=True, slots=True)
+class _Course:
+    """A lane's edges.
+
+    Attributes:
+        s_m: Arc lengths [n].
+        inner_m, outer_m: ``t`` of its edges at them [n].
+    """
+
+    s_m: Array
+    inner_m: Array
+    outer_m: Array
+
+
+def _course(road: Road, section: Section, number: int, step_m: float = _STEP_M) -> _Course:
+    s = stations(section.start_m, section.end_m, step_m)
+    edges = road.boundaries_m(section, s)
+    side = 1 if number > 0 else -1
+    return _Course(s, edges[number - side], edges[number])
+
+
+def _lane(road: Road, index: int, section: Section, number: int, T_body_file: SE3) -> Lane:
+    record = section.lanes[number]
+    course = _course(road, section, number)
+    lift = np.full(len(course.s_m), 0.5 * sum(heights_m(record)))
+    points = road.points(course.s_m, 0.5 * (course.inner_m + course.outer_m), lift)
+    low_m, high_m = heights_m(record)
+    inner = road.points(course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2].mean()
+    outer = road.points(course.s_m, course.outer_m, np.full(len(lift), high_m))[:, 2].mean()
+    width_m = round(float(np.abs(course.outer_m - course.inner_m).mean()), 6)
+    # The inner edge of a lane with a negative number is on the left, seen along the road.
+    bank = float(inner - outer) / width_m * (1.0 if number < 0 else -1.0) if width_m else 0.0
+    if not runs_forward(road, number, record.kind):
+        points, bank = points[::-1], -bank
+    kind = KINDS[record.kind]
+    drives = kind == "driving"
+    return Lane(
+        name=_name((road.road_id, index, number)),
+        kind=kind,
+        center_m=world_points(points, T_body_file),
+        width_m=width_m,
+        road=road.road_id,
+        speed_m_s=(road.speed_m_s or DEFAULT_SPEED_M_S) if drives else 0.0,
+        junction=bool(road.junction),
+        bank=round(bank, 9) + 0.0,
+    )
+
+
+def _beside(road: Road, index: int, section: Section, T_body_file: SE3) -> list[Lane]:
+    """Furniture on sidewalks, and house fronts along the outer edges of roads."""
+    made: list[Lane] = []
+    for side in (1, -1):
+        numbers = sorted((n for n in section.lanes if n * side > 0), key=abs)
+        if not numbers or road.junction:
+            continue
+        outermost = numbers[-1]
+        lines: list[tuple[LaneKind, int, float]] = [("frontage", outermost, 1.0)]
+        lines += [
+            ("furniture", n, 0.0) for n in numbers if KINDS.get(section.lanes[n].kind) == "sidewalk"
+        ]
+        for kind, number, share in lines:
+            course = _course(road, section, number)
+            into = share * (course.outer_m - course.inner_m)
+            if kind == "furniture":
+                into = side * np.minimum(FURNITURE_M, 0.5 * np.abs(course.outer_m - course.inner_m))
+            lift = np.full(len(course.s_m), heights_m(section.lanes[number])[1])
+            points = road.points(course.s_m, course.inner_m + into, lift)
+            points = points if side < 0 else points[::-1]
+            name = f"{_name((road.road_id, index, number))}/{kind}"
+            width = 0.6 if kind == "furniture" else 0.0
+            made.append(
+                Lane(name, kind, world_points(points, T_body_file), width, road=road.road_id)
+            )
+    return made
+
+
+def _name(key: Key) -> str:
+    return f"{key[0]}.{key[1]}.{key[2]}"
+
+
+def _with_links(
+    network: Network, lane: Lane, key: Key, after: list[Key], made: dict[Key, Lane]
+) -> Lane:
+    """The lane with its successors, and its neighbours that run the same way."""
+    road, section, number = key
+    side = 1 if number > 0 else -1
+    kind = network.roads[road].sections[section].lanes[number].kind
+
+    def beside(step: int) -> str:
+        other = (road, section, number + step)
+        return _name(other) if other in made and made[other].kind == lane.kind else ""
+
+    # Towards the middle is -side in t, and left is +t for whoever runs along the road.
+    inner_is_left = runs_forward(network.roads[road], number, kind) == (side < 0)
+    left, right = (-side, side) if inner_is_left else (side, -side)
+    return replace(
+        lane,
+        successors=tuple(sorted(_name(k) for k in after)),
+        left=beside(left),
+        right=beside(right),
+    )
+
+
+def _after(network: Network, key: Key) -> list[Key]:
+    """Keys of the lanes that a lane leads to."""
+    road = network.roads[key[0]]
+    record = road.sections[key[1]].lanes[key[2]]
+    forward = runs_forward(road, record.number, record.kind)
+    step, target = (1, record.successor) if forward else (-1, record.predecessor)
+    index = key[1] + step
+    if 0 <= index < len(road.sections):
+        return [] if target is None else [(road.road_id, index, target)]
+    link = road.successor if forward else road.predecessor
+    if link is None:
+        return []
+    if not link.junction:
+        return [] if target is None else [_entry(network, link.target, link.contact, target)]
+    return [
+        _entry(network, one.connecting, one.contact, to)
+        for one in network.junctions[link.target]
+        if one.incoming == road.road_id
+        for origin, to in one.lanes
+        if origin == record.number
+    ]
+
+
+def _entry(network: Network, road_id: str, contact: Contact, number: int) -> Key:
+    sections = network.roads[road_id].sections
+    return (road_id, 0 if contact == "start" else len(sections) - 1, number)
+
+
+def _check_gap(network: Network, key: Key, lane: Lane, after: Lane) -> None:
+    gap = math.dist(lane.center_m[-1], after.center_m[0])
+    if gap > MAX_LINK_GAP_M:
+        raise AssetError(
+            f"{network.place}: road '{key[0]}': lane {key[2]} ends {gap:.2f} m from lane "
+            f"'{after.name}' that it leads to; correct the link or the geometry"
+        )

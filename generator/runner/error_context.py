@@ -1,0 +1,45 @@
+"""Unexpected errors as messages: place, fact, command to reproduce, end of the trace."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from gen_data.generator.core.errors import GenDataError, SampleError
+
+TRACE_LINES = 12
+CACHE_DAMAGE = ("Failed to find forward kernel", "Failed to load CPU module")
+"""Texts of Warp's errors when a compiled kernel on disk is not as it was written."""
+
+
+@contextmanager
+def explain_errors(place: str, command: str = "") -> Iterator[None]:
+    """Turn whatever is no GenDataError into a SampleError that names the place.
+
+    A plain SampleError gets place and command, too; its subclasses say more than that themselves.
+    """
+    try:
+        yield
+    except GenDataError as error:
+        if type(error) is not SampleError:
+            raise
+        reproduce = f"\n  Reproduce: {command}" if command else ""
+        raise SampleError(f"{place}: {error}{reproduce}") from error
+    except Exception as error:
+        raise unexpected_error(error, place, command) from error
+
+
+def unexpected_error(error: Exception, place: str, command: str = "") -> SampleError:
+    """A SampleError with the end of the error's traceback, which does not cross processes."""
+    trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+    lines = [f"{place}: {type(error).__name__}: {error}"]
+    lines += [f"  {line}" for line in trace.rstrip().splitlines()[-TRACE_LINES:]]
+    if any(text in str(error) for text in CACHE_DAMAGE):
+        lines.append(
+            "  Warp's cache of compiled kernels is damaged: delete its folder, "
+            "~/.cache/warp or $WARP_CACHE_PATH, and repeat the command"
+        )
+    if command:
+        lines.append(f"  Reproduce: {command}")
+    return SampleError("\n".join(lines))

@@ -1,0 +1,145 @@
+"""ShardRecord: what a committed shard holds; its existence *is* the commit."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.serialization import canonical_json, from_plain
+from gen_data.generator.runner.durable_files import IRREGULAR, hash_file, tree_sizes
+
+
+@dataclass(frozen=True, slots=True)
+class FileRecord:
+    """One file of a shard; ``path`` is relative to the shard's folder."""
+
+    path: str
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class SplitCount:
+    """What a split holds: samples, and visible annotated objects per category."""
+
+    split: str
+    samples: int
+    objects: Mapping[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class ShardRecord:
+    """The content of one shard.
+
+    Attributes:
+        first, end: Sample indices ``first <= i < end``.
+        scenes: Scenes whose first view lies in this shard.
+        rejections: Layouts refused before those scenes were accepted.
+        splits: Counts, sorted by split.
+        assets: Ids of all objects, robots, textures and environments in its samples, sorted.
+        files: Sorted by path.
+    """
+
+    shard: int
+    first: int
+    end: int
+    scenes: int
+    rejections: int
+    splits: tuple[SplitCount, ...]
+    assets: tuple[str, ...]
+    files: tuple[FileRecord, ...]
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of all its files."""
+        return sum(file.bytes for file in self.files)
+
+    def to_bytes(self) -> bytes:
+        """The record's file: one line of canonical JSON."""
+        return (canonical_json(self) + "\n").encode()
+
+
+def parse_record(data: bytes) -> ShardRecord | None:
+    """The record in a file's bytes, or None if they are not one."""
+    try:
+        return from_plain(ShardRecord, json.loads(data))
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return None
+
+
+def describe_shard(
+    shard: int, indices: range, samples: Iterable[Sample], folder: Path
+) -> ShardRecord:
+    """The record of a finished shard folder; reads every file once to hash it.
+
+    Raises:
+        StorageError: if something in the folder is not a regular file.
+    """
+    scenes, rejections = 0, 0
+    counts = []
+    assets: set[str] = set()
+    for sample in samples:
+        assets |= _assets_in(sample.scene)
+        if sample.view_index == 0 and sample.step_index == 0:
+            scenes += 1
+            rejections += sample.attempts - 1
+        counts.append(_count(sample))
+    sizes = tree_sizes(folder)
+    irregular = [path for path, size in sizes.items() if size == IRREGULAR]
+    if irregular:
+        raise StorageError(
+            f"shard {shard}: {irregular[0]} is not a regular file; exporters must write files"
+        )
+    files = tuple(FileRecord(path, size, hash_file(folder / path)) for path, size in sizes.items())
+    return ShardRecord(
+        shard,
+        indices.start,
+        indices.stop,
+        scenes,
+        rejections,
+        sum_counts(counts),
+        tuple(sorted(assets)),
+        files,
+    )
+
+
+def sum_counts(counts: Iterable[SplitCount]) -> tuple[SplitCount, ...]:
+    """One count per split, sorted by split and category."""
+    samples: Counter[str] = Counter()
+    objects: dict[str, Counter[str]] = {}
+    for count in counts:
+        samples[count.split] += count.samples
+        objects.setdefault(count.split, Counter()).update(count.objects)
+    return tuple(
+        SplitCount(split, samples[split], dict(sorted(objects[split].items())))
+        for split in sorted(samples)
+    )
+
+
+def _assets_in(scene: Scene) -> set[str]:
+    """Ids of what a scene shows; a robot's links go by the robot's id."""
+    links = tuple(f"{articulation.name}/" for articulation in scene.articulations)
+    bodies = [b for b in scene.bodies if not (links and b.name.startswith(links))]
+    materials = (material for body in scene.bodies for material in body.materials)
+    return {
+        scene.environment.image,
+        *(articulation.asset for articulation in scene.articulations),
+        *(body.asset for body in bodies),
+        *(material.texture.partition("#")[0] for material in materials if material.texture),
+    }
+
+
+def _count(sample: Sample) -> SplitCount:
+    objects = Counter(
+        seen.instance.category
+        for truth in sample.truth.values()
+        for seen in truth.objects
+        if seen.instance.annotated and seen.visible_px > 0
+    )
+    return SplitCount(sample.split, 1, objects)

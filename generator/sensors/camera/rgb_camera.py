@@ -1,0 +1,245 @@
+"""A camera with every label channel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import ConfigError, SampleError, did_you_mean
+from gen_data.generator.core.interfaces import Renderer, SensorInfo
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Camera, Region, Scene
+from gen_data.generator.core.scene_time import RIG_AXES
+from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.core.shutter import INSTANT, Shutter
+from gen_data.generator.core.stereo import baseline_m, disparity_px, is_seen_by_both
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.generator.sensors.camera.lens_models import LensConfig, Pinhole, Published
+from gen_data.generator.sensors.camera.shutter import ExposureTime, RollingShutter, make_shutter
+from gen_data.generator.sensors.mounting import Mounted, check_rig
+
+Image = Literal[
+    Channel.RGB,
+    Channel.Z_DEPTH,
+    Channel.RANGE,
+    Channel.NORMALS,
+    Channel.INSTANCE,
+    Channel.PART,
+    Channel.CATEGORY,
+    Channel.OBJECT_COORDINATES,
+    Channel.DISPARITY,
+    Channel.DISPARITY_VISIBLE,
+    Channel.FLOW_FORWARD,
+    Channel.FLOW_BACKWARD,
+    Channel.FLOW_OCCLUDED_FORWARD,
+    Channel.FLOW_OCCLUDED_BACKWARD,
+    Channel.SCENE_FLOW,
+]
+"""Channels that can be written as images; see ``gen_data.generator.core.capture.Channel``."""
+
+PAIRED = frozenset({Channel.DISPARITY, Channel.DISPARITY_VISIBLE})
+"""Channels that take a second camera."""
+
+SidePx = Annotated[int, Field(ge=8, le=8192)]
+
+PINHOLE_MAX_DEG = 170.0
+NOMINAL_AZIMUTH_RAD = math.radians(-60.0)
+NOMINAL_ELEVATION_RAD = math.radians(35.0)
+
+
+class RgbCamera(Mounted):
+    """A camera, by default without distortion; its pose and lens are varied by randomizers.
+
+    Attributes:
+        name: What labels, files and randomizers call it.
+        size_px: Width and height of its images.
+        hfov_deg: Nominal horizontal field of view, along the middle row; tangential terms are
+            left out, and what is dark beyond a lens's field counts.
+        lens: How directions become image points: a pinhole; brown_conrady, OpenCV's usual model
+            with k1 to k6, p1 and p2; kannala_brandt, its fisheye with k1 to k4; both with
+            field_deg, the full angle beyond which they show nothing; equirectangular, a panorama;
+            or calibrated, a known ``camera`` with its own field of view: kitti_raw_02, euroc_cam0
+            or tum_vi_cam0.
+        channels: What is written as images.
+        ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
+        exposure: How long its images are exposed; null = an instant. Their labels are those of the
+            middle of the exposure, which is the instant of the step.
+        rolling_shutter: How its rows are read one after the other; null = all at once. Labels in
+            the image, keypoints included, are those of each row's instant; labels in space those of
+            the middle row's, which is the instant of the step.
+        image_pipeline: From radiance to photographs: lens, exposure, sensor, tone, JPEG.
+        stereo_with: For its channels ``disparity`` and ``disparity_visible``: name of the camera
+            to its right that makes a rectified pair with it.
+    """
+
+    former_keys: ClassVar[Mapping[str, str]] = {"formation": "image_pipeline"}
+    type: Literal["rgb_camera"] = "rgb_camera"
+    name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    size_px: tuple[SidePx, SidePx] = (640, 480)
+    hfov_deg: float = Field(60.0, ge=1, le=360)
+    lens: LensConfig = Pinhole()
+    channels: tuple[Image, ...] = Field(
+        (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY), min_length=1
+    )
+    ev100: float | None = None
+    exposure: ExposureTime | None = None
+    rolling_shutter: RollingShutter | None = None
+    image_pipeline: ImagePipeline = ImagePipeline()
+    stereo_with: str = ""
+
+    @model_validator(mode="after")
+    def _has_a_partner(self) -> RgbCamera:
+        if not self.stereo_with and PAIRED & set(self.media):
+            raise ValueError("disparity needs a second camera: name it with stereo_with")
+        return self
+
+    @model_validator(mode="after")
+    def _has_a_lens(self) -> RgbCamera:
+        if isinstance(self.lens, Pinhole) and self.hfov_deg > PINHOLE_MAX_DEG:
+            raise ValueError(
+                f"hfov_deg {self.hfov_deg:g} is too wide for a pinhole; expected at most "
+                f"{PINHOLE_MAX_DEG:g}, or another lens, such as {{model: kannala_brandt}}"
+            )
+        if isinstance(self.lens, Published) and "hfov_deg" in self.model_fields_set:
+            raise ValueError("a calibrated lens has its own field of view: leave out hfov_deg")
+        if self.intrinsics().folds_over():
+            raise ValueError(
+                f"lens {self.lens.model}: its polynomial folds over inside the image, where no "
+                "lens does; check the signs and size of its coefficients, make hfov_deg smaller, "
+                "or end its field before with field_deg"
+            )
+        return self
+
+    def intrinsics(self) -> Intrinsics:
+        """Nominal intrinsics.
+
+        Raises:
+            ValueError: the lens does not show as wide a field as ``hfov_deg``.
+        """
+        width_px, height_px = self.size_px
+        if isinstance(self.lens, Published):
+            return self.lens.intrinsics(width_px, height_px)
+        hfov_rad = math.radians(self.hfov_deg)
+        return Intrinsics.from_hfov(width_px, height_px, hfov_rad, self.lens.lens())
+
+    @property
+    def media(self) -> tuple[Channel, ...]:
+        """Channels that are written as images, in a fixed order."""
+        return tuple(channel for channel in Channel if channel in self.channels)
+
+    def describe(self) -> SensorInfo:
+        """A camera with the channels that it writes."""
+        return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with this camera in it, looking at the scene's focus; as it is if it was."""
+        shutter = make_shutter(self.exposure, self.rolling_shutter)
+        return add_camera(
+            scene, self.name, self, self.intrinsics(), ev100=self.ev100, shutter=shutter
+        )
+
+    def capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> SensorReading:
+        """Its own channels and those asked for; only RGB passes through its image pipeline.
+
+        Raises:
+            SampleError: it makes no rectified pair with the camera it should.
+        """
+        asked = channels | set(self.media)
+        if self.stereo_with and PAIRED & asked:
+            below = (asked - PAIRED) | {Channel.Z_DEPTH}
+            reading = self._capture(scene, renderer, below, rng)
+            return self._with_disparity(scene, renderer, reading)
+        return self._capture(scene, renderer, asked, rng)
+
+    def _capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> SensorReading:
+        camera = scene.camera(self.name)
+        return capture_photograph(scene, renderer, camera, channels, self.image_pipeline, rng)
+
+    def _with_disparity(
+        self, scene: Scene, renderer: Renderer, seen: SensorReading
+    ) -> SensorReading:
+        """The reading with disparities to the camera on its right."""
+        known = {camera.name: camera for camera in scene.cameras}
+        if self.stereo_with not in known:
+            raise ConfigError(
+                f"sensor '{self.name}': stereo_with: there is no camera '{self.stereo_with}'; there"
+                f" is {', '.join(known)}{did_you_mean(self.stereo_with, known)}"
+            )
+        left, right = known[self.name], known[self.stereo_with]
+        try:
+            scale = left.intrinsics.fx_px * baseline_m(left, right)
+        except ValueError as error:
+            raise SampleError(
+                f"sensors '{left.name}' and '{right.name}' are no rectified pair: {error}; put them"
+                " on one rig with the same size, field of view, lens and angles, the right one"
+                " beside the left, and let no randomizer vary only one of them"
+            ) from error
+        there = renderer.render(scene, right, frozenset({Channel.Z_DEPTH}))
+        here_px = disparity_px(seen.channels[Channel.Z_DEPTH], scale)
+        visible = is_seen_by_both(here_px, disparity_px(there.channels[Channel.Z_DEPTH], scale))
+        pair = {
+            Channel.DISPARITY: here_px,
+            Channel.DISPARITY_VISIBLE: np.where(visible, here_px, np.float32(0.0)),
+        }
+        return replace(seen, channels={**seen.channels, **pair})
+
+
+def add_camera(
+    scene: Scene,
+    name: str,
+    mounted: Mounted,
+    intrinsics: Intrinsics,
+    *,
+    ev100: float | None = None,
+    shutter: Shutter = INSTANT,
+) -> Scene:
+    """The scene with a camera on its rig, or looking at the scene's focus; as it is if it was.
+
+    Raises:
+        ConfigError: the scene has no such rig.
+    """
+    if any(camera.name == name for camera in scene.cameras):
+        return scene
+    if mounted.rig:
+        rig = check_rig(scene, name, mounted.rig)
+        T_rig_camera = mounted.T_rig_sensor @ RIG_AXES.inverse()
+        camera = Camera(name, SE3(), intrinsics, ev100, rig, T_rig_camera, shutter)
+    else:
+        pose = _nominal_pose(scene.focus, _narrower_half_rad(intrinsics))
+        camera = Camera(name, pose, intrinsics, ev100, shutter=shutter)
+    return replace(scene, cameras=(*scene.cameras, camera))
+
+
+def _narrower_half_rad(intrinsics: Intrinsics) -> float:
+    """Half the field of view along the image's shorter side."""
+    narrower_px = 0.5 * min(intrinsics.width_px, intrinsics.height_px)
+    if intrinsics.straight:
+        return math.atan(narrower_px / intrinsics.fx_px)
+    rim = intrinsics.rays(np.array([intrinsics.cx_px + narrower_px, intrinsics.cy_px]))
+    seen_rad = float(np.arccos(np.clip(rim[2], 0.0, 1.0))) if np.isfinite(rim[2]) else math.pi
+    return min(seen_rad, intrinsics.lens.half_field_rad, 0.5 * math.pi)
+
+
+def _nominal_pose(focus: Region, half_angle_rad: float) -> SE3:
+    """``T_world_camera`` from which the whole focus is in view."""
+    radius_m = 0.5 * math.hypot(*focus.size_m)
+    distance_m = radius_m / math.sin(min(half_angle_rad, math.radians(45.0)))
+    level_m = distance_m * math.cos(NOMINAL_ELEVATION_RAD)
+    x, y, z = focus.center_m
+    eye = (
+        x + level_m * math.cos(NOMINAL_AZIMUTH_RAD),
+        y + level_m * math.sin(NOMINAL_AZIMUTH_RAD),
+        z + distance_m * math.sin(NOMINAL_ELEVATION_RAD),
+    )
+    return look_at(eye, focus.center_m).rounded()

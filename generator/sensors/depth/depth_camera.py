@@ -1,0 +1,129 @@
+"""A depth camera: what a device reports, beside the truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator
+
+from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import SampleError
+from gen_data.generator.core.interfaces import Renderer, SensorInfo
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.generator.sensors.camera.rgb_camera import add_camera
+from gen_data.generator.sensors.depth.depth_model import DepthModel, SidePx
+from gen_data.generator.sensors.depth.view import View
+from gen_data.generator.sensors.device_presets import check_preset, load_preset
+from gen_data.generator.sensors.mounting import Mounted
+
+MODELS = "gen_data.generator.sensors.depth"
+IDEAL = ImagePipeline()
+OWN = frozenset({Channel.MEASURED_DEPTH, Channel.INFRARED})
+
+DepthImage = Literal[
+    Channel.MEASURED_DEPTH,
+    Channel.INFRARED,
+    Channel.RGB,
+    Channel.Z_DEPTH,
+    Channel.RANGE,
+    Channel.NORMALS,
+    Channel.INSTANCE,
+    Channel.PART,
+    Channel.CATEGORY,
+    Channel.OBJECT_COORDINATES,
+]
+"""Channels that can be written as images; all but the first two are the truth."""
+
+
+class DepthCamera(Mounted):
+    """A depth camera; its pose is varied by randomizers like that of any camera.
+
+    ``measured_depth`` is what the device reports; ``depth`` and all labels are the truth.
+
+    Attributes:
+        name: What labels, files and randomizers call it.
+        model: A file of ``generator/sensors/depth``, or the values of one.
+        size_px: Width and height of its images; null = the model's.
+        hfov_deg: Horizontal field of view; null = the model's.
+        channels: What is written as images.
+    """
+
+    type: Literal["depth_camera"] = "depth_camera"
+    name: str = Field("depth_camera", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    model: str | DepthModel = "kinect_v2"
+    size_px: tuple[SidePx, SidePx] | None = None
+    hfov_deg: float | None = Field(None, ge=1, le=150)
+    channels: tuple[DepthImage, ...] = Field(
+        (Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.Z_DEPTH), min_length=1
+    )
+
+    @field_validator("model")
+    @classmethod
+    def _is_known(cls, model: str | DepthModel) -> str | DepthModel:
+        return check_preset(MODELS, model) if isinstance(model, str) else model
+
+    @property
+    def device(self) -> DepthModel:
+        """Its data sheet."""
+        model = self.model
+        return load_preset(MODELS, model, DepthModel) if isinstance(model, str) else model
+
+    @property
+    def media(self) -> tuple[Channel, ...]:
+        """Channels that are written as images, in a fixed order."""
+        return tuple(channel for channel in Channel if channel in self.channels)
+
+    def intrinsics(self) -> Intrinsics:
+        """Nominal intrinsics."""
+        device = self.device
+        width_px, height_px = self.size_px or device.size_px
+        hfov_deg = device.hfov_deg if self.hfov_deg is None else self.hfov_deg
+        return Intrinsics.from_hfov(width_px, height_px, math.radians(hfov_deg))
+
+    def describe(self) -> SensorInfo:
+        """A camera with the channels that it writes."""
+        return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with this camera in it, looking at the scene's focus; as it is if it was.
+
+        Raises:
+            ConfigError: the scene has no such rig.
+        """
+        return add_camera(scene, self.name, self, self.intrinsics())
+
+    def capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> SensorReading:
+        """Its own channels and those asked for; labels are the truth.
+
+        Raises:
+            SampleError: a randomizer gave it another lens than a pinhole.
+        """
+        asked = channels | set(self.media)
+        camera = scene.camera(self.name)
+        if not camera.intrinsics.straight:
+            raise SampleError(
+                f"sensor '{self.name}': a depth camera is a pinhole, got the lens "
+                f"{camera.intrinsics.lens.model}; leave it out of what randomizers change"
+            )
+        seen = capture_photograph(scene, renderer, camera, asked - OWN, IDEAL, rng)
+        if not OWN & asked:
+            return seen
+        device = self.device
+        measured = device.principle.measure(View(scene, renderer, camera), rng)
+        low_m, high_m = device.range_m
+        within = (measured.z_m >= low_m) & (measured.z_m <= high_m)
+        own: dict[Channel, NDArray[Any]] = {
+            Channel.MEASURED_DEPTH: np.where(within, measured.z_m, np.float32(np.inf)),
+            Channel.INFRARED: measured.infrared,
+        }
+        kept = {channel: image for channel, image in own.items() if channel in asked}
+        return replace(seen, channels={**seen.channels, **kept})

@@ -1,0 +1,59 @@
+"""Makes of devices as data: one YAML file each, with its sources."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import TypeVar
+
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.problems import Problems
+from gen_data.generator.config.validation import validate
+from gen_data.generator.config.yaml_tree import load_yaml
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+
+M = TypeVar("M", bound=Strict)
+
+
+@cache
+def preset_names(package: str) -> tuple[str, ...]:
+    """Names of all makes that lie in a package, sorted."""
+    return tuple(sorted(path.stem for path in Path(str(files(package))).glob("*.yaml")))
+
+
+def preset_path(package: str, name: str) -> Path:
+    """The file of a make."""
+    return Path(str(files(package))) / f"{name}.yaml"
+
+
+@cache
+def load_preset(package: str, name: str, kind: type[M]) -> M:
+    """The make of that name.
+
+    Raises:
+        ConfigError: there is no such file, or something in it is wrong.
+    """
+    known = preset_names(package)
+    if name not in known:
+        raise ConfigError(
+            f"there is no '{name}' among {package}; expected one of {', '.join(known)}"
+            f"{did_you_mean(name, known)}"
+        )
+    problems = Problems()
+    made = validate(load_yaml(preset_path(package, name)), kind, problems)
+    problems.raise_if_any()
+    assert made is not None
+    return made
+
+
+def check_preset(package: str, name: str) -> str:
+    """The name, for validators.
+
+    Raises:
+        ValueError: there is no such make.
+    """
+    known = preset_names(package)
+    if name not in known:
+        raise ValueError(f"expected one of {', '.join(known)}{did_you_mean(name, known)}")
+    return name

@@ -1,0 +1,1 @@
+"""Event cameras: the sensor and its pixels."""

@@ -1,0 +1,1 @@
+"""Events of traffic and manipulation: collisions, lane crossings, obstacles."""

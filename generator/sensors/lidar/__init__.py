@@ -1,0 +1,1 @@
+"""Laser scanners: scan pattern, detection, atmosphere, and devices as data."""

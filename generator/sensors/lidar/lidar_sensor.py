@@ -1,0 +1,231 @@
+"""A laser scanner on the rig of a camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, WithJsonSchema, field_validator
+
+from gen_data.generator.core.capture import POINT, Channel, LidarRays, PointCloud
+from gen_data.generator.core.errors import did_you_mean
+from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
+from gen_data.generator.core.scene import Lidar, Scene, Weather
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.lidar.lidar_atmosphere import (
+    add_atmosphere,
+    attenuate,
+    optical_depth,
+    rain_noise_m,
+)
+from gen_data.generator.sensors.lidar.lidar_detection import (
+    LABELS,
+    Float32,
+    Kept,
+    Pulses,
+    UInt8,
+    UInt16,
+    is_beyond_reach,
+    is_detected,
+    make_pulses,
+    report_intensity,
+    select_returns,
+)
+from gen_data.generator.sensors.lidar.motion_distortion import SweepPulses, fire_pulses
+from gen_data.generator.sensors.lidar.presets import lidar_model, model_names
+from gen_data.generator.sensors.lidar.scan_pattern import LidarModel, Sweep, make_sweep
+from gen_data.generator.sensors.mounting import Mounted, with_lidar
+
+SUBRAYS = 7
+"""Rays that stand for a beam with a width."""
+
+CLEAR = Weather()
+
+
+Angle = Annotated[float, Field(ge=-180, le=180)]
+Elevation = Annotated[float, Field(ge=-90, le=90)]
+Beam = tuple[Elevation, Angle]
+
+BEAMS_SCHEMA = {
+    "anyOf": [
+        {"type": "string", "pattern": r"\.csv$"},
+        {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
+    ]
+}
+"""A file takes the list's place before it is read: see ``datasheets``."""
+
+
+class LidarSensor(Mounted):
+    """A laser scanner on a rig, or on that of the camera it is mounted beside.
+
+    Attributes:
+        name: What labels and files call it.
+        model: A file of ``generator/sensors/lidar/presets``, or one of the user's own like them:
+            ``./my_lidar.yaml``, looked for beside the configuration.
+        beams: Other lasers than the model's: elevation and azimuth offset to the left of each
+            [deg], or the name of a CSV file with the columns ``elevation_deg`` and
+            ``azimuth_offset_deg``. Pulses per second stay those of the model.
+        rotation_hz: Sweeps per second; null = the model's. Pulses per second stay those of the
+            model.
+        camera: Without a rig: name of the camera it rides with, which is listed before it. The
+            rig is then at the camera's centre and looks along its axis.
+        returns: Which return of a pulse is reported; ``dual`` reports two.
+        divergence: Whether beams have a width; costs seven rays instead of one.
+        ideal: No noise, no missed return, no weather: every hit within range.
+        motion_distortion: How the scanner's motion during a sweep shows. ``raw``: points are in
+            the lidar frame of each pulse's own instant. ``deskewed``: in that of the sweep's
+            middle, as in KITTI's files; moving objects are where each pulse met them. ``none``:
+            all pulses leave in the middle of the sweep.
+    """
+
+    type: Literal["lidar"] = "lidar"
+    name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    model: str | LidarModel = "HDL-64E"
+    beams: Annotated[tuple[Beam, ...], WithJsonSchema(BEAMS_SCHEMA)] = Field((), max_length=4096)
+    rotation_hz: float | None = Field(None, gt=0, le=100)
+    camera: str = "color"
+    returns: Kept = "strongest"
+    divergence: bool = False
+    ideal: bool = False
+    motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
+
+    @field_validator("model")
+    @classmethod
+    def _is_known(cls, model: str | LidarModel) -> str | LidarModel:
+        if isinstance(model, str) and model not in model_names():
+            raise ValueError(
+                f"expected one of {', '.join(model_names())}, or the name of a .yaml file"
+                f"{did_you_mean(model, model_names())}"
+            )
+        return model
+
+    @property
+    def device(self) -> LidarModel:
+        """Its data sheet."""
+        model = lidar_model(self.model) if isinstance(self.model, str) else self.model
+        if self.rotation_hz is not None:
+            model = model.model_copy(update={"rotation_hz": self.rotation_hz})
+        return model.with_beams(self.beams) if self.beams else model
+
+    def describe(self) -> SensorInfo:
+        """A laser scanner."""
+        return SensorInfo(
+            self.name,
+            Modality.LIDAR,
+            rate_hz=self.rate_hz,
+            time_offset_s=self.time_offset_s,
+            needs_clear_view=not self.inside,
+        )
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with this scanner on its rig.
+
+        Raises:
+            ConfigError: the scene has no such rig or camera.
+        """
+        name = self.model if isinstance(self.model, str) else self.model.name
+        sweep_s = round(1.0 / self.device.rotation_hz, 9)
+        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
+        return with_lidar(scene, self, lidar)
+
+    def capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> PointCloud:
+        """One sweep."""
+        del channels
+        model = self.device
+        lidar = scene.lidar(self.name)
+        sweep = make_sweep(model, float(rng.uniform(0.0, 3600.0)))
+        shots = SweepPulses(sweep.directions)
+        if self.motion_distortion != "none":
+            shots = fire_pulses(scene, lidar, sweep)
+        beams = LidarRays(
+            shots.directions,
+            1e-3 * model.divergence_mrad,
+            SUBRAYS if self.divergence else 1,
+            model.range_m[1],
+            shots.origins_m,
+            shots.time_s,
+            sweep.order,
+        )
+        pulses = make_pulses(renderer.scan(scene, lidar, beams), model, self.returns)
+        weather = CLEAR if self.ideal else scene.weather
+        if weather != CLEAR:
+            pulses = _through_air(pulses, weather, model, lidar, shots, rng)
+        pulses = is_beyond_reach(pulses, model)
+        noticed = pulses.light > 0.0 if self.ideal else is_detected(pulses, rng)
+        rows, picks = select_returns(pulses, noticed, self.returns)
+        found = Found.of(pulses, rows, picks)
+        if not self.ideal:
+            found = _noisy(found, model, weather, rng)
+        seen_from = SweepPulses(sweep.directions) if self.motion_distortion == "raw" else shots
+        points = _points(found, seen_from, sweep, model)
+        return PointCloud(self.name, lidar, points, scene.time_s)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Found:
+    """The returns that are reported, arrays [n]; ``row`` is the number of their pulse."""
+
+    row: NDArray[np.intp]
+    range_m: Float32
+    reflectance: Float32
+    instance_id: UInt16
+    category_id: UInt16
+    surface: UInt8
+
+    @classmethod
+    def of(cls, pulses: Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]) -> Found:
+        """These candidates of these pulses."""
+        which = rows * pulses.light.shape[1] + picks
+        return cls(
+            rows,
+            pulses.range_m.ravel().take(which),
+            pulses.reflectance.ravel().take(which),
+            pulses.instance_id.ravel().take(which),
+            pulses.category_id.ravel().take(which),
+            pulses.surface.ravel().take(which),
+        )
+
+
+def _through_air(
+    pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, shots: SweepPulses, rng: Rng
+) -> Pulses:
+    """The pulses after fog, rain and snow, and what these send back themselves."""
+    height_m = lidar.T_world_lidar.translation_m[2]
+    up = shots.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
+    finite = np.where(np.isfinite(pulses.range_m), pulses.range_m, np.float32(model.range_m[1]))
+    depth = optical_depth(weather, model, height_m, up[:, None], finite)
+    return add_atmosphere(attenuate(pulses, depth), weather, model, height_m, rng)
+
+
+def _noisy(found: Found, model: LidarModel, weather: Weather, rng: Rng) -> Found:
+    """Ranges with the noise and on the steps of the device."""
+    spread_m = np.float32(model.range_noise_m) + rain_noise_m(weather.rain_mm_h, found.range_m)
+    noise = rng.standard_normal(len(found.range_m), dtype=np.float32)
+    range_m = np.clip(found.range_m + spread_m * noise, *model.range_m)
+    if model.range_step_m > 0.0:
+        range_m = np.rint(range_m / model.range_step_m) * model.range_step_m
+    return replace(found, range_m=range_m.astype(np.float32))
+
+
+def _points(found: Found, shots: SweepPulses, sweep: Sweep, model: LidarModel) -> NDArray[np.void]:
+    """Records of ``POINT``; returns of a pulse follow each other, nearest first."""
+    rows = found.row
+    points: NDArray[Any] = np.zeros(len(rows), POINT)
+    points["position_m"] = shots.points_m(rows, found.range_m)
+    points["intensity"] = report_intensity(found.reflectance, model)
+    points["time_s"] = sweep.time_s.take(rows)
+    points["ring"] = sweep.ring.take(rows)
+    points["return_number"] = points["return_count"] = 1
+    for name in LABELS:
+        points[name] = getattr(found, name)
+    if (np.diff(rows) > 0).all():
+        return points
+    per_pulse = np.bincount(rows, minlength=len(sweep.ring))
+    first = np.cumsum(per_pulse) - per_pulse
+    points["return_number"] = np.arange(len(rows)) - first[rows] + 1
+    points["return_count"] = per_pulse[rows]
+    return points

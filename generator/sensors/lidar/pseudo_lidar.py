@@ -1,0 +1,116 @@
+"""Pseudo-LiDAR: the depth image of a camera as a point cloud.
+
+The name and the idea are those of Wang et al., "Pseudo-LiDAR from visual depth estimation", CVPR
+2019; the depth here is the true one. Formats that hold laser scans take it like any other cloud.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gen_data.generator.core.capture import POINT, Channel, PointCloud
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Lidar, Scene
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.shutter import INSTANT
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.mounting import Mounted, known_camera, with_lidar
+
+CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
+
+
+class PseudoLidar(Mounted):
+    """Points of a camera's depth image: one pixel of each ``stride_px`` x ``stride_px``.
+
+    A point is where the ray through the middle of its pixel first meets a surface, at the instant
+    of the reading and without noise; its intensity is 0, its ring the row of its pixel among those
+    that are taken. The first pixel of each axis is number ``stride_px // 2``.
+
+    Attributes:
+        name: What labels and files call it.
+        camera: Name of the camera whose pixels these are, which is listed before it. Without a
+            rig, points are in a frame that moves with that camera and looks along its axis.
+        offset_m: Of the frame of the points, from the camera's centre, or on the rig: forward,
+            left, up. Above the camera as a laser scanner is, so that readers of KITTI's format
+            find the ground below the origin.
+        stride_px: Distance of the pixels that are taken, in both axes.
+        range_max_m: Points farther away from the camera are left out.
+    """
+
+    type: Literal["pseudo_lidar"] = "pseudo_lidar"
+    name: str = Field("pseudo_lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    camera: str = "color"
+    offset_m: Vec3 = (0.0, 0.0, 0.3)
+    stride_px: int = Field(8, ge=1, le=256)
+    range_max_m: float = Field(120.0, gt=0, le=10_000)
+
+    def describe(self) -> SensorInfo:
+        """A laser scanner, as far as formats are concerned."""
+        return SensorInfo(
+            self.name,
+            Modality.LIDAR,
+            rate_hz=self.rate_hz,
+            time_offset_s=self.time_offset_s,
+        )
+
+    def mount(self, scene: Scene) -> Scene:
+        """The scene with the frame of these points in it.
+
+        Raises:
+            ConfigError: the scene has no such rig or camera, or no pixel is taken of its image.
+        """
+        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.type)
+        image = known_camera(scene, self.name, self.camera).intrinsics
+        if self.stride_px > min(image.width_px, image.height_px):
+            raise ConfigError(
+                f"sensor '{self.name}': stride_px {self.stride_px} is larger than the image of "
+                f"camera '{self.camera}', {image.width_px} x {image.height_px} px"
+            )
+        return with_lidar(scene, self, lidar)
+
+    def capture(
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+    ) -> PointCloud:
+        """The points at the scene's instant, row by row of the image."""
+        del channels, rng
+        lidar, camera = scene.lidar(self.name), scene.camera(self.camera)
+        intrinsics = every_nth_pixel(camera.intrinsics, self.stride_px)
+        # All rows at one instant, as the cloud has but one pose.
+        coarse = replace(camera, intrinsics=intrinsics, shutter=INSTANT)
+        seen = renderer.render(scene, coarse, CHANNELS).channels
+        rows, columns = np.nonzero(seen[Channel.RANGE] <= self.range_max_m)
+        range_m = seen[Channel.RANGE][rows, columns].astype(np.float64)
+        p_camera = intrinsics.pixel_rays()[rows, columns] * range_m[:, None]
+        T_lidar_camera = lidar.T_world_lidar.inverse() @ camera.T_world_camera
+        points: NDArray[Any] = np.zeros(len(rows), POINT)
+        points["position_m"] = T_lidar_camera.apply(p_camera)
+        points["ring"] = rows
+        points["instance_id"] = seen[Channel.INSTANCE][rows, columns]
+        points["category_id"] = seen[Channel.CATEGORY][rows, columns]
+        points["return_number"] = points["return_count"] = 1
+        return PointCloud(self.name, lidar, points, scene.time_s)
+
+
+def every_nth_pixel(camera: Intrinsics, stride_px: int) -> Intrinsics:
+    """The camera whose pixel centres are every n-th ones of another's, from ``n // 2`` on.
+
+    Its image costs a share of ``1 / n^2`` of the other's, and shows the same at these pixels: a
+    label is decided by the ray through a pixel's centre alone.
+    """
+    first = stride_px // 2
+    return replace(
+        camera,
+        width_px=len(range(first, camera.width_px, stride_px)),
+        height_px=len(range(first, camera.height_px, stride_px)),
+        fx_px=camera.fx_px / stride_px,
+        fy_px=camera.fy_px / stride_px,
+        cx_px=(camera.cx_px - (first + 0.5)) / stride_px + 0.5,
+        cy_px=(camera.cy_px - (first + 0.5)) / stride_px + 0.5,
+    )

@@ -1,0 +1,1 @@
+"""Inertial units, satellite receivers and odometers, and devices as data."""

@@ -1,0 +1,1 @@
+"""Radars: detections, cross sections, and devices as data."""

@@ -1,0 +1,170 @@
+"""Cells of range, angle and velocity, and the peaks in them that a radar reports.
+
+What falls into one cell cannot be told apart. Cells are not independent: the response of a radar to
+one point is wider than a cell, and its detector reports local maxima only (Richards, "Fundamentals
+of Radar Signal Processing", 2nd ed., 2014, chapter 6). So every cell goes to the strongest of its
+neighbours, that one to the strongest of its own, and so on; cells that end at the same peak are one
+detection, of the sum of their power and in the middle of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.se3 import Array
+
+Curve = tuple[tuple[float, float], ...]
+"""Pairs of azimuth [deg] and value; between them lines, the same on both sides."""
+
+
+class Fineness(Strict):
+    """Resolutions or deviations of the four quantities; elevation 0 = not measured."""
+
+    range_m: float = Field(gt=0)
+    velocity_m_s: float = Field(gt=0)
+    azimuth_deg: Curve = Field(min_length=1)
+    elevation_deg: float = Field(0.0, ge=0)
+
+
+class Look(Strict):
+    """One of the scans that make up a reading.
+
+    Attributes:
+        azimuth_deg: To either side.
+        elevation_deg: Upward and downward.
+        range_m: Nearest and farthest that it reports.
+        resolution: Sizes of cells.
+        noise: Standard deviations.
+        reach_m: Range at which the reference target is detected half of the time, by azimuth.
+        spacing_deg: Between rays, across and upward.
+    """
+
+    azimuth_deg: float = Field(gt=0, le=90)
+    elevation_deg: float = Field(gt=0, le=60)
+    range_m: tuple[float, float]
+    resolution: Fineness
+    noise: Fineness
+    reach_m: Curve = Field(min_length=1)
+    spacing_deg: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Echo:
+    """What rays, cells or detections send back; arrays [n]. ``origin`` as in the table."""
+
+    range_m: Array
+    azimuth_rad: Array
+    elevation_rad: Array
+    velocity_m_s: Array
+    rcs_m2: Array
+    snr: Array
+    instance_id: NDArray[np.int64]
+    origin: NDArray[np.int64]
+
+    def taken(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Echo:
+        """Some of them, in that order."""
+        return replace(self, **{name: getattr(self, name)[which] for name in Echo.__slots__})
+
+    def and_more(self, others: Sequence[Echo]) -> Echo:
+        """These and all of others, one after the other."""
+        every = (self, *others)
+        return replace(
+            self,
+            **{name: np.concatenate([getattr(e, name) for e in every]) for name in Echo.__slots__},
+        )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cells:
+    """Echoes by cell; ``keys`` [n, 4] are whole numbers: range, azimuth, elevation, velocity."""
+
+    echo: Echo
+    keys: NDArray[np.int64]
+
+
+def make_cells(lit: Echo, look: Look) -> Cells:
+    """Rays that fall into one cell as one echo; its labels are those of the strongest ray."""
+    fine = look.resolution
+    upward = math.radians(fine.elevation_deg)
+    bins = (
+        lit.range_m / fine.range_m,
+        _azimuth_bins(fine.azimuth_deg, lit.azimuth_rad),
+        lit.elevation_rad / upward if upward else np.zeros_like(lit.range_m),
+        lit.velocity_m_s / fine.velocity_m_s,
+    )
+    every = np.floor(np.stack(bins, axis=1)).astype(np.int64)
+    keys, cell = np.unique(every, axis=0, return_inverse=True)
+    merged = merge_echoes(lit, cell.reshape(-1), lit.rcs_m2)
+    return Cells(merged if upward else replace(merged, elevation_rad=0.0 * merged.range_m), keys)
+
+
+def find_peaks(cells: Cells, power: Array) -> NDArray[np.int64]:
+    """For every cell the number of the peak that it belongs to, from 0, [n].
+
+    Args:
+        cells: Where they are.
+        power: Of each, [n].
+    """
+    count = len(power)
+    if count == 0:
+        return np.zeros(0, np.int64)
+    low = cells.keys.min(axis=0) - 1
+    spans = cells.keys.max(axis=0) - low + 2
+    strides = np.array([np.prod(spans[k + 1 :]) for k in range(4)], dtype=np.int64)
+    codes = (cells.keys - low) @ strides  # in ascending order, as the keys are
+    best, best_power = np.arange(count), power.copy()
+    for offset in product((-1, 0, 1), repeat=4):
+        wanted = codes + int(np.array(offset) @ strides)
+        place = np.minimum(np.searchsorted(codes, wanted), count - 1)
+        higher = (codes[place] == wanted) & (power[place] > best_power)
+        best[higher], best_power[higher] = place[higher], power[place[higher]]
+    while not np.array_equal(best[best], best):
+        best = best[best]
+    _, number = np.unique(best, return_inverse=True)
+    return number.reshape(-1).astype(np.int64)
+
+
+def merge_echoes(echo: Echo, group: NDArray[np.int64], power: Array) -> Echo:
+    """One echo per group: sums of cross section and signal, means by power, strongest labels."""
+    count = int(group.max()) + 1 if len(group) else 0
+    total = np.bincount(group, power, count)
+
+    def mean(values: Array) -> Array:
+        middle: Array = np.bincount(group, power * values, count) / total
+        return middle
+
+    order = np.lexsort((-power, group))
+    strongest = order[np.searchsorted(group[order], np.arange(count))]
+    return Echo(
+        mean(echo.range_m),
+        mean(echo.azimuth_rad),
+        mean(echo.elevation_rad),
+        mean(echo.velocity_m_s),
+        np.bincount(group, echo.rcs_m2, count).astype(np.float64),
+        np.bincount(group, echo.snr, count).astype(np.float64),
+        echo.instance_id[strongest],
+        echo.origin[strongest],
+    )
+
+
+def along(curve: Curve, azimuth_rad: Array) -> Array:
+    """Values of a curve at azimuths, [n]."""
+    at_deg, values = np.array(curve).T
+    return np.asarray(np.interp(np.abs(np.degrees(azimuth_rad)), at_deg, values))
+
+
+def _azimuth_bins(size_deg: Curve, azimuth_rad: Array) -> Array:
+    """Azimuth in units of cells whose size changes with it."""
+    azimuth_deg = np.linspace(0.0, 90.0, 901)
+    per_deg = 1.0 / along(size_deg, np.radians(azimuth_deg))
+    sums = np.concatenate([[0.0], np.cumsum(0.5 * (per_deg[1:] + per_deg[:-1]) * 0.1)])
+    bins = np.interp(np.abs(np.degrees(azimuth_rad)), azimuth_deg, sums)
+    return np.asarray(np.copysign(bins, azimuth_rad))

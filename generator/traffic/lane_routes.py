@@ -1,0 +1,231 @@
+"""Routes: one lane after the other, as points at even stations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.lane_geometry import LaneLine
+from gen_data.generator.core.scene import Lane
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.streams import Rng
+
+STATION_M = 0.5
+"""Distance between stations."""
+
+
+@dataclass(frozen=True, eq=False)
+class LaneGraph:
+    """Lanes of one kind by name, and how they follow one another.
+
+    Attributes:
+        names: Sorted, lanes across junctions last.
+        segments: All pieces of all centre lines [k, 6]: start, step, station, number of the lane.
+    """
+
+    lines: Mapping[str, LaneLine]
+    predecessors: Mapping[str, tuple[str, ...]]
+    names: tuple[str, ...]
+    segments: Array
+
+    @classmethod
+    def of(cls, lanes: Iterable[Lane], kind: str) -> LaneGraph:
+        """The graph of all lanes of a kind."""
+        lines = {lane.name: LaneLine(lane) for lane in lanes if lane.kind == kind}
+        before: dict[str, list[str]] = {}
+        for name, line in lines.items():
+            for after in line.lane.successors:
+                before.setdefault(after, []).append(name)
+        names = sorted(lines, key=lambda name: (lines[name].lane.junction, name))
+        pieces = [_pieces(lines[name], k) for k, name in enumerate(names)]
+        return cls(
+            lines,
+            {name: tuple(sorted(found)) for name, found in before.items()},
+            tuple(names),
+            np.concatenate(pieces) if pieces else np.zeros((0, 6)),
+        )
+
+    def successors(self, name: str) -> tuple[str, ...]:
+        """Lanes that go on where one ends."""
+        return tuple(n for n in self.lines[name].lane.successors if n in self.lines)
+
+    def nearest(self, x_m: float, y_m: float) -> LanePosition | None:
+        """The place on a lane nearest to a point; None if there is no lane."""
+        if not len(self.segments):
+            return None
+        k, at_m, left_m, away_m = _nearest(self.segments, x_m, y_m)
+        return LanePosition(self.names[k], at_m, left_m, away_m)
+
+
+@dataclass(frozen=True, slots=True)
+class LanePosition:
+    """A place on a lane, as a point sees it.
+
+    Attributes:
+        at_m: Station.
+        left_m: How far to the left of the lane the point is.
+        away_m: Its distance.
+    """
+
+    lane: str
+    at_m: float
+    left_m: float
+    away_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """Lanes in the order of travel.
+
+    Attributes:
+        lanes: Their names.
+        starts_m: Station at which each begins; 0 is the beginning of the first.
+        end_m: Where the last one ends.
+        dead_end: Whether the network ends there.
+    """
+
+    lanes: tuple[str, ...]
+    starts_m: tuple[float, ...]
+    end_m: float
+    dead_end: bool
+
+
+def project_on_lane(line: LaneLine, x_m: float, y_m: float) -> LanePosition:
+    """The place on one lane nearest to a point."""
+    _, at_m, left_m, away_m = _nearest(_pieces(line, 0), x_m, y_m)
+    return LanePosition(line.lane.name, at_m, left_m, away_m)
+
+
+def _pieces(line: LaneLine, number: int) -> Array:
+    points = np.asarray(line.lane.center_m)[:, :2]
+    at = np.asarray(line.at_m[:-1])
+    return np.column_stack([points[:-1], np.diff(points, axis=0), at, np.full(len(at), number)])
+
+
+def _nearest(segments: Array, x_m: float, y_m: float) -> tuple[int, float, float, float]:
+    """Number of the lane, station, how far left of it a point is, and how far away."""
+    x, y, sx, sy, at, number = segments.T
+    dx, dy = x_m - x, y_m - y
+    squared = sx * sx + sy * sy
+    share = np.clip((dx * sx + dy * sy) / squared, 0.0, 1.0)
+    ox, oy = dx - share * sx, dy - share * sy
+    # To the nearest micrometre, so that of lanes that are equally near the first is taken.
+    k = int(np.argmin(np.round(np.sqrt(ox * ox + oy * oy), 6)))
+    span = math.sqrt(float(squared[k]))
+    left = float(sx[k] * dy[k] - sy[k] * dx[k]) / span
+    away = math.sqrt(float(ox[k] * ox[k] + oy[k] * oy[k]))
+    return int(number[k]), float(at[k] + share[k] * span), left, away
+
+
+def draw_route(graph: LaneGraph, given: Sequence[str], length_m: float, rng: Rng) -> Route:
+    """The lanes given, and drawn ones after them until it is long enough or the network ends."""
+    lanes, starts = [given[0]], [0.0]
+    end_m = graph.lines[given[0]].length_m
+    for name in given[1:]:
+        lanes, starts = [*lanes, name], [*starts, end_m]
+        end_m += graph.lines[name].length_m
+    while end_m < length_m:
+        ways = graph.successors(lanes[-1])
+        if not ways:
+            return Route(tuple(lanes), tuple(starts), end_m, dead_end=True)
+        name = ways[int(rng.integers(len(ways)))]
+        lanes, starts = [*lanes, name], [*starts, end_m]
+        end_m += graph.lines[name].length_m
+    return Route(tuple(lanes), tuple(starts), end_m, dead_end=not graph.successors(lanes[-1]))
+
+
+def points_at(graph: LaneGraph, route: Route, stations_m: Array) -> Array:
+    """Points [k, 3] of a route; it goes on straight beyond its ends."""
+    lines = [graph.lines[name] for name in route.lanes]
+    joined = np.concatenate(
+        [np.asarray(line.lane.center_m)[k > 0 :] for k, line in enumerate(lines)]
+    )
+    at = np.concatenate(
+        [
+            start + np.asarray(line.at_m)[k > 0 :]
+            for k, (line, start) in enumerate(zip(lines, route.starts_m, strict=True))
+        ]
+    )
+    points = np.stack([np.interp(stations_m, at, joined[:, k]) for k in range(3)], axis=1)
+    for end, inner, beyond in (
+        (0, 1, np.minimum(stations_m - at[0], 0.0)),
+        (-1, -2, np.maximum(stations_m - at[-1], 0.0)),
+    ):
+        way = (joined[end] - joined[inner]) / (at[end] - at[inner])
+        points[:, :2] += beyond[:, None] * way[:2]
+    return points
+
+
+def lanes_through_point(
+    graph: LaneGraph, stops: Sequence[str | tuple[float, float]], where: str
+) -> tuple[str, ...]:
+    """The lanes that lead through lanes and points, in order; the fewest between two of them.
+
+    Args:
+        graph: Of the lanes that may be driven on.
+        stops: Names of lanes, or points ``(x, y)`` [m] on lanes.
+        where: What messages call them.
+
+    Raises:
+        ConfigError: a stop is on no lane, or no lanes lead to it from the one before.
+    """
+    names = [_lane_of(graph, stop, f"{where}[{k}]") for k, stop in enumerate(stops)]
+    lanes = [names[0]]
+    for k, (one, other) in enumerate(pairwise(names), 1):
+        if one == other:
+            continue
+        way = _way(graph, one, other)
+        if not way:
+            after = ", ".join(graph.successors(one)) or "none: the network ends there"
+            raise ConfigError(
+                f"{where}[{k}]: the route leaves the lanes: none lead from '{one}' to '{other}'; "
+                f"after '{one}' comes {after}"
+            )
+        lanes += way
+    return tuple(lanes)
+
+
+def _lane_of(graph: LaneGraph, stop: str | tuple[float, float], where: str) -> str:
+    if isinstance(stop, str):
+        if stop not in graph.lines:
+            known = sorted(graph.lines)
+            raise ConfigError(
+                f"{where}: there is no driving lane '{stop}'; expected one of {', '.join(known)}"
+                f"{did_you_mean(stop, known)}"
+            )
+        return stop
+    place = graph.nearest(*stop)
+    if place is None:
+        raise ConfigError(f"{where}: the scene has no driving lanes")
+    if place.away_m > 0.5 * graph.lines[place.lane].lane.width_m:
+        raise ConfigError(
+            f"{where}: the route leaves the road: ({stop[0]:g}, {stop[1]:g}) is "
+            f"{place.away_m:.1f} m from the middle of the nearest driving lane, '{place.lane}'; "
+            "expected a point on a lane"
+        )
+    return place.lane
+
+
+def _way(graph: LaneGraph, start: str, goal: str) -> list[str]:
+    """Lanes after one up to another, as few as there can be; empty = there is no way."""
+    came: dict[str, str] = {start: ""}
+    row = [start]
+    while row:
+        found: list[str] = []
+        for name in row:
+            for after in graph.successors(name):
+                if after not in came:
+                    came[after] = name
+                    found.append(after)
+        if goal in came:
+            way = [goal]
+            while came[way[0]] != start:
+                way.insert(0, came[way[0]])
+            return way
+        row = found
+    return []

@@ -1,0 +1,325 @@
+"""Vehicles through time: behind one another, at signals, in junctions and before people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.traffic.conflict_zones import Zone
+from gen_data.generator.traffic.idm import (
+    HARDEST_M_S2,
+    Drivers,
+    equilibrium_speed,
+    free_acceleration,
+    interaction,
+)
+from gen_data.generator.traffic.lane_routes import STATION_M
+from gen_data.generator.traffic.signal_cycles import Approach
+from gen_data.generator.traffic.vehicles import EASY_M_S2, Entry, Vehicles
+
+SEEN_M = 12.0
+"""Drivers decide about a junction this far before it at the latest, and in time to brake."""
+CAN_STOP_M_S2 = 3.0
+"""Whoever would have to brake harder than this for amber, or for people who wait, drives on."""
+MUST_STOP_M_S2 = 6.0
+"""Whoever would have to brake harder than this for people drives on; they have waited for it."""
+GAP_S = 1.0
+"""Spare time between who crosses before and who comes."""
+PATIENCE_S = 3.0
+"""After waiting that long, drivers go in the order in which they came."""
+AT_LINE_S = 0.4
+"""Time gap to lines, which do not brake as who is ahead may."""
+BEFORE_LINE_M = 1.0
+"""They stop this far before a line."""
+
+
+@dataclass(frozen=True, slots=True)
+class CrossingPedestrian:
+    """Somebody on a crosswalk, or waiting to step on it.
+
+    Attributes:
+        waits: Whether they still stand at the kerb: who can stop easily does.
+        at_m: Station on the crosswalk.
+        forward: Whether they walk along it.
+    """
+
+    crosswalk: str
+    at_m: float
+    forward: bool
+    waits: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Comer:
+    """Somebody who comes to a junction and may not yet enter it.
+
+    Attributes:
+        after_s: Time until the front is at the junction.
+    """
+
+    number: int
+    entry: Entry
+    after_s: float
+
+
+@dataclass
+class VehicleModel:
+    """The state of a fleet; ``step`` changes it.
+
+    Attributes:
+        station_m, speed_m_s, acceleration_m_s2: Of every vehicle [n].
+        entered: How many of its junctions each may enter or has entered.
+        waited_s: For how long each has stood.
+    """
+
+    fleet: Vehicles
+    approaches: Mapping[str, Approach]
+    station_m: Array = field(init=False)
+    speed_m_s: Array = field(init=False)
+    acceleration_m_s2: Array = field(init=False)
+    entered: list[int] = field(init=False)
+    waited_s: Array = field(init=False)
+    _at_lines: Drivers = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Everybody at the speed that suits the place."""
+        n = len(self.fleet.vehicles)
+        self._at_lines = replace(self.fleet.drivers, headway_s=np.full(n, AT_LINE_S))
+        self.station_m = self.fleet.first_m.copy()
+        self.acceleration_m_s2 = np.zeros(n)
+        self.waited_s = np.zeros(n)
+        fronts = self.station_m + self.fleet.front_m
+        self.entered = [
+            sum(entry.at_m < front - 0.5 for entry in entries)
+            for entries, front in zip(self.fleet.entries, fronts.tolist(), strict=True)
+        ]
+        self.speed_m_s = self._speed_limits(np.zeros(n))
+
+    def settle(self, crossers: Sequence[CrossingPedestrian]) -> None:
+        """Lowers speeds at time 0 to what leaves room for easy braking."""
+        fleet = self.fleet
+        stops = self._stops(0.0, crossers)
+        room = np.maximum(stops - self.station_m - fleet.front_m - BEFORE_LINE_M, 0.0)
+        speed = np.minimum(self.speed_m_s, np.sqrt(2.0 * EASY_M_S2 * np.minimum(room, 1e4)))
+        for _ in range(len(speed)):
+            gap, leader = self._leaders(speed)
+            behind = equilibrium_speed(fleet.drivers, gap, speed)
+            free = np.maximum(np.minimum(gap, 1e4) - fleet.drivers.standstill_m, 0.0)
+            lower = np.minimum(behind, np.sqrt(leader * leader + 2.0 * EASY_M_S2 * free))
+            if (lower >= speed - 1e-9).all():
+                break
+            speed = np.minimum(speed, lower)
+        self.speed_m_s = speed
+
+    def step(self, time_s: float, step_s: float, crossers: Sequence[CrossingPedestrian]) -> None:
+        """One step of time; speeds change evenly within it and never below 0."""
+        fleet, drivers, v = self.fleet, self.fleet.drivers, self.speed_m_s
+        gap, leader = self._leaders(v)
+        stops = self._stops(time_s, crossers, gap, leader)
+        to_stop = stops - self.station_m - fleet.front_m + drivers.standstill_m - BEFORE_LINE_M
+        taken = np.maximum(
+            interaction(drivers, v, gap, leader),
+            interaction(self._at_lines, v, to_stop, np.zeros_like(v)),
+        )
+        a = free_acceleration(drivers, v, self._speed_limits(v)) - taken
+        a = np.maximum(np.minimum(a, drivers.acceleration_m_s2), -HARDEST_M_S2)
+        after = np.maximum(v + a * step_s, 0.0)
+        # Creeping on by millimetres is no driving: who is about to stand stands.
+        after[(after < 0.05) & (a < 0.1)] = 0.0
+        self.acceleration_m_s2 = (after - v) / step_s
+        self.station_m = self.station_m + 0.5 * (v + after) * step_s
+        self.speed_m_s = after
+        self.waited_s = np.where(after < 0.3, self.waited_s + step_s, 0.0)
+
+    def lets_pass(self, crosswalk: str) -> bool:
+        """Whether people may step on a crosswalk: nobody is on it or too fast to stop."""
+        for i, zones in enumerate(self.fleet.zones):
+            for zone in zones:
+                if zone.zone.crosswalk != crosswalk:
+                    continue
+                front = float(self.station_m[i]) + self.fleet.vehicles[i].front_m
+                rear = float(self.station_m[i]) - self.fleet.vehicles[i].rear_m
+                v = float(self.speed_m_s[i])
+                needed = 0.5 * v * v / CAN_STOP_M_S2 + 0.5 * v
+                if front > zone.enter_m - needed and rear < zone.leave_m:
+                    return False
+        return True
+
+    def _speed_limits(self, speed_m_s: Array) -> Array:
+        """What is allowed half a second ahead [n]."""
+        ahead = self.station_m - self.fleet.first_m + 0.5 * speed_m_s
+        last = self.fleet.allowed_m_s.shape[1] - 1
+        k = np.minimum((ahead / STATION_M).astype(np.int64), last)
+        allowed: Array = self.fleet.allowed_m_s[np.arange(len(k)), k]
+        return allowed
+
+    def _leaders(self, speed_m_s: Array) -> tuple[Array, Array]:
+        """Gaps to who is ahead on the own way [n], ``inf`` = nobody, and their speeds [n]."""
+        fleet = self.fleet
+        if not len(speed_m_s):
+            return np.zeros(0), np.zeros(0)
+        front = self.station_m + fleet.front_m
+        theirs = self.station_m[None] + fleet.offset_m
+        rears, fronts = theirs - fleet.rear_m[None], theirs + fleet.front_m[None]
+        ahead = (
+            (fronts > fleet.from_m)
+            & (rears < fleet.to_m)
+            & (rears + fronts > (2.0 * self.station_m + fleet.front_m - fleet.rear_m)[:, None])
+        )
+        gaps = np.where(ahead, rears - front[:, None], np.inf)
+        who = np.argmin(gaps, axis=1)
+        gap = gaps[np.arange(len(who)), who]
+        return gap, np.where(gap < np.inf, speed_m_s[who], 0.0)
+
+    def _stops(
+        self,
+        time_s: float,
+        crossers: Sequence[CrossingPedestrian],
+        gap_m: Array | None = None,
+        leader_m_s: Array | None = None,
+    ) -> Array:
+        """Stations before which each has to stop now [n]; ``inf`` = nowhere."""
+        stops: Array = self.fleet.end_m.copy()
+        comers = self._comers(time_s, stops)
+        for comer in comers:
+            i = comer.number
+            full = (
+                gap_m is not None
+                and leader_m_s is not None
+                and self._is_full(comer, float(gap_m[i]), float(leader_m_s[i]))
+            )
+            if full or any(self._yields(comer, other) for other in comers) or self._is_taken(comer):
+                stops[i] = min(stops[i], comer.entry.at_m)
+            else:
+                self.entered[i] += 1
+        if crossers:
+            self._stop_for_people(crossers, stops)
+        return stops
+
+    def _comers(self, time_s: float, stops: Array) -> list[_Comer]:
+        """Who comes to a junction and has no red light, first comers first."""
+        comers = []
+        for i, entries in enumerate(self.fleet.entries):
+            self._give_back(i, time_s)
+            if self.entered[i] >= len(entries):
+                continue
+            entry = entries[self.entered[i]]
+            left = entry.at_m - float(self.station_m[i]) - self.fleet.vehicles[i].front_m
+            v = float(self.speed_m_s[i])
+            if left > max(SEEN_M, v * v / EASY_M_S2):
+                continue
+            if self._is_red(entry, left, v, time_s):
+                stops[i] = min(stops[i], entry.at_m)
+                continue
+            comers.append(_Comer(i, entry, max(left, 0.0) / max(v, 2.0)))
+        return sorted(comers, key=lambda comer: (comer.after_s, comer.number))
+
+    def _give_back(self, i: int, time_s: float) -> None:
+        """Whoever may enter a junction, but has not, stops when the light turns to amber."""
+        k = self.entered[i] - 1
+        if k < 0:
+            return
+        entry = self.fleet.entries[i][k]
+        left = entry.at_m - float(self.station_m[i]) - self.fleet.vehicles[i].front_m
+        if left > 0.0 and self._is_red(entry, left, float(self.speed_m_s[i]), time_s):
+            self.entered[i] = k
+
+    def _is_red(self, entry: Entry, left_m: float, speed_m_s: float, time_s: float) -> bool:
+        approach = self.approaches.get(entry.came)
+        if approach is None:
+            return False
+        state = approach.state(time_s)
+        if state == "yellow":
+            return speed_m_s * speed_m_s <= 2.0 * CAN_STOP_M_S2 * max(left_m, 0.0)
+        return state != "green"
+
+    def _is_taken(self, comer: _Comer) -> bool:
+        """Whether somebody is on, or has been let on, a lane that crosses or meets the own one."""
+        for k, entries in enumerate(self.fleet.entries):
+            if k == comer.number:
+                continue
+            for entry in entries[: self.entered[k]]:
+                overlap = self.fleet.overlaps.get((entry.lane, comer.entry.lane))
+                if overlap is None or overlap.kind == "part":
+                    continue
+                rear = float(self.station_m[k]) - self.fleet.vehicles[k].rear_m
+                if rear < min(entry.at_m + overlap.own_m[1], entry.leave_m):
+                    return True
+        return False
+
+    def _is_full(self, comer: _Comer, gap_m: float, leader_m_s: float) -> bool:
+        """Whether there is no room behind the junction: nobody stops within it."""
+        vehicle = self.fleet.vehicles[comer.number]
+        front = float(self.station_m[comer.number]) + vehicle.front_m
+        needed = comer.entry.leave_m + vehicle.front_m + vehicle.rear_m + 2.0
+        return leader_m_s < 2.0 and front + gap_m < needed
+
+    def _yields(self, own: _Comer, other: _Comer) -> bool:
+        """Whether another who comes has the right of way and comes too soon to go before."""
+        if own.number == other.number:
+            return False
+        overlap = self.fleet.overlaps.get((own.entry.lane, other.entry.lane))
+        if overlap is None or overlap.kind == "part":
+            return False
+        vehicle = self.fleet.vehicles[own.number]
+        length = vehicle.front_m + vehicle.rear_m
+        v = max(float(self.speed_m_s[own.number]), 4.0)
+        passed_s = own.after_s + (overlap.own_m[1] + length) / v + GAP_S
+        theirs = max(float(self.speed_m_s[other.number]), 4.0)
+        if other.after_s + overlap.other_m[0] / theirs > passed_s:
+            return False
+        waited = float(self.waited_s[own.number]), float(self.waited_s[other.number])
+        if max(waited) >= PATIENCE_S:
+            return (waited[1], -other.number) > (waited[0], -own.number)
+        return self._is_second(own, other)
+
+    def _is_second(self, own: _Comer, other: _Comer) -> bool:
+        """Who goes first: straight on before oncoming turns, then first come, then from the right.
+
+        Drivers from the same lane follow each other and never ask.
+        """
+        ax, ay = self.fleet.headings[own.entry.came]
+        bx, by = self.fleet.headings[other.entry.came]
+        if ax * bx + ay * by < -0.7:
+            straight = abs(own.entry.turn) < 0.3, abs(other.entry.turn) < 0.3
+            if straight[0] != straight[1]:
+                return straight[1]
+            own_m = own.entry.leave_m - own.entry.at_m
+            other_m = other.entry.leave_m - other.entry.at_m
+            return (other_m, other.number) < (own_m, own.number)
+        if abs(own.after_s - other.after_s) > GAP_S:
+            return other.after_s < own.after_s
+        across = ax * by - ay * bx
+        return across > 0.3 or (abs(across) <= 0.3 and other.number < own.number)
+
+    def _stop_for_people(self, crossers: Sequence[CrossingPedestrian], stops: Array) -> None:
+        for i, zones in enumerate(self.fleet.zones):
+            front = float(self.station_m[i]) + self.fleet.vehicles[i].front_m
+            v = float(self.speed_m_s[i])
+            for zone in zones:
+                left = zone.enter_m - front
+                if left < 0.0 or left > v * v + 30.0:
+                    continue
+                needed = 0.5 * v * v / max(left, 0.01)
+                if any(_is_in_the_way(one, zone.zone, needed) for one in crossers):
+                    stops[i] = min(stops[i], zone.enter_m)
+                    break
+
+
+def _is_in_the_way(crosser: CrossingPedestrian, zone: Zone, needed_m_s2: float) -> bool:
+    """Whether to stop before a zone for somebody who has not left the lane's strip of it.
+
+    Args:
+        crosser: Who crosses.
+        zone: Where the lane leads over the crosswalk.
+        needed_m_s2: Deceleration that this takes.
+    """
+    if crosser.crosswalk != zone.crosswalk:
+        return False
+    if needed_m_s2 > (CAN_STOP_M_S2 if crosser.waits else MUST_STOP_M_S2):
+        return False
+    passed = crosser.at_m - zone.at_m if crosser.forward else zone.at_m - crosser.at_m
+    return passed < 0.5 * zone.width_m + 0.5

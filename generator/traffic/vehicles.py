@@ -1,0 +1,306 @@
+"""Vehicles with all that does not change while they drive: courses, limits, who may meet whom."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gen_data.generator.core.obb import rectangles_overlap
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.traffic.conflict_zones import (
+    Overlap,
+    Zone,
+    crosswalk_zones,
+    find_overlaps,
+    heading,
+)
+from gen_data.generator.traffic.idm import Drivers
+from gen_data.generator.traffic.lane_routes import STATION_M, LaneGraph, Route, points_at
+from gen_data.generator.traffic.steering import Courses, follow_lines
+
+LOOKAHEAD_S, LOOKAHEAD_M = 0.6, (3.0, 10.0)
+"""How far ahead drivers look for where to steer: a time at their speed, within bounds."""
+LATERAL_M_S2 = 2.0
+"""Sideways acceleration that drivers take bends with."""
+EASY_M_S2 = 1.5
+"""Deceleration with which they come to bends and stops that they see from afar."""
+CLEAR_M = 1.5
+"""Drivers see what stands in their way and come no nearer."""
+STEERED_RAD_TAN = 0.75
+"""Tangent of the greatest steering angle, 37 degrees."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """One vehicle and its driver.
+
+    Attributes:
+        xy_m: Middle of the rear axle on the ground, world.
+        ahead: Direction it points in, unit.
+        front_m, rear_m: From the rear axle to its front and rear ends.
+        wheelbase_m: Between the axles.
+        route: What it follows.
+        station_m: Where on the route its rear axle is.
+        speed_factor: On the lanes' usual speed.
+        speed_max_m_s: It never drives faster.
+    """
+
+    name: str
+    xy_m: tuple[float, float]
+    ahead: tuple[float, float]
+    front_m: float
+    rear_m: float
+    width_m: float
+    wheelbase_m: float
+    route: Route
+    station_m: float
+    speed_factor: float = 1.0
+    speed_max_m_s: float = 60.0
+    headway_s: float = 1.2
+    acceleration_m_s2: float = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Where a route enters a junction's lane.
+
+    Attributes:
+        at_m, leave_m: Stations of the route at which that lane begins and ends.
+        came: Lane before it.
+        turn: Sine of half the turn, positive to the left; 0 = straight on.
+    """
+
+    lane: str
+    came: str
+    at_m: float
+    leave_m: float
+    turn: float
+
+
+@dataclass(frozen=True, slots=True)
+class RouteZone:
+    """A crosswalk's zone on a route, stations as on the route."""
+
+    zone: Zone
+    enter_m: float
+    leave_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicles:
+    """n vehicles; arrays [n], [n, n] or [n, m] with m stations from where each begins.
+
+    Attributes:
+        first_m: Station of the rear axle at time 0.
+        allowed_m_s: Speeds that lanes, bends and drivers allow [n, m].
+        height_m: Of the ground under the rear and the front axle [n, m, 2].
+        offset_m: What turns a station of vehicle j into one of vehicle i [n, n].
+        from_m, to_m: Stations of i between which j is on i's way [n, n].
+        end_m: Where the network ends on each route, or something stands in the way; ``inf`` =
+            neither.
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    drivers: Drivers
+    front_m: Array
+    rear_m: Array
+    first_m: Array
+    courses: Courses
+    allowed_m_s: Array
+    height_m: Array
+    offset_m: Array
+    from_m: Array
+    to_m: Array
+    end_m: Array
+    entries: tuple[tuple[Entry, ...], ...]
+    zones: tuple[tuple[RouteZone, ...], ...]
+    overlaps: Mapping[tuple[str, str], Overlap]
+    headings: Mapping[str, tuple[float, float]]
+
+
+def make_vehicles(
+    vehicles: Sequence[Vehicle],
+    graph: LaneGraph,
+    crosswalks: LaneGraph,
+    obstacles: Array,
+    reach_m: float,
+) -> Vehicles:
+    """The fleet of some vehicles.
+
+    Args:
+        vehicles: At least one.
+        graph: Of the driving lanes.
+        crosswalks: Lanes of that kind.
+        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
+        reach_m: Nobody drives farther.
+    """
+    m = math.ceil((reach_m + 1.0) / STATION_M)
+    first = np.array([v.station_m for v in vehicles])
+    beyond = math.ceil(max([LOOKAHEAD_M[1], *(v.wheelbase_m for v in vehicles)]) / STATION_M) + 2
+    grid: Array = STATION_M * np.arange(m + beyond, dtype=np.float64)
+    lines = np.stack([points_at(graph, v.route, v.station_m + grid) for v in vehicles])
+    limits = np.stack([_limits(graph, v, grid[:m]) for v in vehicles])
+    limit_braking(limits)
+    lookahead = np.clip(LOOKAHEAD_S * limits, *LOOKAHEAD_M) / STATION_M
+    courses = follow_lines(
+        lines[..., :2],
+        np.array([v.xy_m for v in vehicles]),
+        np.array([v.ahead for v in vehicles]),
+        np.round(lookahead).astype(np.int64),
+        np.array([STEERED_RAD_TAN / v.wheelbase_m for v in vehicles]),
+    )
+    bends = np.maximum(np.abs(courses.curvature_per_m), 1e-6)
+    allowed = np.minimum(limits, np.sqrt(LATERAL_M_S2 / bends))
+    limit_braking(allowed)
+    widths: dict[str, float] = {}
+    for v in vehicles:
+        for name in v.route.lanes:
+            widths[name] = max(widths.get(name, 0.0), v.width_m)
+    crossed = find_overlaps(graph, widths)
+    walked = crosswalk_zones(graph, widths, crosswalks)
+    offset, low, high = _shared_lanes([v.route for v in vehicles], first, crossed)
+    return Vehicles(
+        tuple(vehicles),
+        _drivers(vehicles),
+        front_m=np.array([v.front_m for v in vehicles]),
+        rear_m=np.array([v.rear_m for v in vehicles]),
+        first_m=first,
+        courses=courses,
+        allowed_m_s=allowed,
+        height_m=_heights(lines[..., 2], [v.wheelbase_m for v in vehicles], m),
+        offset_m=offset,
+        from_m=low,
+        to_m=high,
+        end_m=np.minimum(
+            np.array([v.route.end_m if v.route.dead_end else np.inf for v in vehicles]),
+            [_free_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)],
+        ),
+        entries=tuple(_entries(graph, v.route) for v in vehicles),
+        zones=tuple(_zones(v.route, walked) for v in vehicles),
+        overlaps=crossed,
+        headings={name: heading(graph.lines[name].lane.center_m, -1) for name in widths},
+    )
+
+
+def limit_braking(limits: Array) -> None:
+    """Lowers limits [n, m] in place so that lower ones ahead are reached by easy braking."""
+    for k in range(limits.shape[1] - 2, -1, -1):
+        after = limits[:, k + 1]
+        reachable = np.sqrt(after * after + 2.0 * EASY_M_S2 * STATION_M)
+        limits[:, k] = np.minimum(limits[:, k], reachable)
+
+
+def _free_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
+    """Station that a vehicle's front may reach before it meets what stands; ``inf`` = any."""
+    xy, ahead = courses.xy_m[k], courses.ahead[k]
+    half = np.array([0.5 * (vehicle.front_m + vehicle.rear_m), 0.5 * vehicle.width_m])
+    swept = np.column_stack([xy + (half[0] - vehicle.rear_m) * ahead, ahead])
+    reach = np.sqrt(half[0] * half[0] + half[1] * half[1])
+    low, high = swept[:, :2].min(axis=0) - reach, swept[:, :2].max(axis=0) + reach
+    size = np.sqrt(obstacles[:, 2] * obstacles[:, 2] + obstacles[:, 3] * obstacles[:, 3])
+    centres = obstacles[:, :2]
+    near = ((centres + size[:, None] > low) & (centres - size[:, None] < high)).all(axis=1)
+    free_m = math.inf
+    for box in obstacles[near]:
+        delta = swept[:, :2] - box[:2]
+        apart = float(reach) + math.hypot(box[2], box[3])
+        beside = np.flatnonzero(delta[:, 0] * delta[:, 0] + delta[:, 1] * delta[:, 1] < apart**2)
+        hit = rectangles_overlap(swept[beside], half, box[[0, 1, 4, 5]], box[2:4])
+        if hit.any():
+            met_m = STATION_M * float(beside[int(np.argmax(hit))]) - CLEAR_M
+            free_m = min(free_m, vehicle.station_m + vehicle.front_m + met_m)
+    return free_m
+
+
+def _limits(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
+    """Speeds [m] that lanes and the driver allow."""
+    speeds = np.array([graph.lines[name].lane.speed_m_s for name in vehicle.route.lanes])
+    starts = np.array(vehicle.route.starts_m)
+    at = np.searchsorted(starts, vehicle.station_m + grid, side="right") - 1
+    return np.minimum(speeds[np.maximum(at, 0)] * vehicle.speed_factor, vehicle.speed_max_m_s)
+
+
+def _drivers(vehicles: Sequence[Vehicle]) -> Drivers:
+    n = len(vehicles)
+    return Drivers(
+        headway_s=np.array([v.headway_s for v in vehicles]),
+        standstill_m=np.full(n, 2.0),
+        acceleration_m_s2=np.array([v.acceleration_m_s2 for v in vehicles]),
+        braking_m_s2=np.full(n, 2.0),
+    )
+
+
+def _heights(line_z_m: Array, wheelbases_m: Sequence[float], m: int) -> Array:
+    """Heights [n, m, 2] of lines under rear and front axles."""
+    k = np.arange(line_z_m.shape[1], dtype=np.float64)
+    front = [
+        np.interp(k[:m] + base / STATION_M, k, z)
+        for z, base in zip(line_z_m, wheelbases_m, strict=True)
+    ]
+    return np.stack([line_z_m[:, :m], np.stack(front)], axis=2)
+
+
+def _entries(graph: LaneGraph, route: Route) -> tuple[Entry, ...]:
+    ends = (*route.starts_m[1:], route.end_m)
+    made = []
+    for k, name in enumerate(route.lanes):
+        lane = graph.lines[name].lane
+        if k > 0 and lane.junction and not graph.lines[route.lanes[k - 1]].lane.junction:
+            (ax, ay), (bx, by) = heading(lane.center_m, 0), heading(lane.center_m, -1)
+            half = math.sqrt(max(0.0, 0.5 * (1.0 - (ax * bx + ay * by))))
+            turn = half if ax * by - ay * bx >= 0.0 else -half
+            made.append(Entry(name, route.lanes[k - 1], route.starts_m[k], ends[k], turn))
+    return tuple(made)
+
+
+def _zones(route: Route, walked: Mapping[str, tuple[Zone, ...]]) -> tuple[RouteZone, ...]:
+    return tuple(
+        RouteZone(zone, start + zone.enter_m, start + zone.leave_m)
+        for name, start in zip(route.lanes, route.starts_m, strict=True)
+        for zone in walked.get(name, ())
+    )
+
+
+def _shared_lanes(
+    routes: Sequence[Route],
+    first_m: Array,
+    crossed: Mapping[tuple[str, str], Overlap],
+) -> tuple[Array, Array, Array]:
+    """For each pair, the first lanes that both use: offset, beginning and end, [n, n] each."""
+    n = len(routes)
+    offset, low = np.zeros((n, n)), np.full((n, n), np.inf)
+    high = np.full((n, n), -np.inf)
+    for i, own in enumerate(routes):
+        ends = (*own.starts_m[1:], own.end_m)
+        for j, other in enumerate(routes):
+            if i == j or not set(own.lanes) & set(other.lanes):
+                continue
+            k = next(
+                (k for k, name in enumerate(own.lanes)
+                 if name in other.lanes and ends[k] > first_m[i]),
+                None,
+            )  # fmt: skip
+            if k is None:
+                continue
+            o = other.lanes.index(own.lanes[k])
+            offset[i, j] = own.starts_m[k] - other.starts_m[o]
+            low[i, j] = own.starts_m[k]
+            if k > 0 and o > 0:
+                meet = crossed.get((other.lanes[o - 1], own.lanes[k - 1]))
+                if meet is not None and meet.kind == "meet":
+                    low[i, j] -= other.starts_m[o] - other.starts_m[o - 1] - meet.own_m[0]
+            while (
+                k + 1 < len(own.lanes)
+                and o + 1 < len(other.lanes)
+                and own.lanes[k + 1] == other.lanes[o + 1]
+            ):
+                k, o = k + 1, o + 1
+            high[i, j] = ends[k]
+            if k + 1 < len(own.lanes) and o + 1 < len(other.lanes):
+                part = crossed.get((other.lanes[o + 1], own.lanes[k + 1]))
+                if part is not None and part.kind == "part":
+                    high[i, j] += part.own_m[1]
+    return offset, low, high

@@ -1,0 +1,157 @@
+"""Materials as UsdPreviewSurface networks ("UsdPreviewSurface Specification", version 2.6)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from gen_data.generator.core.asset_types import Material
+
+UV, BOX_UV = "st", "stBox"
+"""Texture coordinates of a mesh, and those in metres that stand for triplanar mapping."""
+
+
+@dataclass(frozen=True, slots=True)
+class TextureFiles:
+    """Images of a texture, as the layer at hand refers to them; empty = there is none.
+
+    Attributes:
+        shares: Occlusion in red, metallic in blue.
+        alpha: Coverage; below a half there is a hole.
+    """
+
+    albedo: str
+    roughness: str = ""
+    normal: str = ""
+    shares: str = ""
+    emission: str = ""
+    alpha: str = ""
+
+
+TextureFinder = Callable[[str], TextureFiles]
+
+
+def define_material(stage: Any, path: str, material: Material, textures: TextureFinder) -> Any:
+    """A material prim with its network; returned as ``UsdShade.Material``."""
+    from pxr import Sdf, UsdShade
+
+    shade = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/Surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(0)
+    number = Sdf.ValueTypeNames.Float
+    ior = material.ior if material.transmission else _index_of(material.specular)
+    shader.CreateInput("metallic", number).Set(material.metallic)
+    shader.CreateInput("ior", number).Set(ior)
+    if any(material.emission_cd_m2):
+        glow = shader.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f)
+        glow.Set(material.emission_cd_m2)
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(material.base_color)
+    shader.CreateInput("roughness", number).Set(material.roughness)
+    _define_layers(shader, material)
+    if material.texture:
+        _connect_images(shader, _Images(stage, path, material), textures(material.texture))
+    shade.CreateSurfaceOutput().ConnectToSource(
+        shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+    )
+    return shade
+
+
+def _define_layers(shader: Any, material: Material) -> None:
+    """Coat, transmission and opacity, where there are any."""
+    from pxr import Sdf
+
+    number = Sdf.ValueTypeNames.Float
+    if material.coat:
+        shader.CreateInput("clearcoat", number).Set(material.coat)
+        shader.CreateInput("clearcoatRoughness", number).Set(material.coat_roughness)
+    if material.opacity < 1.0:
+        shader.CreateInput("opacityMode", Sdf.ValueTypeNames.Token).Set("presence")
+        shader.CreateInput("opacity", number).Set(material.opacity)
+    elif material.transmission:
+        shader.CreateInput("opacity", number).Set(1.0 - material.transmission)
+
+
+def _connect_images(shader: Any, images: _Images, files: TextureFiles) -> None:
+    """Let images, times the numbers that inputs hold, decide instead of these."""
+    from pxr import Gf, Sdf
+
+    def connect(name: str, node: Any, output: str) -> None:
+        kind = Sdf.ValueTypeNames.Float if len(output) == 1 else Sdf.ValueTypeNames.Float3
+        given = shader.GetInput(name)
+        given.GetAttr().Clear()
+        given.ConnectToSource(node.CreateOutput(output, kind))
+
+    def factor(name: str) -> Any:
+        return shader.GetInput(name).Get()
+
+    albedo = images.add("Albedo", files.albedo, "sRGB", (*factor("diffuseColor"), 1.0))
+    connect("diffuseColor", albedo, "rgb")
+    if files.roughness:
+        node = images.add("Roughness", files.roughness, "raw", (factor("roughness"),) * 4)
+        connect("roughness", node, "r")
+    if files.shares:
+        node = images.add("Shares", files.shares, "raw", (1.0, 1.0, factor("metallic"), 1.0))
+        connect("metallic", node, "b")
+        shader.CreateInput("occlusion", Sdf.ValueTypeNames.Float)
+        connect("occlusion", node, "r")
+    if files.emission and shader.GetInput("emissiveColor"):
+        node = images.add("Emission", files.emission, "sRGB", (*factor("emissiveColor"), 1.0))
+        connect("emissiveColor", node, "rgb")
+    if files.normal:
+        node = images.add("Normal", files.normal, "raw", (2.0, 2.0, 2.0, 1.0))
+        node.CreateInput("bias", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(-1.0, -1.0, -1.0, 0.0))
+        shader.CreateInput("normal", Sdf.ValueTypeNames.Normal3f)
+        connect("normal", node, "rgb")
+    if files.alpha:
+        node = images.add("Alpha", files.alpha, "raw", (1.0,) * 4)
+        shader.CreateInput("opacity", Sdf.ValueTypeNames.Float)
+        connect("opacity", node, "r")
+        shader.CreateInput("opacityThreshold", Sdf.ValueTypeNames.Float).Set(0.5)
+
+
+class _Images:
+    """Texture nodes of one material, all at the same coordinates."""
+
+    def __init__(self, stage: Any, path: str, material: Material) -> None:
+        from pxr import Sdf, UsdShade
+
+        self._stage, self._path = stage, path
+        boxed = material.texture_scale_m > 0.0
+        reader = UsdShade.Shader.Define(stage, f"{path}/Coordinates")
+        reader.CreateIdAttr("UsdPrimvarReader_float2")
+        name = BOX_UV if boxed else UV
+        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set(name)
+        self._uvs = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        if boxed:
+            scale = UsdShade.Shader.Define(stage, f"{path}/Repeats")
+            scale.CreateIdAttr("UsdTransform2d")
+            scale.CreateInput("in", Sdf.ValueTypeNames.Float2).ConnectToSource(self._uvs)
+            repeats = 1.0 / material.texture_scale_m
+            scale.CreateInput("scale", Sdf.ValueTypeNames.Float2).Set((repeats, repeats))
+            self._uvs = scale.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+
+    def add(self, name: str, file: str, space: str, factors: tuple[float, ...]) -> Any:
+        """A node that reads one image and multiplies it."""
+        from pxr import Sdf, UsdShade
+
+        node = UsdShade.Shader.Define(self._stage, f"{self._path}/{name}")
+        node.CreateIdAttr("UsdUVTexture")
+        node.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(file)
+        node.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set(space)
+        node.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(self._uvs)
+        node.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(factors)
+        for axis in ("wrapS", "wrapT"):
+            node.CreateInput(axis, Sdf.ValueTypeNames.Token).Set("repeat")
+        return node
+
+
+def _index_of(specular: float) -> float:
+    """Index of refraction whose reflectance at normal incidence is ``0.08 * specular``.
+
+    Source: Fresnel at normal incidence, F0 = ((n - 1) / (n + 1))^2, solved for n.
+    """
+    root = math.sqrt(0.08 * specular)
+    return (1.0 + root) / (1.0 - root)

@@ -1,0 +1,303 @@
+"""Where objects start: layouts on surfaces that physics then settles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from gen_data.generator.config.distributions import So3
+from gen_data.generator.core.errors import LayoutRejected, Rejection
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.core.streams import Rng
+
+GAP_M = 0.004
+"""Free space between what is placed."""
+DROP_M = (0.01, 0.05)
+"""Objects fall this far: enough to tumble, too little to bounce away."""
+DROP_TRIES = 24
+"""Free places are tried this often before an object is dropped on top of others."""
+SCATTER_TRIES = 200
+
+_LIFT_M = 0.0005
+_TOO_HIGH = Rejection("object higher than the space above the surface", "smaller objects or scale")
+
+
+@dataclass(frozen=True)
+class Item:
+    """Something to be placed.
+
+    Attributes:
+        half_m: Half its extents along its own axes, scale included.
+        stackable: Flat above and below.
+    """
+
+    half_m: Vec3
+    stackable: bool = False
+
+    @property
+    def radius_m(self) -> float:
+        """Of the upright cylinder around it."""
+        return math.hypot(self.half_m[0], self.half_m[1])
+
+    @property
+    def reach_m(self) -> float:
+        """Of the ball around it, however it is turned."""
+        return math.hypot(*self.half_m)
+
+
+@dataclass
+class Floor:
+    """A surface that is being filled: cylinders ``(x, y, radius, top)`` in its own frame [m]."""
+
+    surface: SupportSurface
+    taken: list[tuple[float, float, float, float]] = field(default_factory=list)
+    closed: list[Vec3] = field(default_factory=list)
+
+    def top_under(self, x: float, y: float, radius_m: float) -> float:
+        """How high what is placed reaches under a disc; 0 where the surface is bare."""
+        tops = [
+            top
+            for ox, oy, other_m, top in self.taken
+            if math.hypot(x - ox, y - oy) < radius_m + other_m + GAP_M
+        ]
+        return max(tops, default=0.0)
+
+    def is_closed(self, x: float, y: float, radius_m: float) -> bool:
+        """Whether a disc touches a place where nothing may be put."""
+        return any(math.hypot(x - cx, y - cy) < radius_m + r for cx, cy, r in self.closed)
+
+    def place(self, rng: Rng, radius_m: float) -> tuple[float, float]:
+        """A point at which a disc lies within the surface; its centre where it is too large."""
+        room_x = max(0.0, 0.5 * self.surface.size_m[0] - radius_m)
+        room_y = max(0.0, 0.5 * self.surface.size_m[1] - radius_m)
+        return float(rng.uniform(-room_x, room_x)), float(rng.uniform(-room_y, room_y))
+
+
+def find_floors(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Floor]:
+    """The surfaces of a group, with what already lies on them."""
+    floors = []
+    for name in group.surfaces:
+        surface = scene.surface(name)
+        T_surface_world = surface.T_world_surface.inverse()
+        floor = Floor(surface)
+        for x, y, radius_m in group.keep_out:
+            here = _transform(T_surface_world, (x, y, surface.T_world_surface.translation_m[2]))
+            floor.closed.append((here[0], here[1], radius_m))
+        for body in scene.bodies:
+            if body.motion == "dynamic":
+                cylinder = _cylinder(body, T_surface_world, assets)
+                if -GAP_M < cylinder[3] < surface.clearance_m:
+                    floor.taken.append(cylinder)
+        floors.append(floor)
+    return floors
+
+
+def lay_out(
+    group: ObjectGroup,
+    items: Sequence[Item],
+    floors: list[Floor],
+    rng: Rng,
+    upright: Sequence[bool],
+) -> list[SE3]:
+    """``T_world_body`` of every item, by the group's placement.
+
+    Raises:
+        LayoutRejected: there is no place.
+    """
+    if group.placement == "stack":
+        return _stack(group, items, floors, rng)
+    if group.placement == "grid":
+        return _arrange_in_grid(group, items, floors, rng)
+    if group.placement == "scatter":
+        return _scatter(group, items, floors, rng)
+    return [
+        _drop(group, item, floors[_draw_floor(floors, item, rng)], rng, stands)
+        for item, stands in zip(items, upright, strict=True)
+    ]
+
+
+def _drop(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:
+    """Above a free place if one is found soon, else above what lies there."""
+    clearance_m = floor.surface.clearance_m
+    upright = upright or 2 * item.reach_m + DROP_M[1] > clearance_m
+    radius_m = item.radius_m if upright else item.reach_m
+    half_height_m = item.half_m[2] if upright else item.reach_m
+    place = _find_lowest_place(floor, radius_m, rng)
+    if place is None:
+        raise LayoutRejected(_no_place(group))
+    x, y, top_m = place
+    fall_m = float(rng.uniform(*DROP_M)) if not upright else DROP_M[0]
+    z = top_m + half_height_m + fall_m
+    if z + half_height_m > clearance_m:
+        raise LayoutRejected(_no_place(group))
+    floor.taken.append((x, y, radius_m, z + half_height_m))
+    turn = _yaw(rng) if upright else SE3(quaternion_wxyz=So3().draw(rng))
+    return floor.surface.T_world_surface @ SE3((x, y, z)) @ turn
+
+
+def _find_lowest_place(floor: Floor, radius_m: float, rng: Rng) -> Vec3 | None:
+    """``(x, y, height)`` of the first bare place of some, else of that with the least below it.
+
+    None if something stands at all of them.
+    """
+    lowest: Vec3 | None = None
+    for _ in range(DROP_TRIES):
+        x, y = floor.place(rng, radius_m)
+        if floor.is_closed(x, y, radius_m):
+            continue
+        top_m = floor.top_under(x, y, radius_m)
+        if lowest is None or top_m < lowest[2]:
+            lowest = (x, y, top_m)
+        if top_m == 0.0:
+            break
+    return lowest
+
+
+def _scatter(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+    """Standing apart from everything else; the widest choose first."""
+    poses: dict[int, SE3] = {}
+    for k in sorted(range(len(items)), key=lambda k: (-items[k].radius_m, k)):
+        floor, x, y = _find_bare_place(group, items[k], floors, rng)
+        poses[k] = _stand(items[k], floor, (x, y, 0.0), _yaw(rng))
+    return [poses[k] for k in range(len(items))]
+
+
+def _find_bare_place(
+    group: ObjectGroup, item: Item, floors: list[Floor], rng: Rng
+) -> tuple[Floor, float, float]:
+    """A surface, and a point on it around which there is room for an upright item."""
+    for _ in range(SCATTER_TRIES):
+        floor = floors[_draw_floor(floors, item, rng)]
+        x, y = floor.place(rng, item.radius_m)
+        bare = floor.top_under(x, y, item.radius_m) == 0.0
+        if bare and not floor.is_closed(x, y, item.radius_m):
+            return floor, x, y
+    raise LayoutRejected(_no_place(group))
+
+
+def _arrange_in_grid(
+    group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng
+) -> list[SE3]:
+    """In rows, surface after surface, turned by quarters."""
+    poses = []
+    share = -(-len(items) // len(floors))
+    for number, floor in enumerate(floors):
+        here = items[number * share : (number + 1) * share]
+        cells = _cells(floor, here)
+        if len(cells) < len(here):
+            raise LayoutRejected(_no_place(group))
+        for item, (x, y) in zip(here, cells, strict=False):
+            quarter = SE3.about_z(0.5 * math.pi * int(rng.integers(4)))
+            poses.append(_stand(item, floor, (x, y, 0.0), quarter))
+    return poses
+
+
+def _cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]]:
+    """Centres of the free cells of the coarsest grid that has one for every item; else none."""
+    half_m = max((max(item.half_m[:2]) for item in items), default=0.0)
+    length_m, width_m = floor.surface.size_m
+    for count in range(max(len(items), 1), 4 * len(items) + 64):
+        columns = max(1, round((count * length_m / width_m) ** 0.5))
+        rows = -(-count // columns)
+        if min(length_m / columns, width_m / rows) < 2 * half_m + GAP_M:
+            continue
+        centers = [
+            (length_m * ((k + 0.5) / columns - 0.5), width_m * ((row + 0.5) / rows - 0.5))
+            for row in range(rows)
+            for k in range(columns)
+        ]
+        radius_m = math.sqrt(2.0) * half_m
+        free = [
+            (x, y)
+            for x, y in centers
+            if not floor.is_closed(x, y, radius_m) and floor.top_under(x, y, half_m) == 0.0
+        ]
+        if len(free) >= len(items):
+            return free
+    return []
+
+
+def _stack(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+    """In towers of two to four, the widest lowest; what is not flat stands alone."""
+    poses: dict[int, SE3] = {}
+    flat = [k for k, item in enumerate(items) if item.stackable]
+    flat.sort(key=lambda k: (-items[k].radius_m, k))
+    alone = [k for k, item in enumerate(items) if not item.stackable]
+    while flat:
+        height = min(int(rng.integers(2, 5)), len(flat))
+        tower, flat = flat[:height], flat[height:]
+        floor, x, y = _find_bare_place(group, items[tower[0]], floors, rng)
+        z = 0.0
+        for k in tower:
+            poses[k] = _stand(items[k], floor, (x, y, z), _yaw(rng))
+            z += 2 * items[k].half_m[2]
+    for k in alone:
+        floor, x, y = _find_bare_place(group, items[k], floors, rng)
+        poses[k] = _stand(items[k], floor, (x, y, 0.0), _yaw(rng))
+    return [poses[k] for k in range(len(items))]
+
+
+def _stand(item: Item, floor: Floor, place: Vec3, turn: SE3) -> SE3:
+    """Upright on a point of the surface's frame."""
+    x, y, z = place
+    top_m = z + 2 * item.half_m[2]
+    if top_m > floor.surface.clearance_m:
+        raise LayoutRejected(_TOO_HIGH)
+    floor.taken.append((x, y, item.radius_m, top_m))
+    center = SE3((x, y, z + item.half_m[2] + _LIFT_M))
+    return floor.surface.T_world_surface @ center @ turn
+
+
+def _draw_floor(floors: list[Floor], item: Item, rng: Rng) -> int:
+    """One of the surfaces that the item fits under, by area."""
+    areas = [
+        f.surface.size_m[0] * f.surface.size_m[1]
+        if 2 * item.half_m[2] + DROP_M[0] < f.surface.clearance_m
+        else 0.0
+        for f in floors
+    ]
+    total = sum(areas)
+    if total == 0.0:
+        raise LayoutRejected(_TOO_HIGH)
+    draw = float(rng.uniform()) * total
+    for number, area in enumerate(areas):
+        draw -= area
+        if draw < 0.0:
+            return number
+    return max(range(len(areas)), key=areas.__getitem__)
+
+
+def _cylinder(
+    body: Body, T_surface_world: SE3, assets: AssetIndex
+) -> tuple[float, float, float, float]:
+    low, high = assets.bounds_m(body.asset)
+    item = Item(half_extents_m(low, high, body.scale))
+    x, y, z = _transform(T_surface_world, body.T_world_body.translation_m)
+    return (x, y, item.reach_m, z + item.reach_m)
+
+
+def half_extents_m(low: Vec3, high: Vec3, scale: float) -> Vec3:
+    """Half the extents of a scaled bounding box."""
+    return (
+        0.5 * scale * (high[0] - low[0]),
+        0.5 * scale * (high[1] - low[1]),
+        0.5 * scale * (high[2] - low[2]),
+    )
+
+
+def _yaw(rng: Rng) -> SE3:
+    return SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)))
+
+
+def _transform(pose: SE3, point: Vec3) -> Vec3:
+    return (pose @ SE3(point)).translation_m
+
+
+def _no_place(group: ObjectGroup) -> Rejection:
+    return Rejection(
+        "no free place for an object",
+        f"fewer objects (randomizers.{group.name}.count) or a larger surface",
+    )

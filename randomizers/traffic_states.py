@@ -1,0 +1,201 @@
+"""What changes on bodies in traffic: lamps, signals, and the steps of those who walk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.generator.assets.people.animation import PHASES
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.motion import StateChange
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import Array, Vec3
+from gen_data.generator.traffic.pedestrians import stride_m
+from gen_data.generator.traffic.signal_cycles import Approach
+from gen_data.generator.traffic.simulation import STEP_S
+from gen_data.generator.traffic.vehicles import Entry
+from gen_data.randomizers.base import body_materials
+from gen_data.randomizers.traffic_lights import Signal, show_state
+from gen_data.randomizers.vehicle_lights import AMBER, RED, scale_emission, set_emission
+
+BRAKES_M_S2 = 0.7
+"""Brake lights come on from this deceleration on (UN R13-H, 5.2.22.4) and at a standstill."""
+BRAKES_S = 0.3
+"""They stay on for at least this long."""
+SIGNALLED_M = 30.0
+"""Turns are indicated this far ahead."""
+TURNS = 0.25
+"""Sine of half the angle of what counts as a turn, 29 degrees."""
+BLINKS_PER_S = 1.5
+"""UN R48, 6.5.9.1: 90 a minute, give or take 30."""
+STANDS_M_S, WALKS_M_S = 0.05, 0.2
+"""Who is slower stands still; who stands walks again when faster."""
+DEFAULT_HEIGHT_M = 1.7
+
+S = TypeVar("S")
+Lamps = tuple[bool, str, bool]
+"""Whether a vehicle brakes, the turn that it indicates, and whether that lamp is lit now."""
+
+
+def lamp_states(
+    station_m: Array,
+    speed_m_s: Array,
+    acceleration_m_s2: Array,
+    front_m: float,
+    entries: Sequence[Entry],
+    blink: float,
+) -> list[Lamps]:
+    """What a vehicle's lamps show at every step.
+
+    Args:
+        station_m: Of its rear axle on its route [t].
+        speed_m_s: [t].
+        acceleration_m_s2: [t].
+        front_m: From its rear axle to its front.
+        entries: The junctions on its route.
+        blink: Share of a blink that is over at time 0.
+    """
+    brakes = (acceleration_m_s2 < -BRAKES_M_S2) | (speed_m_s < STANDS_M_S)
+    held = _hold(brakes, round(BRAKES_S / STEP_S))
+    turns = ["none"] * len(station_m)
+    for entry in entries:
+        if abs(entry.turn) < TURNS:
+            continue
+        near = (station_m + front_m > entry.at_m - SIGNALLED_M) & (station_m < entry.leave_m)
+        for k in np.flatnonzero(near).tolist():
+            turns[k] = "left" if entry.turn > 0.0 else "right"
+    half = 0.5 / BLINKS_PER_S
+    return [
+        (brake, turn, turn != "none" and int((k * STEP_S + 1e-9) / half + 2.0 * blink) % 2 == 0)
+        for k, (brake, turn) in enumerate(zip(held.tolist(), turns, strict=True))
+    ]
+
+
+def lamp_changes(
+    body: Body, assets: AssetIndex, states: Sequence[Lamps], brake_cd_m2: float, blink_cd_m2: float
+) -> list[StateChange]:
+    """A vehicle's lamps from time 0 on; none for those that have no such lamps."""
+    roles = {material.role for material in body_materials(body, assets)}
+    if not roles & {"brakelight", "indicator_left", "indicator_right"}:
+        return []
+
+    def change(time_s: float, state: Lamps) -> StateChange:
+        brake, turn, lit = state
+        dark: Vec3 = (0.0, 0.0, 0.0)
+        glow = {"brakelight": scale_emission(RED, brake_cd_m2) if brake else dark}
+        for side in ("left", "right"):
+            on = lit and turn == side
+            glow[f"indicator_{side}"] = scale_emission(AMBER, blink_cd_m2) if on else dark
+        facts = (("brake_lights", "on" if brake else "off"), ("indicator", turn))
+        return StateChange(time_s, body.name, "", set_emission(body, assets, glow).materials, facts)
+
+    return _changes(states, change)
+
+
+def signal_changes(
+    signal: Signal, approach: Approach, assets: AssetIndex, lens_cd_m2: float, until_s: float
+) -> list[StateChange]:
+    """What a traffic light shows from time 0 on."""
+    made = []
+    for time_s in (0.0, *approach.cycle.switches_s(approach.axis, until_s)):
+        state = approach.state(time_s)
+        lit: tuple[Material, ...] = show_state(signal.body, assets, state, lens_cd_m2).materials
+        facts = (("state", state),)
+        made.append(StateChange(time_s, signal.body.name, "", lit, facts))
+    return made
+
+
+def gait_changes(
+    body: Body, assets: AssetIndex, walked_m: Array, pace_m_s: Array, start: float
+) -> list[StateChange]:
+    """The steps of somebody who walks, and their standing still; none for other assets.
+
+    Args:
+        body: Theirs.
+        assets: The library.
+        walked_m: Distances so far, at every step of time.
+        pace_m_s: Their speeds.
+        start: Phase of the stride at time 0, in [0, 1).
+    """
+    known = dict(assets.get(body.asset).attributes)
+    if "pose" not in known:
+        return []
+    asset = parse_asset_id(body.asset)
+    stride = body.scale * stride_m(float(known.get("height_m", DEFAULT_HEIGHT_M)))
+    phases = np.floor((start + walked_m / stride) * PHASES).astype(np.int64) % PHASES
+    standing = np.zeros(len(phases), bool)
+    still = False
+    for k, pace in enumerate(pace_m_s.tolist()):
+        still = pace < (WALKS_M_S if still else STANDS_M_S)
+        standing[k] = still
+    states = np.where(standing, -1, phases).tolist()
+    at_rest = str(AssetId(asset.name, {**asset.parameters, "pose": "stand"}))
+    walking = [
+        str(AssetId(asset.name, {**asset.parameters, "phase": k / PHASES})) for k in range(PHASES)
+    ]
+    facts = {
+        of: tuple(p for p in assets.get(of).attributes if p[0] in ("behaviour", "pose"))
+        for of in (at_rest, walking[0])
+    }
+
+    def change(time_s: float, state: int) -> StateChange:
+        if state < 0:
+            return StateChange(time_s, body.name, at_rest, (), facts[at_rest])
+        return StateChange(time_s, body.name, walking[state], (), facts[walking[0]])
+
+    return _changes(states, change)
+
+
+def apply_first_changes(scene: Scene, changes: Iterable[StateChange]) -> Scene:
+    """The scene as it is at time 0."""
+    first = {change.body: change for change in changes if change.time_s == 0.0}
+    bodies = tuple(
+        replace(
+            body, asset=change.asset or body.asset, materials=change.materials or body.materials
+        )
+        if (change := first.get(body.name)) is not None
+        else body
+        for body in scene.bodies
+    )
+    by_id = {body.instance_id: first[body.name] for body in bodies if body.name in first}
+    instances = tuple(
+        replace(
+            instance,
+            asset=by_id[instance.instance_id].asset or instance.asset,
+            attributes=tuple(
+                sorted(
+                    {
+                        **dict(instance.attributes),
+                        **dict(by_id[instance.instance_id].attributes),
+                    }.items()
+                )
+            ),
+        )
+        if instance.instance_id in by_id
+        else instance
+        for instance in scene.instances
+    )
+    return replace(scene, bodies=bodies, instances=instances)
+
+
+def _hold(on: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+    """True for at least some steps once it is."""
+    held: NDArray[np.bool_] = on.copy()
+    for k in range(1, steps):
+        held[k:] |= on[:-k]
+    return held
+
+
+def _changes(states: Sequence[S], change: Callable[[float, S], StateChange]) -> list[StateChange]:
+    """A change at time 0 and wherever a state differs from the one before."""
+    return [
+        change(round(k * STEP_S, 6), state)
+        for k, state in enumerate(states)
+        if k == 0 or state != states[k - 1]
+    ]

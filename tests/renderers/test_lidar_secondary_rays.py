@@ -1,0 +1,151 @@
+"""Laser light through glass, by way of mirrors, on wet ground and on snow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gen_data.generator.core.asset_types import SURFACES, Material
+from gen_data.generator.core.capture import LidarHits, LidarRays
+from gen_data.generator.core.scene import Body, Instance, Lidar, Scene, Weather
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.renderers.warp.lidar.infrared_materials import CLEAR, MIRRORS, oren_nayar
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
+
+GREY = Material((0.4, 0.4, 0.4), 1.0, specular=0.0)
+GLASS = Material((0.01, 0.01, 0.01), 0.05, role="glass")
+WINDOW = Material((0.01, 0.01, 0.01), 0.05, role="window")
+ASPHALT = Material((0.05, 0.05, 0.05), 1.0, specular=0.0, role="asphalt")
+LIBRARY = FakeLibrary(
+    {
+        "wall": box_mesh((0.2, 60.0, 60.0), (GREY,)),
+        "pane": box_mesh((0.006, 60.0, 60.0), (GLASS,)),
+        "window": box_mesh((0.2, 60.0, 60.0), (WINDOW,)),
+        "road": plane_mesh(400.0, (ASPHALT,)),
+    }
+)
+AHEAD = np.array([[1.0, 0.0, 0.0]], np.float32)
+
+
+def scan(
+    scene: Scene, directions: np.ndarray, height_m: float = 0.0, subrays: int = 1
+) -> LidarHits:
+    """From the origin, or above it."""
+    lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, height_m)))
+    beams = LidarRays(np.asarray(directions, np.float32), 0.002, subrays, 200.0)
+    return WarpRenderer(LIBRARY, "cpu").scan(scene, lidar, beams)
+
+
+def schlick(f0: float, angle_rad: float) -> float:
+    """Fresnel reflectance under an angle of incidence."""
+    return f0 + (1.0 - f0) * (1.0 - math.cos(angle_rad)) ** 5
+
+
+def test_behind_a_pane_a_wall_is_seen_dimmed_on_both_ways() -> None:
+    """Its range is its own, its reflectance that of the wall times the pane's squared."""
+    bodies = (
+        Body("pane", "pane", SE3((10.0, 0.0, 0.0)), instance_id=1),
+        Body("wall", "wall", SE3((15.1, 0.0, 0.0)), instance_id=2),
+    )
+    things = tuple(Instance(k, f"i{k}", "thing", k, "") for k in (1, 2))
+
+    echoes = scan(Scene("panes", bodies, things), AHEAD)
+
+    assert echoes.range_m[0, 0] == pytest.approx(9.997, abs=1e-4)
+    assert echoes.instance_id[0, 0] == 1
+    assert echoes.detours is not None
+    (behind,) = np.flatnonzero(echoes.detours.surface != SURFACES.index("mirrored"))
+    assert echoes.detours.ray[behind] == 0
+    assert echoes.detours.range_m[behind] == pytest.approx(15.0, abs=1e-3)
+    assert echoes.detours.instance_id[behind] == 2
+    assert echoes.detours.category_id[behind] == 2
+    passed = CLEAR["glass"] * (1.0 - MIRRORS["glass"])
+    assert echoes.detours.reflectance[behind] == pytest.approx(0.4 * passed**2, rel=1e-3)
+
+
+def test_two_panes_dim_twice() -> None:
+    """Four passages in all."""
+    bodies = tuple(Body(f"p{k}", "pane", SE3((5.0 + k, 0.0, 0.0))) for k in range(2))
+    wall = Body("wall", "wall", SE3((15.1, 0.0, 0.0)))
+
+    detours = scan(Scene("panes", (*bodies, wall)), AHEAD).detours
+
+    assert detours is not None
+    passed = CLEAR["glass"] * (1.0 - MIRRORS["glass"])
+    behind = detours.surface != SURFACES.index("mirrored")
+    np.testing.assert_allclose(detours.range_m[behind], 15.0, atol=1e-3)
+    np.testing.assert_allclose(detours.reflectance[behind], 0.4 * passed**4, rtol=1e-3)
+
+
+def test_a_window_mirrors_a_wall_to_a_place_behind_itself() -> None:
+    """At 45 degrees: the ways add up, Fresnel counts twice, and there is no label."""
+    turned = SE3.about_z(math.radians(45.0), (10.0, 0.0, 0.0))
+    bodies = (
+        Body("window", "window", turned, instance_id=1),
+        Body("wall", "wall", SE3.about_z(math.radians(90.0), (10.0, -20.1, 0.0)), instance_id=2),
+        Body("other", "wall", SE3.about_z(math.radians(90.0), (10.0, 20.1, 0.0)), instance_id=2),
+    )
+
+    echoes = scan(Scene("mirror", bodies), AHEAD)
+
+    detours = echoes.detours
+    assert detours is not None and len(detours.ray) == 1
+    near_m = 10.0 - 0.1 * math.sqrt(2.0)
+    assert echoes.range_m[0, 0] == pytest.approx(near_m, abs=1e-3)
+    assert detours.range_m[0] == pytest.approx(near_m + 20.0, abs=5e-3)
+    mirrored = schlick(MIRRORS["window"], math.radians(45.0))
+    assert detours.reflectance[0] == pytest.approx(0.4 * mirrored**2, rel=1e-3)
+    assert detours.instance_id[0] == detours.category_id[0] == 0
+    assert detours.surface[0] == SURFACES.index("mirrored")
+
+
+def test_where_nothing_is_of_glass_there_are_no_detours() -> None:
+    """Nor does dry asphalt mirror."""
+    bodies = (Body("road", "road"), Body("wall", "wall", SE3((10.0, 0.0, 0.0))))
+
+    assert scan(Scene("street", bodies), AHEAD, 1.0).detours is None
+
+
+def test_puddles_mirror_what_stands_behind_them() -> None:
+    """The wall behind is seen as far below the road as it is above; Fresnel of water, twice."""
+    down = math.radians(4.0)
+    ray = [[math.cos(down), 0.0, -math.sin(down)]]
+    bodies = (Body("road", "road"), Body("wall", "wall", SE3((40.1, 0.0, 0.0))))
+    flooded = Scene("street", bodies, weather=Weather(puddles=1.0, wetness=1.0))
+
+    detours = scan(flooded, ray, 1.8).detours
+
+    assert detours is not None
+    assert detours.range_m[0] == pytest.approx(40.0 / math.cos(down), abs=0.02)
+    mirrored = schlick(0.02, math.radians(86.0))
+    assert detours.reflectance[0] == pytest.approx(0.4 * math.cos(down) * mirrored**2, rel=0.02)
+
+
+@pytest.mark.parametrize("down_deg", [5.0, 20.0, 60.0])
+def test_wet_asphalt_sends_back_less_and_least_aslant(down_deg: float) -> None:
+    """Dark by 1 - 0.8 wetness; a film on half of it reflects its Fresnel share away, both ways."""
+    down = math.radians(down_deg)
+    ray = [[math.cos(down), 0.0, -math.sin(down)]]
+    road = (Body("road", "road"),)
+
+    dry = scan(Scene("street", road), ray, 1.8).reflectance[0, 0]
+    wet = scan(Scene("street", road, weather=Weather(wetness=1.0)), ray, 1.8).reflectance[0, 0]
+
+    passes = 1.0 - 0.5 * schlick(0.02, math.radians(90.0 - down_deg))
+    assert wet / dry == pytest.approx(0.2 * passes**2, rel=0.02)
+
+
+def test_snow_is_bright_in_the_near_infrared() -> None:
+    """0.85 square on, by Lambert, where black asphalt had 0.17."""
+    road, ray = (Body("road", "road"),), [[0.0, 0.0, -1.0]]
+    snow = Weather(snow_cover=1.0)
+
+    bare = scan(Scene("street", road), ray, 1.8)
+    under = scan(Scene("street", road, weather=snow), ray, 1.8)
+
+    assert bare.reflectance[0, 0] == pytest.approx(0.17 * oren_nayar(0.5)[0], rel=1e-3)
+    assert under.reflectance[0, 0] == pytest.approx(0.85, rel=0.02)
+    assert under.surface[0, 0] == bare.surface[0, 0] == SURFACES.index("asphalt")

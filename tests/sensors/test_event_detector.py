@@ -1,0 +1,212 @@
+"""What happens to an ego car, against arithmetic."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from gen_data.generator.core.errors import SampleError
+from gen_data.generator.core.measurement_dtypes import LIGHT_STATES, OCCURRENCES
+from gen_data.generator.core.scene import Body, Lane, Rig
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.sensors.events.event_detector import EventDetector
+from gen_data.generator.sensors.events.obb_queries import ahead_m, find_obstacles, is_touching
+from tests.sensors.streetcar import (
+    PERSON_M,
+    WALL_M,
+    moved,
+    reading,
+    readings,
+    straight,
+    thing,
+    track_of,
+    world,
+)
+
+LIGHT_M = ((-0.05, -0.14, 0.0), (0.35, 0.14, 3.2))
+
+
+def of_kind(rows: np.ndarray, kind: str) -> np.ndarray:
+    return rows[rows["occurrence"] == OCCURRENCES.index(kind)]
+
+
+def lane(y_m: float, length_m: float = 60.0, name: str = "lane") -> Lane:
+    points = tuple((x, y_m, 0.0) for x in np.arange(0.0, length_m + 1.0, 2.0))
+    return Lane(name, "driving", points, 3.5)
+
+
+def test_collision_is_noticed_when_the_bumper_arrives() -> None:
+    """At 10 m/s, 12 m of free way: after 1.2 s, once, with the speed."""
+    wall = thing(7, "wall", "building", SE3((12.0 + 2.2 + 0.1, 0.0, 0.0)), WALL_M)
+    rows = of_kind(readings(EventDetector(), world(others=[wall]), 16), "collision")
+
+    assert len(rows) == 1
+    assert rows[0]["time_s"] == pytest.approx(1.2, abs=0.0101)
+    assert (rows[0]["instance_id"], rows[0]["value"]) == (7, pytest.approx(10.0, abs=1e-4))
+
+
+def test_collision_of_two_that_move_has_the_speed_between_them() -> None:
+    """10 m/s against 5 m/s, 15.6 m between bumpers: after 1.04 s."""
+    other = thing(2, "other", "car", SE3((20.0, 0.0, 0.0)))
+    coming = track_of("other", straight((20.0, 0.0), (-5.0, 0.0)))
+    scene = world(others=[other], tracks=[coming])
+    rows = of_kind(readings(EventDetector(events=("collision",)), scene, 16), "collision")
+
+    assert rows["time_s"].tolist() == pytest.approx([1.04], abs=0.0101)
+    assert rows[0]["value"] == pytest.approx(15.0, abs=1e-4)
+
+
+def test_passing_beside_is_no_collision() -> None:
+    """2 cm between the sides."""
+    beside = thing(2, "parked", "car", SE3((8.0, 1.82, 0.0)))
+
+    assert len(of_kind(readings(EventDetector(), world(others=[beside]), 20), "collision")) == 0
+
+
+def test_crown_of_a_tree_is_no_wall() -> None:
+    """Its stem is what one collides with."""
+    crown = ((-4.0, -4.0, 0.0), (4.0, 4.0, 9.0))
+    aside, ahead = (thing(5, "tree", "tree", SE3((9.0, y, 0.0)), crown) for y in (2.0, 0.0))
+
+    assert len(of_kind(readings(EventDetector(), world(others=[aside]), 20), "collision")) == 0
+    assert len(of_kind(readings(EventDetector(), world(others=[ahead]), 20), "collision")) == 1
+
+
+def test_boxes_touch_exactly_where_their_corners_reach() -> None:
+    """A box turned by 45 degrees reaches sqrt(2) half edges ahead."""
+    cube = ((-1.0, -1.0, 0.0), (1.0, 1.0, 1.5))
+    turned = SE3.about_z(math.pi / 4)
+    for gap_m, expected in ((0.01, False), (-0.01, True)):
+        x_m = 2.2 + math.sqrt(2.0) + gap_m
+        other = thing(2, "cube", "car", SE3((x_m, 0.0, 0.0)) @ turned, cube)
+        own, its = find_obstacles(world(straight((0.0, 0.0), (0.0, 0.0)), [other]))
+        assert is_touching(own, its, 0.0) is expected
+
+
+def test_boxes_above_each_other_do_not_touch() -> None:
+    """A bridge over the car."""
+    bridge = thing(2, "bridge", "building", SE3((0.0, 0.0, 1.51)), ((-9, -9, 0), (9, 9, 1)))
+    own, its = find_obstacles(world(straight((0.0, 0.0), (0.0, 0.0)), [bridge]))
+
+    assert not is_touching(own, its, 0.0)
+
+
+def test_changing_lanes_crosses_one_line() -> None:
+    """At 1 m/s to the left, half a lane minus half the car's width away: after 0.85 s."""
+    scene = world(straight((10.0, 0.0), (10.0, 1.0)), lanes=[lane(0.0), lane(3.5, name="left")])
+    rows = of_kind(readings(EventDetector(), scene, 31), "lane_invasion")
+
+    assert len(rows) == 1
+    assert rows[0]["time_s"] == pytest.approx(1.75 - 0.9, abs=0.0101)
+    assert rows[0]["value"] == 1.0
+
+
+def test_lines_of_junctions_do_not_count() -> None:
+    """Nothing is painted there."""
+    junction = moved(
+        world(straight((10.0, 0.0), (10.0, -1.0))),
+        lanes=(Lane("x", "driving", ((0.0, 0.0, 0.0), (60.0, 0.0, 0.0)), 3.5, junction=True),),
+    )
+    road = moved(junction, lanes=(lane(0.0),))
+
+    assert len(of_kind(readings(EventDetector(), junction, 31), "lane_invasion")) == 0
+    assert of_kind(readings(EventDetector(), road, 31), "lane_invasion")["value"].tolist() == [-1.0]
+
+
+def test_obstacle_is_the_nearest_thing_in_the_way() -> None:
+    """A person in the car's path, nearer than the wall; one beside the path does not count."""
+    others = [
+        thing(2, "beside", "person", SE3((6.0, 1.3, 0.0)), PERSON_M),
+        thing(3, "ahead", "person", SE3((9.0, 0.9, 0.0)), PERSON_M),
+        thing(4, "wall", "building", SE3((15.0, 0.0, 0.0)), WALL_M),
+    ]
+    rows = of_kind(reading(EventDetector(), world(others=others), 2).rows, "obstacle")
+
+    assert rows["instance_id"].tolist() == [3]
+    assert rows[0]["value"] == pytest.approx(9.0 - 2.0 - 0.25 - 2.2, abs=1e-5)
+
+
+def test_obstacle_that_only_reaches_into_the_way_counts_from_where_it_does() -> None:
+    """A beam across at 45 degrees enters the car's strip nearer than its middle."""
+    beam = ((-10.0, -0.001, 0.0), (10.0, 0.001, 2.0))
+    crossing = thing(2, "beam", "building", SE3((12.0, 0.0, 0.0)) @ SE3.about_z(math.pi / 4), beam)
+    own, its = find_obstacles(world(straight((0.0, 0.0), (0.0, 0.0)), [crossing]))
+
+    assert ahead_m(own, its, 0.0) == pytest.approx(12.0 - 0.9 - 2.2, abs=5e-3)
+
+
+def test_far_obstacles_are_not_reported() -> None:
+    """Beyond the threshold."""
+    wall = thing(4, "wall", "building", SE3((40.0, 0.0, 0.0)), WALL_M)
+    scene = world(others=[wall])
+
+    assert len(of_kind(reading(EventDetector(obstacle_m=30.0), scene, 0).rows, "obstacle")) == 0
+    assert len(of_kind(reading(EventDetector(obstacle_m=40.0), scene, 0).rows, "obstacle")) == 1
+
+
+def test_what_lies_flat_on_the_road_is_no_obstacle() -> None:
+    """A manhole cover of 2 cm."""
+    cover = thing(4, "cover", "building", SE3((8.0, 0.0, 0.0)), ((-0.4, -0.4, 0), (0.4, 0.4, 0.02)))
+
+    assert len(readings(EventDetector(), world(others=[cover]), 12)) == 0
+
+
+def test_proximity_is_the_distance_to_the_nearest_box() -> None:
+    """Of a device 1 m up and 2 m ahead: straight to the face of a wall."""
+    wall = thing(4, "wall", "building", SE3((5.0, 0.0, 0.0)), WALL_M)
+    sensor = EventDetector(events=("proximity",), offset_m=(2.0, 0.0, 1.0))
+    rows = reading(sensor, world(others=[wall]), 0).rows
+
+    assert rows["instance_id"].tolist() == [4]
+    assert rows[0]["value"] == pytest.approx(2.9, abs=1e-6)
+
+
+@pytest.mark.parametrize("state", ["red", "yellow", "green", "red_yellow"])
+def test_light_at_the_end_of_the_lane_is_told(state: str) -> None:
+    """That which faces the car; the one of the oncoming traffic is not ours."""
+    ours = thing(
+        5, "ours", "traffic_light", SE3.about_z(math.pi, (60.6, -3.0, 0.0)), LIGHT_M, state=state
+    )
+    theirs = thing(6, "theirs", "traffic_light", SE3((60.0, 3.0, 0.0)), LIGHT_M, state="green")
+    scene = world(straight((20.0, 0.0), (10.0, 0.0)), [ours, theirs], lanes=[lane(0.0)])
+    rows = of_kind(reading(EventDetector(light_m=40.5), scene, 0).rows, "traffic_light")
+
+    assert rows["instance_id"].tolist() == [5]
+    assert LIGHT_STATES[int(rows[0]["value"])] == state
+
+
+def test_light_far_ahead_does_not_matter_yet() -> None:
+    """Its line is 40 m away."""
+    ours = thing(
+        5, "ours", "traffic_light", SE3.about_z(math.pi, (60.6, -3.0, 0.0)), LIGHT_M, state="red"
+    )
+    scene = world(straight((20.0, 0.0), (10.0, 0.0)), [ours], lanes=[lane(0.0)])
+    sensor = EventDetector(light_m=30.0)
+
+    assert len(of_kind(reading(sensor, scene, 0).rows, "traffic_light")) == 0
+    assert len(of_kind(reading(sensor, scene, 12).rows, "traffic_light")) == 1
+
+
+def test_slow_watcher_reports_all_since_its_last_reading() -> None:
+    """At 2 Hz in steps of 0.1 s: what happened at 1.2 s is told at 1.5 s."""
+    wall = thing(7, "wall", "building", SE3((14.3, 0.0, 0.0)), WALL_M)
+    rows = reading(EventDetector(rate_hz=2.0), world(others=[wall]), 15).rows
+
+    assert of_kind(rows, "collision")["time_s"].tolist() == pytest.approx([1.2], abs=0.0101)
+
+
+def test_a_carrier_without_a_box_is_named() -> None:
+    """A rig on something unlabelled."""
+    scene = world()
+    bare = moved(scene, bodies=(*scene.bodies, Body("mast", "mast?")), rigs=(Rig("ego", "mast"),))
+    with pytest.raises(SampleError, match="'mast', which carries rig 'ego', has no box"):
+        reading(EventDetector(), bare, 0)
+
+
+def test_unknown_occurrences_are_refused() -> None:
+    """When they are read."""
+    with pytest.raises(ValidationError, match="events"):
+        EventDetector(events=("crash",))  # type: ignore[arg-type]

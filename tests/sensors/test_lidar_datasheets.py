@@ -1,0 +1,163 @@
+"""Data sheets and tables of beams of the user's own, and sensors where they cannot see."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gen_data.generator.assemble.config import Config, load_config, load_source_config
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Body, Rig, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.generator.sensors.lidar.scan_pattern import make_sweep
+from gen_data.generator.sensors.mounting import check_not_buried
+from tests.renderers.fake_library import FakeLibrary, box_mesh
+
+SHEET = """\
+elevations_deg: [{first: 1, last: -1, count: 3}]
+rotation_hz: 20
+points_per_second: 6000
+range_m: [0.5, 60]
+range_noise_m: 0.01
+range_step_m: 0
+divergence_mrad: 3
+pulse_m: 1
+wavelength_nm: 905
+seen: {reflectance: 0.1, range_m: 50}
+white_intensity: 0.4
+"""
+CONFIG = """\
+template: street
+sensors:
+  - {type: rgb_camera}
+  - type: lidar
+    %s
+"""
+
+
+def spec(folder: Path, line: str, **files: str) -> Config:
+    """The configuration with one line of the scanner's, beside some files."""
+    for name, text in files.items():
+        (folder / name.replace("_", ".", 1)).write_text(text, encoding="utf-8")
+    (folder / "mine.yaml").write_text(CONFIG % line, encoding="utf-8")
+    return load_config(str(folder / "mine.yaml"))
+
+
+def told(folder: Path, line: str, **files: str) -> str:
+    """What a user is told, without folders."""
+    with pytest.raises(ConfigError) as refused:
+        spec(folder, line, **files)
+    return str(refused.value).replace(f"{folder}/", "")
+
+
+def test_a_data_sheet_beside_the_configuration_is_a_model(tmp_path: Path) -> None:
+    """Its name is the file's; the scanner has its lasers and its turns."""
+    sensor = spec(tmp_path, "model: ./sheet.yaml", sheet_yaml=SHEET).sensors[1]
+
+    assert sensor.device.name == "sheet"
+    assert len(make_sweep(sensor.device, 0.0).ring) == 6000 // 20
+    np.testing.assert_allclose(np.degrees(sensor.device.elevations_rad()), [1, 0, -1])
+
+
+def test_a_plan_holds_the_data_sheet_and_needs_no_file(tmp_path: Path) -> None:
+    """Other numbers in the file are another data set; a plan is made again without it."""
+    made = spec(tmp_path, "model: sheet.yaml", sheet_yaml=SHEET)
+    other = spec(tmp_path, "model: sheet.yaml", sheet_yaml=SHEET.replace("20", "10"))
+    assert made.resolved != other.resolved
+    (tmp_path / "sheet.yaml").unlink()
+    plan = canonical_json({"config": made.resolved, "name": "mine"})
+    (tmp_path / "plan.json").write_text(plan, encoding="utf-8")
+
+    assert load_source_config(str(tmp_path)).sensors == made.sensors
+
+
+def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None:
+    """Sorted from the top, each with its own offset to the left; comments are skipped."""
+    table = "azimuth_offset_deg, elevation_deg\n# down first\n-2, -10\n\n4, 5  # up\n"
+    device = spec(tmp_path, "beams: table.csv", table_csv=table).sensors[1].device
+
+    sweep = make_sweep(device, 0.0)
+    elevation = np.degrees(np.arcsin(sweep.directions[:2, 2].astype(float)))
+    azimuth = np.degrees(np.arctan2(sweep.directions[:2, 1], sweep.directions[:2, 0]))
+    np.testing.assert_allclose(elevation, [5.0, -10.0], atol=1e-4)
+    assert azimuth[0] - azimuth[1] == pytest.approx(6.0, abs=1e-3) or math.isclose(
+        abs(azimuth[0] - azimuth[1]), 354.0, abs_tol=1e-3
+    )
+    assert device.rotation_hz == 10
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("elevation_rad\n1\n", "table.csv:1:1: unknown column 'elevation_rad'; expected"),
+        ("azimuth_offset_deg\n1\n", "table.csv:1:1: expected columns elevation_deg"),
+        ("elevation_deg\n1\n one\n", "table.csv:3:2: elevation_deg: expected a number, got 'one'"),
+        ("elevation_deg\n1, 2\n", "table.csv:2:1: expected 1 numbers, got 2"),
+        ("elevation_deg\n1\n-91\n", "table.csv:3:1: sensors[1].beams[1][0]"),
+        ("", "table.csv:1:1: expected columns"),
+    ],
+)
+def test_what_is_wrong_in_a_table_is_told_with_its_place(
+    table: str, message: str, tmp_path: Path
+) -> None:
+    """File, line and column."""
+    assert message in told(tmp_path, "beams: table.csv", table_csv=table)
+
+
+@pytest.mark.parametrize(
+    ("line", "sheet", "message"),
+    [
+        ("model: sheet.yaml", SHEET.replace("60]", "6o]"), "sheet.yaml:4:16: sensors[1].model.ran"),
+        ("model: sheet.yaml", SHEET.replace("range_noise_m", "range_noise_cm"), "sheet.yaml:5:1"),
+        ("model: none.yaml", SHEET, "mine.yaml:5:12: there is no file 'none.yaml'"),
+        ("model: table.csv", SHEET, "mine.yaml:5:12: model: a table of beams belongs into 'beams'"),
+        ("beams: sheet.yaml", SHEET, "mine.yaml:5:12: beams: expected a list, or the name of a"),
+        ("model: HDL64", SHEET, "mine.yaml:5:12: sensors[1].model: expected one of"),
+    ],
+)
+def test_what_is_wrong_with_a_model_is_told_with_its_place(
+    line: str, sheet: str, message: str, tmp_path: Path
+) -> None:
+    """In the sheet, or where the configuration names it."""
+    assert message in told(tmp_path, line, sheet_yaml=sheet)
+
+
+CAR = FakeLibrary({"car": box_mesh((4.0, 1.8, 1.5))})
+STREET = Scene(
+    "street",
+    (Body("ego", "car", SE3((0.0, 0.0, 0.75))),),
+    rigs=(Rig("rig", "ego", SE3((-1.2, 0.0, -0.75))),),
+)
+
+
+@pytest.mark.parametrize("kind", [LidarSensor, RgbCamera])
+@pytest.mark.parametrize(
+    ("offset_m", "buried"),
+    [
+        ((1.2, 0.0, 1.73), False),
+        ((1.2, 0.0, 1.46), False),
+        ((1.2, 0.0, 1.4), True),
+        ((3.5, 0.0, 0.7), False),
+        ((2.0, 0.5, 0.7), True),
+    ],
+)
+def test_sensors_inside_the_body_that_carries_them_are_refused(
+    kind: type[LidarSensor | RgbCamera], offset_m: tuple[float, float, float], buried: bool
+) -> None:
+    """A car 1.5 m high; five centimetres are forgiven, and who says ``inside`` means it."""
+    sensor = kind(name="top", rig="rig", offset_m=offset_m)
+    if buried:
+        with pytest.raises(ConfigError, match=r"'top': offset_m .* inside 'ego'.* at 1.50 m"):
+            check_not_buried(STREET, "top", sensor, CAR)
+    else:
+        check_not_buried(STREET, "top", sensor, CAR)
+
+    check_not_buried(
+        STREET, "top", kind(name="top", rig="rig", offset_m=offset_m, inside=True), CAR
+    )
