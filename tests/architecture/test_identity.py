@@ -21,6 +21,8 @@ BYTES_DO_NOT_DEPEND_ON = {
     "rerun": "shows samples",
     "rerun_cli": "shows samples",
     "rich": "draws progress on the terminal",
+    "threadpoolctl": "limits BLAS to one thread, as workers do",
+    "typing_extensions": "helps type checkers",
     "yaml": "reads text; the configuration that it gives is part of the plan",
 }
 """Imported libraries that are not part of the identity, and why."""
@@ -34,7 +36,7 @@ def imported_libraries(path: Path) -> set[str]:
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             names.add(node.module)
-    ours = {*OURS, "configs"}
+    ours = {"gen_data"}
     return {name.partition(".")[0] for name in names} - ours - sys.stdlib_module_names
 
 

@@ -19,15 +19,21 @@ def python_files(*packages: str) -> list[Path]:
 
 
 def test_functions_stay_short() -> None:
-    """No function is longer than 70 lines."""
+    """No function has more than 70 lines, comments and blank lines apart."""
     too_long = [
         f"{path.relative_to(ROOT)}: {node.name}: {length} lines"
         for path in python_files(*OURS)
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-        and (length := (node.end_lineno or node.lineno) - node.lineno + 1) > LINES_PER_FUNCTION_MAX
+        and (length := lines_of_code(path, node)) > LINES_PER_FUNCTION_MAX
     ]
     assert not too_long
+
+
+def lines_of_code(path: Path, function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Lines of a function that are neither blank nor a comment."""
+    lines = path.read_text().splitlines()[function.lineno - 1 : function.end_lineno]
+    return sum(bool(line.strip()) and not line.lstrip().startswith("#") for line in lines)
 
 
 def test_only_the_command_line_prints_and_reads_the_environment() -> None:
@@ -63,7 +69,7 @@ def test_help_imports_click_and_nothing_else() -> None:
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     assert "--config" in done.stdout
-    assert done.stdout.splitlines()[-1] == "LOADED click generator"
+    assert done.stdout.splitlines()[-1] == "LOADED click gen_data"
 
 
 def test_no_test_measures_the_wall_clock() -> None:

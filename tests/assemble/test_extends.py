@@ -13,7 +13,7 @@ from gen_data.generator.core.errors import ConfigError
 BASE = """\
 seed: 3
 template: tabletop
-render: {glare: 0.1, device: cpu}
+render: {max_lamps: 4, device: cpu}
 shared: {side: {uniform: [0, 1]}}
 elements: {table: {height_m: 0.8}}
 randomizers:
@@ -52,7 +52,7 @@ def test_what_is_not_given_is_inherited(folder: Path) -> None:
     """Sections merge key by key, plug-ins by name, new ones are appended."""
     own = """\
 extends: base.yaml
-render: {glare: 0.2}
+render: {max_lamps: 8}
 elements: {table: {top_size_m: [1, 1]}}
 randomizers:
   - {name: clutter, upright: true}
@@ -65,7 +65,7 @@ exporters: [{type: kitti}]
     assert plain == {
         "seed": 3,
         "template": "tabletop",
-        "render": {"glare": 0.2, "device": "cpu"},
+        "render": {"max_lamps": 8, "device": "cpu"},
         "shared": {"side": {"uniform": [0, 1]}},
         "elements": {"table": {"height_m": 0.8, "top_size_m": [1, 1]}},
         "randomizers": [
