@@ -235,8 +235,9 @@ class Renderer(Protocol):
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """Every requested channel of one camera, with the type and values listed at ``Channel``.
 
-        ``Reading.sensor`` is the camera's name. ``AMODAL`` fills ``Reading.silhouettes`` instead of
-        ``channels``; ``RGB`` and ``RADIANCE`` set ``Reading.ev100``.
+        ``SensorReading.sensor`` is the camera's name. ``AMODAL`` fills ``SensorReading.silhouettes``
+        instead of ``channels``. Renderers end at ``RADIANCE``: cameras develop ``RGB`` from it and
+        set ``SensorReading.ev100``.
         """
         ...
 

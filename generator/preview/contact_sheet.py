@@ -17,6 +17,9 @@ from gen_data.generator.preview.device_views import event_view, radar_view
 from gen_data.generator.preview.overlay import Image, channel_image, draw_labels
 from gen_data.generator.preview.point_cloud_views import range_view, top_view
 
+PSEUDO_LIDAR = "pseudo_lidar"
+"""Model of scanners whose points are pixels of a camera."""
+
 GAP_PX = 4
 BACKGROUND = 24
 
@@ -61,6 +64,9 @@ def tiles(
                 else:
                     yield Tile(caption, channel_image(reading, channel))
         for name, cloud in sorted(sample.capture.clouds.items()):
+            if cloud.lidar.model == PSEUDO_LIDAR:
+                # The depth image of its camera says the same.
+                continue
             yield Tile(name, top_view(cloud, sample.scene, aspect))
             yield Tile(f"{name} range, intensity, class", range_view(cloud))
         for name, table in sorted(sample.capture.tables.items()) if devices else ():

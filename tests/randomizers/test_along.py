@@ -128,7 +128,7 @@ def test_a_scale_that_leaves_nothing_is_refused(scale: float) -> None:
 def test_a_row_of_more_things_than_a_lane_can_hold_is_refused_by_name() -> None:
     """Bricks of 60 micrometres: 666,667 of them fill a lane of 40 m."""
     with pytest.raises(ConfigError, match=r"randomizers\.things\.gap_m: .*larger gap_m or scale"):
-        drawn(street(), gap_m=Constant(0.0), scale=Constant(0.001), used=Constant(False))
+        drawn(street(), gap_m=Constant(0.0), scale=Constant(0.001), occupancy=Constant(False))
 
 
 @pytest.mark.parametrize("field", ["count", "at_least"])

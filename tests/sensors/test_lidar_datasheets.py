@@ -152,12 +152,13 @@ def test_sensors_inside_the_body_that_carries_them_are_refused(
 ) -> None:
     """A car 1.5 m high; five centimetres are forgiven, and who says ``inside`` means it."""
     sensor = kind(name="top", rig="rig", offset_m=offset_m)
+    mounted = sensor.mount(STREET)
     if buried:
         with pytest.raises(ConfigError, match=r"'top': offset_m .* inside 'ego'.* at 1.50 m"):
-            check_not_buried(STREET, "top", sensor, CAR)
+            check_not_buried(mounted, "top", CAR)
     else:
-        check_not_buried(STREET, "top", sensor, CAR)
+        check_not_buried(mounted, "top", CAR)
 
-    check_not_buried(
-        STREET, "top", kind(name="top", rig="rig", offset_m=offset_m, inside=True), CAR
-    )
+    inside = kind(name="top", rig="rig", offset_m=offset_m, inside=True)
+    assert sensor.describe().needs_clear_view
+    assert not inside.describe().needs_clear_view

@@ -44,7 +44,7 @@ def moving_scene(seed: int, of: Config | None = None) -> Scene:
     """A street that moves: the first attempt that is not refused."""
     for attempt in range(10):
         streams = Streams(seed, 0, attempt=attempt)
-        scene, randomizers = scene_source(of or spec(), library())(streams)
+        scene, randomizers, _ = scene_source(of or spec(), library())(streams)
         try:
             for randomizer in randomizers:
                 scene = randomizer(scene, library(), streams.rng(f"randomizer/{randomizer.name}"))

@@ -54,9 +54,7 @@ class Boxes:
         outlines = {}
         if Channel.AMODAL in channels:
             outlines = {i.instance_id: _silhouette(i, camera) for i in scene.instances}
-        lit = channels & {Channel.RGB, Channel.RADIANCE}
-        ev100 = (camera.ev100 or 5.0) if lit else None
-        return SensorReading(camera.name, camera, images, outlines, scene.time_s, ev100)
+        return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
         """The nearest box on each beam, white and seen square on."""
@@ -81,7 +79,6 @@ class Boxes:
         there = hits["instance"] > 0
         length = np.linalg.norm(rays, axis=-1)
         images: dict[Channel, Callable[[], Image]] = {
-            Channel.RGB: lambda: np.where(there[..., None], 128, 0).repeat(3, -1).astype("u1"),
             Channel.RADIANCE: lambda: (there[..., None] * np.full(3, self._luminance)).astype("f4"),
             Channel.Z_DEPTH: lambda: hits["z"].astype("f4"),
             Channel.RANGE: lambda: (hits["z"] * length).astype("f4"),
