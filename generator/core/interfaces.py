@@ -235,9 +235,9 @@ class Renderer(Protocol):
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """Every requested channel of one camera, with the type and values listed at ``Channel``.
 
-        ``SensorReading.sensor`` is the camera's name. ``AMODAL`` fills ``SensorReading.silhouettes``
-        instead of ``channels``. Renderers end at ``RADIANCE``: cameras develop ``RGB`` from it and
-        set ``SensorReading.ev100``.
+        The reading's ``sensor`` is the camera's name. ``AMODAL`` fills its ``silhouettes`` instead
+        of its ``channels``. Renderers end at ``RADIANCE``: cameras develop ``RGB`` from it and set
+        ``ev100``.
         """
         ...
 
