@@ -27,13 +27,8 @@ from gen_data.generator.assets.people.body import (
     Indices,
     strongest_weights,
 )
-from gen_data.generator.assets.people.mesh_simplify import (
-    Level,
-    MeshRows,
-    grid_faces,
-    make_rows,
-    split_region,
-)
+from gen_data.generator.assets.people.body_regions import OUTLINES
+from gen_data.generator.assets.people.mesh_simplify import Level, MeshRows, grid_faces, make_rows
 
 _HEIGHT_M = 1.67
 _SOLE_Z_M = -0.82
@@ -86,93 +81,6 @@ _FACE: Mapping[str, tuple[float, float, float]] = {
     "sole": (0.05, _LEG_Y, _SOLE_Z_M),
 }
 
-# Outlines: height, middle in x, half depth, half width [m].
-_HEAD = (
-    (0.5, 0.015, 0.06, 0.1),
-    (0.55, 0.015, 0.058, 0.075),
-    (0.59, 0.02, 0.053, 0.054),
-    (0.618, 0.035, 0.06, 0.054),
-    (0.628, 0.07, 0.078, 0.052),
-    (0.645, 0.072, 0.082, 0.06),
-    (0.67, 0.068, 0.088, 0.068),
-    (0.7, 0.06, 0.094, 0.074),
-    (0.73, 0.056, 0.096, 0.076),
-    (0.76, 0.055, 0.097, 0.077),
-    (0.79, 0.053, 0.094, 0.074),
-    (0.82, 0.05, 0.082, 0.063),
-    (0.84, 0.048, 0.055, 0.042),
-    (0.85, 0.048, 0.004, 0.003),
-)
-_TRUNK = (
-    (0.583, 0.014, 0.06, 0.066),
-    (0.573, 0.012, 0.068, 0.1),
-    (0.558, 0.01, 0.076, 0.145),
-    (0.535, 0.01, 0.088, 0.172),
-    (0.5, 0.012, 0.1, 0.178),
-    (0.44, 0.02, 0.112, 0.17),
-    (0.36, 0.025, 0.117, 0.162),
-    (0.28, 0.022, 0.112, 0.152),
-    (0.2, 0.018, 0.106, 0.146),
-    (0.13, 0.014, 0.108, 0.156),
-    (0.05, 0.006, 0.114, 0.17),
-    (-0.02, 0.0, 0.113, 0.172),
-    (-0.06, 0.002, 0.1, 0.16),
-)
-_LEG = (
-    (0.02, 0.0, 0.06, 0.055),
-    (-0.05, 0.004, 0.084, 0.076),
-    (-0.15, 0.008, 0.08, 0.074),
-    (-0.25, 0.01, 0.07, 0.066),
-    (-0.35, 0.008, 0.057, 0.055),
-    (-0.42, -0.006, 0.058, 0.054),
-    (-0.5, -0.014, 0.058, 0.053),
-    (-0.6, -0.012, 0.046, 0.043),
-    (-0.7, -0.01, 0.036, 0.034),
-    (-0.76, -0.008, 0.04, 0.036),
-)
-_SKIRT = (
-    (0.18, 0.015, 0.112, 0.15),
-    (0.08, 0.005, 0.125, 0.175),
-    (-0.05, 0.0, 0.135, 0.195),
-    (-0.25, 0.005, 0.15, 0.215),
-    (-0.42, 0.01, 0.16, 0.235),
-    (-0.62, 0.01, 0.17, 0.255),
-)
-# From the shoulder along the arm: share, half width across, half depth.
-_ARM = (
-    (-0.07, 0.012, 0.014),
-    (-0.05, 0.036, 0.04),
-    (0.0, 0.05, 0.056),
-    (0.08, 0.052, 0.058),
-    (0.15, 0.052, 0.056),
-    (0.4, 0.043, 0.045),
-    (0.55, 0.041, 0.041),
-    (0.7, 0.038, 0.038),
-    (0.9, 0.028, 0.03),
-    (1.0, 0.024, 0.03),
-)
-# From the wrist along the hand: share, half thickness, half breadth.
-_HAND = (
-    (-0.1, 0.022, 0.028),
-    (0.0, 0.02, 0.028),
-    (0.3, 0.018, 0.042),
-    (0.55, 0.015, 0.044),
-    (0.8, 0.012, 0.038),
-    (0.95, 0.009, 0.026),
-    (1.0, 0.002, 0.006),
-)
-# From the heel forward: x, middle in z, half width, half height.
-_FOOT = (
-    (-0.075, -0.79, 0.012, 0.02),
-    (-0.066, -0.785, 0.03, 0.033),
-    (-0.03, -0.775, 0.037, 0.044),
-    (0.02, -0.775, 0.038, 0.045),
-    (0.07, -0.786, 0.043, 0.034),
-    (0.12, -0.793, 0.048, 0.027),
-    (0.16, -0.797, 0.042, 0.022),
-    (0.185, -0.8, 0.028, 0.018),
-    (0.192, -0.802, 0.008, 0.01),
-)
 
 _POINT_M = 0.02
 _SMOOTH_M = 0.05
@@ -265,15 +173,17 @@ def _bones() -> dict[str, tuple[str, Array]]:
 def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[MeshRows]:
     spine = ("pelvis", "spine_01", "spine_02", "spine_03")
     neck = ("spine_03", "neck_01", "head")
-    head = _upright(bones, _HEAD, 28, neck)
+    head = _upright(bones, OUTLINES["head"], 28, neck)
     _model_face(head)
-    trunk = _upright(bones, _TRUNK, 24, spine)
+    trunk = _upright(bones, OUTLINES["trunk"], 24, spine)
     made = [
         _divided(head, "face", (body_regions.HAIRLINE, body_regions.SHOULDERS)),
         _divided(trunk, "hips", (body_regions.WAIST, *body_regions.FRONT)),
         _divided(_ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
         _divided(
-            _upright(bones, _SKIRT, 24, ("pelvis",), split=True), "skirt_top", body_regions.SKIRT
+            _upright(bones, OUTLINES["skirt"], 24, ("pelvis",), split=True),
+            "skirt_top",
+            body_regions.SKIRT,
         ),
         _curtain(bones),
     ]
@@ -285,7 +195,7 @@ def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[MeshRows]:
 def _limbs(bones: Mapping[str, tuple[str, Array]], side: str, sign: float) -> Sequence[MeshRows]:
     arm, hand = _arm(bones, side), _hand(bones, side)
     leg = (f"thigh_{side}", f"calf_{side}", f"foot_{side}")
-    bare = _upright(bones, _LEG, 12, leg, middle_y_m=_LEG_Y)
+    bare = _upright(bones, OUTLINES["leg"], 12, leg, middle_y_m=_LEG_Y)
     foot = _foot(bones, side)
     eye = _ball(bones, (0.1335, 0.031, 0.728), (0.0145, 0.0145, 0.0075))
     brow = _ball(bones, (0.137, 0.033, 0.75), (0.008, 0.021, 0.0045))
@@ -324,10 +234,7 @@ def _pupil(p: Array) -> Array:
 
 
 def _divided(loft: tuple[Array, Indices], zone: str, cuts: Sequence[body_regions.Cut]) -> MeshRows:
-    rows = make_rows(*loft, zone)
-    for step in cuts:
-        rows = split_region(rows, step.zone, step.into, step.level)
-    return rows
+    return body_regions.apply_cuts(make_rows(*loft, zone), cuts)
 
 
 def _upright(
@@ -360,13 +267,13 @@ def _upright(
 def _arm(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
     chain = ("spine_03", f"upperarm_{side}", f"lowerarm_{side}")
     length = float((_WRIST - _SHOULDER) @ _DOWN_OUT)
-    share, across, depth = np.array(_ARM).T
+    share, across, depth = np.array(OUTLINES["arm"]).T
     return _along_arm(bones, _SHOULDER, share * length, np.stack([depth, across], 1), chain)
 
 
 def _hand(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
     """A mitten with a thumb."""
-    share, thick, broad = np.array(_HAND).T
+    share, thick, broad = np.array(OUTLINES["hand"]).T
     halves = np.stack([broad, thick], axis=1)
     values, faces = _along_arm(bones, _WRIST, share * _HAND_M, halves, (f"hand_{side}",))
     names = list(bones)
@@ -393,7 +300,7 @@ def _along_arm(
 
 
 def _foot(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
-    x, z, width, height = np.array(_FOOT).T
+    x, z, width, height = np.array(OUTLINES["foot"]).T
     middles = np.stack([x, np.full_like(x, _LEG_Y), z], axis=1)
     axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     values, faces = _loft(middles, axes, np.stack([width, height], axis=1), 12)
@@ -422,12 +329,10 @@ def _ball(
 
 
 def _curtain(bones: Mapping[str, tuple[str, Array]]) -> MeshRows:
-    turn = np.linspace(-1.0, 1.0, body_regions.CURTAIN_COLUMNS) * body_regions.CURTAIN_REACH_RAD
-    z, length, width = (column[:, None] for column in np.array(body_regions.CURTAIN_M).T)
-    x = body_regions.CURTAIN_X_M - length * np.cos(turn)
-    places = np.stack(np.broadcast_arrays(x, width * np.sin(turn), z), axis=2).reshape(-1, 3)
+    places = body_regions.curtain_points()
     weights = _along_chain(bones, places[:, 2], ("spine_03", "neck_01", "head"), 2)
-    faces = grid_faces(len(z), body_regions.CURTAIN_COLUMNS)
+    columns = body_regions.CURTAIN_COLUMNS
+    faces = grid_faces(len(places) // columns, columns)
     return _divided((np.concatenate([places, weights], axis=1), faces), "hair", body_regions.HAIR)
 
 

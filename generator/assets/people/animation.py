@@ -154,11 +154,7 @@ def _sit() -> Stance:
 
 
 def _leg(
-    step: int,
-    hip: Sequence[int],
-    knee: Sequence[int],
-    ankle: Sequence[int],
-    toes: Sequence[int],
+    step: int, hip: Sequence[int], knee: Sequence[int], ankle: Sequence[int], toes: Sequence[int]
 ) -> Leg:
     k = step % PHASES
     return Leg(hip[k], knee[k], ankle[k], toes[k])

@@ -49,13 +49,7 @@ class Layer:
 def layers(person: Person) -> tuple[Layer, ...]:
     """Everything that is seen of a person, from the skin outwards."""
     outfit = person.outfit
-    return (
-        _skin(person),
-        *_hair(person),
-        *_bottoms(outfit),
-        *_tops(outfit),
-        _shoes(outfit),
-    )
+    return (_skin(person), *_hair(person), *_bottoms(outfit), *_tops(outfit), _shoes(outfit))
 
 
 def displace_layer(

@@ -34,7 +34,6 @@ from gen_data.generator.assets.people.mesh_simplify import (
     grid_faces,
     make_rows,
     simplify_region,
-    split_region,
 )
 from gen_data.generator.core.errors import AssetError
 
@@ -119,14 +118,14 @@ def _parts(base: _Base) -> Iterator[MeshRows]:
     yield _cut(base, ("helper-l-eye", "helper-r-eye"), "eyes", body_regions.EYES)
     yield _cut(base, ("helper-tights",), "hips", body_regions.TIGHTS)
     yield _spanned(base, _cut(base, ("helper-skirt",), "skirt_top", body_regions.SKIRT))
-    yield _divided(_curtain(base), body_regions.HAIR)
+    yield body_regions.apply_cuts(_curtain(base), body_regions.HAIR)
 
 
 def _cut(
     base: _Base, groups: Sequence[str], zone: str, cuts: Sequence[body_regions.Cut]
 ) -> MeshRows:
     faces = np.concatenate([base.groups[group] for group in groups])
-    return _divided(make_rows(base.values, faces, zone), cuts)
+    return body_regions.apply_cuts(make_rows(base.values, faces, zone), cuts)
 
 
 def _curtain(base: _Base) -> MeshRows:
@@ -135,17 +134,15 @@ def _curtain(base: _Base) -> MeshRows:
     The base mesh's own hair is made of strips that hang over the face and part when they are
     moved; the sheet takes over the shapes and weights of its nearest vertices.
     """
-    turn = np.linspace(-1.0, 1.0, body_regions.CURTAIN_COLUMNS) * body_regions.CURTAIN_REACH_RAD
-    z, length, width = (column[:, None] for column in np.array(body_regions.CURTAIN_M).T)
-    x = body_regions.CURTAIN_X_M - length * np.cos(turn)
-    places = np.stack(np.broadcast_arrays(x, width * np.sin(turn), z), axis=2).reshape(-1, 3)
+    places = body_regions.curtain_points()
     strands = base.values[np.unique(base.groups["helper-hair"])]
     squared = ((places[:, None] - strands[None, :, :3]) ** 2).sum(axis=2)
     # The mean of the nearest few: neighbours then move alike.
     nearest = np.argsort(squared, axis=1, kind="stable")[:, :_STRANDS]
     values = strands[nearest].mean(axis=1)
     values[:, :3] = places
-    return make_rows(values, grid_faces(len(z), body_regions.CURTAIN_COLUMNS), "hair")
+    columns = body_regions.CURTAIN_COLUMNS
+    return make_rows(values, grid_faces(len(places) // columns, columns), "hair")
 
 
 def _spanned(base: _Base, rows: MeshRows) -> MeshRows:
@@ -159,15 +156,9 @@ def _spanned(base: _Base, rows: MeshRows) -> MeshRows:
     return MeshRows(values, rows.faces, rows.zones)
 
 
-def _divided(rows: MeshRows, cuts: Sequence[body_regions.Cut]) -> MeshRows:
-    for step in cuts:
-        rows = split_region(rows, step.zone, step.into, step.level)
-    return rows
-
-
 def _thinned(rows: MeshRows) -> MeshRows:
     """Each zone with its number of triangles, and no row that nothing uses."""
-    for zone, faces in body_regions.MAX_FACES.items():
+    for zone, faces in body_regions.ZONE_TRIANGLES.items():
         if (rows.zones == zone).sum() > faces:
             rows = simplify_region(rows, zone, faces)
     keep = np.isin(rows.zones, ZONES)

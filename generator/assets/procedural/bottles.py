@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     CAPS,
+    PALETTES,
     STEEL,
     hex_to_linear,
     jitter_color,
@@ -29,11 +30,10 @@ LABEL_ASPECT = 2.6
 _WATER_IOR = 1.33
 # Label paper stands this much proud of the wall.
 _PROUD_M = 0.0003
-_FILLINGS = ("#6d0f1c", "#b34a12", "#d9a02a", "#3b1a12", "#7a8a2a", "#c9b48a", "#4a1030")
 
 
 @dataclass(frozen=True, slots=True)
-class _BottleStyle:
+class BottleStyle:
     """Ranges of one kind of bottle; ``shoulder`` and ``flank`` are fractions.
 
     Attributes:
@@ -59,85 +59,7 @@ class _BottleStyle:
     clear: bool = False
 
 
-_DARK_GLASS = ("#1d3320", "#26331c", "#3a2413", "#142a25", "#2d1a10", "#4a5a34")
-_CLEAR = ("#b9d3dc", "#c9dfe4", "#a9cbd8", "#cfe3dc", "#9fc4d6")
-BOTTLES: Mapping[str, _BottleStyle] = {
-    "wine": _BottleStyle(
-        (0.29, 0.32),
-        (0.036, 0.039),
-        0.0145,
-        (0.70, 0.74),
-        (0.12, 0.42),
-        ((1.0, 0.25), (0.93, 0.45), (0.45, 0.72), (0.08, 0.92)),
-        (0.0155, 0.055),
-        1.0,
-        _DARK_GLASS,
-        ("#5a1020", "#1a1a1a", "#b08d3a", "#23402f", "#c9c5ba"),
-    ),
-    "beer": _BottleStyle(
-        (0.22, 0.25),
-        (0.029, 0.032),
-        0.0135,
-        (0.68, 0.74),
-        (0.14, 0.42),
-        ((1.0, 0.3), (0.85, 0.5), (0.4, 0.75), (0.1, 0.93)),
-        (0.0145, 0.009),
-        1.0,
-        ("#3a2010", "#2a1508", "#16361d", "#52300f"),
-        CAPS,
-    ),
-    "water": _BottleStyle(
-        (0.2, 0.235),
-        (0.031, 0.0345),
-        0.0125,
-        (0.80, 0.84),
-        (0.38, 0.62),
-        ((1.0, 0.12), (0.92, 0.4), (0.55, 0.75), (0.15, 0.96)),
-        (0.0148, 0.016),
-        1.0,
-        _CLEAR,
-        CAPS,
-        clear=True,
-    ),
-    "soda": _BottleStyle(
-        (0.215, 0.25),
-        (0.0325, 0.036),
-        0.0125,
-        (0.80, 0.84),
-        (0.33, 0.58),
-        ((1.02, 0.15), (0.9, 0.45), (0.5, 0.75), (0.12, 0.95)),
-        (0.0148, 0.015),
-        1.0,
-        ("#2b120a", "#b34a12", "#2f7a3a", "#1c0d08", "#c9a21a"),
-        CAPS,
-    ),
-    "ketchup": _BottleStyle(
-        (0.17, 0.2),
-        (0.034, 0.038),
-        0.02,
-        (0.78, 0.82),
-        (0.2, 0.62),
-        ((0.97, 0.3), (0.75, 0.7), (0.3, 0.97)),
-        (0.022, 0.03),
-        0.66,
-        ("#a3150f", "#c5281a", "#d9a514", "#e9e4d0", "#5f2a16"),
-        ("#f2f2ee", "#c62828", "#2e7d32", "#e0c020"),
-        (0.2, 0.35),
-    ),
-    "detergent": _BottleStyle(
-        (0.22, 0.26),
-        (0.042, 0.047),
-        0.016,
-        (0.8, 0.85),
-        (0.16, 0.6),
-        ((1.0, 0.25), (0.8, 0.55), (0.35, 0.9)),
-        (0.018, 0.035),
-        0.6,
-        ("#1f6fb5", "#f0f0ec", "#2e9e4f", "#e8629a", "#f2c417", "#7b3fa0"),
-        ("#f2f2ee", "#1f6fb5", "#e8b21c", "#c62828"),
-        (0.2, 0.4),
-    ),
-}
+BOTTLES = load_table(__package__, "bottles", BottleStyle)
 
 
 def bottle(seed: int) -> Solid:
@@ -193,7 +115,7 @@ def jar(seed: int) -> Solid:
         _lid(lid_radius, top, height),
     ]
     glass = Material(
-        jitter_color(hex_to_linear(choose(_FILLINGS, rng)), 0.15, rng),
+        jitter_color(hex_to_linear(choose(PALETTES["fillings"], rng)), 0.15, rng),
         uniform_between(0.06, 0.12, rng),
     )
     label = printed_material(f"texture/label?seed={seed + 1000}", uniform_between(0.45, 0.65, rng))

@@ -392,10 +392,7 @@ def _post(x: float, y: float, width: float, height: float) -> Box:
 
 def _between(a: Sequence[float], b: Sequence[float], low: float, high: float) -> Box:
     """The box over the rectangle between two corners."""
-    return (
-        (min(a[0], b[0]), min(a[1], b[1]), low),
-        (max(a[0], b[0]), max(a[1], b[1]), high),
-    )
+    return ((min(a[0], b[0]), min(a[1], b[1]), low), (max(a[0], b[0]), max(a[1], b[1]), high))
 
 
 def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:

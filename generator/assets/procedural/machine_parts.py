@@ -12,6 +12,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
     BLACK_OXIDE,
     BRASS,
+    PALETTES,
     STAINLESS,
     STEEL,
     ZINC,
@@ -59,7 +60,6 @@ _WASHERS = (
     (16, 17, 30, 3.0),
     (20, 21, 37, 3.0),
 )
-_ABS = ("#202124", "#6a6f73", "#f0f0ec", "#1f6fb5", "#d7261e", "#f2a71b", "#2e9e4f")
 
 
 def hex_bolt(seed: int) -> Solid:
@@ -173,7 +173,7 @@ def pipe_elbow(seed: int) -> Solid:
             metal_material(BRASS, 0.3),
             metal_material((0.72, 0.45, 0.33), 0.35),
             metal_material(ZINC, 0.4),
-            plastic_material(rng, _ABS),
+            plastic_material(rng, PALETTES["abs"]),
         ),
         rng,
     )
@@ -231,7 +231,7 @@ def gear(seed: int) -> Solid:
         outer = 0.5 * (bore + root)
         patches.append(_collar(bore, outer, hub - thick).moved(z=thick))
         parts.append(collision_hulls.frustum((outer, thick), (outer, hub)))
-    finish = plastic_material(rng, _ABS) if is_drawn(0.3, rng) else _machined(rng)
+    finish = plastic_material(rng, PALETTES["abs"]) if is_drawn(0.3, rng) else _machined(rng)
     return make_centred_solid(patches, (finish,), parts, crease_deg=30.0)
 
 
@@ -288,7 +288,7 @@ def connector(seed: int) -> Solid:
         collision_hulls.box((-half, -half, -half), (half, half, half)),
         *(rotate(band, axis, turn) for axis, turn in turns),
     ]
-    block = plastic_material(rng, _ABS) if is_drawn(0.5, rng) else _machined(rng)
+    block = plastic_material(rng, PALETTES["abs"]) if is_drawn(0.5, rng) else _machined(rng)
     finish = choose((metal_material(BRASS, 0.3), metal_material(ZINC, 0.35), block), rng)
     return make_centred_solid(
         [body, *(pieces.rotated(axis, turn) for axis, turn in turns)], (block, finish), parts

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.colorimetry import srgb_decode
@@ -23,42 +24,8 @@ COPPER: Vec3 = (0.95, 0.64, 0.54)
 BLACK_OXIDE: Vec3 = (0.045, 0.045, 0.048)
 ZINC: Vec3 = (0.66, 0.68, 0.70)
 
-GLAZES = (
-    "#f4f1ea",
-    "#e9e4d8",
-    "#d9dfe2",
-    "#2d4f7c",
-    "#7aa0b8",
-    "#3d6b5c",
-    "#8fa98a",
-    "#b5432e",
-    "#d98a3d",
-    "#e3c565",
-    "#a3627a",
-    "#5b4a6f",
-    "#3a3a3d",
-    "#1d1f22",
-    "#7d5a43",
-    "#c7b299",
-)
-PLASTICS = (
-    "#d7261e",
-    "#f2a71b",
-    "#f7d423",
-    "#2e9e4f",
-    "#1f6fb5",
-    "#123a6b",
-    "#7b3fa0",
-    "#e8629a",
-    "#f0f0ec",
-    "#202124",
-    "#6a6f73",
-    "#12a3a3",
-    "#ef6c2f",
-    "#9ccb3b",
-)
-CAPS = ("#f2f2ee", "#1f6fb5", "#c62828", "#2e9e4f", "#202124", "#e8b21c")
-WOODS = ("#c79a6b", "#a8743f", "#7d5230", "#e0c196", "#5b3a24")
+PALETTES = load_table(__package__, "palettes", tuple[str, ...])
+GLAZES, PLASTICS, CAPS, WOODS = (PALETTES[name] for name in ("glazes", "plastics", "caps", "woods"))
 
 
 def hex_to_linear(code: str) -> Vec3:

@@ -16,12 +16,7 @@ from gen_data.generator.roads.cross_section import RoadShape
 
 
 def crosswalk(
-    *,
-    seed: int = 0,
-    wear: float = 0.3,
-    station_m: float = 20.0,
-    width_m: float = 4.0,
-    **shape: Any,
+    *, seed: int = 0, wear: float = 0.3, station_m: float = 20.0, width_m: float = 4.0, **shape: Any
 ) -> Solid:
     """Bars across a road, in the road's frame, over asphalt that hides its other lines.
 

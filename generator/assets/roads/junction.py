@@ -93,21 +93,14 @@ def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterato
     for end in (0, -1):
         inner, outer = corner(shape, number, 0.02)[end], corner(shape, number, shape.border_m)[end]
         points = np.array(
-            [
-                [[*inner, -0.2], [*outer, -0.2]],
-                [[*inner, top], [*outer, shape.edge_z_m]],
-            ]
+            [[[*inner, -0.2], [*outer, -0.2]], [[*inner, top], [*outer, shape.edge_z_m]]]
         )
         plan = points[..., [0, 2]] + points[..., [1, 1]] * np.array([1.0, 0.0])
         yield surface(points, plan, "kerb", slots["kerb"])
 
 
 def _band(
-    shape: JunctionShape,
-    number: int,
-    profile: Sequence[tuple[float, float]],
-    name: str,
-    slot: int,
+    shape: JunctionShape, number: int, profile: Sequence[tuple[float, float]], name: str, slot: int
 ) -> Patch:
     """A profile of (distance behind the kerb's face, height) drawn around a corner."""
     lines = [

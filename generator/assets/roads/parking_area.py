@@ -19,12 +19,7 @@ _APRON_M, _APRON_Z_M = 4.0, -0.12
 
 
 def parking_area(
-    *,
-    seed: int = 0,
-    wear: float = 0.3,
-    paving: str = "paving",
-    ground: str = "grass",
-    **shape: Any,
+    *, seed: int = 0, wear: float = 0.3, paving: str = "paving", ground: str = "grass", **shape: Any
 ) -> Solid:
     """A level car park around the origin; slots are those of ``street_materials``.
 

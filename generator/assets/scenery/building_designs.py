@@ -6,9 +6,11 @@ houses, windows of 1.0-1.5 m by 1.2-1.9 m, sills 0.8-0.95 m above the floor.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
 from gen_data.generator.assets.procedural.variant_rng import (
     choose,
@@ -227,35 +229,20 @@ _DRAWN = {
     "house": _house,
 }
 
-# Muted tints of mineral paint, sRGB; the texture's own near-white multiplies them.
-_PLASTERS = {
-    "residential": "#d9d2c0 #e3dccb #cfc6b0 #d8c9a3 #c9b99a #c7ccc6 #b9bfb7 #d3bfae #e2e0da",
-    "old_town": "#d3c5a3 #c9b48f #c6ab95 #b49583 #d9cfba #b9b5a2 #aab0a4 #c2b8ae #dcd4c5 #b6a48c",
-    "modern": "#e8e7e3 #dcdbd6 #c7c7c4 #b4b3af #8f8e8b #e3ddd0 #6f6e6c #d5d0c6",
-    "commercial": "#cfcbc2 #b8b5ae #d9d5cb #a5a39e #c4bba8 #8f9294",
-    "house": "#e6e2d8 #ded5bf #d8c7a0 #cdbda5 #d9d8d2 #c9b7a6 #bcc3bd #e4d9c6",
-}
-_STONES = "#a38b7b #97796b #b0a38f #bbb09d #9c958b"
-_ROOFS = "#80564a #754a3e #8a6353 #6b463b #57504b #4a4a4c #665048 #5d4a42"
-_CLOTHS = {
-    "none": "#8b8f8c #d4d1c8 #b9b6ae #a7a294",
-    "roller": "#a9a69c #d4d1c8 #b9b6ae #8f8c84 #6f6a62",
-    "leaves": "#5a6b5d #6d5a48 #4f6157 #7a4a3c #4d5b66",
-    "shops": "#7a3b34 #3a5145 #8b8f8c #cfc6ae #3c4c5c",
-}
-_DOORS = "#5c4434 #3f4a44 #7a2f2a #4a4f55 #8c6b4a #e4e2dc #2e3d4d"
-_FRAMES = {"modern": ("#3c3e40", "#55585a", "#e6e6e3"), "commercial": ("#45484a", "#6c6f71")}
+
+_COLORS = load_table(__package__, "building_colors", tuple[str, ...])
 
 
 def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
     """The materials of a building, one per slot of ``facade``."""
     rng = variant_rng(f"building/{plan.style}/materials", seed)
-    wall = _wall(plan.cladding, _PLASTERS[plan.style], rng)
+    wall = _wall(plan.cladding, _COLORS[f"plaster_{plan.style}"], rng)
     base = _base(plan, wall, rng)
     trim_code = choose(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"), rng)
     trim_code = choose(("#a98d7c", "#b3a48e", trim_code), rng) if plan.trimmed else trim_code
-    frame = choose(_FRAMES.get(plan.style, ("#eceae4", "#e4e2db", "#e8e6df", "#6b5443")), rng)
+    frame = choose(_COLORS.get(f"frames_{plan.style}", _COLORS["frames"]), rng)
     curtains = [jitter_color(hex_to_linear(code), 0.1, rng) for code in ("#8d8a82", "#6a6862")]
+    cloth = _COLORS["cloth_" + ("shops" if plan.shops else plan.shutters)]
     seam = "#77797a" if plan.roof == "flat" else choose(("#8a8c8d", "#7d5f4c", "#9a9c9b"), rng)
     return (
         wall,
@@ -266,7 +253,7 @@ def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
         _glass((0.03, 0.034, 0.036), 0.06),
         _glass(curtains[0], 0.08),
         _glass(curtains[1], 0.08),
-        _plain(choose(_DOORS.split(), rng), 0.5, "trim"),
+        _plain(choose(_COLORS["doors"], rng), 0.5, "trim"),
         Material(hex_to_linear(seam), roughness=0.5, metallic=0.6, role="chrome"),
         _roof(rng),
         Material(
@@ -276,12 +263,12 @@ def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
             printed=True,
             role="sign",
         ),
-        _plain(choose(_CLOTHS["shops" if plan.shops else plan.shutters].split(), rng), 0.7, "trim"),
+        _plain(choose(cloth, rng), 0.7, "trim"),
         _textured("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
     )
 
 
-def _wall(cladding: Cladding, tints: str, rng: Rng) -> Material:
+def _wall(cladding: Cladding, tints: Sequence[str], rng: Rng) -> Material:
     if cladding == "brick":
         seed, level = choose((4, 9, 12), rng), uniform_between(0.75, 1.0, rng)
         return _textured("brick", seed, (level, level, level), 1.1, "facade")
@@ -290,17 +277,15 @@ def _wall(cladding: Cladding, tints: str, rng: Rng) -> Material:
         return _textured("concrete", choose((0, 3), rng), (level, level, level), 2.6, "facade")
     if cladding == "stone":
         return _textured(
-            "ashlar", 0, jitter_color(hex_to_linear(choose(_STONES.split(), rng)), 0.06, rng), 2.4
+            "ashlar", 0, jitter_color(hex_to_linear(choose(_COLORS["stones"], rng)), 0.06, rng), 2.4
         )
-    return _textured(
-        "plaster", 5, jitter_color(hex_to_linear(choose(tints.split(), rng)), 0.05, rng), 2.5
-    )
+    return _textured("plaster", 5, jitter_color(hex_to_linear(choose(tints, rng)), 0.05, rng), 2.5)
 
 
 def _base(plan: Design, wall: Material, rng: Rng) -> Material:
     if plan.trimmed or plan.cladding == "stone":
         return _textured(
-            "ashlar", 0, jitter_color(hex_to_linear(choose(_STONES.split(), rng)), 0.06, rng), 2.4
+            "ashlar", 0, jitter_color(hex_to_linear(choose(_COLORS["stones"], rng)), 0.06, rng), 2.4
         )
     if is_drawn(0.4, rng):
         return _textured("concrete", 3, (0.72, 0.71, 0.7), 2.2)
@@ -311,7 +296,7 @@ def _base(plan: Design, wall: Material, rng: Rng) -> Material:
 
 
 def _roof(rng: Rng) -> Material:
-    color = jitter_color(hex_to_linear(choose(_ROOFS.split(), rng)), 0.08, rng)
+    color = jitter_color(hex_to_linear(choose(_COLORS["roofs"], rng)), 0.08, rng)
     texture = f"texture/roof_tiles?seed={choose((0, 1), rng)}"
     return Material(color, roughness=0.85, texture=texture, role="roof")
 

@@ -109,11 +109,7 @@ def window(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
     """Reveal, frame with bars, and panes; behind some of them hang curtains."""
     depth_m = opening.recess_m + GLASS_SETBACK_M
     return join_patches(
-        [
-            reveal(opening, depth_m, slot),
-            frame(opening),
-            panes(opening, rng, -depth_m),
-        ]
+        [reveal(opening, depth_m, slot), frame(opening), panes(opening, rng, -depth_m)]
     )
 
 

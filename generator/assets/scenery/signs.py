@@ -7,13 +7,13 @@ size 2 (discs of 600 mm, triangles with sides of 900 mm). Faces look to +X.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
@@ -30,47 +30,22 @@ Kind = Literal["regulatory", "mandatory", "warning", "information"]
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """What a sign's plate is like.
+    """One kind of sign.
 
     Attributes:
-        kind: Its group in the convention.
-        size_m: Width of the square that its image fills.
+        shape: Outline of the plate.
+        kind: Group in the convention.
+        face: Steps of drawing the face, see ``signs.yaml``.
+        size_m: Width of the square that the image fills.
     """
 
     shape: Shape
     kind: Kind
+    face: tuple[Any, ...]
     size_m: float = 0.6
 
 
-SIGNS: Mapping[str, Sign] = {
-    "speed_limit_30": Sign("disc", "regulatory"),
-    "speed_limit_50": Sign("disc", "regulatory"),
-    "speed_limit_70": Sign("disc", "regulatory"),
-    "speed_limit_100": Sign("disc", "regulatory"),
-    "no_entry": Sign("disc", "regulatory"),
-    "no_vehicles": Sign("disc", "regulatory"),
-    "no_stopping": Sign("disc", "regulatory"),
-    "no_parking": Sign("disc", "regulatory"),
-    "stop": Sign("octagon", "regulatory", 0.75),
-    "yield": Sign("yield", "regulatory", 0.9),
-    "priority_road": Sign("diamond", "regulatory", 0.72),
-    "straight_ahead": Sign("disc", "mandatory"),
-    "turn_right": Sign("disc", "mandatory"),
-    "keep_right": Sign("disc", "mandatory"),
-    "roundabout": Sign("disc", "mandatory"),
-    "cycle_path": Sign("disc", "mandatory"),
-    "foot_path": Sign("disc", "mandatory"),
-    "danger": Sign("triangle", "warning", 0.9),
-    "right_curve": Sign("triangle", "warning", 0.9),
-    "pedestrians": Sign("triangle", "warning", 0.9),
-    "signals_ahead": Sign("triangle", "warning", 0.9),
-    "crossroads": Sign("triangle", "warning", 0.9),
-    "parking": Sign("square", "information"),
-    "pedestrian_crossing": Sign("square", "information"),
-    "dead_end": Sign("square", "information"),
-    "zone_30": Sign("square", "regulatory"),
-    "one_way": Sign("wide", "information", 0.8),
-}
+SIGNS = load_table(__package__, "signs", Sign)
 
 _THICK_M = 0.004
 _ROOT3 = math.sqrt(3.0)

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
@@ -58,14 +59,7 @@ class _Frame:
     lean_rad: float
 
 
-_FRAMES = {
-    "city": _Frame(0.54, 0.345, (-0.12, 0.29), (-0.27, 0.74), (-0.33, 0.95), (0.27, 0.86),
-                   (0.33, 0.68), 0.3, (0.16, 0.28, 1.1), 0.021, 0.2),
-    "mountain": _Frame(0.55, 0.345, (-0.12, 0.31), (-0.26, 0.73), (-0.31, 0.97), (0.29, 0.85),
-                       (0.34, 0.73), 0.92, (0.34, 0.32, 1.02), 0.028, 0.55),
-    "road": _Frame(0.495, 0.335, (-0.09, 0.27), (-0.24, 0.8), (-0.28, 0.98), (0.29, 0.86),
-                   (0.335, 0.7), 0.97, (0.43, 0.2, 0.95), 0.013, 0.8),
-}  # fmt: skip
+_FRAMES = load_table(__package__, "bicycles", _Frame)
 
 
 def bicycle(seed: int) -> Solid:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import Point2, grid, spline
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot
@@ -26,6 +27,7 @@ Level = Callable[[Patch], Array]
 
 # How far lines stand in front of what they are drawn on.
 _PROUD_M = 0.002
+BODY_ROWS = load_table(__package__, "body_rows", tuple[tuple[float, float, float, float], ...])
 _END_SHARES = (0.0, 0.32, 0.58, 0.78, 0.92)
 
 
@@ -80,6 +82,14 @@ class Row:
     front_m: float
     rear_m: float
     half_m: float
+
+
+def body_rows(name: str, front_m: float, rear_m: float, half_m: float) -> list[Row]:
+    """Rows of the table ``body_rows.yaml`` for a body between two x, ``half_m`` wide to a side."""
+    return [
+        Row(rise, front_m - front, rear_m + rear, share * half_m)
+        for rise, front, rear, share in BODY_ROWS[name]
+    ]
 
 
 def plan(front: Point2, rear: Point2, sides: int) -> BodyOutline:

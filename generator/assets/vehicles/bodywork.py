@@ -8,15 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import Point2, block, rounded_box
 from gen_data.generator.assets.vehicles import body_shell
 from gen_data.generator.assets.vehicles.body_shell import (
+    BODY_ROWS,
     BodyOutline,
     Curve,
     Level,
     Row,
     assign_slot,
+    body_rows,
     level_above,
     level_below,
     level_between,
@@ -120,19 +123,7 @@ class Design:
         )
 
 
-# Share of the height, how far front and rear stand back [m], share of the half width.
-_LOWER = (
-    (0.0, 0.12, 0.13, 0.9), (0.07, 0.055, 0.065, 0.958), (0.17, 0.02, 0.03, 0.985),
-    (0.32, 0.0, 0.0, 1.0), (0.5, 0.008, 0.004, 0.99), (0.66, 0.025, 0.018, 1.0),
-    (0.8, 0.055, 0.038, 0.992), (0.91, 0.1, 0.06, 0.975), (0.97, 0.155, 0.09, 0.95),
-    (1.0, 0.23, 0.14, 0.915),
-)  # fmt: skip
-# Share of the height, share of the windscreen's run, of the rear window's, of the lean inwards.
-_HOUSE = (
-    (0.0, 0.0, 0.0, 0.0), (0.2, 0.19, 0.18, 0.15), (0.52, 0.51, 0.48, 0.48),
-    (0.82, 0.81, 0.77, 0.85), (0.93, 0.94, 0.91, 1.03), (0.98, 1.04, 1.03, 1.17),
-    (1.0, 1.13, 1.16, 1.36),
-)  # fmt: skip
+DESIGNS = load_table(__package__, "designs", Design)
 
 
 def bodywork(design: Design, steer_deg: float) -> Patch:
@@ -173,7 +164,7 @@ def keypoints(design: Design) -> tuple[Keypoint, ...]:
 
 def _lower(design: Design, ring: BodyOutline) -> Patch:
     x, y = 0.5 * design.length_m, design.half_m
-    rows = [Row(rise, x - front, -x + rear, share * y) for rise, front, rear, share in _LOWER]
+    rows = body_rows("car", x, -x, y)
 
     def floor(at: Array) -> Array:
         return np.full_like(at, design.clearance_m)
@@ -288,7 +279,7 @@ def _house(design: Design) -> Patch:
     rows = [
         Row(rise, x[0] + front * (x[1] - x[0]), x[3] + rear * (x[2] - x[3]),
             wide + lean * (narrow - wide))
-        for rise, front, rear, lean in _HOUSE
+        for rise, front, rear, lean in BODY_ROWS["glass_house"]
     ]  # fmt: skip
     top = design.height_m - crown
     middle = 0.55 * x[1] + 0.45 * x[2]
@@ -305,7 +296,7 @@ def _house(design: Design) -> Patch:
 
 def _glazed(design: Design, ring: BodyOutline, house: Patch) -> Patch:
     glass: list[tuple[Level, ...]] = [
-        (*stations_along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91)),
+        (*stations_along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91))
     ]
     if design.rear_window:
         glass.append((*stations_along(ring.rear(0.8), 2.0), *rows_between(0.16, 0.87)))

@@ -17,7 +17,7 @@ from gen_data.generator.assets.procedural.variant_rng import (
 )
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import body_shell
-from gen_data.generator.assets.vehicles.body_shell import Row, assign_slot, level_above, level_below
+from gen_data.generator.assets.vehicles.body_shell import assign_slot, level_above, level_below
 from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, VehicleSlot, materials
 from gen_data.generator.assets.vehicles.wheels import Axles
 
@@ -27,12 +27,6 @@ _LIVERIES = (
 )  # fmt: skip
 _FLOOR_M = 0.26
 _HALF_M = 1.275
-# Share of the height, how far front and rear stand back [m], share of the half width.
-_ROWS = (
-    (0.0, 0.1, 0.1, 0.97), (0.03, 0.02, 0.02, 0.995), (0.1, 0.0, 0.0, 1.0), (0.2, 0.0, 0.0, 1.0),
-    (0.32, 0.01, 0.0, 1.0), (0.6, 0.06, 0.01, 1.0), (0.84, 0.12, 0.03, 0.995),
-    (0.94, 0.16, 0.05, 0.985), (0.98, 0.22, 0.1, 0.95), (1.0, 0.32, 0.2, 0.86),
-)  # fmt: skip
 
 
 def bus(seed: int) -> Solid:
@@ -62,7 +56,7 @@ def bus_facts(**_: object) -> Facts:
 
 def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
     ring = body_shell.plan((40.0, 3.6), (60.0, 7.0), sides=16)
-    rows = [Row(rise, x - front, -x + rear, share * _HALF_M) for rise, front, rear, share in _ROWS]
+    rows = body_shell.body_rows("bus", x, -x, _HALF_M)
 
     def level(height_m: float) -> body_shell.Curve:
         return lambda at: np.full_like(at, height_m)

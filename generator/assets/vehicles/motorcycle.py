@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Patch
@@ -42,14 +43,7 @@ class _Build:
     lean_rad: float
 
 
-_BUILDS = {
-    "naked": _Build(0.71, 0.31, 0.14, (-0.25, 0.81), (0.28, 0.36, 1.05), (-0.1, 0.19, 0.36),
-                    (0.36, 0.98), (0.36, 0.98), 0.3),
-    "sport": _Build(0.7, 0.305, 0.15, (-0.28, 0.83), (0.36, 0.31, 0.93), (-0.24, 0.18, 0.4),
-                    (0.37, 0.92), (0.37, 0.92), 0.72),
-    "scooter": _Build(0.64, 0.235, 0.11, (-0.27, 0.79), (0.26, 0.33, 1.02), (0.15, 0.14, 0.31),
-                      (0.35, 0.95), (0.48, 0.56), 0.08),
-}  # fmt: skip
+_BUILDS = load_table(__package__, "motorcycles", _Build)
 
 
 def motorcycle(seed: int) -> Solid:

@@ -17,7 +17,7 @@ from gen_data.generator.assets.procedural.variant_rng import (
 )
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import body_shell
-from gen_data.generator.assets.vehicles.body_shell import Row, assign_slot, level_above, level_below
+from gen_data.generator.assets.vehicles.body_shell import assign_slot, level_above, level_below
 from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, VehicleSlot, materials
 from gen_data.generator.assets.vehicles.wheels import Axles
 
@@ -25,12 +25,6 @@ _CABS = ("#e6e6e3", "#e6e6e3", "#1d4f96", "#b3231d", "#2d6b45", "#d9a514", "#3d4
 _BOXES = ("#e4e4e0", "#e4e4e0", "#dcdcd6", "#c9ccce", "#2a5c9c", "#b52b22", "#e0b022")
 _FLOOR_M = 0.42
 _HALF_M = 1.16
-# Share of the height, how far front and rear stand back [m], share of the half width.
-_ROWS = (
-    (0.0, 0.08, 0.0, 0.98), (0.04, 0.01, 0.0, 1.0), (0.14, 0.0, 0.0, 1.0), (0.26, 0.01, 0.0, 1.0),
-    (0.4, 0.03, 0.0, 1.0), (0.52, 0.06, 0.0, 1.0), (0.86, 0.26, 0.0, 0.95),
-    (0.94, 0.33, 0.01, 0.93), (0.985, 0.42, 0.04, 0.88), (1.0, 0.56, 0.1, 0.8),
-)  # fmt: skip
 
 
 def truck(seed: int) -> Solid:
@@ -68,10 +62,7 @@ def truck_facts(**_: object) -> Facts:
 
 def _cab(x: float, length: float, roof: float, axles: Axles) -> Patch:
     ring = body_shell.plan((14.0, 3.0), (40.0, 9.0), sides=9)
-    rows = [
-        Row(rise, x - front, x - length + rear, share * _HALF_M)
-        for rise, front, rear, share in _ROWS
-    ]
+    rows = body_shell.body_rows("truck", x, x - length, _HALF_M)
 
     def level(height_m: float) -> body_shell.Curve:
         return lambda at: np.full_like(at, height_m)

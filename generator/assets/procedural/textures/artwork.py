@@ -99,8 +99,7 @@ def lines(image: Image, box: Box, ink: Color, ground: Color, rng: Rng) -> None:
         while x < x1 - 6:
             word = uniform_between(4, 22, rng)
             draw.rectangle(
-                [x, y, min(x + word, x1), y + max(1, pitch // 3)],
-                fill=blend(ink, ground, 0.25),
+                [x, y, min(x + word, x1), y + max(1, pitch // 3)], fill=blend(ink, ground, 0.25)
             )
             x += word + 4
 

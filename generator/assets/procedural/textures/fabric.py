@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gen_data.generator.assets.procedural.material_presets import PALETTES
 from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     blur_image,
@@ -28,34 +29,6 @@ from gen_data.generator.assets.procedural.variant_rng import (
 )
 from gen_data.generator.core.asset_types import Float32, TextureData
 from gen_data.generator.core.streams import Rng
-
-_CLOTH = (
-    "#e8e3d8",
-    "#2f3e5c",
-    "#7a8b99",
-    "#8c2f39",
-    "#3f5b45",
-    "#c9a66b",
-    "#2b2b2e",
-    "#b5643c",
-    "#5d6b70",
-    "#d7b7b0",
-    "#476b8a",
-    "#9a8f7d",
-)
-_CARPETS = (
-    "#6e6a66",
-    "#8c7b68",
-    "#45506b",
-    "#7c2f34",
-    "#a39a8b",
-    "#3e5148",
-    "#b7ab9a",
-    "#2f3033",
-    "#5c4a5e",
-    "#86919b",
-)
-_HIDES = ("#5a3825", "#2a1d17", "#8a5a34", "#1c1b1b", "#a87a4f", "#6b2a22", "#c9b497", "#39434d")
 
 
 def fabric(seed: int) -> TextureData:
@@ -86,7 +59,7 @@ def carpet(seed: int) -> TextureData:
     rng = variant_rng("carpet", seed)
     cells = choose((64, 96, 128), rng)
     tufts = worley((cells, cells), rng, 0.9)
-    base, fleck = draw_color(_CARPETS, 0.06, rng), draw_color(_CARPETS, 0.06, rng)
+    base, fleck = (draw_color(PALETTES["carpets"], 0.06, rng) for _ in range(2))
     spread = uniform_between(0.1, 0.4, rng)
     tone = tufts.of_each(1 + spread * (uniform(tufts.count, rng) - 0.5))
     flecked = tufts.of_each((uniform(tufts.count, rng) < choose((0.0, 0.0, 0.15, 0.4), rng)) * 0.7)
@@ -105,7 +78,7 @@ def leather(seed: int) -> TextureData:
     bend = 6.0 * fbm((8, 8), 3, rng)
     crease = warp_image(grain.second - grain.nearest, bend, np.roll(bend, 171, axis=1))
     pebble = blur_image(smoothstep(0.02, 0.3, crease))
-    base = draw_color(_HIDES, 0.08, rng)
+    base = draw_color(PALETTES["hides"], 0.08, rng)
     worn = 0.08 * fbm((3, 3), 4, rng) + 0.03 * fbm((64, 64), 2, rng)
     albedo = base * (0.72 + 0.28 * pebble + worn)[..., None]
     return texture(albedo, 0.95 - 0.25 * pebble, 2.2 * pebble + 0.3 * fbm((64, 64), 2, rng))
@@ -127,7 +100,7 @@ def cardboard(seed: int) -> TextureData:
 
 def _yarn_colors(yarns: int, rng: Rng) -> tuple[Float32, Float32]:
     """Colour of each warp and each weft yarn, shape [yarns, 3]."""
-    first, second = draw_color(_CLOTH, 0.06, rng), draw_color(_CLOTH, 0.06, rng)
+    first, second = (draw_color(PALETTES["cloth"], 0.06, rng) for _ in range(2))
     kind = choose(("plain", "plain", "melange", "stripes", "check"), rng)
     band = choose((yarns // 4, yarns // 8), rng)
     number = np.arange(yarns)

@@ -15,6 +15,7 @@ from gen_data.generator.assets.procedural.noise import (
 )
 from gen_data.generator.assets.procedural.textures.texture_images import (
     color,
+    colors_in_turn,
     draw_color,
     mix_colors,
     texture,
@@ -23,22 +24,11 @@ from gen_data.generator.assets.procedural.variant_rng import choose, uniform_bet
 from gen_data.generator.core.asset_types import Float32, TextureData
 from gen_data.generator.core.streams import Rng
 
-# Ground and blush of apples.
-_APPLES = (
-    ("#d9b24a", "#b01f2a"),
-    ("#c9382f", "#8a1620"),
-    ("#a8bf4a", "#93b03a"),
-    ("#d8c45a", "#c8442f"),
-    ("#a3202b", "#6f121b"),
-    ("#cfd06a", "#c9b83f"),
-    ("#b8c25a", "#b0362f"),
-)
-
 
 def apple_skin(seed: int) -> TextureData:
     """Streaks from stalk to blossom over a paler ground, with pores."""
     rng = variant_rng("apple_skin", seed)
-    ground, blush = (color(code) for code in _APPLES[seed % len(_APPLES)])
+    ground, blush = colors_in_turn("apples", seed)
     y, _ = rows_and_columns()
     streaks = 0.6 * fbm((2, 40), 3, rng) + 0.3 * fbm((6, 90), 2, rng)
     patches = fbm((2, 2), 3, rng) + uniform_between(-0.2, 0.4, rng)

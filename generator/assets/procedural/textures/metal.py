@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gen_data.generator.assets.procedural.material_presets import PALETTES
 from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     fbm,
@@ -21,20 +22,6 @@ from gen_data.generator.assets.procedural.variant_rng import uniform_between, va
 from gen_data.generator.core.asset_types import Float32, TextureData
 from gen_data.generator.core.streams import Rng
 
-_METALS = ("#c6c7c8", "#b7b9bb", "#d5d6d7", "#c9b27c", "#a8aaad", "#8f9194", "#c48f6b")
-_PAINTS = (
-    "#2e5e8c",
-    "#c23b2a",
-    "#e0b02a",
-    "#3d7a4c",
-    "#d9dad6",
-    "#44484d",
-    "#e07b2a",
-    "#6f8fa3",
-    "#1f2a33",
-    "#7d8a6a",
-)
-
 
 def brushed_metal(seed: int) -> TextureData:
     """Brushed sheet, strokes across the image; 0.3 m per repeat."""
@@ -47,7 +34,7 @@ def brushed_metal(seed: int) -> TextureData:
         start=np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32),
     )
     clouds = fbm((2, 3), 4, rng)
-    base = draw_color(_METALS, 0.05, rng)
+    base = draw_color(PALETTES["bare_metals"], 0.05, rng)
     shade = 1 + uniform_between(0.05, 0.11, rng) * strokes + 0.03 * clouds
     return texture(base * shade[..., None], 0.75 + 0.2 * strokes + 0.08 * clouds, 0.7 * strokes)
 
@@ -55,7 +42,7 @@ def brushed_metal(seed: int) -> TextureData:
 def painted_metal(seed: int) -> TextureData:
     """Lacquered sheet with chips, scratches and grime; 0.6 m per repeat."""
     rng = variant_rng("painted_metal", seed)
-    paint = draw_color(_PAINTS, 0.06, rng)
+    paint = draw_color(PALETTES["metal_paints"], 0.06, rng)
     peel, grime = fbm((90, 90), 2, rng), smoothstep(0.0, 0.9, fbm((3, 3), 5, rng, 0.6))
     wear = uniform_between(0.55, 0.95, rng)
     flakes = fbm((7, 7), 6, rng, 0.62) + 0.25 * fbm((2, 2), 2, rng)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from gen_data.generator.assets.procedural import cans, cartons
 from gen_data.generator.assets.procedural.bottles import LABEL_ASPECT
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
 from gen_data.generator.assets.procedural.textures import artwork as art
 from gen_data.generator.assets.procedural.textures.artwork import Box, Color, Place
@@ -30,130 +31,7 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 _FRUIT = ((200, 40, 40), (240, 150, 30), (120, 40, 110), (235, 200, 50), (110, 160, 50))
-# Ground, second colour, accent, ink.
-_SCHEMES = (
-    ("#f6f2e7", "#c8202f", "#f2b705", "#2a1a14"),
-    ("#12355b", "#f2f2ee", "#e94f37", "#f2f2ee"),
-    ("#1f7a4d", "#f3f0df", "#f2c14e", "#f3f0df"),
-    ("#f4d35e", "#d1495b", "#2e4057", "#2e2420"),
-    ("#ffffff", "#0f6fb8", "#7ac143", "#12324a"),
-    ("#c1121f", "#fdf0d5", "#f2b705", "#fdf0d5"),
-    ("#3d2a5c", "#e7c6ff", "#f7b801", "#ffffff"),
-    ("#f7ede2", "#84a59d", "#f28482", "#3a3a3a"),
-    ("#111417", "#c9a24b", "#8d1b24", "#f0e9d8"),
-    ("#e76f51", "#264653", "#f4e3b2", "#fff6e0"),
-    ("#9fd3e6", "#ffffff", "#e63946", "#1d3557"),
-    ("#f2a6c0", "#ffffff", "#7a1f4b", "#5a1236"),
-    ("#5c3a21", "#e8c99b", "#d98e04", "#fff1d6"),
-    ("#0b8f8c", "#ffffff", "#ffd23f", "#ffffff"),
-    ("#ff8c1a", "#ffffff", "#3a2a8c", "#2b1a10"),
-    ("#dfe5e8", "#4a5a66", "#d62828", "#1f2a30"),
-)
-_STARTS = (
-    "Sol",
-    "Ver",
-    "Kin",
-    "Bra",
-    "Lun",
-    "Mar",
-    "Tol",
-    "Fen",
-    "Ori",
-    "Zan",
-    "Pel",
-    "Gra",
-    "Nor",
-    "Cas",
-    "Dul",
-    "Ha",
-    "Riv",
-    "Ost",
-    "Quil",
-    "Tam",
-)
-_ENDS = (
-    "ara",
-    "ello",
-    "ix",
-    "on",
-    "ita",
-    "berg",
-    "ova",
-    "ette",
-    "um",
-    "ino",
-    "ay",
-    "eva",
-    "or",
-    "ula",
-    "ano",
-    "is",
-    "enda",
-    "ik",
-    "ora",
-    "ey",
-)
-_PRODUCTS = (
-    "CRISPY FLAKES",
-    "GREEN TEA",
-    "TOMATO SOUP",
-    "SEA SALT",
-    "ORANGE & LIME",
-    "DARK ROAST",
-    "WHOLE OATS",
-    "RED BEANS",
-    "FRESH CITRUS",
-    "CLASSIC COLA",
-    "PEACH ICED TEA",
-    "BASIL PESTO",
-    "CORN & PEAS",
-    "WILD BERRY",
-    "COCOA CRUNCH",
-    "SPARKLING",
-    "HONEY NUT",
-    "SOFT CARE",
-    "MOUNTAIN",
-    "GINGER ALE",
-)
-_NOTES = (
-    "new recipe",
-    "no added sugar",
-    "since 1926",
-    "100% natural",
-    "family size",
-    "extra fresh",
-    "original",
-    "with real fruit",
-    "crunchy!",
-    "light",
-)
-_VOLUMES = ("330 ml", "500 ml", "750 ml", "1 L")
-_WEIGHTS = ("250 g", "375 g", "400 g", "500 g")
-_PRAISE = ("A quiet triumph", "Impossible to put down", "Warm and wise", "The book of the year")
-_TITLES = (
-    "THE LONG",
-    "A QUIET",
-    "WINTER",
-    "THE LAST",
-    "BEYOND THE",
-    "NORTH OF",
-    "THE PAPER",
-    "SEVEN",
-    "NIGHT",
-    "THE GLASS",
-)
-_SUBJECTS = (
-    "HARBOUR",
-    "GARDEN",
-    "RIVER",
-    "MACHINE",
-    "LETTERS",
-    "ISLAND",
-    "ORCHARD",
-    "SIGNAL",
-    "HOUSE",
-    "MEADOW",
-)
+_WORDS = load_table(__package__, "printed_matter", tuple[str, ...])
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,19 +54,14 @@ class _Design:
 def label(seed: int) -> TextureData:
     """Wrap-around label of a bottle or jar; the front is in the middle. 512 x 256."""
     rng = variant_rng("label", seed)
-    image = _wrap(
-        int(art.SIZE_PX * 1.5),
-        LABEL_ASPECT,
-        _design(seed, rng, _VOLUMES),
-        rng,
-    )
+    image = _wrap(int(art.SIZE_PX * 1.5), LABEL_ASPECT, _design(seed, rng, _WORDS["volumes"]), rng)
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX // 2)
 
 
 def can_label(seed: int) -> TextureData:
     """All around a can; the front is in the middle."""
     rng = variant_rng("can_label", seed)
-    sizes = _WEIGHTS if cans.can_size(seed).food else ("330 ml", "500 ml")
+    sizes = _WORDS["weights"] if cans.can_size(seed).food else ("330 ml", "500 ml")
     image = _wrap(int(art.SIZE_PX * 1.5), cans.label_aspect(seed), _design(seed, rng, sizes), rng)
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX)
 
@@ -208,8 +81,10 @@ def book_cover(seed: int) -> TextureData:
     from gen_data.generator.assets.procedural import books
 
     rng = variant_rng("book_cover", seed)
-    words = choose(_TITLES, rng), choose(_SUBJECTS, rng)
-    design = replace(_design(seed, rng), product=" ".join(words), note=choose(_PRAISE, rng))
+    words = choose(_WORDS["titles"], rng), choose(_WORDS["subjects"], rng)
+    design = replace(
+        _design(seed, rng), product=" ".join(words), note=choose(_WORDS["praise"], rng)
+    )
     length, width, thickness = books.book_size_m(seed)
     scale = 560.0 / length
     h = int(length * scale)
@@ -221,19 +96,21 @@ def book_cover(seed: int) -> TextureData:
     return art.atlas(faces, books.COVER_ATLAS, design.ground)
 
 
-def _design(seed: int, rng: Rng, sizes: Sequence[str] = _WEIGHTS) -> _Design:
-    ground, second, accent, ink = (hex_to_srgb8(code) for code in _SCHEMES[seed % len(_SCHEMES)])
+def _design(seed: int, rng: Rng, sizes: Sequence[str] = _WORDS["weights"]) -> _Design:
+    schemes = _WORDS["schemes"]
+    codes = schemes[seed % len(schemes)].split()
+    ground, second, accent, ink = (hex_to_srgb8(code) for code in codes)
     if is_drawn(0.3, rng):
         second, accent = accent, second
-    name = choose(_STARTS, rng) + choose(_ENDS, rng)
+    name = choose(_WORDS["starts"], rng) + choose(_WORDS["ends"], rng)
     return _Design(
         ground,
         second,
         accent,
         ink,
         brand=name.upper() if is_drawn(0.5, rng) else name,
-        product=choose(_PRODUCTS, rng),
-        note=choose(_NOTES, rng),
+        product=choose(_WORDS["products"], rng),
+        note=choose(_WORDS["notes"], rng),
         size=choose(sizes, rng),
         layout=int(uniform_between(0, 5, rng)),
         picture=int(uniform_between(0, 5, rng)),
@@ -423,7 +300,7 @@ def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: R
     art.text(
         image,
         (0.2, 0.895, 0.8, 0.945),
-        f"{design.brand} {choose(_ENDS, rng).title()}",
+        f"{design.brand} {choose(_WORDS['ends'], rng).title()}",
         _readable(design, design.second),
         1,
     )

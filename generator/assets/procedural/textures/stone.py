@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gen_data.generator.assets.procedural.material_presets import PALETTES
 from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     blur_image,
@@ -16,6 +17,7 @@ from gen_data.generator.assets.procedural.noise import (
 )
 from gen_data.generator.assets.procedural.textures.texture_images import (
     color,
+    colors_in_turn,
     draw_color,
     mix_colors,
     texture,
@@ -29,36 +31,11 @@ from gen_data.generator.assets.procedural.variant_rng import (
 from gen_data.generator.core.asset_types import Float32, TextureData
 from gen_data.generator.core.streams import Rng
 
-_MARBLES = (
-    ("#eceae6", "#8d8f94"),
-    ("#f1efe9", "#b59a6a"),
-    ("#e2d9c8", "#9b7f5e"),
-    ("#26272a", "#cfcac0"),
-    ("#2f4a3e", "#b7c9bb"),
-    ("#8c4a3c", "#e3cfc2"),
-    ("#d9dcdd", "#5f666e"),
-    ("#3a3330", "#c6a06a"),
-)
-_CHIPS = ("#f2efe8", "#2f2f31", "#8b6b4e", "#b9573c", "#5e7f78", "#d9b36c", "#6e6f74", "#a9b7b0")
-_BRICKS = ("#9c4a35", "#8a3f2d", "#b0623f", "#7b4636", "#c07a52", "#d8d2c6", "#6b4a3f", "#a88768")
-_TILES = (
-    "#f0efeb",
-    "#e6e0d2",
-    "#d7dcdc",
-    "#9fb4b8",
-    "#3f5d6b",
-    "#7e9a80",
-    "#c9a98b",
-    "#b9b4ac",
-    "#55585c",
-    "#efe6d0",
-)
-
 
 def marble(seed: int) -> TextureData:
     """Polished marble; 0.8 m per repeat."""
     rng = variant_rng("marble", seed)
-    ground, vein_color = (color(code) for code in _MARBLES[seed % len(_MARBLES)])
+    ground, vein_color = colors_in_turn("marbles", seed)
     clouds = fbm((3, 3), 5, rng)
     veins = np.zeros_like(clouds)
     for cells, width, weight in (((2, 2), 0.06, 1.0), ((4, 3), 0.045, 0.6), ((8, 8), 0.03, 0.35)):
@@ -76,7 +53,7 @@ def terrazzo(seed: int) -> TextureData:
     ground = draw_color(
         ("#d9d5cc", "#c5c3be", "#e7e2d6", "#6d6e70", "#b8a999", "#dadfdd"), 0.06, rng
     )
-    palette = [color(choose(_CHIPS, rng)) for _ in range(choose((2, 3, 4), rng))]
+    palette = [color(choose(PALETTES["chips"], rng)) for _ in range(choose((2, 3, 4), rng))]
     albedo = ground + 0.02 * fbm((16, 16), 4, rng)[..., None]
     chips_everywhere = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
     for cells, share in ((9, 0.75), (18, 0.7), (36, 0.5), (70, 0.35)):
@@ -142,8 +119,8 @@ def brick(seed: int) -> TextureData:
     wobble = 1.2 * fbm((24, 24), 3, rng)
     face = smoothstep(joint, joint + 2.0, edge + wobble)
     bricks = courses * per_course
-    base = draw_color(_BRICKS, 0.08, rng)
-    other = draw_color(_BRICKS, 0.08, rng)
+    base = draw_color(PALETTES["bricks"], 0.08, rng)
+    other = draw_color(PALETTES["bricks"], 0.08, rng)
     pick_other = (uniform(bricks, rng) < uniform_between(0.0, 0.35, rng)).astype(np.float64)
     tone = 0.72 + 0.33 * uniform(bricks, rng)
     tints = (base + (other - base) * pick_other[:, None]) * tone[:, None]
@@ -167,7 +144,7 @@ def tiles(seed: int) -> TextureData:
     edge, number = _courses(courses, per_course, 0.5 if kind == "subway" else 0.0, rng)
     joint = uniform_between(1.5, 3.0, rng)
     face = smoothstep(joint, joint + 1.5, edge)
-    first, second = draw_color(_TILES, 0.05, rng), draw_color(_TILES, 0.05, rng)
+    first, second = (draw_color(PALETTES["tiles"], 0.05, rng) for _ in range(2))
     odd = (number // per_course + number % per_course) % 2 if kind == "checkered" else 0 * number
     tone = (0.96 + 0.08 * uniform(courses * per_course, rng)).astype(np.float32)[number]
     albedo = mix_colors(np.broadcast_to(first, (*odd.shape, 3)), second, odd.astype(np.float32))

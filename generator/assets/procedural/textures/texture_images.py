@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
+from gen_data.generator.assets.procedural.material_presets import PALETTES, hex_to_srgb8
 from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between
 from gen_data.generator.core.asset_types import Float32, TextureData, UInt8
 from gen_data.generator.core.streams import Rng
@@ -51,6 +51,12 @@ def color(code: str) -> Float32:
     """``#rrggbb`` as sRGB in [0, 1], shape [3]."""
     channels: Float32 = np.array(hex_to_srgb8(code), dtype=np.float32) / np.float32(255.0)
     return channels
+
+
+def colors_in_turn(palette: str, seed: int) -> tuple[Float32, ...]:
+    """Colours of one entry of a palette, entries taken in turn by seed; see ``color``."""
+    entries = PALETTES[palette]
+    return tuple(color(code) for code in entries[seed % len(entries)].split())
 
 
 def draw_color(codes: Sequence[str], spread: float, rng: Rng) -> Float32:

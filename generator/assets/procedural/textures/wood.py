@@ -12,30 +12,21 @@ from gen_data.generator.assets.procedural.noise import (
     smoothstep,
     uniform,
 )
-from gen_data.generator.assets.procedural.textures.texture_images import color, mix_colors, texture
+from gen_data.generator.assets.procedural.textures.texture_images import (
+    colors_in_turn,
+    mix_colors,
+    texture,
+)
 from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
 from gen_data.generator.core.streams import Rng
-
-# Light and dark wood of: oak, beech, pine, walnut, cherry, ash, teak, wenge, birch.
-_SPECIES = (
-    ("#c8a478", "#a67c50"),
-    ("#d2a67c", "#bb8a60"),
-    ("#e0bd88", "#c18f55"),
-    ("#7d5a3e", "#4f3524"),
-    ("#b06f45", "#8a4f2e"),
-    ("#d8c3a0", "#b79c74"),
-    ("#a9763f", "#7a4f26"),
-    ("#4b3629", "#2c1e17"),
-    ("#e3cda6", "#cbb083"),
-)
 
 
 def wood_grain(seed: int) -> TextureData:
     """One board; 0.4 m per repeat."""
     rng = variant_rng("wood_grain", seed)
     rings, fibre = _grain(rng)
-    light, dark = (color(code) for code in _SPECIES[seed % len(_SPECIES)])
+    light, dark = colors_in_turn("timber", seed)
     albedo = mix_colors(light, dark, 0.75 * rings + 0.35 * fibre)
     return texture(albedo, 0.85 + 0.15 * fibre, -0.8 * fibre - 0.3 * rings)
 
@@ -44,7 +35,7 @@ def wood_planks(seed: int) -> TextureData:
     """Boards laid side by side, ends staggered; 1.2 m per repeat."""
     rng = variant_rng("wood_planks", seed)
     rings, fibre = _grain(rng)
-    light, dark = (color(code) for code in _SPECIES[seed % len(_SPECIES)])
+    light, dark = colors_in_turn("timber", seed)
     rows = choose((4, 6, 8, 8, 10), rng)
     per_row = choose((1, 2, 2, 3), rng)
     y, x = rows_and_columns()
