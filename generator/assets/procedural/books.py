@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     hex_to_linear,
@@ -63,7 +63,7 @@ def book(seed: int) -> Solid:
     print_ = printed_material(f"texture/book_cover?seed={seed}", uniform_between(0.25, 0.6, rng))
     half = (0.5 * length, 0.5 * width, 0.5 * thickness)
     low = (-half[0], -half[1], -half[2])
-    return make_centred_solid([cover, pages], (print_, paper), [collision_hulls.box(low, half)])
+    return make_centred_solid([cover, pages], (print_, paper), [hulls.box(low, half)])
 
 
 def _cover(size_m: Vec3, board: float, bow: float) -> Patch:

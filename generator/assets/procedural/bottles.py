@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
@@ -91,7 +91,7 @@ def bottle(seed: int) -> Solid:
         (0.97 * cap_radius, height),
     ]
     flat = np.array([1.0, style.depth, 1.0])
-    parts = [hull * flat for hull in collision_hulls.stack(_climbing(stages))]
+    parts = [hull * flat for hull in hulls.stack(_climbing(stages))]
     body = Material(
         jitter_color(hex_to_linear(choose(style.colors, rng)), 0.1, rng),
         uniform_between(*style.gloss, rng),
@@ -134,7 +134,7 @@ def jar(seed: int) -> Solid:
         (lid_radius, top),
         (lid_radius, height),
     ]
-    return make_centred_solid(patches, (glass, label, lid), collision_hulls.stack(stages))
+    return make_centred_solid(patches, (glass, label, lid), hulls.stack(stages))
 
 
 def _labelled(radius: float, label: Point2, upper: list[Point2], radii: list[float]) -> list[Patch]:

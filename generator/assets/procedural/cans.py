@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
@@ -78,7 +78,7 @@ def can(seed: int) -> Solid:
         metal_material(STEEL if size.food else ALUMINIUM, uniform_between(0.22, 0.35, rng)),
         metal_material(ALUMINIUM, 0.3),
     )
-    return make_centred_solid([*patches, *lid], materials, collision_hulls.stack(stages))
+    return make_centred_solid([*patches, *lid], materials, hulls.stack(stages))
 
 
 def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     CAPS,
@@ -78,7 +78,7 @@ def carton(seed: int) -> Solid:
     half = tuple(0.5 * side for side in size)
     print_ = printed_material(f"texture/carton?seed={seed}", uniform_between(0.35, 0.65, rng))
     low, high = (-half[0], -half[1], -half[2]), (half[0], half[1], half[2])
-    return make_centred_solid([body], (print_,), [collision_hulls.box(low, high)])
+    return make_centred_solid([body], (print_,), [hulls.box(low, high)])
 
 
 def milk_carton(seed: int) -> Solid:
@@ -89,19 +89,19 @@ def milk_carton(seed: int) -> Solid:
     rise, fin = 0.33 * x, 0.016
     roof = _gable(x, y, rise, fin).moved(z=z)
     print_ = printed_material(f"texture/milk_label?seed={seed}", uniform_between(0.35, 0.5, rng))
-    patches, parts = [body, roof], [collision_hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
+    patches, parts = [body, roof], [hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
     if is_drawn(0.7, rng):
         tilt = math.atan2(rise, 0.5 * x)
         at = (0.27 * x, 0.0, z + 0.46 * rise)
         patches.append(_screw_cap().rotated("y", tilt).moved(*at))
-        cap = collision_hulls.frustum((0.013, -0.004), (0.013, 0.009), 12)
+        cap = hulls.frustum((0.013, -0.004), (0.013, 0.009), 12)
         parts.append(rotate(cap, "y", tilt) + np.array(at))
     ridge = z + rise
     prism = np.array(
         [(sx * 0.5 * x, sy * 0.5 * y, z) for sx in (-1, 1) for sy in (-1, 1)]
         + [(sx * 0.002, sy * 0.5 * y, ridge) for sx in (-1, 1) for sy in (-1, 1)]
     )
-    fin_hull = collision_hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
+    fin_hull = hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
     parts += [prism, fin_hull]
     return make_centred_solid(patches, (print_, plastic_material(rng, CAPS)), parts)
 

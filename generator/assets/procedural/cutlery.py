@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     STAINLESS,
@@ -172,7 +172,7 @@ def _cutlery(sheets: list[Patch], size: float, cut_mm: float, rng: Rng) -> Solid
     handle: Material = plastic_material(rng) if is_drawn(0.2, rng) else steel
     low, high = patch.bounds_m()
     edges = np.linspace(float(low[0]), float(high[0]), 8)
-    parts = [collision_hulls.extreme(_slice(patch, a, b)) for a, b in pairwise(edges.tolist())]
+    parts = [hulls.extreme(_slice(patch, a, b)) for a, b in pairwise(edges.tolist())]
     return make_centred_solid([patch], (steel, handle), parts)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, NamedTuple
@@ -17,6 +17,7 @@ from gen_data.generator.core.asset_types import (
     MeshData,
     TextureData,
 )
+from gen_data.generator.core.errors import AssetError, did_you_mean
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -159,6 +160,15 @@ class ConstantFacts:
     def __call__(self, **_: Any) -> Facts:
         """The facts, whatever the arguments."""
         return Facts(self.subcategory)
+
+
+def check_option(family: str, parameter: str, value: str, options: Iterable[str]) -> None:
+    """Raise AssetError if a parameter of a family has none of the values that it may have."""
+    if value not in options:
+        raise AssetError(
+            f"{family}: {parameter}={value} is unknown; expected one of {', '.join(options)}"
+            f"{did_you_mean(value, options)}"
+        )
 
 
 class FamilyTables(NamedTuple):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, printed_material
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid
@@ -46,7 +46,7 @@ def apple(seed: int) -> Solid:
     return make_centred_solid(
         [body, stalk.painted(1)],
         (skin, _STALK),
-        [collision_hulls.extreme(body.corners_m), collision_hulls.extreme(stalk.corners_m, 16)],
+        [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)],
     )
 
 
@@ -67,9 +67,7 @@ def orange(seed: int) -> Solid:
     button = ball(lambda d: 0.0035 * d * np.array([1.0, 1.0, 0.4]), 6, 10).painted(1)
     button = button.moved(z=radius * flat * 0.955)
     green = Material(hex_to_linear("#6d7a3a"), 0.8)
-    return make_centred_solid(
-        [body, button], (peel, green), [collision_hulls.extreme(body.corners_m)]
-    )
+    return make_centred_solid([body, button], (peel, green), [hulls.extreme(body.corners_m)])
 
 
 def lemon(seed: int) -> Solid:
@@ -89,7 +87,7 @@ def lemon(seed: int) -> Solid:
         f"texture/citrus_peel?seed={seed + 1000}", uniform_between(0.35, 0.5, rng)
     )
     body = ball(shape, 24, 24)
-    return make_centred_solid([body], (peel,), [collision_hulls.extreme(body.corners_m)])
+    return make_centred_solid([body], (peel,), [hulls.extreme(body.corners_m)])
 
 
 def pear(seed: int) -> Solid:
@@ -120,11 +118,7 @@ def pear(seed: int) -> Solid:
     return make_centred_solid(
         [body, stalk.painted(1)],
         (skin, _STALK),
-        [
-            collision_hulls.extreme(lower),
-            collision_hulls.extreme(upper),
-            collision_hulls.extreme(stalk.corners_m, 16),
-        ],
+        [hulls.extreme(lower), hulls.extreme(upper), hulls.extreme(stalk.corners_m, 16)],
     )
 
 
@@ -151,7 +145,7 @@ def banana(seed: int) -> Solid:
     parts = []
     for a, b in ((0, 4), (4, 9), (9, 15), (15, 20), (20, 24)):
         ring = np.concatenate([_ring_of(skin, path, i) for i in (a, (a + b) // 2, b)])
-        parts.append(collision_hulls.extreme(ring))
+        parts.append(hulls.extreme(ring))
     return make_centred_solid([skin], (peel,), parts)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import make_centred_solid
 from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe
@@ -43,8 +43,8 @@ def tumbler(seed: int) -> Solid:
         [0.0, 0.0, 0.0, 0.003, 0.45 * wall, 0.45 * wall, 0.005, 0.0],
         4,
     )
-    base = collision_hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
-    walls = collision_hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
+    base = hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
+    walls = hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
     return make_centred_solid([lathe(profile, 48)], (_glass(rng),), [base, *walls])
 
 
@@ -70,11 +70,11 @@ def wine_glass(seed: int) -> Solid:
     levels = [_around(rim, wall, height), _around(belly, wall, wide)]
     floor = (0.5 * belly, 0.62 * belly, low + 0.008)
     parts = [
-        collision_hulls.frustum((foot, 0.0), (foot, 0.003)),
-        collision_hulls.frustum((stem, 0.003), (stem, low - 0.008)),
-        collision_hulls.frustum((stem, low - 0.008), (0.62 * belly, low + 0.008)),
-        *collision_hulls.ring(floor, levels[1], 10),
-        *collision_hulls.ring(levels[1], levels[0], 10),
+        hulls.frustum((foot, 0.0), (foot, 0.003)),
+        hulls.frustum((stem, 0.003), (stem, low - 0.008)),
+        hulls.frustum((stem, low - 0.008), (0.62 * belly, low + 0.008)),
+        *hulls.ring(floor, levels[1], 10),
+        *hulls.ring(levels[1], levels[0], 10),
     ]
     return make_centred_solid([lathe(profile, 32)], (_glass(rng),), parts)
 

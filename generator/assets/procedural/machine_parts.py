@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
@@ -83,8 +83,8 @@ def hex_bolt(seed: int) -> Solid:
     profile += [(root, end), (0.0, end)]
     patches = [extrude(circle(corner, 6), head, 0.06 * flats), lathe(profile, 20)]
     parts = [
-        collision_hulls.frustum((corner, 0.0), (corner, head), 6),
-        collision_hulls.frustum((0.5 * d, head), (0.5 * d, end), 12),
+        hulls.frustum((corner, 0.0), (corner, head), 6),
+        hulls.frustum((0.5 * d, head), (0.5 * d, end), 12),
     ]
     return make_centred_solid(patches, (_steel(rng),), parts, crease_deg=25.0)
 
@@ -95,7 +95,7 @@ def nut(seed: int) -> Solid:
     d, flats, _, height, _ = (0.001 * v for v in _HEX[seed % len(_HEX)])
     corner = flats / math.sqrt(3)
     body = extrude(circle(corner, 6), height, 0.05 * flats, [circle(0.46 * d, 24)])
-    wedges = collision_hulls.ring((0.46 * d, corner, 0.0), (0.46 * d, corner, height), 6)
+    wedges = hulls.ring((0.46 * d, corner, 0.0), (0.46 * d, corner, height), 6)
     # A hexagon's flats are its wedges: leave out the round middle point.
     flat = [hull[[0, 1, 2, 4, 5, 6, 7, 9]] for hull in wedges]
     turned = [rotate(hull, "z", math.pi / 6) for hull in flat]
@@ -112,7 +112,7 @@ def washer(seed: int) -> Solid:
         0.12 * thick,
         1,
     )
-    wedges = collision_hulls.ring((r, big, 0.0), (r, big, thick), 8)
+    wedges = hulls.ring((r, big, 0.0), (r, big, thick), 8)
     return make_centred_solid([lathe(profile, 36)], (_steel(rng),), wedges)
 
 
@@ -137,7 +137,7 @@ def stepped_shaft(seed: int) -> Solid:
             (r, z + length - chamfer),
             (r - chamfer, z + length),
         ]
-        parts.append(collision_hulls.frustum((r, z), (r, z + length)))
+        parts.append(hulls.frustum((r, z), (r, z + length)))
         z += length
     profile.append((0.0, z))
     turned = [rotate(part, "y", 0.5 * math.pi) for part in parts]
@@ -163,7 +163,7 @@ def pipe_elbow(seed: int) -> Solid:
     parts = [
         _tube_piece(path[a : b + 1], outer) for a, b in ((0, 1), (1, 5), (5, 9), (9, 13), (13, 14))
     ]
-    band = collision_hulls.frustum((collar, -0.55 * outer), (collar, 0.0))
+    band = hulls.frustum((collar, -0.55 * outer), (collar, 0.0))
     parts += [
         rotate(band, "y", -0.5 * math.pi) + np.array([-straight, 0, 0]),
         rotate(band, "x", -0.5 * math.pi) + np.array([bend, bend + straight, 0]),
@@ -199,8 +199,8 @@ def bracket(seed: int) -> Solid:
     )
     half = 0.5 * width
     parts = [
-        collision_hulls.box((0.0, -half, 0.0), (a, half, thick)),
-        collision_hulls.box((0.0, -half, 0.0), (thick, half, b)),
+        hulls.box((0.0, -half, 0.0), (a, half, thick)),
+        hulls.box((0.0, -half, 0.0), (thick, half, b)),
     ]
     return make_centred_solid([foot, upright], (finish,), parts)
 
@@ -226,11 +226,11 @@ def gear(seed: int) -> Solid:
             outline.append((r * math.cos(turn), r * math.sin(turn)))
     disc = extrude(np.array(outline), thick, 0.0004, [circle(bore, 28)])
     hub = thick + uniform_between(0.004, 0.01, rng) if is_drawn(0.6, rng) else 0.0
-    patches, parts = [disc], [collision_hulls.frustum((tip, 0.0), (tip, thick), 24)]
+    patches, parts = [disc], [hulls.frustum((tip, 0.0), (tip, thick), 24)]
     if hub:
         outer = 0.5 * (bore + root)
         patches.append(_collar(bore, outer, hub - thick).moved(z=thick))
-        parts.append(collision_hulls.frustum((outer, thick), (outer, hub)))
+        parts.append(hulls.frustum((outer, thick), (outer, hub)))
     finish = plastic_material(rng, PALETTES["abs"]) if is_drawn(0.3, rng) else _machined(rng)
     return make_centred_solid(patches, (finish,), parts, crease_deg=30.0)
 
@@ -250,8 +250,8 @@ def flange(seed: int) -> Solid:
     neck, rise = 0.56 * radius, uniform_between(0.3, 0.6, rng) * radius
     collar = _collar(bore, neck, rise).moved(z=thick)
     parts = [
-        *collision_hulls.ring((bore, radius, 0.0), (bore, radius, thick), 12),
-        *collision_hulls.ring((bore, neck, thick), (bore, neck, thick + rise), 8),
+        *hulls.ring((bore, radius, 0.0), (bore, radius, thick), 12),
+        *hulls.ring((bore, neck, thick), (bore, neck, thick + rise), 8),
     ]
     return make_centred_solid([disc, collar], (_machined(rng),), parts)
 
@@ -274,7 +274,7 @@ def connector(seed: int) -> Solid:
         22,
     )
     pieces = join_patches([stub.painted(1), plug])
-    band = collision_hulls.frustum((port, 0.5 * side), (port, 0.5 * side + reach), 16)
+    band = hulls.frustum((port, 0.5 * side), (port, 0.5 * side + reach), 16)
     turns = [
         ("y", 0.0),
         ("y", 0.5 * math.pi),
@@ -285,7 +285,7 @@ def connector(seed: int) -> Solid:
     ][: choose((3, 4, 5, 6), rng)]
     half = 0.5 * side
     parts = [
-        collision_hulls.box((-half, -half, -half), (half, half, half)),
+        hulls.box((-half, -half, -half), (half, half, half)),
         *(rotate(band, axis, turn) for axis, turn in turns),
     ]
     block = plastic_material(rng, PALETTES["abs"]) if is_drawn(0.5, rng) else _machined(rng)
@@ -345,4 +345,4 @@ def _holed_plate(length: float, width: float, thick: float, hole: float) -> Patc
 def _tube_piece(path: Array, radius: float) -> Array:
     """Convex hull points of a piece of pipe in the plane z = 0."""
     tube = sweep(path, circle(radius, 16), capped=False)
-    return collision_hulls.extreme(tube.corners_m, 48)
+    return hulls.extreme(tube.corners_m, 48)

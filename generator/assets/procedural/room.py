@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import check_size, rectangle
 from gen_data.generator.assets.procedural.material_presets import (
@@ -53,9 +53,7 @@ def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Soli
         ((-x / 2, -y / 2 - t, 0.0), (x / 2, -y / 2, z)),
         ((-x / 2, y / 2, 0.0), (x / 2, y / 2 + t, z)),
     ]
-    return make_solid_in_place(
-        patches, _room_materials(), [collision_hulls.box(*slab) for slab in slabs]
-    )
+    return make_solid_in_place(patches, _room_materials(), [hulls.box(*slab) for slab in slabs])
 
 
 def _room_materials() -> tuple[Material, ...]:

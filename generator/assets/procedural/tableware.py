@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
@@ -52,19 +52,15 @@ def mug(seed: int) -> Solid:
         lighten(outside.base_color, uniform_between(0.5, 0.95, rng)), outside.roughness
     )
     grip = inside if is_drawn(0.15, rng) else outside
-    rings = collision_hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    rings = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
     if bulge > 0:
         middle = 0.5 * (top + bottom) + bulge
         rings = [
-            *collision_hulls.ring(
-                (bottom - wall, bottom, wall), (middle - wall, middle, 0.5 * height), 8
-            ),
-            *collision_hulls.ring(
-                (middle - wall, middle, 0.5 * height), (top - wall, top, height), 9
-            ),
+            *hulls.ring((bottom - wall, bottom, wall), (middle - wall, middle, 0.5 * height), 8),
+            *hulls.ring((middle - wall, middle, 0.5 * height), (top - wall, top, height), 9),
         ]
-    base = collision_hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
-    grip_hulls = collision_hulls.tube(path[[0, 4, 9, 13, 18, 22]], 0.8 * across[1])
+    base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
+    grip_hulls = hulls.tube(path[[0, 4, 9, 13, 18, 22]], 0.8 * across[1])
     return make_centred_solid(
         [*_two_sided(profile, 32), handle], (outside, inside, grip), [base, *rings, *grip_hulls]
     )
@@ -78,8 +74,8 @@ def cup(seed: int) -> Solid:
     profile = _cup_profile(top, bottom, height, wall, 0.0)
     outside = plastic_material(rng)
     inside = outside if is_drawn(0.6, rng) else plastic_material(rng, ("#f0f0ec", "#e8e4da"))
-    walls = collision_hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
-    base = collision_hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
+    walls = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
     return make_centred_solid(_two_sided(profile, 32), (outside, inside), [base, *walls])
 
 
@@ -111,9 +107,9 @@ def bowl(seed: int) -> Solid:
     for i, z in ((2, float(outer[2, 1])), (5, float(outer[5, 1])), (9, height + 0.5 * wall)):
         levels.append((float(np.interp(z, inner[:, 1], inner[:, 0])), float(outer[i, 0]), z))
     parts = [
-        collision_hulls.frustum((foot, 0.0), (levels[0][1], levels[0][2])),
-        *collision_hulls.ring(levels[0], levels[1], 9),
-        *collision_hulls.ring(levels[1], levels[2], 14),
+        hulls.frustum((foot, 0.0), (levels[0][1], levels[0][2])),
+        *hulls.ring(levels[0], levels[1], 9),
+        *hulls.ring(levels[1], levels[2], 14),
     ]
     return make_centred_solid(_two_sided(profile, 40), (outside, inside), parts)
 
@@ -165,8 +161,8 @@ def plate(seed: int) -> Solid:
         (radius + 0.4 * wall, rise),
         (radius + 0.4 * wall, rise - 0.8 * wall),
     ]
-    walls = collision_hulls.wedges(rim, 20)
-    base = collision_hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
+    walls = hulls.wedges(rim, 20)
+    base = hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
     return make_centred_solid(_two_sided(profile, 48), (outside, inside), [base, *walls])
 
 

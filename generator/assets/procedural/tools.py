@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     BLACK_OXIDE,
@@ -68,10 +68,7 @@ def screwdriver(seed: int) -> Solid:
         (0.7 * radius, 0.82 * grip),
         (0.6 * radius, grip),
     ]
-    parts = [
-        *collision_hulls.stack(profile, 16),
-        collision_hulls.frustum((shaft, grip), (shaft, end), 12),
-    ]
+    parts = [*hulls.stack(profile, 16), hulls.frustum((shaft, grip), (shaft, end), 12)]
     materials = (
         plastic_material(rng),
         metal_material(ZINC, uniform_between(0.2, 0.35, rng)),
@@ -95,10 +92,7 @@ def hammer(seed: int) -> Solid:
     steel = choose((metal_material(STEEL, 0.35), metal_material(BLACK_OXIDE, 0.45)), rng)
     at = length - 0.005
     share = handle.corners_m[:, :, 0].mean(axis=1) / length
-    parts = [
-        collision_hulls.extreme(handle.corners_m[abs(share - m) < 0.2], 40)
-        for m in (0.18, 0.5, 0.8)
-    ]
+    parts = [hulls.extreme(handle.corners_m[abs(share - m) < 0.2], 40) for m in (0.18, 0.5, 0.8)]
     parts += [hull * size + np.array([at, 0.0, 0.0]) for hull in head_hulls]
     return make_centred_solid(
         [handle, head.scaled(size, size, size).moved(at)], (grip, steel), parts
@@ -141,7 +135,7 @@ def wrench(seed: int) -> Solid:
     parts = [
         *(_slab(_turned(piece) + centre, h) for piece in _jaw_pieces(across, head)),
         _slab(shank, 0.8 * h),
-        *collision_hulls.ring((0.57 * across, ring, -1.3 * h), (0.57 * across, ring, 1.3 * h), 8),
+        *hulls.ring((0.57 * across, ring, -1.3 * h), (0.57 * across, ring, 1.3 * h), 8),
     ]
     return make_centred_solid(patches, (finish,), parts)
 
@@ -233,9 +227,9 @@ def _hammer_head() -> tuple[Patch, list[Array]]:
     face = lathe(fillet(profile, [0.0, 0.0, 0.004, 0.003, 0.0015, 0.0], 2), 24)
     peen = _peen()
     parts = [
-        collision_hulls.box((-0.015, -0.018, -0.013), (0.015, 0.018, 0.013)),
-        rotate(collision_hulls.frustum((0.0138, 0.015), (0.0138, 0.058), 16), "x", -_LAID),
-        collision_hulls.extreme(peen.corners_m, 24),
+        hulls.box((-0.015, -0.018, -0.013), (0.015, 0.018, 0.013)),
+        rotate(hulls.frustum((0.0138, 0.015), (0.0138, 0.058), 16), "x", -_LAID),
+        hulls.extreme(peen.corners_m, 24),
     ]
     return join_patches([eye, face.rotated("x", -_LAID), peen]).painted(1), parts
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
@@ -47,7 +47,7 @@ def block(seed: int) -> Solid:
     )
     body = rounded_box((x, y, z), 0.0025, 2)
     return make_centred_solid(
-        [body], (paint,), [collision_hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))]
+        [body], (paint,), [hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))]
     )
 
 
@@ -62,9 +62,7 @@ def ball(seed: int) -> Solid:
     body = sphere(lambda d: radius * d, 22, 36)
     cover = printed_material(f"texture/ball_cover?seed={seed}", rough)
     # One small hull has flat sides that a ball would rest on; four that are turned have not.
-    parts = [
-        collision_hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)
-    ]
+    parts = [hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)]
     return make_centred_solid([body], (cover,), parts)
 
 
@@ -79,7 +77,7 @@ def plain_sphere(diameter_m: float = 0.2) -> Solid:
     radius = 0.5 * diameter_m
     body = sphere(lambda d: radius * d, 48, 96).moved(0.0, 0.0, radius)
     surface = Material((0.5, 0.5, 0.5), 0.5)
-    return make_solid_in_place([body], (surface,), [collision_hulls.extreme(body.corners_m)])
+    return make_solid_in_place([body], (surface,), [hulls.extreme(body.corners_m)])
 
 
 def ball_kind(seed: int) -> str:
@@ -120,8 +118,8 @@ def candle(seed: int) -> Solid:
         [lathe(wax, 32), wick],
         (material, Material((0.02, 0.02, 0.02), 0.9)),
         [
-            collision_hulls.frustum((radius, 0.0), (radius, height)),
-            collision_hulls.frustum((0.001, height), (0.001, height + 0.0075), 6),
+            hulls.frustum((radius, 0.0), (radius, height)),
+            hulls.frustum((0.001, height), (0.001, height + 0.0075), 6),
         ],
     )
 
@@ -155,5 +153,5 @@ def vase(seed: int) -> Solid:
             lathe([outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)], 32, 1),
         ],
         (outside, inside),
-        collision_hulls.stack(stages),
+        hulls.stack(stages),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import make_solid_in_place
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
@@ -47,5 +47,5 @@ def ground(
     plan = np.stack([x, y], axis=2)
     patch = surface(np.stack([x, y, z], axis=2), plan, "ground", 0)
     low, high = (-0.5 * size_m[0], -0.5 * size_m[1]), (0.5 * size_m[0], 0.5 * size_m[1])
-    slab = collision_hulls.box((*low, -relief_m - 0.5), (*high, 0.0))
+    slab = hulls.box((*low, -relief_m - 0.5), (*high, 0.0))
     return make_solid_in_place([patch], (ground_material(cover, seed),), [slab])

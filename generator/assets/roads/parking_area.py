@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Patch, make_solid_in_place
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
@@ -38,7 +38,7 @@ def parking_area(
     patches.append(_skirt(x, y, slots["ground"]))
     for low, high in _lines(profile):
         patches.append(_rectangle(low, high, PAINT_LIFT_M, "marking", slots["marking"]))
-    slab = collision_hulls.box((-x, -y, -0.3), (x, y, 0.0))
+    slab = hulls.box((-x, -y, -0.3), (x, y, 0.0))
     return make_solid_in_place(patches, tuple(materials.values()), [slab])
 
 

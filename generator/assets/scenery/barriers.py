@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import (
     painted_material,
     patterned_material,
@@ -22,7 +22,6 @@ from gen_data.generator.assets.procedural.variant_rng import choose, uniform_bet
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import Vec3
 
 BARRIERS = ("guard_rail", "jersey", "construction")
@@ -45,7 +44,7 @@ def fence(seed: int, style: str) -> Solid:
     kind = fence_facts(seed, style).subcategory
     rng = variant_rng("fence", seed)
     half, h = 0.5 * uniform_between(2.0, 3.0, rng), uniform_between(0.9, 1.4, rng)
-    hull = collision_hulls.box((-0.06, -half, 0.0), (0.06, half, h))
+    hull = hulls.box((-0.06, -half, 0.0), (0.06, half, h))
     if kind == "wall":
         return _garden_wall(half, h, seed)
     posts = [
@@ -91,11 +90,7 @@ def fence_facts(seed: int, style: str) -> Facts:
 def _chosen(family: str, seed: int, style: str, styles: Sequence[str]) -> str:
     if style == "any":
         return styles[seed % len(styles)]
-    if style not in styles:
-        raise AssetError(
-            f"{family}: there is no style '{style}'{did_you_mean(style, styles)}; expected any, "
-            f"{', '.join(styles)}"
-        )
+    check_option(family, "style", style, ("any", *styles))
     return style
 
 
@@ -108,7 +103,7 @@ def _guard_rail(seed: int) -> Solid:
     back = np.array([[(0.096 + x, y, z) for y in (half, -half)] for x, z in wave])
     posts = [block((-0.05, y - 0.03, 0.0), (0.05, y + 0.03, 0.72)) for y in (-1.0, 1.0)]
     spacers = [block((0.05, y - 0.05, 0.52), (0.1, y + 0.05, 0.68)) for y in (-1.0, 1.0)]
-    hull = collision_hulls.box((-0.05, -half, 0.0), (0.18, half, 0.75))
+    hull = hulls.box((-0.05, -half, 0.0), (0.18, half, 0.75))
     parts = [grid(rows), grid(back), *posts, *spacers]
     shade = patterned_material("texture/brushed_metal?seed=1", 1.0, 0.6, (0.62, 0.63, 0.64))
     return make_solid(parts, (shade if seed % 2 else GALVANISED,), [hull])
@@ -137,7 +132,7 @@ def _jersey(seed: int) -> Solid:
     x, y, _ = (0.5 * (low + high)).tolist()
     body = lying.moved(-x, -y, -float(low[2]))
     concrete = patterned_material("texture/concrete?seed=3", 2.0, 0.92, (0.95, 0.94, 0.92))
-    hull = collision_hulls.extreme(body.corners_m, 32)
+    hull = hulls.extreme(body.corners_m, 32)
     return make_solid([body], (concrete,), [hull])
 
 
@@ -165,7 +160,7 @@ def _construction(seed: int) -> Solid:
         painted_material("#242526", 0.85),
         Material((0.85, 0.42, 0.05), roughness=0.2, role="lamp"),
     )
-    return make_solid(parts, slots, [collision_hulls.box((-0.4, -half, 0.0), (0.4, half, z + 0.2))])
+    return make_solid(parts, slots, [hulls.box((-0.4, -half, 0.0), (0.4, half, z + 0.2))])
 
 
 def _striped(half: float, z_m: tuple[float, float], fields: int) -> list[Patch]:
@@ -196,4 +191,4 @@ def _garden_wall(half: float, h: float, seed: int) -> Solid:
     name, k, scale, color = kind
     skin = patterned_material(f"texture/{name}?seed={k}", scale, 0.92, color)
     stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
-    return make_solid([body, cap], (skin, stone), [collision_hulls.box(low, (0.12, half, h))])
+    return make_solid([body, cap], (skin, stone), [hulls.box(low, (0.12, half, h))])

@@ -6,11 +6,12 @@ houses, windows of 1.0-1.5 m by 1.2-1.9 m, sills 0.8-0.95 m above the floor.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import check_option
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
 from gen_data.generator.assets.procedural.variant_rng import (
     choose,
@@ -19,7 +20,6 @@ from gen_data.generator.assets.procedural.variant_rng import (
     variant_rng,
 )
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 
@@ -78,159 +78,45 @@ class Design:
         return self.ground_m + (self.floors - 1) * self.storey_m
 
 
+_STYLES = load_table(__package__, "building_styles", dict)
+_COLORS = load_table(__package__, "building_colors", tuple[str, ...])
+
+
 def draw_design(style: str, seed: int) -> Design:
     """The design of variant ``seed`` of a style. Raises AssetError for an unknown style."""
-    if style not in _DRAWN:
-        raise AssetError(
-            f"building: there is no style '{style}'{did_you_mean(style, STYLES)}; expected one of "
-            f"{', '.join(STYLES)}"
-        )
-    return _DRAWN[style](variant_rng(f"building/{style}", seed))
+    check_option("building", "style", style, STYLES)
+    values = _draw_fields(_STYLES[style], variant_rng(f"building/{style}", seed))
+    bays, bay_m = values["bays"], values.pop("bay_m")
+    low, high = values["width_m"]
+    values["width_m"] = round(min(high, max(low, bays * bay_m)), 2)
+    if "pier_m" in values:
+        values["window_m"] = (round(bay_m - values.pop("pier_m"), 2), values["window_m"][1])
+    values["oriel"] = {"middle": bays // 2, "last": bays - 2}.get(values.get("oriel", ""), -1)
+    return Design(style=style, **values)
 
 
-def _residential(rng: Rng) -> Design:
-    floors = choose((2, 3, 3, 4, 4, 5), rng)
-    bays, bay_m = choose((3, 4, 5, 6, 7), rng), uniform_between(2.5, 3.1, rng)
-    return Design(
-        style="residential",
-        width_m=max(8.0, round(bays * bay_m, 2)),
-        depth_m=round(uniform_between(10.0, 13.0, rng), 2),
-        floors=floors,
-        bays=bays,
-        ground_m=round(uniform_between(3.0, 3.5, rng), 2),
-        storey_m=round(uniform_between(2.75, 3.0, rng), 2),
-        window_m=(
-            round(uniform_between(1.1, 1.5, rng), 2),
-            round(uniform_between(1.25, 1.5, rng), 2),
-        ),
-        sill_m=0.9,
-        recess_m=round(uniform_between(0.12, 0.2, rng), 3),
-        panes=(choose((1, 2, 2), rng), 1),
-        roof=choose(("gable", "gable", "gable", "mansard"), rng),
-        cladding=choose(("plaster", "plaster", "plaster", "plaster", "brick"), rng),
-        shutters=choose(("roller", "roller", "none"), rng),
-        balconies=choose(("none", "none", "slab"), rng),
-        pitch_rad=uniform_between(0.6, 0.82, rng),
-        dormers=choose((0, 0, 1, 2, 3), rng),
-    )
+def _draw_fields(recipe: Mapping[str, Any], rng: Rng) -> dict[str, Any]:
+    """A value for every field of a recipe, drawn in its order; see ``building_styles.yaml``."""
+    values: dict[str, Any] = {}
+    for name, item in recipe.items():
+        if name == "variants":
+            values |= _draw_fields(item["yes" if is_drawn(item["chance"], rng) else "no"], rng)
+        else:
+            values[name] = _draw_value(item, rng)
+    return values
 
 
-def _old_town(rng: Rng) -> Design:
-    bays, bay_m = choose((3, 4, 5, 6, 7), rng), uniform_between(2.1, 2.5, rng)
-    return Design(
-        style="old_town",
-        width_m=max(8.0, round(bays * bay_m, 2)),
-        depth_m=round(uniform_between(10.0, 14.0, rng), 2),
-        floors=choose((3, 3, 4, 4, 5), rng),
-        bays=bays,
-        ground_m=round(uniform_between(3.9, 4.4, rng), 2),
-        storey_m=round(uniform_between(3.3, 3.7, rng), 2),
-        window_m=(
-            round(uniform_between(1.0, 1.15, rng), 2),
-            round(uniform_between(1.75, 2.05, rng), 2),
-        ),
-        sill_m=0.8,
-        recess_m=round(uniform_between(0.16, 0.25, rng), 3),
-        panes=(2, 2),
-        roof=choose(("mansard", "mansard", "gable"), rng),
-        cladding=choose(("plaster", "plaster", "brick", "stone"), rng),
-        shops=is_drawn(0.6, rng),
-        trimmed=True,
-        shutters=choose(("none", "none", "leaves"), rng),
-        balconies=choose(("none", "french"), rng),
-        pitch_rad=uniform_between(0.7, 0.9, rng),
-        dormers=choose((1, 2, 3), rng),
-        oriel=choose((-1, bays // 2, bays - 2), rng),
-    )
-
-
-def _modern(rng: Rng) -> Design:
-    bays, bay_m = choose((3, 4, 5, 6), rng), uniform_between(3.0, 3.7, rng)
-    tall = is_drawn(0.5, rng)
-    return Design(
-        style="modern",
-        width_m=round(min(24.0, max(9.0, bays * bay_m)), 2),
-        depth_m=round(uniform_between(11.0, 14.0, rng), 2),
-        floors=choose((3, 4, 5, 6), rng),
-        bays=bays,
-        ground_m=round(uniform_between(3.1, 3.6, rng), 2),
-        storey_m=round(uniform_between(2.95, 3.1, rng), 2),
-        window_m=(
-            round(uniform_between(1.4, 2.2, rng), 2),
-            2.3 if tall else round(uniform_between(1.4, 1.6, rng), 2),
-        ),
-        sill_m=0.12 if tall else 0.85,
-        recess_m=round(uniform_between(0.16, 0.24, rng), 3),
-        panes=(2, 1),
-        roof="flat",
-        cladding=choose(("plaster", "plaster", "plaster", "brick", "concrete"), rng),
-        shutters=choose(("roller", "none"), rng),
-        balconies=choose(("slab", "french" if tall else "slab", "slab"), rng),
-        sided=True,
-    )
-
-
-def _commercial(rng: Rng) -> Design:
-    bays, bay_m = choose((4, 5, 6, 7), rng), uniform_between(2.8, 3.4, rng)
-    return Design(
-        style="commercial",
-        width_m=round(min(24.0, bays * bay_m), 2),
-        depth_m=round(uniform_between(12.0, 14.0, rng), 2),
-        floors=choose((2, 3, 4, 5, 6, 7), rng),
-        bays=bays,
-        ground_m=round(uniform_between(4.0, 4.6, rng), 2),
-        storey_m=round(uniform_between(3.1, 3.4, rng), 2),
-        window_m=(
-            round(bay_m - uniform_between(0.35, 0.9, rng), 2),
-            round(uniform_between(1.7, 2.1, rng), 2),
-        ),
-        sill_m=0.8,
-        recess_m=round(uniform_between(0.12, 0.25, rng), 3),
-        panes=(choose((2, 3), rng), 1),
-        roof="flat",
-        cladding=choose(("plaster", "concrete", "concrete", "brick", "stone"), rng),
-        shops=True,
-    )
-
-
-def _house(rng: Rng) -> Design:
-    bays, bay_m = choose((3, 3, 3, 4), rng), uniform_between(2.8, 3.4, rng)
-    return Design(
-        style="house",
-        width_m=max(8.0, round(bays * bay_m, 2)),
-        depth_m=round(uniform_between(8.0, 10.5, rng), 2),
-        floors=choose((1, 2, 2), rng),
-        bays=bays,
-        ground_m=round(uniform_between(2.9, 3.3, rng), 2),
-        storey_m=round(uniform_between(2.7, 2.9, rng), 2),
-        window_m=(
-            round(uniform_between(1.1, 1.5, rng), 2),
-            round(uniform_between(1.2, 1.4, rng), 2),
-        ),
-        sill_m=0.95,
-        recess_m=round(uniform_between(0.1, 0.18, rng), 3),
-        panes=(choose((1, 2), rng), 1),
-        roof=choose(("gable", "gable", "hip"), rng),
-        cladding=choose(("plaster", "plaster", "plaster", "brick"), rng),
-        shutters=choose(("roller", "leaves", "none"), rng),
-        pitch_rad=uniform_between(0.62, 0.85, rng),
-        verge_m=round(uniform_between(0.25, 0.5, rng), 2),
-        dormers=choose((0, 0, 1), rng),
-        sided=True,
-        gable_front=is_drawn(0.4, rng),
-    )
-
-
-_DRAWN = {
-    "residential": _residential,
-    "old_town": _old_town,
-    "modern": _modern,
-    "commercial": _commercial,
-    "house": _house,
-}
-
-
-_COLORS = load_table(__package__, "building_colors", tuple[str, ...])
+def _draw_value(item: Any, rng: Rng) -> Any:
+    if isinstance(item, list):
+        return tuple(_draw_value(part, rng) for part in item)
+    if not isinstance(item, dict):
+        return item
+    if "choose" in item:
+        return choose(item["choose"], rng)
+    if "chance" in item:
+        return is_drawn(item["chance"], rng)
+    value = uniform_between(*item["uniform"], rng)
+    return round(value, item["digits"]) if "digits" in item else value
 
 
 def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block
@@ -45,7 +45,7 @@ def building(seed: int, style: str) -> Solid:
     x, y = 0.5 * plan.depth_m, 0.5 * plan.width_m
     floor = quad([(-x, -y, 0.0), (-x, y, 0.0), (x, y, 0.0), (x, -y, 0.0)], BASE)
     roof = _roof(plan, rng).moved(z=plan.eaves_m)
-    hull = collision_hulls.box((-x, -y, 0.0), (x, y, plan.eaves_m + 0.5))
+    hull = hulls.box((-x, -y, 0.0), (x, y, plan.eaves_m + 0.5))
     return make_solid([*walls, floor, roof], building_materials(plan, seed), [hull])
 
 
@@ -81,7 +81,7 @@ def garage(seed: int) -> Solid:
     x = 0.5 * deep
     floor = quad([(-x, -half, 0.0), (-x, half, 0.0), (x, half, 0.0), (x, -half, 0.0)], BASE)
     roof = block((-x - 0.05, -half - 0.05, high), (x + 0.12, half + 0.05, high + 0.16), slot=METAL)
-    hull = collision_hulls.box((-x, -half, 0.0), (x, half, high + 0.16))
+    hull = hulls.box((-x, -half, 0.0), (x, half, high + 0.16))
     return make_solid([*walls, floor, roof], building_materials(plan, seed), [hull])
 
 

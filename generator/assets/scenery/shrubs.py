@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, patterned_material
 from gen_data.generator.assets.procedural.noise import uniform
@@ -43,9 +43,7 @@ def hedge(seed: int) -> Solid:
     core = core.moved(z=0.5 * (size[2] - 0.05))
     anchors = _skin(size, 700, rng)
     middle = np.array([0.0, 0.0, 0.4 * size[2]])
-    hull = collision_hulls.box(
-        (-0.5 * size[0], -0.5 * size[1], 0.0), (0.5 * size[0], 0.5 * size[1], size[2])
-    )
+    hull = hulls.box((-0.5 * size[0], -0.5 * size[1], 0.0), (0.5 * size[0], 0.5 * size[1], size[2]))
     return _leafy(core, anchors, middle, 2600, 0.1, hull, rng)
 
 
@@ -62,7 +60,7 @@ def bush(seed: int) -> Solid:
         lobes.append((away * math.cos(turn), away * math.sin(turn), z, r))
     core = join_patches([_round(x, y, z, 0.82 * r) for x, y, z, r in lobes])
     anchors = np.concatenate([_shell(x, y, z, r, 90, rng) for x, y, z, r in lobes])
-    hull = collision_hulls.frustum((0.45 * h, 0.0), (0.4 * h, 0.9 * h), 12)
+    hull = hulls.frustum((0.45 * h, 0.0), (0.4 * h, 0.9 * h), 12)
     middle = np.array([0.0, 0.0, 0.3 * h])
     return _leafy(core, anchors, middle, 2400, 0.12 + 0.03 * h, hull, rng)
 
@@ -91,7 +89,7 @@ def planter(seed: int) -> Solid:
     core = join_patches([*(_round(*head[:3], 0.8 * head[3]).painted(1) for head in heads), *tub])
     anchors = np.concatenate([_shell(*head, 60, rng) for head in heads])
     anchors = anchors[anchors[:, 2] > h]
-    hull = collision_hulls.box((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h))
+    hull = hulls.box((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h))
     stuff = (
         patterned_material("texture/concrete?seed=3", 1.5, 0.9, (0.8, 0.78, 0.75)),
         patterned_material("texture/wood_grain?seed=5", 1.2, 0.8, (0.5, 0.42, 0.36)),

@@ -12,9 +12,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import circle, grid
@@ -22,7 +22,6 @@ from gen_data.generator.assets.procedural.variant_rng import uniform_between, va
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 
 Shape = Literal["disc", "octagon", "triangle", "yield", "diamond", "square", "wide"]
 Kind = Literal["regulatory", "mandatory", "warning", "information"]
@@ -74,7 +73,7 @@ def traffic_sign(seed: int, sign: str) -> Solid:
         printed=True,
         role="sign",
     )
-    hull = collision_hulls.frustum((0.03, 0.0), (0.03, centre_z + half_high - 0.02), 8)
+    hull = hulls.frustum((0.03, 0.0), (0.03, centre_z + half_high - 0.02), 8)
     return make_solid([face, pole], (image, painted_material("#8c8f90", 0.6), GALVANISED), [hull])
 
 
@@ -88,11 +87,7 @@ def sign_name(seed: int, sign: str) -> str:
     """The name of a sign; by seed for ``any``. Raises AssetError for an unknown one."""
     if sign == "any":
         return list(SIGNS)[seed % len(SIGNS)]
-    if sign not in SIGNS:
-        raise AssetError(
-            f"traffic_sign: there is no sign '{sign}'{did_you_mean(sign, SIGNS)}; expected any or "
-            f"one of {', '.join(SIGNS)}"
-        )
+    check_option("traffic_sign", "sign", sign, ("any", *SIGNS))
     return sign
 
 

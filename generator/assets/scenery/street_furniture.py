@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import (
     metal_material,
@@ -46,7 +46,7 @@ def street_light(seed: int) -> Solid:
         head, lens, at = _arm_head(height, reach, rise=0.5 if style == "curved" else 0.12)
     finish = GALVANISED if is_drawn(0.5, rng) else painted_material(choose(_IRON_PAINTS, rng), 0.5)
     glass = Material((0.75, 0.76, 0.74), roughness=0.2, role="lamp")
-    hull = collision_hulls.frustum((0.085, 0.0), (0.04, height), 12)
+    hull = hulls.frustum((0.085, 0.0), (0.04, height), 12)
     lamp = Keypoint("lamp", at, 0.1)
     return make_solid([mast, head, lens.painted(1)], (finish, glass), [hull], (lamp,))
 
@@ -65,7 +65,7 @@ def litter_bin(seed: int) -> Solid:
         body = lathe([*shell, (0.0, z + h - 0.08)], 18).moved(r + 0.04)
         mast = post(0.03, (0.0, 1.2), sides=8)
         parts = [body, mast.painted(1), _bracket(r, z).painted(1)]
-        hull = collision_hulls.frustum((r, z), (r, z + h), 12) + np.array([r + 0.04, 0.0, 0.0])
+        hull = hulls.frustum((r, z), (r, z + h), 12) + np.array([r + 0.04, 0.0, 0.0])
         return make_solid(parts, (color, GALVANISED, dark), [hull])
     r, h = uniform_between(0.22, 0.3, rng), uniform_between(0.75, 0.95, rng)
     profile = [(0.0, 0.0), (0.9 * r, 0.0), (r, 0.06), (r, h), (0.9 * r, h), (0.88 * r, h - 0.12)]
@@ -74,9 +74,7 @@ def litter_bin(seed: int) -> Solid:
     stays = [post(0.012, (h - 0.02, h + 0.17), (0.93 * r * x, 0.93 * r * y, 0.0), 5)
              for x, y in ((1, 0), (-0.5, 0.866), (-0.5, -0.866))]  # fmt: skip
     parts = [body, hood, *(stay.painted(1) for stay in stays)]
-    return make_solid(
-        parts, (color, GALVANISED, dark), [collision_hulls.frustum((r, 0.0), (r, h), 12)]
-    )
+    return make_solid(parts, (color, GALVANISED, dark), [hulls.frustum((r, 0.0), (r, h), 12)])
 
 
 def bench(seed: int) -> Solid:
@@ -104,7 +102,7 @@ def bench(seed: int) -> Solid:
     wood = patterned_material(
         f"texture/wood_grain?seed={choose((2, 5), rng)}", 1.2, 0.7, (0.75, 0.72, 0.7)
     )
-    hull = collision_hulls.box((-0.34, -half, 0.0), (0.27, half, seat))
+    hull = hulls.box((-0.34, -half, 0.0), (0.27, half, seat))
     return make_solid(parts, (wood, painted_material(choose(_IRON_PAINTS, rng), 0.5)), [hull])
 
 
@@ -140,7 +138,7 @@ def hydrant(seed: int) -> Solid:
     paint = choose(("#b3201b", "#b3201b", "#c9a227", "#2c5c94"), rng)
     caps = choose(("#b3201b", "#c8cacb", "#d0cfc8"), rng)
     parts = [body, front.painted(1), cap.painted(1), *(o.painted(1) for o in outlets)]
-    hull = collision_hulls.frustum((0.15, 0.0), (0.12, h), 12)
+    hull = hulls.frustum((0.15, 0.0), (0.12, h), 12)
     return make_solid(parts, (painted_material(paint, 0.4), painted_material(caps, 0.4)), [hull])
 
 
@@ -154,9 +152,7 @@ def bollard(seed: int) -> Solid:
             [(0.0, 0.0), (r, 0.0), (0.92 * r, 0.7 * h), (0.6 * r, 0.82 * h), (0.0, 0.86 * h)], 18
         )
         stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9, (0.9, 0.88, 0.85))
-        return make_solid(
-            [body], (stone,), [collision_hulls.frustum((r, 0.0), (0.9 * r, 0.8 * h), 12)]
-        )
+        return make_solid([body], (stone,), [hulls.frustum((r, 0.0), (0.9 * r, 0.8 * h), 12)])
     r = uniform_between(0.035, 0.055, rng)
     if kind == "iron":
         r = 1.4 * r
@@ -185,7 +181,7 @@ def bollard(seed: int) -> Solid:
         ]
     paint = painted_material(choose((*_IRON_PAINTS, "#7b7f82"), rng), 0.45)
     stripe = painted_material(choose(("#b3201b", "#e8e7e2"), rng), 0.35)
-    return make_solid(parts, (paint, stripe), [collision_hulls.frustum((1.2 * r, 0.0), (r, h), 12)])
+    return make_solid(parts, (paint, stripe), [hulls.frustum((1.2 * r, 0.0), (r, h), 12)])
 
 
 def bollard_facts(seed: int) -> Facts:
@@ -213,8 +209,8 @@ def traffic_cone(seed: int) -> Solid:
     orange, white = painted_material("#e2561b", 0.6), painted_material("#e6e6e2", 0.4)
     base = painted_material(choose(("#c94d1a", "#232425"), rng), 0.8)
     hull = [
-        collision_hulls.frustum((0.235 * h, 0.04), (0.045 * h, h), 12),
-        collision_hulls.box((-half, -half, 0.0), (half, half, 0.04)),
+        hulls.frustum((0.235 * h, 0.04), (0.045 * h, h), 12),
+        hulls.box((-half, -half, 0.0), (half, half, 0.04)),
     ]
     return make_solid([*pieces, tip, foot], (orange, white, base), hull)
 
@@ -237,7 +233,7 @@ def post_box(seed: int) -> Solid:
         (("#e0b21c", "#2b2b2b"), ("#b3201b", "#d8d6cf"), ("#274b8f", "#e0dfda")), rng
     )
     parts = [body, flap, plate, *(leg.painted(2) for leg in legs)]
-    hull = collision_hulls.box((-x, -0.5 * w, 0.0), (x, 0.5 * w, z + h))
+    hull = hulls.box((-x, -0.5 * w, 0.0), (x, 0.5 * w, z + h))
     return make_solid(
         parts, (painted_material(color, 0.4), painted_material(trim, 0.5), GALVANISED), [hull]
     )
@@ -286,8 +282,8 @@ def bus_stop(seed: int) -> Solid:
         role="sign",
     )
     walls = [
-        collision_hulls.box((-x - 0.03, -half, 0.0), (-x + 0.03, half, h)),
-        collision_hulls.box((-x, -half, h), (x, half, h + 0.1)),
+        hulls.box((-x - 0.03, -half, 0.0), (-x + 0.03, half, h)),
+        hulls.box((-x, -half, h), (x, half, h + 0.1)),
     ]
     frame = painted_material(choose(_IRON_PAINTS, rng), 0.45)
     return make_solid(parts, (frame, glass, painted_material("#5f6365", 0.5), wood, art), walls)
@@ -304,7 +300,7 @@ def utility_pole(seed: int) -> Solid:
         for y in (-0.8, -0.35, 0.35, 0.8):
             parts.append(post(0.035, (z + 0.05, z + 0.2), (0.0, y, 0.0), 8).painted(1))
     bark = patterned_material("texture/bark?seed=1", 1.0, 0.9, (0.17, 0.13, 0.1))
-    hull = collision_hulls.frustum((0.14, 0.0), (0.1, h), 12)
+    hull = hulls.frustum((0.14, 0.0), (0.1, h), 12)
     return make_solid([pole, *parts], (bark, painted_material("#8b8f90", 0.3)), [hull])
 
 
@@ -332,7 +328,7 @@ def cabinet(seed: int) -> Solid:
     grey = painted_material(choose(("#8d9091", "#a5a79f", "#6f7a70", "#b0aea6"), rng), 0.6)
     parts = [body, lid, plinth.painted(2), *seams, handle]
     concrete = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
-    hull = collision_hulls.box((-x, -y, 0.0), (x, y, h))
+    hull = hulls.box((-x, -y, 0.0), (x, y, h))
     return make_solid(parts, (grey, painted_material("#3b3d3f", 0.6), concrete), [hull])
 
 
@@ -347,7 +343,7 @@ def bike_rack(seed: int) -> Solid:
         0.024,
     )  # fmt: skip
     at = [pitch * (k - 0.5 * (count - 1)) for k in range(count)]
-    parts = collision_hulls.box((-half, -0.025, 0.0), (half, 0.025, h))
+    parts = hulls.box((-half, -0.025, 0.0), (half, 0.025, h))
     shells = [parts + np.array([0.0, y, 0.0]) for y in at]
     finish = GALVANISED if is_drawn(0.7, rng) else _ANTHRACITE
     return make_solid([hoop.moved(y=y) for y in at], (finish,), shells)

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import (
@@ -32,7 +32,6 @@ from gen_data.generator.assets.procedural.variant_rng import (
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post, tube
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import Vec3
 
 MOUNTS = ("pole", "mast_arm")
@@ -90,7 +89,7 @@ def traffic_light(seed: int, mount: str) -> Solid:
         parts += [part.moved(0.1, -reach + 0.25, top - 0.75) for part in (high, plate)]
     elif is_drawn(0.35, rng):
         parts.append(_backboard(low))
-    hull = collision_hulls.frustum((radius, 0.0), (radius, top), 10)
+    hull = hulls.frustum((radius, 0.0), (radius, top), 10)
     return make_solid(
         parts, _materials(VEHICLE_LENSES, choose(("#262829", "#2f4236"), rng)), [hull]
     )
@@ -108,7 +107,7 @@ def pedestrian_signal(seed: int) -> Solid:
     top = float(signal.bounds_m()[1][2]) + 0.1
     button = rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
     parts = [signal, button, post(0.052, (0.0, top), sides=12).painted(POLE)]
-    hull = collision_hulls.frustum((0.052, 0.0), (0.052, top), 10)
+    hull = hulls.frustum((0.052, 0.0), (0.052, top), 10)
     materials = list(_materials(PEDESTRIAN_LENSES, "#262829"))
     materials[BOARD] = painted_material("#d9a520", 0.5)
     return make_solid(parts, materials, [hull])
@@ -177,9 +176,5 @@ def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
 def _mount(seed: int, mount: str) -> str:
     if mount == "any":
         return MOUNTS[1] if seed % 4 == 2 else MOUNTS[0]
-    if mount not in MOUNTS:
-        raise AssetError(
-            f"traffic_light: there is no mount '{mount}'{did_you_mean(mount, MOUNTS)}; expected "
-            f"any, {', '.join(MOUNTS)}"
-        )
+    check_option("traffic_light", "mount", mount, ("any", *MOUNTS))
     return mount

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
 from gen_data.generator.assets.procedural.noise import uniform
 from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh
@@ -30,7 +30,7 @@ from gen_data.generator.assets.scenery.foliage import (
     sprays_about,
 )
 from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
-from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.streams import Rng
 
 SPECIES = ("broad", "round", "columnar", "birch", "young", "conifer")
@@ -79,11 +79,7 @@ def tree(seed: int, species: str, leaves: float) -> Solid:
     Raises:
         AssetError: for an unknown species or a share outside of [0, 1].
     """
-    if species not in SPECIES:
-        raise AssetError(
-            f"tree: there is no species '{species}'{did_you_mean(species, SPECIES)}; expected one "
-            f"of {', '.join(SPECIES)}"
-        )
+    check_option("tree", "species", species, SPECIES)
     if not 0.0 <= leaves <= 1.0:
         raise AssetError(f"tree: leaves={leaves} is not a share between 0 and 1")
     rng = variant_rng(f"tree/{species}", seed)
@@ -104,7 +100,7 @@ def _broadleaf(shape: Shape, leaves: float, rng: Rng) -> Solid:
     # Thin twigs hide behind leaves; without leaves they are the crown.
     thinnest = 0.0 if leaves < 0.05 else 0.2 * shape.trunk_m
     mesh = finish_mesh(_flared(wood(skeleton, thinnest, 2)), (bark,), 60.0)
-    hull = collision_hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
+    hull = hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
     count = round(_LEAVES * leaves)
     if count:
         greens = leaf_greens(shape.green, rng)
@@ -190,7 +186,7 @@ def _conifer(rng: Rng) -> Solid:
     mesh = merge_meshes(
         finish_mesh(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng)
     )
-    hull = collision_hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
+    hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
 

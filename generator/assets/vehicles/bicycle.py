@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
@@ -24,7 +24,8 @@ from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
-from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
+from gen_data.generator.assets.vehicles.vehicle_materials import materials
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
@@ -95,22 +96,22 @@ def cyclist_facts(seed: int) -> Facts:
 def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
     """A thin wheel about the origin, its axle along Y."""
     ring = circle(tyre_m, 6) + np.array([radius_m - tyre_m, 0.0])
-    tyre = lathe([*map(tuple, ring), tuple(ring[0])], 24, VehicleSlot.TYRE)
+    tyre = lathe([*map(tuple, ring), tuple(ring[0])], 24, Slot.TYRE)
     rim = lathe(
         [(radius_m - 1.7 * tyre_m - 0.014, h) for h in (0.6 * tyre_m, -0.6 * tyre_m)]
         + [(radius_m - 1.4 * tyre_m, h) for h in (-0.7 * tyre_m, 0.7 * tyre_m)]
         + [(radius_m - 1.7 * tyre_m - 0.014, 0.6 * tyre_m)],
         24,
-        VehicleSlot.RIM,
+        Slot.RIM,
     )
-    hub = cone((0.022, -0.035), (0.022, 0.035), 6, VehicleSlot.CHROME)
+    hub = cone((0.022, -0.035), (0.022, 0.035), 6, Slot.CHROME)
     wires = []
     for k in range(spokes):
         turn = 2.0 * math.pi * k / spokes
         end = (radius_m - 2.2 * tyre_m) * np.array([math.cos(turn), math.sin(turn), 0.0])
         start = np.array([0.02 * end[1], -0.02 * end[0], 0.03 * (-1) ** k])
         wires.append(
-            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=VehicleSlot.CHROME)
+            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=Slot.CHROME)
         )
     return join_patches([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
 
@@ -128,8 +129,8 @@ def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top:
         Keypoint("taillight", (frame.saddle[0] - 0.14, 0.0, frame.saddle[1] - 0.1), 0.06),
     )
     hull = [
-        collision_hulls.box((-reach, -0.05, 0.0), (reach, 0.05, 0.7)),
-        collision_hulls.box((-0.45, -0.28, 0.25), (0.45, 0.28, top)),
+        hulls.box((-reach, -0.05, 0.0), (reach, 0.05, 0.7)),
+        hulls.box((-0.45, -0.28, 0.25), (0.45, 0.28, top)),
     ]
     return make_solid([drop_uvs(part) for part in parts], finish, hull, points)
 
@@ -140,17 +141,17 @@ def _machine(style: str, frame: _Frame, turn_rad: float, rng: Rng) -> list[Patch
     parts = [wheel.moved(sign * frame.axle, 0.0, frame.wheel_m) for sign in (1.0, -1.0)]
     parts += [*_tubes(frame), *_bars(style, frame), *_drive(frame, turn_rad)]
     x, z = frame.saddle
-    parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), VehicleSlot.TRIM))
-    parts.append(limb([_at((x + 0.1, z)), _at((x + 0.15, z))], (0.03, 0.016), VehicleSlot.TRIM))
+    parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), Slot.TRIM))
+    parts.append(limb([_at((x + 0.1, z)), _at((x + 0.15, z))], (0.03, 0.016), Slot.TRIM))
     x, z = frame.head
-    parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), VehicleSlot.HEADLIGHT))
+    parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), Slot.HEADLIGHT))
     x, z = frame.saddle
-    parts.append(blob((x - 0.14, 0.0, z - 0.1), (0.018, 0.03, 0.025), VehicleSlot.TAILLIGHT))
+    parts.append(blob((x - 0.14, 0.0, z - 0.1), (0.018, 0.03, 0.025), Slot.TAILLIGHT))
     if style == "city":
         parts += [_mudguard(frame, 1.0, (0.2, 2.0)), _mudguard(frame, -1.0, (0.8, 3.3))]
         parts += _rack(frame)
         if is_drawn(0.5, rng):
-            parts.append(block((0.3, -0.18, 0.98), (0.55, 0.18, 1.18), 0.02, VehicleSlot.TRIM))
+            parts.append(block((0.3, -0.18, 0.98), (0.55, 0.18, 1.18), 0.02, Slot.TRIM))
     return parts
 
 
@@ -159,8 +160,8 @@ def _tubes(frame: _Frame) -> list[Patch]:
     step = crank + frame.step * (seat - crank)
     radius = 0.017
     bars = [(crank, seat), (step, head - 0.12 * (head - fork)), (crank, fork), (head, fork)]
-    parts = [limb(bar, (radius, radius), VehicleSlot.PAINT, 6) for bar in bars]
-    parts.append(limb([seat, _at(frame.saddle)], (0.013, 0.013), VehicleSlot.CHROME, 6))
+    parts = [limb(bar, (radius, radius), Slot.PAINT, 6) for bar in bars]
+    parts.append(limb([seat, _at(frame.saddle)], (0.013, 0.013), Slot.CHROME, 6))
     for sign in (1.0, -1.0):
         out = np.array([0.0, sign * 0.055, 0.0])
         rear = np.array([-frame.axle, sign * 0.065, frame.wheel_m])
@@ -170,14 +171,14 @@ def _tubes(frame: _Frame) -> list[Patch]:
             (seat + 0.3 * out, rear),
             (fork + out, front),
         ):
-            parts.append(limb([start, end], (0.012, 0.009), VehicleSlot.PAINT, 5))
+            parts.append(limb([start, end], (0.012, 0.009), Slot.PAINT, 5))
     return parts
 
 
 def _bars(style: str, frame: _Frame) -> list[Patch]:
     x, y, z = frame.grip
     stem = np.array([frame.head[0] - 0.01, 0.0, z - (0.0 if style == "road" else 0.03)])
-    parts = [limb([_at(frame.head), stem], (0.014, 0.014), VehicleSlot.CHROME, 6)]
+    parts = [limb([_at(frame.head), stem], (0.014, 0.014), Slot.CHROME, 6)]
     for sign in (1.0, -1.0):
         grip = np.array([x, sign * y, z])
         corner = np.array([stem[0] + 0.06, sign * (y - 0.04), z])
@@ -190,12 +191,10 @@ def _bars(style: str, frame: _Frame) -> list[Patch]:
                 grip + np.array([0.01, 0.0, -0.11]),
                 grip + np.array([-0.1, 0.0, -0.13]),
             ]
-        parts.append(limb(path, (0.012,) * len(path), VehicleSlot.TRIM, 5))
+        parts.append(limb(path, (0.012,) * len(path), Slot.TRIM, 5))
         tip = grip + np.array([-0.09, sign * 0.02, 0.0])
         if style != "road":
-            parts.append(
-                limb([grip + 0.5 * (grip - tip), tip], (0.016, 0.016), VehicleSlot.TRIM, 6)
-            )
+            parts.append(limb([grip + 0.5 * (grip - tip), tip], (0.016, 0.016), Slot.TRIM, 6))
     return parts
 
 
@@ -207,26 +206,26 @@ def _pedals(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
 
 
 def _drive(frame: _Frame, turn_rad: float) -> list[Patch]:
-    ring = lathe([(0.0, -0.004), (0.09, -0.004), (0.09, 0.004), (0.0, 0.004)], 16, VehicleSlot.TRIM)
+    ring = lathe([(0.0, -0.004), (0.09, -0.004), (0.09, 0.004), (0.0, 0.004)], 16, Slot.TRIM)
     x, z = frame.crank
     parts = [ring.rotated("x", 0.5 * math.pi).moved(x, -0.05, z)]
     for sign, pedal in zip((1.0, -1.0), _pedals(frame, turn_rad), strict=True):
         axle, (px, py, pz) = np.array([x, sign * 0.07, z]), pedal
         arm = [axle, np.array([px, sign * 0.07, pz])]
-        parts.append(limb(arm, (0.012, 0.01), VehicleSlot.CHROME, 5))
+        parts.append(limb(arm, (0.012, 0.01), Slot.CHROME, 5))
         parts.append(
             block(
                 (px - 0.045, py - 0.045, pz - 0.012),
                 (px + 0.045, py + 0.045, pz + 0.012),
                 0.0,
-                VehicleSlot.TRIM,
+                Slot.TRIM,
             )
         )
     rear = np.array([-frame.axle, -0.05, frame.wheel_m])
     for up in (1.0, -1.0):
         near, far = (np.array([0.0, 0.0, up * r]) for r in (0.085, 0.035))
         chain = [np.array([x, -0.05, z]) + near, rear + far]
-        parts.append(limb(chain, (0.005, 0.005), VehicleSlot.TRIM, 4))
+        parts.append(limb(chain, (0.005, 0.005), Slot.TRIM, 4))
     return parts
 
 
@@ -243,17 +242,17 @@ def _mudguard(frame: _Frame, sign: float, arc_rad: tuple[float, float]) -> Patch
     )
     section = np.array([(0.004, 0.0), (-0.006, 0.028), (-0.006, -0.028)])
     return join_patches(
-        sweep(np.array(pair), section, up=(0.0, 0.0, 1.0), slot=VehicleSlot.PAINT)
+        sweep(np.array(pair), section, up=(0.0, 0.0, 1.0), slot=Slot.PAINT)
         for pair in pairwise(path)
     )
 
 
 def _rack(frame: _Frame) -> list[Patch]:
     x, z = -frame.axle, 2.0 * frame.wheel_m + 0.07
-    top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, VehicleSlot.TRIM)
+    top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, Slot.TRIM)
     stays = [
         limb([np.array([x, s * 0.07, frame.wheel_m]), np.array([x - 0.1, s * 0.06, z])],
-             (0.006, 0.006), VehicleSlot.TRIM, 4)
+             (0.006, 0.006), Slot.TRIM, 4)
         for s in (1.0, -1.0)
     ]  # fmt: skip
     return [top, *stays]
