@@ -177,10 +177,10 @@ def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[MeshRows]:
     _model_face(head)
     trunk = _upright(bones, OUTLINES["trunk"], 24, spine)
     made = [
-        _divided(head, "face", (body_regions.HAIRLINE, body_regions.SHOULDERS)),
-        _divided(trunk, "hips", (body_regions.WAIST, *body_regions.FRONT)),
-        _divided(_ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
-        _divided(
+        _divide(head, "face", (body_regions.HAIRLINE, body_regions.SHOULDERS)),
+        _divide(trunk, "hips", (body_regions.WAIST, *body_regions.FRONT)),
+        _divide(_ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
+        _divide(
             _upright(bones, OUTLINES["skirt"], 24, ("pelvis",), split=True),
             "skirt_top",
             body_regions.SKIRT,
@@ -200,29 +200,29 @@ def _limbs(bones: Mapping[str, tuple[str, Array]], side: str, sign: float) -> Se
     eye = _ball(bones, (0.1335, 0.031, 0.728), (0.0145, 0.0145, 0.0075))
     brow = _ball(bones, (0.137, 0.033, 0.75), (0.008, 0.021, 0.0045))
     ear = _ball(bones, (0.045, 0.079, 0.715), (0.017, 0.007, 0.028))
-    short = body_regions.Cut("torso", "sleeves", _beyond(0.145))
+    short = body_regions.Cut("torso", "sleeves", _level_beyond(0.145))
     made = [
-        _divided(arm, "", (body_regions.Cut("", "arms", _beyond(0.1)),)),
-        _divided(arm, "torso", (short,)),
-        _divided(hand, "hands", ()),
-        _divided(bare, "legs", (body_regions.THIGH,)),
-        _divided(bare, "thighs", (body_regions.KNEE, body_regions.CUFF)),
-        _divided(foot, "shoes", (body_regions.SOLE,)),
-        _divided(eye, "eyes", (body_regions.Cut("eyes", "irises", _pupil),)),
-        _divided(brow, "brows", ()),
-        _divided(ear, "face", ()),
+        _divide(arm, "", (body_regions.Cut("", "arms", _level_beyond(0.1)),)),
+        _divide(arm, "torso", (short,)),
+        _divide(hand, "hands", ()),
+        _divide(bare, "legs", (body_regions.THIGH,)),
+        _divide(bare, "thighs", (body_regions.KNEE, body_regions.CUFF)),
+        _divide(foot, "shoes", (body_regions.SOLE,)),
+        _divide(eye, "eyes", (body_regions.Cut("eyes", "irises", _pupil),)),
+        _divide(brow, "brows", ()),
+        _divide(ear, "face", ()),
     ]
-    return made if sign > 0.0 else [_mirrored(rows) for rows in made]
+    return made if sign > 0.0 else [_mirror(rows) for rows in made]
 
 
-def _mirrored(rows: MeshRows) -> MeshRows:
+def _mirror(rows: MeshRows) -> MeshRows:
     """Left limbs as right ones: they were made with the right bones already."""
     values = rows.values.copy()
     values[:, 1] *= -1.0
     return MeshRows(values, rows.faces[:, ::-1], rows.zones)
 
 
-def _beyond(distance_m: float) -> Level:
+def _level_beyond(distance_m: float) -> Level:
     def level(p: Array) -> Array:
         return np.asarray(((p - _SHOULDER) * _DOWN_OUT).sum(axis=1) - distance_m)
 
@@ -233,13 +233,13 @@ def _pupil(p: Array) -> Array:
     return np.asarray(0.0065 - np.abs(p[:, 1] - 0.031))
 
 
-def _divided(loft: tuple[Array, Indices], zone: str, cuts: Sequence[body_regions.Cut]) -> MeshRows:
+def _divide(loft: tuple[Array, Indices], zone: str, cuts: Sequence[body_regions.Cut]) -> MeshRows:
     return body_regions.apply_cuts(make_rows(*loft, zone), cuts)
 
 
 def _upright(
     bones: Mapping[str, tuple[str, Array]],
-    outline: Sequence[tuple[float, float, float, float]],
+    outline: Sequence[Sequence[float]],
     columns: int,
     chain: Sequence[str],
     *,
@@ -333,7 +333,7 @@ def _curtain(bones: Mapping[str, tuple[str, Array]]) -> MeshRows:
     weights = _along_chain(bones, places[:, 2], ("spine_03", "neck_01", "head"), 2)
     columns = body_regions.CURTAIN_COLUMNS
     faces = grid_faces(len(places) // columns, columns)
-    return _divided((np.concatenate([places, weights], axis=1), faces), "hair", body_regions.HAIR)
+    return _divide((np.concatenate([places, weights], axis=1), faces), "hair", body_regions.HAIR)
 
 
 def _loft(middles: Array, axes: Array, halves: Array, columns: int) -> tuple[Array, Indices]:

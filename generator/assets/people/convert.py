@@ -82,7 +82,7 @@ def convert(source: Path, target: Path) -> None:
 
 def _body(base: _Base) -> BodyTemplate:
     bones = tuple(base.bones)
-    parts = [_thinned(rows) for rows in _parts(base)]
+    parts = [_simplify(rows) for rows in _parts(base)]
     heads = np.stack([base.values[bone["points"]].mean(axis=0) for bone in base.bones.values()])
     values = np.concatenate([heads, _landmarks(base), *(rows.values for rows in parts)])
     faces: dict[str, Indices] = {}
@@ -117,7 +117,7 @@ def _parts(base: _Base) -> Iterator[MeshRows]:
     yield _cut(base, ("body",), "face", body_regions.BODY)
     yield _cut(base, ("helper-l-eye", "helper-r-eye"), "eyes", body_regions.EYES)
     yield _cut(base, ("helper-tights",), "hips", body_regions.TIGHTS)
-    yield _spanned(base, _cut(base, ("helper-skirt",), "skirt_top", body_regions.SKIRT))
+    yield _span_legs(base, _cut(base, ("helper-skirt",), "skirt_top", body_regions.SKIRT))
     yield body_regions.apply_cuts(_curtain(base), body_regions.HAIR)
 
 
@@ -145,7 +145,7 @@ def _curtain(base: _Base) -> MeshRows:
     return make_rows(values, grid_faces(len(places) // columns, columns), "hair")
 
 
-def _spanned(base: _Base, rows: MeshRows) -> MeshRows:
+def _span_legs(base: _Base, rows: MeshRows) -> MeshRows:
     """A skirt whose middle follows both legs, so that it does not part between them."""
     first = 3 + 3 * len(base.targets)
     left, right = (first + list(base.bones).index(f"thigh_{side}") for side in "lr")
@@ -156,7 +156,7 @@ def _spanned(base: _Base, rows: MeshRows) -> MeshRows:
     return MeshRows(values, rows.faces, rows.zones)
 
 
-def _thinned(rows: MeshRows) -> MeshRows:
+def _simplify(rows: MeshRows) -> MeshRows:
     """Each zone with its number of triangles, and no row that nothing uses."""
     for zone, faces in body_regions.ZONE_TRIANGLES.items():
         if (rows.zones == zone).sum() > faces:

@@ -115,14 +115,14 @@ def build_person(person: Person, figure: Figure) -> Solid:
     bones = len(body.bones)
     rotations = bone_rotations(body, points[:bones], _stance(person))
     transforms = bone_transforms(body, points[:bones], rotations)
-    sheets = [_posed(piece, body, transforms) for piece in figure.pieces]
+    sheets = [_pose_piece(piece, body, transforms) for piece in figure.pieces]
     marks = slice(0, bones + len(LANDMARKS))
     posed = skin_points(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
     sheets += [
         _Sheet(prop.vertices_m, prop.normals, prop.faces, prop.slots, prop.materials)
         for prop in props.make_props(person, body, posed, transforms, scale)
     ]
-    mesh, shift = _grounded(sheets, body, posed)
+    mesh, shift = _join_on_ground(sheets, body, posed)
     keypoints = tuple(
         Keypoint(name, _vec(posed[_index(body, mark)] + shift), round(radius * scale, 4))
         for name, mark, radius in KEYPOINTS
@@ -138,14 +138,16 @@ def _stance(person: Person) -> Stance:
     return shorten_stride(made, _NARROW_STRIDE) if narrow and person.pose != "sit" else made
 
 
-def _posed(piece: _Piece, body: BodyTemplate, transforms: Array) -> _Sheet:
+def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> _Sheet:
     bones, weights = body.weight_bones[piece.used], body.weights[piece.used]
     moved = skin_points(piece.vertices_m, bones, weights, transforms)
     normals = vertex_normals(moved, piece.faces)
     return _Sheet(moved, normals, piece.faces, piece.slots, piece.materials)
 
 
-def _grounded(sheets: list[_Sheet], body: BodyTemplate, posed: Array) -> tuple[MeshData, Array]:
+def _join_on_ground(
+    sheets: list[_Sheet], body: BodyTemplate, posed: Array
+) -> tuple[MeshData, Array]:
     """The sheets as one mesh whose lowest vertex has z = 0, and the shift that took it there."""
     vertices = np.concatenate([sheet.vertices_m for sheet in sheets])
     # Between the ankles lies the origin: a stride reaches as far ahead as behind.
@@ -159,7 +161,7 @@ def _grounded(sheets: list[_Sheet], body: BodyTemplate, posed: Array) -> tuple[M
         MeshData(
             vertices_m=(np.rint((vertices + shift) / _GRID_M) * _GRID_M + 0.0).astype(np.float32),
             faces=np.concatenate(faces).astype(np.int32),
-            normals=_rounded(np.concatenate([sheet.normals for sheet in sheets])),
+            normals=_round_normals(np.concatenate([sheet.normals for sheet in sheets])),
             uvs=np.zeros((len(vertices), 2), np.float32),
             face_slots=np.concatenate(slots).astype(np.int32),
             materials=tuple(material for sheet in sheets for material in sheet.materials),
@@ -168,7 +170,7 @@ def _grounded(sheets: list[_Sheet], body: BodyTemplate, posed: Array) -> tuple[M
     )
 
 
-def _rounded(normals: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
+def _round_normals(normals: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
     return (np.round(normals, 5) + 0.0).astype(np.float32)
 
 

@@ -13,15 +13,14 @@ from gen_data.generator.assets.procedural.material_presets import (
     CAPS,
     PALETTES,
     STEEL,
-    hex_to_linear,
-    jitter_color,
+    draw_linear,
     metal_material,
     plastic_material,
     printed_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch, make_centred_solid
 from gen_data.generator.assets.procedural.surface_shapes import Point2, fillet, lathe
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
 
 # Width by height of the unrolled label, which the drawing of its texture goes by.
@@ -65,9 +64,9 @@ BOTTLES = load_table(__package__, "bottles", BottleStyle)
 def bottle(seed: int) -> Solid:
     """A bottle of one of the styles in ``BOTTLES``. Slots: body, label, cap."""
     rng = variant_rng("bottle", seed)
-    style = BOTTLES[tuple(BOTTLES)[seed % len(BOTTLES)]]
-    height, radius = uniform_between(*style.height_m, rng), uniform_between(*style.radius_m, rng)
-    neck_z = height * uniform_between(*style.neck_share, rng)
+    style = BOTTLES[in_turn(tuple(BOTTLES), seed)]
+    height, radius = rng.between(*style.height_m), rng.between(*style.radius_m)
+    neck_z = height * rng.between(*style.neck_share)
     z0, z1 = height * style.label_share[0], min(height * style.label_share[1], neck_z - 0.01)
     shoulder = [
         (style.neck_m + r * (radius - style.neck_m), z1 + t * (neck_z - z1))
@@ -77,7 +76,7 @@ def bottle(seed: int) -> Solid:
     cap_z, neck_top = height - cap_height, height - 0.4 * cap_height
     upper = [*shoulder, (style.neck_m, neck_z), (style.neck_m, neck_top)]
     patches = [
-        *_labelled(radius, (z0, z1), upper, [0.06] * (len(upper) - 1)),
+        *_wall_with_label(radius, (z0, z1), upper, [0.06] * (len(upper) - 1)),
         lathe([(style.neck_m, neck_top), (0.0, neck_top)], 32, 0),
         _cap(cap_radius, cap_z, height),
     ]
@@ -91,14 +90,11 @@ def bottle(seed: int) -> Solid:
         (0.97 * cap_radius, height),
     ]
     flat = np.array([1.0, style.depth, 1.0])
-    parts = [hull * flat for hull in hulls.stack(_climbing(stages))]
-    body = Material(
-        jitter_color(hex_to_linear(choose(style.colors, rng)), 0.1, rng),
-        uniform_between(*style.gloss, rng),
-    )
+    parts = [hull * flat for hull in hulls.stack(_drop_level_stages(stages))]
+    body = Material(draw_linear(style.colors, 0.1, rng), rng.between(*style.gloss))
     if style.clear:
         body = replace(body, roughness=0.04, transmission=1.0, ior=_WATER_IOR, thin=False)
-    label = printed_material(f"texture/label?seed={seed}", uniform_between(0.35, 0.6, rng))
+    label = printed_material(f"texture/label?seed={seed}", rng.between(0.35, 0.6))
     flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
     return make_centred_solid(flattened, (body, label, plastic_material(rng, style.caps)), parts)
 
@@ -106,26 +102,22 @@ def bottle(seed: int) -> Solid:
 def jar(seed: int) -> Solid:
     """A filled preserving jar with a twist-off lid. Slots: body, label, lid."""
     rng = variant_rng("jar", seed)
-    radius, height = uniform_between(0.031, 0.043, rng), uniform_between(0.085, 0.14, rng)
+    radius, height = rng.between(0.031, 0.043), rng.between(0.085, 0.14)
     top, lid_radius, mouth = height - 0.014, 0.9 * radius, 0.86 * radius
     upper = [(radius, 0.8 * height), (mouth, top - 0.003), (mouth, top + 0.004)]
     patches = [
-        *_labelled(radius, (0.2 * height, 0.66 * height), upper, [0.02, 0.006]),
+        *_wall_with_label(radius, (0.2 * height, 0.66 * height), upper, [0.02, 0.006]),
         lathe([(mouth, top + 0.004), (0.0, top + 0.004)], 32, 0),
         _lid(lid_radius, top, height),
     ]
-    glass = Material(
-        jitter_color(hex_to_linear(choose(PALETTES["fillings"], rng)), 0.15, rng),
-        uniform_between(0.06, 0.12, rng),
-    )
-    label = printed_material(f"texture/label?seed={seed + 1000}", uniform_between(0.45, 0.65, rng))
-    lid = choose(
+    glass = Material(draw_linear(PALETTES["fillings"], 0.15, rng), rng.between(0.06, 0.12))
+    label = printed_material(f"texture/label?seed={seed + 1000}", rng.between(0.45, 0.65))
+    lid = rng.choose(
         (
             metal_material((0.83, 0.69, 0.35), 0.3),
             metal_material(STEEL, 0.3),
             plastic_material(rng, CAPS),
-        ),
-        rng,
+        )
     )
     stages = [
         (0.92 * radius, 0.0),
@@ -137,7 +129,9 @@ def jar(seed: int) -> Solid:
     return make_centred_solid(patches, (glass, label, lid), hulls.stack(stages))
 
 
-def _labelled(radius: float, label: Point2, upper: list[Point2], radii: list[float]) -> list[Patch]:
+def _wall_with_label(
+    radius: float, label: Point2, upper: list[Point2], radii: list[float]
+) -> list[Patch]:
     """Bottom and wall up to the last point of ``upper``, with a label between two heights."""
     z0, z1 = label
     lower = fillet(
@@ -180,7 +174,7 @@ def _lid(radius: float, low: float, high: float) -> Patch:
     return lathe(fillet(profile, [0.0, 0.001, 0.002, 0.0, 0.0, 0.0], 2), 32, 2)
 
 
-def _climbing(stages: list[Point2]) -> list[Point2]:
+def _drop_level_stages(stages: list[Point2]) -> list[Point2]:
     """The stages without those that do not rise."""
     kept = stages[:1]
     for stage in stages[1:]:

@@ -23,7 +23,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     fillet,
     lathe,
 )
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ CANS = (
 
 def can_size(seed: int) -> CanSize:
     """Which of ``CANS`` a variant is."""
-    return CANS[seed % len(CANS)]
+    return in_turn(CANS, seed)
 
 
 def label_aspect(seed: int) -> float:
@@ -65,17 +65,17 @@ def can(seed: int) -> Solid:
     r, h = size.radius_m, size.height_m
     texture = f"texture/can_label?seed={seed}"
     if size.food:
-        print_ = printed_material(texture, uniform_between(0.5, 0.7, rng))
+        print_ = printed_material(texture, rng.between(0.5, 0.7))
         patches, stages = _food_can(r, h)
         lid: list[Patch] = []
     else:
-        print_ = printed_material(texture, uniform_between(0.25, 0.38, rng), 0.35)
+        print_ = printed_material(texture, rng.between(0.25, 0.38), 0.35)
         patches, stages = _drink_can(r, h)
         lid = _tab(0.68 * r)
         lid = [piece.moved(z=h - 0.0045) for piece in lid]
     materials = (
         print_,
-        metal_material(STEEL if size.food else ALUMINIUM, uniform_between(0.22, 0.35, rng)),
+        metal_material(STEEL if size.food else ALUMINIUM, rng.between(0.22, 0.35)),
         metal_material(ALUMINIUM, 0.3),
     )
     return make_centred_solid([*patches, *lid], materials, hulls.stack(stages))

@@ -6,10 +6,9 @@ from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import make_centred_solid
 from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 # What one wall leaves of white light; soda-lime glass has a touch of green.
 _TINTS: tuple[Vec3, ...] = (
@@ -25,9 +24,9 @@ _TINTS: tuple[Vec3, ...] = (
 def tumbler(seed: int) -> Solid:
     """A drinking glass with a thick bottom. Slots: glass."""
     rng = variant_rng("tumbler", seed)
-    height, top = uniform_between(0.085, 0.145, rng), uniform_between(0.03, 0.042, rng)
-    bottom, wall = top * uniform_between(0.74, 0.98, rng), uniform_between(0.0016, 0.0026, rng)
-    floor = uniform_between(0.006, 0.013, rng)
+    height, top = rng.between(0.085, 0.145), rng.between(0.03, 0.042)
+    bottom, wall = top * rng.between(0.74, 0.98), rng.between(0.0016, 0.0026)
+    floor = rng.between(0.006, 0.013)
     inner = bottom - wall + (top - bottom) * floor / height
     profile = fillet(
         [
@@ -51,11 +50,11 @@ def tumbler(seed: int) -> Solid:
 def wine_glass(seed: int) -> Solid:
     """A goblet on a stem. Slots: glass."""
     rng = variant_rng("wine_glass", seed)
-    foot, stem = uniform_between(0.032, 0.038, rng), uniform_between(0.0035, 0.0045, rng)
-    height, belly = uniform_between(0.17, 0.22, rng), uniform_between(0.034, 0.044, rng)
-    rim, wall = belly * uniform_between(0.72, 0.9, rng), uniform_between(0.0012, 0.0018, rng)
-    low = height * uniform_between(0.38, 0.48, rng)
-    wide = low + (height - low) * uniform_between(0.38, 0.5, rng)
+    foot, stem = rng.between(0.032, 0.038), rng.between(0.0035, 0.0045)
+    height, belly = rng.between(0.17, 0.22), rng.between(0.034, 0.044)
+    rim, wall = belly * rng.between(0.72, 0.9), rng.between(0.0012, 0.0018)
+    low = height * rng.between(0.38, 0.48)
+    wide = low + (height - low) * rng.between(0.38, 0.5)
     outer = [(stem, low - 0.008), (0.62 * belly, low + 0.008), (belly, wide), (rim, height)]
     inner = [
         (rim - wall, height),
@@ -67,7 +66,7 @@ def wine_glass(seed: int) -> Solid:
     rounded = [0.0, 0.0, 0.0004, 0.0004, 0.012, 0.02, 0.03, 0.05]
     within = [0.45 * wall, 0.45 * wall, 0.05, 0.025, 0.0]
     profile = fillet([*below, *outer, *inner], [*rounded, *within], 2)
-    levels = [_around(rim, wall, height), _around(belly, wall, wide)]
+    levels = [_ring_section(rim, wall, height), _ring_section(belly, wall, wide)]
     floor = (0.5 * belly, 0.62 * belly, low + 0.008)
     parts = [
         hulls.frustum((foot, 0.0), (foot, 0.003)),
@@ -79,9 +78,9 @@ def wine_glass(seed: int) -> Solid:
     return make_centred_solid([lathe(profile, 32)], (_glass(rng),), parts)
 
 
-def _around(radius: float, wall: float, z: float) -> tuple[float, float, float]:
+def _ring_section(radius: float, wall: float, z: float) -> tuple[float, float, float]:
     return (radius - wall, radius, z)
 
 
-def _glass(rng: Rng) -> Material:
-    return Material(choose(_TINTS, rng), roughness=0.04, transmission=1.0, ior=1.52, thin=False)
+def _glass(rng: VariantRng) -> Material:
+    return Material(rng.choose(_TINTS), roughness=0.04, transmission=1.0, ior=1.52, thin=False)

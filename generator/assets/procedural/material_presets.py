@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 STEEL: Vec3 = (0.56, 0.57, 0.58)
 STAINLESS: Vec3 = (0.66, 0.65, 0.63)
@@ -46,28 +45,32 @@ def lighten(color: Vec3, amount: float) -> Vec3:
     return (r, g, b)
 
 
-def jitter_color(color: Vec3, amount: float, rng: Rng) -> Vec3:
+def jitter_color(color: Vec3, amount: float, rng: VariantRng) -> Vec3:
     """The colour with brightness and tint moved by up to the given fraction."""
-    level = 1.0 + uniform_between(-amount, amount, rng)
+    level = 1.0 + rng.between(-amount, amount)
     r, g, b = (
-        min(1.0, max(0.0, c * level * (1.0 + uniform_between(-0.3, 0.3, rng) * amount)))
-        for c in color
+        min(1.0, max(0.0, c * level * (1.0 + rng.between(-0.3, 0.3) * amount))) for c in color
     )
     return (r, g, b)
 
 
-def ceramic_material(rng: Rng, colors: Sequence[str] = GLAZES) -> Material:
+def draw_linear(codes: Sequence[str], amount: float, rng: VariantRng) -> Vec3:
+    """One of several sRGB colours, jittered; linear RGB."""
+    return jitter_color(hex_to_linear(rng.choose(codes)), amount, rng)
+
+
+def ceramic_material(rng: VariantRng, colors: Sequence[str] = GLAZES) -> Material:
     """Glazed stoneware or porcelain."""
-    color = jitter_color(hex_to_linear(choose(colors, rng)), 0.08, rng)
-    return Material(base_color=color, roughness=uniform_between(0.1, 0.3, rng))
+    color = draw_linear(colors, 0.08, rng)
+    return Material(base_color=color, roughness=rng.between(0.1, 0.3))
 
 
 def plastic_material(
-    rng: Rng, colors: Sequence[str] = PLASTICS, gloss: tuple[float, float] = (0.25, 0.5)
+    rng: VariantRng, colors: Sequence[str] = PLASTICS, gloss: tuple[float, float] = (0.25, 0.5)
 ) -> Material:
     """Injection-moulded plastic."""
-    color = jitter_color(hex_to_linear(choose(colors, rng)), 0.06, rng)
-    return Material(base_color=color, roughness=uniform_between(*gloss, rng))
+    color = draw_linear(colors, 0.06, rng)
+    return Material(base_color=color, roughness=rng.between(*gloss))
 
 
 def metal_material(color: Vec3, roughness: float) -> Material:

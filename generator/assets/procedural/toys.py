@@ -9,20 +9,14 @@ from gen_data.generator.assets.procedural.material_presets import (
     PLASTICS,
     WOODS,
     ceramic_material,
-    hex_to_linear,
-    jitter_color,
+    draw_linear,
     plastic_material,
     printed_material,
 )
 from gen_data.generator.assets.procedural.patches import make_centred_solid, make_solid_in_place
 from gen_data.generator.assets.procedural.surface_shapes import ball as sphere
 from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe, rounded_box, spline
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
 
 _SHAPES = (
@@ -38,10 +32,10 @@ _SHAPES = (
 def block(seed: int) -> Solid:
     """A wooden or plastic building block. Slot: body."""
     rng = variant_rng("block", seed)
-    x, y, z = (side * uniform_between(0.95, 1.05, rng) for side in _SHAPES[seed % len(_SHAPES)])
-    bare = is_drawn(0.25, rng)
+    x, y, z = (side * rng.between(0.95, 1.05) for side in in_turn(_SHAPES, seed))
+    bare = rng.chance(0.25)
     paint = (
-        Material(jitter_color(hex_to_linear(choose(WOODS, rng)), 0.08, rng), 0.6)
+        Material(draw_linear(WOODS, 0.08, rng), 0.6)
         if bare
         else plastic_material(rng, PLASTICS[:8])
     )
@@ -55,10 +49,10 @@ def ball(seed: int) -> Solid:
     """A tennis, rubber, beach, basket or foot ball; the small ones are toys. Slot: cover."""
     rng = variant_rng("ball", seed)
     kind = ball_kind(seed)
-    radius = {"tennis": 0.0334, "rubber": uniform_between(0.02, 0.035, rng)}.get(
-        kind, uniform_between(0.05, 0.09, rng)
+    radius = {"tennis": 0.0334, "rubber": rng.between(0.02, 0.035)}.get(
+        kind, rng.between(0.05, 0.09)
     )
-    rough = {"tennis": 0.9, "basket": 0.65}.get(kind, uniform_between(0.3, 0.5, rng))
+    rough = {"tennis": 0.9, "basket": 0.65}.get(kind, rng.between(0.3, 0.5))
     body = sphere(lambda d: radius * d, 22, 36)
     cover = printed_material(f"texture/ball_cover?seed={seed}", rough)
     # One small hull has flat sides that a ball would rest on; four that are turned have not.
@@ -88,7 +82,7 @@ def ball_kind(seed: int) -> str:
 def candle(seed: int) -> Solid:
     """A pillar candle with a wick. Slots: wax, wick."""
     rng = variant_rng("candle", seed)
-    radius, height = uniform_between(0.022, 0.04, rng), uniform_between(0.05, 0.15, rng)
+    radius, height = rng.between(0.022, 0.04), rng.between(0.05, 0.15)
     wax = fillet(
         [
             (0.0, 0.0),
@@ -111,9 +105,7 @@ def candle(seed: int) -> Solid:
         1,
     )
     colors = ("#f1e8d2", "#e9dcc0", "#a83a34", "#3f5a4a", "#d9a441", "#7d8fa3", "#c58b8b")
-    material = Material(
-        jitter_color(hex_to_linear(choose(colors, rng)), 0.05, rng), uniform_between(0.4, 0.6, rng)
-    )
+    material = Material(draw_linear(colors, 0.05, rng), rng.between(0.4, 0.6))
     return make_centred_solid(
         [lathe(wax, 32), wick],
         (material, Material((0.02, 0.02, 0.02), 0.9)),
@@ -127,9 +119,9 @@ def candle(seed: int) -> Solid:
 def vase(seed: int) -> Solid:
     """A ceramic vase, hollow to look at. Slots: outside, inside."""
     rng = variant_rng("vase", seed)
-    height, belly = uniform_between(0.15, 0.27, rng), uniform_between(0.04, 0.06, rng)
-    foot, neck = belly * uniform_between(0.55, 0.75, rng), belly * uniform_between(0.3, 0.6, rng)
-    mouth, widest = neck * uniform_between(1.1, 1.6, rng), uniform_between(0.3, 0.55, rng)
+    height, belly = rng.between(0.15, 0.27), rng.between(0.04, 0.06)
+    foot, neck = belly * rng.between(0.55, 0.75), belly * rng.between(0.3, 0.6)
+    mouth, widest = neck * rng.between(1.1, 1.6), rng.between(0.3, 0.55)
     curve = spline(
         [
             (foot, 0.004),

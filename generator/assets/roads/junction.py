@@ -156,7 +156,7 @@ def _markings(
     stop = (start + STOP_LINE_M[0], start + STOP_LINE_M[1])
 
     def painted(r: tuple[float, float], t: tuple[float, float]) -> Patch:
-        return _draped(shape, fan, arm, r, t, slot)
+        return _drape(shape, fan, arm, r, t, slot)
 
     inner, outer = sorted((side * 0.06, side * (half - 0.15)))
     yield painted(stop, (inner, outer))
@@ -179,7 +179,7 @@ def _markings(
                 yield painted((edge, edge + NARROW_M), (float(t), float(t) + 0.5))
 
 
-def _draped(
+def _drape(
     shape: JunctionShape,
     fan: Fan,
     arm: int,

@@ -30,7 +30,7 @@ def parking_area(
         ground: What the land beside is covered with, a word of ``GROUNDS``.
         shape: Fields of ``ParkingShape``.
     """
-    profile = ParkingShape(**{**shape, **_whole(shape)})
+    profile = ParkingShape(**{**shape, **_round_counts(shape)})
     materials = street_materials(seed, wear, paving, ground)
     slots = {name: k for k, name in enumerate(materials)}
     x, y = 0.5 * profile.length_m + EDGE_M, 0.5 * profile.width_m + EDGE_M
@@ -42,7 +42,7 @@ def parking_area(
     return make_solid_in_place(patches, tuple(materials.values()), [slab])
 
 
-def _whole(shape: dict[str, Any]) -> dict[str, int]:
+def _round_counts(shape: dict[str, Any]) -> dict[str, int]:
     return {name: round(shape[name]) for name in ("bays", "aisles") if name in shape}
 
 

@@ -18,7 +18,7 @@ from gen_data.generator.assets.procedural.material_presets import (
 )
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.surface_shapes import block, extrude, grid
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
@@ -36,14 +36,14 @@ def barrier(seed: int, style: str) -> Solid:
 
 def barrier_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
-    return Facts(_chosen("barrier", seed, style, BARRIERS))
+    return Facts(_choose_style("barrier", seed, style, BARRIERS))
 
 
 def fence(seed: int, style: str) -> Solid:
     """A fence or garden wall section of 2-3 m."""
     kind = fence_facts(seed, style).subcategory
     rng = variant_rng("fence", seed)
-    half, h = 0.5 * uniform_between(2.0, 3.0, rng), uniform_between(0.9, 1.4, rng)
+    half, h = 0.5 * rng.between(2.0, 3.0), rng.between(0.9, 1.4)
     hull = hulls.box((-0.06, -half, 0.0), (0.06, half, h))
     if kind == "wall":
         return _garden_wall(half, h, seed)
@@ -55,10 +55,7 @@ def fence(seed: int, style: str) -> Solid:
         parts = [block((0.03, y - 0.04, 0.06), (0.05, y + 0.04, h)) for y in bars]
         parts += [block((-0.01, -half, z), (0.03, half, z + 0.07)) for z in (0.25, h - 0.3)]
         wood = patterned_material(
-            "texture/wood_grain?seed=5",
-            1.2,
-            0.8,
-            choose(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)), rng),
+            "texture/wood_grain?seed=5", 1.2, 0.8, rng.choose(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)))
         )
         return make_solid([*posts, *parts], (wood,), [hull])
     if kind == "panel":
@@ -78,18 +75,18 @@ def fence(seed: int, style: str) -> Solid:
     wires += [
         block((-0.008, -half, z), (0.008, half, z + 0.012)) for z in np.linspace(0.06, h - 0.03, 5)
     ]
-    paint = painted_material(choose(("#2f4236", "#3b3d3f"), rng), 0.5)
+    paint = painted_material(rng.choose(("#2f4236", "#3b3d3f")), 0.5)
     return make_solid([*posts, *wires], (paint,), [hull])
 
 
 def fence_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
-    return Facts(_chosen("fence", seed, style, FENCES))
+    return Facts(_choose_style("fence", seed, style, FENCES))
 
 
-def _chosen(family: str, seed: int, style: str, styles: Sequence[str]) -> str:
+def _choose_style(family: str, seed: int, style: str, styles: Sequence[str]) -> str:
     if style == "any":
-        return styles[seed % len(styles)]
+        return in_turn(styles, seed)
     check_option(family, "style", style, ("any", *styles))
     return style
 
@@ -112,7 +109,7 @@ def _guard_rail(seed: int) -> Solid:
 def _jersey(seed: int) -> Solid:
     """A concrete safety shape, 2 m long: foot 0.6 m, 0.8-0.9 m high."""
     rng = variant_rng("barrier/jersey", seed)
-    half, h = 1.0, uniform_between(0.8, 0.9, rng)
+    half, h = 1.0, rng.between(0.8, 0.9)
     section = np.array(
         [
             (0.0, -0.3),
@@ -139,10 +136,10 @@ def _jersey(seed: int) -> Solid:
 def _construction(seed: int) -> Solid:
     """A work-site barrier: a red and white board on two feet, lamps on some."""
     rng = variant_rng("barrier/construction", seed)
-    half, z, fields = 0.5 * uniform_between(1.2, 2.0, rng), 0.85, 8
+    half, z, fields = 0.5 * rng.between(1.2, 2.0), 0.85, 8
     boards = []
-    for low in ((z, z + 0.2), (0.25, 0.35))[: choose((1, 2, 2), rng)]:
-        boards += _striped(half, low, fields)
+    for low in ((z, z + 0.2), (0.25, 0.35))[: rng.choose((1, 2, 2))]:
+        boards += _striped_board(half, low, fields)
     legs = [
         block((-0.02, y - 0.02, 0.05), (0.01, y + 0.02, 1.1)) for y in (-half + 0.15, half - 0.15)
     ]
@@ -163,7 +160,7 @@ def _construction(seed: int) -> Solid:
     return make_solid(parts, slots, [hulls.box((-0.4, -half, 0.0), (0.4, half, z + 0.2))])
 
 
-def _striped(half: float, z_m: tuple[float, float], fields: int) -> list[Patch]:
+def _striped_board(half: float, z_m: tuple[float, float], fields: int) -> list[Patch]:
     """A board of slanted red and white fields; slots 0 and 1, its back is white."""
     (z0, z1), step = z_m, 2 * half / fields
     lean = 0.35 * step

@@ -12,16 +12,14 @@ from typing import Any, Literal
 
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import check_option
-from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
+from gen_data.generator.assets.procedural.material_presets import (
+    draw_linear,
+    hex_to_linear,
+    jitter_color,
 )
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 STYLES = ("residential", "old_town", "modern", "commercial", "house")
 RoofKind = Literal["gable", "hip", "mansard", "flat"]
@@ -95,27 +93,27 @@ def draw_design(style: str, seed: int) -> Design:
     return Design(style=style, **values)
 
 
-def _draw_fields(recipe: Mapping[str, Any], rng: Rng) -> dict[str, Any]:
+def _draw_fields(recipe: Mapping[str, Any], rng: VariantRng) -> dict[str, Any]:
     """A value for every field of a recipe, drawn in its order; see ``building_styles.yaml``."""
     values: dict[str, Any] = {}
     for name, item in recipe.items():
         if name == "variants":
-            values |= _draw_fields(item["yes" if is_drawn(item["chance"], rng) else "no"], rng)
+            values |= _draw_fields(item["yes" if rng.chance(item["chance"]) else "no"], rng)
         else:
             values[name] = _draw_value(item, rng)
     return values
 
 
-def _draw_value(item: Any, rng: Rng) -> Any:
+def _draw_value(item: Any, rng: VariantRng) -> Any:
     if isinstance(item, list):
         return tuple(_draw_value(part, rng) for part in item)
     if not isinstance(item, dict):
         return item
     if "choose" in item:
-        return choose(item["choose"], rng)
+        return rng.choose(item["choose"])
     if "chance" in item:
-        return is_drawn(item["chance"], rng)
-    value = uniform_between(*item["uniform"], rng)
+        return rng.chance(item["chance"])
+    value = rng.between(*item["uniform"])
     return round(value, item["digits"]) if "digits" in item else value
 
 
@@ -124,22 +122,22 @@ def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
     rng = variant_rng(f"building/{plan.style}/materials", seed)
     wall = _wall(plan.cladding, _COLORS[f"plaster_{plan.style}"], rng)
     base = _base(plan, wall, rng)
-    trim_code = choose(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"), rng)
-    trim_code = choose(("#a98d7c", "#b3a48e", trim_code), rng) if plan.trimmed else trim_code
-    frame = choose(_COLORS.get(f"frames_{plan.style}", _COLORS["frames"]), rng)
+    trim_code = rng.choose(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"))
+    trim_code = rng.choose(("#a98d7c", "#b3a48e", trim_code)) if plan.trimmed else trim_code
+    frame = rng.choose(_COLORS.get(f"frames_{plan.style}", _COLORS["frames"]))
     curtains = [jitter_color(hex_to_linear(code), 0.1, rng) for code in ("#8d8a82", "#6a6862")]
     cloth = _COLORS["cloth_" + ("shops" if plan.shops else plan.shutters)]
-    seam = "#77797a" if plan.roof == "flat" else choose(("#8a8c8d", "#7d5f4c", "#9a9c9b"), rng)
+    seam = "#77797a" if plan.roof == "flat" else rng.choose(("#8a8c8d", "#7d5f4c", "#9a9c9b"))
     return (
         wall,
         base,
-        _plain(trim_code, 0.85, "trim"),
-        _plain(frame, 0.45, "trim"),
-        _glass((0.012, 0.016, 0.019), 0.04),
-        _glass((0.03, 0.034, 0.036), 0.06),
-        _glass(curtains[0], 0.08),
-        _glass(curtains[1], 0.08),
-        _plain(choose(_COLORS["doors"], rng), 0.5, "trim"),
+        _plain_material(trim_code, 0.85, "trim"),
+        _plain_material(frame, 0.45, "trim"),
+        _glass_material((0.012, 0.016, 0.019), 0.04),
+        _glass_material((0.03, 0.034, 0.036), 0.06),
+        _glass_material(curtains[0], 0.08),
+        _glass_material(curtains[1], 0.08),
+        _plain_material(rng.choose(_COLORS["doors"]), 0.5, "trim"),
         Material(hex_to_linear(seam), roughness=0.5, metallic=0.6, role="chrome"),
         _roof(rng),
         Material(
@@ -149,52 +147,52 @@ def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
             printed=True,
             role="sign",
         ),
-        _plain(choose(cloth, rng), 0.7, "trim"),
-        _textured("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
+        _plain_material(rng.choose(cloth), 0.7, "trim"),
+        _textured_material("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
     )
 
 
-def _wall(cladding: Cladding, tints: Sequence[str], rng: Rng) -> Material:
+def _wall(cladding: Cladding, tints: Sequence[str], rng: VariantRng) -> Material:
     if cladding == "brick":
-        seed, level = choose((4, 9, 12), rng), uniform_between(0.75, 1.0, rng)
-        return _textured("brick", seed, (level, level, level), 1.1, "facade")
+        seed, level = rng.choose((4, 9, 12)), rng.between(0.75, 1.0)
+        return _textured_material("brick", seed, (level, level, level), 1.1, "facade")
     if cladding == "concrete":
-        level = uniform_between(0.8, 1.0, rng)
-        return _textured("concrete", choose((0, 3), rng), (level, level, level), 2.6, "facade")
+        level = rng.between(0.8, 1.0)
+        return _textured_material(
+            "concrete", rng.choose((0, 3)), (level, level, level), 2.6, "facade"
+        )
     if cladding == "stone":
-        return _textured(
-            "ashlar", 0, jitter_color(hex_to_linear(choose(_COLORS["stones"], rng)), 0.06, rng), 2.4
-        )
-    return _textured("plaster", 5, jitter_color(hex_to_linear(choose(tints, rng)), 0.05, rng), 2.5)
+        return _textured_material("ashlar", 0, draw_linear(_COLORS["stones"], 0.06, rng), 2.4)
+    return _textured_material("plaster", 5, draw_linear(tints, 0.05, rng), 2.5)
 
 
-def _base(plan: Design, wall: Material, rng: Rng) -> Material:
+def _base(plan: Design, wall: Material, rng: VariantRng) -> Material:
     if plan.trimmed or plan.cladding == "stone":
-        return _textured(
-            "ashlar", 0, jitter_color(hex_to_linear(choose(_COLORS["stones"], rng)), 0.06, rng), 2.4
-        )
-    if is_drawn(0.4, rng):
-        return _textured("concrete", 3, (0.72, 0.71, 0.7), 2.2)
-    darker = uniform_between(0.5, 0.7, rng)
+        return _textured_material("ashlar", 0, draw_linear(_COLORS["stones"], 0.06, rng), 2.4)
+    if rng.chance(0.4):
+        return _textured_material("concrete", 3, (0.72, 0.71, 0.7), 2.2)
+    darker = rng.between(0.5, 0.7)
     r, g, b = wall.base_color
     color = (darker * r, darker * g, darker * b)
     return Material(color, 0.9, texture=wall.texture, texture_scale_m=wall.texture_scale_m)
 
 
-def _roof(rng: Rng) -> Material:
-    color = jitter_color(hex_to_linear(choose(_COLORS["roofs"], rng)), 0.08, rng)
-    texture = f"texture/roof_tiles?seed={choose((0, 1), rng)}"
+def _roof(rng: VariantRng) -> Material:
+    color = draw_linear(_COLORS["roofs"], 0.08, rng)
+    texture = f"texture/roof_tiles?seed={rng.choose((0, 1))}"
     return Material(color, roughness=0.85, texture=texture, role="roof")
 
 
-def _plain(code: str, roughness: float, role: str) -> Material:
+def _plain_material(code: str, roughness: float, role: str) -> Material:
     return Material(hex_to_linear(code), roughness=roughness, role=role)
 
 
-def _glass(color: Vec3, roughness: float) -> Material:
+def _glass_material(color: Vec3, roughness: float) -> Material:
     return Material(color, roughness=roughness, specular=0.7, role="window")
 
 
-def _textured(name: str, seed: int, color: Vec3, scale_m: float, role: str = "facade") -> Material:
+def _textured_material(
+    name: str, seed: int, color: Vec3, scale_m: float, role: str = "facade"
+) -> Material:
     texture = f"texture/{name}?seed={seed}"
     return Material(color, roughness=0.92, texture=texture, texture_scale_m=scale_m, role=role)

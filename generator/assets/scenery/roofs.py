@@ -99,13 +99,13 @@ def hip(depth_m: float, width_m: float, pitch_rad: float, eaves_m: float) -> Pat
     slope = x / math.cos(pitch_rad) / TILE_REPEAT_M
     u = (0.0, 2 * y / TILE_REPEAT_M)
     front = quad([(x, -y, low), (x, y, low), (0, ridge, top), (0, -ridge, top)], ROOF, (u, (0, 1)))
-    front = _slope_mapped(front, axis=1, v_top=slope, z_m=(low, top))
+    front = _map_slope(front, axis=1, v_top=slope, z_m=(low, top))
     side = Patch(
         np.array([[(x, y, low), (-x, y, low), (0.0, ridge, top)]]),
         np.zeros((1, 3, 2)),
         np.array([ROOF]),
     )
-    side = _slope_mapped(side, axis=0, v_top=slope, z_m=(low, top))
+    side = _map_slope(side, axis=0, v_top=slope, z_m=(low, top))
     half = join_patches([front, side])
     rim = block((-x, -y, low - thick), (x, y, low - 0.001), slot=METAL)
     return join_patches([half, half.rotated("z", math.pi), rim])
@@ -186,7 +186,7 @@ def _gables(profile: Sequence[Point], width_m: float, thick_m: float) -> list[Pa
     return walls
 
 
-def _slope_mapped(patch: Patch, axis: int, v_top: float, z_m: Span) -> Patch:
+def _map_slope(patch: Patch, axis: int, v_top: float, z_m: Span) -> Patch:
     """The patch with u along an axis and v with the height."""
     corners: Array = patch.corners_m
     u = corners[..., axis] / TILE_REPEAT_M

@@ -18,7 +18,7 @@ from gen_data.generator.assets.procedural.family import Facts, Solid, check_opti
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import circle, grid
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
@@ -63,7 +63,7 @@ def traffic_sign(seed: int, sign: str) -> Solid:
     half_high = float(outline[:, 1].max())
     foot = float(-outline[:, 1].min())
     # Over a pavement the lower edge hangs 2.0-2.2 m high, so that people walk below.
-    centre_z = uniform_between(2.0, 2.2, rng) + foot
+    centre_z = rng.between(2.0, 2.2) + foot
     face = _plate(outline, made.size_m).moved(0.045, 0.0, centre_z)
     pole = post(0.03, (0.0, centre_z + half_high - 0.02), sides=10).painted(2)
     image = Material(
@@ -86,7 +86,7 @@ def traffic_sign_facts(seed: int, sign: str) -> Facts:
 def sign_name(seed: int, sign: str) -> str:
     """The name of a sign; by seed for ``any``. Raises AssetError for an unknown one."""
     if sign == "any":
-        return list(SIGNS)[seed % len(SIGNS)]
+        return in_turn(list(SIGNS), seed)
     check_option("traffic_sign", "sign", sign, ("any", *SIGNS))
     return sign
 
@@ -99,13 +99,13 @@ def plate_outline(shape: Shape) -> Array:
         sign = 1.0 if shape == "triangle" else -1.0
         height = 0.5 * _ROOT3
         corners = np.array([(-0.5, -0.5 * height), (0.5, -0.5 * height), (0.0, 0.5 * height)])
-        return _blunted(corners * np.array([1.0, sign]), 0.045)[:: round(sign)]
+        return _round_corners(corners * np.array([1.0, sign]), 0.045)[:: round(sign)]
     if shape == "diamond":
-        return _blunted(np.array([(0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)]), 0.04)
+        return _round_corners(np.array([(0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)]), 0.04)
     if shape in ("square", "wide"):
         high = 0.5 if shape == "square" else 0.15
         corners = np.array([(-0.5, -high), (0.5, -high), (0.5, high), (-0.5, high)])
-        return _blunted(corners, 0.03)
+        return _round_corners(corners, 0.03)
     return circle(0.5, 28)
 
 
@@ -123,7 +123,7 @@ def _plate(outline: Array, size_m: float) -> Patch:
     return join_patches([face, rear.painted(1), rim.painted(1)])
 
 
-def _blunted(corners: Array, radius: float) -> Array:
+def _round_corners(corners: Array, radius: float) -> Array:
     """A polygon with its corners cut off by short arcs, [n * 4, 2]."""
     made = []
     for before, corner, after in zip(

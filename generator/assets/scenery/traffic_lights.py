@@ -23,12 +23,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     lathe,
     rounded_box,
 )
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post, tube
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
@@ -72,38 +67,34 @@ def traffic_light(seed: int, mount: str) -> Solid:
         AssetError: for an unknown mount.
     """
     rng = variant_rng("traffic_light", seed)
-    arm = _mount(seed, mount) == "mast_arm"
-    lens_m = 0.15 if arm else choose((0.1, 0.1, 0.15), rng)
-    low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(
-        0.11, 0.0, uniform_between(2.15, 2.5, rng)
-    )
+    arm = _choose_mount(seed, mount) == "mast_arm"
+    lens_m = 0.15 if arm else rng.choose((0.1, 0.1, 0.15))
+    low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(0.11, 0.0, rng.between(2.15, 2.5))
     radius = 0.09 if arm else 0.055
-    top = uniform_between(5.6, 6.2, rng) if arm else float(low.bounds_m()[1][2]) + 0.1
+    top = rng.between(5.6, 6.2) if arm else float(low.bounds_m()[1][2]) + 0.1
     parts = [low, post(radius, (0.0, top), sides=12).painted(POLE)]
     if arm:
-        reach = uniform_between(3.5, 5.5, rng)
+        reach = rng.between(3.5, 5.5)
         path = [(0.0, 0.0, top - 0.1), (0.0, -0.6 * reach, top + 0.05), (0.0, -reach, top + 0.1)]
         high = head(VEHICLE_LENSES, lens_m)
         plate = _backboard(high)
         parts += [tube(path, 0.055, 8).painted(POLE)]
         parts += [part.moved(0.1, -reach + 0.25, top - 0.75) for part in (high, plate)]
-    elif is_drawn(0.35, rng):
+    elif rng.chance(0.35):
         parts.append(_backboard(low))
     hull = hulls.frustum((radius, 0.0), (radius, top), 10)
-    return make_solid(
-        parts, _materials(VEHICLE_LENSES, choose(("#262829", "#2f4236"), rng)), [hull]
-    )
+    return make_solid(parts, _materials(VEHICLE_LENSES, rng.choose(("#262829", "#2f4236"))), [hull])
 
 
 def traffic_light_facts(seed: int, mount: str) -> Facts:
     """For vehicles; how it is mounted."""
-    return Facts("vehicle", {"mount": _mount(seed, mount)})
+    return Facts("vehicle", {"mount": _choose_mount(seed, mount)})
 
 
 def pedestrian_signal(seed: int) -> Solid:
     """A red and green signal for people, with a push button. Slots as above."""
     rng = variant_rng("pedestrian_signal", seed)
-    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, uniform_between(2.1, 2.3, rng))
+    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, rng.between(2.1, 2.3))
     top = float(signal.bounds_m()[1][2]) + 0.1
     button = rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
     parts = [signal, button, post(0.052, (0.0, top), sides=12).painted(POLE)]
@@ -173,7 +164,7 @@ def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
     return (painted_material(housing, 0.5), GALVANISED, painted_material("#e9e8e3", 0.4), *lit)
 
 
-def _mount(seed: int, mount: str) -> str:
+def _choose_mount(seed: int, mount: str) -> str:
     if mount == "any":
         return MOUNTS[1] if seed % 4 == 2 else MOUNTS[0]
     check_option("traffic_light", "mount", mount, ("any", *MOUNTS))

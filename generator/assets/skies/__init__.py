@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from gen_data.generator.assets.procedural.family import load_families
 
-_, _, ENVIRONMENTS = load_families(__name__)
+ENVIRONMENTS = load_families(__name__).environments

@@ -139,15 +139,15 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
     if model.model == "preetham":
         zenith = daylight.preetham_zenith_cd_m2(model.sun_altitude_rad, model.turbidity)
         half = clear_sky(above[:, :rows], model.sun_altitude_rad, model.turbidity, pale=0.0)
-        image = _mirrored(zenith * half)
+        image = _mirror(zenith * half)
         return np.concatenate([image, _land(image, below, model)])
     night_lux = daylight.night_illuminance_lux(model.cloudiness)
     day_lux = daylight.sky_illuminance_lux(model.sun_altitude_rad, model.cloudiness) - night_lux
     image = np.zeros(above.shape, np.float32)
     if day_lux > _NEGLIGIBLE * night_lux:
-        image += _scaled(_daylit(above, model), day_lux)
+        image += _scale_to_lux(_daylight(above, model), day_lux)
     if night_lux > _NEGLIGIBLE * day_lux:
-        image += _scaled(_night(above, model), night_lux)
+        image += _scale_to_lux(_night(above, model), night_lux)
     return np.concatenate([image, _land(image, below, model)])
 
 
@@ -202,21 +202,21 @@ def _perez(up: Array, angle: Array, cosine_squared: Array, c: list[float]) -> Ar
     return luminance
 
 
-def _mirrored(half: Array) -> Float32:
+def _mirror(half: Array) -> Float32:
     """Both sides of the plane through the sun and the zenith, which differ in clouds only."""
     return np.concatenate([half, half[:, ::-1]], axis=1).astype(np.float32)
 
 
-def _daylit(d: Array, model: SkyModel) -> Float32:
+def _daylight(d: Array, model: SkyModel) -> Float32:
     """What the sun lights, any unit: clear air, clouds in it, a closed deck."""
     altitude = model.sun_altitude_rad
     half = d[:, : d.shape[1] // 2]
     by_day = clear_sky(half, max(altitude, math.radians(1.5)), model.turbidity)
     dusk = 1.0 - _ramp(-1.0, 6.0, model.sun_altitude_deg)
-    by_day = _scaled(by_day, 1.0)
+    by_day = _scale_to_lux(by_day, 1.0)
     if dusk > 0.0:
-        by_day = by_day * (1.0 - dusk) + _scaled(_twilight(half, model), 1.0) * dusk
-    image = _mirrored(by_day)
+        by_day = by_day * (1.0 - dusk) + _scale_to_lux(_twilight(half, model), 1.0) * dusk
+    image = _mirror(by_day)
     if model.cloudiness == 0.0:
         return image
     cover, light = cloud_layer(d, model.cloudiness, altitude, model.seed)
@@ -226,14 +226,14 @@ def _daylit(d: Array, model: SkyModel) -> Float32:
     warm = np.array(daylight.sun_color(max(altitude, 0.01), model.turbidity))
     lit = (0.7 * sun_lux * warm + 1.3 * clear_lux * _DECK) / (math.pi * clear_lux)
     towards = half[..., 0] * math.cos(altitude) + half[..., 2] * math.sin(altitude)
-    rim = _mirrored(1.0 + 0.9 * np.exp((towards - 1.0) / 0.03))
+    rim = _mirror(1.0 + 0.9 * np.exp((towards - 1.0) / 0.03))
     _lay(image, cover, (light * rim)[..., None] * lit.astype(np.float32))
     closed = _ramp(0.6, 0.95, model.cloudiness)
     if closed == 0.0:
-        return _scaled(image, 1.0)
+        return _scale_to_lux(image, 1.0)
     shade = np.float32(0.72) + np.float32(0.5) * np.where(cover > 0.0, light, np.float32(0.5))
     deck: Float32 = overcast_sky(d[:, :1]).astype(np.float32) * shade[..., None]
-    return _scaled(image, 1.0 - closed) + _scaled(deck, closed)
+    return _scale_to_lux(image, 1.0 - closed) + _scale_to_lux(deck, closed)
 
 
 def _lay(image: Float32, cover: Float32, clouds: Float32) -> None:
@@ -287,7 +287,7 @@ def _land(image: Float32, d: Array, model: SkyModel) -> Float32:
     return mixed
 
 
-def _scaled(image: Image, lux: float) -> Image:
+def _scale_to_lux(image: Image, lux: float) -> Image:
     """A sky, or its half, that gives that illuminance on level ground."""
     scaled: Image = image * image.dtype.type(lux / float(luminance(_level_light(image))))
     return scaled

@@ -14,12 +14,7 @@ from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, circle, cone, lathe, sweep
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
@@ -28,7 +23,6 @@ from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as 
 from gen_data.generator.assets.vehicles.vehicle_materials import materials
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 STYLES = ("city", "mountain", "road")
 
@@ -66,31 +60,31 @@ _FRAMES = load_table(__package__, "bicycles", _Frame)
 def bicycle(seed: int) -> Solid:
     """A bicycle that stands upright with nobody on it."""
     rng = variant_rng("bicycle", seed)
-    frame = _FRAMES[_style(seed)]
-    parts = _machine(_style(seed), frame, uniform_between(0.0, 2.0 * math.pi, rng), rng)
-    paint = hex_to_linear(choose(_PAINTS, rng))
+    frame = _FRAMES[in_turn(STYLES, seed)]
+    parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi), rng)
+    paint = hex_to_linear(rng.choose(_PAINTS))
     return _solid(parts, frame, materials(rng, paint), 1.0)
 
 
 def bicycle_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts(_style(seed), {"rider": "no"})
+    return Facts(in_turn(STYLES, seed), {"rider": "no"})
 
 
 def cyclist(seed: int) -> Solid:
     """A bicycle with its rider."""
     rng = variant_rng("cyclist", seed)
-    frame, turn = _FRAMES[_style(seed)], uniform_between(0.0, 2.0 * math.pi, rng)
-    parts = _machine(_style(seed), frame, turn, rng)
+    frame, turn = _FRAMES[in_turn(STYLES, seed)], rng.between(0.0, 2.0 * math.pi)
+    parts = _machine(in_turn(STYLES, seed), frame, turn, rng)
     parts += people.rider(_seat(frame, turn), rng)
-    paint = hex_to_linear(choose(_PAINTS, rng))
+    paint = hex_to_linear(rng.choose(_PAINTS))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng))
     return _solid(parts, frame, finish, 1.7)
 
 
 def cyclist_facts(seed: int) -> Facts:
     """The kind of bicycle."""
-    return Facts(_style(seed), {"rider": "yes"})
+    return Facts(in_turn(STYLES, seed), {"rider": "yes"})
 
 
 def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
@@ -116,10 +110,6 @@ def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
     return join_patches([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
 
 
-def _style(seed: int) -> str:
-    return STYLES[seed % len(STYLES)]
-
-
 def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top: float) -> Solid:
     reach, z = frame.axle + frame.wheel_m, frame.wheel_m
     points = (
@@ -135,14 +125,16 @@ def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top:
     return make_solid([drop_uvs(part) for part in parts], finish, hull, points)
 
 
-def _machine(style: str, frame: _Frame, turn_rad: float, rng: Rng) -> list[Patch]:
+def _machine(style: str, frame: _Frame, turn_rad: float, rng: VariantRng) -> list[Patch]:
     """The bicycle itself; ``turn_rad`` is the left crank's angle."""
     wheel = spoked_wheel(frame.wheel_m, frame.tyre_m, 14)
     parts = [wheel.moved(sign * frame.axle, 0.0, frame.wheel_m) for sign in (1.0, -1.0)]
     parts += [*_tubes(frame), *_bars(style, frame), *_drive(frame, turn_rad)]
     x, z = frame.saddle
     parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), Slot.TRIM))
-    parts.append(limb([_at((x + 0.1, z)), _at((x + 0.15, z))], (0.03, 0.016), Slot.TRIM))
+    parts.append(
+        limb([_in_plane((x + 0.1, z)), _in_plane((x + 0.15, z))], (0.03, 0.016), Slot.TRIM)
+    )
     x, z = frame.head
     parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), Slot.HEADLIGHT))
     x, z = frame.saddle
@@ -150,18 +142,20 @@ def _machine(style: str, frame: _Frame, turn_rad: float, rng: Rng) -> list[Patch
     if style == "city":
         parts += [_mudguard(frame, 1.0, (0.2, 2.0)), _mudguard(frame, -1.0, (0.8, 3.3))]
         parts += _rack(frame)
-        if is_drawn(0.5, rng):
+        if rng.chance(0.5):
             parts.append(block((0.3, -0.18, 0.98), (0.55, 0.18, 1.18), 0.02, Slot.TRIM))
     return parts
 
 
 def _tubes(frame: _Frame) -> list[Patch]:
-    crank, seat, head, fork = (_at(p) for p in (frame.crank, frame.seat, frame.head, frame.fork))
+    crank, seat, head, fork = (
+        _in_plane(p) for p in (frame.crank, frame.seat, frame.head, frame.fork)
+    )
     step = crank + frame.step * (seat - crank)
     radius = 0.017
     bars = [(crank, seat), (step, head - 0.12 * (head - fork)), (crank, fork), (head, fork)]
     parts = [limb(bar, (radius, radius), Slot.PAINT, 6) for bar in bars]
-    parts.append(limb([seat, _at(frame.saddle)], (0.013, 0.013), Slot.CHROME, 6))
+    parts.append(limb([seat, _in_plane(frame.saddle)], (0.013, 0.013), Slot.CHROME, 6))
     for sign in (1.0, -1.0):
         out = np.array([0.0, sign * 0.055, 0.0])
         rear = np.array([-frame.axle, sign * 0.065, frame.wheel_m])
@@ -178,7 +172,7 @@ def _tubes(frame: _Frame) -> list[Patch]:
 def _bars(style: str, frame: _Frame) -> list[Patch]:
     x, y, z = frame.grip
     stem = np.array([frame.head[0] - 0.01, 0.0, z - (0.0 if style == "road" else 0.03)])
-    parts = [limb([_at(frame.head), stem], (0.014, 0.014), Slot.CHROME, 6)]
+    parts = [limb([_in_plane(frame.head), stem], (0.014, 0.014), Slot.CHROME, 6)]
     for sign in (1.0, -1.0):
         grip = np.array([x, sign * y, z])
         corner = np.array([stem[0] + 0.06, sign * (y - 0.04), z])
@@ -274,5 +268,5 @@ def _soles(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
     return left, right
 
 
-def _at(point: tuple[float, float]) -> Array:
+def _in_plane(point: tuple[float, float]) -> Array:
     return np.array([point[0], 0.0, point[1]])

@@ -164,8 +164,8 @@ def split_patch(patch: Patch, level: Level) -> tuple[Patch, Patch, Array]:
     v = v[rows, turn]
     touching = v[:, 0] == 0
     lines = []
-    for chosen, pieces in ((touching, _halved(data[touching], v[touching])),
-                           (~touching, _tipped(data[~touching], v[~touching]))):  # fmt: skip
+    for chosen, pieces in ((touching, _halve_triangles(data[touching], v[touching])),
+                           (~touching, _cut_tips(data[~touching], v[~touching]))):  # fmt: skip
         for corners, positive in pieces[0]:
             for keep, side in ((positive, inside), (~positive, outside)):
                 slots = part.slots[chosen][keep]
@@ -284,7 +284,7 @@ def take_triangles(patch: Patch, chosen: Mask) -> Patch:
 Pieces = tuple[list[tuple[Array, Mask]], Array]
 
 
-def _halved(data: Array, value: Array) -> Pieces:
+def _halve_triangles(data: Array, value: Array) -> Pieces:
     """Triangles whose first corner is on the line, and the side each is on."""
     a, b, c = (data[:, i] for i in range(3))
     d = _crossing(b, c, value[:, 1], value[:, 2])
@@ -293,7 +293,7 @@ def _halved(data: Array, value: Array) -> Pieces:
     return pieces, np.stack([a, d], axis=1)
 
 
-def _tipped(data: Array, value: Array) -> Pieces:
+def _cut_tips(data: Array, value: Array) -> Pieces:
     """Triangles whose first corner is alone on its side: a tip and two of the rest."""
     a, b, c = (data[:, i] for i in range(3))
     d, e = (_crossing(a, data[:, i], value[:, 0], value[:, i]) for i in (1, 2))

@@ -133,7 +133,7 @@ def bodywork(design: Design, steer_deg: float) -> Patch:
     plain = _lower(design, ring)
     lower, wells = design.axles.wells(_lower_paint(design, ring, plain), design.half_m)
     gaps = _gaps(design, design.axles.wells(plain, design.half_m)[0])
-    half = join_patches([lower, *wells, *gaps, _house(design), *_fitted(design)])
+    half = join_patches([lower, *wells, *gaps, _house(design), *_fittings(design)])
     middle = [*_plates(design), *design.axles.wheels(steer_deg)]
     return join_patches(
         [body_shell.mirror_half(half, SIDES), *(body_shell.drop_uvs(p) for p in middle)]
@@ -289,10 +289,10 @@ def _house(design: Design) -> Patch:
 
     house = body_shell.stack(ring, rows, base, roof, crown_m=crown, lid_rows=2)
     _, house, _ = body_shell.split_patch(house, lambda p: -p.uvs[..., 1])
-    return _glazed(design, ring, house)
+    return _glaze(design, ring, house)
 
 
-def _glazed(design: Design, ring: BodyOutline, house: Patch) -> Patch:
+def _glaze(design: Design, ring: BodyOutline, house: Patch) -> Patch:
     glass: list[tuple[Level, ...]] = [
         (*stations_along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91))
     ]
@@ -310,7 +310,7 @@ def _glazed(design: Design, ring: BodyOutline, house: Patch) -> Patch:
     return house
 
 
-def _fitted(design: Design) -> Iterable[Patch]:
+def _fittings(design: Design) -> Iterable[Patch]:
     """Mirror, door handles, roof rail: the left one of each."""
     shoulder = design.shoulder()
     y = design.half_m

@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles.body_shell import (
     BodyOutline,
@@ -48,12 +43,12 @@ _HALF_M = 1.275
 def bus(seed: int) -> Solid:
     """A city bus with its doors on the right. Slots and keypoints as every vehicle's."""
     rng = variant_rng("bus", seed)
-    x, top = 0.5 * uniform_between(11.2, 12.2, rng), uniform_between(2.95, 3.08, rng)
+    x, top = 0.5 * rng.between(11.2, 12.2), rng.between(2.95, 3.08)
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, 0)
-    livery = choose(_LIVERIES, rng)
-    body = _body(x, top, axles, striped=is_drawn(0.6, rng))
-    body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if is_drawn(0.5, rng) else ())), top)
-    parts = [body, *(drop_uvs(p) for p in [*axles.wheels(0.0), *_fitted(x, top)])]
+    livery = rng.choose(_LIVERIES)
+    body = _body(x, top, axles, striped=rng.chance(0.6))
+    body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if rng.chance(0.5) else ())), top)
+    parts = [body, *(drop_uvs(p) for p in [*axles.wheels(0.0), *_fittings(x, top)])]
     colors = [hex_to_linear(code) for code in livery]
     hull = [
         hulls.box((-x, -_HALF_M, _FLOOR_M), (x, _HALF_M, top)),
@@ -61,11 +56,6 @@ def bus(seed: int) -> Solid:
     ]
     points = axles.keypoints((x - 0.1, 0.95, 0.72), (-x + 0.06, 1.1, 1.1))
     return make_solid([join_patches(parts)], materials(rng, colors[0], colors[1]), hull, points)
-
-
-def bus_facts(**_: object) -> Facts:
-    """Its kind."""
-    return Facts("city_bus")
 
 
 def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
@@ -77,7 +67,7 @@ def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
 
     half = stack(ring, rows, level(_FLOOR_M), level(top - 0.04), crown_m=0.04, lid_rows=2)
     half = assign_slot(half, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
-    half = _painted(half, ring, top, striped=striped)
+    half = _paint_body(half, ring, top, striped=striped)
     around = [hub + 0.28 * k for hub in (axles.front_m, axles.rear_m) for k in (-2, -1, 0, 1, 2)]
     near = (half.corners_m[..., 2].min(axis=1) < 1.1) & (half.corners_m[..., 1].max(axis=1) > 0.9)
     low = refine_patch(take_triangles(half, near), "x", around)
@@ -85,7 +75,7 @@ def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
     return mirror_half(join_patches([take_triangles(half, ~near), low, *wells]), SIDES)
 
 
-def _painted(half: Patch, ring: BodyOutline, top: float, *, striped: bool) -> Patch:
+def _paint_body(half: Patch, ring: BodyOutline, top: float, *, striped: bool) -> Patch:
     """Stripe, windows, lamps."""
     if striped:
         half = assign_slot(half, Slot.SECOND_PAINT, *level_between("z", 0.55, 0.95))
@@ -138,7 +128,7 @@ def _doors(body: Patch, fronts_m: tuple[float, ...], top: float) -> Patch:
     return body
 
 
-def _fitted(x: float, top: float) -> list[Patch]:
+def _fittings(x: float, top: float) -> list[Patch]:
     """Pillars, display, mirrors, plates, cooling unit."""
     parts = [
         block((x - 0.35, -0.75, top - 0.37), (x - 0.105, 0.75, top - 0.15), 0.0, Slot.TRIM),

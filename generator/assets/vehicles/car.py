@@ -5,12 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gen_data.generator.assets.procedural.family import Facts, Solid
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles.bodywork import (
     DESIGNS,
@@ -20,7 +15,6 @@ from gen_data.generator.assets.vehicles.bodywork import (
     keypoints,
 )
 from gen_data.generator.assets.vehicles.vehicle_materials import draw_paint, materials
-from gen_data.generator.core.streams import Rng
 
 STYLES = ("hatchback", "sedan", "estate", "suv", "coupe")
 
@@ -28,25 +22,21 @@ STYLES = ("hatchback", "sedan", "estate", "suv", "coupe")
 def car(seed: int, steer_deg: float) -> Solid:
     """A car. Slots and keypoints as every vehicle's; positive steering turns to the left."""
     rng = variant_rng("car", seed)
-    design = _drawn(DESIGNS[_style(seed)], rng)
+    design = _vary_design(DESIGNS[in_turn(STYLES, seed)], rng)
     finish = materials(rng, draw_paint(rng))
     return make_solid([bodywork(design, steer_deg)], finish, collision(design), keypoints(design))
 
 
 def car_facts(seed: int, **_: object) -> Facts:
     """Its body style."""
-    return Facts(_style(seed))
+    return Facts(in_turn(STYLES, seed))
 
 
-def _style(seed: int) -> str:
-    return STYLES[seed % len(STYLES)]
-
-
-def _drawn(design: Design, rng: Rng) -> Design:
+def _vary_design(design: Design, rng: VariantRng) -> Design:
     """The design stretched, raised and restyled a little."""
-    long, wide, high = (1.0 + uniform_between(-share, share, rng) for share in (0.04, 0.02, 0.02))
-    shift = uniform_between(-0.012, 0.012, rng)
-    rise = uniform_between(-0.02, 0.03, rng)
+    long, wide, high = (1.0 + rng.between(-share, share) for share in (0.04, 0.02, 0.02))
+    shift = rng.between(-0.012, 0.012)
+    rise = rng.between(-0.02, 0.03)
     return replace(
         design,
         length_m=design.length_m * long,
@@ -54,14 +44,14 @@ def _drawn(design: Design, rng: Rng) -> Design:
         height_m=max(1.402, design.height_m * high),
         wheelbase_m=design.wheelbase_m * long,
         front_axle_m=design.front_axle_m * long,
-        wheel_radius_m=design.wheel_radius_m + uniform_between(-0.01, 0.012, rng),
-        spokes=choose((5, 5, 6, 7, 8, 10, 0), rng),
+        wheel_radius_m=design.wheel_radius_m + rng.between(-0.01, 0.012),
+        spokes=rng.choose((5, 5, 6, 7, 8, 10, 0)),
         nose_m=design.nose_m + rise,
         belt_m=design.belt_m + 0.5 * rise,
         tail_m=design.tail_m + rise,
         cowl=design.cowl + shift,
         header=design.header + shift,
-        roof_end=design.roof_end + uniform_between(-0.015, 0.01, rng),
+        roof_end=design.roof_end + rng.between(-0.015, 0.01),
         lamp_m=(design.lamp_m[0] + rise, design.lamp_m[1] + rise),
-        rails=design.rails and is_drawn(0.7, rng),
+        rails=design.rails and rng.chance(0.7),
     )

@@ -13,7 +13,7 @@ from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.surface_shapes import block, circle, sweep
-from gen_data.generator.assets.procedural.variant_rng import choose, is_drawn, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
@@ -50,13 +50,13 @@ _BUILDS = load_table(__package__, "motorcycles", _Build)
 def motorcycle(seed: int) -> Solid:
     """A motorcycle; two of three have a rider."""
     rng = variant_rng("motorcycle", seed)
-    style = _style(seed)
+    style = in_turn(STYLES, seed)
     build = _BUILDS[style]
     parts = [*_running_gear(build), *_lamps(style, build), *_bodies(style, build)]
-    ridden = _ridden(seed)
+    ridden = _is_ridden(seed)
     if ridden:
         parts += people.rider(_seat(build), rng)
-    paint = hex_to_linear(choose(_PAINTS, rng))
+    paint = hex_to_linear(rng.choose(_PAINTS))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng), plate_rows=2)
     reach = build.axle + build.wheel_m
     hull = [
@@ -76,15 +76,11 @@ def motorcycle(seed: int) -> Solid:
 
 def motorcycle_facts(seed: int) -> Facts:
     """Its kind, and whether somebody rides it."""
-    return Facts(_style(seed), {"rider": "yes" if _ridden(seed) else "no"})
+    return Facts(in_turn(STYLES, seed), {"rider": "yes" if _is_ridden(seed) else "no"})
 
 
-def _style(seed: int) -> str:
-    return STYLES[seed % len(STYLES)]
-
-
-def _ridden(seed: int) -> bool:
-    return is_drawn(2.0 / 3.0, variant_rng("motorcycle rider", seed))
+def _is_ridden(seed: int) -> bool:
+    return variant_rng("motorcycle rider", seed).chance(2.0 / 3.0)
 
 
 def _running_gear(build: _Build) -> list[Patch]:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
 from gen_data.generator.assets.procedural.textures import artwork as art
-from gen_data.generator.assets.procedural.variant_rng import choose, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import TextureData
-from gen_data.generator.core.streams import Rng
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -44,8 +43,8 @@ _STROKE = 0.95
 def plate_text(seed: int) -> str:
     """What stands on a plate; groups are separated by a space."""
     rng = variant_rng("licence_plate", seed)
-    pattern = choose(_PATTERNS, rng)
-    return "".join(_drawn(place, rng) for place in pattern)
+    pattern = rng.choose(_PATTERNS)
+    return "".join(_draw_character(place, rng) for place in pattern)
 
 
 def plate_id(seed: int, rows: int) -> str:
@@ -70,7 +69,7 @@ def licence_plate(seed: int, rows: int) -> TextureData:
     if rows not in _DRAWN_PX:
         raise ValueError(f"a licence plate has 1 or 2 rows, not {rows}")
     ground, ink = (
-        hex_to_srgb8(c) for c in choose(_SCHEMES, variant_rng("licence_plate/colors", seed))
+        hex_to_srgb8(c) for c in variant_rng("licence_plate/colors", seed).choose(_SCHEMES)
     )
     width, height = _DRAWN_PX[rows]
     image = art.canvas(width, height, ground)
@@ -111,7 +110,7 @@ def _strokes(letter: str) -> Iterator[list[tuple[int, int]]]:
             yield [(int(point[0]), int(point[1])) for point in stroke.split()]
 
 
-def _drawn(place: str, rng: Rng) -> str:
+def _draw_character(place: str, rng: VariantRng) -> str:
     if place == " ":
         return place
-    return choose(_LETTERS if place == "L" else _DIGITS, rng)
+    return rng.choose(_LETTERS if place == "L" else _DIGITS)

@@ -14,10 +14,9 @@ import numpy as np
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.procedural.surface_shapes import ball, circle, spline, sweep
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 _SKINS = ("#f0cdb0", "#e0b08c", "#c68e64", "#8d5a3a", "#5a3825")
 _TOPS = ("#1f3a5f", "#b3231d", "#20242a", "#e8e6e0", "#d9d12a", "#2f6b4a", "#6b6f76", "#d96a1f")
@@ -47,18 +46,18 @@ class Seat:
     full_face: bool
 
 
-def draw_clothes(rng: Rng) -> tuple[Vec3, ...]:
+def draw_clothes(rng: VariantRng) -> tuple[Vec3, ...]:
     """Colours of skin, top, bottom, shoes and helmet, linear RGB."""
     codes = (_SKINS, _TOPS, _BOTTOMS, ("#18181a", "#e2e2de", "#4a3627"), _HELMETS)
-    return tuple(hex_to_linear(choose(options, rng)) for options in codes)
+    return tuple(hex_to_linear(rng.choose(options)) for options in codes)
 
 
-def rider(seat: Seat, rng: Rng) -> list[Patch]:
+def rider(seat: Seat, rng: VariantRng) -> list[Patch]:
     """The rider's body."""
     hips = np.array(seat.hips)
     spine = np.array([math.sin(seat.lean_rad), 0.0, math.cos(seat.lean_rad)])
     neck = hips + (_TORSO_M + 0.05) * spine
-    parts = [*_trunk(hips, spine), *_head(neck, seat, uniform_between(-0.1, 0.15, rng))]
+    parts = [*_trunk(hips, spine), *_head(neck, seat, rng.between(-0.1, 0.15))]
     for sign, grip, sole in zip((1.0, -1.0), seat.grips, seat.soles, strict=True):
         shoulder = hips + _TORSO_M * spine + np.array([0.0, sign * 0.175, 0.0])
         parts += _arm(shoulder, np.array(grip), sign)

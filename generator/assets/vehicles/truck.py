@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles.body_shell import (
     Curve,
@@ -44,22 +39,16 @@ _HALF_M = 1.16
 def truck(seed: int) -> Solid:
     """A box truck. Slots and keypoints as every vehicle's; the box is the second paint."""
     rng = variant_rng("truck", seed)
-    x, cab, roof = (
-        0.5 * uniform_between(6.6, 9.8, rng),
-        uniform_between(1.75, 2.05, rng),
-        uniform_between(2.45, 2.75, rng),
-    )
-    top = max(roof + 0.25, uniform_between(3.0, 3.75, rng))
-    radius = uniform_between(0.42, 0.49, rng)
-    axles = Axles(
-        x - 1.22, -x + uniform_between(1.6, 2.0, rng), 1.0, radius, 0.27, radius + 0.08, 0, True
-    )
+    x, cab, roof = (0.5 * rng.between(6.6, 9.8), rng.between(1.75, 2.05), rng.between(2.45, 2.75))
+    top = max(roof + 0.25, rng.between(3.0, 3.75))
+    radius = rng.between(0.42, 0.49)
+    axles = Axles(x - 1.22, -x + rng.between(1.6, 2.0), 1.0, radius, 0.27, radius + 0.08, 0, True)
     parts = [_cab(x, cab, roof, axles)]
     fitted = [*axles.wheels(0.0), *_load(x, cab, top), *_chassis(x, cab, axles), *_lamps(x)]
-    if is_drawn(0.6, rng):
+    if rng.chance(0.6):
         fitted.append(_spoiler(x, cab, roof, top))
     parts += [drop_uvs(p) for p in fitted]
-    cab_paint, box_paint = (hex_to_linear(choose(codes, rng)) for codes in (_CABS, _BOXES))
+    cab_paint, box_paint = (hex_to_linear(rng.choose(codes)) for codes in (_CABS, _BOXES))
     hull = [
         hulls.box((x - cab, -_HALF_M, _FLOOR_M), (x, _HALF_M, roof)),
         hulls.box((-x, -1.25, 0.95), (x - cab - 0.12, 1.25, top)),
@@ -67,11 +56,6 @@ def truck(seed: int) -> Solid:
     ]
     points = axles.keypoints((x - 0.08, 0.95, 0.72), (-x + 0.02, 1.0, 0.8))
     return make_solid([join_patches(parts)], materials(rng, cab_paint, box_paint), hull, points)
-
-
-def truck_facts(**_: object) -> Facts:
-    """Its kind."""
-    return Facts("box_truck")
 
 
 def _cab(x: float, length: float, roof: float, axles: Axles) -> Patch:

@@ -18,9 +18,8 @@ from gen_data.generator.assets.procedural.textures.texture_images import (
     mix_colors,
     texture,
 )
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
-from gen_data.generator.core.streams import Rng
 
 
 def brushed_metal(seed: int) -> TextureData:
@@ -35,7 +34,7 @@ def brushed_metal(seed: int) -> TextureData:
     )
     clouds = fbm((2, 3), 4, rng)
     base = draw_color(PALETTES["bare_metals"], 0.05, rng)
-    shade = 1 + uniform_between(0.05, 0.11, rng) * strokes + 0.03 * clouds
+    shade = 1 + rng.between(0.05, 0.11) * strokes + 0.03 * clouds
     return texture(base * shade[..., None], 0.75 + 0.2 * strokes + 0.08 * clouds, 0.7 * strokes)
 
 
@@ -44,7 +43,7 @@ def painted_metal(seed: int) -> TextureData:
     rng = variant_rng("painted_metal", seed)
     paint = draw_color(PALETTES["metal_paints"], 0.06, rng)
     peel, grime = fbm((90, 90), 2, rng), smoothstep(0.0, 0.9, fbm((3, 3), 5, rng, 0.6))
-    wear = uniform_between(0.55, 0.95, rng)
+    wear = rng.between(0.55, 0.95)
     flakes = fbm((7, 7), 6, rng, 0.62) + 0.25 * fbm((2, 2), 2, rng)
     bare = smoothstep(wear, wear + 0.05, flakes)
     rim = smoothstep(wear - 0.09, wear - 0.02, flakes) * (1 - bare)
@@ -61,11 +60,11 @@ def painted_metal(seed: int) -> TextureData:
     return texture(albedo, rough, 0.35 * peel - 1.5 * bare - 0.5 * scratches)
 
 
-def _scratches(rng: Rng) -> Float32:
+def _scratches(rng: VariantRng) -> Float32:
     """Thin arcs in [0, 1], periodic."""
     y, x = rows_and_columns()
     total = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
-    for _ in range(int(uniform_between(8, 26, rng))):
+    for _ in range(int(rng.between(8, 26))):
         cy, cx, turn, length, bow = (float(t) for t in rng.random(5))
         s, c = np.sin(2 * np.pi * turn), np.cos(2 * np.pi * turn)
         dy, dx = (y - cy + 0.5) % 1.0 - 0.5, (x - cx + 0.5) % 1.0 - 0.5

@@ -15,7 +15,7 @@ import numpy as np
 
 from gen_data.generator.assets.procedural.noise import fbm, smoothstep
 from gen_data.generator.assets.procedural.textures import artwork as art
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.signs import SIGNS, Shape, plate_outline, sign_name
 from gen_data.generator.core.asset_types import TextureData
 
@@ -169,5 +169,5 @@ def traffic_sign(seed: int, sign: str) -> TextureData:
     clean = art.resize_texture(face.image, SIZE_PX, SIZE_PX).albedo.astype(np.float32)
     rng = variant_rng("traffic_sign/dirt", seed)
     streaks = smoothstep(0.1, 0.9, fbm((3, 24), 4, rng, size_px=SIZE_PX))
-    dirt = 1.0 - uniform_between(0.02, 0.1, rng) * streaks
+    dirt = 1.0 - rng.between(0.02, 0.1) * streaks
     return TextureData(np.round(clean * dirt[..., None]).astype(np.uint8))
