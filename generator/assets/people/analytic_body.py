@@ -1,7 +1,7 @@
 """A body from formulas: lofted limbs in the proportions of tables, for when no pack is installed.
 
-It has the template frame, the zones and the words of shapes of the pack's body, so that the same
-clothes fit it and the same poses move it.
+It shares the template frame, the zones and the shape names of the pack's body, so that the same
+clothes and poses apply to both.
 
 Lengths are shares of stature from Drillis and Contini, "Body segment parameters", New York
 University 1966, as drawn in Winter, "Biomechanics and motor control of human movement", fig. 4.1;
@@ -84,7 +84,7 @@ _FACE: Mapping[str, tuple[float, float, float]] = {
 
 _POINT_M = 0.02
 _SMOOTH_M = 0.05
-"""Half length of the stretch over which one bone hands over to the next."""
+"""Half length of the stretch over which weights go over from one bone to the next."""
 
 
 @lru_cache(maxsize=1)
@@ -216,7 +216,7 @@ def _limbs(bones: Mapping[str, tuple[str, Array]], side: str, sign: float) -> Se
 
 
 def _mirror(rows: MeshRows) -> MeshRows:
-    """Left limbs as right ones: they were made with the right bones already."""
+    """Mirror left limbs; they already follow the right bones."""
     values = rows.values.copy()
     values[:, 1] *= -1.0
     return MeshRows(values, rows.faces[:, ::-1], rows.zones)
@@ -360,7 +360,7 @@ def _loft(middles: Array, axes: Array, halves: Array, columns: int) -> tuple[Arr
 def _along_chain(
     bones: Mapping[str, tuple[str, Array]], heights: Array, chain: Sequence[str], axis: int
 ) -> Array:
-    """Weights of points that one bone hands over to the next at the head of the latter.
+    """Bone weights of points along a chain, blended around the head of each next bone.
 
     Args:
         bones: All bones.

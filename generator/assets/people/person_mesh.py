@@ -1,4 +1,4 @@
-"""A person as a mesh: shaped, dressed, posed, set on the ground."""
+"""Meshes of people: shaped, dressed, posed and placed on the ground."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class _Piece:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Figure:
-    """A person shaped and dressed, before any pose: what all their poses share.
+    """A shaped and dressed person before any pose; shared by all poses.
 
     Attributes:
         body: The template.
@@ -148,7 +148,7 @@ def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> _Sheet:
 def _join_on_ground(
     sheets: list[_Sheet], body: BodyTemplate, posed: Array
 ) -> tuple[MeshData, Array]:
-    """The sheets as one mesh whose lowest vertex has z = 0, and the shift that took it there."""
+    """Join the sheets into one mesh whose lowest vertex has z = 0; also return its shift [m]."""
     vertices = np.concatenate([sheet.vertices_m for sheet in sheets])
     # Between the ankles lies the origin: a stride reaches as far ahead as behind.
     middle = 0.5 * (posed[body.bone("foot_l")] + posed[body.bone("foot_r")])

@@ -1,4 +1,4 @@
-"""What people wear: garments, colours and patterns as streets show them."""
+"""Outfits: garments, colours and patterns as seen in streets."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from gen_data.generator.core.se3 import Vec3
 _COLORS = load_table(__package__, "wardrobe", tuple[str, ...])
 _WARM_FABRICS = tuple(f"texture/fabric?seed={k}" for k in (2, 5, 9))
 _STRIPES = tuple(f"texture/stripes?seed={k}" for k in (3, 6))
-"""Few textures, shared by everybody: each one that a picture uses costs its upload."""
+"""Few textures, shared by all people: each texture in an image has to be uploaded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outfit:
-    """What one person wears.
+    """Outfit of one person.
 
     Attributes:
         top: ``tshirt``, ``shirt``, ``jacket``, ``coat`` or ``dress``.
@@ -47,7 +47,7 @@ class Outfit:
 
 
 def draw_outfit(sex: str, child: bool, rng: VariantRng) -> Outfit:
-    """An outfit that suits."""
+    """Draw an outfit that fits sex and age."""
     woman = sex == "female"
     tops = ("jacket",) * 5 + ("shirt",) * 4 + ("tshirt",) * 3 + ("coat",) * (0 if child else 3)
     top = rng.choose(tops + ("dress",) * (2 if woman else 0))

@@ -23,7 +23,7 @@ from gen_data.generator.assets.procedural.surface_shapes import Point2, fillet, 
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
 
-# Width by height of the unrolled label, which the drawing of its texture goes by.
+# Width by height of the unrolled label; its texture is drawn at this aspect.
 LABEL_ASPECT = 2.6
 
 _WATER_IOR = 1.33
@@ -33,15 +33,15 @@ _PROUD_M = 0.0003
 
 @dataclass(frozen=True, slots=True)
 class BottleStyle:
-    """Ranges of one kind of bottle; ``shoulder`` and ``flank`` are fractions.
+    """Ranges of the measures of one kind of bottle.
 
     Attributes:
         shoulder: (radius as a share of the body's beyond the neck's, height as a share of the way
             from label to neck) of the points between body and neck.
         depth: Extent along Y as a share of that along X.
-        colors: Of the body; of what is clear, the tint of what is seen through all of it.
+        colors: Of the body; of a clear bottle, the tint of light that has passed through it.
         caps: Of the cap.
-        clear: Whether it is full of water: body and filling refract as one.
+        clear: Whether it is transparent and full of water: body and filling refract as one.
     """
 
     height_m: tuple[float, float]
@@ -175,7 +175,7 @@ def _lid(radius: float, low: float, high: float) -> Patch:
 
 
 def _drop_level_stages(stages: list[Point2]) -> list[Point2]:
-    """The stages without those that do not rise."""
+    """Return the stages that lie above the one before."""
     kept = stages[:1]
     for stage in stages[1:]:
         if stage[1] > kept[-1][1] + 1e-4:

@@ -48,7 +48,7 @@ CANS = (
 
 
 def can_size(seed: int) -> CanSize:
-    """Which of ``CANS`` a variant is."""
+    """Size of a variant, from ``CANS``."""
     return in_turn(CANS, seed)
 
 

@@ -1,4 +1,4 @@
-"""Furniture and other things that stand still.
+"""Furniture and other static objects.
 
 Origin on the floor at the centre of the footprint, Z up; ``size_m`` is the extent along X, Y, Z.
 """
@@ -95,7 +95,7 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
 
     Args:
         size_m: Width (X), depth (Y), height.
-        levels: Boards to stand things on; see ``shelf_levels_m``.
+        levels: Number of boards that carry objects; see ``shelf_levels_m``.
         style: ``bookcase`` (side and back panels) or ``rack`` (steel posts, open all around).
 
     Raises:
@@ -126,7 +126,7 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
 
 
 def shelf_levels_m(size_m: Vec3, levels: int) -> tuple[float, ...]:
-    """Height of the upper side of each board that things can stand on, from below.
+    """Height of the upper side of each board that carries objects, the lowest first.
 
     Raises:
         AssetError: if there is no room for so many boards.

@@ -10,7 +10,7 @@ from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
-# What one wall leaves of white light; soda-lime glass has a touch of green.
+# Transmittance of one wall, RGB; soda-lime glass is slightly green.
 _TINTS: tuple[Vec3, ...] = (
     (0.97, 0.98, 0.97),
     (0.97, 0.98, 0.97),

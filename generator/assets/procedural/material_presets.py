@@ -1,6 +1,6 @@
-"""Surfaces that real things are made of: colour, roughness and metalness within their usual range.
+"""Materials of common surfaces: colour, roughness and metalness within their usual range.
 
-Base colours are linear; the metals' are the reflectances at normal incidence that are used across
+Base colours are linear; the metals' are the reflectances at normal incidence that are usual in
 the field (Karis, "Real shading in Unreal Engine 4", 2013; Hoffman, "Background: physics and math
 of shading", 2015).
 """

@@ -55,7 +55,7 @@ def ball(seed: int) -> Solid:
     rough = {"tennis": 0.9, "basket": 0.65}.get(kind, rng.between(0.3, 0.5))
     body = sphere(lambda d: radius * d, 22, 36)
     cover = printed_material(f"texture/ball_cover?seed={seed}", rough)
-    # One small hull has flat sides that a ball would rest on; four that are turned have not.
+    # A single small hull has flat sides that a ball would rest on; four rotated ones roll.
     parts = [hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)]
     return make_centred_solid([body], (cover,), parts)
 
@@ -75,7 +75,7 @@ def plain_sphere(diameter_m: float = 0.2) -> Solid:
 
 
 def ball_kind(seed: int) -> str:
-    """Which sport a ball is for."""
+    """Kind of a ball, by the sport it is for."""
     return ("tennis", "rubber", "beach", "basket", "foot")[seed % 5]
 
 

@@ -1,4 +1,4 @@
-"""Roads and junctions: their surfaces, and what those are made of."""
+"""Surfaces of roads and junctions, and their textures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The surface of a road, and things that lie on it."""
+"""The surface of a road, and patches that lie on it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Deck:
         return np.column_stack([flat, z]).reshape(*s_m.shape, 3)
 
     def rows(self, start_m: float, end_m: float) -> Array:
-        """Arc lengths from start to end, as close as the bend asks for."""
+        """Arc lengths from start to end, as dense as the curvature requires."""
         step = ROW_M
         if self.bend_per_m > 0.0:
             step = min(step, math.sqrt(8.0 * SAGITTA_M / self.bend_per_m))

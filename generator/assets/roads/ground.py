@@ -28,7 +28,7 @@ def ground(
         seed: Of relief and texture.
         size_m: Extent along X and Y.
         cover: A word of ``GROUNDS``.
-        relief_m: How deep hollows are.
+        relief_m: Depth of the hollows.
 
     Raises:
         AssetError: the cover is unknown.

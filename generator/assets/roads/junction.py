@@ -49,9 +49,9 @@ def junction(
     Args:
         seed: Of textures.
         wear: 0 freshly laid to 1 worn out.
-        paving: What sidewalks are covered with, a word of ``GROUNDS``.
-        ground: What the land beside is covered with, a word of ``GROUNDS``.
-        crossings: What crosswalks look like: ``zebra``, ``lines`` or ``none``.
+        paving: Cover of the sidewalks, a word of ``GROUNDS``.
+        ground: Cover of the land beside, a word of ``GROUNDS``.
+        crossings: Style of the crosswalks: ``zebra``, ``lines`` or ``none``.
         shape: Fields of ``JunctionShape``.
     """
     profile = JunctionShape(**shape)
@@ -80,7 +80,7 @@ def _fan_patch(center: Array, line: Array, name: str, slot: int) -> Patch:
 
 
 def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterator[Patch]:
-    """Kerb and sidewalk from one arm's end to the next one's, and what closes them at both."""
+    """Kerb and sidewalk from one arm's end to the next one's, closed at both ends."""
     top, b = shape.kerb_m, 0.02
     yield _band(
         shape, number, ((0.0, 0.0), (b, top - 0.015), (b + 0.015, top), (KERB_WIDTH_M, top)),
@@ -119,7 +119,7 @@ def _band(
 
 
 def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
-    """What lies between two arms beyond the sidewalk: out to where their land begins."""
+    """Land between two arms, from the sidewalk to the land beside the arms."""
     offset = shape.border_m if shape.sidewalk_m > 0.0 else 0.0
     z = shape.edge_z_m if shape.sidewalk_m > 0.0 else 0.0
     line = corner(shape, number, offset)

@@ -26,8 +26,8 @@ def parking_area(
     Args:
         seed: Of textures.
         wear: 0 freshly laid to 1 worn out.
-        paving: A word of ``GROUNDS``; kept for the sake of one set of slots.
-        ground: What the land beside is covered with, a word of ``GROUNDS``.
+        paving: A word of ``GROUNDS``; unused, so that all streets share one set of slots.
+        ground: Cover of the land beside, a word of ``GROUNDS``.
         shape: Fields of ``ParkingShape``.
     """
     profile = ParkingShape(**{**shape, **_round_counts(shape)})

@@ -186,7 +186,7 @@ def _wear(deck: Deck, profile: RoadShape, wear: float, rng: VariantRng) -> Itera
 
 
 def _columns_between(deck: Deck, across: tuple[float, float]) -> tuple[float, ...]:
-    """Both ends and the deck's columns between them, so that what lies on ruts follows them."""
+    """Both ends and the deck's columns between them, so that markings on ruts follow them."""
     inside = deck.t_m[(deck.t_m > across[0] + 1e-4) & (deck.t_m < across[1] - 1e-4)]
     return (across[0], *(float(t) for t in inside), across[1])
 
@@ -255,7 +255,7 @@ def _guard_rail(deck: Deck, profile: RoadShape, side: int) -> Iterator[Patch]:
 
 
 def _hulls(deck: Deck, profile: RoadShape) -> list[Array]:
-    """Slabs of at most 20 m under every strip: what wheels and feet stand on."""
+    """Collision slabs of at most 20 m under every strip."""
     stations = np.linspace(0.0, profile.length_m, max(2, int(np.ceil(profile.length_m / 20.0)) + 1))
     hulls = []
     for s0, s1 in pairwise(stations):

@@ -1,4 +1,4 @@
-"""Grounds seen from above, road paint, and castings. Every image tiles.
+"""Ground surfaces from above, road paint, and castings. Every image tiles.
 
 Grounds have 1024 pixels: 6 mm each at their usual repeat of 5 to 7 m.
 """

@@ -1,4 +1,4 @@
-"""What keeps traffic and people apart: guard rails, jersey barriers, work-site barriers, fences.
+"""Guard rails, jersey barriers, work-site barriers and fences.
 
 Pieces run along Y, so that they line a street whose traffic they face with +X; sections of equal
 length join end to end.

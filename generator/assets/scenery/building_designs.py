@@ -1,4 +1,4 @@
-"""What a building is like: drawn once from its style and seed, then built.
+"""Designs of buildings, drawn from a style and a seed, and their materials.
 
 Sizes follow German practice: storeys of 2.7-3.0 m in post-war and 3.4-3.8 m in nineteenth-century
 houses, windows of 1.0-1.5 m by 1.2-1.9 m, sills 0.8-0.95 m above the floor.
@@ -28,7 +28,7 @@ Cladding = Literal["plaster", "brick", "concrete", "stone"]
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """Everything that the parts of one building have in common.
+    """Measures and features that the parts of one building share.
 
     Attributes:
         bays: Windows per floor on the street side.

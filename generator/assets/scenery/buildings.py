@@ -1,7 +1,7 @@
 """Buildings: a facade grammar over a design.
 
 A building is four walls and a roof. Each wall is split into floors, floors into bays, and every
-bay gets an opening that is filled by what belongs there. Origin: the centre of the walls'
+bay gets an opening with a window, a door or a shop front. Origin: the centre of the walls'
 footprint on the ground; the front wall lies at x = depth / 2 and faces +X. Sills, cornices,
 balconies and awnings reach beyond it.
 """
@@ -76,7 +76,7 @@ def garage(seed: int) -> Solid:
 
 
 def _front(plan: Design, rng: VariantRng) -> Patch:
-    """The street side: ground floor, upper floors, and what separates them."""
+    """The street side: ground floor, upper floors, and the bands between them."""
     half = 0.5 * plan.width_m
     ground = _shops(plan, rng) if plan.shops else _dwelling(plan, rng)
     holes, upper = _upper(plan, rng)

@@ -1,7 +1,7 @@
-"""Walls with holes, and what fills the holes: windows, doors, shop fronts, railings.
+"""Walls with openings, and windows, doors, shop fronts and railings for them.
 
-A wall's own frame: its outer plane is x = 0, +X points outward, y to the right of who stands
-before it, z up. Recesses lie at negative x.
+A wall's own frame: its outer plane is x = 0, +X points outward, y to the right of a viewer
+in front of it, z up. Recesses lie at negative x.
 """
 
 from __future__ import annotations

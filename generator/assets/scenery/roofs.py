@@ -1,4 +1,4 @@
-"""Roofs and what stands on them.
+"""Roofs, dormers and chimneys.
 
 All of them lie over a rectangle about the Z axis, ``depth_m`` along X and ``width_m`` along Y,
 whose walls end at height 0. Tiles follow texture coordinates: u along the eaves, v up the slope,

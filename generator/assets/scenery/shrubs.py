@@ -112,7 +112,7 @@ def _shades(rng: VariantRng) -> tuple[Material, ...]:
 
 
 def _core_material(greens: tuple[Material, ...]) -> Material:
-    """What shows between the leaves: the same green, deeper."""
+    """Material that shows between the leaves: the same green, darker."""
     r, g, b = greens[1].base_color
     return Material(
         (1.1 * r, 1.1 * g, 1.1 * b),

@@ -1,7 +1,7 @@
 """Traffic signs: shaped plates on poles, their faces drawn by ``textures.sign_faces``.
 
 Shapes and meanings: Vienna Convention on Road Signs and Signals, 1968. Sizes: German VwV-StVO,
-size 2 (discs of 600 mm, triangles with sides of 900 mm). Faces look to +X.
+size 2 (discs of 600 mm, triangles with sides of 900 mm). Faces point to +X.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Street furniture. Sizes after manufacturers' catalogues and the standards named below.
 
-Everything stands on the origin; what has a front shows it to +X.
+Everything stands on the origin; fronts face +X.
 """
 
 from __future__ import annotations

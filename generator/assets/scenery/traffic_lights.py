@@ -1,7 +1,7 @@
 """Traffic lights: lenses that are dark until they are lit by their role.
 
-Lenses face +X, towards the traffic they are for. Lens diameters of 200 and 300 mm and heights above
-the road follow EN 12368 and the German RiLSA.
+Lenses face +X, towards the traffic that they control. Lens diameters of 200 and 300 mm and
+heights above the road follow EN 12368 and the German RiLSA.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ _OFF: dict[str, Vec3] = {
 def traffic_light(seed: int, mount: str) -> Solid:
     """A signal for vehicles, on a pole or also on an arm over the road.
 
-    The arm reaches towards -Y: to the left of who drives towards the lenses.
+    The arm reaches towards -Y: to the left of a driver who approaches the lenses.
     Slots: housing, pole, board, and one per lens by its role.
 
     Raises:

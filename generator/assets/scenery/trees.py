@@ -47,13 +47,13 @@ _STEP = 0.12
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What a tree is like.
+    """Measures and colours of one tree.
 
     Attributes:
         height_m: Overall.
         clear_m: From the ground to the lowest branches.
         trunk_m: Radius of the trunk at its foot.
-        lobes: What the crown fills.
+        lobes: Ellipsoids that the crown fills.
         green: sRGB of the leaves, from the crown's depth to its surface.
         bark: sRGB of the bark.
     """

@@ -33,7 +33,7 @@ _OCTAVES = 7
 def cloud_layer(
     d: Array, cloudiness: float, sun_altitude_rad: float, seed: int
 ) -> tuple[Float32, Float32]:
-    """How much of each direction clouds hide, and how bright they are there.
+    """Cloud cover and cloud brightness in each direction.
 
     Args:
         d: Unit directions of the upper hemisphere [rows, columns, 3], one elevation per row.
@@ -65,7 +65,7 @@ def cloud_layer(
 # A sky is looked at twice: for its mean, and for its image.
 @lru_cache(maxsize=2)
 def _layer(cloudiness: float, sun_altitude_rad: float, seed: int) -> tuple[Float32, ...]:
-    """The layer, and its halvings; read-only."""
+    """The layer and its mip chain; read-only."""
     cover, light = _seen_from_below(cloudiness, sun_altitude_rad, variant_rng("sky", seed))
     return tuple(_mip_chain(np.stack([cover, cover * light], axis=-1)))
 
@@ -92,7 +92,7 @@ def _seen_from_below(
 
 
 def _heaps(rng: Rng) -> Float32:
-    """Where there is much cloud: large masses with billows on them, in about [-1, 1]."""
+    """Density of clouds: large masses with billows on them, in about [-1, 1]."""
     masses = fbm((3, 3), _OCTAVES, rng, 0.52, _TILE_PX)
     billows = np.zeros_like(masses)
     for k, cells in enumerate((12, 24, 48)):
@@ -109,7 +109,7 @@ def _way_to_layer(up: Array) -> Array:
 
 
 def _mip_levels(up: Array, levels: int, rows: int) -> Array:
-    """The size of the layer, as a number of halvings, that suits each row of the image."""
+    """Mip level of the layer for each row of the image."""
     flat_m = _HEIGHT_M / (np.maximum(up, 0.0) + _HEAPING)
     footprint_m = flat_m * (math.pi / rows) / (np.maximum(up, 0.0) + _HEAPING)
     return np.clip(np.log2(footprint_m / (_TILE_M / _TILE_PX)), 0.0, levels - 1.0)

@@ -1,4 +1,4 @@
-"""How much light comes from the sun and from the sky.
+"""Illuminance by sun and sky.
 
 Altitudes are those of the sun over the horizon [rad]; ``cloudiness`` runs from 0 (clear) over 0.5
 (broken clouds) to 1 (overcast); ``turbidity`` is that of Linke and Preetham: 2 very clear, 6 hazy.
@@ -99,7 +99,7 @@ def preetham_zenith_cd_m2(altitude_rad: float, turbidity: float) -> float:
 
 
 def sun_radius_rad(cloudiness: float = 0.0) -> float:
-    """Angular radius of what the sun's light comes from: thin cloud spreads it."""
+    """Angular radius of the sun as a light source; thin cloud enlarges it."""
     return math.radians(0.266 + 4.0 * _step(0.2, 0.85, cloudiness))
 
 

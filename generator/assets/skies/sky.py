@@ -70,7 +70,7 @@ _STREETS_CD_M2 = 0.2
 
 @dataclass(frozen=True, slots=True)
 class SkyModel:
-    """What a sky depends on.
+    """Parameters of a sky.
 
     Attributes:
         seed: Of the clouds.
@@ -78,7 +78,7 @@ class SkyModel:
         turbidity: 2 very clear, 3 usual, 6 hazy.
         cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
         ground_albedo: Of the land below the horizon.
-        model: ``measured``: as much light as IES RP-21 says, under any clouds, day and night.
+        model: ``measured``: the illuminance of IES RP-21, under any clouds, day and night.
             ``preetham``: the luminances of Preetham's clear sky by day as published.
     """
 
@@ -120,7 +120,7 @@ def sun_lux(model: SkyModel) -> float:
 
 
 def mean_luminance_cd_m2(model: SkyModel) -> float:
-    """Mean over the whole sphere: what ``Environment.luminance_cd_m2`` has to be."""
+    """Mean over the whole sphere, the value for ``Environment.luminance_cd_m2``."""
     image = luminance_cd_m2(model, _MEAN_ROWS)
     weights = _row_weights(_MEAN_ROWS)
     rows = np.einsum("hwc,c->h", image, REC709_LUMINANCE, optimize=False) / image.shape[1]
@@ -208,7 +208,7 @@ def _mirror(half: Array) -> Float32:
 
 
 def _daylight(d: Array, model: SkyModel) -> Float32:
-    """What the sun lights, any unit: clear air, clouds in it, a closed deck."""
+    """Sky lit by the sun, any unit: clear air, clouds in it, a closed deck."""
     altitude = model.sun_altitude_rad
     half = d[:, : d.shape[1] // 2]
     by_day = clear_sky(half, max(altitude, math.radians(1.5)), model.turbidity)
@@ -220,7 +220,7 @@ def _daylight(d: Array, model: SkyModel) -> Float32:
     if model.cloudiness == 0.0:
         return image
     cover, light = cloud_layer(d, model.cloudiness, altitude, model.seed)
-    # A white cloud sends back what sun and sky throw on it.
+    # A white cloud reflects all light of sun and sky.
     clear_lux = daylight.sky_illuminance_lux(altitude)
     sun_lux = daylight.sun_illuminance_lux(altitude, model.turbidity) * max(math.sin(altitude), 0.1)
     warm = np.array(daylight.sun_color(max(altitude, 0.01), model.turbidity))
@@ -275,7 +275,7 @@ def _night(d: Array, model: SkyModel) -> Float32:
 
 
 def _land(image: Float32, d: Array, model: SkyModel) -> Float32:
-    """What lies below the horizon: land that sun and sky light, hazy where it is far."""
+    """Land below the horizon, lit by sun and sky, hazy in the distance."""
     altitude = model.sun_altitude_rad
     sun = sun_lux(model) * max(math.sin(altitude), 0.0) * np.array(daylight.sun_color(altitude))
     light = _level_light(image) + sun

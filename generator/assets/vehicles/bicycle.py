@@ -58,7 +58,7 @@ _FRAMES = load_table(__package__, "bicycles", _Frame)
 
 
 def bicycle(seed: int) -> Solid:
-    """A bicycle that stands upright with nobody on it."""
+    """A bicycle without rider, upright."""
     rng = variant_rng("bicycle", seed)
     frame = _FRAMES[in_turn(STYLES, seed)]
     parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi), rng)

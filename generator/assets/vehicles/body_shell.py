@@ -250,7 +250,7 @@ def round_x_z(x_m: float, z_m: float, radius_m: float, beyond_y_m: float) -> Lev
 
 
 def mirror_half(half: Patch, swaps: Sequence[tuple[int, int]] = ()) -> Patch:
-    """A left half and its mirror image, whose slots are exchanged as named."""
+    """A left half and its mirror image, which exchanges the pairs of slots in ``swaps``."""
     slots = half.slots.copy()
     for left, right in swaps:
         slots[half.slots == left] = right
@@ -285,7 +285,7 @@ Pieces = tuple[list[tuple[Array, Mask]], Array]
 
 
 def _halve_triangles(data: Array, value: Array) -> Pieces:
-    """Triangles whose first corner is on the line, and the side each is on."""
+    """Cut triangles whose first corner lies on the line; with the side of each piece."""
     a, b, c = (data[:, i] for i in range(3))
     d = _crossing(b, c, value[:, 1], value[:, 2])
     pieces = [(np.stack([a, b, d], axis=1), value[:, 1] > 0),
@@ -294,7 +294,7 @@ def _halve_triangles(data: Array, value: Array) -> Pieces:
 
 
 def _cut_tips(data: Array, value: Array) -> Pieces:
-    """Triangles whose first corner is alone on its side: a tip and two of the rest."""
+    """Cut triangles whose first corner is alone on its side: one tip, two other pieces."""
     a, b, c = (data[:, i] for i in range(3))
     d, e = (_crossing(a, data[:, i], value[:, 0], value[:, i]) for i in (1, 2))
     tip = value[:, 0] > 0
@@ -304,7 +304,7 @@ def _cut_tips(data: Array, value: Array) -> Pieces:
 
 
 def _crossing(a: Array, b: Array, at_a: Array, at_b: Array) -> Array:
-    """Where the level is 0 between two points; the same whichever comes first."""
+    """Points where the level is 0 between two points; independent of their order."""
     share = (at_a / (at_a - at_b))[:, None]
     point: Array = a + share * (b - a)
     return np.round(point, 9)

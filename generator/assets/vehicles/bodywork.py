@@ -1,4 +1,4 @@
-"""Cars and vans: a lower body with a hood, a glass house on it, and what is fitted to them."""
+"""Cars and vans: lower body with hood, glass house, and fittings."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from gen_data.generator.core.asset_types import Keypoint
 
 @dataclass(frozen=True)
 class Design:
-    """What distinguishes one car or van from another.
+    """Design of a car or van.
 
     Shares are of the length from the front bumper; heights are above the ground.
 
@@ -97,7 +97,7 @@ class Design:
 
     @property
     def axles(self) -> Axles:
-        """Where the wheels are."""
+        """Position and size of the wheels."""
         front, tyre = 0.5 * self.length_m - self.front_axle_m, 0.66 * self.wheel_radius_m
         return Axles(
             front_m=front,
@@ -128,7 +128,7 @@ DESIGNS = load_table(__package__, "designs", Design)
 
 
 def bodywork(design: Design, steer_deg: float) -> Patch:
-    """Everything, both sides."""
+    """The whole vehicle, both sides."""
     ring = body_shell.plan(*design.body_ends, sides=20)
     plain = _lower(design, ring)
     lower, wells = design.axles.wells(_lower_paint(design, ring, plain), design.half_m)
@@ -171,7 +171,7 @@ def _lower(design: Design, ring: BodyOutline) -> Patch:
         return np.full_like(at, design.clearance_m)
 
     body = body_shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
-    # What lies under the glass house is never seen.
+    # The part under the glass house is never visible.
     hidden = np.all(
         (body.uvs[..., 1] >= 1.0)
         & (body.corners_m[..., 0] < design.x(design.cowl) - 0.35)

@@ -75,7 +75,7 @@ def motorcycle(seed: int) -> Solid:
 
 
 def motorcycle_facts(seed: int) -> Facts:
-    """Its kind, and whether somebody rides it."""
+    """Its kind, and whether it has a rider."""
     return Facts(in_turn(STYLES, seed), {"rider": "yes" if _is_ridden(seed) else "no"})
 
 

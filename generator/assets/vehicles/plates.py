@@ -1,7 +1,7 @@
 """Licence plates: letters and digits of straight strokes, in a format that no country has.
 
-Glyphs stand on a grid of 4 by 6. Letters that are easily taken for digits are left out, as many
-countries do.
+Glyphs stand on a grid of 4 by 6. Letters that are easily confused with digits are left out, as
+in many countries.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _STROKE = 0.95
 
 
 def plate_text(seed: int) -> str:
-    """What stands on a plate; groups are separated by a space."""
+    """Text of a plate; groups are separated by a space."""
     rng = variant_rng("licence_plate", seed)
     pattern = rng.choose(_PATTERNS)
     return "".join(_draw_character(place, rng) for place in pattern)

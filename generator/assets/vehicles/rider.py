@@ -1,4 +1,4 @@
-"""Someone who sits on two wheels: limbs between hips, grips and pedals.
+"""Riders of two-wheelers: limbs between hips, grips and pedals.
 
 Lengths are shares of stature from Drillis and Contini, "Body segment parameters", 1966.
 """
@@ -30,11 +30,11 @@ _TORSO_M = 0.275 * _STATURE_M
 
 @dataclass(frozen=True)
 class Seat:
-    """Where the rider touches the vehicle, metres; left (y > 0) before right.
+    """Points of contact between rider and vehicle [m]; left (y > 0) before right.
 
     Attributes:
         hips: Middle of the hip joints.
-        grips, soles: Hands' and feet's places.
+        grips, soles: Positions of hands and feet.
         lean_rad: Of the trunk, forward from upright.
         full_face: Whether the helmet covers the face.
     """
@@ -87,7 +87,7 @@ def blob(centre: Sequence[float] | Array, half: Vec3, slot: int, pitch_rad: floa
 
 
 def joint(start: Array, end: Array, first_m: float, second_m: float, towards: Array) -> Array:
-    """Where a limb of two bones bends; it bends towards a direction, or not if it cannot reach."""
+    """Joint of a limb of two bones that bends towards a direction; straight if it cannot reach."""
     reach = end - start
     distance = math.sqrt(float((reach**2).sum()))
     along = (distance**2 + first_m**2 - second_m**2) / (2.0 * distance)

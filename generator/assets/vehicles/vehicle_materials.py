@@ -1,4 +1,4 @@
-"""The slots that all vehicles share, and what they are made of."""
+"""Material slots that all vehicles share, and their materials."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gen_data.generator.core.se3 import Vec3
 
 
 class VehicleSlot(IntEnum):
-    """Number of a material in what ``materials`` returns."""
+    """Index of a material in the result of ``materials``."""
 
     PAINT = 0
     GLASS = 1

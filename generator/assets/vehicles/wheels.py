@@ -1,4 +1,4 @@
-"""Wheels of everything with an axle, and the wells they turn in."""
+"""Wheels of all vehicles, and their wheel wells."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _spokes(rim: float, half: float, count: int) -> list[Patch]:
         return [lathe(plate, _SEGMENTS, Slot.RIM)]
     width = 1.25 * rim / (count + 1.5)
     bar = block((0.12 * rim, -0.5 * width, 0.45 * half), (0.92 * rim, 0.5 * width, 0.82 * half))
-    # The lower face is never seen.
+    # The lower face is never visible.
     up = np.cross(
         bar.corners_m[:, 1] - bar.corners_m[:, 0], bar.corners_m[:, 2] - bar.corners_m[:, 0]
     )
@@ -92,7 +92,7 @@ class Axles:
             yield side.rotated("z", turn).moved(x, sign * self.hub_y_m, self.radius_m)
 
     def wells(self, patch: Patch, half_m: float) -> tuple[Patch, list[Patch]]:
-        """A left half of a body with holes for the wheels, and what is behind the holes."""
+        """Cut wheel openings into a left half of a body; also return the wells behind them."""
         inner = half_m - _WELL_M
         made = []
         for x in (self.front_m, self.rear_m):
@@ -118,7 +118,7 @@ class Axles:
 
 
 def _well(edge_m: Array, hub_m: tuple[float, float], radius_m: float, inner_y_m: float) -> Patch:
-    """The inside of a wheel well behind an edge, as segments [n, 2, 3]; it looks at the hub."""
+    """The inside of a wheel well behind an edge, as segments [n, 2, 3]; it faces the hub."""
     inner = edge_m.copy()
     inner[..., 1] = inner_y_m
     a, b, c, d = edge_m[:, 0], edge_m[:, 1], inner[:, 1], inner[:, 0]

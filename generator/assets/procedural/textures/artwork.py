@@ -34,7 +34,7 @@ def canvas(w: int, h: int, fill: Color) -> Image:
 
 
 def pen(image: Image) -> ImageDraw:
-    """What draws on an image, in pixels."""
+    """Drawing context of an image; coordinates in pixels."""
     from PIL.ImageDraw import Draw
 
     return Draw(image)

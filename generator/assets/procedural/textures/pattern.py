@@ -1,4 +1,4 @@
-"""Abstract patterns: what domain randomization paints on anything."""
+"""Abstract patterns for domain randomization."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ _WORDS = load_table(__package__, "printed_matter", tuple[str, ...])
 
 @dataclass(frozen=True, slots=True)
 class _Design:
-    """What all faces of one product share."""
+    """Colours, words and layout that all faces of one product share."""
 
     ground: Color
     second: Color
@@ -142,7 +142,7 @@ def _wrap(width: int, aspect: float, design: _Design, rng: VariantRng) -> Image:
 
 
 def _front(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
-    """The face that sells: ground, picture, brand, product, note, size."""
+    """Front of a package: ground, picture, brand, product, note, size."""
     image = art.canvas(w, h, design.ground)
     _ground(image, design, rng)
     tall = h > 0.8 * w
@@ -191,7 +191,7 @@ def _ground(image: Image, design: _Design, rng: VariantRng) -> None:
 
 
 def _picture(image: Image, box: Box, design: _Design, rng: VariantRng) -> None:
-    """A simple picture of what is inside."""
+    """Draw a simple picture of the contents."""
     x0, y0, x1, y1 = art.pixels(image, box)
     radius = min(x1 - x0, y1 - y0) // 2
     draw = (_bowl, _fruits, _leaves, _landscape, _rings)[design.picture]
