@@ -47,15 +47,7 @@ _WRIST = _ELBOW + 0.146 * _HEIGHT_M * _DOWN_OUT
 _HAND_M = 0.108 * _HEIGHT_M
 _LEG_Y = 0.088
 
-_MIDDLE_BONES: Mapping[str, tuple[str, tuple[float, float, float]]] = {
-    "Root": ("", (0.0, 0.0, _SOLE_Z_M)),
-    "pelvis": ("Root", (0.0, 0.0, 0.075)),
-    "spine_01": ("pelvis", (0.0, 0.0, 0.12)),
-    "spine_02": ("spine_01", (0.0, 0.0, 0.19)),
-    "spine_03": ("spine_02", (0.0, 0.0, 0.29)),
-    "neck_01": ("spine_03", (0.0, 0.0, 0.585)),
-    "head": ("neck_01", (0.015, 0.0, 0.69)),
-}
+_SPINE = ("Root", "pelvis", "spine_01", "spine_02", "spine_03", "neck_01", "head")
 _SIDE_BONES: Mapping[str, tuple[str, Array]] = {
     "clavicle": ("spine_03", np.array([0.03, 0.03, 0.52])),
     "upperarm": ("clavicle", _SHOULDER),
@@ -70,15 +62,6 @@ _SIDE_BONES: Mapping[str, tuple[str, Array]] = {
     "calf": ("thigh", np.array([0.005, _LEG_Y, _KNEE_Z])),
     "foot": ("calf", np.array([-0.01, _LEG_Y, _ANKLE_Z])),
     "ball": ("foot", np.array([0.115, _LEG_Y, -0.8])),
-}
-_FACE: Mapping[str, tuple[float, float, float]] = {
-    "nose": (0.166, 0.0, 0.692),
-    "left_eye": (0.128, 0.031, 0.728),
-    "right_eye": (0.128, -0.031, 0.728),
-    "left_ear": (0.045, 0.08, 0.715),
-    "right_ear": (0.045, -0.08, 0.715),
-    "crown": (0.05, 0.0, 0.85),
-    "sole": (0.05, _LEG_Y, _SOLE_Z_M),
 }
 
 
@@ -96,9 +79,7 @@ def simple_body() -> BodyTemplate:
     names = list(bones)
     marks = np.zeros((len(LANDMARKS), len(names)))
     marks[:, names.index("head")] = 1.0
-    points = np.concatenate(
-        [heads, [_FACE[name] for name in LANDMARKS], *(p.values[:, :3] for p in parts)]
-    )
+    points = np.concatenate([heads, OUTLINES["landmarks"], *(p.values[:, :3] for p in parts)])
     table = np.concatenate([np.eye(len(names)), marks, *(p.values[:, 3:] for p in parts)])
     weight_bones, weights = strongest_weights(table)
     faces: dict[str, list[Indices]] = {}
@@ -162,10 +143,11 @@ def _warp(p: Array, sex: str, age: str, weight: str) -> Array:
 
 def _bones() -> dict[str, tuple[str, Array]]:
     """``{bone: (parent or "", head [m])}``, each after its parent."""
-    made = {name: (parent, np.array(head)) for name, (parent, head) in _MIDDLE_BONES.items()}
+    spine = zip(_SPINE, ("", *_SPINE), OUTLINES["spine"], strict=False)
+    made = {name: (parent, np.array(head)) for name, parent, head in spine}
     for side, sign in (("l", 1.0), ("r", -1.0)):
         for name, (parent, head) in _SIDE_BONES.items():
-            above = parent if parent in _MIDDLE_BONES else f"{parent}_{side}"
+            above = parent if parent in _SPINE else f"{parent}_{side}"
             made[f"{name}_{side}"] = (above, head * (1.0, sign, 1.0))
     return made
 

@@ -1,7 +1,7 @@
 """Template body: mesh, shapes and bones.
 
 Template frame: metres, Z up, front +X, left +Y; the origin lies in the pelvis. The body stands
-upright with its arms held away from it. Everything that moves with the body is a *point* in one list:
+upright with its arms held away from it. All that moves with the body is a *point* in one list:
 bone heads first, then landmarks, then the vertices of skin, clothes and hair.
 """
 

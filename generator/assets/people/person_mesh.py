@@ -15,6 +15,7 @@ from gen_data.generator.assets.people.clothes import displace_layer, layers
 from gen_data.generator.assets.people.person import Person
 from gen_data.generator.assets.people.skinning import bone_transforms, skin_points, vertex_normals
 from gen_data.generator.assets.procedural.collision_hulls import extreme
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData
@@ -26,27 +27,7 @@ _NARROW_STRIDE = 0.7
 """What a long skirt leaves of a stride."""
 _HULL_POINTS = 40
 
-KEYPOINTS: tuple[tuple[str, str, float], ...] = (
-    ("nose", "nose", 0.02),
-    ("left_eye", "left_eye", 0.03),
-    ("right_eye", "right_eye", 0.03),
-    ("left_ear", "left_ear", 0.03),
-    ("right_ear", "right_ear", 0.03),
-    ("left_shoulder", "upperarm_l", 0.1),
-    ("right_shoulder", "upperarm_r", 0.1),
-    ("left_elbow", "lowerarm_l", 0.08),
-    ("right_elbow", "lowerarm_r", 0.08),
-    ("left_wrist", "hand_l", 0.06),
-    ("right_wrist", "hand_r", 0.06),
-    ("left_hip", "thigh_l", 0.16),
-    ("right_hip", "thigh_r", 0.16),
-    ("left_knee", "calf_l", 0.1),
-    ("right_knee", "calf_r", 0.1),
-    ("left_ankle", "foot_l", 0.09),
-    ("right_ankle", "foot_r", 0.09),
-)
-"""COCO's 17 names in COCO's order; the bone head or landmark of each; its depth under the surface
-of a grown person [m], clothes included."""
+KEYPOINTS = load_table(__package__, "keypoints", tuple[str, float])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -125,7 +106,7 @@ def build_person(person: Person, figure: Figure) -> Solid:
     mesh, shift = _join_on_ground(sheets, body, posed)
     keypoints = tuple(
         Keypoint(name, _vec(posed[_index(body, mark)] + shift), round(radius * scale, 4))
-        for name, mark, radius in KEYPOINTS
+        for name, (mark, radius) in KEYPOINTS.items()
     )
     hull = extreme(mesh.vertices_m.astype(np.float64), _HULL_POINTS)
     return Solid(mesh, ConvexParts((hull,)), keypoints)

@@ -26,7 +26,7 @@ def parking_area(
     Args:
         seed: Of textures.
         wear: 0 freshly laid to 1 worn out.
-        paving: A word of ``GROUNDS``; unused, so that all streets share one set of slots.
+        paving: A word of ``GROUNDS``; without area here, as all streets share one set of slots.
         ground: Cover of the land beside, a word of ``GROUNDS``.
         shape: Fields of ``ParkingShape``.
     """

@@ -111,7 +111,7 @@ def wood(skeleton: Skeleton, thinnest_m: float, stride: int = 2) -> Patch:
             continue
         kept = np.unique([*range(0, thick, stride), thick])
         path, r = skeleton.nodes_m[chain][kept], radii[kept].copy()
-        # A branch starts as thick as it is itself, not as what it grows from.
+        # A branch starts with its own thickness, not with that of its parent.
         r[0] = min(r[0], 1.25 * r[1])
         sides = 8 if r[0] > 0.1 else 5 if r[0] > 0.035 else 3
         up = (1.0, 0.0, 0.0) if abs(path[1, 2] - path[0, 2]) > 0.05 else (0.0, 0.0, 1.0)

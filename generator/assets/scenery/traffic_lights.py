@@ -7,11 +7,12 @@ heights above the road follow EN 12368 and the German RiLSA.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
@@ -34,20 +35,7 @@ HOUSING, POLE, BOARD = 0, 1, 2
 _FIRST_LENS = 3
 VEHICLE_LENSES = ("lens_red", "lens_yellow", "lens_green")
 PEDESTRIAN_LENSES = ("lens_stop", "lens_walk")
-# Convex outlines (right, up) in lens radii, counter-clockwise.
-FIGURES: Mapping[str, Sequence[Sequence[tuple[float, float]]]] = {
-    "lens_stop": (
-        ((-0.36, -0.12), (-0.22, -0.14), (0.22, -0.14), (0.36, -0.12), (0.2, 0.42), (-0.2, 0.42)),
-        ((-0.17, -0.85), (0.17, -0.85), (0.2, -0.13), (-0.2, -0.13)),
-    ),
-    "lens_walk": (
-        ((-0.16, -0.2), (0.16, -0.18), (0.18, 0.42), (-0.14, 0.42)),
-        ((0.18, -0.85), (0.42, -0.82), (0.16, -0.17), (-0.06, -0.19)),
-        ((-0.5, -0.8), (-0.27, -0.82), (0.06, -0.19), (-0.16, -0.21)),
-        ((0.18, 0.22), (0.46, -0.04), (0.5, 0.06), (0.16, 0.42)),
-        ((-0.46, 0.0), (-0.36, -0.08), (-0.13, 0.2), (-0.14, 0.42)),
-    ),
-}
+FIGURES = load_table(__package__, "signal_figures", tuple[tuple[tuple[float, float], ...], ...])
 _OFF: dict[str, Vec3] = {
     "lens_red": (0.09, 0.008, 0.006),
     "lens_yellow": (0.11, 0.06, 0.006),

@@ -1,7 +1,7 @@
 """A layer of clouds over a curved earth, seen from below.
 
-The layer is a square that repeats. What is seen near the horizon is averaged over many
-kilometres, so the layer is kept at many sizes, each half as fine as the one before.
+The layer is a square that repeats. Pixels near the horizon average over many kilometres, so the
+layer is kept as a mip chain, each level half as fine as the one before.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The sky at any time of day, under any clouds, as an environment.
 
 The sun stands in the direction of +X and is not in the image: it is a Light. Luminances are those
-of the real sky: the light on level ground is what ``daylight.sky_illuminance_lux`` says.
+of the real sky: the illuminance of level ground is ``daylight.sky_illuminance_lux``.
 
 Sources: Preetham, Shirley and Smits, "A practical analytic model for daylight", SIGGRAPH 1999
 (clear sky: Perez' formula for luminance and chromaticity); CIE S 011/E:2003 (overcast sky).
@@ -165,7 +165,7 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float =
     towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
     angle = np.arccos(np.clip(towards, -1.0, 1.0))
 
-    # Gradation is the same along a row, and all three formulas ask for the same cosines.
+    # Gradation is constant along a row, and all three formulas share the same cosines.
     rows_up, cosine_squared = up[:, :1], np.clip(towards, -1.0, 1.0) ** 2
 
     def relative(coefficients: tuple[tuple[float, float], ...]) -> Array:

@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 Level = Callable[[Patch], Array]
 """Values at the corners of a patch, shape [n, 3]; positive inside."""
 
-# How far lines stand in front of what they are drawn on.
+# Distance of lines from the surface under them.
 _PROUD_M = 0.002
 BODY_ROWS = load_table(__package__, "body_rows", tuple[tuple[float, float, float, float], ...])
 _END_SHARES = (0.0, 0.32, 0.58, 0.78, 0.92)

@@ -131,7 +131,7 @@ def _wrap(width: int, aspect: float, design: _Design, rng: VariantRng) -> Image:
     """Front in the middle, information half on each end; the ends meet in the plain ground."""
     height = max(48, int(width / aspect))
     canvas = art.canvas(width, height, design.ground)
-    # What is seen at once of a cylinder is less than half of it.
+    # Less than half of a cylinder is visible at once.
     front = _front(int(0.42 * width), height, design, rng)
     canvas.paste(front, (int(0.29 * width), 0))
     end = int(0.25 * width)
