@@ -28,31 +28,10 @@ LANDMARKS = ("nose", "left_eye", "right_eye", "left_ear", "right_ear", "crown", 
 """Points that no bone marks: of the face, the top of the head, the underside of a foot."""
 
 ZONES = (
-    "face",
-    "scalp",
-    "brows",
-    "lips",
-    "eyes",
-    "irises",
-    "arms",
-    "hands",
-    "legs",
-    "upper_legs",
-    "torso",
-    "front",
-    "sleeves",
-    "hips",
-    "thighs",
-    "shins",
-    "ankles",
-    "shoes",
-    "soles",
-    "skirt_top",
-    "skirt_middle",
-    "skirt_end",
-    "hair",
-    "hair_end",
-)
+    "face", "scalp", "brows", "lips", "eyes", "irises", "arms", "hands", "legs", "upper_legs",
+    "torso", "front", "sleeves", "hips", "thighs", "shins", "ankles", "shoes", "soles",
+    "skirt_top", "skirt_middle", "skirt_end", "hair", "hair_end",
+)  # fmt: skip
 """Parts of the template that are shown or left out as a whole."""
 
 Array = NDArray[np.float64]

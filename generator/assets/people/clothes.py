@@ -136,14 +136,8 @@ def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
         zones: tuple[str, ...] = ("hips", "thighs", "shins", "ankles")
         if outfit.top == "coat":
             zones = zones[outfit.skirt_zones :]
-        profile: Profile = (
-            (-0.78, 0.024),
-            (-0.7, 0.018),
-            (-0.36, 0.013),
-            (-0.1, 0.008),
-            (0.0, 0.004),
-            (0.12, 0.002),
-        )
+        profile: Profile = ((-0.78, 0.024), (-0.7, 0.018), (-0.36, 0.013), (-0.1, 0.008),
+                            (0.0, 0.004), (0.12, 0.002))  # fmt: skip
         painted = tuple((zone, material) for zone in zones)
         return (Layer(painted, profile, 0.0025, 5.0, smoothings=1),)
     if outfit.bottom == "shorts":

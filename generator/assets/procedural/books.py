@@ -29,14 +29,8 @@ COVER_ATLAS: Mapping[str, UvRect] = {
     "spine": (0.442, 0.002, 0.558, 0.998),
     "front": (0.562, 0.002, 0.998, 0.998),
 }
-_FORMATS = (
-    (0.178, 0.11),
-    (0.198, 0.129),
-    (0.21, 0.148),
-    (0.234, 0.156),
-    (0.19, 0.19),
-    (0.297, 0.21),
-)
+_FORMATS = ((0.178, 0.11), (0.198, 0.129), (0.21, 0.148), (0.234, 0.156), (0.19, 0.19),
+            (0.297, 0.21))  # fmt: skip
 
 
 def book_size_m(seed: int) -> tuple[float, float, float]:
@@ -73,13 +67,9 @@ def _cover(size_m: Vec3, board: float, bow: float) -> Patch:
     y0, y1 = -0.5 * width, 0.5 * width
     spine = [(y0 + bow * t**2, -h * t) for t in (0.9, 0.5, 0.0, -0.5, -0.9)]
     outer = [(y1, -h), (y0 + bow, -h), *spine, (y0 + bow, h), (y1, h)]
-    inner = [
-        (y1, h - board),
-        (y0 + bow + board, h - board),
-        *((y + board, z * (1 - board / h)) for y, z in spine[::-1]),
-        (y0 + bow + board, board - h),
-        (y1, board - h),
-    ]
+    inner = [(y1, h - board), (y0 + bow + board, h - board),
+             *((y + board, z * (1 - board / h)) for y, z in spine[::-1]),
+             (y0 + bow + board, board - h), (y1, board - h)]  # fmt: skip
     back, side, front = (COVER_ATLAS[name] for name in ("back", "spine", "front"))
     arc = np.array(outer[1:8])
     steps = np.sqrt((np.diff(arc, axis=0) ** 2).sum(axis=1))

@@ -119,13 +119,8 @@ def jar(seed: int) -> Solid:
             plastic_material(rng, CAPS),
         )
     )
-    stages = [
-        (0.92 * radius, 0.0),
-        (radius, 0.008),
-        (radius, 0.8 * height),
-        (lid_radius, top),
-        (lid_radius, height),
-    ]
+    stages = [(0.92 * radius, 0.0), (radius, 0.008), (radius, 0.8 * height), (lid_radius, top),
+              (lid_radius, height)]  # fmt: skip
     return make_centred_solid(patches, (glass, label, lid), hulls.stack(stages))
 
 
@@ -135,18 +130,11 @@ def _wall_with_label(
     """Bottom and wall up to the last point of ``upper``, with a label between two heights."""
     z0, z1 = label
     lower = fillet(
-        [
-            (0.0, 0.004),
-            (0.6 * radius, 0.003),
-            (0.72 * radius, 0.0),
-            (0.93 * radius, 0.0),
-            (radius, 0.008),
-            (radius, z0 - _PROUD_M),
-            (radius + _PROUD_M, z0),
-        ],
+        [(0.0, 0.004), (0.6 * radius, 0.003), (0.72 * radius, 0.0), (0.93 * radius, 0.0),
+         (radius, 0.008), (radius, z0 - _PROUD_M), (radius + _PROUD_M, z0)],
         [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0],
         3,
-    )
+    )  # fmt: skip
     rest = [(radius + _PROUD_M, z1), (radius, z1 + _PROUD_M), *upper]
     return [
         lathe(lower, 32, 0),
@@ -163,14 +151,8 @@ def _cap(radius: float, low: float, high: float) -> Patch:
 
 def _lid(radius: float, low: float, high: float) -> Patch:
     """A twist-off lid with a sunken panel."""
-    profile = [
-        (0.0, low),
-        (radius, low),
-        (radius, high),
-        (radius - 0.006, high),
-        (radius - 0.008, high - 0.0012),
-        (0.0, high - 0.0012),
-    ]
+    profile = [(0.0, low), (radius, low), (radius, high), (radius - 0.006, high),
+               (radius - 0.008, high - 0.0012), (0.0, high - 0.0012)]  # fmt: skip
     return lathe(fillet(profile, [0.0, 0.001, 0.002, 0.0, 0.0, 0.0], 2), 32, 2)
 
 

@@ -93,19 +93,11 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     )
     side = [(r, z0), (r, z1)]
     top = fillet(
-        [
-            (r, z1),
-            (r, h - 0.014),
-            (neck, h - 0.0035),
-            (neck, h - 0.002),
-            (rim, h),
-            (rim - 0.002, h),
-            (rim - 0.0028, h - 0.005),
-            (0.0, h - 0.005),
-        ],
+        [(r, z1), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002), (rim, h),
+         (rim - 0.002, h), (rim - 0.0028, h - 0.005), (0.0, h - 0.005)],
         [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0],
         2,
-    )
+    )  # fmt: skip
     split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
     patches = [
         lathe(bottom, 32, 1),
@@ -120,16 +112,8 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
 def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     """Three-piece steel can: seamed ends, paper label between."""
     seam = 0.0035
-    end = [
-        (0.0, 0.003),
-        (0.8 * r, 0.003),
-        (0.82 * r, 0.004),
-        (0.9 * r, 0.004),
-        (0.93 * r, 0.0),
-        (r, 0.0),
-        (r, seam),
-        (r - 0.001, seam + 0.001),
-    ]
+    end = [(0.0, 0.003), (0.8 * r, 0.003), (0.82 * r, 0.004), (0.9 * r, 0.004),
+           (0.93 * r, 0.0), (r, 0.0), (r, seam), (r - 0.001, seam + 0.001)]  # fmt: skip
     z0, z1 = seam + 0.001, h - seam - 0.001
     wall = r - 0.001
     body = [(wall, z0), (wall, z1)]

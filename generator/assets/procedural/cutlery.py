@@ -55,15 +55,9 @@ def spoon(seed: int) -> Solid:
     rng = variant_rng("spoon", seed)
     size = (1.0, 0.86, 0.66)[seed % 3] * rng.between(0.96, 1.04)
     wide, tail = rng.between(0.93, 1.07), rng.between(0.85, 1.2)
-    bowl = [
-        (-32, 3.0, 12.0, 0.5),
-        (-22, 12.0, 9.5, 4.0),
-        (-8, 19.5, 7.0, 7.5),
-        (8, 21.0, 6.5, 8.0),
-        (20, 17.5, 7.5, 6.5),
-        (28, 10.5, 9.0, 3.0),
-        (31.5, 4.0, 10.0, 0.5),
-    ]
+    bowl = [(-32, 3.0, 12.0, 0.5), (-22, 12.0, 9.5, 4.0), (-8, 19.5, 7.0, 7.5),
+            (8, 21.0, 6.5, 8.0), (20, 17.5, 7.5, 6.5), (28, 10.5, 9.0, 3.0),
+            (31.5, 4.0, 10.0, 0.5)]  # fmt: skip
     head = [_Station(67 + x, wide * w, wide * w, z + h, 1.6, h) for x, w, z, h in bowl]
     stations = [*_handle(tail, 13.0, 36.0, rng), *head]
     return _cutlery([_sheet(stations, 40)], size, 36.0, rng)
@@ -92,13 +86,8 @@ def fork(seed: int) -> Solid:
         w = 0.32 * pitch
         # The tines continue the head's curve across, and rise again towards their tips.
         lift = 2.0 * (middle / half) ** 2 - 2.0
-        line = [
-            (60, 7.3, w),
-            (75, 3.6, 0.97 * w),
-            (90, 3.0, 0.9 * w),
-            (104, 5.2, 0.72 * w),
-            (110, 7.0, 0.25 * w),
-        ]
+        line = [(60, 7.3, w), (75, 3.6, 0.97 * w), (90, 3.0, 0.9 * w), (104, 5.2, 0.72 * w),
+                (110, 7.0, 0.25 * w)]  # fmt: skip
         tines.append(
             _sheet(
                 [_Station(x, w_ - middle, w_ + middle, z + lift + 2.0, 1.8) for x, z, w_ in line],

@@ -378,18 +378,10 @@ def _between(a: Sequence[float], b: Sequence[float], low: float, high: float) ->
 def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:
     """Floor and wall in one sheet: outside bottom, wall, rim, inner wall, inside bottom."""
     w, lip = _BIN_WALL_M, min(0.02, 0.2 * z)
-    levels = [
-        (rim + 0.006, 0.0, 0.016),
-        (rim, 0.006, 0.02),
-        (rim, z - lip, 0.02),
-        (0.0, z - lip, 0.03),
-        (0.0, z - 0.002, 0.03),
-        (0.002, z, 0.028),
-        (rim + w - 0.002, z, 0.014),
-        (rim + w, z - 0.002, 0.012),
-        (rim + w, w + 0.008, 0.012),
-        (rim + w + 0.008, w, 0.006),
-    ]
+    levels = [(rim + 0.006, 0.0, 0.016), (rim, 0.006, 0.02), (rim, z - lip, 0.02),
+              (0.0, z - lip, 0.03), (0.0, z - 0.002, 0.03), (0.002, z, 0.028),
+              (rim + w - 0.002, z, 0.014), (rim + w, z - 0.002, 0.012),
+              (rim + w, w + 0.008, 0.012), (rim + w + 0.008, w, 0.006)]  # fmt: skip
     loops = [_rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
     rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in loops])
     return join_patches([grid(rows), fan(loops[0][::-1]), fan(loops[-1])])

@@ -11,14 +11,8 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
 # Transmittance of one wall, RGB; soda-lime glass is slightly green.
-_TINTS: tuple[Vec3, ...] = (
-    (0.97, 0.98, 0.97),
-    (0.97, 0.98, 0.97),
-    (0.97, 0.98, 0.97),
-    (0.86, 0.93, 0.95),
-    (0.86, 0.95, 0.88),
-    (0.95, 0.88, 0.72),
-)
+_TINTS: tuple[Vec3, ...] = ((0.97, 0.98, 0.97), (0.97, 0.98, 0.97), (0.97, 0.98, 0.97),
+                            (0.86, 0.93, 0.95), (0.86, 0.95, 0.88), (0.95, 0.88, 0.72))  # fmt: skip
 
 
 def tumbler(seed: int) -> Solid:
@@ -29,19 +23,11 @@ def tumbler(seed: int) -> Solid:
     floor = rng.between(0.006, 0.013)
     inner = bottom - wall + (top - bottom) * floor / height
     profile = fillet(
-        [
-            (0.0, 0.001),
-            (0.75 * bottom, 0.001),
-            (0.85 * bottom, 0.0),
-            (bottom, 0.0),
-            (top, height),
-            (top - wall, height),
-            (inner, floor),
-            (0.0, floor),
-        ],
+        [(0.0, 0.001), (0.75 * bottom, 0.001), (0.85 * bottom, 0.0), (bottom, 0.0),
+         (top, height), (top - wall, height), (inner, floor), (0.0, floor)],
         [0.0, 0.0, 0.0, 0.003, 0.45 * wall, 0.45 * wall, 0.005, 0.0],
         4,
-    )
+    )  # fmt: skip
     base = hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
     walls = hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
     return make_centred_solid([lathe(profile, 48)], (_glass(rng),), [base, *walls])
@@ -56,12 +42,8 @@ def wine_glass(seed: int) -> Solid:
     low = height * rng.between(0.38, 0.48)
     wide = low + (height - low) * rng.between(0.38, 0.5)
     outer = [(stem, low - 0.008), (0.62 * belly, low + 0.008), (belly, wide), (rim, height)]
-    inner = [
-        (rim - wall, height),
-        (belly - wall, wide),
-        (0.55 * belly, low + 0.009),
-        (0.0, low + 0.004),
-    ]
+    inner = [(rim - wall, height), (belly - wall, wide), (0.55 * belly, low + 0.009),
+             (0.0, low + 0.004)]  # fmt: skip
     below = [(0.0, 0.0015), (0.8 * foot, 0.0015), (foot, 0.0), (foot, 0.002), (stem, 0.008)]
     rounded = [0.0, 0.0, 0.0004, 0.0004, 0.012, 0.02, 0.03, 0.05]
     within = [0.45 * wall, 0.45 * wall, 0.05, 0.025, 0.0]

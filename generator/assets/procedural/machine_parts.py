@@ -39,21 +39,11 @@ from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn
 from gen_data.generator.core.asset_types import Material
 
 # Thread, width across flats, height of head, of nut, pitch [mm]: ISO 4014 and ISO 4032.
-_HEX = (
-    (8, 13, 5.3, 6.8, 1.25),
-    (10, 16, 6.4, 8.4, 1.5),
-    (12, 18, 7.5, 10.8, 1.75),
-    (16, 24, 10, 14.8, 2.0),
-    (20, 30, 12.5, 18, 2.5),
-)
+_HEX = ((8, 13, 5.3, 6.8, 1.25), (10, 16, 6.4, 8.4, 1.5), (12, 18, 7.5, 10.8, 1.75),
+        (16, 24, 10, 14.8, 2.0), (20, 30, 12.5, 18, 2.5))  # fmt: skip
 # Thread, inner and outer diameter, thickness [mm]: ISO 7089.
-_WASHERS = (
-    (8, 8.4, 16, 1.6),
-    (10, 10.5, 20, 2.0),
-    (12, 13, 24, 2.5),
-    (16, 17, 30, 3.0),
-    (20, 21, 37, 3.0),
-)
+_WASHERS = ((8, 8.4, 16, 1.6), (10, 10.5, 20, 2.0), (12, 13, 24, 2.5), (16, 17, 30, 3.0),
+            (20, 21, 37, 3.0))  # fmt: skip
 
 
 def hex_bolt(seed: int) -> Solid:
@@ -125,12 +115,8 @@ def stepped_shaft(seed: int) -> Solid:
     parts = []
     for r in radii:
         length = rng.between(0.012, 0.04)
-        profile += [
-            (r - chamfer, z),
-            (r, z + chamfer),
-            (r, z + length - chamfer),
-            (r - chamfer, z + length),
-        ]
+        profile += [(r - chamfer, z), (r, z + chamfer), (r, z + length - chamfer),
+                    (r - chamfer, z + length)]  # fmt: skip
         parts.append(hulls.frustum((r, z), (r, z + length)))
         z += length
     profile.append((0.0, z))
@@ -257,14 +243,10 @@ def connector(seed: int) -> Solid:
     stub = _collar(0.7 * port, port, reach, 22).moved(z=0.5 * side)
     level = 0.5 * side + 0.3 * reach
     plug = lathe(
-        [
-            (0.0, 0.5 * side - 0.001),
-            (0.72 * port, 0.5 * side - 0.001),
-            (0.72 * port, level),
-            (0.0, level),
-        ],
+        [(0.0, 0.5 * side - 0.001), (0.72 * port, 0.5 * side - 0.001), (0.72 * port, level),
+         (0.0, level)],
         22,
-    )
+    )  # fmt: skip
     pieces = join_patches([stub.painted(1), plug])
     band = hulls.frustum((port, 0.5 * side), (port, 0.5 * side + reach), 16)
     turns = [
@@ -306,15 +288,8 @@ def _machined_metal(rng: VariantRng) -> Material:
 def _collar(bore: float, outer: float, height: float, segments: int = 28) -> Patch:
     """A closed ring from z = 0 to ``height``, its outer edges broken."""
     c = 0.06 * outer
-    profile = [
-        (bore, height),
-        (bore, 0.0),
-        (outer - c, 0.0),
-        (outer, c),
-        (outer, height - c),
-        (outer - c, height),
-        (bore, height),
-    ]
+    profile = [(bore, height), (bore, 0.0), (outer - c, 0.0), (outer, c), (outer, height - c),
+               (outer - c, height), (bore, height)]  # fmt: skip
     return lathe(profile, segments)
 
 

@@ -129,13 +129,9 @@ def _window_wall(x: float, wall: float, z: float, window: bool) -> list[Patch]:
         rectangle((half, back, low), (0, -depth, 0), (0, 0, high - low)),
     ]
     w, y0 = 0.06, back - 0.05
-    bars = [
-        (-half, -half + w, low, high),
-        (half - w, half, low, high),
-        (-w / 2, w / 2, low, high),
-        (-half + w, half - w, low, low + w),
-        (-half + w, half - w, high - w, high),
-    ]
+    bars = [(-half, -half + w, low, high), (half - w, half, low, high),
+            (-w / 2, w / 2, low, high), (-half + w, half - w, low, low + w),
+            (-half + w, half - w, high - w, high)]  # fmt: skip
     frame = [block((a, y0, c), (b, back, d), 0.004, 5) for a, b, c, d in bars]
     sill = block(
         (-half - 0.05, wall - 0.04, low - 0.03), (half + 0.05, wall + 0.02, low + 0.002), 0.004, 5

@@ -115,41 +115,26 @@ def plate(seed: int) -> Solid:
     well, foot = radius * rng.between(0.6, 0.72), radius * rng.between(0.5, 0.58)
     step = rise * rng.between(0.45, 0.7)
     upper = fillet(
-        [
-            (radius, rise),
-            (well + 0.35 * (radius - well), step + 0.002),
-            (well, 0.002 + wall),
-            (0.0, 0.002 + wall),
-        ],
+        [(radius, rise), (well + 0.35 * (radius - well), step + 0.002), (well, 0.002 + wall),
+         (0.0, 0.002 + wall)],
         0.014,
         3,
-    )
+    )  # fmt: skip
     lower = fillet(
-        [
-            (0.0, 0.002),
-            (foot - 0.004, 0.002),
-            (foot - 0.003, 0.0),
-            (foot, 0.0),
-            (foot + 0.002, 0.002),
-            (well, 0.0025),
-            (well + 0.35 * (radius - well), step + 0.002 - wall),
-            (radius, rise - 0.8 * wall),
-        ],
+        [(0.0, 0.002), (foot - 0.004, 0.002), (foot - 0.003, 0.0), (foot, 0.0),
+         (foot + 0.002, 0.002), (well, 0.0025),
+         (well + 0.35 * (radius - well), step + 0.002 - wall), (radius, rise - 0.8 * wall)],
         [0.0] * 5 + [0.012, 0.012, 0.0],
         3,
-    )
+    )  # fmt: skip
     profile = [*lower, (radius + 0.4 * wall, rise - 0.4 * wall), *upper]
     outside = ceramic_material(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
     inside = (
         outside if rng.chance(0.7) else Material(draw_linear(GLAZES, 0.08, rng), outside.roughness)
     )
-    rim = [
-        (well - 0.004, 0.0015),
-        (well - 0.004, 0.002 + wall),
-        (well + 0.35 * (radius - well), step + 0.002),
-        (radius + 0.4 * wall, rise),
-        (radius + 0.4 * wall, rise - 0.8 * wall),
-    ]
+    rim = [(well - 0.004, 0.0015), (well - 0.004, 0.002 + wall),
+           (well + 0.35 * (radius - well), step + 0.002), (radius + 0.4 * wall, rise),
+           (radius + 0.4 * wall, rise - 0.8 * wall)]  # fmt: skip
     walls = hulls.wedges(rim, 20)
     base = hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
     return make_centred_solid(_lathe_two_sided(profile, 48), (outside, inside), [base, *walls])
@@ -168,31 +153,12 @@ def _cup_profile(
     middle = 0.5 * (top + bottom) + bulge
     waist = [(middle, 0.5 * height)] if bulge > 0 else []
     inner_waist = [(middle - wall, 0.5 * height)] if bulge > 0 else []
-    points = [
-        (0.0, 0.0015),
-        (0.78 * bottom, 0.0015),
-        (0.8 * bottom, 0.0),
-        (bottom, 0.0),
-        *waist,
-        (top, height),
-        (top - wall, height),
-        *inner_waist,
-        (bottom - wall, wall),
-        (0.0, wall),
-    ]
+    points = [(0.0, 0.0015), (0.78 * bottom, 0.0015), (0.8 * bottom, 0.0), (bottom, 0.0),
+              *waist, (top, height), (top - wall, height), *inner_waist, (bottom - wall, wall),
+              (0.0, wall)]  # fmt: skip
     rim = 0.45 * wall
-    radii = [
-        0.0,
-        0.0,
-        0.0,
-        0.007,
-        *([0.12] if waist else []),
-        rim,
-        rim,
-        *([0.12] if waist else []),
-        0.006,
-        0.0,
-    ]
+    radii = [0.0, 0.0, 0.0, 0.007, *([0.12] if waist else []), rim, rim,
+             *([0.12] if waist else []), 0.006, 0.0]  # fmt: skip
     return fillet(points, radii, 4)
 
 

@@ -55,13 +55,8 @@ def screwdriver(seed: int) -> Solid:
         cone((0.45 * radius, grip - 0.001), (0.42 * radius, grip + 0.004), 20, 2),
         _flat_tip(shaft, end) if rng.chance(0.5) else _pointed_tip(shaft, end),
     ]
-    profile = [
-        (0.55 * radius, 0.0),
-        (0.97 * radius, 0.1 * grip),
-        (0.97 * radius, 0.6 * grip),
-        (0.7 * radius, 0.82 * grip),
-        (0.6 * radius, grip),
-    ]
+    profile = [(0.55 * radius, 0.0), (0.97 * radius, 0.1 * grip), (0.97 * radius, 0.6 * grip),
+               (0.7 * radius, 0.82 * grip), (0.6 * radius, grip)]  # fmt: skip
     parts = [*hulls.stack(profile, 16), hulls.frustum((shaft, grip), (shaft, end), 12)]
     materials = (
         plastic_material(rng),
@@ -102,13 +97,9 @@ def wrench(seed: int) -> Solid:
     head, ring = 1.12 * across, 0.8 * across
     centre = np.array([length - head, 0.0])
     shank = np.array(
-        [
-            (0.6 * ring, -bar),
-            (length - 1.75 * head, -0.85 * bar),
-            (length - 1.75 * head, 0.85 * bar),
-            (0.6 * ring, bar),
-        ]
-    )
+        [(0.6 * ring, -bar), (length - 1.75 * head, -0.85 * bar),
+         (length - 1.75 * head, 0.85 * bar), (0.6 * ring, bar)]
+    )  # fmt: skip
     bevel = 0.12 * thick
     patches = [
         extrude(_turn_jaw(_jaw(across, head)) + centre, thick, bevel).moved(z=-0.5 * thick),
@@ -185,13 +176,8 @@ def _fluted_handle(radius: float, length: float, flutes: int) -> Patch:
 
 def _pointed_tip(radius: float, end: float) -> Patch:
     """A cross-head tip, as the cone it is ground from."""
-    profile = [
-        (0.0, end - 0.013),
-        (radius, end - 0.013),
-        (radius, end - 0.008),
-        (0.3 * radius, end),
-        (0.0, end),
-    ]
+    profile = [(0.0, end - 0.013), (radius, end - 0.013), (radius, end - 0.008),
+               (0.3 * radius, end), (0.0, end)]  # fmt: skip
     return lathe(profile, 8, 1)
 
 
@@ -209,14 +195,8 @@ def _hammer_handle(length: float) -> Patch:
 def _hammer_head() -> tuple[Patch, list[Array]]:
     """Eye at the origin, striking face towards +Y, wedge towards -Y; slot 1."""
     eye = rounded_box((0.03, 0.036, 0.026), 0.003, 1)
-    profile = [
-        (0.0, 0.015),
-        (0.009, 0.015),
-        (0.009, 0.034),
-        (0.0138, 0.04),
-        (0.0138, 0.058),
-        (0.0, 0.0585),
-    ]
+    profile = [(0.0, 0.015), (0.009, 0.015), (0.009, 0.034), (0.0138, 0.04), (0.0138, 0.058),
+               (0.0, 0.0585)]  # fmt: skip
     face = lathe(fillet(profile, [0.0, 0.0, 0.004, 0.003, 0.0015, 0.0], 2), 24)
     peen = _peen()
     parts = [
@@ -239,12 +219,8 @@ def _flat_tip(radius: float, end: float) -> Patch:
 
 def _peen() -> Patch:
     """The wedge at the back of a hammer's head, towards -Y."""
-    stations = [
-        (0.015, 0.013, 0.011),
-        (0.03, 0.012, 0.009),
-        (0.056, 0.0115, 0.0022),
-        (0.059, 0.0105, 0.0012),
-    ]
+    stations = [(0.015, 0.013, 0.011), (0.03, 0.012, 0.009), (0.056, 0.0115, 0.0022),
+                (0.059, 0.0105, 0.0012)]  # fmt: skip
     rows = []
     for y, wide, thin in stations:
         rows.append(

@@ -19,14 +19,8 @@ from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe, r
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
 
-_SHAPES = (
-    (0.04, 0.04, 0.04),
-    (0.03, 0.06, 0.03),
-    (0.03, 0.09, 0.03),
-    (0.05, 0.05, 0.025),
-    (0.06, 0.06, 0.03),
-    (0.025, 0.075, 0.015),
-)
+_SHAPES = ((0.04, 0.04, 0.04), (0.03, 0.06, 0.03), (0.03, 0.09, 0.03), (0.05, 0.05, 0.025),
+           (0.06, 0.06, 0.03), (0.025, 0.075, 0.015))  # fmt: skip
 
 
 def block(seed: int) -> Solid:
@@ -84,26 +78,17 @@ def candle(seed: int) -> Solid:
     rng = variant_rng("candle", seed)
     radius, height = rng.between(0.022, 0.04), rng.between(0.05, 0.15)
     wax = fillet(
-        [
-            (0.0, 0.0),
-            (radius, 0.0),
-            (radius, height),
-            (0.75 * radius, height - 0.003),
-            (0.0, height - 0.006),
-        ],
+        [(0.0, 0.0), (radius, 0.0), (radius, height), (0.75 * radius, height - 0.003),
+         (0.0, height - 0.006)],
         [0.0, 0.002, 0.003, 0.004, 0.0],
         3,
-    )
+    )  # fmt: skip
     wick = lathe(
-        [
-            (0.0, height - 0.008),
-            (0.001, height - 0.008),
-            (0.001, height + 0.007),
-            (0.0, height + 0.0075),
-        ],
+        [(0.0, height - 0.008), (0.001, height - 0.008), (0.001, height + 0.007),
+         (0.0, height + 0.0075)],
         8,
         1,
-    )
+    )  # fmt: skip
     colors = ("#f1e8d2", "#e9dcc0", "#a83a34", "#3f5a4a", "#d9a441", "#7d8fa3", "#c58b8b")
     material = Material(draw_linear(colors, 0.05, rng), rng.between(0.4, 0.6))
     return make_centred_solid(
@@ -123,15 +108,11 @@ def vase(seed: int) -> Solid:
     foot, neck = belly * rng.between(0.55, 0.75), belly * rng.between(0.3, 0.6)
     mouth, widest = neck * rng.between(1.1, 1.6), rng.between(0.3, 0.55)
     curve = spline(
-        [
-            (foot, 0.004),
-            (belly, widest * height),
-            (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height),
-            (neck, 0.82 * height),
-            (mouth, height),
-        ],
+        [(foot, 0.004), (belly, widest * height),
+         (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height), (neck, 0.82 * height),
+         (mouth, height)],
         17,
-    )
+    )  # fmt: skip
     wall = 0.004
     inner = [(float(r) - wall, float(z)) for r, z in curve[::-1] if z > 0.02]
     outer = [(float(r), float(z)) for r, z in curve]

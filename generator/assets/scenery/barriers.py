@@ -111,17 +111,9 @@ def _jersey(seed: int) -> Solid:
     rng = variant_rng("barrier/jersey", seed)
     half, h = 1.0, rng.between(0.8, 0.9)
     section = np.array(
-        [
-            (0.0, -0.3),
-            (0.08, -0.3),
-            (0.33, -0.17),
-            (h, -0.09),
-            (h, 0.09),
-            (0.33, 0.17),
-            (0.08, 0.3),
-            (0.0, 0.3),
-        ]
-    )
+        [(0.0, -0.3), (0.08, -0.3), (0.33, -0.17), (h, -0.09), (h, 0.09), (0.33, 0.17),
+         (0.08, 0.3), (0.0, 0.3)]
+    )  # fmt: skip
     prism = extrude(section, 2 * half, 0.008).rotated("y", -0.5 * np.pi)
     # The section's first axis has become Z, the extrusion runs along -X: turn it to Y.
     lying = prism.rotated("z", 0.5 * np.pi)

@@ -19,21 +19,9 @@ from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.scenery.basic_shapes import Span, facing_rectangle, quad
 
 (
-    FACADE,
-    BASE,
-    TRIM,
-    FRAME,
-    GLASS,
-    GLASS_TOO,
-    CURTAIN,
-    CURTAIN_TOO,
-    DOOR,
-    METAL,
-    ROOF,
-    SIGN,
-    AWNING,
-    CHIMNEY,
-) = range(14)
+    FACADE, BASE, TRIM, FRAME, GLASS, GLASS_TOO, CURTAIN, CURTAIN_TOO, DOOR, METAL, ROOF,
+    SIGN, AWNING, CHIMNEY,
+) = range(14)  # fmt: skip
 
 GLASS_SETBACK_M = 0.03
 """Panes lie this far behind the front of their frame."""

@@ -47,15 +47,8 @@ def mansard_profile(depth_m: float, height_m: float, eaves_m: float) -> list[Poi
     half = 0.5 * depth_m
     knee, rise = half - 0.36 * height_m, height_m
     ridge = rise + 0.32 * knee
-    return [
-        (half + eaves_m, -0.1),
-        (half - 0.05, 0.12),
-        (knee, rise),
-        (0.0, ridge),
-        (-knee, rise),
-        (0.05 - half, 0.12),
-        (-half - eaves_m, -0.1),
-    ]
+    return [(half + eaves_m, -0.1), (half - 0.05, 0.12), (knee, rise), (0.0, ridge),
+            (-knee, rise), (0.05 - half, 0.12), (-half - eaves_m, -0.1)]  # fmt: skip
 
 
 def over_profile(profile: Sequence[Point], width_m: float, verge_m: float, thick_m: float) -> Patch:

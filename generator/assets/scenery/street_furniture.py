@@ -105,21 +105,10 @@ def hydrant(seed: int) -> Solid:
     """A pillar hydrant with two outlets (EN 14384). Slots: body, caps."""
     rng = variant_rng("hydrant", seed)
     h = rng.between(0.75, 0.95)
-    profile = [
-        (0.0, 0.0),
-        (0.16, 0.0),
-        (0.16, 0.04),
-        (0.105, 0.06),
-        (0.1, 0.62 * h),
-        (0.135, 0.65 * h),
-    ]
-    profile += [
-        (0.135, 0.72 * h),
-        (0.11, 0.74 * h),
-        (0.1, 0.9 * h),
-        (0.05, 0.97 * h),
-        (0.0, 0.97 * h),
-    ]
+    profile = [(0.0, 0.0), (0.16, 0.0), (0.16, 0.04), (0.105, 0.06), (0.1, 0.62 * h),
+               (0.135, 0.65 * h)]  # fmt: skip
+    profile += [(0.135, 0.72 * h), (0.11, 0.74 * h), (0.1, 0.9 * h), (0.05, 0.97 * h),
+                (0.0, 0.97 * h)]  # fmt: skip
     body = lathe(profile, 18)
     outlet = lathe(
         [(0.0, 0.0), (0.045, 0.0), (0.045, 0.1), (0.06, 0.1), (0.06, 0.16), (0.0, 0.16)], 12
@@ -152,24 +141,15 @@ def bollard(seed: int) -> Solid:
     if kind == "iron":
         r = 1.4 * r
         profile = [(0.0, 0.0), (1.5 * r, 0.0), (1.5 * r, 0.12), (r, 0.16), (0.85 * r, 0.85 * h)]
-        profile += [
-            (1.1 * r, 0.87 * h),
-            (1.1 * r, 0.9 * h),
-            (0.6 * r, 0.91 * h),
-            (0.95 * r, 0.96 * h),
-            (0.0, h),
-        ]
+        profile += [(1.1 * r, 0.87 * h), (1.1 * r, 0.9 * h), (0.6 * r, 0.91 * h),
+                    (0.95 * r, 0.96 * h), (0.0, h)]  # fmt: skip
         parts = [lathe(profile, 16)]
     else:
         band = lathe(
-            [
-                (r + 0.001, 0.72 * h),
-                (r + 0.003, 0.73 * h),
-                (r + 0.003, 0.84 * h),
-                (r + 0.001, 0.85 * h),
-            ],
+            [(r + 0.001, 0.72 * h), (r + 0.003, 0.73 * h), (r + 0.003, 0.84 * h),
+             (r + 0.001, 0.85 * h)],
             14,
-        )
+        )  # fmt: skip
         parts = [
             lathe([(0.0, 0.0), (r, 0.0), (r, h - 0.01), (0.8 * r, h), (0.0, h)], 14),
             band.painted(1),
@@ -341,12 +321,8 @@ def _arm_head(
 ) -> tuple[Patch, Patch, tuple[float, float, float]]:
     """An arm towards +X with a flat luminaire; its lens looks down."""
     top = height + rise
-    path = [
-        (0.0, 0.0, height - 0.3),
-        (0.05 * reach, 0.0, height),
-        (0.35 * reach, 0.0, height + 0.7 * rise),
-        (reach, 0.0, top),
-    ]
+    path = [(0.0, 0.0, height - 0.3), (0.05 * reach, 0.0, height),
+            (0.35 * reach, 0.0, height + 0.7 * rise), (reach, 0.0, top)]  # fmt: skip
     arm = tube(path, 0.032, 8)
     body = rounded_box((0.62, 0.26, 0.1), 0.03, 1).moved(reach + 0.25, 0.0, top)
     lens = block((reach + 0.02, -0.1, top - 0.062), (reach + 0.5, 0.1, top - 0.049))

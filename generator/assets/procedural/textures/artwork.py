@@ -161,16 +161,12 @@ def burst(image: Image, centre: Place, radius: float, fill: Color, ink: Color) -
     w, h = image.size
     text(
         image,
-        (
-            (cx - 0.6 * radius) / w,
-            (cy - 0.3 * radius) / h,
-            (cx + 0.6 * radius) / w,
-            (cy + 0.3 * radius) / h,
-        ),
+        ((cx - 0.6 * radius) / w, (cy - 0.3 * radius) / h, (cx + 0.6 * radius) / w,
+         (cy + 0.3 * radius) / h),
         "NEW",
         ink,
         2,
-    )
+    )  # fmt: skip
 
 
 def gradient(image: Image, top: Color, bottom: Color) -> None:
