@@ -251,6 +251,7 @@ def fillet(
         cosine = float((before * after).sum()) / (lb * la)
         half = 0.5 * math.acos(max(-1.0, min(1.0, cosine)))
         reach = min(radii[i] / max(math.tan(half), 1e-9), 0.49 * lb, 0.49 * la)
+        # The arc of a nearly straight corner would have no length.
         if radii[i] <= 0.0 or half > 0.5 * math.pi - 1e-3:
             made.append(points[i])
             continue

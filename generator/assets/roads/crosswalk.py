@@ -39,8 +39,7 @@ def crosswalk(
     for k in range(count):
         t0 = first + 2.0 * k * ZEBRA_BAR_M
         t1 = t0 + ZEBRA_BAR_M
-        between = deck.t_m[(deck.t_m > t0 + 1e-4) & (deck.t_m < t1 - 1e-4)]
-        bar = (t0, *(float(t) for t in between), t1)
+        bar = deck.columns_between(t0, t1)
         patches.append(deck.ribbon(span, bar, "marking", PAINT_LIFT_M + 0.002))
     s, t = np.meshgrid(span, [low, high], indexing="ij")
     top = deck.at(s, t).reshape(-1, 3)

@@ -125,6 +125,7 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
     line = corner(shape, number, offset)
     edge = np.column_stack([line, np.full(len(line), z)])
     gap = shape.gaps_rad()[number]
+    # The outer edges of arms in line are parallel: they do not meet in a tip.
     if abs(gap - math.pi) <= 1e-3:
         far = corner(shape, number, offset + APRON_M)
         outer = np.column_stack([far, np.full(len(far), -APRON_FALL_M)])

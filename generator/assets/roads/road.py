@@ -177,18 +177,12 @@ def _wear(deck: Deck, profile: RoadShape, wear: float, rng: VariantRng) -> Itera
             continue
         seam = 0.025
         across, inner = (t, t + width), (t + seam, t + width - seam)
-        yield deck.ribbon((s, s + length), _columns_between(deck, across), "tar", 0.0012)
+        yield deck.ribbon((s, s + length), deck.columns_between(*across), "tar", 0.0012)
         yield deck.ribbon(
-            (s + seam, s + length - seam), _columns_between(deck, inner), "asphalt_new", 0.0018
+            (s + seam, s + length - seam), deck.columns_between(*inner), "asphalt_new", 0.0018
         )
     for _ in range(round(wear * profile.length_m / 4.5)):
         yield _crack(deck, profile.length_m, low, high, rng)
-
-
-def _columns_between(deck: Deck, across: tuple[float, float]) -> tuple[float, ...]:
-    """Both ends and the deck's columns between them, so that markings on ruts follow them."""
-    inside = deck.t_m[(deck.t_m > across[0] + 1e-4) & (deck.t_m < across[1] - 1e-4)]
-    return (across[0], *(float(t) for t in inside), across[1])
 
 
 def _crack(deck: Deck, length_m: float, low: float, high: float, rng: VariantRng) -> Patch:

@@ -149,6 +149,7 @@ def split_patch(patch: Patch, level: Level) -> tuple[Patch, Patch, Array]:
     The level is taken to be linear along edges. The line is segments, shape [n, 2, 3] [m].
     """
     value = np.round(level(patch), 9)
+    # Corners that an earlier cut left on this line, but for rounding, must not be cut to slivers.
     value = np.where(np.abs(value) < 1e-7, 0.0, value)
     inside = [take_triangles(patch, np.all(value >= 0, axis=1) & np.any(value > 0, axis=1))]
     outside = [take_triangles(patch, np.all(value <= 0, axis=1))]
