@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull
 from gen_data.generator.assets.procedural import FAMILIES
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import (
+    SLOTS,
     bin_interior_m,
     shelf_clearance_m,
     shelf_levels_m,
@@ -16,20 +17,6 @@ from gen_data.generator.assets.procedural.furniture import (
 from gen_data.generator.core.errors import AssetError
 
 FURNITURE = sorted(name for name, family in FAMILIES.items() if not family.variants)
-# Number of material slots that the docstring of each family names.
-SLOTS = {
-    "table": 2,
-    "shelf": 2,
-    "bin": 1,
-    "gantry": 2,
-    "plane": 1,
-    "backdrop": 1,
-    "box": 1,
-    "pedestal": 2,
-    "light_panel": 2,
-    "sphere": 1,
-    "room": 8,
-}
 SIZED = ("table", "shelf", "bin", "box", "pedestal", "gantry")
 
 
@@ -40,8 +27,8 @@ def test_defaults_build_finite_meshes_with_the_documented_slots(name: str) -> No
 
     assert np.isfinite(mesh.vertices_m).all()
     assert np.isfinite(mesh.normals).all()
-    assert len(mesh.materials) == SLOTS[name]
-    assert set(np.unique(mesh.face_slots)) == set(range(SLOTS[name]))
+    assert len(mesh.materials) == len(SLOTS[name])
+    assert set(np.unique(mesh.face_slots)) == set(range(len(SLOTS[name])))
 
 
 @pytest.mark.parametrize("name", SIZED)

@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
@@ -39,6 +40,7 @@ from gen_data.generator.core.se3 import Vec3
 
 Box = tuple[Vec3, Vec3]
 
+SLOTS = load_table(__package__, "furniture_slots", tuple[str, ...])
 PANEL_SHAPES = ("rectangle", "disk")
 TABLE_STYLES = ("legs", "trestle", "bench")
 SHELF_STYLES = ("bookcase", "rack")

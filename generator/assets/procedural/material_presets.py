@@ -19,7 +19,6 @@ STEEL: Vec3 = (0.56, 0.57, 0.58)
 STAINLESS: Vec3 = (0.66, 0.65, 0.63)
 ALUMINIUM: Vec3 = (0.91, 0.92, 0.92)
 BRASS: Vec3 = (0.89, 0.70, 0.37)
-COPPER: Vec3 = (0.95, 0.64, 0.54)
 BLACK_OXIDE: Vec3 = (0.045, 0.045, 0.048)
 ZINC: Vec3 = (0.66, 0.68, 0.70)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, fan
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.scenery.basic_shapes import Span, post, quad
 from gen_data.generator.assets.scenery.facade import (
     BASE,
@@ -29,7 +30,6 @@ from gen_data.generator.assets.scenery.facade import (
     panes,
     reveal,
 )
-from gen_data.generator.core.streams import Rng
 
 TILE_REPEAT_M = 1.8
 Point = tuple[float, float]
@@ -127,7 +127,7 @@ def chimney(x: float, y: float, z_m: Span) -> Patch:
     return join_patches([stack, plate.painted(TRIM), pot.painted(METAL)])
 
 
-def dormer(x: float, y: float, z0: float, reach_m: float, rng: Rng) -> Patch:
+def dormer(x: float, y: float, z0: float, reach_m: float, rng: VariantRng) -> Patch:
     """A small window house that looks out of a slope towards +X.
 
     Args:
