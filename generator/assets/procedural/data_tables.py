@@ -22,7 +22,7 @@ def load_table(package: str, name: str, kind: type[T]) -> Mapping[str, T]:
         kind: Type of a row: a dataclass, or an annotation made of tuples and plain types.
 
     Raises:
-        TypeError: if a row does not fit the type.
+        KeyError, TypeError: if a row has other fields than the type.
     """
     rows = yaml.safe_load((files(package) / f"{name}.yaml").read_text(encoding="utf-8"))
     return {key: from_plain(kind, row) for key, row in rows.items()}

@@ -109,7 +109,7 @@ def make_solid_in_place(
     hulls_m: Iterable[Array],
     crease_deg: float = CREASE_DEG,
 ) -> Solid:
-    """A solid in the frame it was made in (furniture: the centre of the footprint on the floor)."""
+    """A solid that keeps its frame (furniture: the centre of the footprint on the floor)."""
     mesh = finish_mesh(join_patches(patches), materials, crease_deg)
     return Solid(
         mesh, ConvexParts(tuple(np.round(round_values(hull), 6) + 0.0 for hull in hulls_m))

@@ -285,7 +285,7 @@ def space_evenly(path: Array, count: int) -> Array:
 def map_along_grain(patch: Patch, repeat_m: float) -> Patch:
     """The patch with a texture's horizontal along its longest side, one repeat per ``repeat_m``.
 
-    Each piece starts at another place of the image, as boards cut from different logs do.
+    Each piece starts at another place of the image, like boards cut from different logs.
     """
     low, high = patch.bounds_m()
     axes = np.argsort(-np.round(high - low, 6), kind="stable")
@@ -409,7 +409,7 @@ def _double_area(loop: Array) -> float:
 
 
 def _arc(a: Array, corner: Array, b: Array, half: float, steps: int) -> list[Point2]:
-    """Points of the arc that touches both sides of a corner at ``a`` and ``b``."""
+    """Points of the arc that is tangent to both sides of a corner at ``a`` and ``b``."""
     middle = 0.5 * (a + b)
     to_centre = middle - corner
     length = math.hypot(*to_centre)

@@ -33,7 +33,7 @@ def make_solid(
     keypoints: Sequence[Keypoint] = (),
     crease_deg: float = CREASE_DEG,
 ) -> Solid:
-    """A solid in the frame it was made in; materials that no triangle uses are left out."""
+    """A solid that keeps its frame; materials that no triangle uses are left out."""
     patch = join_patches(patches)
     used = np.unique(patch.slots)
     numbers = np.zeros(len(materials), dtype=np.int64)

@@ -75,7 +75,7 @@ def traffic_light(seed: int, mount: str) -> Solid:
 
 
 def traffic_light_facts(seed: int, mount: str) -> Facts:
-    """For vehicles; how it is mounted."""
+    """Its kind and its mount."""
     return Facts("vehicle", {"mount": _choose_mount(seed, mount)})
 
 

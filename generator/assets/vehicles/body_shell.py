@@ -214,34 +214,34 @@ def gap(patch: Patch, x_m: float, width_m: float, slot: int, *levels: Level) -> 
 
 
 def level_above(axis: str, limit_m: float, slope: float = 0.0, over: str = "x") -> Level:
-    """Inside is where the coordinate exceeds ``limit_m + slope * over``."""
+    """Positive where a coordinate exceeds ``limit_m + slope * over``."""
     i, j = "xyz".index(axis), "xyz".index(over)
     return lambda p: p.corners_m[..., i] - limit_m - slope * p.corners_m[..., j]
 
 
 def level_below(axis: str, limit_m: float, slope: float = 0.0, over: str = "x") -> Level:
-    """Inside is where the coordinate is smaller than ``limit_m + slope * over``."""
+    """Positive where a coordinate is smaller than ``limit_m + slope * over``."""
     i, j = "xyz".index(axis), "xyz".index(over)
     return lambda p: limit_m + slope * p.corners_m[..., j] - p.corners_m[..., i]
 
 
 def level_between(axis: str, low_m: float, high_m: float) -> tuple[Level, Level]:
-    """Inside is where the coordinate lies between two values."""
+    """Two levels, both positive where a coordinate lies between two values."""
     return level_above(axis, low_m), level_below(axis, high_m)
 
 
 def stations_along(low: float, high: float) -> tuple[Level, Level]:
-    """Inside is where the place along the ring lies between two values."""
+    """Two levels, both positive where the place along the ring lies between two values."""
     return (lambda p: p.uvs[..., 0] - low), (lambda p: high - p.uvs[..., 0])
 
 
 def rows_between(low: float, high: float) -> tuple[Level, Level]:
-    """Inside is where the row lies between two values; the lid begins at 1."""
+    """Two levels, both positive where the row lies between two values; the lid begins at 1."""
     return (lambda p: p.uvs[..., 1] - low), (lambda p: high - p.uvs[..., 1])
 
 
 def round_x_z(x_m: float, z_m: float, radius_m: float, beyond_y_m: float) -> Level:
-    """Inside is a cylinder across the vehicle, as far out as ``beyond_y_m``."""
+    """Positive in a cylinder across the vehicle, outside of ``beyond_y_m``."""
 
     def level(p: Patch) -> Array:
         x, y, z = (p.corners_m[..., i] for i in range(3))

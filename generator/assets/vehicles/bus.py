@@ -41,7 +41,7 @@ _HALF_M = 1.275
 
 
 def bus(seed: int) -> Solid:
-    """A city bus with its doors on the right. Slots and keypoints as every vehicle's."""
+    """A city bus with its doors on the right. Slots and keypoints are those of all vehicles."""
     rng = variant_rng("bus", seed)
     x, top = 0.5 * rng.between(11.2, 12.2), rng.between(2.95, 3.08)
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, 0)

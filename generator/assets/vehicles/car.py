@@ -20,7 +20,7 @@ STYLES = ("hatchback", "sedan", "estate", "suv", "coupe")
 
 
 def car(seed: int, steer_deg: float) -> Solid:
-    """A car. Slots and keypoints as every vehicle's; positive steering turns to the left."""
+    """A car. Slots and keypoints are those of all vehicles; positive steering turns to the left."""
     rng = variant_rng("car", seed)
     design = _vary_design(DESIGNS[in_turn(STYLES, seed)], rng)
     finish = materials(rng, draw_paint(rng))

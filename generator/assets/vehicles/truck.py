@@ -37,7 +37,7 @@ _HALF_M = 1.16
 
 
 def truck(seed: int) -> Solid:
-    """A box truck. Slots and keypoints as every vehicle's; the box is the second paint."""
+    """A box truck. Slots and keypoints are those of all vehicles; the box is the second paint."""
     rng = variant_rng("truck", seed)
     x, cab, roof = (0.5 * rng.between(6.6, 9.8), rng.between(1.75, 2.05), rng.between(2.45, 2.75))
     top = max(roof + 0.25, rng.between(3.0, 3.75))

@@ -23,7 +23,7 @@ _FLEET = ("#f0c419", "#7a4a24", "#1e5aa8", "#c8281e")
 
 
 def van(seed: int, steer_deg: float) -> Solid:
-    """A van. Slots and keypoints as every vehicle's; positive steering turns to the left."""
+    """A van. Slots and keypoints are those of all vehicles; positive steering turns to the left."""
     rng = variant_rng("van", seed)
     design = _vary_design(DESIGNS[in_turn(STYLES, seed)], rng)
     draw = float(rng.random())

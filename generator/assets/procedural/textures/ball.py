@@ -40,7 +40,7 @@ def ball_cover(seed: int) -> TextureData:
 
 
 def _directions() -> Float32:
-    """Direction of each pixel as ``shapes.ball`` lays out its UVs."""
+    """Direction of each pixel as ``surface_shapes.ball`` lays out its UVs."""
     y, x = rows_and_columns()
     polar, turn = math.pi * (0.5 - y), 2 * math.pi * (x - 0.5)
     flat = np.cos(polar)

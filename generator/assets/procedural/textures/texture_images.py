@@ -1,4 +1,4 @@
-"""From colours and heights in floating point to the 8-bit images of a texture."""
+"""Conversion of floating-point colours and heights to the 8-bit images of a texture."""
 
 from __future__ import annotations
 
