@@ -19,10 +19,7 @@ PACK_FILE = Path(os.environ.get(VARIABLE, "missing"), "packs", "people", pack_fi
 NEEDS_PACK = pytest.mark.skipif(
     not PACK_FILE.is_file(), reason=f"{VARIABLE} names no folder with the people pack"
 )
-KINDS = [
-    pytest.param("simple", id="simple"),
-    pytest.param("pack", id="pack", marks=NEEDS_PACK),
-]
+KINDS = [pytest.param("simple", id="simple"), pytest.param("pack", id="pack", marks=NEEDS_PACK)]
 
 
 def body_of(kind: str) -> BodyTemplate:

@@ -44,13 +44,7 @@ def test_a_pose_that_is_asked_for_leaves_the_person_the_same() -> None:
 
 def test_phases_are_rounded_to_sixteenths() -> None:
     """So that a data set needs at most sixteen meshes per walking person."""
-    assert [draw_person(1, "walk", p).step for p in (0.0, 0.03, 0.04, 0.97, 1.0)] == [
-        0,
-        0,
-        1,
-        0,
-        0,
-    ]
+    assert [draw_person(1, "walk", p).step for p in (0.0, 0.03, 0.04, 0.97, 1.0)] == [0, 0, 1, 0, 0]
 
 
 def test_a_pose_that_does_not_exist_is_refused_with_a_suggestion() -> None:

@@ -1,6 +1,6 @@
 """Posed, clothed people with keypoints.
 
-``person`` is made from the people pack and is offered where that is installed; ``simple_person``
+``person`` needs the people pack and is offered only where that is installed; ``simple_person``
 needs no file.
 """
 
@@ -34,7 +34,7 @@ def _people(name: str, version: int, *tags: str) -> Family:
         parameters={"pose": "", "phase": -1.0},
         build=Lazy(f"{_PACKAGE}.families:{name}"),
         facts=Lazy(f"{_PACKAGE}.person:facts"),
-        # In other poses there are too many of them.
+        # There are too many poses to keep them all on disk.
         stored=False,
         origin=_PACK if "pack" in tags else OURS,
     )

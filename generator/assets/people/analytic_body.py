@@ -1,7 +1,7 @@
 """A body from formulas: lofted limbs in the proportions of tables, for when no pack is installed.
 
-It has the template frame, the zones and the words of shapes of the pack's body, so that the same
-clothes fit it and the same poses move it.
+It shares the template frame, the zones and the shape names of the pack's body, so that the same
+clothes and poses apply to both.
 
 Lengths are shares of stature from Drillis and Contini, "Body segment parameters", New York
 University 1966, as drawn in Winter, "Biomechanics and motor control of human movement", fig. 4.1;
@@ -27,13 +27,8 @@ from gen_data.generator.assets.people.body import (
     Indices,
     strongest_weights,
 )
-from gen_data.generator.assets.people.mesh_simplify import (
-    Level,
-    MeshRows,
-    grid_faces,
-    make_rows,
-    split_region,
-)
+from gen_data.generator.assets.people.body_regions import OUTLINES
+from gen_data.generator.assets.people.mesh_simplify import Level, MeshRows, grid_faces, make_rows
 
 _HEIGHT_M = 1.67
 _SOLE_Z_M = -0.82
@@ -52,15 +47,7 @@ _WRIST = _ELBOW + 0.146 * _HEIGHT_M * _DOWN_OUT
 _HAND_M = 0.108 * _HEIGHT_M
 _LEG_Y = 0.088
 
-_MIDDLE_BONES: Mapping[str, tuple[str, tuple[float, float, float]]] = {
-    "Root": ("", (0.0, 0.0, _SOLE_Z_M)),
-    "pelvis": ("Root", (0.0, 0.0, 0.075)),
-    "spine_01": ("pelvis", (0.0, 0.0, 0.12)),
-    "spine_02": ("spine_01", (0.0, 0.0, 0.19)),
-    "spine_03": ("spine_02", (0.0, 0.0, 0.29)),
-    "neck_01": ("spine_03", (0.0, 0.0, 0.585)),
-    "head": ("neck_01", (0.015, 0.0, 0.69)),
-}
+_SPINE = ("Root", "pelvis", "spine_01", "spine_02", "spine_03", "neck_01", "head")
 _SIDE_BONES: Mapping[str, tuple[str, Array]] = {
     "clavicle": ("spine_03", np.array([0.03, 0.03, 0.52])),
     "upperarm": ("clavicle", _SHOULDER),
@@ -76,107 +63,11 @@ _SIDE_BONES: Mapping[str, tuple[str, Array]] = {
     "foot": ("calf", np.array([-0.01, _LEG_Y, _ANKLE_Z])),
     "ball": ("foot", np.array([0.115, _LEG_Y, -0.8])),
 }
-_FACE: Mapping[str, tuple[float, float, float]] = {
-    "nose": (0.166, 0.0, 0.692),
-    "left_eye": (0.128, 0.031, 0.728),
-    "right_eye": (0.128, -0.031, 0.728),
-    "left_ear": (0.045, 0.08, 0.715),
-    "right_ear": (0.045, -0.08, 0.715),
-    "crown": (0.05, 0.0, 0.85),
-    "sole": (0.05, _LEG_Y, _SOLE_Z_M),
-}
 
-# Outlines: height, middle in x, half depth, half width [m].
-_HEAD = (
-    (0.5, 0.015, 0.06, 0.1),
-    (0.55, 0.015, 0.058, 0.075),
-    (0.59, 0.02, 0.053, 0.054),
-    (0.618, 0.035, 0.06, 0.054),
-    (0.628, 0.07, 0.078, 0.052),
-    (0.645, 0.072, 0.082, 0.06),
-    (0.67, 0.068, 0.088, 0.068),
-    (0.7, 0.06, 0.094, 0.074),
-    (0.73, 0.056, 0.096, 0.076),
-    (0.76, 0.055, 0.097, 0.077),
-    (0.79, 0.053, 0.094, 0.074),
-    (0.82, 0.05, 0.082, 0.063),
-    (0.84, 0.048, 0.055, 0.042),
-    (0.85, 0.048, 0.004, 0.003),
-)
-_TRUNK = (
-    (0.583, 0.014, 0.06, 0.066),
-    (0.573, 0.012, 0.068, 0.1),
-    (0.558, 0.01, 0.076, 0.145),
-    (0.535, 0.01, 0.088, 0.172),
-    (0.5, 0.012, 0.1, 0.178),
-    (0.44, 0.02, 0.112, 0.17),
-    (0.36, 0.025, 0.117, 0.162),
-    (0.28, 0.022, 0.112, 0.152),
-    (0.2, 0.018, 0.106, 0.146),
-    (0.13, 0.014, 0.108, 0.156),
-    (0.05, 0.006, 0.114, 0.17),
-    (-0.02, 0.0, 0.113, 0.172),
-    (-0.06, 0.002, 0.1, 0.16),
-)
-_LEG = (
-    (0.02, 0.0, 0.06, 0.055),
-    (-0.05, 0.004, 0.084, 0.076),
-    (-0.15, 0.008, 0.08, 0.074),
-    (-0.25, 0.01, 0.07, 0.066),
-    (-0.35, 0.008, 0.057, 0.055),
-    (-0.42, -0.006, 0.058, 0.054),
-    (-0.5, -0.014, 0.058, 0.053),
-    (-0.6, -0.012, 0.046, 0.043),
-    (-0.7, -0.01, 0.036, 0.034),
-    (-0.76, -0.008, 0.04, 0.036),
-)
-_SKIRT = (
-    (0.18, 0.015, 0.112, 0.15),
-    (0.08, 0.005, 0.125, 0.175),
-    (-0.05, 0.0, 0.135, 0.195),
-    (-0.25, 0.005, 0.15, 0.215),
-    (-0.42, 0.01, 0.16, 0.235),
-    (-0.62, 0.01, 0.17, 0.255),
-)
-# From the shoulder along the arm: share, half width across, half depth.
-_ARM = (
-    (-0.07, 0.012, 0.014),
-    (-0.05, 0.036, 0.04),
-    (0.0, 0.05, 0.056),
-    (0.08, 0.052, 0.058),
-    (0.15, 0.052, 0.056),
-    (0.4, 0.043, 0.045),
-    (0.55, 0.041, 0.041),
-    (0.7, 0.038, 0.038),
-    (0.9, 0.028, 0.03),
-    (1.0, 0.024, 0.03),
-)
-# From the wrist along the hand: share, half thickness, half breadth.
-_HAND = (
-    (-0.1, 0.022, 0.028),
-    (0.0, 0.02, 0.028),
-    (0.3, 0.018, 0.042),
-    (0.55, 0.015, 0.044),
-    (0.8, 0.012, 0.038),
-    (0.95, 0.009, 0.026),
-    (1.0, 0.002, 0.006),
-)
-# From the heel forward: x, middle in z, half width, half height.
-_FOOT = (
-    (-0.075, -0.79, 0.012, 0.02),
-    (-0.066, -0.785, 0.03, 0.033),
-    (-0.03, -0.775, 0.037, 0.044),
-    (0.02, -0.775, 0.038, 0.045),
-    (0.07, -0.786, 0.043, 0.034),
-    (0.12, -0.793, 0.048, 0.027),
-    (0.16, -0.797, 0.042, 0.022),
-    (0.185, -0.8, 0.028, 0.018),
-    (0.192, -0.802, 0.008, 0.01),
-)
 
 _POINT_M = 0.02
 _SMOOTH_M = 0.05
-"""Half length of the stretch over which one bone hands over to the next."""
+"""Half length of the stretch over which weights go over from one bone to the next."""
 
 
 @lru_cache(maxsize=1)
@@ -188,9 +79,7 @@ def simple_body() -> BodyTemplate:
     names = list(bones)
     marks = np.zeros((len(LANDMARKS), len(names)))
     marks[:, names.index("head")] = 1.0
-    points = np.concatenate(
-        [heads, [_FACE[name] for name in LANDMARKS], *(p.values[:, :3] for p in parts)]
-    )
+    points = np.concatenate([heads, OUTLINES["landmarks"], *(p.values[:, :3] for p in parts)])
     table = np.concatenate([np.eye(len(names)), marks, *(p.values[:, 3:] for p in parts)])
     weight_bones, weights = strongest_weights(table)
     faces: dict[str, list[Indices]] = {}
@@ -254,10 +143,11 @@ def _warp(p: Array, sex: str, age: str, weight: str) -> Array:
 
 def _bones() -> dict[str, tuple[str, Array]]:
     """``{bone: (parent or "", head [m])}``, each after its parent."""
-    made = {name: (parent, np.array(head)) for name, (parent, head) in _MIDDLE_BONES.items()}
+    spine = zip(_SPINE, ("", *_SPINE), OUTLINES["spine"], strict=False)
+    made = {name: (parent, np.array(head)) for name, parent, head in spine}
     for side, sign in (("l", 1.0), ("r", -1.0)):
         for name, (parent, head) in _SIDE_BONES.items():
-            above = parent if parent in _MIDDLE_BONES else f"{parent}_{side}"
+            above = parent if parent in _SPINE else f"{parent}_{side}"
             made[f"{name}_{side}"] = (above, head * (1.0, sign, 1.0))
     return made
 
@@ -265,15 +155,17 @@ def _bones() -> dict[str, tuple[str, Array]]:
 def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[MeshRows]:
     spine = ("pelvis", "spine_01", "spine_02", "spine_03")
     neck = ("spine_03", "neck_01", "head")
-    head = _upright(bones, _HEAD, 28, neck)
+    head = _upright(bones, OUTLINES["head"], 28, neck)
     _model_face(head)
-    trunk = _upright(bones, _TRUNK, 24, spine)
+    trunk = _upright(bones, OUTLINES["trunk"], 24, spine)
     made = [
-        _divided(head, "face", (body_regions.HAIRLINE, body_regions.SHOULDERS)),
-        _divided(trunk, "hips", (body_regions.WAIST, *body_regions.FRONT)),
-        _divided(_ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
-        _divided(
-            _upright(bones, _SKIRT, 24, ("pelvis",), split=True), "skirt_top", body_regions.SKIRT
+        _divide(head, "face", (body_regions.HAIRLINE, body_regions.SHOULDERS)),
+        _divide(trunk, "hips", (body_regions.WAIST, *body_regions.FRONT)),
+        _divide(_ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
+        _divide(
+            _upright(bones, OUTLINES["skirt"], 24, ("pelvis",), split=True),
+            "skirt_top",
+            body_regions.SKIRT,
         ),
         _curtain(bones),
     ]
@@ -285,34 +177,34 @@ def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[MeshRows]:
 def _limbs(bones: Mapping[str, tuple[str, Array]], side: str, sign: float) -> Sequence[MeshRows]:
     arm, hand = _arm(bones, side), _hand(bones, side)
     leg = (f"thigh_{side}", f"calf_{side}", f"foot_{side}")
-    bare = _upright(bones, _LEG, 12, leg, middle_y_m=_LEG_Y)
+    bare = _upright(bones, OUTLINES["leg"], 12, leg, middle_y_m=_LEG_Y)
     foot = _foot(bones, side)
     eye = _ball(bones, (0.1335, 0.031, 0.728), (0.0145, 0.0145, 0.0075))
     brow = _ball(bones, (0.137, 0.033, 0.75), (0.008, 0.021, 0.0045))
     ear = _ball(bones, (0.045, 0.079, 0.715), (0.017, 0.007, 0.028))
-    short = body_regions.Cut("torso", "sleeves", _beyond(0.145))
+    short = body_regions.Cut("torso", "sleeves", _level_beyond(0.145))
     made = [
-        _divided(arm, "", (body_regions.Cut("", "arms", _beyond(0.1)),)),
-        _divided(arm, "torso", (short,)),
-        _divided(hand, "hands", ()),
-        _divided(bare, "legs", (body_regions.THIGH,)),
-        _divided(bare, "thighs", (body_regions.KNEE, body_regions.CUFF)),
-        _divided(foot, "shoes", (body_regions.SOLE,)),
-        _divided(eye, "eyes", (body_regions.Cut("eyes", "irises", _pupil),)),
-        _divided(brow, "brows", ()),
-        _divided(ear, "face", ()),
+        _divide(arm, "", (body_regions.Cut("", "arms", _level_beyond(0.1)),)),
+        _divide(arm, "torso", (short,)),
+        _divide(hand, "hands", ()),
+        _divide(bare, "legs", (body_regions.THIGH,)),
+        _divide(bare, "thighs", (body_regions.KNEE, body_regions.CUFF)),
+        _divide(foot, "shoes", (body_regions.SOLE,)),
+        _divide(eye, "eyes", (body_regions.Cut("eyes", "irises", _pupil),)),
+        _divide(brow, "brows", ()),
+        _divide(ear, "face", ()),
     ]
-    return made if sign > 0.0 else [_mirrored(rows) for rows in made]
+    return made if sign > 0.0 else [_mirror(rows) for rows in made]
 
 
-def _mirrored(rows: MeshRows) -> MeshRows:
-    """Left limbs as right ones: they were made with the right bones already."""
+def _mirror(rows: MeshRows) -> MeshRows:
+    """Mirror left limbs; they already follow the right bones."""
     values = rows.values.copy()
     values[:, 1] *= -1.0
     return MeshRows(values, rows.faces[:, ::-1], rows.zones)
 
 
-def _beyond(distance_m: float) -> Level:
+def _level_beyond(distance_m: float) -> Level:
     def level(p: Array) -> Array:
         return np.asarray(((p - _SHOULDER) * _DOWN_OUT).sum(axis=1) - distance_m)
 
@@ -323,16 +215,13 @@ def _pupil(p: Array) -> Array:
     return np.asarray(0.0065 - np.abs(p[:, 1] - 0.031))
 
 
-def _divided(loft: tuple[Array, Indices], zone: str, cuts: Sequence[body_regions.Cut]) -> MeshRows:
-    rows = make_rows(*loft, zone)
-    for step in cuts:
-        rows = split_region(rows, step.zone, step.into, step.level)
-    return rows
+def _divide(loft: tuple[Array, Indices], zone: str, cuts: Sequence[body_regions.Cut]) -> MeshRows:
+    return body_regions.apply_cuts(make_rows(*loft, zone), cuts)
 
 
 def _upright(
     bones: Mapping[str, tuple[str, Array]],
-    outline: Sequence[tuple[float, float, float, float]],
+    outline: Sequence[Sequence[float]],
     columns: int,
     chain: Sequence[str],
     *,
@@ -360,13 +249,13 @@ def _upright(
 def _arm(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
     chain = ("spine_03", f"upperarm_{side}", f"lowerarm_{side}")
     length = float((_WRIST - _SHOULDER) @ _DOWN_OUT)
-    share, across, depth = np.array(_ARM).T
+    share, across, depth = np.array(OUTLINES["arm"]).T
     return _along_arm(bones, _SHOULDER, share * length, np.stack([depth, across], 1), chain)
 
 
 def _hand(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
     """A mitten with a thumb."""
-    share, thick, broad = np.array(_HAND).T
+    share, thick, broad = np.array(OUTLINES["hand"]).T
     halves = np.stack([broad, thick], axis=1)
     values, faces = _along_arm(bones, _WRIST, share * _HAND_M, halves, (f"hand_{side}",))
     names = list(bones)
@@ -393,7 +282,7 @@ def _along_arm(
 
 
 def _foot(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
-    x, z, width, height = np.array(_FOOT).T
+    x, z, width, height = np.array(OUTLINES["foot"]).T
     middles = np.stack([x, np.full_like(x, _LEG_Y), z], axis=1)
     axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     values, faces = _loft(middles, axes, np.stack([width, height], axis=1), 12)
@@ -422,13 +311,11 @@ def _ball(
 
 
 def _curtain(bones: Mapping[str, tuple[str, Array]]) -> MeshRows:
-    turn = np.linspace(-1.0, 1.0, body_regions.CURTAIN_COLUMNS) * body_regions.CURTAIN_REACH_RAD
-    z, length, width = (column[:, None] for column in np.array(body_regions.CURTAIN_M).T)
-    x = body_regions.CURTAIN_X_M - length * np.cos(turn)
-    places = np.stack(np.broadcast_arrays(x, width * np.sin(turn), z), axis=2).reshape(-1, 3)
+    places = body_regions.curtain_points()
     weights = _along_chain(bones, places[:, 2], ("spine_03", "neck_01", "head"), 2)
-    faces = grid_faces(len(z), body_regions.CURTAIN_COLUMNS)
-    return _divided((np.concatenate([places, weights], axis=1), faces), "hair", body_regions.HAIR)
+    columns = body_regions.CURTAIN_COLUMNS
+    faces = grid_faces(len(places) // columns, columns)
+    return _divide((np.concatenate([places, weights], axis=1), faces), "hair", body_regions.HAIR)
 
 
 def _loft(middles: Array, axes: Array, halves: Array, columns: int) -> tuple[Array, Indices]:
@@ -455,7 +342,7 @@ def _loft(middles: Array, axes: Array, halves: Array, columns: int) -> tuple[Arr
 def _along_chain(
     bones: Mapping[str, tuple[str, Array]], heights: Array, chain: Sequence[str], axis: int
 ) -> Array:
-    """Weights of points that one bone hands over to the next at the head of the latter.
+    """Bone weights of points along a chain, blended around the head of each next bone.
 
     Args:
         bones: All bones.

@@ -1,4 +1,4 @@
-"""What people do with their joints: walking, running, standing, sitting.
+"""Joint angles of people who walk, run, stand or sit.
 
 Angles are degrees here, as in the tables of gait analysis: hip and knee flexion, ankle
 dorsiflexion and shoulder flexion (arm forward) are positive.
@@ -89,7 +89,7 @@ _RUN_TOES = (0, 0, 0, 2, 10, 22, 24, 10, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
 def shorten_stride(stance: Stance, share: float) -> Stance:
-    """The same stride with smaller steps, as narrow clothes allow."""
+    """Shorten the steps of a stride, for narrow clothes."""
     left, right = (
         Leg(share * leg.hip, leg.knee * (0.5 + 0.5 * share), leg.ankle * share, leg.toes)
         for leg in (stance.left_leg, stance.right_leg)
@@ -101,7 +101,7 @@ def stance(pose: PoseName, step: int) -> Stance:
     """Joint angles of a pose.
 
     Args:
-        pose: What is done.
+        pose: Name of the pose.
         step: Sixteenth of the stride of the left leg, 0 = its heel strikes; walk, carry, run.
     """
     step %= PHASES
@@ -154,11 +154,7 @@ def _sit() -> Stance:
 
 
 def _leg(
-    step: int,
-    hip: Sequence[int],
-    knee: Sequence[int],
-    ankle: Sequence[int],
-    toes: Sequence[int],
+    step: int, hip: Sequence[int], knee: Sequence[int], ankle: Sequence[int], toes: Sequence[int]
 ) -> Leg:
     k = step % PHASES
     return Leg(hip[k], knee[k], ankle[k], toes[k])

@@ -1,7 +1,7 @@
-"""The body that people are made of: a template mesh, its shapes, its bones.
+"""Template body: mesh, shapes and bones.
 
 Template frame: metres, Z up, front +X, left +Y; the origin lies in the pelvis. The body stands
-upright with its arms held away from it. Whatever moves with the body is a *point* of one list:
+upright with its arms held away from it. All that moves with the body is a *point* in one list:
 bone heads first, then landmarks, then the vertices of skin, clothes and hair.
 """
 
@@ -28,31 +28,10 @@ LANDMARKS = ("nose", "left_eye", "right_eye", "left_ear", "right_ear", "crown", 
 """Points that no bone marks: of the face, the top of the head, the underside of a foot."""
 
 ZONES = (
-    "face",
-    "scalp",
-    "brows",
-    "lips",
-    "eyes",
-    "irises",
-    "arms",
-    "hands",
-    "legs",
-    "upper_legs",
-    "torso",
-    "front",
-    "sleeves",
-    "hips",
-    "thighs",
-    "shins",
-    "ankles",
-    "shoes",
-    "soles",
-    "skirt_top",
-    "skirt_middle",
-    "skirt_end",
-    "hair",
-    "hair_end",
-)
+    "face", "scalp", "brows", "lips", "eyes", "irises", "arms", "hands", "legs", "upper_legs",
+    "torso", "front", "sleeves", "hips", "thighs", "shins", "ankles", "shoes", "soles",
+    "skirt_top", "skirt_middle", "skirt_end", "hair", "hair_end",
+)  # fmt: skip
 """Parts of the template that are shown or left out as a whole."""
 
 Array = NDArray[np.float64]

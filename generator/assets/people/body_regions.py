@@ -1,4 +1,4 @@
-"""Where the template of the people pack is cut into zones, and how finely each is kept.
+"""Zones of the people pack's template: the cuts between them and their number of triangles.
 
 Coordinates are those of the base shape in the template frame [m]; they were read off its joints
 and its outline. Both halves are cut alike, by ``|y|``.
@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gen_data.generator.assets.people.body import Array
-from gen_data.generator.assets.people.mesh_simplify import Level
+from gen_data.generator.assets.people.mesh_simplify import Level, MeshRows, split_region
+from gen_data.generator.assets.procedural.data_tables import load_table
 
 EAR_XZ_M = (0.045, 0.715)
 EAR_RADIUS_M = 0.015
@@ -172,46 +173,24 @@ SKIRT: Sequence[Cut] = (
 )
 HAIR: Sequence[Cut] = (Cut("hair", "hair_end", _below(0.57)),)
 
-CURTAIN_M = (
-    (0.785, 0.079, 0.082),
-    (0.75, 0.084, 0.088),
-    (0.71, 0.086, 0.092),
-    (0.67, 0.086, 0.095),
-    (0.63, 0.086, 0.099),
-    (0.6, 0.088, 0.104),
-    (0.57, 0.095, 0.109),
-    (0.53, 0.11, 0.112),
-    (0.49, 0.119, 0.112),
-    (0.44, 0.123, 0.106),
-)
-"""Long hair: height, half length and half width of the ellipses that it hangs along."""
+OUTLINES = load_table(__package__, "outlines", tuple[tuple[float, ...], ...])
+ZONE_TRIANGLES = load_table(__package__, "zone_triangles", int)
 CURTAIN_X_M = 0.03
 CURTAIN_REACH_RAD = 1.75
 """From the back of the head to the hair's front edge, behind the ears."""
 CURTAIN_COLUMNS = 15
 
-MAX_FACES = {
-    "face": 1200,
-    "scalp": 220,
-    "brows": 24,
-    "lips": 40,
-    "eyes": 80,
-    "irises": 32,
-    "hands": 560,
-    "arms": 260,
-    "legs": 220,
-    "upper_legs": 120,
-    "torso": 600,
-    "front": 80,
-    "sleeves": 280,
-    "hips": 240,
-    "thighs": 240,
-    "shins": 220,
-    "ankles": 80,
-    "shoes": 320,
-    "soles": 120,
-    "skirt_top": 240,
-    "skirt_middle": 140,
-    "skirt_end": 140,
-}
-"""Triangles of a zone, both sides together; a zone with fewer keeps what it has."""
+
+def curtain_points() -> Array:
+    """Points of long hair [m], float64 [rows * CURTAIN_COLUMNS, 3]: arcs around the head."""
+    turn = np.linspace(-1.0, 1.0, CURTAIN_COLUMNS) * CURTAIN_REACH_RAD
+    z, length, width = (column[:, None] for column in np.array(OUTLINES["curtain"]).T)
+    x = CURTAIN_X_M - length * np.cos(turn)
+    return np.stack(np.broadcast_arrays(x, width * np.sin(turn), z), axis=2).reshape(-1, 3)
+
+
+def apply_cuts(rows: MeshRows, cuts: Sequence[Cut]) -> MeshRows:
+    """A mesh after several cuts, made one after the other."""
+    for cut in cuts:
+        rows = split_region(rows, cut.zone, cut.into, cut.level)
+    return rows

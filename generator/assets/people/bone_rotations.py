@@ -1,6 +1,6 @@
-"""From joint angles to a rotation per bone.
+"""Bone rotations from joint angles.
 
-Limbs are given the direction they shall have, whatever the template's own pose is: a bone is first
+Limbs take their direction from the angles, independent of the template's own pose: a bone is first
 turned so that it hangs straight down and then swung from there.
 """
 
@@ -24,7 +24,7 @@ def bone_rotations(body: BodyTemplate, heads_m: Array, stance: Stance) -> Rotati
     """The rotation of every bone that a stance turns.
 
     Args:
-        body: Whose bones.
+        body: Template with the bones.
         heads_m: Bone heads before the pose [m], shape [bones, 3].
         stance: Joint angles.
     """

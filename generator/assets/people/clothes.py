@@ -1,4 +1,4 @@
-"""Layers over a body: skin where it shows, garments that stand off it, hair."""
+"""Layers over a body: visible skin, garments and hair."""
 
 from __future__ import annotations
 
@@ -47,15 +47,9 @@ class Layer:
 
 
 def layers(person: Person) -> tuple[Layer, ...]:
-    """Everything that is seen of a person, from the skin outwards."""
+    """All visible layers of a person, from the skin outwards."""
     outfit = person.outfit
-    return (
-        _skin(person),
-        *_hair(person),
-        *_bottoms(outfit),
-        *_tops(outfit),
-        _shoes(outfit),
-    )
+    return (_skin(person), *_hair(person), *_bottoms(outfit), *_tops(outfit), _shoes(outfit))
 
 
 def displace_layer(
@@ -82,7 +76,7 @@ def displace_layer(
     local = number[faces]
     places = points_m[used]
     if layer.smoothings:
-        places = _smoothed(places, local, layer.smoothings)
+        places = _smooth(places, local, layer.smoothings)
     if any(distance for _, distance in layer.profile):
         heights, distances = zip(*layer.profile, strict=True)
         template = body.points_m[used]
@@ -100,7 +94,9 @@ def _skin(person: Person) -> Layer:
     skin = Material(base_color=person.skin, roughness=0.5, specular=0.4, role="skin")
     r, g, b = person.skin
     lips = replace(skin, base_color=(0.82 * r, 0.55 * g, 0.55 * b), roughness=0.4)
-    brows = Material(base_color=_mixed(person.hair, person.skin, 0.45), roughness=0.8, role="hair")
+    brows = Material(
+        base_color=_mix_colors(person.hair, person.skin, 0.45), roughness=0.8, role="hair"
+    )
     zones = [("face", skin), ("lips", lips), ("brows", brows), ("hands", skin)]
     if person.haircut == "bald" and not outfit.hat:
         zones.append(("scalp", skin))
@@ -140,14 +136,8 @@ def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
         zones: tuple[str, ...] = ("hips", "thighs", "shins", "ankles")
         if outfit.top == "coat":
             zones = zones[outfit.skirt_zones :]
-        profile: Profile = (
-            (-0.78, 0.024),
-            (-0.7, 0.018),
-            (-0.36, 0.013),
-            (-0.1, 0.008),
-            (0.0, 0.004),
-            (0.12, 0.002),
-        )
+        profile: Profile = ((-0.78, 0.024), (-0.7, 0.018), (-0.36, 0.013), (-0.1, 0.008),
+                            (0.0, 0.004), (0.12, 0.002))  # fmt: skip
         painted = tuple((zone, material) for zone in zones)
         return (Layer(painted, profile, 0.0025, 5.0, smoothings=1),)
     if outfit.bottom == "shorts":
@@ -187,8 +177,8 @@ def _shoes(outfit: Outfit) -> Layer:
     return Layer(zones[0 if outfit.bottom == "trousers" else 1 :], ((-0.8, 0.012), (-0.74, 0.006)))
 
 
-def _smoothed(places: Array, faces: Indices, times: int) -> Array:
-    """Points moved to and fro along the way to the mean of their neighbours; edges stay.
+def _smooth(places: Array, faces: Indices, times: int) -> Array:
+    """Smooth points along their normals without shrinking (Taubin); vertices on borders stay.
 
     Source: Taubin, "A signal processing approach to fair surface design", SIGGRAPH 1995.
     """
@@ -228,6 +218,6 @@ def _border(faces: Indices) -> Indices:
     return np.unique(np.concatenate([alone // size, alone % size]))
 
 
-def _mixed(a: Vec3, b: Vec3, share: float) -> Vec3:
+def _mix_colors(a: Vec3, b: Vec3, share: float) -> Vec3:
     x, y, z = ((1.0 - share) * p + share * q for p, q in zip(a, b, strict=True))
     return (x, y, z)

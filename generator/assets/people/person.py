@@ -1,4 +1,4 @@
-"""Who a person is: drawn from a seed, before anything is built."""
+"""Properties of a person, drawn from a seed before any mesh is built."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ from typing import Literal, cast
 from gen_data.generator.assets.people.animation import BEHAVIOURS, PHASES, POSES, PoseName
 from gen_data.generator.assets.people.wardrobe import Outfit, draw_outfit
 from gen_data.generator.assets.procedural.family import Facts
-from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
+from gen_data.generator.assets.procedural.material_presets import (
+    draw_linear,
+    hex_to_linear,
+    jitter_color,
 )
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 Sex = Literal["female", "male"]
 AgeGroup = Literal["child", "adult", "senior"]
@@ -45,7 +43,7 @@ _HAIRCUTS = {
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person's looks and what they do.
+    """Appearance and activity of one person.
 
     Attributes:
         figure: Strength of each word of the body's shapes.
@@ -70,17 +68,17 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     """The person of a seed.
 
     Args:
-        seed: Of everything that is left open.
+        seed: Of all properties that are not given.
         pose: One of ``POSES``; empty = drawn.
         phase: Of the stride, in [0, 1), rounded to sixteenths; negative = drawn.
 
     Raises:
-        ValueError: on a pose that does not exist or a phase that is no number.
+        ValueError: if the pose does not exist or the phase is not finite.
     """
     if pose and pose not in POSES:
         raise ValueError(f"pose '{pose}' is none of {', '.join(POSES)}{did_you_mean(pose, POSES)}")
     rng = variant_rng("person", seed)
-    sex: Sex = "female" if is_drawn(0.5, rng) else "male"
+    sex: Sex = "female" if rng.chance(0.5) else "male"
     age_group = _drawn_age(rng)
     height_m = _drawn_height_m(sex, age_group, rng)
     tone = min(int(rng.random() * len(_SKIN)), len(_SKIN) - 1)
@@ -94,7 +92,7 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
         figure=figure,
         skin=jitter_color(hex_to_linear(_SKIN[tone]), 0.07, rng),
         hair=_drawn_hair(age_group, tone, rng),
-        haircut=choose(_HAIRCUTS[sex][: 3 if age_group == "child" else None], rng),
+        haircut=rng.choose(_HAIRCUTS[sex][: 3 if age_group == "child" else None]),
         outfit=draw_outfit(sex, age_group == "child", rng),
         pose=action,
         step=step,
@@ -102,7 +100,7 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
 
 
 def facts(seed: int, pose: str, phase: float) -> Facts:
-    """What labels say of the person of a seed."""
+    """Facts about the person of a seed, for labels."""
     person = draw_person(seed, pose, phase)
     return Facts(
         "child" if person.age_group == "child" else "adult",
@@ -116,17 +114,17 @@ def facts(seed: int, pose: str, phase: float) -> Facts:
     )
 
 
-def _drawn_age(rng: Rng) -> AgeGroup:
+def _drawn_age(rng: VariantRng) -> AgeGroup:
     draw = float(rng.random())
     if draw < _CHILD_SHARE:
         return "child"
     return "senior" if draw < _CHILD_SHARE + _SENIOR_SHARE else "adult"
 
 
-def _drawn_height_m(sex: Sex, age_group: AgeGroup, rng: Rng) -> float:
+def _drawn_height_m(sex: Sex, age_group: AgeGroup, rng: VariantRng) -> float:
     """A height [m], whole centimetres."""
     if age_group == "child":
-        return round(uniform_between(*_CHILD_M, rng), 2)
+        return round(rng.between(*_CHILD_M), 2)
     mean, deviation = _HEIGHT_M[sex]
     # Irwin and Hall: twelve uniforms add up to nearly a normal, exactly alike everywhere.
     normal = sum(float(rng.random()) for _ in range(12)) - 6.0
@@ -134,7 +132,7 @@ def _drawn_height_m(sex: Sex, age_group: AgeGroup, rng: Rng) -> float:
 
 
 def _drawn_figure(
-    sex: Sex, age_group: AgeGroup, height_m: float, tone: int, rng: Rng
+    sex: Sex, age_group: AgeGroup, height_m: float, tone: int, rng: VariantRng
 ) -> dict[str, float]:
     """Strength of every word that names of shapes use."""
     figure = {"universal": 1.0, sex: 1.0}
@@ -143,21 +141,17 @@ def _drawn_figure(
         grown = 0.75 * max(0.0, (height_m - 1.3) / (_CHILD_M[1] - 1.3))
         figure |= {"child": 1.0 - grown, "young": grown}
     else:
-        old = (
-            uniform_between(0.55, 1.0, rng)
-            if age_group == "senior"
-            else uniform_between(0.0, 0.35, rng)
-        )
+        old = rng.between(0.55, 1.0) if age_group == "senior" else rng.between(0.0, 0.35)
         figure |= {"old": old, "young": 1.0 - old}
-    figure |= _three("muscle", uniform_between(-0.5, 0.6 if sex == "male" else 0.2, rng))
-    figure |= _three("weight", uniform_between(-0.7, 0.8, rng) if age_group != "child" else -0.1)
+    figure |= _three("muscle", rng.between(-0.5, 0.6 if sex == "male" else 0.2))
+    figure |= _three("weight", rng.between(-0.7, 0.8) if age_group != "child" else -0.1)
     if age_group != "child":
         mean, _ = _HEIGHT_M[sex]
         tall = max(-0.6, min(0.6, (height_m - mean) / 0.3))
         figure |= {"maxheight": max(0.0, tall), "minheight": max(0.0, -tall)}
     main = ("caucasian", "asian", "african")[0 if tone < 2 else 1 if tone < 4 else 2]
-    other = choose(("caucasian", "asian", "african"), rng)
-    share = uniform_between(0.0, 0.4, rng)
+    other = rng.choose(("caucasian", "asian", "african"))
+    share = rng.between(0.0, 0.4)
     figure[main] = 1.0 - share
     figure[other] = figure.get(other, 0.0) + share
     return figure
@@ -172,19 +166,17 @@ def _three(word: str, value: float) -> dict[str, float]:
     }
 
 
-def _drawn_hair(age_group: AgeGroup, tone: int, rng: Rng) -> Vec3:
-    if age_group == "senior" and is_drawn(0.8, rng):
-        return jitter_color(hex_to_linear(choose(_GREY, rng)), 0.1, rng)
+def _drawn_hair(age_group: AgeGroup, tone: int, rng: VariantRng) -> Vec3:
+    if age_group == "senior" and rng.chance(0.8):
+        return draw_linear(_GREY, 0.1, rng)
     # Fair hair belongs to fair skin.
-    return jitter_color(
-        hex_to_linear(choose(_HAIR[: 8 if tone < 2 else 4 if tone < 4 else 2], rng)), 0.12, rng
-    )
+    return draw_linear(_HAIR[: 8 if tone < 2 else 4 if tone < 4 else 2], 0.12, rng)
 
 
 def _drawn_action(seed: int, pose: str, phase: float) -> tuple[PoseName, int]:
     """Pose and step; they have a stream of their own, so that the same person can do anything."""
     rng = variant_rng("person/pose", seed)
-    drawn = choose(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3, rng)
+    drawn = rng.choose(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3)
     step = min(int(rng.random() * PHASES), PHASES - 1)
     if not math.isfinite(phase):
         raise ValueError("phase is no number")

@@ -1,4 +1,4 @@
-"""A person as a mesh: shaped, dressed, posed, set on the ground."""
+"""Meshes of people: shaped, dressed, posed and placed on the ground."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from gen_data.generator.assets.people.clothes import displace_layer, layers
 from gen_data.generator.assets.people.person import Person
 from gen_data.generator.assets.people.skinning import bone_transforms, skin_points, vertex_normals
 from gen_data.generator.assets.procedural.collision_hulls import extreme
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData
@@ -26,27 +27,7 @@ _NARROW_STRIDE = 0.7
 """What a long skirt leaves of a stride."""
 _HULL_POINTS = 40
 
-KEYPOINTS: tuple[tuple[str, str, float], ...] = (
-    ("nose", "nose", 0.02),
-    ("left_eye", "left_eye", 0.03),
-    ("right_eye", "right_eye", 0.03),
-    ("left_ear", "left_ear", 0.03),
-    ("right_ear", "right_ear", 0.03),
-    ("left_shoulder", "upperarm_l", 0.1),
-    ("right_shoulder", "upperarm_r", 0.1),
-    ("left_elbow", "lowerarm_l", 0.08),
-    ("right_elbow", "lowerarm_r", 0.08),
-    ("left_wrist", "hand_l", 0.06),
-    ("right_wrist", "hand_r", 0.06),
-    ("left_hip", "thigh_l", 0.16),
-    ("right_hip", "thigh_r", 0.16),
-    ("left_knee", "calf_l", 0.1),
-    ("right_knee", "calf_r", 0.1),
-    ("left_ankle", "foot_l", 0.09),
-    ("right_ankle", "foot_r", 0.09),
-)
-"""COCO's 17 names in COCO's order; the bone head or landmark of each; its depth under the surface
-of a grown person [m], clothes included."""
+KEYPOINTS = load_table(__package__, "keypoints", tuple[str, float])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -78,7 +59,7 @@ class _Piece:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Figure:
-    """A person shaped and dressed, before any pose: what all their poses share.
+    """A shaped and dressed person before any pose; shared by all poses.
 
     Attributes:
         body: The template.
@@ -115,17 +96,17 @@ def build_person(person: Person, figure: Figure) -> Solid:
     bones = len(body.bones)
     rotations = bone_rotations(body, points[:bones], _stance(person))
     transforms = bone_transforms(body, points[:bones], rotations)
-    sheets = [_posed(piece, body, transforms) for piece in figure.pieces]
+    sheets = [_pose_piece(piece, body, transforms) for piece in figure.pieces]
     marks = slice(0, bones + len(LANDMARKS))
     posed = skin_points(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
     sheets += [
         _Sheet(prop.vertices_m, prop.normals, prop.faces, prop.slots, prop.materials)
         for prop in props.make_props(person, body, posed, transforms, scale)
     ]
-    mesh, shift = _grounded(sheets, body, posed)
+    mesh, shift = _join_on_ground(sheets, body, posed)
     keypoints = tuple(
         Keypoint(name, _vec(posed[_index(body, mark)] + shift), round(radius * scale, 4))
-        for name, mark, radius in KEYPOINTS
+        for name, (mark, radius) in KEYPOINTS.items()
     )
     hull = extreme(mesh.vertices_m.astype(np.float64), _HULL_POINTS)
     return Solid(mesh, ConvexParts((hull,)), keypoints)
@@ -138,15 +119,17 @@ def _stance(person: Person) -> Stance:
     return shorten_stride(made, _NARROW_STRIDE) if narrow and person.pose != "sit" else made
 
 
-def _posed(piece: _Piece, body: BodyTemplate, transforms: Array) -> _Sheet:
+def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> _Sheet:
     bones, weights = body.weight_bones[piece.used], body.weights[piece.used]
     moved = skin_points(piece.vertices_m, bones, weights, transforms)
     normals = vertex_normals(moved, piece.faces)
     return _Sheet(moved, normals, piece.faces, piece.slots, piece.materials)
 
 
-def _grounded(sheets: list[_Sheet], body: BodyTemplate, posed: Array) -> tuple[MeshData, Array]:
-    """The sheets as one mesh whose lowest vertex has z = 0, and the shift that took it there."""
+def _join_on_ground(
+    sheets: list[_Sheet], body: BodyTemplate, posed: Array
+) -> tuple[MeshData, Array]:
+    """Join the sheets into one mesh whose lowest vertex has z = 0; also return its shift [m]."""
     vertices = np.concatenate([sheet.vertices_m for sheet in sheets])
     # Between the ankles lies the origin: a stride reaches as far ahead as behind.
     middle = 0.5 * (posed[body.bone("foot_l")] + posed[body.bone("foot_r")])
@@ -159,7 +142,7 @@ def _grounded(sheets: list[_Sheet], body: BodyTemplate, posed: Array) -> tuple[M
         MeshData(
             vertices_m=(np.rint((vertices + shift) / _GRID_M) * _GRID_M + 0.0).astype(np.float32),
             faces=np.concatenate(faces).astype(np.int32),
-            normals=_rounded(np.concatenate([sheet.normals for sheet in sheets])),
+            normals=_round_normals(np.concatenate([sheet.normals for sheet in sheets])),
             uvs=np.zeros((len(vertices), 2), np.float32),
             face_slots=np.concatenate(slots).astype(np.int32),
             materials=tuple(material for sheet in sheets for material in sheet.materials),
@@ -168,7 +151,7 @@ def _grounded(sheets: list[_Sheet], body: BodyTemplate, posed: Array) -> tuple[M
     )
 
 
-def _rounded(normals: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
+def _round_normals(normals: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
     return (np.round(normals, 5) + 0.0).astype(np.float32)
 
 

@@ -1,4 +1,4 @@
-"""What people carry: a bag on the back, in the hand, a telephone."""
+"""Carried objects: backpack, handbag, telephone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PHONE = Material((0.012, 0.012, 0.014), 0.15, role="bag")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Prop:
-    """A rigid thing in its place."""
+    """A rigid object in place."""
 
     vertices_m: Array
     normals: Array
@@ -31,7 +31,7 @@ def make_props(
     """Everything a person carries.
 
     Args:
-        person: Who.
+        person: Person who carries them.
         body: Their template.
         posed_m: Bone heads and landmarks after the pose [m].
         transforms: Of every bone, shape [bones, 3, 4].

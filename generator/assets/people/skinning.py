@@ -1,4 +1,4 @@
-"""Moving points with bones: linear blend skinning.
+"""Linear blend skinning: points that move with bones.
 
 Source: Magnenat-Thalmann, Laperrière and Thalmann, "Joint-dependent local deformations for hand
 animation and object grasping", Graphics Interface 1988.
@@ -18,10 +18,10 @@ not named turn with their parent."""
 
 
 def bone_transforms(body: BodyTemplate, heads_m: Array, rotations: Rotations) -> Array:
-    """Where each bone takes what belongs to it, float64 [bones, 3, 4].
+    """Transform of each bone from the rest pose to the pose, float64 [bones, 3, 4].
 
     Args:
-        body: Whose bones.
+        body: Template with the bones.
         heads_m: Bone heads before the pose [m], shape [bones, 3]; the root's stays where it is.
         rotations: The pose.
     """

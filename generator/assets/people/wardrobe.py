@@ -1,48 +1,25 @@
-"""What people wear: garments, colours and patterns as streets show them."""
+"""Outfits: garments, colours and patterns as seen in streets."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
-from gen_data.generator.assets.procedural.variant_rng import choose, is_drawn, uniform_between
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.material_presets import draw_linear
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
-_DARK = ("#1b1c1f", "#23262e", "#2c2f36", "#1d2740", "#26324a", "#39404d", "#3b3530")
-_JACKETS = (*_DARK, "#1b1c1f", "#4a5260", "#4d4a3a", "#5a4636", "#7c7468", "#6e1f24", "#35506e")
-_TOPS = (
-    "#e9e7e2",
-    "#d9d6cf",
-    "#9aa0a6",
-    "#5c6670",
-    "#1f2023",
-    "#22304c",
-    "#3f6a96",
-    "#7fa3c4",
-    "#7d2a2f",
-    "#b4443a",
-    "#3f5f46",
-    "#c9a23e",
-    "#c48a92",
-    "#5b4668",
-)
-_BRIGHT = ("#d63a2f", "#e8a020", "#f0d32c", "#2f9a58", "#2774c4", "#e56aa0", "#30a7b0")
-_DENIM = ("#2a3a57", "#3c5274", "#5f7898", "#22283a", "#1f2229")
-_TROUSERS = (*_DARK, "#1b1c1f", "#4a4640", "#6d6454", "#8b8271", "#3f4a3c", "#5d5f63")
-_SKIRTS = (*_DARK, "#6e2433", "#4d5d48", "#8d7f6d", "#3a567c", "#a35a4e")
-_SHOES = ("#141416", "#1d1a18", "#33241a", "#5a3d28", "#e4e2de", "#c9c7c2", "#4a4d54", "#26344f")
-_BAGS = ("#17181b", "#2a2522", "#5b3a24", "#26344a", "#6b6f74", "#7a2a2c", "#3d4a35")
+_COLORS = load_table(__package__, "wardrobe", tuple[str, ...])
 _WARM_FABRICS = tuple(f"texture/fabric?seed={k}" for k in (2, 5, 9))
 _STRIPES = tuple(f"texture/stripes?seed={k}" for k in (3, 6))
-"""Few textures, shared by everybody: each one that a picture uses costs its upload."""
+"""Few textures, shared by all people: each texture in an image has to be uploaded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outfit:
-    """What one person wears.
+    """Outfit of one person.
 
     Attributes:
         top: ``tshirt``, ``shirt``, ``jacket``, ``coat`` or ``dress``.
@@ -69,59 +46,61 @@ class Outfit:
     hat_material: Material
 
 
-def draw_outfit(sex: str, child: bool, rng: Rng) -> Outfit:
-    """An outfit that suits."""
+def draw_outfit(sex: str, child: bool, rng: VariantRng) -> Outfit:
+    """Draw an outfit that fits sex and age."""
     woman = sex == "female"
     tops = ("jacket",) * 5 + ("shirt",) * 4 + ("tshirt",) * 3 + ("coat",) * (0 if child else 3)
-    top = choose(tops + ("dress",) * (2 if woman else 0), rng)
+    top = rng.choose(tops + ("dress",) * (2 if woman else 0))
     bottoms = ("trousers",) * 9 + ("shorts",) * (2 if top in ("tshirt", "shirt") else 0)
-    bottom = choose(bottoms + ("skirt",) * (3 if woman else 0), rng)
+    bottom = rng.choose(bottoms + ("skirt",) * (3 if woman else 0))
     if top == "dress":
         bottom = "none"
     outer = _top(top, child, rng)
-    open_front = top in ("jacket", "coat") and is_drawn(0.6, rng)
-    reach = choose((1, 1, 1, 2, 2, 2, 3), rng)
+    open_front = top in ("jacket", "coat") and rng.chance(0.6)
+    reach = rng.choose((1, 1, 1, 2, 2, 2, 3))
     return Outfit(
         top=top,
         bottom=bottom,
         skirt_zones=min(reach, 2) if top == "coat" else reach,
-        sleeves=top in ("shirt", "jacket", "coat") or (top == "dress" and is_drawn(0.4, rng)),
-        bag=choose(("", "", "", "backpack", "handbag" if woman and not child else ""), rng),
-        hat=top in ("jacket", "coat") and is_drawn(0.2, rng),
-        stockings=top == "coat" or is_drawn(0.5, rng),
+        sleeves=top in ("shirt", "jacket", "coat") or (top == "dress" and rng.chance(0.4)),
+        bag=rng.choose(("", "", "", "backpack", "handbag" if woman and not child else "")),
+        hat=top in ("jacket", "coat") and rng.chance(0.2),
+        stockings=top == "coat" or rng.chance(0.5),
         top_material=outer,
         front_material=_top("shirt", child, rng) if open_front else outer,
         bottom_material=_bottom(bottom, rng),
-        shoe_material=_plain(_SHOES, uniform_between(0.35, 0.7, rng), "shoes", rng),
-        bag_material=_plain(_BAGS, uniform_between(0.45, 0.8, rng), "bag", rng),
-        hat_material=_plain((*_DARK, *_TOPS), 0.95, "hat", rng),
+        shoe_material=_plain_material(_COLORS["shoes"], rng.between(0.35, 0.7), "shoes", rng),
+        bag_material=_plain_material(_COLORS["bags"], rng.between(0.45, 0.8), "bag", rng),
+        hat_material=_plain_material(_COLORS["hats"], 0.95, "hat", rng),
     )
 
 
-def _top(kind: str, child: bool, rng: Rng) -> Material:
+def _top(kind: str, child: bool, rng: VariantRng) -> Material:
     if kind in ("jacket", "coat"):
-        colors = _BRIGHT if is_drawn(0.35 if child else 0.07, rng) else _JACKETS
-        return _plain(colors, uniform_between(0.55, 0.9, rng), "top", rng)
+        colors = _COLORS["bright"] if rng.chance(0.35 if child else 0.07) else _COLORS["jackets"]
+        return _plain_material(colors, rng.between(0.55, 0.9), "top", rng)
     pattern, seed = float(rng.random()), float(rng.random())
     if kind != "tshirt" and pattern < 0.12:
-        return _patterned(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22, "top")
+        return _patterned_material(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22, "top")
     if pattern < 0.12:
-        return _patterned(_STRIPES[int(seed * len(_STRIPES))], 0.3, "top")
-    colors = _BRIGHT if is_drawn(0.4 if child else 0.1, rng) else _TOPS
-    return _plain(colors, uniform_between(0.75, 0.95, rng), "top", rng)
+        return _patterned_material(_STRIPES[int(seed * len(_STRIPES))], 0.3, "top")
+    colors = _COLORS["bright"] if rng.chance(0.4 if child else 0.1) else _COLORS["tops"]
+    return _plain_material(colors, rng.between(0.75, 0.95), "top", rng)
 
 
-def _bottom(kind: str, rng: Rng) -> Material:
-    colors = _SKIRTS if kind == "skirt" else _DENIM if is_drawn(0.42, rng) else _TROUSERS
-    return _plain(colors, uniform_between(0.75, 0.95, rng), "bottom", rng)
+def _bottom(kind: str, rng: VariantRng) -> Material:
+    colors = "skirts" if kind == "skirt" else "denim" if rng.chance(0.42) else "trousers"
+    return _plain_material(_COLORS[colors], rng.between(0.75, 0.95), "bottom", rng)
 
 
-def _plain(colors: Sequence[str], roughness: float, role: str, rng: Rng) -> Material:
-    color: Vec3 = jitter_color(hex_to_linear(choose(colors, rng)), 0.12, rng)
+def _plain_material(
+    colors: Sequence[str], roughness: float, role: str, rng: VariantRng
+) -> Material:
+    color: Vec3 = draw_linear(colors, 0.12, rng)
     return Material(base_color=color, roughness=roughness, specular=0.35, role=role)
 
 
-def _patterned(texture: str, scale_m: float, role: str) -> Material:
+def _patterned_material(texture: str, scale_m: float, role: str) -> Material:
     return Material(
         base_color=(0.9, 0.9, 0.9),
         roughness=0.9,

@@ -1,6 +1,7 @@
-"""Procedural assets: everything here is made by a formula from a seed or from a size.
+"""Procedural assets: objects, textures and environments computed from a seed or a size.
 
 A new generator is one function and one line of ``families.yaml``; it is imported when first built.
+Its colours, words, measures and designs are rows of YAML files beside it (``data_tables``).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     hex_to_linear,
@@ -20,7 +20,7 @@ from gen_data.generator.assets.procedural.patches import (
     make_centred_solid,
 )
 from gen_data.generator.assets.procedural.surface_shapes import Point2, UvRect, grid, rounded_box
-from gen_data.generator.assets.procedural.variant_rng import is_drawn, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
@@ -29,29 +29,23 @@ COVER_ATLAS: Mapping[str, UvRect] = {
     "spine": (0.442, 0.002, 0.558, 0.998),
     "front": (0.562, 0.002, 0.998, 0.998),
 }
-_FORMATS = (
-    (0.178, 0.11),
-    (0.198, 0.129),
-    (0.21, 0.148),
-    (0.234, 0.156),
-    (0.19, 0.19),
-    (0.297, 0.21),
-)
+_FORMATS = ((0.178, 0.11), (0.198, 0.129), (0.21, 0.148), (0.234, 0.156), (0.19, 0.19),
+            (0.297, 0.21))  # fmt: skip
 
 
 def book_size_m(seed: int) -> tuple[float, float, float]:
     """Length along the spine, width and thickness."""
     rng = variant_rng("book/size", seed)
-    length, width = _FORMATS[seed % len(_FORMATS)]
-    scale = uniform_between(0.97, 1.03, rng)
-    return (length * scale, width * scale, uniform_between(0.012, 0.042, rng))
+    length, width = in_turn(_FORMATS, seed)
+    scale = rng.between(0.97, 1.03)
+    return (length * scale, width * scale, rng.between(0.012, 0.042))
 
 
 def book(seed: int) -> Solid:
     """A paperback or hardcover. Slots: cover, pages."""
     rng = variant_rng("book", seed)
     length, width, thickness = book_size_m(seed)
-    hard = is_drawn(0.5, rng)
+    hard = rng.chance(0.5)
     board = 0.0028 if hard else 0.0006
     margin = 0.003 if hard else 0.0
     bow = min(0.004, 0.3 * thickness) if hard else 0.0006
@@ -60,10 +54,10 @@ def book(seed: int) -> Solid:
     block = rounded_box((length - 2 * margin, width - inside, thickness - 2 * board), 0.0003, 1)
     pages = block.painted(1).moved(y=0.5 * (board + bow - margin))
     paper = Material(jitter_color(hex_to_linear("#e9e2cf"), 0.05, rng), 0.85)
-    print_ = printed_material(f"texture/book_cover?seed={seed}", uniform_between(0.25, 0.6, rng))
+    print_ = printed_material(f"texture/book_cover?seed={seed}", rng.between(0.25, 0.6))
     half = (0.5 * length, 0.5 * width, 0.5 * thickness)
     low = (-half[0], -half[1], -half[2])
-    return make_centred_solid([cover, pages], (print_, paper), [collision_hulls.box(low, half)])
+    return make_centred_solid([cover, pages], (print_, paper), [hulls.box(low, half)])
 
 
 def _cover(size_m: Vec3, board: float, bow: float) -> Patch:
@@ -73,13 +67,9 @@ def _cover(size_m: Vec3, board: float, bow: float) -> Patch:
     y0, y1 = -0.5 * width, 0.5 * width
     spine = [(y0 + bow * t**2, -h * t) for t in (0.9, 0.5, 0.0, -0.5, -0.9)]
     outer = [(y1, -h), (y0 + bow, -h), *spine, (y0 + bow, h), (y1, h)]
-    inner = [
-        (y1, h - board),
-        (y0 + bow + board, h - board),
-        *((y + board, z * (1 - board / h)) for y, z in spine[::-1]),
-        (y0 + bow + board, board - h),
-        (y1, board - h),
-    ]
+    inner = [(y1, h - board), (y0 + bow + board, h - board),
+             *((y + board, z * (1 - board / h)) for y, z in spine[::-1]),
+             (y0 + bow + board, board - h), (y1, board - h)]  # fmt: skip
     back, side, front = (COVER_ATLAS[name] for name in ("back", "spine", "front"))
     arc = np.array(outer[1:8])
     steps = np.sqrt((np.diff(arc, axis=0) ** 2).sum(axis=1))

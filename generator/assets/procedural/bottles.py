@@ -2,47 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     CAPS,
+    PALETTES,
     STEEL,
-    hex_to_linear,
-    jitter_color,
+    draw_linear,
     metal_material,
     plastic_material,
     printed_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch, make_centred_solid
 from gen_data.generator.assets.procedural.surface_shapes import Point2, fillet, lathe
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
 
-# Width by height of the unrolled label, which the drawing of its texture goes by.
+# Width by height of the unrolled label; its texture is drawn at this aspect.
 LABEL_ASPECT = 2.6
 
 _WATER_IOR = 1.33
 # Label paper stands this much proud of the wall.
 _PROUD_M = 0.0003
-_FILLINGS = ("#6d0f1c", "#b34a12", "#d9a02a", "#3b1a12", "#7a8a2a", "#c9b48a", "#4a1030")
 
 
 @dataclass(frozen=True, slots=True)
-class _BottleStyle:
-    """Ranges of one kind of bottle; ``shoulder`` and ``flank`` are fractions.
+class BottleStyle:
+    """Ranges of the measures of one kind of bottle.
 
     Attributes:
         shoulder: (radius as a share of the body's beyond the neck's, height as a share of the way
             from label to neck) of the points between body and neck.
         depth: Extent along Y as a share of that along X.
-        colors: Of the body; of what is clear, the tint of what is seen through all of it.
+        colors: Of the body; of a clear bottle, the tint of light that has passed through it.
         caps: Of the cap.
-        clear: Whether it is full of water: body and filling refract as one.
+        clear: Whether it is transparent and full of water: body and filling refract as one.
     """
 
     height_m: tuple[float, float]
@@ -59,93 +58,15 @@ class _BottleStyle:
     clear: bool = False
 
 
-_DARK_GLASS = ("#1d3320", "#26331c", "#3a2413", "#142a25", "#2d1a10", "#4a5a34")
-_CLEAR = ("#b9d3dc", "#c9dfe4", "#a9cbd8", "#cfe3dc", "#9fc4d6")
-BOTTLES: Mapping[str, _BottleStyle] = {
-    "wine": _BottleStyle(
-        (0.29, 0.32),
-        (0.036, 0.039),
-        0.0145,
-        (0.70, 0.74),
-        (0.12, 0.42),
-        ((1.0, 0.25), (0.93, 0.45), (0.45, 0.72), (0.08, 0.92)),
-        (0.0155, 0.055),
-        1.0,
-        _DARK_GLASS,
-        ("#5a1020", "#1a1a1a", "#b08d3a", "#23402f", "#c9c5ba"),
-    ),
-    "beer": _BottleStyle(
-        (0.22, 0.25),
-        (0.029, 0.032),
-        0.0135,
-        (0.68, 0.74),
-        (0.14, 0.42),
-        ((1.0, 0.3), (0.85, 0.5), (0.4, 0.75), (0.1, 0.93)),
-        (0.0145, 0.009),
-        1.0,
-        ("#3a2010", "#2a1508", "#16361d", "#52300f"),
-        CAPS,
-    ),
-    "water": _BottleStyle(
-        (0.2, 0.235),
-        (0.031, 0.0345),
-        0.0125,
-        (0.80, 0.84),
-        (0.38, 0.62),
-        ((1.0, 0.12), (0.92, 0.4), (0.55, 0.75), (0.15, 0.96)),
-        (0.0148, 0.016),
-        1.0,
-        _CLEAR,
-        CAPS,
-        clear=True,
-    ),
-    "soda": _BottleStyle(
-        (0.215, 0.25),
-        (0.0325, 0.036),
-        0.0125,
-        (0.80, 0.84),
-        (0.33, 0.58),
-        ((1.02, 0.15), (0.9, 0.45), (0.5, 0.75), (0.12, 0.95)),
-        (0.0148, 0.015),
-        1.0,
-        ("#2b120a", "#b34a12", "#2f7a3a", "#1c0d08", "#c9a21a"),
-        CAPS,
-    ),
-    "ketchup": _BottleStyle(
-        (0.17, 0.2),
-        (0.034, 0.038),
-        0.02,
-        (0.78, 0.82),
-        (0.2, 0.62),
-        ((0.97, 0.3), (0.75, 0.7), (0.3, 0.97)),
-        (0.022, 0.03),
-        0.66,
-        ("#a3150f", "#c5281a", "#d9a514", "#e9e4d0", "#5f2a16"),
-        ("#f2f2ee", "#c62828", "#2e7d32", "#e0c020"),
-        (0.2, 0.35),
-    ),
-    "detergent": _BottleStyle(
-        (0.22, 0.26),
-        (0.042, 0.047),
-        0.016,
-        (0.8, 0.85),
-        (0.16, 0.6),
-        ((1.0, 0.25), (0.8, 0.55), (0.35, 0.9)),
-        (0.018, 0.035),
-        0.6,
-        ("#1f6fb5", "#f0f0ec", "#2e9e4f", "#e8629a", "#f2c417", "#7b3fa0"),
-        ("#f2f2ee", "#1f6fb5", "#e8b21c", "#c62828"),
-        (0.2, 0.4),
-    ),
-}
+BOTTLES = load_table(__package__, "bottles", BottleStyle)
 
 
 def bottle(seed: int) -> Solid:
     """A bottle of one of the styles in ``BOTTLES``. Slots: body, label, cap."""
     rng = variant_rng("bottle", seed)
-    style = BOTTLES[tuple(BOTTLES)[seed % len(BOTTLES)]]
-    height, radius = uniform_between(*style.height_m, rng), uniform_between(*style.radius_m, rng)
-    neck_z = height * uniform_between(*style.neck_share, rng)
+    style = BOTTLES[in_turn(tuple(BOTTLES), seed)]
+    height, radius = rng.between(*style.height_m), rng.between(*style.radius_m)
+    neck_z = height * rng.between(*style.neck_share)
     z0, z1 = height * style.label_share[0], min(height * style.label_share[1], neck_z - 0.01)
     shoulder = [
         (style.neck_m + r * (radius - style.neck_m), z1 + t * (neck_z - z1))
@@ -155,7 +76,7 @@ def bottle(seed: int) -> Solid:
     cap_z, neck_top = height - cap_height, height - 0.4 * cap_height
     upper = [*shoulder, (style.neck_m, neck_z), (style.neck_m, neck_top)]
     patches = [
-        *_labelled(radius, (z0, z1), upper, [0.06] * (len(upper) - 1)),
+        *_wall_with_label(radius, (z0, z1), upper, [0.06] * (len(upper) - 1)),
         lathe([(style.neck_m, neck_top), (0.0, neck_top)], 32, 0),
         _cap(cap_radius, cap_z, height),
     ]
@@ -169,14 +90,11 @@ def bottle(seed: int) -> Solid:
         (0.97 * cap_radius, height),
     ]
     flat = np.array([1.0, style.depth, 1.0])
-    parts = [hull * flat for hull in collision_hulls.stack(_climbing(stages))]
-    body = Material(
-        jitter_color(hex_to_linear(choose(style.colors, rng)), 0.1, rng),
-        uniform_between(*style.gloss, rng),
-    )
+    parts = [hull * flat for hull in hulls.stack(_drop_level_stages(stages))]
+    body = Material(draw_linear(style.colors, 0.1, rng), rng.between(*style.gloss))
     if style.clear:
         body = replace(body, roughness=0.04, transmission=1.0, ior=_WATER_IOR, thin=False)
-    label = printed_material(f"texture/label?seed={seed}", uniform_between(0.35, 0.6, rng))
+    label = printed_material(f"texture/label?seed={seed}", rng.between(0.35, 0.6))
     flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
     return make_centred_solid(flattened, (body, label, plastic_material(rng, style.caps)), parts)
 
@@ -184,53 +102,39 @@ def bottle(seed: int) -> Solid:
 def jar(seed: int) -> Solid:
     """A filled preserving jar with a twist-off lid. Slots: body, label, lid."""
     rng = variant_rng("jar", seed)
-    radius, height = uniform_between(0.031, 0.043, rng), uniform_between(0.085, 0.14, rng)
+    radius, height = rng.between(0.031, 0.043), rng.between(0.085, 0.14)
     top, lid_radius, mouth = height - 0.014, 0.9 * radius, 0.86 * radius
     upper = [(radius, 0.8 * height), (mouth, top - 0.003), (mouth, top + 0.004)]
     patches = [
-        *_labelled(radius, (0.2 * height, 0.66 * height), upper, [0.02, 0.006]),
+        *_wall_with_label(radius, (0.2 * height, 0.66 * height), upper, [0.02, 0.006]),
         lathe([(mouth, top + 0.004), (0.0, top + 0.004)], 32, 0),
         _lid(lid_radius, top, height),
     ]
-    glass = Material(
-        jitter_color(hex_to_linear(choose(_FILLINGS, rng)), 0.15, rng),
-        uniform_between(0.06, 0.12, rng),
-    )
-    label = printed_material(f"texture/label?seed={seed + 1000}", uniform_between(0.45, 0.65, rng))
-    lid = choose(
+    glass = Material(draw_linear(PALETTES["fillings"], 0.15, rng), rng.between(0.06, 0.12))
+    label = printed_material(f"texture/label?seed={seed + 1000}", rng.between(0.45, 0.65))
+    lid = rng.choose(
         (
             metal_material((0.83, 0.69, 0.35), 0.3),
             metal_material(STEEL, 0.3),
             plastic_material(rng, CAPS),
-        ),
-        rng,
+        )
     )
-    stages = [
-        (0.92 * radius, 0.0),
-        (radius, 0.008),
-        (radius, 0.8 * height),
-        (lid_radius, top),
-        (lid_radius, height),
-    ]
-    return make_centred_solid(patches, (glass, label, lid), collision_hulls.stack(stages))
+    stages = [(0.92 * radius, 0.0), (radius, 0.008), (radius, 0.8 * height), (lid_radius, top),
+              (lid_radius, height)]  # fmt: skip
+    return make_centred_solid(patches, (glass, label, lid), hulls.stack(stages))
 
 
-def _labelled(radius: float, label: Point2, upper: list[Point2], radii: list[float]) -> list[Patch]:
+def _wall_with_label(
+    radius: float, label: Point2, upper: list[Point2], radii: list[float]
+) -> list[Patch]:
     """Bottom and wall up to the last point of ``upper``, with a label between two heights."""
     z0, z1 = label
     lower = fillet(
-        [
-            (0.0, 0.004),
-            (0.6 * radius, 0.003),
-            (0.72 * radius, 0.0),
-            (0.93 * radius, 0.0),
-            (radius, 0.008),
-            (radius, z0 - _PROUD_M),
-            (radius + _PROUD_M, z0),
-        ],
+        [(0.0, 0.004), (0.6 * radius, 0.003), (0.72 * radius, 0.0), (0.93 * radius, 0.0),
+         (radius, 0.008), (radius, z0 - _PROUD_M), (radius + _PROUD_M, z0)],
         [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0],
         3,
-    )
+    )  # fmt: skip
     rest = [(radius + _PROUD_M, z1), (radius, z1 + _PROUD_M), *upper]
     return [
         lathe(lower, 32, 0),
@@ -247,19 +151,13 @@ def _cap(radius: float, low: float, high: float) -> Patch:
 
 def _lid(radius: float, low: float, high: float) -> Patch:
     """A twist-off lid with a sunken panel."""
-    profile = [
-        (0.0, low),
-        (radius, low),
-        (radius, high),
-        (radius - 0.006, high),
-        (radius - 0.008, high - 0.0012),
-        (0.0, high - 0.0012),
-    ]
+    profile = [(0.0, low), (radius, low), (radius, high), (radius - 0.006, high),
+               (radius - 0.008, high - 0.0012), (0.0, high - 0.0012)]  # fmt: skip
     return lathe(fillet(profile, [0.0, 0.001, 0.002, 0.0, 0.0, 0.0], 2), 32, 2)
 
 
-def _climbing(stages: list[Point2]) -> list[Point2]:
-    """The stages without those that do not rise."""
+def _drop_level_stages(stages: list[Point2]) -> list[Point2]:
+    """Return the stages that lie above the one before."""
     kept = stages[:1]
     for stage in stages[1:]:
         if stage[1] > kept[-1][1] + 1e-4:

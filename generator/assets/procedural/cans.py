@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
@@ -23,7 +23,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     fillet,
     lathe,
 )
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +48,8 @@ CANS = (
 
 
 def can_size(seed: int) -> CanSize:
-    """Which of ``CANS`` a variant is."""
-    return CANS[seed % len(CANS)]
+    """Size of a variant, from ``CANS``."""
+    return in_turn(CANS, seed)
 
 
 def label_aspect(seed: int) -> float:
@@ -65,20 +65,20 @@ def can(seed: int) -> Solid:
     r, h = size.radius_m, size.height_m
     texture = f"texture/can_label?seed={seed}"
     if size.food:
-        print_ = printed_material(texture, uniform_between(0.5, 0.7, rng))
+        print_ = printed_material(texture, rng.between(0.5, 0.7))
         patches, stages = _food_can(r, h)
         lid: list[Patch] = []
     else:
-        print_ = printed_material(texture, uniform_between(0.25, 0.38, rng), 0.35)
+        print_ = printed_material(texture, rng.between(0.25, 0.38), 0.35)
         patches, stages = _drink_can(r, h)
         lid = _tab(0.68 * r)
         lid = [piece.moved(z=h - 0.0045) for piece in lid]
     materials = (
         print_,
-        metal_material(STEEL if size.food else ALUMINIUM, uniform_between(0.22, 0.35, rng)),
+        metal_material(STEEL if size.food else ALUMINIUM, rng.between(0.22, 0.35)),
         metal_material(ALUMINIUM, 0.3),
     )
-    return make_centred_solid([*patches, *lid], materials, collision_hulls.stack(stages))
+    return make_centred_solid([*patches, *lid], materials, hulls.stack(stages))
 
 
 def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
@@ -93,19 +93,11 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     )
     side = [(r, z0), (r, z1)]
     top = fillet(
-        [
-            (r, z1),
-            (r, h - 0.014),
-            (neck, h - 0.0035),
-            (neck, h - 0.002),
-            (rim, h),
-            (rim - 0.002, h),
-            (rim - 0.0028, h - 0.005),
-            (0.0, h - 0.005),
-        ],
+        [(r, z1), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002), (rim, h),
+         (rim - 0.002, h), (rim - 0.0028, h - 0.005), (0.0, h - 0.005)],
         [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0],
         2,
-    )
+    )  # fmt: skip
     split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
     patches = [
         lathe(bottom, 32, 1),
@@ -120,16 +112,8 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
 def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     """Three-piece steel can: seamed ends, paper label between."""
     seam = 0.0035
-    end = [
-        (0.0, 0.003),
-        (0.8 * r, 0.003),
-        (0.82 * r, 0.004),
-        (0.9 * r, 0.004),
-        (0.93 * r, 0.0),
-        (r, 0.0),
-        (r, seam),
-        (r - 0.001, seam + 0.001),
-    ]
+    end = [(0.0, 0.003), (0.8 * r, 0.003), (0.82 * r, 0.004), (0.9 * r, 0.004),
+           (0.93 * r, 0.0), (r, 0.0), (r, seam), (r - 0.001, seam + 0.001)]  # fmt: skip
     z0, z1 = seam + 0.001, h - seam - 0.001
     wall = r - 0.001
     body = [(wall, z0), (wall, z1)]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     CAPS,
@@ -27,12 +27,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     lathe,
     rounded_box,
 )
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.se3 import Vec3
 
 # Where each face of a carton lies in its image: four sides above, top and bottom below.
@@ -45,29 +40,22 @@ CARTON_ATLAS: Mapping[str, UvRect] = {
     "bottom": (0.502, 0.002, 0.998, 0.248),
 }
 _CARTONS: tuple[tuple[float, float, float], ...] = (
-    (0.065, 0.19, 0.28),
-    (0.055, 0.17, 0.25),
-    (0.07, 0.125, 0.075),
-    (0.06, 0.09, 0.125),
-    (0.035, 0.155, 0.21),
-    (0.05, 0.1, 0.17),
-    (0.04, 0.13, 0.18),
-    (0.075, 0.15, 0.07),
-)
+    (0.065, 0.19, 0.28), (0.055, 0.17, 0.25), (0.07, 0.125, 0.075), (0.06, 0.09, 0.125),
+    (0.035, 0.155, 0.21), (0.05, 0.1, 0.17), (0.04, 0.13, 0.18), (0.075, 0.15, 0.07))  # fmt: skip
 
 
 def carton_size_m(seed: int) -> Vec3:
     """Depth (X), width (Y) and height of a carton; its front faces +X."""
     rng = variant_rng("carton/size", seed)
-    x, y, z = (side * uniform_between(0.92, 1.08, rng) for side in _CARTONS[seed % len(_CARTONS)])
+    x, y, z = (side * rng.between(0.92, 1.08) for side in in_turn(_CARTONS, seed))
     return (x, y, z)
 
 
 def milk_size_m(seed: int) -> Vec3:
     """Depth, width and height of a milk carton without its gable."""
     rng = variant_rng("milk_carton/size", seed)
-    side = uniform_between(0.066, 0.075, rng)
-    return (side, side, side * choose((1.4, 2.4, 2.7), rng))
+    side = rng.between(0.066, 0.075)
+    return (side, side, side * rng.choose((1.4, 2.4, 2.7)))
 
 
 def carton(seed: int) -> Solid:
@@ -76,9 +64,9 @@ def carton(seed: int) -> Solid:
     size = carton_size_m(seed)
     body = rounded_box(size, 0.0012, 1, uv=CARTON_ATLAS)
     half = tuple(0.5 * side for side in size)
-    print_ = printed_material(f"texture/carton?seed={seed}", uniform_between(0.35, 0.65, rng))
+    print_ = printed_material(f"texture/carton?seed={seed}", rng.between(0.35, 0.65))
     low, high = (-half[0], -half[1], -half[2]), (half[0], half[1], half[2])
-    return make_centred_solid([body], (print_,), [collision_hulls.box(low, high)])
+    return make_centred_solid([body], (print_,), [hulls.box(low, high)])
 
 
 def milk_carton(seed: int) -> Solid:
@@ -88,20 +76,20 @@ def milk_carton(seed: int) -> Solid:
     body = rounded_box((x, y, z), 0.0015, 1, uv=CARTON_ATLAS).moved(z=z / 2)
     rise, fin = 0.33 * x, 0.016
     roof = _gable(x, y, rise, fin).moved(z=z)
-    print_ = printed_material(f"texture/milk_label?seed={seed}", uniform_between(0.35, 0.5, rng))
-    patches, parts = [body, roof], [collision_hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
-    if is_drawn(0.7, rng):
+    print_ = printed_material(f"texture/milk_label?seed={seed}", rng.between(0.35, 0.5))
+    patches, parts = [body, roof], [hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
+    if rng.chance(0.7):
         tilt = math.atan2(rise, 0.5 * x)
         at = (0.27 * x, 0.0, z + 0.46 * rise)
         patches.append(_screw_cap().rotated("y", tilt).moved(*at))
-        cap = collision_hulls.frustum((0.013, -0.004), (0.013, 0.009), 12)
+        cap = hulls.frustum((0.013, -0.004), (0.013, 0.009), 12)
         parts.append(rotate(cap, "y", tilt) + np.array(at))
     ridge = z + rise
     prism = np.array(
         [(sx * 0.5 * x, sy * 0.5 * y, z) for sx in (-1, 1) for sy in (-1, 1)]
         + [(sx * 0.002, sy * 0.5 * y, ridge) for sx in (-1, 1) for sy in (-1, 1)]
     )
-    fin_hull = collision_hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
+    fin_hull = hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
     parts += [prism, fin_hull]
     return make_centred_solid(patches, (print_, plastic_material(rng, CAPS)), parts)
 

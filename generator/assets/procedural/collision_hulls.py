@@ -1,4 +1,4 @@
-"""Convex collision parts: few, small, and hollow where things must fall in.
+"""Convex collision parts: few, small, and hollow where objects must be able to fall in.
 
 Every function returns float64 [n, 3] arrays of hull vertices [m], at most 48 per part.
 """

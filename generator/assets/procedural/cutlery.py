@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     STAINLESS,
@@ -26,9 +26,8 @@ from gen_data.generator.assets.procedural.patches import (
     make_centred_solid,
 )
 from gen_data.generator.assets.procedural.surface_shapes import fan, grid, spline
-from gen_data.generator.assets.procedural.variant_rng import is_drawn, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.streams import Rng
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +53,11 @@ class _Station:
 def spoon(seed: int) -> Solid:
     """A table, dessert or coffee spoon. Slots: head, handle."""
     rng = variant_rng("spoon", seed)
-    size = (1.0, 0.86, 0.66)[seed % 3] * uniform_between(0.96, 1.04, rng)
-    wide, tail = uniform_between(0.93, 1.07, rng), uniform_between(0.85, 1.2, rng)
-    bowl = [
-        (-32, 3.0, 12.0, 0.5),
-        (-22, 12.0, 9.5, 4.0),
-        (-8, 19.5, 7.0, 7.5),
-        (8, 21.0, 6.5, 8.0),
-        (20, 17.5, 7.5, 6.5),
-        (28, 10.5, 9.0, 3.0),
-        (31.5, 4.0, 10.0, 0.5),
-    ]
+    size = (1.0, 0.86, 0.66)[seed % 3] * rng.between(0.96, 1.04)
+    wide, tail = rng.between(0.93, 1.07), rng.between(0.85, 1.2)
+    bowl = [(-32, 3.0, 12.0, 0.5), (-22, 12.0, 9.5, 4.0), (-8, 19.5, 7.0, 7.5),
+            (8, 21.0, 6.5, 8.0), (20, 17.5, 7.5, 6.5), (28, 10.5, 9.0, 3.0),
+            (31.5, 4.0, 10.0, 0.5)]  # fmt: skip
     head = [_Station(67 + x, wide * w, wide * w, z + h, 1.6, h) for x, w, z, h in bowl]
     stations = [*_handle(tail, 13.0, 36.0, rng), *head]
     return _cutlery([_sheet(stations, 40)], size, 36.0, rng)
@@ -73,11 +66,11 @@ def spoon(seed: int) -> Solid:
 def fork(seed: int) -> Solid:
     """A table or dessert fork with three or four tines. Slots: head, handle."""
     rng = variant_rng("fork", seed)
-    size = (1.0, 0.86)[seed % 2] * uniform_between(0.97, 1.03, rng)
+    size = (1.0, 0.86)[seed % 2] * rng.between(0.97, 1.03)
     tail, half, count = (
-        uniform_between(0.85, 1.2, rng),
-        uniform_between(11.5, 13.0, rng),
-        3 if is_drawn(0.25, rng) else 4,
+        rng.between(0.85, 1.2),
+        rng.between(11.5, 13.0),
+        3 if rng.chance(0.25) else 4,
     )
     head = [
         _Station(40, 4.0, 4.0, 14.5, 2.2),
@@ -93,13 +86,8 @@ def fork(seed: int) -> Solid:
         w = 0.32 * pitch
         # The tines continue the head's curve across, and rise again towards their tips.
         lift = 2.0 * (middle / half) ** 2 - 2.0
-        line = [
-            (60, 7.3, w),
-            (75, 3.6, 0.97 * w),
-            (90, 3.0, 0.9 * w),
-            (104, 5.2, 0.72 * w),
-            (110, 7.0, 0.25 * w),
-        ]
+        line = [(60, 7.3, w), (75, 3.6, 0.97 * w), (90, 3.0, 0.9 * w), (104, 5.2, 0.72 * w),
+                (110, 7.0, 0.25 * w)]  # fmt: skip
         tines.append(
             _sheet(
                 [_Station(x, w_ - middle, w_ + middle, z + lift + 2.0, 1.8) for x, z, w_ in line],
@@ -113,8 +101,8 @@ def fork(seed: int) -> Solid:
 def knife(seed: int) -> Solid:
     """A table knife lying on its side, edge towards -Y. Slots: blade, handle."""
     rng = variant_rng("knife", seed)
-    size = uniform_between(0.94, 1.06, rng)
-    grip, tip = uniform_between(0.9, 1.15, rng), uniform_between(0.0, 5.0, rng)
+    size = rng.between(0.94, 1.06)
+    grip, tip = rng.between(0.9, 1.15), rng.between(0.0, 5.0)
     handle = [
         _Station(-112, 3.0, 3.0, 3.2, 3.4),
         _Station(-108, 8.0 * grip, 8.0 * grip, 3.4, 5.0),
@@ -135,9 +123,9 @@ def knife(seed: int) -> Solid:
     return _cutlery([_sheet(handle, 22), _sheet(blade, 26)], size, -3.0, rng)
 
 
-def _handle(tail: float, neck_z: float, neck_x: float, rng: Rng) -> list[_Station]:
+def _handle(tail: float, neck_z: float, neck_x: float, rng: VariantRng) -> list[_Station]:
     """From the broad end on the table to the slender raised neck."""
-    end = uniform_between(8.0, 10.5, rng) * tail
+    end = rng.between(8.0, 10.5) * tail
     return [
         _Station(-98, 0.35 * end, 0.35 * end, 3.4, 1.4),
         _Station(-95, 0.75 * end, 0.75 * end, 3.0, 1.9),
@@ -162,17 +150,17 @@ def _sheet(stations: Sequence[_Station], count: int, across: int = 6) -> Patch:
     return join_patches([grid(loop), fan(loop[0, :0:-1]), fan(loop[-1, :-1])])
 
 
-def _cutlery(sheets: list[Patch], size: float, cut_mm: float, rng: Rng) -> Solid:
+def _cutlery(sheets: list[Patch], size: float, cut_mm: float, rng: VariantRng) -> Solid:
     """The finished piece: scaled to metres, slot 1 behind the cut, collision in slices."""
     scale = 0.001 * size
     patch = join_patches(sheets)
     behind = patch.corners_m.mean(axis=1)[:, 0] < cut_mm - 6.0
     patch = Patch(patch.corners_m * scale, patch.uvs, behind.astype(np.int64))
-    steel = metal_material(STAINLESS, uniform_between(0.12, 0.28, rng))
-    handle: Material = plastic_material(rng) if is_drawn(0.2, rng) else steel
+    steel = metal_material(STAINLESS, rng.between(0.12, 0.28))
+    handle: Material = plastic_material(rng) if rng.chance(0.2) else steel
     low, high = patch.bounds_m()
     edges = np.linspace(float(low[0]), float(high[0]), 8)
-    parts = [collision_hulls.extreme(_slice(patch, a, b)) for a, b in pairwise(edges.tolist())]
+    parts = [hulls.extreme(_slice(patch, a, b)) for a, b in pairwise(edges.tolist())]
     return make_centred_solid([patch], (steel, handle), parts)
 
 

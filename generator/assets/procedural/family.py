@@ -1,9 +1,9 @@
-"""Families: named generators of objects, textures and environments, and the tables they are in."""
+"""Families: named generators of objects, textures and environments, and their tables."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, NamedTuple
@@ -17,11 +17,12 @@ from gen_data.generator.core.asset_types import (
     MeshData,
     TextureData,
 )
+from gen_data.generator.core.errors import AssetError, did_you_mean
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solid:
-    """One object: what is seen of it and what collides.
+    """One object: visual mesh, collision geometry and keypoints.
 
     Attributes:
         mesh: Visual geometry in the object's frame.
@@ -36,7 +37,7 @@ class Solid:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where an asset comes from, and on which terms."""
+    """Source and licence of an asset."""
 
     licence: str
     author: str
@@ -48,7 +49,7 @@ OURS = Provenance("Apache-2.0", "gen-data contributors", "gen-data (procedural)"
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What is known of an object without building it.
+    """Facts about an object that need no mesh.
 
     Attributes:
         subcategory: A finer name than the category.
@@ -64,9 +65,9 @@ class Family:
     """A generator of similar objects.
 
     Attributes:
-        name: What ids start with: ``mug`` in ``mug?seed=3``.
-        category: What its objects are called in labels.
-        tags: What YAML selects by, sorted.
+        name: First part of its ids: ``mug`` in ``mug?seed=3``.
+        category: Category of its objects in labels.
+        tags: Sorted words that configurations select it by.
         variants: ``build(seed=k)`` is an object for ``k`` in ``range(variants)``; 0 = the family
             is parametric: ``build(**parameters)``.
         mass_kg: Nominal mass; 0 = does not move.
@@ -74,10 +75,10 @@ class Family:
         version: Raised whenever the same arguments make other bytes.
         parameters: ``{name: default}`` of a parametric family.
         build: Pure function of its arguments.
-        facts: Pure and quick function of the same arguments; None = nothing more is known.
-        stored: Whether the disk also keeps results that are not offered for selection; not if
-            hardly any is asked for twice.
-        origin: Where it comes from, if it is not all ours.
+        facts: Pure, quick function of the same arguments; None = no further facts.
+        stored: Whether the disk cache also keeps results that are not offered for selection;
+            false where hardly any is used twice.
+        origin: Source and licence, if not all is ours.
     """
 
     name: str
@@ -100,7 +101,7 @@ class TextureFamily:
 
     Attributes:
         variants: Seeds ``range(variants)`` are offered for selection; any other seed works too.
-        origin: Where it comes from, if it is not ours.
+        origin: Source and licence, if it is not ours.
     """
 
     name: str
@@ -119,9 +120,9 @@ class EnvironmentFamily:
     ``build(seed, **parameters)`` is a pure function.
 
     Attributes:
-        stored: Whether the disk also keeps images that are not offered for selection; not if
-            hardly any is asked for twice.
-        origin: Where it comes from, if it is not ours.
+        stored: Whether the disk cache also keeps images that are not offered for selection;
+            false where hardly any is used twice.
+        origin: Source and licence, if it is not ours.
     """
 
     name: str
@@ -159,6 +160,15 @@ class ConstantFacts:
     def __call__(self, **_: Any) -> Facts:
         """The facts, whatever the arguments."""
         return Facts(self.subcategory)
+
+
+def check_option(family: str, parameter: str, value: str, options: Iterable[str]) -> None:
+    """Raise AssetError if a parameter of a family has none of the values that it may have."""
+    if value not in options:
+        raise AssetError(
+            f"{family}: {parameter}={value} is unknown; expected one of {', '.join(options)}"
+            f"{did_you_mean(value, options)}"
+        )
 
 
 class FamilyTables(NamedTuple):

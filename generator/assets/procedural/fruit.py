@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, printed_material
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid
@@ -18,9 +18,8 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     spline,
     sweep,
 )
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.streams import Rng
 
 _STALK = Material(hex_to_linear("#5a4329"), 0.8)
 
@@ -28,9 +27,9 @@ _STALK = Material(hex_to_linear("#5a4329"), 0.8)
 def apple(seed: int) -> Solid:
     """An apple with dimples and a stalk. Slots: skin, stalk."""
     rng = variant_rng("apple", seed)
-    radius, slim = uniform_between(0.034, 0.042, rng), uniform_between(0.9, 1.02, rng)
+    radius, slim = rng.between(0.034, 0.042), rng.between(0.9, 1.02)
     lumps = _lumps(5, 0.025, rng)
-    pinch = uniform_between(0.28, 0.36, rng)
+    pinch = rng.between(0.28, 0.36)
 
     def shape(d: Array) -> Array:
         z = d[..., 2]
@@ -40,20 +39,20 @@ def apple(seed: int) -> Solid:
         return np.stack([r * d[..., 0], r * d[..., 1], slim * r * z], axis=2)
 
     dip = radius * slim * (1 - pinch) * 1.07
-    skin = printed_material(f"texture/apple_skin?seed={seed}", uniform_between(0.25, 0.4, rng))
-    stalk = _stalk((0.0, 0.0, dip - 0.002), uniform_between(0.012, 0.02, rng), 0.0013, rng)
+    skin = printed_material(f"texture/apple_skin?seed={seed}", rng.between(0.25, 0.4))
+    stalk = _stalk((0.0, 0.0, dip - 0.002), rng.between(0.012, 0.02), 0.0013, rng)
     body = ball(shape, 22, 28)
     return make_centred_solid(
         [body, stalk.painted(1)],
         (skin, _STALK),
-        [collision_hulls.extreme(body.corners_m), collision_hulls.extreme(stalk.corners_m, 16)],
+        [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)],
     )
 
 
 def orange(seed: int) -> Solid:
     """An orange with the scar of its stalk. Slots: peel, stalk."""
     rng = variant_rng("orange", seed)
-    radius, flat = uniform_between(0.034, 0.042, rng), uniform_between(0.93, 1.0, rng)
+    radius, flat = rng.between(0.034, 0.042), rng.between(0.93, 1.0)
     lumps = _lumps(4, 0.012, rng)
 
     def shape(d: Array) -> Array:
@@ -62,20 +61,18 @@ def orange(seed: int) -> Solid:
         r = radius * (1 - dent + lumps(d))
         return np.stack([r * d[..., 0], r * d[..., 1], flat * r * z], axis=2)
 
-    peel = printed_material(f"texture/citrus_peel?seed={seed}", uniform_between(0.4, 0.55, rng))
+    peel = printed_material(f"texture/citrus_peel?seed={seed}", rng.between(0.4, 0.55))
     body = ball(shape, 24, 36)
     button = ball(lambda d: 0.0035 * d * np.array([1.0, 1.0, 0.4]), 6, 10).painted(1)
     button = button.moved(z=radius * flat * 0.955)
     green = Material(hex_to_linear("#6d7a3a"), 0.8)
-    return make_centred_solid(
-        [body, button], (peel, green), [collision_hulls.extreme(body.corners_m)]
-    )
+    return make_centred_solid([body, button], (peel, green), [hulls.extreme(body.corners_m)])
 
 
 def lemon(seed: int) -> Solid:
     """A lemon lying along X, pointed at one end. Slot: peel."""
     rng = variant_rng("lemon", seed)
-    radius, long = uniform_between(0.025, 0.03, rng), uniform_between(1.25, 1.45, rng)
+    radius, long = rng.between(0.025, 0.03), rng.between(1.25, 1.45)
     lumps = _lumps(5, 0.025, rng)
 
     def shape(d: Array) -> Array:
@@ -85,18 +82,16 @@ def lemon(seed: int) -> Solid:
         x = radius * long * (z + tip * np.sign(z))
         return np.stack([x, r * d[..., 1], -r * d[..., 0]], axis=2)
 
-    peel = printed_material(
-        f"texture/citrus_peel?seed={seed + 1000}", uniform_between(0.35, 0.5, rng)
-    )
+    peel = printed_material(f"texture/citrus_peel?seed={seed + 1000}", rng.between(0.35, 0.5))
     body = ball(shape, 24, 24)
-    return make_centred_solid([body], (peel,), [collision_hulls.extreme(body.corners_m)])
+    return make_centred_solid([body], (peel,), [hulls.extreme(body.corners_m)])
 
 
 def pear(seed: int) -> Solid:
     """A pear standing upright. Slots: skin, stalk."""
     rng = variant_rng("pear", seed)
-    radius, height = uniform_between(0.03, 0.036, rng), uniform_between(0.085, 0.105, rng)
-    neck, lean = uniform_between(0.42, 0.52, rng), uniform_between(-0.006, 0.006, rng)
+    radius, height = rng.between(0.03, 0.036), rng.between(0.085, 0.105)
+    neck, lean = rng.between(0.42, 0.52), rng.between(-0.006, 0.006)
     lumps = _lumps(4, 0.03, rng)
 
     def shape(d: Array) -> Array:
@@ -110,29 +105,23 @@ def pear(seed: int) -> Solid:
         up = 0.5 * height * (z + dent)
         return np.stack([r * unit[..., 0] + lean * t**2, r * unit[..., 1], up], axis=2)
 
-    skin = printed_material(f"texture/pear_skin?seed={seed}", uniform_between(0.35, 0.5, rng))
+    skin = printed_material(f"texture/pear_skin?seed={seed}", rng.between(0.35, 0.5))
     body = ball(shape, 24, 24)
-    stalk = _stalk(
-        (lean, 0.0, 0.5 * height - 0.002), uniform_between(0.014, 0.022, rng), 0.0014, rng
-    )
+    stalk = _stalk((lean, 0.0, 0.5 * height - 0.002), rng.between(0.014, 0.022), 0.0014, rng)
     points = body.corners_m.reshape(-1, 3)
     lower, upper = points[points[:, 2] < 0.12 * height], points[points[:, 2] > 0.02 * height]
     return make_centred_solid(
         [body, stalk.painted(1)],
         (skin, _STALK),
-        [
-            collision_hulls.extreme(lower),
-            collision_hulls.extreme(upper),
-            collision_hulls.extreme(stalk.corners_m, 16),
-        ],
+        [hulls.extreme(lower), hulls.extreme(upper), hulls.extreme(stalk.corners_m, 16)],
     )
 
 
 def banana(seed: int) -> Solid:
     """A banana lying on its side, bent in the plane of the ground. Slot: peel."""
     rng = variant_rng("banana", seed)
-    length, thick = uniform_between(0.17, 0.21, rng), uniform_between(0.0165, 0.0195, rng)
-    bend = uniform_between(0.9, 1.35, rng)
+    length, thick = rng.between(0.17, 0.21), rng.between(0.0165, 0.0195)
+    bend = rng.between(0.9, 1.35)
     arc = np.linspace(-0.5 * bend, 0.5 * bend, 25)
     radius = length / bend
     path = np.stack([radius * np.sin(arc), radius * (1 - np.cos(arc)), np.zeros_like(arc)], axis=1)
@@ -146,29 +135,29 @@ def banana(seed: int) -> Solid:
     turn = 2 * math.pi * np.arange(20) / 20
     edge = 1.0 + 0.045 * np.cos(5 * turn) + 0.008 * np.cos(10 * turn)
     section = thick * edge[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    skin = sweep(path, section, scale=_smoothed(girth))
-    peel = printed_material(f"texture/banana_peel?seed={seed}", uniform_between(0.4, 0.55, rng))
+    skin = sweep(path, section, scale=_smooth(girth))
+    peel = printed_material(f"texture/banana_peel?seed={seed}", rng.between(0.4, 0.55))
     parts = []
     for a, b in ((0, 4), (4, 9), (9, 15), (15, 20), (20, 24)):
-        ring = np.concatenate([_ring_of(skin, path, i) for i in (a, (a + b) // 2, b)])
-        parts.append(collision_hulls.extreme(ring))
+        ring = np.concatenate([_ring_points(skin, path, i) for i in (a, (a + b) // 2, b)])
+        parts.append(hulls.extreme(ring))
     return make_centred_solid([skin], (peel,), parts)
 
 
-def _ring_of(skin: Patch, path: Array, i: int) -> Array:
+def _ring_points(skin: Patch, path: Array, i: int) -> Array:
     """Points of the skin nearest to one point of the centre line."""
     points = np.unique(np.round(skin.corners_m.reshape(-1, 3), 9), axis=0)
     nearest = ((points[:, None, :] - path[None, :, :]) ** 2).sum(axis=2).argmin(axis=1)
     return np.array(points[nearest == i])
 
 
-def _smoothed(values: Array) -> Array:
+def _smooth(values: Array) -> Array:
     padded = np.concatenate([values[:1], values, values[-1:]])
     smooth: Array = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
     return smooth
 
 
-def _lumps(count: int, size: float, rng: Rng) -> Callable[[Array], Array]:
+def _lumps(count: int, size: float, rng: VariantRng) -> Callable[[Array], Array]:
     """A low-frequency swelling over directions: a sum of cosines."""
     axes = rng.random((count, 3)) - 0.5
     phases = 2 * math.pi * rng.random(count)
@@ -182,10 +171,10 @@ def _lumps(count: int, size: float, rng: Rng) -> Callable[[Array], Array]:
     return lumps
 
 
-def _stalk(foot: tuple[float, float, float], length: float, thick: float, rng: Rng) -> Patch:
+def _stalk(foot: tuple[float, float, float], length: float, thick: float, rng: VariantRng) -> Patch:
     """A bent, tapering twig."""
     x, y, z = foot
-    lean = uniform_between(-0.4, 0.4, rng) * length
+    lean = rng.between(-0.4, 0.4) * length
     path = space_evenly(
         spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24), 6
     )

@@ -1,7 +1,6 @@
-"""Furniture and other things that stand still.
+"""Furniture and other static objects.
 
 Origin on the floor at the centre of the footprint, Z up; ``size_m`` is the extent along X, Y, Z.
-``SLOTS`` names the material slots of each family's mesh, in order.
 """
 
 from __future__ import annotations
@@ -12,8 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
     metal_material,
@@ -35,24 +35,12 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     map_along_grain,
 )
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.se3 import Vec3
 
 Box = tuple[Vec3, Vec3]
 
-SLOTS: Mapping[str, tuple[str, ...]] = {
-    "table": ("top", "frame"),
-    "shelf": ("boards", "frame"),
-    "bin": ("body",),
-    "gantry": ("profiles", "joints"),
-    "plane": ("ground",),
-    "backdrop": ("paper",),
-    "box": ("body",),
-    "pedestal": ("body", "plates"),
-    "light_panel": ("housing", "lamp"),
-    "sphere": ("surface",),
-    "room": ("floor", "ceiling", "walls", "skirting", "door", "frames", "window", "handle"),
-}
+SLOTS = load_table(__package__, "furniture_slots", tuple[str, ...])
 PANEL_SHAPES = ("rectangle", "disk")
 TABLE_STYLES = ("legs", "trestle", "bench")
 SHELF_STYLES = ("bookcase", "rack")
@@ -85,7 +73,7 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
         AssetError: if a size or the style is not usable.
     """
     x, y, z = check_size("table", size_m, 0.2)
-    _known("table", "style", style, TABLE_STYLES)
+    check_option("table", "style", style, TABLE_STYLES)
     thick = 0.03 if style != "bench" else 0.04
     top = (-x / 2, -y / 2, z - thick), (x / 2, y / 2, z)
     frame = {"legs": _four_legs, "trestle": _trestles, "bench": _bench}[style](x, y, z - thick)
@@ -100,9 +88,7 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
         else patterned_material("texture/wood_grain?seed=1", 0.0, 0.5)
     )
     return make_solid_in_place(
-        patches,
-        (wood, legs),
-        [collision_hulls.box(*top), *(collision_hulls.box(*f) for f in frame)],
+        patches, (wood, legs), [hulls.box(*top), *(hulls.box(*f) for f in frame)]
     )
 
 
@@ -111,14 +97,14 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
 
     Args:
         size_m: Width (X), depth (Y), height.
-        levels: Boards to stand things on; see ``shelf_levels_m``.
+        levels: Number of boards that carry objects; see ``shelf_levels_m``.
         style: ``bookcase`` (side and back panels) or ``rack`` (steel posts, open all around).
 
     Raises:
         AssetError: if a size, the style or the number of levels is not usable.
     """
     x, y, z = check_size("shelf", size_m, 0.1)
-    _known("shelf", "style", style, SHELF_STYLES)
+    check_option("shelf", "style", style, SHELF_STYLES)
     t = _BOARD_M
     boards = [
         ((-x / 2 + t, -y / 2 + 0.002, top - t), (x / 2 - t, y / 2 - 0.008, top))
@@ -138,13 +124,11 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
     ]
     wood = patterned_material("texture/wood_grain?seed=8", 0.0, 0.45)
     posts = painted_material("#2f3338", 0.4) if style == "rack" else wood
-    return make_solid_in_place(
-        patches, (wood, posts), [collision_hulls.box(*b) for b in (*boards, *frame)]
-    )
+    return make_solid_in_place(patches, (wood, posts), [hulls.box(*b) for b in (*boards, *frame)])
 
 
 def shelf_levels_m(size_m: Vec3, levels: int) -> tuple[float, ...]:
-    """Height of the upper side of each board that things can stand on, from below.
+    """Height of the upper side of each board that carries objects, the lowest first.
 
     Raises:
         AssetError: if there is no room for so many boards.
@@ -193,7 +177,7 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
     return make_solid_in_place(
         [shell, *ribs],
         (painted_material(_color("bin", color), 0.5),),
-        [collision_hulls.box(*wall) for wall in walls],
+        [hulls.box(*wall) for wall in walls],
     )
 
 
@@ -219,7 +203,7 @@ def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> Solid:
     return make_solid_in_place(
         [block(*corners, bevel)],
         (painted_material(_color("box", color), 0.6),),
-        [collision_hulls.box(*corners)],
+        [hulls.box(*corners)],
     )
 
 
@@ -243,7 +227,7 @@ def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
     patches = [block(*body, 0.006), *(block(*p, 0.002, 1) for p in plates), *bolts]
     materials = (painted_material("#d7d9d8", 0.4), metal_material((0.45, 0.46, 0.48), 0.42))
     return make_solid_in_place(
-        patches, materials, [collision_hulls.box(*body), *(collision_hulls.box(*p) for p in plates)]
+        patches, materials, [hulls.box(*body), *(hulls.box(*p) for p in plates)]
     )
 
 
@@ -275,9 +259,7 @@ def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
         for sy in (-1, 1)
     ]
     materials = (metal_material(ALUMINIUM, 0.45), painted_material("#26282b", 0.5))
-    return make_solid_in_place(
-        [*patches, *feet], materials, [collision_hulls.box(*bar) for bar in bars]
-    )
+    return make_solid_in_place([*patches, *feet], materials, [hulls.box(*bar) for bar in bars])
 
 
 def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
@@ -288,7 +270,7 @@ def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
     """
     x, y, _ = check_size("plane", (*size_m, 1.0), 0.1)
     ground = rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0))
-    slab = collision_hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0))
+    slab = hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0))
     return make_solid_in_place(
         [ground], (patterned_material("texture/concrete?seed=0", 2.0, 0.8),), [slab]
     )
@@ -310,7 +292,7 @@ def light_panel(
         AssetError: if a size or the shape is not usable.
     """
     x, y, z = check_size("light_panel", (*size_m[:2], depth_m), 0.005)
-    _known("light_panel", "shape", shape, PANEL_SHAPES)
+    check_option("light_panel", "shape", shape, PANEL_SHAPES)
     if shape == "disk":
         y = x
         rim = circle(0.5 * x, 64)
@@ -320,7 +302,7 @@ def light_panel(
         front = rectangle((-x / 2, -y / 2, 0.0), (0.0, y, 0.0), (x, 0.0, 0.0)).painted(1)
         back = join_patches(_plain_shell(x, y, z))
     lamp = Material((0.8, 0.8, 0.8), 0.9, specular=0.2, role="lamp")
-    hull = collision_hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
+    hull = hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
     return make_solid_in_place([back, front], (painted_material("#d9dadb", 0.5), lamp), [hull])
 
 
@@ -343,8 +325,8 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
     rows = [np.stack([np.full(len(ys), s * x / 2), ys, zs], axis=1) for s in (-1.0, 1.0)]
     sheet = grid(np.stack(rows, axis=1))
     parts = [
-        collision_hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
-        collision_hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
+        hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
+        hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
         *_cove(x, y, r),
     ]
     return make_solid_in_place([sheet], (painted_material(_color("backdrop", color), 0.85),), parts)
@@ -392,27 +374,16 @@ def _post(x: float, y: float, width: float, height: float) -> Box:
 
 def _between(a: Sequence[float], b: Sequence[float], low: float, high: float) -> Box:
     """The box over the rectangle between two corners."""
-    return (
-        (min(a[0], b[0]), min(a[1], b[1]), low),
-        (max(a[0], b[0]), max(a[1], b[1]), high),
-    )
+    return ((min(a[0], b[0]), min(a[1], b[1]), low), (max(a[0], b[0]), max(a[1], b[1]), high))
 
 
 def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:
     """Floor and wall in one sheet: outside bottom, wall, rim, inner wall, inside bottom."""
     w, lip = _BIN_WALL_M, min(0.02, 0.2 * z)
-    levels = [
-        (rim + 0.006, 0.0, 0.016),
-        (rim, 0.006, 0.02),
-        (rim, z - lip, 0.02),
-        (0.0, z - lip, 0.03),
-        (0.0, z - 0.002, 0.03),
-        (0.002, z, 0.028),
-        (rim + w - 0.002, z, 0.014),
-        (rim + w, z - 0.002, 0.012),
-        (rim + w, w + 0.008, 0.012),
-        (rim + w + 0.008, w, 0.006),
-    ]
+    levels = [(rim + 0.006, 0.0, 0.016), (rim, 0.006, 0.02), (rim, z - lip, 0.02),
+              (0.0, z - lip, 0.03), (0.0, z - 0.002, 0.03), (0.002, z, 0.028),
+              (rim + w - 0.002, z, 0.014), (rim + w, z - 0.002, 0.012),
+              (rim + w, w + 0.008, 0.012), (rim + w + 0.008, w, 0.006)]  # fmt: skip
     loops = [_rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
     rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in loops])
     return join_patches([grid(rows), fan(loops[0][::-1]), fan(loops[-1])])
@@ -511,13 +482,5 @@ def check_size(name: str, size_m: Sequence[float], least: float) -> Vec3:
 
 
 def _color(name: str, color: str) -> str:
-    _known(name, "color", color, tuple(COLORS))
+    check_option(name, "color", color, tuple(COLORS))
     return COLORS[color]
-
-
-def _known(name: str, parameter: str, value: str, options: Sequence[str]) -> None:
-    if value not in options:
-        raise AssetError(
-            f"{name}: {parameter}={value} is unknown; expected one of {', '.join(options)}"
-            f"{did_you_mean(value, options)}"
-        )

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
     BLACK_OXIDE,
     BRASS,
+    PALETTES,
     STAINLESS,
     STEEL,
     ZINC,
@@ -34,39 +35,22 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     rounded_box,
     sweep,
 )
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.streams import Rng
 
 # Thread, width across flats, height of head, of nut, pitch [mm]: ISO 4014 and ISO 4032.
-_HEX = (
-    (8, 13, 5.3, 6.8, 1.25),
-    (10, 16, 6.4, 8.4, 1.5),
-    (12, 18, 7.5, 10.8, 1.75),
-    (16, 24, 10, 14.8, 2.0),
-    (20, 30, 12.5, 18, 2.5),
-)
+_HEX = ((8, 13, 5.3, 6.8, 1.25), (10, 16, 6.4, 8.4, 1.5), (12, 18, 7.5, 10.8, 1.75),
+        (16, 24, 10, 14.8, 2.0), (20, 30, 12.5, 18, 2.5))  # fmt: skip
 # Thread, inner and outer diameter, thickness [mm]: ISO 7089.
-_WASHERS = (
-    (8, 8.4, 16, 1.6),
-    (10, 10.5, 20, 2.0),
-    (12, 13, 24, 2.5),
-    (16, 17, 30, 3.0),
-    (20, 21, 37, 3.0),
-)
-_ABS = ("#202124", "#6a6f73", "#f0f0ec", "#1f6fb5", "#d7261e", "#f2a71b", "#2e9e4f")
+_WASHERS = ((8, 8.4, 16, 1.6), (10, 10.5, 20, 2.0), (12, 13, 24, 2.5), (16, 17, 30, 3.0),
+            (20, 21, 37, 3.0))  # fmt: skip
 
 
 def hex_bolt(seed: int) -> Solid:
     """A hexagon bolt standing on its head. Slot: body."""
     rng = variant_rng("hex_bolt", seed)
-    d, flats, head, _, pitch = (0.001 * v for v in _HEX[seed % len(_HEX)])
-    length = d * choose((2.0, 3.0, 4.0, 5.0), rng)
+    d, flats, head, _, pitch = (0.001 * v for v in in_turn(_HEX, seed))
+    length = d * rng.choose((2.0, 3.0, 4.0, 5.0))
     threaded = min(length - d, max(2 * d, 0.55 * length))
     corner = flats / math.sqrt(3)
     end = head + length
@@ -83,74 +67,70 @@ def hex_bolt(seed: int) -> Solid:
     profile += [(root, end), (0.0, end)]
     patches = [extrude(circle(corner, 6), head, 0.06 * flats), lathe(profile, 20)]
     parts = [
-        collision_hulls.frustum((corner, 0.0), (corner, head), 6),
-        collision_hulls.frustum((0.5 * d, head), (0.5 * d, end), 12),
+        hulls.frustum((corner, 0.0), (corner, head), 6),
+        hulls.frustum((0.5 * d, head), (0.5 * d, end), 12),
     ]
-    return make_centred_solid(patches, (_steel(rng),), parts, crease_deg=25.0)
+    return make_centred_solid(patches, (_fastener_metal(rng),), parts, crease_deg=25.0)
 
 
 def nut(seed: int) -> Solid:
     """A hexagon nut. Slot: body."""
     rng = variant_rng("nut", seed)
-    d, flats, _, height, _ = (0.001 * v for v in _HEX[seed % len(_HEX)])
+    d, flats, _, height, _ = (0.001 * v for v in in_turn(_HEX, seed))
     corner = flats / math.sqrt(3)
     body = extrude(circle(corner, 6), height, 0.05 * flats, [circle(0.46 * d, 24)])
-    wedges = collision_hulls.ring((0.46 * d, corner, 0.0), (0.46 * d, corner, height), 6)
+    wedges = hulls.ring((0.46 * d, corner, 0.0), (0.46 * d, corner, height), 6)
     # A hexagon's flats are its wedges: leave out the round middle point.
     flat = [hull[[0, 1, 2, 4, 5, 6, 7, 9]] for hull in wedges]
     turned = [rotate(hull, "z", math.pi / 6) for hull in flat]
-    return make_centred_solid([body], (_steel(rng),), turned, crease_deg=25.0)
+    return make_centred_solid([body], (_fastener_metal(rng),), turned, crease_deg=25.0)
 
 
 def washer(seed: int) -> Solid:
     """A flat washer. Slot: body."""
     rng = variant_rng("washer", seed)
-    _, inner, outer, thick = (0.001 * v for v in _WASHERS[seed % len(_WASHERS)])
+    _, inner, outer, thick = (0.001 * v for v in in_turn(_WASHERS, seed))
     r, big = 0.5 * inner, 0.5 * outer
     profile = fillet(
         [(r, 0.5 * thick), (r, 0.0), (big, 0.0), (big, thick), (r, thick), (r, 0.5 * thick)],
         0.12 * thick,
         1,
     )
-    wedges = collision_hulls.ring((r, big, 0.0), (r, big, thick), 8)
-    return make_centred_solid([lathe(profile, 36)], (_steel(rng),), wedges)
+    wedges = hulls.ring((r, big, 0.0), (r, big, thick), 8)
+    return make_centred_solid([lathe(profile, 36)], (_fastener_metal(rng),), wedges)
 
 
 def stepped_shaft(seed: int) -> Solid:
     """A turned shaft of several diameters, lying along X. Slot: body."""
     rng = variant_rng("stepped_shaft", seed)
     radii = [
-        uniform_between(0.005, 0.008, rng),
-        uniform_between(0.007, 0.011, rng),
-        uniform_between(0.01, 0.016, rng),
-        uniform_between(0.007, 0.01, rng),
-        uniform_between(0.004, 0.007, rng),
-    ][: choose((3, 4, 5), rng)]
+        rng.between(0.005, 0.008),
+        rng.between(0.007, 0.011),
+        rng.between(0.01, 0.016),
+        rng.between(0.007, 0.01),
+        rng.between(0.004, 0.007),
+    ][: rng.choose((3, 4, 5))]
     chamfer, z = 0.0008, 0.0
     profile: list[Point2] = [(0.0, 0.0)]
     parts = []
     for r in radii:
-        length = uniform_between(0.012, 0.04, rng)
-        profile += [
-            (r - chamfer, z),
-            (r, z + chamfer),
-            (r, z + length - chamfer),
-            (r - chamfer, z + length),
-        ]
-        parts.append(collision_hulls.frustum((r, z), (r, z + length)))
+        length = rng.between(0.012, 0.04)
+        profile += [(r - chamfer, z), (r, z + chamfer), (r, z + length - chamfer),
+                    (r - chamfer, z + length)]  # fmt: skip
+        parts.append(hulls.frustum((r, z), (r, z + length)))
         z += length
     profile.append((0.0, z))
     turned = [rotate(part, "y", 0.5 * math.pi) for part in parts]
     return make_centred_solid(
-        [lathe(profile, 40).rotated("y", 0.5 * math.pi)], (_machined(rng),), turned
+        [lathe(profile, 40).rotated("y", 0.5 * math.pi)], (_machined_metal(rng),), turned
     )
 
 
 def pipe_elbow(seed: int) -> Solid:
     """A 90 degree pipe elbow with collars, flat on the ground. Slot: body."""
     rng = variant_rng("pipe_elbow", seed)
-    outer = uniform_between(0.01, 0.018, rng)
-    inner, bend = 0.78 * outer, outer * uniform_between(1.5, 2.4, rng)
+    outer = rng.between(0.01, 0.018)
+    inner, bend = 0.78 * outer, outer * rng.between(1.5, 2.4)
     straight, collar = 0.8 * outer, outer * 1.22
     turn = np.linspace(0.0, 0.5 * math.pi, 13)
     arc = np.stack([bend * np.sin(turn), bend * (1 - np.cos(turn)), 0 * turn], axis=1)
@@ -163,19 +143,18 @@ def pipe_elbow(seed: int) -> Solid:
     parts = [
         _tube_piece(path[a : b + 1], outer) for a, b in ((0, 1), (1, 5), (5, 9), (9, 13), (13, 14))
     ]
-    band = collision_hulls.frustum((collar, -0.55 * outer), (collar, 0.0))
+    band = hulls.frustum((collar, -0.55 * outer), (collar, 0.0))
     parts += [
         rotate(band, "y", -0.5 * math.pi) + np.array([-straight, 0, 0]),
         rotate(band, "x", -0.5 * math.pi) + np.array([bend, bend + straight, 0]),
     ]
-    finish = choose(
+    finish = rng.choose(
         (
             metal_material(BRASS, 0.3),
             metal_material((0.72, 0.45, 0.33), 0.35),
             metal_material(ZINC, 0.4),
-            plastic_material(rng, _ABS),
-        ),
-        rng,
+            plastic_material(rng, PALETTES["abs"]),
+        )
     )
     return make_centred_solid([wall, bore, first, second], (finish,), parts)
 
@@ -183,24 +162,23 @@ def pipe_elbow(seed: int) -> Solid:
 def bracket(seed: int) -> Solid:
     """An angle bracket with screw holes. Slot: body."""
     rng = variant_rng("bracket", seed)
-    a, b = uniform_between(0.04, 0.07, rng), uniform_between(0.03, 0.06, rng)
-    width, thick = uniform_between(0.02, 0.035, rng), uniform_between(0.002, 0.004, rng)
+    a, b = rng.between(0.04, 0.07), rng.between(0.03, 0.06)
+    width, thick = rng.between(0.02, 0.035), rng.between(0.002, 0.004)
     hole = min(0.16 * width, 0.004)
     foot = _holed_plate(a, width, thick, hole)
     upright = _holed_plate(b, width, thick, hole).rotated("y", -0.5 * math.pi).moved(thick)
-    finish = choose(
+    finish = rng.choose(
         (
             metal_material(ZINC, 0.35),
             metal_material(STAINLESS, 0.3),
             metal_material(BLACK_OXIDE, 0.5),
             metal_material(ALUMINIUM, 0.4),
-        ),
-        rng,
+        )
     )
     half = 0.5 * width
     parts = [
-        collision_hulls.box((0.0, -half, 0.0), (a, half, thick)),
-        collision_hulls.box((0.0, -half, 0.0), (thick, half, b)),
+        hulls.box((0.0, -half, 0.0), (a, half, thick)),
+        hulls.box((0.0, -half, 0.0), (thick, half, b)),
     ]
     return make_centred_solid([foot, upright], (finish,), parts)
 
@@ -208,10 +186,10 @@ def bracket(seed: int) -> Solid:
 def gear(seed: int) -> Solid:
     """A spur gear with hub and bore. Slot: body."""
     rng = variant_rng("gear", seed)
-    teeth, module = choose((14, 16, 18, 20, 24), rng), choose((0.0015, 0.002, 0.0025), rng)
-    thick, pitch = uniform_between(0.006, 0.014, rng), 0.5 * teeth * module
+    teeth, module = rng.choose((14, 16, 18, 20, 24)), rng.choose((0.0015, 0.002, 0.0025))
+    thick, pitch = rng.between(0.006, 0.014), 0.5 * teeth * module
     tip, root = pitch + module, pitch - 1.2 * module
-    bore = uniform_between(0.25, 0.35, rng) * pitch
+    bore = rng.between(0.25, 0.35) * pitch
     outline = []
     for i in range(teeth):
         for share, r in (
@@ -225,21 +203,21 @@ def gear(seed: int) -> Solid:
             turn = 2 * math.pi * (i + share) / teeth
             outline.append((r * math.cos(turn), r * math.sin(turn)))
     disc = extrude(np.array(outline), thick, 0.0004, [circle(bore, 28)])
-    hub = thick + uniform_between(0.004, 0.01, rng) if is_drawn(0.6, rng) else 0.0
-    patches, parts = [disc], [collision_hulls.frustum((tip, 0.0), (tip, thick), 24)]
+    hub = thick + rng.between(0.004, 0.01) if rng.chance(0.6) else 0.0
+    patches, parts = [disc], [hulls.frustum((tip, 0.0), (tip, thick), 24)]
     if hub:
         outer = 0.5 * (bore + root)
         patches.append(_collar(bore, outer, hub - thick).moved(z=thick))
-        parts.append(collision_hulls.frustum((outer, thick), (outer, hub)))
-    finish = plastic_material(rng, _ABS) if is_drawn(0.3, rng) else _machined(rng)
+        parts.append(hulls.frustum((outer, thick), (outer, hub)))
+    finish = plastic_material(rng, PALETTES["abs"]) if rng.chance(0.3) else _machined_metal(rng)
     return make_centred_solid(patches, (finish,), parts, crease_deg=30.0)
 
 
 def flange(seed: int) -> Solid:
     """A pipe flange with bolt holes and a neck. Slot: body."""
     rng = variant_rng("flange", seed)
-    radius, thick = uniform_between(0.03, 0.045, rng), uniform_between(0.005, 0.009, rng)
-    bore, count = 0.42 * radius, choose((4, 4, 6, 8), rng)
+    radius, thick = rng.between(0.03, 0.045), rng.between(0.005, 0.009)
+    bore, count = 0.42 * radius, rng.choose((4, 4, 6, 8))
     bolt, at = 0.1 * radius, 0.76 * radius
     holes = [circle(bore, 32)]
     for i in range(count):
@@ -247,34 +225,30 @@ def flange(seed: int) -> Solid:
         # Turned a little, so that no three points of the triangulation are in line.
         holes.append(circle(bolt, 12, (at * math.cos(turn), at * math.sin(turn)), 0.37 + 0.1 * i))
     disc = extrude(circle(radius, 56), thick, 0.0006, holes)
-    neck, rise = 0.56 * radius, uniform_between(0.3, 0.6, rng) * radius
+    neck, rise = 0.56 * radius, rng.between(0.3, 0.6) * radius
     collar = _collar(bore, neck, rise).moved(z=thick)
     parts = [
-        *collision_hulls.ring((bore, radius, 0.0), (bore, radius, thick), 12),
-        *collision_hulls.ring((bore, neck, thick), (bore, neck, thick + rise), 8),
+        *hulls.ring((bore, radius, 0.0), (bore, radius, thick), 12),
+        *hulls.ring((bore, neck, thick), (bore, neck, thick + rise), 8),
     ]
-    return make_centred_solid([disc, collar], (_machined(rng),), parts)
+    return make_centred_solid([disc, collar], (_machined_metal(rng),), parts)
 
 
 def connector(seed: int) -> Solid:
     """A block with round ports on three to six sides. Slots: body, ports."""
     rng = variant_rng("connector", seed)
-    side = uniform_between(0.022, 0.034, rng)
-    port, reach = 0.32 * side, uniform_between(0.2, 0.45, rng) * side
+    side = rng.between(0.022, 0.034)
+    port, reach = 0.32 * side, rng.between(0.2, 0.45) * side
     body = rounded_box((side, side, side), 0.06 * side, 2)
     stub = _collar(0.7 * port, port, reach, 22).moved(z=0.5 * side)
     level = 0.5 * side + 0.3 * reach
     plug = lathe(
-        [
-            (0.0, 0.5 * side - 0.001),
-            (0.72 * port, 0.5 * side - 0.001),
-            (0.72 * port, level),
-            (0.0, level),
-        ],
+        [(0.0, 0.5 * side - 0.001), (0.72 * port, 0.5 * side - 0.001), (0.72 * port, level),
+         (0.0, level)],
         22,
-    )
+    )  # fmt: skip
     pieces = join_patches([stub.painted(1), plug])
-    band = collision_hulls.frustum((port, 0.5 * side), (port, 0.5 * side + reach), 16)
+    band = hulls.frustum((port, 0.5 * side), (port, 0.5 * side + reach), 16)
     turns = [
         ("y", 0.0),
         ("y", 0.5 * math.pi),
@@ -282,47 +256,40 @@ def connector(seed: int) -> Solid:
         ("x", 0.5 * math.pi),
         ("x", -0.5 * math.pi),
         ("y", math.pi),
-    ][: choose((3, 4, 5, 6), rng)]
+    ][: rng.choose((3, 4, 5, 6))]
     half = 0.5 * side
     parts = [
-        collision_hulls.box((-half, -half, -half), (half, half, half)),
+        hulls.box((-half, -half, -half), (half, half, half)),
         *(rotate(band, axis, turn) for axis, turn in turns),
     ]
-    block = plastic_material(rng, _ABS) if is_drawn(0.5, rng) else _machined(rng)
-    finish = choose((metal_material(BRASS, 0.3), metal_material(ZINC, 0.35), block), rng)
+    block = plastic_material(rng, PALETTES["abs"]) if rng.chance(0.5) else _machined_metal(rng)
+    finish = rng.choose((metal_material(BRASS, 0.3), metal_material(ZINC, 0.35), block))
     return make_centred_solid(
         [body, *(pieces.rotated(axis, turn) for axis, turn in turns)], (block, finish), parts
     )
 
 
-def _steel(rng: Rng) -> Material:
+def _fastener_metal(rng: VariantRng) -> Material:
     """Fastener: zinc-plated, stainless, black or brass."""
-    color, rough = choose(
-        ((ZINC, 0.3), (ZINC, 0.35), (STAINLESS, 0.25), (BLACK_OXIDE, 0.5), (BRASS, 0.3)), rng
+    color, rough = rng.choose(
+        ((ZINC, 0.3), (ZINC, 0.35), (STAINLESS, 0.25), (BLACK_OXIDE, 0.5), (BRASS, 0.3))
     )
-    return metal_material(color, rough * uniform_between(0.85, 1.2, rng))
+    return metal_material(color, rough * rng.between(0.85, 1.2))
 
 
-def _machined(rng: Rng) -> Material:
+def _machined_metal(rng: VariantRng) -> Material:
     """Turned or milled steel, aluminium or brass."""
-    color, rough = choose(
-        ((STEEL, 0.35), (STEEL, 0.4), (ALUMINIUM, 0.35), (BRASS, 0.3), (BLACK_OXIDE, 0.45)), rng
+    color, rough = rng.choose(
+        ((STEEL, 0.35), (STEEL, 0.4), (ALUMINIUM, 0.35), (BRASS, 0.3), (BLACK_OXIDE, 0.45))
     )
-    return metal_material(color, rough * uniform_between(0.85, 1.2, rng))
+    return metal_material(color, rough * rng.between(0.85, 1.2))
 
 
 def _collar(bore: float, outer: float, height: float, segments: int = 28) -> Patch:
     """A closed ring from z = 0 to ``height``, its outer edges broken."""
     c = 0.06 * outer
-    profile = [
-        (bore, height),
-        (bore, 0.0),
-        (outer - c, 0.0),
-        (outer, c),
-        (outer, height - c),
-        (outer - c, height),
-        (bore, height),
-    ]
+    profile = [(bore, height), (bore, 0.0), (outer - c, 0.0), (outer, c), (outer, height - c),
+               (outer - c, height), (bore, height)]  # fmt: skip
     return lathe(profile, segments)
 
 
@@ -345,4 +312,4 @@ def _holed_plate(length: float, width: float, thick: float, hole: float) -> Patc
 def _tube_piece(path: Array, radius: float) -> Array:
     """Convex hull points of a piece of pipe in the plane z = 0."""
     tube = sweep(path, circle(radius, 16), capped=False)
-    return collision_hulls.extreme(tube.corners_m, 48)
+    return hulls.extreme(tube.corners_m, 48)

@@ -1,6 +1,6 @@
-"""Surfaces that real things are made of: colour, roughness and metalness within their usual range.
+"""Materials of common surfaces: colour, roughness and metalness within their usual range.
 
-Base colours are linear; the metals' are the reflectances at normal incidence that are used across
+Base colours are linear; the metals' are the reflectances at normal incidence that are usual in
 the field (Karis, "Real shading in Unreal Engine 4", 2013; Hoffman, "Background: physics and math
 of shading", 2015).
 """
@@ -9,56 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 STEEL: Vec3 = (0.56, 0.57, 0.58)
 STAINLESS: Vec3 = (0.66, 0.65, 0.63)
 ALUMINIUM: Vec3 = (0.91, 0.92, 0.92)
 BRASS: Vec3 = (0.89, 0.70, 0.37)
-COPPER: Vec3 = (0.95, 0.64, 0.54)
 BLACK_OXIDE: Vec3 = (0.045, 0.045, 0.048)
 ZINC: Vec3 = (0.66, 0.68, 0.70)
 
-GLAZES = (
-    "#f4f1ea",
-    "#e9e4d8",
-    "#d9dfe2",
-    "#2d4f7c",
-    "#7aa0b8",
-    "#3d6b5c",
-    "#8fa98a",
-    "#b5432e",
-    "#d98a3d",
-    "#e3c565",
-    "#a3627a",
-    "#5b4a6f",
-    "#3a3a3d",
-    "#1d1f22",
-    "#7d5a43",
-    "#c7b299",
-)
-PLASTICS = (
-    "#d7261e",
-    "#f2a71b",
-    "#f7d423",
-    "#2e9e4f",
-    "#1f6fb5",
-    "#123a6b",
-    "#7b3fa0",
-    "#e8629a",
-    "#f0f0ec",
-    "#202124",
-    "#6a6f73",
-    "#12a3a3",
-    "#ef6c2f",
-    "#9ccb3b",
-)
-CAPS = ("#f2f2ee", "#1f6fb5", "#c62828", "#2e9e4f", "#202124", "#e8b21c")
-WOODS = ("#c79a6b", "#a8743f", "#7d5230", "#e0c196", "#5b3a24")
+PALETTES = load_table(__package__, "palettes", tuple[str, ...])
+GLAZES, PLASTICS, CAPS, WOODS = (PALETTES[name] for name in ("glazes", "plastics", "caps", "woods"))
 
 
 def hex_to_linear(code: str) -> Vec3:
@@ -79,28 +44,32 @@ def lighten(color: Vec3, amount: float) -> Vec3:
     return (r, g, b)
 
 
-def jitter_color(color: Vec3, amount: float, rng: Rng) -> Vec3:
+def jitter_color(color: Vec3, amount: float, rng: VariantRng) -> Vec3:
     """The colour with brightness and tint moved by up to the given fraction."""
-    level = 1.0 + uniform_between(-amount, amount, rng)
+    level = 1.0 + rng.between(-amount, amount)
     r, g, b = (
-        min(1.0, max(0.0, c * level * (1.0 + uniform_between(-0.3, 0.3, rng) * amount)))
-        for c in color
+        min(1.0, max(0.0, c * level * (1.0 + rng.between(-0.3, 0.3) * amount))) for c in color
     )
     return (r, g, b)
 
 
-def ceramic_material(rng: Rng, colors: Sequence[str] = GLAZES) -> Material:
+def draw_linear(codes: Sequence[str], amount: float, rng: VariantRng) -> Vec3:
+    """One of several sRGB colours, jittered; linear RGB."""
+    return jitter_color(hex_to_linear(rng.choose(codes)), amount, rng)
+
+
+def ceramic_material(rng: VariantRng, colors: Sequence[str] = GLAZES) -> Material:
     """Glazed stoneware or porcelain."""
-    color = jitter_color(hex_to_linear(choose(colors, rng)), 0.08, rng)
-    return Material(base_color=color, roughness=uniform_between(0.1, 0.3, rng))
+    color = draw_linear(colors, 0.08, rng)
+    return Material(base_color=color, roughness=rng.between(0.1, 0.3))
 
 
 def plastic_material(
-    rng: Rng, colors: Sequence[str] = PLASTICS, gloss: tuple[float, float] = (0.25, 0.5)
+    rng: VariantRng, colors: Sequence[str] = PLASTICS, gloss: tuple[float, float] = (0.25, 0.5)
 ) -> Material:
     """Injection-moulded plastic."""
-    color = jitter_color(hex_to_linear(choose(colors, rng)), 0.06, rng)
-    return Material(base_color=color, roughness=uniform_between(*gloss, rng))
+    color = draw_linear(colors, 0.06, rng)
+    return Material(base_color=color, roughness=rng.between(*gloss))
 
 
 def metal_material(color: Vec3, roughness: float) -> Material:

@@ -1,4 +1,4 @@
-"""Periodic noise on a square image: what repeats without a seam.
+"""Periodic noise on a square image, which repeats without a seam.
 
 Perlin, "Improving noise", SIGGRAPH 2002; Worley, "A cellular texture basis function", SIGGRAPH
 1996; both on a torus. ``cells`` are lattice cells per image as (down, across).

@@ -1,4 +1,4 @@
-"""From loose triangles to a finished mesh.
+"""Patches: loose triangles, and their assembly into finished meshes.
 
 Generators make ``Patch`` objects: triangles without shared vertices, which are moved and joined
 freely. ``finish_mesh`` welds them, computes normals that are smooth except across creases, and
@@ -109,7 +109,7 @@ def make_solid_in_place(
     hulls_m: Iterable[Array],
     crease_deg: float = CREASE_DEG,
 ) -> Solid:
-    """A solid in the frame it was made in (furniture: the centre of the footprint on the floor)."""
+    """A solid that keeps its frame (furniture: the centre of the footprint on the floor)."""
     mesh = finish_mesh(join_patches(patches), materials, crease_deg)
     return Solid(
         mesh, ConvexParts(tuple(np.round(round_values(hull), 6) + 0.0 for hull in hulls_m))
@@ -134,7 +134,7 @@ def finish_mesh(patch: Patch, materials: Sequence[Material], crease_deg: float) 
     return MeshData(
         vertices_m=(cells.reshape(-1, 3)[first] * GRID_M).astype(np.float32),
         faces=inverse.reshape(-1, 3).astype(np.int32),
-        # Adding zero turns -0.0 into 0.0: the sign of nothing differs between processors too.
+        # Adding zero turns -0.0 into 0.0: the sign of zero differs between processors too.
         normals=(np.round(normals[first], 6) + 0.0).astype(np.float32),
         uvs=(np.round(uvs.reshape(-1, 2)[first], 6) + 0.0).astype(np.float32),
         face_slots=slots.astype(np.int32),
@@ -143,7 +143,7 @@ def finish_mesh(patch: Patch, materials: Sequence[Material], crease_deg: float) 
 
 
 def round_values(values: Array) -> Array:
-    """Values without their last bits, which sine, cosine and powers leave to the processor.
+    """Round away the last bits, which differ between processors after sine, cosine and powers.
 
     Rounding twice, here and to a coarser grid, gives the same for values that lie exactly between
     two points of that grid, as a symmetric shape's do.
@@ -201,6 +201,7 @@ def _corner_angles(corners: Array) -> Array:
 
 def _unit(vectors: Array) -> Array:
     lengths = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
+    # Vectors without length stay zero.
     unit: Array = vectors / np.maximum(lengths, 1e-300)
     return unit
 

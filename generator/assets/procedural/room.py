@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import check_size, rectangle
 from gen_data.generator.assets.procedural.material_presets import (
@@ -53,9 +53,7 @@ def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Soli
         ((-x / 2, -y / 2 - t, 0.0), (x / 2, -y / 2, z)),
         ((-x / 2, y / 2, 0.0), (x / 2, y / 2 + t, z)),
     ]
-    return make_solid_in_place(
-        patches, _room_materials(), [collision_hulls.box(*slab) for slab in slabs]
-    )
+    return make_solid_in_place(patches, _room_materials(), [hulls.box(*slab) for slab in slabs])
 
 
 def _room_materials() -> tuple[Material, ...]:
@@ -131,13 +129,9 @@ def _window_wall(x: float, wall: float, z: float, window: bool) -> list[Patch]:
         rectangle((half, back, low), (0, -depth, 0), (0, 0, high - low)),
     ]
     w, y0 = 0.06, back - 0.05
-    bars = [
-        (-half, -half + w, low, high),
-        (half - w, half, low, high),
-        (-w / 2, w / 2, low, high),
-        (-half + w, half - w, low, low + w),
-        (-half + w, half - w, high - w, high),
-    ]
+    bars = [(-half, -half + w, low, high), (half - w, half, low, high),
+            (-w / 2, w / 2, low, high), (-half + w, half - w, low, low + w),
+            (-half + w, half - w, high - w, high)]  # fmt: skip
     frame = [block((a, y0, c), (b, back, d), 0.004, 5) for a, b, c, d in bars]
     sill = block(
         (-half - 0.05, wall - 0.04, low - 0.03), (half + 0.05, wall + 0.02, low + 0.002), 0.004, 5

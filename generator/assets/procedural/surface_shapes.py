@@ -216,7 +216,7 @@ def extrude(
     Outline and holes may run either way round; edges at top and bottom are bevelled by
     ``bevel_m``, which must be smaller than half of the narrowest part.
     """
-    loops = [_wound(outline, 1.0), *(_wound(hole, -1.0) for hole in holes)]
+    loops = [_wind_loop(outline, 1.0), *(_wind_loop(hole, -1.0) for hole in holes)]
     inner = [_inset(loop, bevel_m) if bevel_m > 0 else loop for loop in loops]
     levels = (
         [(inner, 0.0), (loops, bevel_m), (loops, height_m - bevel_m), (inner, height_m)]
@@ -251,6 +251,7 @@ def fillet(
         cosine = float((before * after).sum()) / (lb * la)
         half = 0.5 * math.acos(max(-1.0, min(1.0, cosine)))
         reach = min(radii[i] / max(math.tan(half), 1e-9), 0.49 * lb, 0.49 * la)
+        # The arc of a nearly straight corner would have no length.
         if radii[i] <= 0.0 or half > 0.5 * math.pi - 1e-3:
             made.append(points[i])
             continue
@@ -284,7 +285,7 @@ def space_evenly(path: Array, count: int) -> Array:
 def map_along_grain(patch: Patch, repeat_m: float) -> Patch:
     """The patch with a texture's horizontal along its longest side, one repeat per ``repeat_m``.
 
-    Each piece starts at another place of the image, as boards cut from different logs do.
+    Each piece starts at another place of the image, like boards cut from different logs.
     """
     low, high = patch.bounds_m()
     axes = np.argsort(-np.round(high - low, 6), kind="stable")
@@ -344,10 +345,8 @@ def _plain_box(size: Sequence[float]) -> Patch:
     return join_patches(patches)
 
 
-def _wound(loop: Array, sign: float) -> Array:
-    x, y = loop[:, 0], loop[:, 1]
-    area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
-    return loop if area * sign > 0 else loop[::-1]
+def _wind_loop(loop: Array, sign: float) -> Array:
+    return loop if _double_area(loop) * sign > 0 else loop[::-1]
 
 
 def _inset(loop: Array, distance: float) -> Array:
@@ -386,16 +385,16 @@ def triangulate(outline: Array, holes: Sequence[Array] = ()) -> Array:
     ends = np.cumsum([len(outline), *(len(hole) for hole in holes)], dtype=np.uint32)
     corners = mapbox_earcut.triangulate_float64(points, ends).reshape(-1, 3)
     triangles: Array = points[corners]
-    areas = _areas(*np.moveaxis(triangles, 1, 0))
-    expected = abs(_enclosed(outline)) - sum(abs(_enclosed(hole)) for hole in holes)
+    areas = _double_areas(*np.moveaxis(triangles, 1, 0))
+    expected = abs(_double_area(outline)) - sum(abs(_double_area(hole)) for hole in holes)
     # Polygons that are none are cut up all the same: their triangles overlap or leave gaps.
-    if abs(np.abs(areas).sum() - expected) > 1e-9 * abs(_enclosed(outline)):
+    if abs(np.abs(areas).sum() - expected) > 1e-9 * abs(_double_area(outline)):
         raise ValueError("the polygon crosses itself, or a hole lies outside its outline")
     triangles[areas < 0.0] = triangles[areas < 0.0][:, ::-1]
     return triangles
 
 
-def _areas(a: Array, b: Array, c: Array) -> Array:
+def _double_areas(a: Array, b: Array, c: Array) -> Array:
     """Twice the signed areas of triangles."""
     doubled: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
         c[..., 0] - a[..., 0]
@@ -403,14 +402,14 @@ def _areas(a: Array, b: Array, c: Array) -> Array:
     return doubled
 
 
-def _enclosed(loop: Array) -> float:
+def _double_area(loop: Array) -> float:
     """Twice the signed area inside a loop of points."""
     after = np.roll(loop, -1, axis=0)
     return float((loop[:, 0] * after[:, 1] - loop[:, 1] * after[:, 0]).sum())
 
 
 def _arc(a: Array, corner: Array, b: Array, half: float, steps: int) -> list[Point2]:
-    """Points of the arc that touches both sides of a corner at ``a`` and ``b``."""
+    """Points of the arc that is tangent to both sides of a corner at ``a`` and ``b``."""
     middle = 0.5 * (a + b)
     to_centre = middle - corner
     length = math.hypot(*to_centre)

@@ -1,4 +1,4 @@
-"""Mugs, cups, bowls and plates: bodies of revolution with a real wall, hollow in physics too."""
+"""Mugs, cups, bowls, plates and drinking glasses: bodies of revolution, hollow in physics too."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
     ceramic_material,
-    hex_to_linear,
-    jitter_color,
+    draw_linear,
     lighten,
     plastic_material,
 )
@@ -25,71 +24,66 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     space_evenly,
     sweep,
 )
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.streams import Rng
+from gen_data.generator.core.se3 import Vec3
+
+# Transmittance of one wall, RGB; soda-lime glass is slightly green.
+_TINTS: tuple[Vec3, ...] = ((0.97, 0.98, 0.97), (0.97, 0.98, 0.97), (0.97, 0.98, 0.97),
+                            (0.86, 0.93, 0.95), (0.86, 0.95, 0.88), (0.95, 0.88, 0.72))  # fmt: skip
 
 
 def mug(seed: int) -> Solid:
     """A mug with its handle towards +X. Slots: outside, inside, handle."""
     rng = variant_rng("mug", seed)
-    height, top = uniform_between(0.085, 0.108, rng), uniform_between(0.037, 0.044, rng)
-    bottom = top * choose((1.0, 1.0, 0.94, 0.84), rng)
-    wall = uniform_between(0.0035, 0.0048, rng)
-    bulge = choose((0.0, 0.0, 0.0, 0.004), rng)
+    height, top = rng.between(0.085, 0.108), rng.between(0.037, 0.044)
+    bottom = top * rng.choose((1.0, 1.0, 0.94, 0.84))
+    wall = rng.between(0.0035, 0.0048)
+    bulge = rng.choose((0.0, 0.0, 0.0, 0.004))
     profile = _cup_profile(top, bottom, height, wall, bulge)
     path = _handle_path(top, bottom, height, wall, bulge, rng)
-    across = uniform_between(0.0045, 0.006, rng), uniform_between(0.0065, 0.0095, rng)
+    across = rng.between(0.0045, 0.006), rng.between(0.0065, 0.0095)
     section = circle(1.0, 12) * np.array(across)
-    handle = sweep(path, section, scale=_flared(len(path)), slot=2)
+    handle = sweep(path, section, scale=_flare_factors(len(path)), slot=2)
     outside = ceramic_material(rng)
-    inside = Material(
-        lighten(outside.base_color, uniform_between(0.5, 0.95, rng)), outside.roughness
-    )
-    grip = inside if is_drawn(0.15, rng) else outside
-    rings = collision_hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    inside = Material(lighten(outside.base_color, rng.between(0.5, 0.95)), outside.roughness)
+    grip = inside if rng.chance(0.15) else outside
+    rings = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
     if bulge > 0:
         middle = 0.5 * (top + bottom) + bulge
         rings = [
-            *collision_hulls.ring(
-                (bottom - wall, bottom, wall), (middle - wall, middle, 0.5 * height), 8
-            ),
-            *collision_hulls.ring(
-                (middle - wall, middle, 0.5 * height), (top - wall, top, height), 9
-            ),
+            *hulls.ring((bottom - wall, bottom, wall), (middle - wall, middle, 0.5 * height), 8),
+            *hulls.ring((middle - wall, middle, 0.5 * height), (top - wall, top, height), 9),
         ]
-    base = collision_hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
-    grip_hulls = collision_hulls.tube(path[[0, 4, 9, 13, 18, 22]], 0.8 * across[1])
+    base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
+    grip_hulls = hulls.tube(path[[0, 4, 9, 13, 18, 22]], 0.8 * across[1])
     return make_centred_solid(
-        [*_two_sided(profile, 32), handle], (outside, inside, grip), [base, *rings, *grip_hulls]
+        [*_lathe_two_sided(profile, 32), handle],
+        (outside, inside, grip),
+        [base, *rings, *grip_hulls],
     )
 
 
 def cup(seed: int) -> Solid:
     """A tumbler of opaque plastic. Slots: outside, inside."""
     rng = variant_rng("cup", seed)
-    height, top = uniform_between(0.08, 0.13, rng), uniform_between(0.034, 0.042, rng)
-    bottom, wall = top * uniform_between(0.72, 0.9, rng), uniform_between(0.0018, 0.0028, rng)
+    height, top = rng.between(0.08, 0.13), rng.between(0.034, 0.042)
+    bottom, wall = top * rng.between(0.72, 0.9), rng.between(0.0018, 0.0028)
     profile = _cup_profile(top, bottom, height, wall, 0.0)
     outside = plastic_material(rng)
-    inside = outside if is_drawn(0.6, rng) else plastic_material(rng, ("#f0f0ec", "#e8e4da"))
-    walls = collision_hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
-    base = collision_hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
-    return make_centred_solid(_two_sided(profile, 32), (outside, inside), [base, *walls])
+    inside = outside if rng.chance(0.6) else plastic_material(rng, ("#f0f0ec", "#e8e4da"))
+    walls = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
+    return make_centred_solid(_lathe_two_sided(profile, 32), (outside, inside), [base, *walls])
 
 
 def bowl(seed: int) -> Solid:
     """A bowl on a foot ring. Slots: outside, inside."""
     rng = variant_rng("bowl", seed)
-    radius = uniform_between(0.06, 0.125, rng)
-    height = radius * uniform_between(0.75, 1.0, rng) * (0.85 if radius > 0.1 else 1.0)
-    foot, lift = radius * uniform_between(0.45, 0.55, rng), uniform_between(0.004, 0.009, rng)
-    wall, fullness = uniform_between(0.003, 0.005, rng), uniform_between(0.55, 0.85, rng)
+    radius = rng.between(0.06, 0.125)
+    height = radius * rng.between(0.75, 1.0) * (0.85 if radius > 0.1 else 1.0)
+    foot, lift = radius * rng.between(0.45, 0.55), rng.between(0.004, 0.009)
+    wall, fullness = rng.between(0.003, 0.005), rng.between(0.55, 0.85)
     outer = _bowl_curve(foot, radius, lift, height, fullness)
     inner = _offset(outer, wall)
     profile = [
@@ -104,73 +98,99 @@ def bowl(seed: int) -> Solid:
     ]
     outside = ceramic_material(rng)
     inside = (
-        outside if is_drawn(0.5, rng) else ceramic_material(rng, ("#f4f1ea", "#e9e4d8", "#d9dfe2"))
+        outside if rng.chance(0.5) else ceramic_material(rng, ("#f4f1ea", "#e9e4d8", "#d9dfe2"))
     )
     # The floor lies about as high as the wall's outside after a fifth of its curve.
     levels = []
     for i, z in ((2, float(outer[2, 1])), (5, float(outer[5, 1])), (9, height + 0.5 * wall)):
         levels.append((float(np.interp(z, inner[:, 1], inner[:, 0])), float(outer[i, 0]), z))
     parts = [
-        collision_hulls.frustum((foot, 0.0), (levels[0][1], levels[0][2])),
-        *collision_hulls.ring(levels[0], levels[1], 9),
-        *collision_hulls.ring(levels[1], levels[2], 14),
+        hulls.frustum((foot, 0.0), (levels[0][1], levels[0][2])),
+        *hulls.ring(levels[0], levels[1], 9),
+        *hulls.ring(levels[1], levels[2], 14),
     ]
-    return make_centred_solid(_two_sided(profile, 40), (outside, inside), parts)
+    return make_centred_solid(_lathe_two_sided(profile, 40), (outside, inside), parts)
 
 
 def plate(seed: int) -> Solid:
     """A flat plate with a raised rim. Slots: outside, inside."""
     rng = variant_rng("plate", seed)
-    radius = choose((0.085, 0.105, 0.13, 0.14), rng) * uniform_between(0.97, 1.03, rng)
-    rise, wall = uniform_between(0.016, 0.026, rng), uniform_between(0.0035, 0.005, rng)
-    well, foot = radius * uniform_between(0.6, 0.72, rng), radius * uniform_between(0.5, 0.58, rng)
-    step = rise * uniform_between(0.45, 0.7, rng)
+    radius = rng.choose((0.085, 0.105, 0.13, 0.14)) * rng.between(0.97, 1.03)
+    rise, wall = rng.between(0.016, 0.026), rng.between(0.0035, 0.005)
+    well, foot = radius * rng.between(0.6, 0.72), radius * rng.between(0.5, 0.58)
+    step = rise * rng.between(0.45, 0.7)
     upper = fillet(
-        [
-            (radius, rise),
-            (well + 0.35 * (radius - well), step + 0.002),
-            (well, 0.002 + wall),
-            (0.0, 0.002 + wall),
-        ],
+        [(radius, rise), (well + 0.35 * (radius - well), step + 0.002), (well, 0.002 + wall),
+         (0.0, 0.002 + wall)],
         0.014,
         3,
-    )
+    )  # fmt: skip
     lower = fillet(
-        [
-            (0.0, 0.002),
-            (foot - 0.004, 0.002),
-            (foot - 0.003, 0.0),
-            (foot, 0.0),
-            (foot + 0.002, 0.002),
-            (well, 0.0025),
-            (well + 0.35 * (radius - well), step + 0.002 - wall),
-            (radius, rise - 0.8 * wall),
-        ],
+        [(0.0, 0.002), (foot - 0.004, 0.002), (foot - 0.003, 0.0), (foot, 0.0),
+         (foot + 0.002, 0.002), (well, 0.0025),
+         (well + 0.35 * (radius - well), step + 0.002 - wall), (radius, rise - 0.8 * wall)],
         [0.0] * 5 + [0.012, 0.012, 0.0],
         3,
-    )
+    )  # fmt: skip
     profile = [*lower, (radius + 0.4 * wall, rise - 0.4 * wall), *upper]
     outside = ceramic_material(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
     inside = (
-        outside
-        if is_drawn(0.7, rng)
-        else Material(
-            jitter_color(hex_to_linear(choose(GLAZES, rng)), 0.08, rng), outside.roughness
-        )
+        outside if rng.chance(0.7) else Material(draw_linear(GLAZES, 0.08, rng), outside.roughness)
     )
-    rim = [
-        (well - 0.004, 0.0015),
-        (well - 0.004, 0.002 + wall),
-        (well + 0.35 * (radius - well), step + 0.002),
-        (radius + 0.4 * wall, rise),
-        (radius + 0.4 * wall, rise - 0.8 * wall),
+    rim = [(well - 0.004, 0.0015), (well - 0.004, 0.002 + wall),
+           (well + 0.35 * (radius - well), step + 0.002), (radius + 0.4 * wall, rise),
+           (radius + 0.4 * wall, rise - 0.8 * wall)]  # fmt: skip
+    walls = hulls.wedges(rim, 20)
+    base = hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
+    return make_centred_solid(_lathe_two_sided(profile, 48), (outside, inside), [base, *walls])
+
+
+def tumbler(seed: int) -> Solid:
+    """A drinking glass with a thick bottom. Slots: glass."""
+    rng = variant_rng("tumbler", seed)
+    height, top = rng.between(0.085, 0.145), rng.between(0.03, 0.042)
+    bottom, wall = top * rng.between(0.74, 0.98), rng.between(0.0016, 0.0026)
+    floor = rng.between(0.006, 0.013)
+    inner = bottom - wall + (top - bottom) * floor / height
+    profile = fillet(
+        [(0.0, 0.001), (0.75 * bottom, 0.001), (0.85 * bottom, 0.0), (bottom, 0.0),
+         (top, height), (top - wall, height), (inner, floor), (0.0, floor)],
+        [0.0, 0.0, 0.0, 0.003, 0.45 * wall, 0.45 * wall, 0.005, 0.0],
+        4,
+    )  # fmt: skip
+    base = hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
+    walls = hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
+    return make_centred_solid([lathe(profile, 48)], (_glass(rng),), [base, *walls])
+
+
+def wine_glass(seed: int) -> Solid:
+    """A goblet on a stem. Slots: glass."""
+    rng = variant_rng("wine_glass", seed)
+    foot, stem = rng.between(0.032, 0.038), rng.between(0.0035, 0.0045)
+    height, belly = rng.between(0.17, 0.22), rng.between(0.034, 0.044)
+    rim, wall = belly * rng.between(0.72, 0.9), rng.between(0.0012, 0.0018)
+    low = height * rng.between(0.38, 0.48)
+    wide = low + (height - low) * rng.between(0.38, 0.5)
+    outer = [(stem, low - 0.008), (0.62 * belly, low + 0.008), (belly, wide), (rim, height)]
+    inner = [(rim - wall, height), (belly - wall, wide), (0.55 * belly, low + 0.009),
+             (0.0, low + 0.004)]  # fmt: skip
+    below = [(0.0, 0.0015), (0.8 * foot, 0.0015), (foot, 0.0), (foot, 0.002), (stem, 0.008)]
+    rounded = [0.0, 0.0, 0.0004, 0.0004, 0.012, 0.02, 0.03, 0.05]
+    within = [0.45 * wall, 0.45 * wall, 0.05, 0.025, 0.0]
+    profile = fillet([*below, *outer, *inner], [*rounded, *within], 2)
+    levels = [_ring_section(rim, wall, height), _ring_section(belly, wall, wide)]
+    floor = (0.5 * belly, 0.62 * belly, low + 0.008)
+    parts = [
+        hulls.frustum((foot, 0.0), (foot, 0.003)),
+        hulls.frustum((stem, 0.003), (stem, low - 0.008)),
+        hulls.frustum((stem, low - 0.008), (0.62 * belly, low + 0.008)),
+        *hulls.ring(floor, levels[1], 10),
+        *hulls.ring(levels[1], levels[0], 10),
     ]
-    walls = collision_hulls.wedges(rim, 20)
-    base = collision_hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
-    return make_centred_solid(_two_sided(profile, 48), (outside, inside), [base, *walls])
+    return make_centred_solid([lathe(profile, 32)], (_glass(rng),), parts)
 
 
-def _two_sided(profile: list[Point2], segments: int) -> list[Patch]:
+def _lathe_two_sided(profile: list[Point2], segments: int) -> list[Patch]:
     """The profile turned about Z: slot 0 up to the highest point, slot 1 from there inward."""
     k = max(range(len(profile)), key=lambda i: profile[i][1])
     return [lathe(profile[: k + 1], segments, 0), lathe(profile[k:], segments, 1)]
@@ -183,47 +203,28 @@ def _cup_profile(
     middle = 0.5 * (top + bottom) + bulge
     waist = [(middle, 0.5 * height)] if bulge > 0 else []
     inner_waist = [(middle - wall, 0.5 * height)] if bulge > 0 else []
-    points = [
-        (0.0, 0.0015),
-        (0.78 * bottom, 0.0015),
-        (0.8 * bottom, 0.0),
-        (bottom, 0.0),
-        *waist,
-        (top, height),
-        (top - wall, height),
-        *inner_waist,
-        (bottom - wall, wall),
-        (0.0, wall),
-    ]
+    points = [(0.0, 0.0015), (0.78 * bottom, 0.0015), (0.8 * bottom, 0.0), (bottom, 0.0),
+              *waist, (top, height), (top - wall, height), *inner_waist, (bottom - wall, wall),
+              (0.0, wall)]  # fmt: skip
     rim = 0.45 * wall
-    radii = [
-        0.0,
-        0.0,
-        0.0,
-        0.007,
-        *([0.12] if waist else []),
-        rim,
-        rim,
-        *([0.12] if waist else []),
-        0.006,
-        0.0,
-    ]
+    radii = [0.0, 0.0, 0.0, 0.007, *([0.12] if waist else []), rim, rim,
+             *([0.12] if waist else []), 0.006, 0.0]  # fmt: skip
     return fillet(points, radii, 4)
 
 
 def _handle_path(
-    top: float, bottom: float, height: float, wall: float, bulge: float, rng: Rng
+    top: float, bottom: float, height: float, wall: float, bulge: float, rng: VariantRng
 ) -> Array:
     """Centre line of a handle in the plane y = 0; its ends are inside the wall."""
-    high, low = height * uniform_between(0.78, 0.86, rng), height * uniform_between(0.16, 0.26, rng)
-    reach = uniform_between(0.026, 0.036, rng)
+    high, low = height * rng.between(0.78, 0.86), height * rng.between(0.16, 0.26)
+    reach = rng.between(0.026, 0.036)
 
     def wall_at(z: float) -> float:
         t = z / height
         bow = bulge * (1.0 - abs(2.0 * t - 1.0))
         return bottom + (top - bottom) * t + bow - 0.5 * wall
 
-    belly, square = uniform_between(-0.25, 0.0, rng), uniform_between(0.45, 0.75, rng)
+    belly, square = rng.between(-0.25, 0.0), rng.between(0.45, 0.75)
     turn = np.linspace(0.5 * math.pi, -0.5 * math.pi, 181)
     # A superellipse: it leaves the wall level and bulges less below where belly is negative.
     out = np.maximum(np.cos(turn), 0.0) ** square * (1.0 + 0.5 * belly * (1.0 - np.sin(turn)))
@@ -233,7 +234,7 @@ def _handle_path(
     return space_evenly(np.stack([x, np.zeros_like(x), z], axis=1), 23)
 
 
-def _flared(count: int) -> Array:
+def _flare_factors(count: int) -> Array:
     """Section factors along a handle: wider where it joins the body."""
     t = np.abs(np.linspace(-1.0, 1.0, count))
     return 1.0 + 0.35 * t**6
@@ -253,3 +254,11 @@ def _offset(curve: Array, distance: float) -> Array:
     step = step / np.sqrt((step**2).sum(axis=1, keepdims=True))
     moved: Array = curve + distance * np.stack([-step[:, 1], step[:, 0]], axis=1)
     return moved
+
+
+def _ring_section(radius: float, wall: float, z: float) -> tuple[float, float, float]:
+    return (radius - wall, radius, z)
+
+
+def _glass(rng: VariantRng) -> Material:
+    return Material(rng.choose(_TINTS), roughness=0.04, transmission=1.0, ior=1.52, thin=False)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     BLACK_OXIDE,
@@ -14,8 +14,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     STEEL,
     WOODS,
     ZINC,
-    hex_to_linear,
-    jitter_color,
+    draw_linear,
     metal_material,
     plastic_material,
 )
@@ -37,12 +36,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     rounded_box,
     sweep,
 )
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.core.asset_types import Material
 
 _LAID = 0.5 * math.pi
@@ -51,30 +45,22 @@ _LAID = 0.5 * math.pi
 def screwdriver(seed: int) -> Solid:
     """A screwdriver with a fluted handle, slotted or pointed tip. Slots: handle, steel, ring."""
     rng = variant_rng("screwdriver", seed)
-    radius, grip = uniform_between(0.011, 0.016, rng), uniform_between(0.085, 0.115, rng)
-    blade, shaft = uniform_between(0.06, 0.15, rng), uniform_between(0.0025, 0.0038, rng)
-    handle = _fluted_handle(radius, grip, choose((0, 6, 6, 8), rng))
+    radius, grip = rng.between(0.011, 0.016), rng.between(0.085, 0.115)
+    blade, shaft = rng.between(0.06, 0.15), rng.between(0.0025, 0.0038)
+    handle = _fluted_handle(radius, grip, rng.choose((0, 6, 6, 8)))
     end = grip + blade
     pieces = [
         handle,
         cone((shaft, grip - 0.01), (shaft, end - 0.012), 16, 1),
         cone((0.45 * radius, grip - 0.001), (0.42 * radius, grip + 0.004), 20, 2),
-        _flat_tip(shaft, end) if is_drawn(0.5, rng) else _pointed_tip(shaft, end),
+        _flat_tip(shaft, end) if rng.chance(0.5) else _pointed_tip(shaft, end),
     ]
-    profile = [
-        (0.55 * radius, 0.0),
-        (0.97 * radius, 0.1 * grip),
-        (0.97 * radius, 0.6 * grip),
-        (0.7 * radius, 0.82 * grip),
-        (0.6 * radius, grip),
-    ]
-    parts = [
-        *collision_hulls.stack(profile, 16),
-        collision_hulls.frustum((shaft, grip), (shaft, end), 12),
-    ]
+    profile = [(0.55 * radius, 0.0), (0.97 * radius, 0.1 * grip), (0.97 * radius, 0.6 * grip),
+               (0.7 * radius, 0.82 * grip), (0.6 * radius, grip)]  # fmt: skip
+    parts = [*hulls.stack(profile, 16), hulls.frustum((shaft, grip), (shaft, end), 12)]
     materials = (
         plastic_material(rng),
-        metal_material(ZINC, uniform_between(0.2, 0.35, rng)),
+        metal_material(ZINC, rng.between(0.2, 0.35)),
         plastic_material(rng, ("#202124",)),
     )
     return make_centred_solid(
@@ -87,18 +73,15 @@ def screwdriver(seed: int) -> Solid:
 def hammer(seed: int) -> Solid:
     """A joiner's hammer with wooden or plastic handle. Slots: handle, head."""
     rng = variant_rng("hammer", seed)
-    length, size = uniform_between(0.26, 0.33, rng), uniform_between(0.9, 1.1, rng)
+    length, size = rng.between(0.26, 0.33), rng.between(0.9, 1.1)
     handle = _hammer_handle(length)
     head, head_hulls = _hammer_head()
-    wood = Material(jitter_color(hex_to_linear(choose(WOODS[:4], rng)), 0.1, rng), 0.55)
-    grip = wood if is_drawn(0.6, rng) else plastic_material(rng, PLASTICS)
-    steel = choose((metal_material(STEEL, 0.35), metal_material(BLACK_OXIDE, 0.45)), rng)
+    wood = Material(draw_linear(WOODS[:4], 0.1, rng), 0.55)
+    grip = wood if rng.chance(0.6) else plastic_material(rng, PLASTICS)
+    steel = rng.choose((metal_material(STEEL, 0.35), metal_material(BLACK_OXIDE, 0.45)))
     at = length - 0.005
     share = handle.corners_m[:, :, 0].mean(axis=1) / length
-    parts = [
-        collision_hulls.extreme(handle.corners_m[abs(share - m) < 0.2], 40)
-        for m in (0.18, 0.5, 0.8)
-    ]
+    parts = [hulls.extreme(handle.corners_m[abs(share - m) < 0.2], 40) for m in (0.18, 0.5, 0.8)]
     parts += [hull * size + np.array([at, 0.0, 0.0]) for hull in head_hulls]
     return make_centred_solid(
         [handle, head.scaled(size, size, size).moved(at)], (grip, steel), parts
@@ -108,40 +91,35 @@ def hammer(seed: int) -> Solid:
 def wrench(seed: int) -> Solid:
     """A combination wrench: open jaw at +X, ring at -X. Slot: steel."""
     rng = variant_rng("wrench", seed)
-    across = choose((0.010, 0.012, 0.013, 0.015, 0.017, 0.019), rng)
-    length = across * uniform_between(10.5, 12.5, rng)
+    across = rng.choose((0.010, 0.012, 0.013, 0.015, 0.017, 0.019))
+    length = across * rng.between(10.5, 12.5)
     thick, bar = 0.33 * across + 0.0012, 0.36 * across + 0.0015
     head, ring = 1.12 * across, 0.8 * across
     centre = np.array([length - head, 0.0])
     shank = np.array(
-        [
-            (0.6 * ring, -bar),
-            (length - 1.75 * head, -0.85 * bar),
-            (length - 1.75 * head, 0.85 * bar),
-            (0.6 * ring, bar),
-        ]
-    )
+        [(0.6 * ring, -bar), (length - 1.75 * head, -0.85 * bar),
+         (length - 1.75 * head, 0.85 * bar), (0.6 * ring, bar)]
+    )  # fmt: skip
     bevel = 0.12 * thick
     patches = [
-        extrude(_turned(_jaw(across, head)) + centre, thick, bevel).moved(z=-0.5 * thick),
+        extrude(_turn_jaw(_jaw(across, head)) + centre, thick, bevel).moved(z=-0.5 * thick),
         extrude(shank, 0.8 * thick, 0.3 * thick).moved(z=-0.4 * thick),
         extrude(circle(ring, 32), 1.3 * thick, bevel, [circle(0.57 * across, 24)]).moved(
             z=-0.65 * thick
         ),
     ]
-    finish = choose(
+    finish = rng.choose(
         (
             metal_material((0.72, 0.73, 0.74), 0.18),
             metal_material(STEEL, 0.35),
             metal_material(BLACK_OXIDE, 0.4),
-        ),
-        rng,
+        )
     )
     h = 0.5 * thick
     parts = [
-        *(_slab(_turned(piece) + centre, h) for piece in _jaw_pieces(across, head)),
+        *(_slab(_turn_jaw(piece) + centre, h) for piece in _jaw_pieces(across, head)),
         _slab(shank, 0.8 * h),
-        *collision_hulls.ring((0.57 * across, ring, -1.3 * h), (0.57 * across, ring, 1.3 * h), 8),
+        *hulls.ring((0.57 * across, ring, -1.3 * h), (0.57 * across, ring, 1.3 * h), 8),
     ]
     return make_centred_solid(patches, (finish,), parts)
 
@@ -166,7 +144,7 @@ def _jaw_pieces(across: float, radius: float) -> list[Array]:
     return [prong, prong * np.array([1.0, -1.0]), palm]
 
 
-def _turned(points: Array) -> Array:
+def _turn_jaw(points: Array) -> Array:
     """Points [n, 2] turned by the 15 degrees of a wrench's jaw."""
     c, s = math.cos(math.radians(15.0)), math.sin(math.radians(15.0))
     return np.stack(
@@ -198,13 +176,8 @@ def _fluted_handle(radius: float, length: float, flutes: int) -> Patch:
 
 def _pointed_tip(radius: float, end: float) -> Patch:
     """A cross-head tip, as the cone it is ground from."""
-    profile = [
-        (0.0, end - 0.013),
-        (radius, end - 0.013),
-        (radius, end - 0.008),
-        (0.3 * radius, end),
-        (0.0, end),
-    ]
+    profile = [(0.0, end - 0.013), (radius, end - 0.013), (radius, end - 0.008),
+               (0.3 * radius, end), (0.0, end)]  # fmt: skip
     return lathe(profile, 8, 1)
 
 
@@ -222,20 +195,14 @@ def _hammer_handle(length: float) -> Patch:
 def _hammer_head() -> tuple[Patch, list[Array]]:
     """Eye at the origin, striking face towards +Y, wedge towards -Y; slot 1."""
     eye = rounded_box((0.03, 0.036, 0.026), 0.003, 1)
-    profile = [
-        (0.0, 0.015),
-        (0.009, 0.015),
-        (0.009, 0.034),
-        (0.0138, 0.04),
-        (0.0138, 0.058),
-        (0.0, 0.0585),
-    ]
+    profile = [(0.0, 0.015), (0.009, 0.015), (0.009, 0.034), (0.0138, 0.04), (0.0138, 0.058),
+               (0.0, 0.0585)]  # fmt: skip
     face = lathe(fillet(profile, [0.0, 0.0, 0.004, 0.003, 0.0015, 0.0], 2), 24)
     peen = _peen()
     parts = [
-        collision_hulls.box((-0.015, -0.018, -0.013), (0.015, 0.018, 0.013)),
-        rotate(collision_hulls.frustum((0.0138, 0.015), (0.0138, 0.058), 16), "x", -_LAID),
-        collision_hulls.extreme(peen.corners_m, 24),
+        hulls.box((-0.015, -0.018, -0.013), (0.015, 0.018, 0.013)),
+        rotate(hulls.frustum((0.0138, 0.015), (0.0138, 0.058), 16), "x", -_LAID),
+        hulls.extreme(peen.corners_m, 24),
     ]
     return join_patches([eye, face.rotated("x", -_LAID), peen]).painted(1), parts
 
@@ -252,12 +219,8 @@ def _flat_tip(radius: float, end: float) -> Patch:
 
 def _peen() -> Patch:
     """The wedge at the back of a hammer's head, towards -Y."""
-    stations = [
-        (0.015, 0.013, 0.011),
-        (0.03, 0.012, 0.009),
-        (0.056, 0.0115, 0.0022),
-        (0.059, 0.0105, 0.0012),
-    ]
+    stations = [(0.015, 0.013, 0.011), (0.03, 0.012, 0.009), (0.056, 0.0115, 0.0022),
+                (0.059, 0.0105, 0.0012)]  # fmt: skip
     rows = []
     for y, wide, thin in stations:
         rows.append(

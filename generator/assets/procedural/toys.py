@@ -2,52 +2,40 @@
 
 from __future__ import annotations
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
     PLASTICS,
     WOODS,
     ceramic_material,
-    hex_to_linear,
-    jitter_color,
+    draw_linear,
     plastic_material,
     printed_material,
 )
 from gen_data.generator.assets.procedural.patches import make_centred_solid, make_solid_in_place
 from gen_data.generator.assets.procedural.surface_shapes import ball as sphere
 from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe, rounded_box, spline
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
 
-_SHAPES = (
-    (0.04, 0.04, 0.04),
-    (0.03, 0.06, 0.03),
-    (0.03, 0.09, 0.03),
-    (0.05, 0.05, 0.025),
-    (0.06, 0.06, 0.03),
-    (0.025, 0.075, 0.015),
-)
+_SHAPES = ((0.04, 0.04, 0.04), (0.03, 0.06, 0.03), (0.03, 0.09, 0.03), (0.05, 0.05, 0.025),
+           (0.06, 0.06, 0.03), (0.025, 0.075, 0.015))  # fmt: skip
 
 
 def block(seed: int) -> Solid:
     """A wooden or plastic building block. Slot: body."""
     rng = variant_rng("block", seed)
-    x, y, z = (side * uniform_between(0.95, 1.05, rng) for side in _SHAPES[seed % len(_SHAPES)])
-    bare = is_drawn(0.25, rng)
+    x, y, z = (side * rng.between(0.95, 1.05) for side in in_turn(_SHAPES, seed))
+    bare = rng.chance(0.25)
     paint = (
-        Material(jitter_color(hex_to_linear(choose(WOODS, rng)), 0.08, rng), 0.6)
+        Material(draw_linear(WOODS, 0.08, rng), 0.6)
         if bare
         else plastic_material(rng, PLASTICS[:8])
     )
     body = rounded_box((x, y, z), 0.0025, 2)
     return make_centred_solid(
-        [body], (paint,), [collision_hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))]
+        [body], (paint,), [hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))]
     )
 
 
@@ -55,16 +43,14 @@ def ball(seed: int) -> Solid:
     """A tennis, rubber, beach, basket or foot ball; the small ones are toys. Slot: cover."""
     rng = variant_rng("ball", seed)
     kind = ball_kind(seed)
-    radius = {"tennis": 0.0334, "rubber": uniform_between(0.02, 0.035, rng)}.get(
-        kind, uniform_between(0.05, 0.09, rng)
+    radius = {"tennis": 0.0334, "rubber": rng.between(0.02, 0.035)}.get(
+        kind, rng.between(0.05, 0.09)
     )
-    rough = {"tennis": 0.9, "basket": 0.65}.get(kind, uniform_between(0.3, 0.5, rng))
+    rough = {"tennis": 0.9, "basket": 0.65}.get(kind, rng.between(0.3, 0.5))
     body = sphere(lambda d: radius * d, 22, 36)
     cover = printed_material(f"texture/ball_cover?seed={seed}", rough)
-    # One small hull has flat sides that a ball would rest on; four that are turned have not.
-    parts = [
-        collision_hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)
-    ]
+    # A single small hull has flat sides that a ball would rest on; four rotated ones roll.
+    parts = [hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)]
     return make_centred_solid([body], (cover,), parts)
 
 
@@ -79,49 +65,38 @@ def plain_sphere(diameter_m: float = 0.2) -> Solid:
     radius = 0.5 * diameter_m
     body = sphere(lambda d: radius * d, 48, 96).moved(0.0, 0.0, radius)
     surface = Material((0.5, 0.5, 0.5), 0.5)
-    return make_solid_in_place([body], (surface,), [collision_hulls.extreme(body.corners_m)])
+    return make_solid_in_place([body], (surface,), [hulls.extreme(body.corners_m)])
 
 
 def ball_kind(seed: int) -> str:
-    """Which sport a ball is for."""
+    """Kind of a ball, by the sport it is for."""
     return ("tennis", "rubber", "beach", "basket", "foot")[seed % 5]
 
 
 def candle(seed: int) -> Solid:
     """A pillar candle with a wick. Slots: wax, wick."""
     rng = variant_rng("candle", seed)
-    radius, height = uniform_between(0.022, 0.04, rng), uniform_between(0.05, 0.15, rng)
+    radius, height = rng.between(0.022, 0.04), rng.between(0.05, 0.15)
     wax = fillet(
-        [
-            (0.0, 0.0),
-            (radius, 0.0),
-            (radius, height),
-            (0.75 * radius, height - 0.003),
-            (0.0, height - 0.006),
-        ],
+        [(0.0, 0.0), (radius, 0.0), (radius, height), (0.75 * radius, height - 0.003),
+         (0.0, height - 0.006)],
         [0.0, 0.002, 0.003, 0.004, 0.0],
         3,
-    )
+    )  # fmt: skip
     wick = lathe(
-        [
-            (0.0, height - 0.008),
-            (0.001, height - 0.008),
-            (0.001, height + 0.007),
-            (0.0, height + 0.0075),
-        ],
+        [(0.0, height - 0.008), (0.001, height - 0.008), (0.001, height + 0.007),
+         (0.0, height + 0.0075)],
         8,
         1,
-    )
+    )  # fmt: skip
     colors = ("#f1e8d2", "#e9dcc0", "#a83a34", "#3f5a4a", "#d9a441", "#7d8fa3", "#c58b8b")
-    material = Material(
-        jitter_color(hex_to_linear(choose(colors, rng)), 0.05, rng), uniform_between(0.4, 0.6, rng)
-    )
+    material = Material(draw_linear(colors, 0.05, rng), rng.between(0.4, 0.6))
     return make_centred_solid(
         [lathe(wax, 32), wick],
         (material, Material((0.02, 0.02, 0.02), 0.9)),
         [
-            collision_hulls.frustum((radius, 0.0), (radius, height)),
-            collision_hulls.frustum((0.001, height), (0.001, height + 0.0075), 6),
+            hulls.frustum((radius, 0.0), (radius, height)),
+            hulls.frustum((0.001, height), (0.001, height + 0.0075), 6),
         ],
     )
 
@@ -129,19 +104,15 @@ def candle(seed: int) -> Solid:
 def vase(seed: int) -> Solid:
     """A ceramic vase, hollow to look at. Slots: outside, inside."""
     rng = variant_rng("vase", seed)
-    height, belly = uniform_between(0.15, 0.27, rng), uniform_between(0.04, 0.06, rng)
-    foot, neck = belly * uniform_between(0.55, 0.75, rng), belly * uniform_between(0.3, 0.6, rng)
-    mouth, widest = neck * uniform_between(1.1, 1.6, rng), uniform_between(0.3, 0.55, rng)
+    height, belly = rng.between(0.15, 0.27), rng.between(0.04, 0.06)
+    foot, neck = belly * rng.between(0.55, 0.75), belly * rng.between(0.3, 0.6)
+    mouth, widest = neck * rng.between(1.1, 1.6), rng.between(0.3, 0.55)
     curve = spline(
-        [
-            (foot, 0.004),
-            (belly, widest * height),
-            (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height),
-            (neck, 0.82 * height),
-            (mouth, height),
-        ],
+        [(foot, 0.004), (belly, widest * height),
+         (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height), (neck, 0.82 * height),
+         (mouth, height)],
         17,
-    )
+    )  # fmt: skip
     wall = 0.004
     inner = [(float(r) - wall, float(z)) for r, z in curve[::-1] if z > 0.02]
     outer = [(float(r), float(z)) for r, z in curve]
@@ -155,5 +126,5 @@ def vase(seed: int) -> Solid:
             lathe([outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)], 32, 1),
         ],
         (outside, inside),
-        collision_hulls.stack(stages),
+        hulls.stack(stages),
     )

@@ -1,4 +1,4 @@
-"""Draws inside a variant: a pure function of the family's name and the seed.
+"""Random draws of one variant: a pure function of the family's name and the seed.
 
 Built on ``Rng.random`` alone, whose stream numpy guarantees; its other distributions may change
 between versions (NEP 19).
@@ -14,27 +14,32 @@ from gen_data.generator.core.streams import Rng, Streams
 T = TypeVar("T")
 
 
-def variant_rng(name: str, seed: int) -> Rng:
+class VariantRng(Rng):
+    """A generator with the draws that families use."""
+
+    def between(self, low: float, high: float) -> float:
+        """Draw uniformly from [low, high)."""
+        return low + (high - low) * float(self.random())
+
+    def choose(self, options: Sequence[T]) -> T:
+        """Draw one of the options, all equally likely."""
+        return options[min(int(self.random() * len(options)), len(options) - 1)]
+
+    def chance(self, probability: float) -> bool:
+        """Draw True with the given probability."""
+        return float(self.random()) < probability
+
+    def shuffled(self, items: Sequence[T]) -> list[T]:
+        """Return the items in random order."""
+        keys = [float(self.random()) for _ in items]
+        return [items[i] for i in sorted(range(len(items)), key=keys.__getitem__)]
+
+
+def variant_rng(name: str, seed: int) -> VariantRng:
     """The generator of everything that variant ``seed`` of family ``name`` draws."""
-    return Streams(seed=seed, scene=0).rng(name)
+    return VariantRng(Streams(seed=seed, scene=0).rng(name).bit_generator)
 
 
-def uniform_between(low: float, high: float, rng: Rng) -> float:
-    """Uniform in [low, high)."""
-    return low + (high - low) * float(rng.random())
-
-
-def choose(options: Sequence[T], rng: Rng) -> T:
-    """One of the options, all equally likely."""
-    return options[min(int(rng.random() * len(options)), len(options) - 1)]
-
-
-def is_drawn(probability: float, rng: Rng) -> bool:
-    """True with the given probability."""
-    return float(rng.random()) < probability
-
-
-def shuffle(items: Sequence[T], rng: Rng) -> list[T]:
-    """The items in random order."""
-    keys = [float(rng.random()) for _ in items]
-    return [items[i] for i in sorted(range(len(items)), key=keys.__getitem__)]
+def in_turn(options: Sequence[T], seed: int) -> T:
+    """The option of a seed: consecutive seeds take the options in turn."""
+    return options[seed % len(options)]

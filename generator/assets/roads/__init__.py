@@ -1,11 +1,11 @@
-"""Roads and junctions: their surfaces, and what those are made of."""
+"""Surfaces of roads and junctions, and their textures."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
 
-from gen_data.generator.assets.procedural.family import Family, Lazy, TextureFamily
+from gen_data.generator.assets.procedural.family import Family, Lazy, load_families
 from gen_data.generator.roads.cross_section import RoadShape
 from gen_data.generator.roads.junction_shape import JunctionShape
 from gen_data.generator.roads.parking_shape import ParkingShape
@@ -14,11 +14,6 @@ from gen_data.generator.roads.parking_shape import ParkingShape
 def _surface(name: str, **parameters: object) -> Family:
     build = Lazy(f"gen_data.generator.assets.roads.{name}:{name}")
     return Family(name, name, ("street",), 0, 0.0, False, 1, parameters, build)
-
-
-def _texture(name: str, variants: int = 4, **parameters: object) -> TextureFamily:
-    build = Lazy(f"gen_data.generator.assets.roads.road_textures:{name}")
-    return TextureFamily(name, ("ground", "street"), variants, 1, build, parameters)
 
 
 _SHAPE, _JUNCTION, _PARKING = (
@@ -48,17 +43,4 @@ FAMILIES: Mapping[str, Family] = {
     )
 }
 
-TEXTURES: Mapping[str, TextureFamily] = {
-    texture.name: texture
-    for texture in (
-        _texture("asphalt", 9, wear=0.3),
-        _texture("paving"),
-        _texture("cobbles"),
-        _texture("grass"),
-        _texture("gravel"),
-        _texture("earth"),
-        _texture("road_paint", 3, wear=0.3),
-        _texture("manhole", 1),
-        _texture("drain", 1),
-    )
-}
+TEXTURES = load_families(__name__).textures

@@ -16,12 +16,7 @@ from gen_data.generator.roads.cross_section import RoadShape
 
 
 def crosswalk(
-    *,
-    seed: int = 0,
-    wear: float = 0.3,
-    station_m: float = 20.0,
-    width_m: float = 4.0,
-    **shape: Any,
+    *, seed: int = 0, wear: float = 0.3, station_m: float = 20.0, width_m: float = 4.0, **shape: Any
 ) -> Solid:
     """Bars across a road, in the road's frame, over asphalt that hides its other lines.
 
@@ -44,8 +39,7 @@ def crosswalk(
     for k in range(count):
         t0 = first + 2.0 * k * ZEBRA_BAR_M
         t1 = t0 + ZEBRA_BAR_M
-        between = deck.t_m[(deck.t_m > t0 + 1e-4) & (deck.t_m < t1 - 1e-4)]
-        bar = (t0, *(float(t) for t in between), t1)
+        bar = deck.columns_between(t0, t1)
         patches.append(deck.ribbon(span, bar, "marking", PAINT_LIFT_M + 0.002))
     s, t = np.meshgrid(span, [low, high], indexing="ij")
     top = deck.at(s, t).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The surface of a road, and things that lie on it."""
+"""The surface of a road, and patches that lie on it."""
 
 from __future__ import annotations
 
@@ -44,12 +44,19 @@ class Deck:
         return np.column_stack([flat, z]).reshape(*s_m.shape, 3)
 
     def rows(self, start_m: float, end_m: float) -> Array:
-        """Arc lengths from start to end, as close as the bend asks for."""
+        """Arc lengths from start to end, as dense as the curvature requires."""
         step = ROW_M
         if self.bend_per_m > 0.0:
             step = min(step, math.sqrt(8.0 * SAGITTA_M / self.bend_per_m))
+        # A whole number of steps, but for rounding, needs no further row.
         count = max(1, math.ceil((end_m - start_m) / step - 1e-9))
         return np.linspace(start_m, end_m, count + 1)
+
+    def columns_between(self, low_m: float, high_m: float) -> tuple[float, ...]:
+        """Both distances and the deck's columns between them, so that patches follow its ruts."""
+        # Columns next to an end would make slivers.
+        inside = self.t_m[(self.t_m > low_m + 1e-4) & (self.t_m < high_m - 1e-4)]
+        return (low_m, *(float(t) for t in inside), high_m)
 
     def ribbon(
         self, span_m: tuple[float, float], t_m: Sequence[float], slot: str, lift_m: float = 0.0

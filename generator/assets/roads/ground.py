@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Solid, check_option
 from gen_data.generator.assets.procedural.patches import make_solid_in_place
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.roads.deck import surface
 from gen_data.generator.assets.roads.road_materials import GROUNDS, ground_material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 
 _CELLS = 56
 
@@ -28,16 +27,12 @@ def ground(
         seed: Of relief and texture.
         size_m: Extent along X and Y.
         cover: A word of ``GROUNDS``.
-        relief_m: How deep hollows are.
+        relief_m: Depth of the hollows.
 
     Raises:
         AssetError: the cover is unknown.
     """
-    if cover not in GROUNDS:
-        raise AssetError(
-            f"ground: cover={cover} is unknown; expected one of {', '.join(GROUNDS)}"
-            f"{did_you_mean(cover, GROUNDS)}"
-        )
+    check_option("ground", "cover", cover, GROUNDS)
     even = np.linspace(-1.0, 1.0, _CELLS + 1)
     graded = even * (0.25 + 0.75 * even * even)
     x, y = np.meshgrid(0.5 * size_m[0] * graded, 0.5 * size_m[1] * graded, indexing="ij")
@@ -47,5 +42,5 @@ def ground(
     plan = np.stack([x, y], axis=2)
     patch = surface(np.stack([x, y, z], axis=2), plan, "ground", 0)
     low, high = (-0.5 * size_m[0], -0.5 * size_m[1]), (0.5 * size_m[0], 0.5 * size_m[1])
-    slab = collision_hulls.box((*low, -relief_m - 0.5), (*high, 0.0))
+    slab = hulls.box((*low, -relief_m - 0.5), (*high, 0.0))
     return make_solid_in_place([patch], (ground_material(cover, seed),), [slab])

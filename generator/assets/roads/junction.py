@@ -49,9 +49,9 @@ def junction(
     Args:
         seed: Of textures.
         wear: 0 freshly laid to 1 worn out.
-        paving: What sidewalks are covered with, a word of ``GROUNDS``.
-        ground: What the land beside is covered with, a word of ``GROUNDS``.
-        crossings: What crosswalks look like: ``zebra``, ``lines`` or ``none``.
+        paving: Cover of the sidewalks, a word of ``GROUNDS``.
+        ground: Cover of the land beside, a word of ``GROUNDS``.
+        crossings: Style of the crosswalks: ``zebra``, ``lines`` or ``none``.
         shape: Fields of ``JunctionShape``.
     """
     profile = JunctionShape(**shape)
@@ -80,7 +80,7 @@ def _fan_patch(center: Array, line: Array, name: str, slot: int) -> Patch:
 
 
 def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterator[Patch]:
-    """Kerb and sidewalk from one arm's end to the next one's, and what closes them at both."""
+    """Kerb and sidewalk from one arm's end to the next one's, closed at both ends."""
     top, b = shape.kerb_m, 0.02
     yield _band(
         shape, number, ((0.0, 0.0), (b, top - 0.015), (b + 0.015, top), (KERB_WIDTH_M, top)),
@@ -93,21 +93,14 @@ def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterato
     for end in (0, -1):
         inner, outer = corner(shape, number, 0.02)[end], corner(shape, number, shape.border_m)[end]
         points = np.array(
-            [
-                [[*inner, -0.2], [*outer, -0.2]],
-                [[*inner, top], [*outer, shape.edge_z_m]],
-            ]
+            [[[*inner, -0.2], [*outer, -0.2]], [[*inner, top], [*outer, shape.edge_z_m]]]
         )
         plan = points[..., [0, 2]] + points[..., [1, 1]] * np.array([1.0, 0.0])
         yield surface(points, plan, "kerb", slots["kerb"])
 
 
 def _band(
-    shape: JunctionShape,
-    number: int,
-    profile: Sequence[tuple[float, float]],
-    name: str,
-    slot: int,
+    shape: JunctionShape, number: int, profile: Sequence[tuple[float, float]], name: str, slot: int
 ) -> Patch:
     """A profile of (distance behind the kerb's face, height) drawn around a corner."""
     lines = [
@@ -126,12 +119,13 @@ def _band(
 
 
 def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
-    """What lies between two arms beyond the sidewalk: out to where their land begins."""
+    """Land between two arms, from the sidewalk to the land beside the arms."""
     offset = shape.border_m if shape.sidewalk_m > 0.0 else 0.0
     z = shape.edge_z_m if shape.sidewalk_m > 0.0 else 0.0
     line = corner(shape, number, offset)
     edge = np.column_stack([line, np.full(len(line), z)])
     gap = shape.gaps_rad()[number]
+    # The outer edges of arms in line are parallel: they do not meet in a tip.
     if abs(gap - math.pi) <= 1e-3:
         far = corner(shape, number, offset + APRON_M)
         outer = np.column_stack([far, np.full(len(far), -APRON_FALL_M)])
@@ -163,7 +157,7 @@ def _markings(
     stop = (start + STOP_LINE_M[0], start + STOP_LINE_M[1])
 
     def painted(r: tuple[float, float], t: tuple[float, float]) -> Patch:
-        return _draped(shape, fan, arm, r, t, slot)
+        return _drape(shape, fan, arm, r, t, slot)
 
     inner, outer = sorted((side * 0.06, side * (half - 0.15)))
     yield painted(stop, (inner, outer))
@@ -186,7 +180,7 @@ def _markings(
                 yield painted((edge, edge + NARROW_M), (float(t), float(t) + 0.5))
 
 
-def _draped(
+def _drape(
     shape: JunctionShape,
     fan: Fan,
     arm: int,

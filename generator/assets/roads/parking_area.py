@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Patch, make_solid_in_place
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
@@ -19,23 +19,18 @@ _APRON_M, _APRON_Z_M = 4.0, -0.12
 
 
 def parking_area(
-    *,
-    seed: int = 0,
-    wear: float = 0.3,
-    paving: str = "paving",
-    ground: str = "grass",
-    **shape: Any,
+    *, seed: int = 0, wear: float = 0.3, paving: str = "paving", ground: str = "grass", **shape: Any
 ) -> Solid:
     """A level car park around the origin; slots are those of ``street_materials``.
 
     Args:
         seed: Of textures.
         wear: 0 freshly laid to 1 worn out.
-        paving: A word of ``GROUNDS``; kept for the sake of one set of slots.
-        ground: What the land beside is covered with, a word of ``GROUNDS``.
+        paving: A word of ``GROUNDS``; without area here, as all streets share one set of slots.
+        ground: Cover of the land beside, a word of ``GROUNDS``.
         shape: Fields of ``ParkingShape``.
     """
-    profile = ParkingShape(**{**shape, **_whole(shape)})
+    profile = ParkingShape(**{**shape, **_round_counts(shape)})
     materials = street_materials(seed, wear, paving, ground)
     slots = {name: k for k, name in enumerate(materials)}
     x, y = 0.5 * profile.length_m + EDGE_M, 0.5 * profile.width_m + EDGE_M
@@ -43,11 +38,11 @@ def parking_area(
     patches.append(_skirt(x, y, slots["ground"]))
     for low, high in _lines(profile):
         patches.append(_rectangle(low, high, PAINT_LIFT_M, "marking", slots["marking"]))
-    slab = collision_hulls.box((-x, -y, -0.3), (x, y, 0.0))
+    slab = hulls.box((-x, -y, -0.3), (x, y, 0.0))
     return make_solid_in_place(patches, tuple(materials.values()), [slab])
 
 
-def _whole(shape: dict[str, Any]) -> dict[str, int]:
+def _round_counts(shape: dict[str, Any]) -> dict[str, int]:
     return {name: round(shape[name]) for name in ("bays", "aisles") if name in shape}
 
 

@@ -11,11 +11,10 @@ import numpy as np
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
 from gen_data.generator.assets.procedural.surface_shapes import block
-from gen_data.generator.assets.procedural.variant_rng import is_drawn, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.roads.deck import Deck, surface
 from gen_data.generator.assets.roads.markings import bay_lines, paint_stripe, stripes
 from gen_data.generator.assets.roads.road_materials import street_materials
-from gen_data.generator.core.streams import Rng
 from gen_data.generator.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
@@ -167,67 +166,59 @@ def _beyond(
     return surface(points, plan, slot, deck.slots[slot])
 
 
-def _wear(deck: Deck, profile: RoadShape, wear: float, rng: Rng) -> Iterator[Patch]:
+def _wear(deck: Deck, profile: RoadShape, wear: float, rng: VariantRng) -> Iterator[Patch]:
     """Mended patches and sealed cracks."""
     low, high = -profile.carriageway_m(-1), profile.carriageway_m(1)
     for _ in range(round(wear * profile.length_m / 18.0)):
-        length, width = uniform_between(0.8, 5.0, rng), uniform_between(0.6, 1.6, rng)
-        s = uniform_between(0.3, max(0.4, profile.length_m - length - 0.3), rng)
-        t = uniform_between(low + 0.1, high - width - 0.1, rng)
+        length, width = rng.between(0.8, 5.0), rng.between(0.6, 1.6)
+        s = rng.between(0.3, max(0.4, profile.length_m - length - 0.3))
+        t = rng.between(low + 0.1, high - width - 0.1)
         if s + length > profile.length_m or high - low < width + 0.3:
             continue
         seam = 0.025
         across, inner = (t, t + width), (t + seam, t + width - seam)
-        yield deck.ribbon((s, s + length), _crossed(deck, across), "tar", 0.0012)
+        yield deck.ribbon((s, s + length), deck.columns_between(*across), "tar", 0.0012)
         yield deck.ribbon(
-            (s + seam, s + length - seam), _crossed(deck, inner), "asphalt_new", 0.0018
+            (s + seam, s + length - seam), deck.columns_between(*inner), "asphalt_new", 0.0018
         )
     for _ in range(round(wear * profile.length_m / 4.5)):
         yield _crack(deck, profile.length_m, low, high, rng)
 
 
-def _crossed(deck: Deck, across: tuple[float, float]) -> tuple[float, ...]:
-    """Both ends and the deck's columns between them, so that what lies on ruts follows them."""
-    inside = deck.t_m[(deck.t_m > across[0] + 1e-4) & (deck.t_m < across[1] - 1e-4)]
-    return (across[0], *(float(t) for t in inside), across[1])
-
-
-def _crack(deck: Deck, length_m: float, low: float, high: float, rng: Rng) -> Patch:
+def _crack(deck: Deck, length_m: float, low: float, high: float, rng: VariantRng) -> Patch:
     """A sealed crack: across the road, or wandering along it."""
     count = 14
-    steps = np.array([uniform_between(-1.0, 1.0, rng) for _ in range(count)])
-    if is_drawn(0.45, rng):
-        t = np.linspace(
-            low + 0.1, low + 0.1 + (high - low - 0.2) * uniform_between(0.3, 1.0, rng), count
-        )
-        s = uniform_between(1.0, max(1.1, length_m - 1.0), rng) + 0.12 * np.cumsum(steps)
+    steps = np.array([rng.between(-1.0, 1.0) for _ in range(count)])
+    if rng.chance(0.45):
+        t = np.linspace(low + 0.1, low + 0.1 + (high - low - 0.2) * rng.between(0.3, 1.0), count)
+        s = rng.between(1.0, max(1.1, length_m - 1.0)) + 0.12 * np.cumsum(steps)
     else:
-        reach = min(uniform_between(2.0, 10.0, rng), 0.8 * length_m)
-        s = uniform_between(0.2, length_m - reach - 0.1, rng) + np.linspace(0.0, reach, count)
-        t = uniform_between(low + 0.6, high - 0.6, rng) + 0.1 * np.cumsum(steps)
+        reach = min(rng.between(2.0, 10.0), 0.8 * length_m)
+        s = rng.between(0.2, length_m - reach - 0.1) + np.linspace(0.0, reach, count)
+        t = rng.between(low + 0.6, high - 0.6) + 0.1 * np.cumsum(steps)
     s, t = np.clip(s, 0.05, length_m - 0.05), np.clip(t, low + 0.05, high - 0.05)
-    return deck.path(s, t, uniform_between(0.015, 0.05, rng), "tar", 0.002)
+    return deck.path(s, t, rng.between(0.015, 0.05), "tar", 0.002)
 
 
-def _covers(deck: Deck, profile: RoadShape, rng: Rng) -> Iterator[Patch]:
+def _covers(deck: Deck, profile: RoadShape, rng: VariantRng) -> Iterator[Patch]:
     """Manhole covers in the lanes, and drains in the gutters of roads with kerbs."""
     if profile.kerb_m <= 0.0:
         return
     for side in (1, -1):
         row = strips(profile, side)
         driving = [strip for strip in row if strip.kind == "driving"]
-        s = uniform_between(6.0, 30.0, rng)
+        s = rng.between(6.0, 30.0)
         while driving and s < profile.length_m - 1.0:
-            t = driving[0].middle_m + uniform_between(-0.5, 0.5, rng)
+            t = driving[0].middle_m + rng.between(-0.5, 0.5)
             yield deck.disc(s, t, 0.40, "tar", 0.0022)
             yield deck.disc(s, t, 0.3125, "manhole", 0.003)
-            s += uniform_between(28.0, 55.0, rng)
-        s = uniform_between(4.0, 12.0, rng)
+            s += rng.between(28.0, 55.0)
+        s = rng.between(4.0, 12.0)
         while any(strip.kind == "kerb" for strip in row) and s < profile.length_m - 1.0:
             gutter = profile.carriageway_m(side)
             t0, t1 = sorted((side * (gutter - 0.34), side * (gutter - 0.02)))
             yield deck.ribbon((s, s + 0.5), (t0, t1), "drain", 0.004)
-            s += uniform_between(18.0, 30.0, rng)
+            s += rng.between(18.0, 30.0)
 
 
 def _guard_rail(deck: Deck, profile: RoadShape, side: int) -> Iterator[Patch]:
@@ -258,7 +249,7 @@ def _guard_rail(deck: Deck, profile: RoadShape, side: int) -> Iterator[Patch]:
 
 
 def _hulls(deck: Deck, profile: RoadShape) -> list[Array]:
-    """Slabs of at most 20 m under every strip: what wheels and feet stand on."""
+    """Collision slabs of at most 20 m under every strip."""
     stations = np.linspace(0.0, profile.length_m, max(2, int(np.ceil(profile.length_m / 20.0)) + 1))
     hulls = []
     for s0, s1 in pairwise(stations):

@@ -1,4 +1,4 @@
-"""What streets are made of. Albedos: asphalt 0.07 to 0.13, concrete 0.25 to 0.4, paint 0.5 to 0.7.
+"""Materials of streets. Albedos: asphalt 0.07 to 0.13, concrete 0.25 to 0.4, paint 0.5 to 0.7.
 
 Source: Pomerantz et al., "The effect of pavements' temperatures on air temperatures in large
 cities", LBNL-43442, 2000 (new asphalt 0.04-0.05, aged 0.1-0.15, concrete 0.25-0.4).
@@ -35,7 +35,7 @@ GROUNDS: Mapping[str, str] = {
 def textured_material(
     texture: str, role: str, roughness: float, color: Vec3 = (1.0, 1.0, 1.0)
 ) -> Material:
-    """A surface whose mesh says where on the texture it is."""
+    """A surface with texture coordinates of its own."""
     return Material(base_color=color, roughness=roughness, texture=texture, role=role)
 
 

@@ -1,4 +1,4 @@
-"""Grounds seen from above, road paint, and castings. Every image tiles.
+"""Ground surfaces from above, road paint, and castings. Every image tiles.
 
 Grounds have 1024 pixels: 6 mm each at their usual repeat of 5 to 7 m.
 """
@@ -23,7 +23,7 @@ from gen_data.generator.assets.procedural.textures.texture_images import (
     mix_colors,
     texture,
 )
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
 
 GROUND_PX = 1024
@@ -39,7 +39,7 @@ def asphalt(seed: int, wear: float = 0.3) -> TextureData:
     """
     rng = variant_rng("asphalt", seed)
     # Mean albedo 0.06 to 0.12 (linear) is 0.27 to 0.38 in sRGB; worn roads reach 0.15.
-    level = 0.315 + 0.09 * wear + uniform_between(-0.015, 0.015, rng)
+    level = 0.315 + 0.09 * wear + rng.between(-0.015, 0.015)
     warm = np.array([1.0 + 0.012 * wear, 1.0, 0.985 - 0.01 * wear], dtype=np.float32)
     stones = worley((340, 340), rng, size_px=_N)
     tone = stones.of_each(uniform(stones.count, rng) - 0.5)
@@ -56,9 +56,9 @@ def asphalt(seed: int, wear: float = 0.3) -> TextureData:
 def paving(seed: int) -> TextureData:
     """Concrete slabs or blocks in straight or running bond; 3 m per repeat."""
     rng = variant_rng("paving", seed)
-    rows, columns, shift = choose(((10, 10, 0.0), (10, 5, 0.5), (15, 15, 0.5), (6, 6, 0.0)), rng)
+    rows, columns, shift = rng.choose(((10, 10, 0.0), (10, 5, 0.5), (15, 15, 0.5), (6, 6, 0.0)))
     edge, number = _bond(rows, columns, shift)
-    joint = uniform_between(1.2, 2.2, rng)
+    joint = rng.between(1.2, 2.2)
     face = smoothstep(joint, joint + 1.6, edge + 0.5 * fbm((60, 60), 3, rng, size_px=_N))
     count = rows * columns
     base = draw_color(("#8f8d88", "#9b9890", "#868482", "#a39a8c", "#94867a"), 0.04, rng)
@@ -75,7 +75,7 @@ def paving(seed: int) -> TextureData:
 def cobbles(seed: int) -> TextureData:
     """Small sett paving in rows; 2.4 m per repeat."""
     rng = variant_rng("cobbles", seed)
-    rows = choose((24, 26), rng)
+    rows = rng.choose((24, 26))
     points = worley((rows, rows), rng, jitter=0.38, size_px=_N)
     gap = points.second - points.nearest
     face = smoothstep(0.06, 0.2, gap + 0.03 * fbm((80, 80), 3, rng, size_px=_N))
@@ -95,7 +95,7 @@ def grass(seed: int) -> TextureData:
     green, deep, straw = color("#717a48"), color("#566034"), color("#9a9064")
     patches = fbm((7, 7), 6, rng, 0.62, _N)
     albedo = mix_colors(green, deep, smoothstep(-0.5, 0.8, patches))
-    dry = smoothstep(0.15, 1.1, fbm((9, 9), 6, rng, 0.66, _N) + uniform_between(-0.15, 0.25, rng))
+    dry = smoothstep(0.15, 1.1, fbm((9, 9), 6, rng, 0.66, _N) + rng.between(-0.15, 0.25))
     albedo = mix_colors(albedo, straw, 0.75 * dry)
     bare = smoothstep(0.75, 1.3, fbm((11, 11), 5, rng, 0.65, _N))
     albedo = mix_colors(albedo, color("#6b5a45"), 0.7 * bare)

@@ -1,4 +1,4 @@
-"""What lines a street: buildings, plants, street furniture, traffic lights and signs."""
+"""Scenery of streets: buildings, plants, street furniture, traffic lights and signs."""
 
 from __future__ import annotations
 

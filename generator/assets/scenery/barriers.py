@@ -1,4 +1,4 @@
-"""What keeps traffic and people apart: guard rails, jersey barriers, work-site barriers, fences.
+"""Guard rails, jersey barriers, work-site barriers and fences.
 
 Pieces run along Y, so that they line a street whose traffic they face with +X; sections of equal
 length join end to end.
@@ -10,19 +10,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import (
     painted_material,
     patterned_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.surface_shapes import block, extrude, grid
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import Vec3
 
 BARRIERS = ("guard_rail", "jersey", "construction")
@@ -37,15 +36,15 @@ def barrier(seed: int, style: str) -> Solid:
 
 def barrier_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
-    return Facts(_chosen("barrier", seed, style, BARRIERS))
+    return Facts(_choose_style("barrier", seed, style, BARRIERS))
 
 
 def fence(seed: int, style: str) -> Solid:
     """A fence or garden wall section of 2-3 m."""
     kind = fence_facts(seed, style).subcategory
     rng = variant_rng("fence", seed)
-    half, h = 0.5 * uniform_between(2.0, 3.0, rng), uniform_between(0.9, 1.4, rng)
-    hull = collision_hulls.box((-0.06, -half, 0.0), (0.06, half, h))
+    half, h = 0.5 * rng.between(2.0, 3.0), rng.between(0.9, 1.4)
+    hull = hulls.box((-0.06, -half, 0.0), (0.06, half, h))
     if kind == "wall":
         return _garden_wall(half, h, seed)
     posts = [
@@ -56,10 +55,7 @@ def fence(seed: int, style: str) -> Solid:
         parts = [block((0.03, y - 0.04, 0.06), (0.05, y + 0.04, h)) for y in bars]
         parts += [block((-0.01, -half, z), (0.03, half, z + 0.07)) for z in (0.25, h - 0.3)]
         wood = patterned_material(
-            "texture/wood_grain?seed=5",
-            1.2,
-            0.8,
-            choose(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)), rng),
+            "texture/wood_grain?seed=5", 1.2, 0.8, rng.choose(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)))
         )
         return make_solid([*posts, *parts], (wood,), [hull])
     if kind == "panel":
@@ -79,23 +75,19 @@ def fence(seed: int, style: str) -> Solid:
     wires += [
         block((-0.008, -half, z), (0.008, half, z + 0.012)) for z in np.linspace(0.06, h - 0.03, 5)
     ]
-    paint = painted_material(choose(("#2f4236", "#3b3d3f"), rng), 0.5)
+    paint = painted_material(rng.choose(("#2f4236", "#3b3d3f")), 0.5)
     return make_solid([*posts, *wires], (paint,), [hull])
 
 
 def fence_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
-    return Facts(_chosen("fence", seed, style, FENCES))
+    return Facts(_choose_style("fence", seed, style, FENCES))
 
 
-def _chosen(family: str, seed: int, style: str, styles: Sequence[str]) -> str:
+def _choose_style(family: str, seed: int, style: str, styles: Sequence[str]) -> str:
     if style == "any":
-        return styles[seed % len(styles)]
-    if style not in styles:
-        raise AssetError(
-            f"{family}: there is no style '{style}'{did_you_mean(style, styles)}; expected any, "
-            f"{', '.join(styles)}"
-        )
+        return in_turn(styles, seed)
+    check_option(family, "style", style, ("any", *styles))
     return style
 
 
@@ -108,7 +100,7 @@ def _guard_rail(seed: int) -> Solid:
     back = np.array([[(0.096 + x, y, z) for y in (half, -half)] for x, z in wave])
     posts = [block((-0.05, y - 0.03, 0.0), (0.05, y + 0.03, 0.72)) for y in (-1.0, 1.0)]
     spacers = [block((0.05, y - 0.05, 0.52), (0.1, y + 0.05, 0.68)) for y in (-1.0, 1.0)]
-    hull = collision_hulls.box((-0.05, -half, 0.0), (0.18, half, 0.75))
+    hull = hulls.box((-0.05, -half, 0.0), (0.18, half, 0.75))
     parts = [grid(rows), grid(back), *posts, *spacers]
     shade = patterned_material("texture/brushed_metal?seed=1", 1.0, 0.6, (0.62, 0.63, 0.64))
     return make_solid(parts, (shade if seed % 2 else GALVANISED,), [hull])
@@ -117,19 +109,11 @@ def _guard_rail(seed: int) -> Solid:
 def _jersey(seed: int) -> Solid:
     """A concrete safety shape, 2 m long: foot 0.6 m, 0.8-0.9 m high."""
     rng = variant_rng("barrier/jersey", seed)
-    half, h = 1.0, uniform_between(0.8, 0.9, rng)
+    half, h = 1.0, rng.between(0.8, 0.9)
     section = np.array(
-        [
-            (0.0, -0.3),
-            (0.08, -0.3),
-            (0.33, -0.17),
-            (h, -0.09),
-            (h, 0.09),
-            (0.33, 0.17),
-            (0.08, 0.3),
-            (0.0, 0.3),
-        ]
-    )
+        [(0.0, -0.3), (0.08, -0.3), (0.33, -0.17), (h, -0.09), (h, 0.09), (0.33, 0.17),
+         (0.08, 0.3), (0.0, 0.3)]
+    )  # fmt: skip
     prism = extrude(section, 2 * half, 0.008).rotated("y", -0.5 * np.pi)
     # The section's first axis has become Z, the extrusion runs along -X: turn it to Y.
     lying = prism.rotated("z", 0.5 * np.pi)
@@ -137,17 +121,17 @@ def _jersey(seed: int) -> Solid:
     x, y, _ = (0.5 * (low + high)).tolist()
     body = lying.moved(-x, -y, -float(low[2]))
     concrete = patterned_material("texture/concrete?seed=3", 2.0, 0.92, (0.95, 0.94, 0.92))
-    hull = collision_hulls.extreme(body.corners_m, 32)
+    hull = hulls.extreme(body.corners_m, 32)
     return make_solid([body], (concrete,), [hull])
 
 
 def _construction(seed: int) -> Solid:
     """A work-site barrier: a red and white board on two feet, lamps on some."""
     rng = variant_rng("barrier/construction", seed)
-    half, z, fields = 0.5 * uniform_between(1.2, 2.0, rng), 0.85, 8
+    half, z, fields = 0.5 * rng.between(1.2, 2.0), 0.85, 8
     boards = []
-    for low in ((z, z + 0.2), (0.25, 0.35))[: choose((1, 2, 2), rng)]:
-        boards += _striped(half, low, fields)
+    for low in ((z, z + 0.2), (0.25, 0.35))[: rng.choose((1, 2, 2))]:
+        boards += _striped_board(half, low, fields)
     legs = [
         block((-0.02, y - 0.02, 0.05), (0.01, y + 0.02, 1.1)) for y in (-half + 0.15, half - 0.15)
     ]
@@ -165,10 +149,10 @@ def _construction(seed: int) -> Solid:
         painted_material("#242526", 0.85),
         Material((0.85, 0.42, 0.05), roughness=0.2, role="lamp"),
     )
-    return make_solid(parts, slots, [collision_hulls.box((-0.4, -half, 0.0), (0.4, half, z + 0.2))])
+    return make_solid(parts, slots, [hulls.box((-0.4, -half, 0.0), (0.4, half, z + 0.2))])
 
 
-def _striped(half: float, z_m: tuple[float, float], fields: int) -> list[Patch]:
+def _striped_board(half: float, z_m: tuple[float, float], fields: int) -> list[Patch]:
     """A board of slanted red and white fields; slots 0 and 1, its back is white."""
     (z0, z1), step = z_m, 2 * half / fields
     lean = 0.35 * step
@@ -196,4 +180,4 @@ def _garden_wall(half: float, h: float, seed: int) -> Solid:
     name, k, scale, color = kind
     skin = patterned_material(f"texture/{name}?seed={k}", scale, 0.92, color)
     stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
-    return make_solid([body, cap], (skin, stone), [collision_hulls.box(low, (0.12, half, h))])
+    return make_solid([body, cap], (skin, stone), [hulls.box(low, (0.12, half, h))])

@@ -1,4 +1,4 @@
-"""Small forms that street objects are made of, and how they become solids.
+"""Basic shapes of street objects, and their assembly into solids.
 
 Frame of everything here: metres, Z up, front +X, origin on the ground.
 """
@@ -33,7 +33,7 @@ def make_solid(
     keypoints: Sequence[Keypoint] = (),
     crease_deg: float = CREASE_DEG,
 ) -> Solid:
-    """A solid in the frame it was made in; materials that no triangle uses are left out."""
+    """A solid that keeps its frame; materials that no triangle uses are left out."""
     patch = join_patches(patches)
     used = np.unique(patch.slots)
     numbers = np.zeros(len(materials), dtype=np.int64)
@@ -53,7 +53,7 @@ def quad(
 
 
 def facing_rectangle(x: float, y_m: Span, z_m: Span, slot: int = 0) -> Patch:
-    """An upright rectangle that faces +X; y runs to the right of who looks at it."""
+    """An upright rectangle that faces +X; y runs to the viewer's right."""
     (y0, y1), (z0, z1) = y_m, z_m
     return quad([(x, y0, z0), (x, y1, z0), (x, y1, z1), (x, y0, z1)], slot)
 

@@ -1,4 +1,4 @@
-"""How a tree branches, and the wood that follows from it.
+"""Branching of trees, and the wood around the branches.
 
 Space colonization: Runions, Lane and Prusinkiewicz, "Modeling trees with a space colonization
 algorithm", Eurographics Workshop on Natural Phenomena, 2007. Branch radii follow the pipe model:
@@ -26,7 +26,7 @@ from gen_data.generator.core.streams import Rng
 
 _PIPE_EXPONENT = 2.3
 _ROUNDS_MAX = 70
-# Attraction points are seen from this many steps away, and reached at this many.
+# Attraction points act within this many steps, and are reached at this many.
 _SEEN, _REACHED = 9.0, 1.8
 
 
@@ -79,7 +79,7 @@ def grow_skeleton(
     parents = [*range(-1, len(trunk_m) - 1)]
     free = attractors_m
     nearest, distance = _nearest(free, np.array(nodes), 0)
-    # From the ground, no point may be in sight: the first rounds see as far as they must.
+    # From the ground no point may be near: the first rounds reach as far as they must.
     sight = max(_SEEN * step_m, float(distance.min()) + step_m)
     for _ in range(_ROUNDS_MAX):
         seen = distance < sight
@@ -111,7 +111,7 @@ def wood(skeleton: Skeleton, thinnest_m: float, stride: int = 2) -> Patch:
             continue
         kept = np.unique([*range(0, thick, stride), thick])
         path, r = skeleton.nodes_m[chain][kept], radii[kept].copy()
-        # A branch starts as thick as it is itself, not as what it grows from.
+        # A branch starts with its own thickness, not with that of its parent.
         r[0] = min(r[0], 1.25 * r[1])
         sides = 8 if r[0] > 0.1 else 5 if r[0] > 0.035 else 3
         up = (1.0, 0.0, 0.0) if abs(path[1, 2] - path[0, 2]) > 0.05 else (0.0, 0.0, 1.0)
@@ -149,7 +149,7 @@ def _shoots(
 
 
 def _radii(parents: Indices, base_m: float) -> Array:
-    """Pipe model: what flows through a node is the sum of what flows through its children."""
+    """Pipe model: the flow through a node is the sum of the flows through its children."""
     flow = np.zeros(len(parents))
     for k in range(len(parents) - 1, -1, -1):
         flow[k] = max(flow[k], 1.0)
@@ -160,7 +160,7 @@ def _radii(parents: Indices, base_m: float) -> Array:
 
 
 def _chains(skeleton: Skeleton) -> list[Indices]:
-    """Paths from a fork to a tip that follow the thickest child; together they are the tree."""
+    """Paths from a fork to a tip along the thickest child; together they cover the tree."""
     children: list[list[int]] = [[] for _ in skeleton.parents]
     for k, parent in enumerate(skeleton.parents.tolist()):
         if parent >= 0:

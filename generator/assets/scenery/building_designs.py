@@ -1,4 +1,4 @@
-"""What a building is like: drawn once from its style and seed, then built.
+"""Designs of buildings, drawn from a style and a seed, and their materials.
 
 Sizes follow German practice: storeys of 2.7-3.0 m in post-war and 3.4-3.8 m in nineteenth-century
 houses, windows of 1.0-1.5 m by 1.2-1.9 m, sills 0.8-0.95 m above the floor.
@@ -6,20 +6,20 @@ houses, windows of 1.0-1.5 m by 1.2-1.9 m, sills 0.8-0.95 m above the floor.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import check_option
+from gen_data.generator.assets.procedural.material_presets import (
+    draw_linear,
+    hex_to_linear,
+    jitter_color,
 )
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 STYLES = ("residential", "old_town", "modern", "commercial", "house")
 RoofKind = Literal["gable", "hip", "mansard", "flat"]
@@ -28,7 +28,7 @@ Cladding = Literal["plaster", "brick", "concrete", "stone"]
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """Everything that the parts of one building have in common.
+    """Measures and features that the parts of one building share.
 
     Attributes:
         bays: Windows per floor on the street side.
@@ -76,197 +76,68 @@ class Design:
         return self.ground_m + (self.floors - 1) * self.storey_m
 
 
+_STYLES = load_table(__package__, "building_styles", dict)
+_COLORS = load_table(__package__, "building_colors", tuple[str, ...])
+
+
 def draw_design(style: str, seed: int) -> Design:
     """The design of variant ``seed`` of a style. Raises AssetError for an unknown style."""
-    if style not in _DRAWN:
-        raise AssetError(
-            f"building: there is no style '{style}'{did_you_mean(style, STYLES)}; expected one of "
-            f"{', '.join(STYLES)}"
-        )
-    return _DRAWN[style](variant_rng(f"building/{style}", seed))
+    check_option("building", "style", style, STYLES)
+    values = _draw_fields(_STYLES[style], variant_rng(f"building/{style}", seed))
+    bays, bay_m = values["bays"], values.pop("bay_m")
+    low, high = values["width_m"]
+    values["width_m"] = round(min(high, max(low, bays * bay_m)), 2)
+    if "pier_m" in values:
+        values["window_m"] = (round(bay_m - values.pop("pier_m"), 2), values["window_m"][1])
+    values["oriel"] = {"middle": bays // 2, "last": bays - 2}.get(values.get("oriel", ""), -1)
+    return Design(style=style, **values)
 
 
-def _residential(rng: Rng) -> Design:
-    floors = choose((2, 3, 3, 4, 4, 5), rng)
-    bays, bay_m = choose((3, 4, 5, 6, 7), rng), uniform_between(2.5, 3.1, rng)
-    return Design(
-        style="residential",
-        width_m=max(8.0, round(bays * bay_m, 2)),
-        depth_m=round(uniform_between(10.0, 13.0, rng), 2),
-        floors=floors,
-        bays=bays,
-        ground_m=round(uniform_between(3.0, 3.5, rng), 2),
-        storey_m=round(uniform_between(2.75, 3.0, rng), 2),
-        window_m=(
-            round(uniform_between(1.1, 1.5, rng), 2),
-            round(uniform_between(1.25, 1.5, rng), 2),
-        ),
-        sill_m=0.9,
-        recess_m=round(uniform_between(0.12, 0.2, rng), 3),
-        panes=(choose((1, 2, 2), rng), 1),
-        roof=choose(("gable", "gable", "gable", "mansard"), rng),
-        cladding=choose(("plaster", "plaster", "plaster", "plaster", "brick"), rng),
-        shutters=choose(("roller", "roller", "none"), rng),
-        balconies=choose(("none", "none", "slab"), rng),
-        pitch_rad=uniform_between(0.6, 0.82, rng),
-        dormers=choose((0, 0, 1, 2, 3), rng),
-    )
+def _draw_fields(recipe: Mapping[str, Any], rng: VariantRng) -> dict[str, Any]:
+    """A value for every field of a recipe, drawn in its order; see ``building_styles.yaml``."""
+    values: dict[str, Any] = {}
+    for name, item in recipe.items():
+        if name == "variants":
+            values |= _draw_fields(item["yes" if rng.chance(item["chance"]) else "no"], rng)
+        else:
+            values[name] = _draw_value(item, rng)
+    return values
 
 
-def _old_town(rng: Rng) -> Design:
-    bays, bay_m = choose((3, 4, 5, 6, 7), rng), uniform_between(2.1, 2.5, rng)
-    return Design(
-        style="old_town",
-        width_m=max(8.0, round(bays * bay_m, 2)),
-        depth_m=round(uniform_between(10.0, 14.0, rng), 2),
-        floors=choose((3, 3, 4, 4, 5), rng),
-        bays=bays,
-        ground_m=round(uniform_between(3.9, 4.4, rng), 2),
-        storey_m=round(uniform_between(3.3, 3.7, rng), 2),
-        window_m=(
-            round(uniform_between(1.0, 1.15, rng), 2),
-            round(uniform_between(1.75, 2.05, rng), 2),
-        ),
-        sill_m=0.8,
-        recess_m=round(uniform_between(0.16, 0.25, rng), 3),
-        panes=(2, 2),
-        roof=choose(("mansard", "mansard", "gable"), rng),
-        cladding=choose(("plaster", "plaster", "brick", "stone"), rng),
-        shops=is_drawn(0.6, rng),
-        trimmed=True,
-        shutters=choose(("none", "none", "leaves"), rng),
-        balconies=choose(("none", "french"), rng),
-        pitch_rad=uniform_between(0.7, 0.9, rng),
-        dormers=choose((1, 2, 3), rng),
-        oriel=choose((-1, bays // 2, bays - 2), rng),
-    )
-
-
-def _modern(rng: Rng) -> Design:
-    bays, bay_m = choose((3, 4, 5, 6), rng), uniform_between(3.0, 3.7, rng)
-    tall = is_drawn(0.5, rng)
-    return Design(
-        style="modern",
-        width_m=round(min(24.0, max(9.0, bays * bay_m)), 2),
-        depth_m=round(uniform_between(11.0, 14.0, rng), 2),
-        floors=choose((3, 4, 5, 6), rng),
-        bays=bays,
-        ground_m=round(uniform_between(3.1, 3.6, rng), 2),
-        storey_m=round(uniform_between(2.95, 3.1, rng), 2),
-        window_m=(
-            round(uniform_between(1.4, 2.2, rng), 2),
-            2.3 if tall else round(uniform_between(1.4, 1.6, rng), 2),
-        ),
-        sill_m=0.12 if tall else 0.85,
-        recess_m=round(uniform_between(0.16, 0.24, rng), 3),
-        panes=(2, 1),
-        roof="flat",
-        cladding=choose(("plaster", "plaster", "plaster", "brick", "concrete"), rng),
-        shutters=choose(("roller", "none"), rng),
-        balconies=choose(("slab", "french" if tall else "slab", "slab"), rng),
-        sided=True,
-    )
-
-
-def _commercial(rng: Rng) -> Design:
-    bays, bay_m = choose((4, 5, 6, 7), rng), uniform_between(2.8, 3.4, rng)
-    return Design(
-        style="commercial",
-        width_m=round(min(24.0, bays * bay_m), 2),
-        depth_m=round(uniform_between(12.0, 14.0, rng), 2),
-        floors=choose((2, 3, 4, 5, 6, 7), rng),
-        bays=bays,
-        ground_m=round(uniform_between(4.0, 4.6, rng), 2),
-        storey_m=round(uniform_between(3.1, 3.4, rng), 2),
-        window_m=(
-            round(bay_m - uniform_between(0.35, 0.9, rng), 2),
-            round(uniform_between(1.7, 2.1, rng), 2),
-        ),
-        sill_m=0.8,
-        recess_m=round(uniform_between(0.12, 0.25, rng), 3),
-        panes=(choose((2, 3), rng), 1),
-        roof="flat",
-        cladding=choose(("plaster", "concrete", "concrete", "brick", "stone"), rng),
-        shops=True,
-    )
-
-
-def _house(rng: Rng) -> Design:
-    bays, bay_m = choose((3, 3, 3, 4), rng), uniform_between(2.8, 3.4, rng)
-    return Design(
-        style="house",
-        width_m=max(8.0, round(bays * bay_m, 2)),
-        depth_m=round(uniform_between(8.0, 10.5, rng), 2),
-        floors=choose((1, 2, 2), rng),
-        bays=bays,
-        ground_m=round(uniform_between(2.9, 3.3, rng), 2),
-        storey_m=round(uniform_between(2.7, 2.9, rng), 2),
-        window_m=(
-            round(uniform_between(1.1, 1.5, rng), 2),
-            round(uniform_between(1.2, 1.4, rng), 2),
-        ),
-        sill_m=0.95,
-        recess_m=round(uniform_between(0.1, 0.18, rng), 3),
-        panes=(choose((1, 2), rng), 1),
-        roof=choose(("gable", "gable", "hip"), rng),
-        cladding=choose(("plaster", "plaster", "plaster", "brick"), rng),
-        shutters=choose(("roller", "leaves", "none"), rng),
-        pitch_rad=uniform_between(0.62, 0.85, rng),
-        verge_m=round(uniform_between(0.25, 0.5, rng), 2),
-        dormers=choose((0, 0, 1), rng),
-        sided=True,
-        gable_front=is_drawn(0.4, rng),
-    )
-
-
-_DRAWN = {
-    "residential": _residential,
-    "old_town": _old_town,
-    "modern": _modern,
-    "commercial": _commercial,
-    "house": _house,
-}
-
-# Muted tints of mineral paint, sRGB; the texture's own near-white multiplies them.
-_PLASTERS = {
-    "residential": "#d9d2c0 #e3dccb #cfc6b0 #d8c9a3 #c9b99a #c7ccc6 #b9bfb7 #d3bfae #e2e0da",
-    "old_town": "#d3c5a3 #c9b48f #c6ab95 #b49583 #d9cfba #b9b5a2 #aab0a4 #c2b8ae #dcd4c5 #b6a48c",
-    "modern": "#e8e7e3 #dcdbd6 #c7c7c4 #b4b3af #8f8e8b #e3ddd0 #6f6e6c #d5d0c6",
-    "commercial": "#cfcbc2 #b8b5ae #d9d5cb #a5a39e #c4bba8 #8f9294",
-    "house": "#e6e2d8 #ded5bf #d8c7a0 #cdbda5 #d9d8d2 #c9b7a6 #bcc3bd #e4d9c6",
-}
-_STONES = "#a38b7b #97796b #b0a38f #bbb09d #9c958b"
-_ROOFS = "#80564a #754a3e #8a6353 #6b463b #57504b #4a4a4c #665048 #5d4a42"
-_CLOTHS = {
-    "none": "#8b8f8c #d4d1c8 #b9b6ae #a7a294",
-    "roller": "#a9a69c #d4d1c8 #b9b6ae #8f8c84 #6f6a62",
-    "leaves": "#5a6b5d #6d5a48 #4f6157 #7a4a3c #4d5b66",
-    "shops": "#7a3b34 #3a5145 #8b8f8c #cfc6ae #3c4c5c",
-}
-_DOORS = "#5c4434 #3f4a44 #7a2f2a #4a4f55 #8c6b4a #e4e2dc #2e3d4d"
-_FRAMES = {"modern": ("#3c3e40", "#55585a", "#e6e6e3"), "commercial": ("#45484a", "#6c6f71")}
+def _draw_value(item: Any, rng: VariantRng) -> Any:
+    if isinstance(item, list):
+        return tuple(_draw_value(part, rng) for part in item)
+    if not isinstance(item, dict):
+        return item
+    if "choose" in item:
+        return rng.choose(item["choose"])
+    if "chance" in item:
+        return rng.chance(item["chance"])
+    value = rng.between(*item["uniform"])
+    return round(value, item["digits"]) if "digits" in item else value
 
 
 def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
     """The materials of a building, one per slot of ``facade``."""
     rng = variant_rng(f"building/{plan.style}/materials", seed)
-    wall = _wall(plan.cladding, _PLASTERS[plan.style], rng)
+    wall = _wall(plan.cladding, _COLORS[f"plaster_{plan.style}"], rng)
     base = _base(plan, wall, rng)
-    trim_code = choose(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"), rng)
-    trim_code = choose(("#a98d7c", "#b3a48e", trim_code), rng) if plan.trimmed else trim_code
-    frame = choose(_FRAMES.get(plan.style, ("#eceae4", "#e4e2db", "#e8e6df", "#6b5443")), rng)
+    trim_code = rng.choose(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"))
+    trim_code = rng.choose(("#a98d7c", "#b3a48e", trim_code)) if plan.trimmed else trim_code
+    frame = rng.choose(_COLORS.get(f"frames_{plan.style}", _COLORS["frames"]))
     curtains = [jitter_color(hex_to_linear(code), 0.1, rng) for code in ("#8d8a82", "#6a6862")]
-    seam = "#77797a" if plan.roof == "flat" else choose(("#8a8c8d", "#7d5f4c", "#9a9c9b"), rng)
+    cloth = _COLORS["cloth_" + ("shops" if plan.shops else plan.shutters)]
+    seam = "#77797a" if plan.roof == "flat" else rng.choose(("#8a8c8d", "#7d5f4c", "#9a9c9b"))
     return (
         wall,
         base,
-        _plain(trim_code, 0.85, "trim"),
-        _plain(frame, 0.45, "trim"),
-        _glass((0.012, 0.016, 0.019), 0.04),
-        _glass((0.03, 0.034, 0.036), 0.06),
-        _glass(curtains[0], 0.08),
-        _glass(curtains[1], 0.08),
-        _plain(choose(_DOORS.split(), rng), 0.5, "trim"),
+        _plain_material(trim_code, 0.85, "trim"),
+        _plain_material(frame, 0.45, "trim"),
+        _glass_material((0.012, 0.016, 0.019), 0.04),
+        _glass_material((0.03, 0.034, 0.036), 0.06),
+        _glass_material(curtains[0], 0.08),
+        _glass_material(curtains[1], 0.08),
+        _plain_material(rng.choose(_COLORS["doors"]), 0.5, "trim"),
         Material(hex_to_linear(seam), roughness=0.5, metallic=0.6, role="chrome"),
         _roof(rng),
         Material(
@@ -276,54 +147,52 @@ def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
             printed=True,
             role="sign",
         ),
-        _plain(choose(_CLOTHS["shops" if plan.shops else plan.shutters].split(), rng), 0.7, "trim"),
-        _textured("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
+        _plain_material(rng.choose(cloth), 0.7, "trim"),
+        _textured_material("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
     )
 
 
-def _wall(cladding: Cladding, tints: str, rng: Rng) -> Material:
+def _wall(cladding: Cladding, tints: Sequence[str], rng: VariantRng) -> Material:
     if cladding == "brick":
-        seed, level = choose((4, 9, 12), rng), uniform_between(0.75, 1.0, rng)
-        return _textured("brick", seed, (level, level, level), 1.1, "facade")
+        seed, level = rng.choose((4, 9, 12)), rng.between(0.75, 1.0)
+        return _textured_material("brick", seed, (level, level, level), 1.1, "facade")
     if cladding == "concrete":
-        level = uniform_between(0.8, 1.0, rng)
-        return _textured("concrete", choose((0, 3), rng), (level, level, level), 2.6, "facade")
+        level = rng.between(0.8, 1.0)
+        return _textured_material(
+            "concrete", rng.choose((0, 3)), (level, level, level), 2.6, "facade"
+        )
     if cladding == "stone":
-        return _textured(
-            "ashlar", 0, jitter_color(hex_to_linear(choose(_STONES.split(), rng)), 0.06, rng), 2.4
-        )
-    return _textured(
-        "plaster", 5, jitter_color(hex_to_linear(choose(tints.split(), rng)), 0.05, rng), 2.5
-    )
+        return _textured_material("ashlar", 0, draw_linear(_COLORS["stones"], 0.06, rng), 2.4)
+    return _textured_material("plaster", 5, draw_linear(tints, 0.05, rng), 2.5)
 
 
-def _base(plan: Design, wall: Material, rng: Rng) -> Material:
+def _base(plan: Design, wall: Material, rng: VariantRng) -> Material:
     if plan.trimmed or plan.cladding == "stone":
-        return _textured(
-            "ashlar", 0, jitter_color(hex_to_linear(choose(_STONES.split(), rng)), 0.06, rng), 2.4
-        )
-    if is_drawn(0.4, rng):
-        return _textured("concrete", 3, (0.72, 0.71, 0.7), 2.2)
-    darker = uniform_between(0.5, 0.7, rng)
+        return _textured_material("ashlar", 0, draw_linear(_COLORS["stones"], 0.06, rng), 2.4)
+    if rng.chance(0.4):
+        return _textured_material("concrete", 3, (0.72, 0.71, 0.7), 2.2)
+    darker = rng.between(0.5, 0.7)
     r, g, b = wall.base_color
     color = (darker * r, darker * g, darker * b)
     return Material(color, 0.9, texture=wall.texture, texture_scale_m=wall.texture_scale_m)
 
 
-def _roof(rng: Rng) -> Material:
-    color = jitter_color(hex_to_linear(choose(_ROOFS.split(), rng)), 0.08, rng)
-    texture = f"texture/roof_tiles?seed={choose((0, 1), rng)}"
+def _roof(rng: VariantRng) -> Material:
+    color = draw_linear(_COLORS["roofs"], 0.08, rng)
+    texture = f"texture/roof_tiles?seed={rng.choose((0, 1))}"
     return Material(color, roughness=0.85, texture=texture, role="roof")
 
 
-def _plain(code: str, roughness: float, role: str) -> Material:
+def _plain_material(code: str, roughness: float, role: str) -> Material:
     return Material(hex_to_linear(code), roughness=roughness, role=role)
 
 
-def _glass(color: Vec3, roughness: float) -> Material:
+def _glass_material(color: Vec3, roughness: float) -> Material:
     return Material(color, roughness=roughness, specular=0.7, role="window")
 
 
-def _textured(name: str, seed: int, color: Vec3, scale_m: float, role: str = "facade") -> Material:
+def _textured_material(
+    name: str, seed: int, color: Vec3, scale_m: float, role: str = "facade"
+) -> Material:
     texture = f"texture/{name}?seed={seed}"
     return Material(color, roughness=0.92, texture=texture, texture_scale_m=scale_m, role=role)

@@ -1,7 +1,7 @@
-"""Walls with holes, and what fills the holes: windows, doors, shop fronts, railings.
+"""Walls with openings, and windows, doors, shop fronts and railings for them.
 
-A wall's own frame: its outer plane is x = 0, +X points outward, y to the right of who stands
-before it, z up. Recesses lie at negative x.
+A wall's own frame: its outer plane is x = 0, +X points outward, y to the right of a viewer
+in front of it, z up. Recesses lie at negative x.
 """
 
 from __future__ import annotations
@@ -15,26 +15,13 @@ import numpy as np
 
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, grid
-from gen_data.generator.assets.procedural.variant_rng import choose, is_drawn, uniform_between
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.scenery.basic_shapes import Span, facing_rectangle, quad
-from gen_data.generator.core.streams import Rng
 
 (
-    FACADE,
-    BASE,
-    TRIM,
-    FRAME,
-    GLASS,
-    GLASS_TOO,
-    CURTAIN,
-    CURTAIN_TOO,
-    DOOR,
-    METAL,
-    ROOF,
-    SIGN,
-    AWNING,
-    CHIMNEY,
-) = range(14)
+    FACADE, BASE, TRIM, FRAME, GLASS, GLASS_TOO, CURTAIN, CURTAIN_TOO, DOOR, METAL, ROOF,
+    SIGN, AWNING, CHIMNEY,
+) = range(14)  # fmt: skip
 
 GLASS_SETBACK_M = 0.03
 """Panes lie this far behind the front of their frame."""
@@ -105,15 +92,11 @@ def reveal(opening: Opening, depth_m: float, slot: int = FACADE) -> Patch:
     return grid(np.array([[(x, y, z) for y, z in loop] for x in (0.0, -depth_m)]), slot=slot)
 
 
-def window(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
+def window(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
     """Reveal, frame with bars, and panes; behind some of them hang curtains."""
     depth_m = opening.recess_m + GLASS_SETBACK_M
     return join_patches(
-        [
-            reveal(opening, depth_m, slot),
-            frame(opening),
-            panes(opening, rng, -depth_m),
-        ]
+        [reveal(opening, depth_m, slot), frame(opening), panes(opening, rng, -depth_m)]
     )
 
 
@@ -143,17 +126,17 @@ def frame(opening: Opening, slot: int = FRAME) -> Patch:
     return join_patches(parts)
 
 
-def panes(opening: Opening, rng: Rng, x: float) -> Patch:
+def panes(opening: Opening, rng: VariantRng, x: float) -> Patch:
     """Glass: dark where a room lies behind, lighter where a curtain hangs."""
     (y0, y1), z = opening.y_m, opening.z_m
-    glass, curtain = choose((GLASS, GLASS, GLASS_TOO), rng), choose((CURTAIN, CURTAIN_TOO), rng)
-    drawn = choose(("open", "open", "sides", "all", "blind"), rng)
+    glass, curtain = rng.choose((GLASS, GLASS, GLASS_TOO)), rng.choose((CURTAIN, CURTAIN_TOO))
+    drawn = rng.choose(("open", "open", "sides", "all", "blind"))
     if drawn == "sides":
-        w = uniform_between(0.12, 0.3, rng) * opening.width_m
+        w = rng.between(0.12, 0.3) * opening.width_m
         strips = ((y0, y0 + w, curtain), (y0 + w, y1 - w, glass), (y1 - w, y1, curtain))
         return join_patches([facing_rectangle(x, (a, b), z, slot) for a, b, slot in strips])
     if drawn == "blind":
-        level = z[1] - uniform_between(0.15, 0.6, rng) * opening.height_m
+        level = z[1] - rng.between(0.15, 0.6) * opening.height_m
         return join_patches(
             [
                 facing_rectangle(x, (y0, y1), (z[0], level), glass),
@@ -201,14 +184,14 @@ def roller(opening: Opening, share: float) -> Patch:
     return block(low, high, slot=AWNING)
 
 
-def door(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
+def door(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
     """An entrance: reveal, leaf with a glazed or panelled field, light above, handle, step."""
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
     x = -opening.recess_m
     head = min(z1 - 0.12, z0 + 2.15)
     inset = 0.2 * opening.width_m
-    field = GLASS if is_drawn(0.5, rng) else DOOR
-    low = z0 + (0.25 if field == GLASS and is_drawn(0.5, rng) else 1.0)
+    field = GLASS if rng.chance(0.5) else DOOR
+    low = z0 + (0.25 if field == GLASS and rng.chance(0.5) else 1.0)
     step = block((x, y0, 0.0), (0.25, y1, z0 + 0.01), slot=BASE)
     return join_patches(
         [
@@ -223,13 +206,13 @@ def door(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
     )
 
 
-def shop_front(opening: Opening, rng: Rng, slot: int = FACADE) -> Patch:
+def shop_front(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
     """A display window: stall riser, frame, large panes."""
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
-    riser = z0 + uniform_between(0.12, 0.5, rng)
+    riser = z0 + rng.between(0.12, 0.5)
     glazed = Opening((y0, y1), (riser, z1), opening.recess_m, opening.upright, opening.level)
     depth_m = opening.recess_m + GLASS_SETBACK_M
-    shown = [(GLASS, z1), (choose((GLASS_TOO, CURTAIN), rng), riser + 0.28 * (z1 - riser))]
+    shown = [(GLASS, z1), (rng.choose((GLASS_TOO, CURTAIN)), riser + 0.28 * (z1 - riser))]
     return join_patches(
         [
             reveal(opening, depth_m, slot),
@@ -288,7 +271,9 @@ def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
     return join_patches([slab, railing(y_m, z0, out_m - 0.04), *ends])
 
 
-def oriel(y_m: Span, z_m: Span, out_m: float, openings: Sequence[Opening], rng: Rng) -> Patch:
+def oriel(
+    y_m: Span, z_m: Span, out_m: float, openings: Sequence[Opening], rng: VariantRng
+) -> Patch:
     """A box before the wall, with windows in its front, a corbel below and a lid."""
     (y0, y1), (z0, z1) = y_m, z_m
     front = [cut_openings(y_m, z_m, openings), *(window(o, rng) for o in openings)]
@@ -307,7 +292,7 @@ def oriel(y_m: Span, z_m: Span, out_m: float, openings: Sequence[Opening], rng: 
     )
 
 
-def attic_window(y_m: Span, z_m: Span, rng: Rng) -> Patch:
+def attic_window(y_m: Span, z_m: Span, rng: VariantRng) -> Patch:
     """A small window set on a gable: pane between the bars of a frame that stands out."""
     (y0, y1), (z0, z1) = y_m, z_m
     bars = [((y0, y0 + 0.08), z_m), ((y1 - 0.08, y1), z_m)]

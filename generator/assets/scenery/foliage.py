@@ -73,7 +73,7 @@ def leaf_mesh(sprays: Sprays, materials: Sequence[Material], width: float, rng: 
 
 @dataclass(frozen=True, slots=True)
 class Habit:
-    """How a plant wears its leaves.
+    """Arrangement of a plant's leaves.
 
     Attributes:
         count: How many sprays.

@@ -1,4 +1,4 @@
-"""Roofs and what stands on them.
+"""Roofs, dormers and chimneys.
 
 All of them lie over a rectangle about the Z axis, ``depth_m`` along X and ``width_m`` along Y,
 whose walls end at height 0. Tiles follow texture coordinates: u along the eaves, v up the slope,
@@ -15,6 +15,7 @@ import numpy as np
 
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, fan
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.scenery.basic_shapes import Span, post, quad
 from gen_data.generator.assets.scenery.facade import (
     BASE,
@@ -29,7 +30,6 @@ from gen_data.generator.assets.scenery.facade import (
     panes,
     reveal,
 )
-from gen_data.generator.core.streams import Rng
 
 TILE_REPEAT_M = 1.8
 Point = tuple[float, float]
@@ -47,15 +47,8 @@ def mansard_profile(depth_m: float, height_m: float, eaves_m: float) -> list[Poi
     half = 0.5 * depth_m
     knee, rise = half - 0.36 * height_m, height_m
     ridge = rise + 0.32 * knee
-    return [
-        (half + eaves_m, -0.1),
-        (half - 0.05, 0.12),
-        (knee, rise),
-        (0.0, ridge),
-        (-knee, rise),
-        (0.05 - half, 0.12),
-        (-half - eaves_m, -0.1),
-    ]
+    return [(half + eaves_m, -0.1), (half - 0.05, 0.12), (knee, rise), (0.0, ridge),
+            (-knee, rise), (0.05 - half, 0.12), (-half - eaves_m, -0.1)]  # fmt: skip
 
 
 def over_profile(profile: Sequence[Point], width_m: float, verge_m: float, thick_m: float) -> Patch:
@@ -99,13 +92,13 @@ def hip(depth_m: float, width_m: float, pitch_rad: float, eaves_m: float) -> Pat
     slope = x / math.cos(pitch_rad) / TILE_REPEAT_M
     u = (0.0, 2 * y / TILE_REPEAT_M)
     front = quad([(x, -y, low), (x, y, low), (0, ridge, top), (0, -ridge, top)], ROOF, (u, (0, 1)))
-    front = _slope_mapped(front, axis=1, v_top=slope, z_m=(low, top))
+    front = _map_slope(front, axis=1, v_top=slope, z_m=(low, top))
     side = Patch(
         np.array([[(x, y, low), (-x, y, low), (0.0, ridge, top)]]),
         np.zeros((1, 3, 2)),
         np.array([ROOF]),
     )
-    side = _slope_mapped(side, axis=0, v_top=slope, z_m=(low, top))
+    side = _map_slope(side, axis=0, v_top=slope, z_m=(low, top))
     half = join_patches([front, side])
     rim = block((-x, -y, low - thick), (x, y, low - 0.001), slot=METAL)
     return join_patches([half, half.rotated("z", math.pi), rim])
@@ -134,7 +127,7 @@ def chimney(x: float, y: float, z_m: Span) -> Patch:
     return join_patches([stack, plate.painted(TRIM), pot.painted(METAL)])
 
 
-def dormer(x: float, y: float, z0: float, reach_m: float, rng: Rng) -> Patch:
+def dormer(x: float, y: float, z0: float, reach_m: float, rng: VariantRng) -> Patch:
     """A small window house that looks out of a slope towards +X.
 
     Args:
@@ -186,7 +179,7 @@ def _gables(profile: Sequence[Point], width_m: float, thick_m: float) -> list[Pa
     return walls
 
 
-def _slope_mapped(patch: Patch, axis: int, v_top: float, z_m: Span) -> Patch:
+def _map_slope(patch: Patch, axis: int, v_top: float, z_m: Span) -> Patch:
     """The patch with u along an axis and v with the height."""
     corners: Array = patch.corners_m
     u = corners[..., axis] / TILE_REPEAT_M

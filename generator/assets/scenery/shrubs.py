@@ -6,22 +6,16 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, patterned_material
 from gen_data.generator.assets.procedural.noise import uniform
 from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import ball, block, rounded_box
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.scenery.foliage import Habit, leaf_mesh, merge_meshes, sprays_about
 from gen_data.generator.assets.scenery.trees import leaf_greens
 from gen_data.generator.core.asset_types import ConvexParts, Material
-from gen_data.generator.core.streams import Rng
 
 _GREENS = (
     ("#26331d", "#344527", "#455833", "#586c42"),
@@ -34,35 +28,29 @@ _FLOWERS = ("#b33a4a", "#d8c7d9", "#d9b23a", "#9a4f9c", "#e6e2dc")
 def hedge(seed: int) -> Solid:
     """A clipped hedge along Y, 1.5-4 m long. Slots: core, then shades of leaf."""
     rng = variant_rng("hedge", seed)
-    size = (
-        uniform_between(0.5, 0.9, rng),
-        uniform_between(1.5, 4.0, rng),
-        uniform_between(0.8, 1.8, rng),
-    )
+    size = (rng.between(0.5, 0.9), rng.between(1.5, 4.0), rng.between(0.8, 1.8))
     core = rounded_box((size[0] - 0.1, size[1] - 0.08, size[2] - 0.05), 0.12, 2)
     core = core.moved(z=0.5 * (size[2] - 0.05))
     anchors = _skin(size, 700, rng)
     middle = np.array([0.0, 0.0, 0.4 * size[2]])
-    hull = collision_hulls.box(
-        (-0.5 * size[0], -0.5 * size[1], 0.0), (0.5 * size[0], 0.5 * size[1], size[2])
-    )
+    hull = hulls.box((-0.5 * size[0], -0.5 * size[1], 0.0), (0.5 * size[0], 0.5 * size[1], size[2]))
     return _leafy(core, anchors, middle, 2600, 0.1, hull, rng)
 
 
 def bush(seed: int) -> Solid:
     """A free-growing shrub, 0.7-1.8 m high. Slots: core, then shades of leaf."""
     rng = variant_rng("bush", seed)
-    h = uniform_between(0.7, 1.8, rng)
+    h = rng.between(0.7, 1.8)
     lobes = []
     for k in range(5):
-        turn = 2.0 * math.pi * (k + uniform_between(-0.3, 0.3, rng)) / 5
-        r = uniform_between(0.24, 0.36, rng) * h
-        away = uniform_between(0.2, 0.34, rng) * h if k else 0.0
-        z = max(r, uniform_between(0.35, 0.62, rng) * h)
+        turn = 2.0 * math.pi * (k + rng.between(-0.3, 0.3)) / 5
+        r = rng.between(0.24, 0.36) * h
+        away = rng.between(0.2, 0.34) * h if k else 0.0
+        z = max(r, rng.between(0.35, 0.62) * h)
         lobes.append((away * math.cos(turn), away * math.sin(turn), z, r))
     core = join_patches([_round(x, y, z, 0.82 * r) for x, y, z, r in lobes])
     anchors = np.concatenate([_shell(x, y, z, r, 90, rng) for x, y, z, r in lobes])
-    hull = collision_hulls.frustum((0.45 * h, 0.0), (0.4 * h, 0.9 * h), 12)
+    hull = hulls.frustum((0.45 * h, 0.0), (0.4 * h, 0.9 * h), 12)
     middle = np.array([0.0, 0.0, 0.3 * h])
     return _leafy(core, anchors, middle, 2400, 0.12 + 0.03 * h, hull, rng)
 
@@ -70,11 +58,7 @@ def bush(seed: int) -> Solid:
 def planter(seed: int) -> Solid:
     """A tub or trough with a plant, flowering in some. Slots: tub, soil and core, leaves."""
     rng = variant_rng("planter", seed)
-    w, long, h = (
-        uniform_between(0.45, 0.6, rng),
-        uniform_between(0.6, 1.4, rng),
-        uniform_between(0.4, 0.6, rng),
-    )
+    w, long, h = (rng.between(0.45, 0.6), rng.between(0.6, 1.4), rng.between(0.4, 0.6))
     tub = [
         block((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h - 0.05), 0.012),
         block(
@@ -85,22 +69,22 @@ def planter(seed: int) -> Solid:
     ]
     spots = max(2, round(long / 0.35))
     heads = [
-        (0.0, (k + 0.5) * long / spots - 0.5 * long, h + 0.08, uniform_between(0.18, 0.26, rng))
+        (0.0, (k + 0.5) * long / spots - 0.5 * long, h + 0.08, rng.between(0.18, 0.26))
         for k in range(spots)
     ]
     core = join_patches([*(_round(*head[:3], 0.8 * head[3]).painted(1) for head in heads), *tub])
     anchors = np.concatenate([_shell(*head, 60, rng) for head in heads])
     anchors = anchors[anchors[:, 2] > h]
-    hull = collision_hulls.box((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h))
+    hull = hulls.box((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h))
     stuff = (
         patterned_material("texture/concrete?seed=3", 1.5, 0.9, (0.8, 0.78, 0.75)),
         patterned_material("texture/wood_grain?seed=5", 1.2, 0.8, (0.5, 0.42, 0.36)),
     )
     greens = _shades(rng)
-    if is_drawn(0.6, rng):
-        blossom = Material(hex_to_linear(choose(_FLOWERS, rng)), roughness=0.8, role="leaf")
+    if rng.chance(0.6):
+        blossom = Material(hex_to_linear(rng.choose(_FLOWERS)), roughness=0.8, role="leaf")
         greens = (*greens[:3], blossom)
-    mesh = finish_mesh(core, (choose(stuff, rng), _core_material(greens)), 50.0)
+    mesh = finish_mesh(core, (rng.choose(stuff), _core_material(greens)), 50.0)
     sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), Habit(620, 0.095, 0.07), rng)
     return Solid(
         merge_meshes(mesh, leaf_mesh(sprays, greens, 0.7, rng)), ConvexParts((np.round(hull, 6),))
@@ -108,7 +92,13 @@ def planter(seed: int) -> Solid:
 
 
 def _leafy(
-    core: Patch, anchors: Array, middle: Array, count: int, length: float, hull: Array, rng: Rng
+    core: Patch,
+    anchors: Array,
+    middle: Array,
+    count: int,
+    length: float,
+    hull: Array,
+    rng: VariantRng,
 ) -> Solid:
     greens = _shades(rng)
     mesh = finish_mesh(core, (_core_material(greens),), 70.0)
@@ -117,12 +107,12 @@ def _leafy(
     return Solid(merge_meshes(mesh, leaves), ConvexParts((np.round(hull, 6),)))
 
 
-def _shades(rng: Rng) -> tuple[Material, ...]:
-    return leaf_greens(choose(_GREENS, rng), rng)
+def _shades(rng: VariantRng) -> tuple[Material, ...]:
+    return leaf_greens(rng.choose(_GREENS), rng)
 
 
 def _core_material(greens: tuple[Material, ...]) -> Material:
-    """What shows between the leaves: the same green, deeper."""
+    """Material that shows between the leaves: the same green, darker."""
     r, g, b = greens[1].base_color
     return Material(
         (1.1 * r, 1.1 * g, 1.1 * b),
@@ -134,7 +124,7 @@ def _core_material(greens: tuple[Material, ...]) -> Material:
     )
 
 
-def _skin(size: tuple[float, float, float], count: int, rng: Rng) -> Array:
+def _skin(size: tuple[float, float, float], count: int, rng: VariantRng) -> Array:
     """Points on the sides and the top of a box that stands on the ground, by area."""
     x, y, z = size
     areas = np.array([x * y, x * z, x * z, y * z, y * z])
@@ -148,7 +138,7 @@ def _skin(size: tuple[float, float, float], count: int, rng: Rng) -> Array:
     return np.stack([px, py, pz], axis=1)
 
 
-def _shell(x: float, y: float, z: float, r: float, count: int, rng: Rng) -> Array:
+def _shell(x: float, y: float, z: float, r: float, count: int, rng: VariantRng) -> Array:
     """Points on a ball."""
     level = 2.0 * uniform(count, rng) - 1.0
     turn = 2.0 * math.pi * uniform(count, rng)

@@ -1,28 +1,27 @@
 """Traffic signs: shaped plates on poles, their faces drawn by ``textures.sign_faces``.
 
 Shapes and meanings: Vienna Convention on Road Signs and Signals, 1968. Sizes: German VwV-StVO,
-size 2 (discs of 600 mm, triangles with sides of 900 mm). Faces look to +X.
+size 2 (discs of 600 mm, triangles with sides of 900 mm). Faces point to +X.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import circle, grid
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 
 Shape = Literal["disc", "octagon", "triangle", "yield", "diamond", "square", "wide"]
 Kind = Literal["regulatory", "mandatory", "warning", "information"]
@@ -30,47 +29,22 @@ Kind = Literal["regulatory", "mandatory", "warning", "information"]
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """What a sign's plate is like.
+    """One kind of sign.
 
     Attributes:
-        kind: Its group in the convention.
-        size_m: Width of the square that its image fills.
+        shape: Outline of the plate.
+        kind: Group in the convention.
+        face: Steps of drawing the face, see ``signs.yaml``.
+        size_m: Width of the square that the image fills.
     """
 
     shape: Shape
     kind: Kind
+    face: tuple[Any, ...]
     size_m: float = 0.6
 
 
-SIGNS: Mapping[str, Sign] = {
-    "speed_limit_30": Sign("disc", "regulatory"),
-    "speed_limit_50": Sign("disc", "regulatory"),
-    "speed_limit_70": Sign("disc", "regulatory"),
-    "speed_limit_100": Sign("disc", "regulatory"),
-    "no_entry": Sign("disc", "regulatory"),
-    "no_vehicles": Sign("disc", "regulatory"),
-    "no_stopping": Sign("disc", "regulatory"),
-    "no_parking": Sign("disc", "regulatory"),
-    "stop": Sign("octagon", "regulatory", 0.75),
-    "yield": Sign("yield", "regulatory", 0.9),
-    "priority_road": Sign("diamond", "regulatory", 0.72),
-    "straight_ahead": Sign("disc", "mandatory"),
-    "turn_right": Sign("disc", "mandatory"),
-    "keep_right": Sign("disc", "mandatory"),
-    "roundabout": Sign("disc", "mandatory"),
-    "cycle_path": Sign("disc", "mandatory"),
-    "foot_path": Sign("disc", "mandatory"),
-    "danger": Sign("triangle", "warning", 0.9),
-    "right_curve": Sign("triangle", "warning", 0.9),
-    "pedestrians": Sign("triangle", "warning", 0.9),
-    "signals_ahead": Sign("triangle", "warning", 0.9),
-    "crossroads": Sign("triangle", "warning", 0.9),
-    "parking": Sign("square", "information"),
-    "pedestrian_crossing": Sign("square", "information"),
-    "dead_end": Sign("square", "information"),
-    "zone_30": Sign("square", "regulatory"),
-    "one_way": Sign("wide", "information", 0.8),
-}
+SIGNS = load_table(__package__, "signs", Sign)
 
 _THICK_M = 0.004
 _ROOT3 = math.sqrt(3.0)
@@ -89,7 +63,7 @@ def traffic_sign(seed: int, sign: str) -> Solid:
     half_high = float(outline[:, 1].max())
     foot = float(-outline[:, 1].min())
     # Over a pavement the lower edge hangs 2.0-2.2 m high, so that people walk below.
-    centre_z = uniform_between(2.0, 2.2, rng) + foot
+    centre_z = rng.between(2.0, 2.2) + foot
     face = _plate(outline, made.size_m).moved(0.045, 0.0, centre_z)
     pole = post(0.03, (0.0, centre_z + half_high - 0.02), sides=10).painted(2)
     image = Material(
@@ -99,7 +73,7 @@ def traffic_sign(seed: int, sign: str) -> Solid:
         printed=True,
         role="sign",
     )
-    hull = collision_hulls.frustum((0.03, 0.0), (0.03, centre_z + half_high - 0.02), 8)
+    hull = hulls.frustum((0.03, 0.0), (0.03, centre_z + half_high - 0.02), 8)
     return make_solid([face, pole], (image, painted_material("#8c8f90", 0.6), GALVANISED), [hull])
 
 
@@ -112,12 +86,8 @@ def traffic_sign_facts(seed: int, sign: str) -> Facts:
 def sign_name(seed: int, sign: str) -> str:
     """The name of a sign; by seed for ``any``. Raises AssetError for an unknown one."""
     if sign == "any":
-        return list(SIGNS)[seed % len(SIGNS)]
-    if sign not in SIGNS:
-        raise AssetError(
-            f"traffic_sign: there is no sign '{sign}'{did_you_mean(sign, SIGNS)}; expected any or "
-            f"one of {', '.join(SIGNS)}"
-        )
+        return in_turn(list(SIGNS), seed)
+    check_option("traffic_sign", "sign", sign, ("any", *SIGNS))
     return sign
 
 
@@ -129,13 +99,13 @@ def plate_outline(shape: Shape) -> Array:
         sign = 1.0 if shape == "triangle" else -1.0
         height = 0.5 * _ROOT3
         corners = np.array([(-0.5, -0.5 * height), (0.5, -0.5 * height), (0.0, 0.5 * height)])
-        return _blunted(corners * np.array([1.0, sign]), 0.045)[:: round(sign)]
+        return _round_corners(corners * np.array([1.0, sign]), 0.045)[:: round(sign)]
     if shape == "diamond":
-        return _blunted(np.array([(0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)]), 0.04)
+        return _round_corners(np.array([(0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)]), 0.04)
     if shape in ("square", "wide"):
         high = 0.5 if shape == "square" else 0.15
         corners = np.array([(-0.5, -high), (0.5, -high), (0.5, high), (-0.5, high)])
-        return _blunted(corners, 0.03)
+        return _round_corners(corners, 0.03)
     return circle(0.5, 28)
 
 
@@ -153,7 +123,7 @@ def _plate(outline: Array, size_m: float) -> Patch:
     return join_patches([face, rear.painted(1), rim.painted(1)])
 
 
-def _blunted(corners: Array, radius: float) -> Array:
+def _round_corners(corners: Array, radius: float) -> Array:
     """A polygon with its corners cut off by short arcs, [n * 4, 2]."""
     made = []
     for before, corner, after in zip(

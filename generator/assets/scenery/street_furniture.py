@@ -1,6 +1,6 @@
 """Street furniture. Sizes after manufacturers' catalogues and the standards named below.
 
-Everything stands on the origin; what has a front shows it to +X.
+Everything stands on the origin; fronts face +X.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import (
     metal_material,
@@ -18,12 +18,7 @@ from gen_data.generator.assets.procedural.material_presets import (
 )
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, cone, lathe, rounded_box
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post, tube
 from gen_data.generator.core.asset_types import Keypoint, Material
 
@@ -35,18 +30,18 @@ _IRON_PAINTS = ("#2f3234", "#3b3d3f", "#2f4236", "#55585a")
 def street_light(seed: int) -> Solid:
     """A lamp on a mast of 6-8 m. Slots: mast, lamp. Keypoint ``lamp``."""
     rng = variant_rng("street_light", seed)
-    height, reach = uniform_between(6.0, 8.0, rng), uniform_between(0.8, 1.8, rng)
+    height, reach = rng.between(6.0, 8.0), rng.between(0.8, 1.8)
     mast = lathe(
         [(0.0, 0.0), (0.085, 0.0), (0.085, 1.1), (0.06, 1.16), (0.038, height), (0.0, height)], 12
     )
-    style = choose(("arm", "arm", "curved", "top"), rng)
+    style = rng.choose(("arm", "arm", "curved", "top"))
     if style == "top":
         head, lens, at = _post_top(height)
     else:
         head, lens, at = _arm_head(height, reach, rise=0.5 if style == "curved" else 0.12)
-    finish = GALVANISED if is_drawn(0.5, rng) else painted_material(choose(_IRON_PAINTS, rng), 0.5)
+    finish = GALVANISED if rng.chance(0.5) else painted_material(rng.choose(_IRON_PAINTS), 0.5)
     glass = Material((0.75, 0.76, 0.74), roughness=0.2, role="lamp")
-    hull = collision_hulls.frustum((0.085, 0.0), (0.04, height), 12)
+    hull = hulls.frustum((0.085, 0.0), (0.04, height), 12)
     lamp = Keypoint("lamp", at, 0.1)
     return make_solid([mast, head, lens.painted(1)], (finish, glass), [hull], (lamp,))
 
@@ -55,39 +50,37 @@ def litter_bin(seed: int) -> Solid:
     """A litter bin on a post, or standing. Slots: body, post, liner."""
     rng = variant_rng("litter_bin", seed)
     color = painted_material(
-        choose(("#3a5a40", "#d9702b", "#44484a", "#2f3234", "#6b7073"), rng), 0.45
+        rng.choose(("#3a5a40", "#d9702b", "#44484a", "#2f3234", "#6b7073")), 0.45
     )
     dark = painted_material("#161718", 0.8)
-    if is_drawn(0.5, rng):
-        r, h = uniform_between(0.16, 0.21, rng), uniform_between(0.45, 0.55, rng)
+    if rng.chance(0.5):
+        r, h = rng.between(0.16, 0.21), rng.between(0.45, 0.55)
         z = 0.95 - h + 0.15
         shell = [(0.0, z), (0.85 * r, z), (r, z + h), (0.9 * r, z + h), (0.9 * r, z + h - 0.08)]
         body = lathe([*shell, (0.0, z + h - 0.08)], 18).moved(r + 0.04)
         mast = post(0.03, (0.0, 1.2), sides=8)
         parts = [body, mast.painted(1), _bracket(r, z).painted(1)]
-        hull = collision_hulls.frustum((r, z), (r, z + h), 12) + np.array([r + 0.04, 0.0, 0.0])
+        hull = hulls.frustum((r, z), (r, z + h), 12) + np.array([r + 0.04, 0.0, 0.0])
         return make_solid(parts, (color, GALVANISED, dark), [hull])
-    r, h = uniform_between(0.22, 0.3, rng), uniform_between(0.75, 0.95, rng)
+    r, h = rng.between(0.22, 0.3), rng.between(0.75, 0.95)
     profile = [(0.0, 0.0), (0.9 * r, 0.0), (r, 0.06), (r, h), (0.9 * r, h), (0.88 * r, h - 0.12)]
     body = lathe([*profile, (0.0, h - 0.12)], 20)
     hood = lathe([(0.0, h + 0.16), (r, h + 0.16), (r, h + 0.19), (0.0, h + 0.26)], 20)
     stays = [post(0.012, (h - 0.02, h + 0.17), (0.93 * r * x, 0.93 * r * y, 0.0), 5)
              for x, y in ((1, 0), (-0.5, 0.866), (-0.5, -0.866))]  # fmt: skip
     parts = [body, hood, *(stay.painted(1) for stay in stays)]
-    return make_solid(
-        parts, (color, GALVANISED, dark), [collision_hulls.frustum((r, 0.0), (r, h), 12)]
-    )
+    return make_solid(parts, (color, GALVANISED, dark), [hulls.frustum((r, 0.0), (r, h), 12)])
 
 
 def bench(seed: int) -> Solid:
     """A park bench, sat on from +X. Slots: slats, frame."""
     rng = variant_rng("bench", seed)
-    half, seat = 0.5 * uniform_between(1.5, 2.0, rng), uniform_between(0.42, 0.46, rng)
+    half, seat = 0.5 * rng.between(1.5, 2.0), rng.between(0.42, 0.46)
     parts = []
     for k in range(4):
         x = -0.18 + 0.115 * k
         parts.append(block((x, -half, seat - 0.03), (x + 0.09, half, seat), 0.008))
-    if is_drawn(0.75, rng):
+    if rng.chance(0.75):
         for k in range(3):
             z, x = seat + 0.14 + 0.12 * k, -0.24 - 0.03 * k
             parts.append(block((x, -half, z), (x + 0.03, half, z + 0.09), 0.008))
@@ -102,31 +95,20 @@ def bench(seed: int) -> Solid:
         ]
         parts += [leg.painted(1) for leg in legs]
     wood = patterned_material(
-        f"texture/wood_grain?seed={choose((2, 5), rng)}", 1.2, 0.7, (0.75, 0.72, 0.7)
+        f"texture/wood_grain?seed={rng.choose((2, 5))}", 1.2, 0.7, (0.75, 0.72, 0.7)
     )
-    hull = collision_hulls.box((-0.34, -half, 0.0), (0.27, half, seat))
-    return make_solid(parts, (wood, painted_material(choose(_IRON_PAINTS, rng), 0.5)), [hull])
+    hull = hulls.box((-0.34, -half, 0.0), (0.27, half, seat))
+    return make_solid(parts, (wood, painted_material(rng.choose(_IRON_PAINTS), 0.5)), [hull])
 
 
 def hydrant(seed: int) -> Solid:
     """A pillar hydrant with two outlets (EN 14384). Slots: body, caps."""
     rng = variant_rng("hydrant", seed)
-    h = uniform_between(0.75, 0.95, rng)
-    profile = [
-        (0.0, 0.0),
-        (0.16, 0.0),
-        (0.16, 0.04),
-        (0.105, 0.06),
-        (0.1, 0.62 * h),
-        (0.135, 0.65 * h),
-    ]
-    profile += [
-        (0.135, 0.72 * h),
-        (0.11, 0.74 * h),
-        (0.1, 0.9 * h),
-        (0.05, 0.97 * h),
-        (0.0, 0.97 * h),
-    ]
+    h = rng.between(0.75, 0.95)
+    profile = [(0.0, 0.0), (0.16, 0.0), (0.16, 0.04), (0.105, 0.06), (0.1, 0.62 * h),
+               (0.135, 0.65 * h)]  # fmt: skip
+    profile += [(0.135, 0.72 * h), (0.11, 0.74 * h), (0.1, 0.9 * h), (0.05, 0.97 * h),
+                (0.0, 0.97 * h)]  # fmt: skip
     body = lathe(profile, 18)
     outlet = lathe(
         [(0.0, 0.0), (0.045, 0.0), (0.045, 0.1), (0.06, 0.1), (0.06, 0.16), (0.0, 0.16)], 12
@@ -137,55 +119,44 @@ def hydrant(seed: int) -> Solid:
     ]
     front = outlet.scaled(1.3, 1.3, 1.0).rotated("y", 0.5 * math.pi).moved(0.06, 0.0, 0.5 * h)
     cap = cone((0.03, 0.96 * h), (0.03, h), 6)
-    paint = choose(("#b3201b", "#b3201b", "#c9a227", "#2c5c94"), rng)
-    caps = choose(("#b3201b", "#c8cacb", "#d0cfc8"), rng)
+    paint = rng.choose(("#b3201b", "#b3201b", "#c9a227", "#2c5c94"))
+    caps = rng.choose(("#b3201b", "#c8cacb", "#d0cfc8"))
     parts = [body, front.painted(1), cap.painted(1), *(o.painted(1) for o in outlets)]
-    hull = collision_hulls.frustum((0.15, 0.0), (0.12, h), 12)
+    hull = hulls.frustum((0.15, 0.0), (0.12, h), 12)
     return make_solid(parts, (painted_material(paint, 0.4), painted_material(caps, 0.4)), [hull])
 
 
 def bollard(seed: int) -> Solid:
     """A bollard: iron with a cap, steel with a reflecting band, or stone. Slots: body, band."""
     rng = variant_rng("bollard", seed)
-    h, kind = uniform_between(0.8, 1.0, rng), _bollard_kind(seed)
+    h, kind = rng.between(0.8, 1.0), _bollard_kind(seed)
     if kind == "stone":
-        r = uniform_between(0.13, 0.18, rng)
+        r = rng.between(0.13, 0.18)
         body = lathe(
             [(0.0, 0.0), (r, 0.0), (0.92 * r, 0.7 * h), (0.6 * r, 0.82 * h), (0.0, 0.86 * h)], 18
         )
         stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9, (0.9, 0.88, 0.85))
-        return make_solid(
-            [body], (stone,), [collision_hulls.frustum((r, 0.0), (0.9 * r, 0.8 * h), 12)]
-        )
-    r = uniform_between(0.035, 0.055, rng)
+        return make_solid([body], (stone,), [hulls.frustum((r, 0.0), (0.9 * r, 0.8 * h), 12)])
+    r = rng.between(0.035, 0.055)
     if kind == "iron":
         r = 1.4 * r
         profile = [(0.0, 0.0), (1.5 * r, 0.0), (1.5 * r, 0.12), (r, 0.16), (0.85 * r, 0.85 * h)]
-        profile += [
-            (1.1 * r, 0.87 * h),
-            (1.1 * r, 0.9 * h),
-            (0.6 * r, 0.91 * h),
-            (0.95 * r, 0.96 * h),
-            (0.0, h),
-        ]
+        profile += [(1.1 * r, 0.87 * h), (1.1 * r, 0.9 * h), (0.6 * r, 0.91 * h),
+                    (0.95 * r, 0.96 * h), (0.0, h)]  # fmt: skip
         parts = [lathe(profile, 16)]
     else:
         band = lathe(
-            [
-                (r + 0.001, 0.72 * h),
-                (r + 0.003, 0.73 * h),
-                (r + 0.003, 0.84 * h),
-                (r + 0.001, 0.85 * h),
-            ],
+            [(r + 0.001, 0.72 * h), (r + 0.003, 0.73 * h), (r + 0.003, 0.84 * h),
+             (r + 0.001, 0.85 * h)],
             14,
-        )
+        )  # fmt: skip
         parts = [
             lathe([(0.0, 0.0), (r, 0.0), (r, h - 0.01), (0.8 * r, h), (0.0, h)], 14),
             band.painted(1),
         ]
-    paint = painted_material(choose((*_IRON_PAINTS, "#7b7f82"), rng), 0.45)
-    stripe = painted_material(choose(("#b3201b", "#e8e7e2"), rng), 0.35)
-    return make_solid(parts, (paint, stripe), [collision_hulls.frustum((1.2 * r, 0.0), (r, h), 12)])
+    paint = painted_material(rng.choose((*_IRON_PAINTS, "#7b7f82")), 0.45)
+    stripe = painted_material(rng.choose(("#b3201b", "#e8e7e2")), 0.35)
+    return make_solid(parts, (paint, stripe), [hulls.frustum((1.2 * r, 0.0), (r, h), 12)])
 
 
 def bollard_facts(seed: int) -> Facts:
@@ -196,7 +167,7 @@ def bollard_facts(seed: int) -> Facts:
 def traffic_cone(seed: int) -> Solid:
     """A traffic cone with two white sleeves (EN 13422). Slots: orange, white, foot."""
     rng = variant_rng("cone", seed)
-    h = choose((0.5, 0.75, 0.75), rng)
+    h = rng.choose((0.5, 0.75, 0.75))
     half = 0.27 * h + 0.06
     profile = [
         (0.235 * h * (1 - t) + 0.045 * h * t, 0.04 + t * (h - 0.04))
@@ -211,10 +182,10 @@ def traffic_cone(seed: int) -> Solid:
     )
     foot = rounded_box((2 * half, 2 * half, 0.04), 0.012, 1).moved(z=0.02).painted(2)
     orange, white = painted_material("#e2561b", 0.6), painted_material("#e6e6e2", 0.4)
-    base = painted_material(choose(("#c94d1a", "#232425"), rng), 0.8)
+    base = painted_material(rng.choose(("#c94d1a", "#232425")), 0.8)
     hull = [
-        collision_hulls.frustum((0.235 * h, 0.04), (0.045 * h, h), 12),
-        collision_hulls.box((-half, -half, 0.0), (half, half, 0.04)),
+        hulls.frustum((0.235 * h, 0.04), (0.045 * h, h), 12),
+        hulls.box((-half, -half, 0.0), (half, half, 0.04)),
     ]
     return make_solid([*pieces, tip, foot], (orange, white, base), hull)
 
@@ -222,22 +193,18 @@ def traffic_cone(seed: int) -> Solid:
 def post_box(seed: int) -> Solid:
     """A letter box on two legs or on a wall post. Slots: body, flap, legs."""
     rng = variant_rng("post_box", seed)
-    w, d, h = (
-        uniform_between(0.45, 0.6, rng),
-        uniform_between(0.3, 0.4, rng),
-        uniform_between(0.6, 0.75, rng),
-    )
-    z = uniform_between(0.65, 0.8, rng)
+    w, d, h = (rng.between(0.45, 0.6), rng.between(0.3, 0.4), rng.between(0.6, 0.75))
+    z = rng.between(0.65, 0.8)
     body = rounded_box((d, w, h), 0.03, 2).moved(z=z + 0.5 * h)
     x = 0.5 * d
     flap = block((x, -0.4 * w, z + 0.68 * h), (x + 0.03, 0.4 * w, z + 0.82 * h), 0.008).painted(1)
     plate = facing_rectangle(x + 0.003, (-0.25 * w, 0.25 * w), (z + 0.25 * h, z + 0.5 * h), 1)
     legs = [block((-0.04, y - 0.03, 0.0), (0.04, y + 0.03, z + 0.05)) for y in (-0.3 * w, 0.3 * w)]
-    color, trim = choose(
-        (("#e0b21c", "#2b2b2b"), ("#b3201b", "#d8d6cf"), ("#274b8f", "#e0dfda")), rng
+    color, trim = rng.choose(
+        (("#e0b21c", "#2b2b2b"), ("#b3201b", "#d8d6cf"), ("#274b8f", "#e0dfda"))
     )
     parts = [body, flap, plate, *(leg.painted(2) for leg in legs)]
-    hull = collision_hulls.box((-x, -0.5 * w, 0.0), (x, 0.5 * w, z + h))
+    hull = hulls.box((-x, -0.5 * w, 0.0), (x, 0.5 * w, z + h))
     return make_solid(
         parts, (painted_material(color, 0.4), painted_material(trim, 0.5), GALVANISED), [hull]
     )
@@ -246,11 +213,7 @@ def post_box(seed: int) -> Solid:
 def bus_stop(seed: int) -> Solid:
     """A shelter, open to +X, with a seat. Slots: frame, glass, roof, seat, panel."""
     rng = variant_rng("bus_stop", seed)
-    half, d, h = (
-        0.5 * uniform_between(3.2, 4.2, rng),
-        uniform_between(1.3, 1.6, rng),
-        uniform_between(2.35, 2.55, rng),
-    )
+    half, d, h = (0.5 * rng.between(3.2, 4.2), rng.between(1.3, 1.6), rng.between(2.35, 2.55))
     x = 0.5 * d
     posts = [block((px - 0.03, y - 0.03, 0.0), (px + 0.03, y + 0.03, h))
              for px in (-x, x - 0.25) for y in (-half, -half / 3, half / 3, half)
@@ -286,36 +249,32 @@ def bus_stop(seed: int) -> Solid:
         role="sign",
     )
     walls = [
-        collision_hulls.box((-x - 0.03, -half, 0.0), (-x + 0.03, half, h)),
-        collision_hulls.box((-x, -half, h), (x, half, h + 0.1)),
+        hulls.box((-x - 0.03, -half, 0.0), (-x + 0.03, half, h)),
+        hulls.box((-x, -half, h), (x, half, h + 0.1)),
     ]
-    frame = painted_material(choose(_IRON_PAINTS, rng), 0.45)
+    frame = painted_material(rng.choose(_IRON_PAINTS), 0.45)
     return make_solid(parts, (frame, glass, painted_material("#5f6365", 0.5), wood, art), walls)
 
 
 def utility_pole(seed: int) -> Solid:
     """A wooden pole with cross-arms and insulators. Slots: wood, insulators."""
     rng = variant_rng("utility_pole", seed)
-    h = uniform_between(8.0, 10.0, rng)
+    h = rng.between(8.0, 10.0)
     pole = cone((0.14, 0.0), (0.1, h), 12)
     parts = []
-    for z in (h - 0.3, h - 1.0)[: choose((1, 2), rng)]:
+    for z in (h - 0.3, h - 1.0)[: rng.choose((1, 2))]:
         parts.append(block((-0.06, -0.9, z - 0.05), (0.06, 0.9, z + 0.05)))
         for y in (-0.8, -0.35, 0.35, 0.8):
             parts.append(post(0.035, (z + 0.05, z + 0.2), (0.0, y, 0.0), 8).painted(1))
     bark = patterned_material("texture/bark?seed=1", 1.0, 0.9, (0.17, 0.13, 0.1))
-    hull = collision_hulls.frustum((0.14, 0.0), (0.1, h), 12)
+    hull = hulls.frustum((0.14, 0.0), (0.1, h), 12)
     return make_solid([pole, *parts], (bark, painted_material("#8b8f90", 0.3)), [hull])
 
 
 def cabinet(seed: int) -> Solid:
     """A distribution cabinet with two doors and a lid. Slots: body, seams, plinth."""
     rng = variant_rng("cabinet", seed)
-    w, d, h = (
-        uniform_between(0.7, 1.5, rng),
-        uniform_between(0.3, 0.45, rng),
-        uniform_between(0.95, 1.35, rng),
-    )
+    w, d, h = (rng.between(0.7, 1.5), rng.between(0.3, 0.45), rng.between(0.95, 1.35))
     x, y = 0.5 * d, 0.5 * w
     body = rounded_box((d, w, h - 0.15), 0.015, 1).moved(z=0.15 + 0.5 * (h - 0.15))
     lid = block((-x - 0.02, -y - 0.02, h - 0.04), (x + 0.02, y + 0.02, h + 0.015), 0.01)
@@ -329,27 +288,27 @@ def cabinet(seed: int) -> Solid:
         for z in (0.22, h - 0.1)
     ]
     handle = block((x, 0.05, 0.55 * h), (x + 0.025, 0.08, 0.55 * h + 0.14)).painted(1)
-    grey = painted_material(choose(("#8d9091", "#a5a79f", "#6f7a70", "#b0aea6"), rng), 0.6)
+    grey = painted_material(rng.choose(("#8d9091", "#a5a79f", "#6f7a70", "#b0aea6")), 0.6)
     parts = [body, lid, plinth.painted(2), *seams, handle]
     concrete = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
-    hull = collision_hulls.box((-x, -y, 0.0), (x, y, h))
+    hull = hulls.box((-x, -y, 0.0), (x, y, h))
     return make_solid(parts, (grey, painted_material("#3b3d3f", 0.6), concrete), [hull])
 
 
 def bike_rack(seed: int) -> Solid:
     """A row of hoops; bicycles lean against them along X. Slot: hoops."""
     rng = variant_rng("bike_rack", seed)
-    count, pitch = choose((2, 3, 4, 5), rng), uniform_between(0.8, 1.0, rng)
-    half, h = uniform_between(0.35, 0.45, rng), uniform_between(0.75, 0.85, rng)
+    count, pitch = rng.choose((2, 3, 4, 5)), rng.between(0.8, 1.0)
+    half, h = rng.between(0.35, 0.45), rng.between(0.75, 0.85)
     hoop = tube(
         [(-half, 0, 0), (-half, 0, h - 0.15), (-half + 0.04, 0, h - 0.04), (-half + 0.15, 0, h),
          (half - 0.15, 0, h), (half - 0.04, 0, h - 0.04), (half, 0, h - 0.15), (half, 0, 0)],
         0.024,
     )  # fmt: skip
     at = [pitch * (k - 0.5 * (count - 1)) for k in range(count)]
-    parts = collision_hulls.box((-half, -0.025, 0.0), (half, 0.025, h))
+    parts = hulls.box((-half, -0.025, 0.0), (half, 0.025, h))
     shells = [parts + np.array([0.0, y, 0.0]) for y in at]
-    finish = GALVANISED if is_drawn(0.7, rng) else _ANTHRACITE
+    finish = GALVANISED if rng.chance(0.7) else _ANTHRACITE
     return make_solid([hoop.moved(y=y) for y in at], (finish,), shells)
 
 
@@ -362,12 +321,8 @@ def _arm_head(
 ) -> tuple[Patch, Patch, tuple[float, float, float]]:
     """An arm towards +X with a flat luminaire; its lens looks down."""
     top = height + rise
-    path = [
-        (0.0, 0.0, height - 0.3),
-        (0.05 * reach, 0.0, height),
-        (0.35 * reach, 0.0, height + 0.7 * rise),
-        (reach, 0.0, top),
-    ]
+    path = [(0.0, 0.0, height - 0.3), (0.05 * reach, 0.0, height),
+            (0.35 * reach, 0.0, height + 0.7 * rise), (reach, 0.0, top)]  # fmt: skip
     arm = tube(path, 0.032, 8)
     body = rounded_box((0.62, 0.26, 0.1), 0.03, 1).moved(reach + 0.25, 0.0, top)
     lens = block((reach + 0.02, -0.1, top - 0.062), (reach + 0.5, 0.1, top - 0.049))

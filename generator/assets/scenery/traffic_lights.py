@@ -1,18 +1,19 @@
 """Traffic lights: lenses that are dark until they are lit by their role.
 
-Lenses face +X, towards the traffic they are for. Lens diameters of 200 and 300 mm and heights above
-the road follow EN 12368 and the German RiLSA.
+Lenses face +X, towards the traffic that they control. Lens diameters of 200 and 300 mm and
+heights above the road follow EN 12368 and the German RiLSA.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import (
@@ -23,16 +24,10 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     lathe,
     rounded_box,
 )
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post, tube
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import Vec3
 
 MOUNTS = ("pole", "mast_arm")
@@ -40,20 +35,7 @@ HOUSING, POLE, BOARD = 0, 1, 2
 _FIRST_LENS = 3
 VEHICLE_LENSES = ("lens_red", "lens_yellow", "lens_green")
 PEDESTRIAN_LENSES = ("lens_stop", "lens_walk")
-# Convex outlines (right, up) in lens radii, counter-clockwise.
-FIGURES: Mapping[str, Sequence[Sequence[tuple[float, float]]]] = {
-    "lens_stop": (
-        ((-0.36, -0.12), (-0.22, -0.14), (0.22, -0.14), (0.36, -0.12), (0.2, 0.42), (-0.2, 0.42)),
-        ((-0.17, -0.85), (0.17, -0.85), (0.2, -0.13), (-0.2, -0.13)),
-    ),
-    "lens_walk": (
-        ((-0.16, -0.2), (0.16, -0.18), (0.18, 0.42), (-0.14, 0.42)),
-        ((0.18, -0.85), (0.42, -0.82), (0.16, -0.17), (-0.06, -0.19)),
-        ((-0.5, -0.8), (-0.27, -0.82), (0.06, -0.19), (-0.16, -0.21)),
-        ((0.18, 0.22), (0.46, -0.04), (0.5, 0.06), (0.16, 0.42)),
-        ((-0.46, 0.0), (-0.36, -0.08), (-0.13, 0.2), (-0.14, 0.42)),
-    ),
-}
+FIGURES = load_table(__package__, "signal_figures", tuple[tuple[tuple[float, float], ...], ...])
 _OFF: dict[str, Vec3] = {
     "lens_red": (0.09, 0.008, 0.006),
     "lens_yellow": (0.11, 0.06, 0.006),
@@ -66,49 +48,45 @@ _OFF: dict[str, Vec3] = {
 def traffic_light(seed: int, mount: str) -> Solid:
     """A signal for vehicles, on a pole or also on an arm over the road.
 
-    The arm reaches towards -Y: to the left of who drives towards the lenses.
+    The arm reaches towards -Y: to the left of a driver who approaches the lenses.
     Slots: housing, pole, board, and one per lens by its role.
 
     Raises:
         AssetError: for an unknown mount.
     """
     rng = variant_rng("traffic_light", seed)
-    arm = _mount(seed, mount) == "mast_arm"
-    lens_m = 0.15 if arm else choose((0.1, 0.1, 0.15), rng)
-    low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(
-        0.11, 0.0, uniform_between(2.15, 2.5, rng)
-    )
+    arm = _choose_mount(seed, mount) == "mast_arm"
+    lens_m = 0.15 if arm else rng.choose((0.1, 0.1, 0.15))
+    low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(0.11, 0.0, rng.between(2.15, 2.5))
     radius = 0.09 if arm else 0.055
-    top = uniform_between(5.6, 6.2, rng) if arm else float(low.bounds_m()[1][2]) + 0.1
+    top = rng.between(5.6, 6.2) if arm else float(low.bounds_m()[1][2]) + 0.1
     parts = [low, post(radius, (0.0, top), sides=12).painted(POLE)]
     if arm:
-        reach = uniform_between(3.5, 5.5, rng)
+        reach = rng.between(3.5, 5.5)
         path = [(0.0, 0.0, top - 0.1), (0.0, -0.6 * reach, top + 0.05), (0.0, -reach, top + 0.1)]
         high = head(VEHICLE_LENSES, lens_m)
         plate = _backboard(high)
         parts += [tube(path, 0.055, 8).painted(POLE)]
         parts += [part.moved(0.1, -reach + 0.25, top - 0.75) for part in (high, plate)]
-    elif is_drawn(0.35, rng):
+    elif rng.chance(0.35):
         parts.append(_backboard(low))
-    hull = collision_hulls.frustum((radius, 0.0), (radius, top), 10)
-    return make_solid(
-        parts, _materials(VEHICLE_LENSES, choose(("#262829", "#2f4236"), rng)), [hull]
-    )
+    hull = hulls.frustum((radius, 0.0), (radius, top), 10)
+    return make_solid(parts, _materials(VEHICLE_LENSES, rng.choose(("#262829", "#2f4236"))), [hull])
 
 
 def traffic_light_facts(seed: int, mount: str) -> Facts:
-    """For vehicles; how it is mounted."""
-    return Facts("vehicle", {"mount": _mount(seed, mount)})
+    """Its kind and its mount."""
+    return Facts("vehicle", {"mount": _choose_mount(seed, mount)})
 
 
 def pedestrian_signal(seed: int) -> Solid:
     """A red and green signal for people, with a push button. Slots as above."""
     rng = variant_rng("pedestrian_signal", seed)
-    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, uniform_between(2.1, 2.3, rng))
+    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, rng.between(2.1, 2.3))
     top = float(signal.bounds_m()[1][2]) + 0.1
     button = rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
     parts = [signal, button, post(0.052, (0.0, top), sides=12).painted(POLE)]
-    hull = collision_hulls.frustum((0.052, 0.0), (0.052, top), 10)
+    hull = hulls.frustum((0.052, 0.0), (0.052, top), 10)
     materials = list(_materials(PEDESTRIAN_LENSES, "#262829"))
     materials[BOARD] = painted_material("#d9a520", 0.5)
     return make_solid(parts, materials, [hull])
@@ -174,12 +152,8 @@ def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
     return (painted_material(housing, 0.5), GALVANISED, painted_material("#e9e8e3", 0.4), *lit)
 
 
-def _mount(seed: int, mount: str) -> str:
+def _choose_mount(seed: int, mount: str) -> str:
     if mount == "any":
         return MOUNTS[1] if seed % 4 == 2 else MOUNTS[0]
-    if mount not in MOUNTS:
-        raise AssetError(
-            f"traffic_light: there is no mount '{mount}'{did_you_mean(mount, MOUNTS)}; expected "
-            f"any, {', '.join(MOUNTS)}"
-        )
+    check_option("traffic_light", "mount", mount, ("any", *MOUNTS))
     return mount

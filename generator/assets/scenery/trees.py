@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
 from gen_data.generator.assets.procedural.noise import uniform
 from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh
 from gen_data.generator.assets.procedural.surface_shapes import circle, sweep
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.scenery.branching import (
     Lobe,
     Skeleton,
@@ -30,8 +30,7 @@ from gen_data.generator.assets.scenery.foliage import (
     sprays_about,
 )
 from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
-from gen_data.generator.core.errors import AssetError, did_you_mean
-from gen_data.generator.core.streams import Rng
+from gen_data.generator.core.errors import AssetError
 
 SPECIES = ("broad", "round", "columnar", "birch", "young", "conifer")
 
@@ -48,13 +47,13 @@ _STEP = 0.12
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What a tree is like.
+    """Measures and colours of one tree.
 
     Attributes:
         height_m: Overall.
         clear_m: From the ground to the lowest branches.
         trunk_m: Radius of the trunk at its foot.
-        lobes: What the crown fills.
+        lobes: Ellipsoids that the crown fills.
         green: sRGB of the leaves, from the crown's depth to its surface.
         bark: sRGB of the bark.
     """
@@ -79,11 +78,7 @@ def tree(seed: int, species: str, leaves: float) -> Solid:
     Raises:
         AssetError: for an unknown species or a share outside of [0, 1].
     """
-    if species not in SPECIES:
-        raise AssetError(
-            f"tree: there is no species '{species}'{did_you_mean(species, SPECIES)}; expected one "
-            f"of {', '.join(SPECIES)}"
-        )
+    check_option("tree", "species", species, SPECIES)
     if not 0.0 <= leaves <= 1.0:
         raise AssetError(f"tree: leaves={leaves} is not a share between 0 and 1")
     rng = variant_rng(f"tree/{species}", seed)
@@ -95,7 +90,7 @@ def tree_facts(seed: int, species: str, leaves: float) -> Facts:  # noqa: ARG001
     return Facts(species, {"foliage": "bare" if leaves < 0.05 else "leafy"})
 
 
-def _broadleaf(shape: Shape, leaves: float, rng: Rng) -> Solid:
+def _broadleaf(shape: Shape, leaves: float, rng: VariantRng) -> Solid:
     trunk = _trunk(shape, rng)
     points = points_in(shape.lobes, _ATTRACTORS, rng)
     step_m = min(max(0.1, _STEP * max(lobe.axes_m[0] for lobe in shape.lobes)), 0.35)
@@ -103,8 +98,8 @@ def _broadleaf(shape: Shape, leaves: float, rng: Rng) -> Solid:
     bark = _bark(shape.bark)
     # Thin twigs hide behind leaves; without leaves they are the crown.
     thinnest = 0.0 if leaves < 0.05 else 0.2 * shape.trunk_m
-    mesh = finish_mesh(_flared(wood(skeleton, thinnest, 2)), (bark,), 60.0)
-    hull = collision_hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
+    mesh = finish_mesh(_flare_roots(wood(skeleton, thinnest, 2)), (bark,), 60.0)
+    hull = hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
     count = round(_LEAVES * leaves)
     if count:
         greens = leaf_greens(shape.green, rng)
@@ -115,7 +110,7 @@ def _broadleaf(shape: Shape, leaves: float, rng: Rng) -> Solid:
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
 
-def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: Rng) -> Sprays:
+def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: VariantRng) -> Sprays:
     """Leaves at the twigs' ends, as large as it takes to fill the crown."""
     outer = np.array([lobe.centre_m for lobe in shape.lobes]).mean(axis=0)
     radius = np.sqrt(
@@ -133,7 +128,7 @@ def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: Rng) 
     )
 
 
-def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: Rng) -> MeshData:
+def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: VariantRng) -> MeshData:
     """The finest twigs of a winter crown, each a thin sliver."""
     middle = np.array([0.0, 0.0, shape.clear_m])
     length = 0.1 * (shape.height_m - shape.clear_m)
@@ -143,7 +138,7 @@ def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: Rng) -> M
     return leaf_mesh(sprays, (bark,), 0.03, rng)
 
 
-def _trunk(shape: Shape, rng: Rng) -> Array:
+def _trunk(shape: Shape, rng: VariantRng) -> Array:
     """Centre line from the ground to the first branches, gently bent."""
     count = max(4, round(shape.clear_m / 0.4))
     t = np.linspace(0.0, 1.0, count)
@@ -153,7 +148,7 @@ def _trunk(shape: Shape, rng: Rng) -> Array:
     return np.stack([np.round(axis, 4) for axis in (x, y, t * shape.clear_m)], axis=1)
 
 
-def _flared(patch: Patch) -> Patch:
+def _flare_roots(patch: Patch) -> Patch:
     """Wood with a root flare: wider by half at the ground, on which it stands level."""
     z = patch.corners_m[..., 2]
     factor = 1.0 + 0.45 * np.clip(1.0 - z / 0.5, 0.0, 1.0) ** 2
@@ -161,10 +156,10 @@ def _flared(patch: Patch) -> Patch:
     return replace(patch, corners_m=np.stack([x, y, np.where(z < 0.05, 0.0, z)], axis=2))
 
 
-def _conifer(rng: Rng) -> Solid:
+def _conifer(rng: VariantRng) -> Solid:
     """A spruce: whorls of drooping branches along a straight trunk, evergreen."""
-    height, base_m = uniform_between(6.0, 12.0, rng), uniform_between(0.1, 0.17, rng)
-    clear, spread = uniform_between(0.2, 0.9, rng), uniform_between(0.17, 0.24, rng) * height
+    height, base_m = rng.between(6.0, 12.0), rng.between(0.1, 0.17)
+    clear, spread = rng.between(0.2, 0.9), rng.between(0.17, 0.24) * height
     line = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * height), (0.0, 0.0, height)])
     trunk = sweep(line, circle(base_m, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.0, 0.5, 0.08]))
     whorls = 20
@@ -174,10 +169,8 @@ def _conifer(rng: Rng) -> Solid:
         z = clear + (height - clear) * share**0.9
         reach = spread * (1.0 - share) ** 0.85 + 0.12
         for k in range(9):
-            turn = (
-                2.0 * math.pi * (k + 0.5 * (level % 2) + 0.5 * uniform_between(-0.5, 0.5, rng)) / 9
-            )
-            fans.append(_fan(z, turn, reach * uniform_between(0.75, 1.1, rng), 0.5 - share, rng))
+            turn = 2.0 * math.pi * (k + 0.5 * (level % 2) + 0.5 * rng.between(-0.5, 0.5)) / 9
+            fans.append(_fan(z, turn, reach * rng.between(0.75, 1.1), 0.5 - share, rng))
     places, growth, reach_m = (np.concatenate(part) for part in zip(*fans, strict=True))
     # The lowest sprays rest on the ground.
     growth[:, 2] = np.maximum(growth[:, 2], (0.03 - places[:, 2]) / reach_m)
@@ -190,11 +183,13 @@ def _conifer(rng: Rng) -> Solid:
     mesh = merge_meshes(
         finish_mesh(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng)
     )
-    hull = collision_hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
+    hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
 
-def _fan(z: float, turn: float, reach: float, sag: float, rng: Rng) -> tuple[Array, Array, Array]:
+def _fan(
+    z: float, turn: float, reach: float, sag: float, rng: VariantRng
+) -> tuple[Array, Array, Array]:
     """Sprays of needles along one branch: feet, directions and lengths."""
     count = 24
     t = np.sqrt(np.arange(1, count + 1) / count)
@@ -220,10 +215,10 @@ def _bark(code: str) -> Material:
     )
 
 
-def leaf_greens(codes: tuple[str, ...], rng: Rng) -> tuple[Material, ...]:
+def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[Material, ...]:
     """Shades of leaf that vary together from tree to tree."""
     r, g, b = jitter_color((1.0, 1.0, 1.0), 0.0, rng)
-    warm, level = uniform_between(0.85, 1.18, rng), uniform_between(0.85, 1.15, rng)
+    warm, level = rng.between(0.85, 1.18), rng.between(0.85, 1.15)
     return tuple(
         Material(
             (level * warm * c[0] * r, level * c[1] * g, level * c[2] * b),
@@ -240,62 +235,64 @@ _MAPLE = ("#384225", "#49572b", "#5d6c34", "#718141")
 _BIRCH = ("#45522f", "#56663a", "#697a45", "#7d8c54")
 
 
-def _lobed(radius: float, height: float, centre_z: float, count: int, rng: Rng) -> tuple[Lobe, ...]:
+def _draw_lobes(
+    radius: float, height: float, centre_z: float, count: int, rng: VariantRng
+) -> tuple[Lobe, ...]:
     """A crown of one body and several overlapping boughs around it."""
     lobes = [Lobe((0.0, 0.0, centre_z), (0.72 * radius, 0.72 * radius, 0.42 * height))]
     for k in range(count):
-        turn = 2.0 * math.pi * (k + uniform_between(-0.3, 0.3, rng)) / count
-        away, r = uniform_between(0.42, 0.6, rng) * radius, uniform_between(0.4, 0.55, rng) * radius
-        z = centre_z + uniform_between(-0.24, 0.26, rng) * height
+        turn = 2.0 * math.pi * (k + rng.between(-0.3, 0.3)) / count
+        away, r = rng.between(0.42, 0.6) * radius, rng.between(0.4, 0.55) * radius
+        z = centre_z + rng.between(-0.24, 0.26) * height
         lobes.append(Lobe((away * math.cos(turn), away * math.sin(turn), z), (r, r, 0.8 * r)))
     return tuple(lobes)
 
 
-def _broad(rng: Rng) -> Shape:
-    height, clear = uniform_between(8.5, 12.0, rng), uniform_between(2.9, 3.6, rng)
+def _broad(rng: VariantRng) -> Shape:
+    height, clear = rng.between(8.5, 12.0), rng.between(2.9, 3.6)
     crown = height - clear + 0.3
-    radius = crown * uniform_between(0.42, 0.54, rng)
-    lobes = _lobed(radius, crown, height - 0.52 * crown, 7, rng)
-    green = choose((_LIME, _MAPLE), rng)
-    return Shape(height, clear, uniform_between(0.16, 0.26, rng), lobes, green, "#7d7263")
+    radius = crown * rng.between(0.42, 0.54)
+    lobes = _draw_lobes(radius, crown, height - 0.52 * crown, 7, rng)
+    green = rng.choose((_LIME, _MAPLE))
+    return Shape(height, clear, rng.between(0.16, 0.26), lobes, green, "#7d7263")
 
 
-def _round(rng: Rng) -> Shape:
-    height, clear = uniform_between(5.0, 6.5, rng), uniform_between(2.2, 2.6, rng)
+def _round(rng: VariantRng) -> Shape:
+    height, clear = rng.between(5.0, 6.5), rng.between(2.2, 2.6)
     r = 0.5 * (height - clear + 0.2)
     lobes = (Lobe((0.0, 0.0, height - r), (1.02 * r, 1.02 * r, r)),)
-    return Shape(height, clear, uniform_between(0.1, 0.15, rng), lobes, _MAPLE, "#75695b")
+    return Shape(height, clear, rng.between(0.1, 0.15), lobes, _MAPLE, "#75695b")
 
 
-def _columnar(rng: Rng) -> Shape:
-    height, clear = uniform_between(8.0, 12.0, rng), uniform_between(1.6, 2.4, rng)
+def _columnar(rng: VariantRng) -> Shape:
+    height, clear = rng.between(8.0, 12.0), rng.between(1.6, 2.4)
     crown = height - clear + 0.3
-    r = crown * uniform_between(0.15, 0.21, rng)
+    r = crown * rng.between(0.15, 0.21)
     lobes = tuple(
         Lobe((0.0, 0.0, clear + crown * z), (w * r, w * r, 0.24 * crown))
         for z, w in ((0.22, 0.85), (0.48, 1.0), (0.74, 0.72))
     )
-    return Shape(height, clear, uniform_between(0.13, 0.19, rng), lobes, _LIME, "#7a7062", 0.0)
+    return Shape(height, clear, rng.between(0.13, 0.19), lobes, _LIME, "#7a7062", 0.0)
 
 
-def _birch(rng: Rng) -> Shape:
-    height, clear = uniform_between(8.0, 11.5, rng), uniform_between(2.0, 3.0, rng)
+def _birch(rng: VariantRng) -> Shape:
+    height, clear = rng.between(8.0, 11.5), rng.between(2.0, 3.0)
     crown = height - clear + 0.3
-    radius = crown * uniform_between(0.26, 0.34, rng)
-    lobes = _lobed(radius, crown, height - 0.5 * crown, 5, rng)
-    return Shape(height, clear, uniform_between(0.1, 0.15, rng), lobes, _BIRCH, "#cfccc4", 0.7)
+    radius = crown * rng.between(0.26, 0.34)
+    lobes = _draw_lobes(radius, crown, height - 0.5 * crown, 5, rng)
+    return Shape(height, clear, rng.between(0.1, 0.15), lobes, _BIRCH, "#cfccc4", 0.7)
 
 
-def _young(rng: Rng) -> Shape:
-    height, clear = uniform_between(3.6, 4.8, rng), uniform_between(1.8, 2.2, rng)
+def _young(rng: VariantRng) -> Shape:
+    height, clear = rng.between(3.6, 4.8), rng.between(1.8, 2.2)
     r = 0.5 * (height - clear)
-    wide = uniform_between(0.55, 0.75, rng)
+    wide = rng.between(0.55, 0.75)
     lobes = (Lobe((0.0, 0.0, height - r), (wide * r, wide * r, r)),)
-    green = choose((_LIME, _MAPLE, _BIRCH), rng)
-    return Shape(height, clear, uniform_between(0.04, 0.06, rng), lobes, green, "#80746a")
+    green = rng.choose((_LIME, _MAPLE, _BIRCH))
+    return Shape(height, clear, rng.between(0.04, 0.06), lobes, green, "#80746a")
 
 
-_SHAPES: dict[str, Callable[[Rng], Shape]] = {
+_SHAPES: dict[str, Callable[[VariantRng], Shape]] = {
     "broad": _broad,
     "round": _round,
     "columnar": _columnar,

@@ -1,7 +1,7 @@
 """A layer of clouds over a curved earth, seen from below.
 
-The layer is a square that repeats. What is seen near the horizon is averaged over many
-kilometres, so the layer is kept at many sizes, each half as fine as the one before.
+The layer is a square that repeats. Pixels near the horizon average over many kilometres, so the
+layer is kept as a mip chain, each level half as fine as the one before.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _OCTAVES = 7
 def cloud_layer(
     d: Array, cloudiness: float, sun_altitude_rad: float, seed: int
 ) -> tuple[Float32, Float32]:
-    """How much of each direction clouds hide, and how bright they are there.
+    """Cloud cover and cloud brightness in each direction.
 
     Args:
         d: Unit directions of the upper hemisphere [rows, columns, 3], one elevation per row.
@@ -49,14 +49,14 @@ def cloud_layer(
     up = d[:, 0, 2]
     way_m = _way_to_layer(np.maximum(up, 0.0))
     seen = np.zeros((*d.shape[:2], 2), np.float32)
-    level_of_row = _levels_of(up, len(levels), 2 * d.shape[0])
+    level_of_row = _mip_levels(up, len(levels), 2 * d.shape[0])
     for k, level in enumerate(levels):
         near = np.clip(1.0 - np.abs(level_of_row - k), 0.0, 1.0)
         rows = np.flatnonzero((near > 0.0) & (up > 0.0))
         if rows.size:
             flat_m = _HEIGHT_M / (up[rows, None, None] + _HEAPING)
             place = d[rows, :, :2] * (flat_m / _TILE_M)
-            seen[rows] += near[rows, None, None].astype(np.float32) * _sampled(level, place)
+            seen[rows] += near[rows, None, None].astype(np.float32) * _sample(level, place)
     clear = np.exp(-way_m / _HAZE_M)[:, None].astype(np.float32)
     brightness = seen[..., 1] / np.maximum(seen[..., 0], np.float32(1e-6))
     return seen[..., 0] * clear, brightness
@@ -65,9 +65,9 @@ def cloud_layer(
 # A sky is looked at twice: for its mean, and for its image.
 @lru_cache(maxsize=2)
 def _layer(cloudiness: float, sun_altitude_rad: float, seed: int) -> tuple[Float32, ...]:
-    """The layer, and its halvings; read-only."""
+    """The layer and its mip chain; read-only."""
     cover, light = _seen_from_below(cloudiness, sun_altitude_rad, variant_rng("sky", seed))
-    return tuple(_halvings(np.stack([cover, cover * light], axis=-1)))
+    return tuple(_mip_chain(np.stack([cover, cover * light], axis=-1)))
 
 
 def _seen_from_below(
@@ -92,7 +92,7 @@ def _seen_from_below(
 
 
 def _heaps(rng: Rng) -> Float32:
-    """Where there is much cloud: large masses with billows on them, in about [-1, 1]."""
+    """Density of clouds: large masses with billows on them, in about [-1, 1]."""
     masses = fbm((3, 3), _OCTAVES, rng, 0.52, _TILE_PX)
     billows = np.zeros_like(masses)
     for k, cells in enumerate((12, 24, 48)):
@@ -108,14 +108,14 @@ def _way_to_layer(up: Array) -> Array:
     return np.sqrt(level * level + 2.0 * _EARTH_RADIUS_M * _HEIGHT_M + _HEIGHT_M**2) - level
 
 
-def _levels_of(up: Array, levels: int, rows: int) -> Array:
-    """The size of the layer, as a number of halvings, that suits each row of the image."""
+def _mip_levels(up: Array, levels: int, rows: int) -> Array:
+    """Mip level of the layer for each row of the image."""
     flat_m = _HEIGHT_M / (np.maximum(up, 0.0) + _HEAPING)
     footprint_m = flat_m * (math.pi / rows) / (np.maximum(up, 0.0) + _HEAPING)
     return np.clip(np.log2(footprint_m / (_TILE_M / _TILE_PX)), 0.0, levels - 1.0)
 
 
-def _halvings(layer: Float32) -> list[Float32]:
+def _mip_chain(layer: Float32) -> list[Float32]:
     levels = [layer]
     while levels[-1].shape[0] > 1:
         # Corner by corner: reducing over two short axes takes ten times as long.
@@ -124,7 +124,7 @@ def _halvings(layer: Float32) -> list[Float32]:
     return levels
 
 
-def _sampled(layer: Float32, place: Array) -> Float32:
+def _sample(layer: Float32, place: Array) -> Float32:
     """The repeating layer at places in units of its length, bilinear."""
     size = layer.shape[0]
     position = place * size - 0.5

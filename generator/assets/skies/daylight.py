@@ -1,4 +1,4 @@
-"""How much light comes from the sun and from the sky.
+"""Illuminance by sun and sky.
 
 Altitudes are those of the sun over the horizon [rad]; ``cloudiness`` runs from 0 (clear) over 0.5
 (broken clouds) to 1 (overcast); ``turbidity`` is that of Linke and Preetham: 2 very clear, 6 hazy.
@@ -29,12 +29,9 @@ _EXTINCTION_CLEAR, _EXTINCTION_BROKEN = 0.21, 0.80
 # Horizontal illuminance of the sky: constant and factor on a power of the sine of the altitude.
 _CLEAR, _BROKEN, _OVERCAST = (800.0, 15_500.0, 0.5), (300.0, 45_000.0, 1.0), (300.0, 21_000.0, 1.0)
 # Lower end [deg] and coefficients of log10 of the illuminance over altitude / 90 deg.
-_TWILIGHT = (
-    (-0.8, (2.88, 22.26, -207.64, 1034.30)),
-    (-5.0, (2.88, 21.81, -258.11, -858.36)),
-    (-12.0, (2.70, 12.17, -431.69, -1899.83)),
-    (-18.0, (13.84, 262.72, 1447.42, 2797.93)),
-)
+_TWILIGHT = ((-0.8, (2.88, 22.26, -207.64, 1034.30)), (-5.0, (2.88, 21.81, -258.11, -858.36)),
+             (-12.0, (2.70, 12.17, -431.69, -1899.83)),
+             (-18.0, (13.84, 262.72, 1447.42, 2797.93)))  # fmt: skip
 _SUNSET_DEG = -0.8
 # Of a city's sky without moon; clouds throw ten times as much light back (Kyba et al. 2011).
 _NIGHT_LUX, _NIGHT_OVERCAST_LUX = 0.03, 0.3
@@ -99,7 +96,7 @@ def preetham_zenith_cd_m2(altitude_rad: float, turbidity: float) -> float:
 
 
 def sun_radius_rad(cloudiness: float = 0.0) -> float:
-    """Angular radius of what the sun's light comes from: thin cloud spreads it."""
+    """Angular radius of the sun as a light source; thin cloud enlarges it."""
     return math.radians(0.266 + 4.0 * _step(0.2, 0.85, cloudiness))
 
 

@@ -1,7 +1,7 @@
 """The sky at any time of day, under any clouds, as an environment.
 
 The sun stands in the direction of +X and is not in the image: it is a Light. Luminances are those
-of the real sky: the light on level ground is what ``daylight.sky_illuminance_lux`` says.
+of the real sky: the illuminance of level ground is ``daylight.sky_illuminance_lux``.
 
 Sources: Preetham, Shirley and Smits, "A practical analytic model for daylight", SIGGRAPH 1999
 (clear sky: Perez' formula for luminance and chromaticity); CIE S 011/E:2003 (overcast sky).
@@ -70,7 +70,7 @@ _STREETS_CD_M2 = 0.2
 
 @dataclass(frozen=True, slots=True)
 class SkyModel:
-    """What a sky depends on.
+    """Parameters of a sky.
 
     Attributes:
         seed: Of the clouds.
@@ -78,7 +78,7 @@ class SkyModel:
         turbidity: 2 very clear, 3 usual, 6 hazy.
         cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
         ground_albedo: Of the land below the horizon.
-        model: ``measured``: as much light as IES RP-21 says, under any clouds, day and night.
+        model: ``measured``: the illuminance of IES RP-21, under any clouds, day and night.
             ``preetham``: the luminances of Preetham's clear sky by day as published.
     """
 
@@ -120,7 +120,7 @@ def sun_lux(model: SkyModel) -> float:
 
 
 def mean_luminance_cd_m2(model: SkyModel) -> float:
-    """Mean over the whole sphere: what ``Environment.luminance_cd_m2`` has to be."""
+    """Mean over the whole sphere, the value for ``Environment.luminance_cd_m2``."""
     image = luminance_cd_m2(model, _MEAN_ROWS)
     weights = _row_weights(_MEAN_ROWS)
     rows = np.einsum("hwc,c->h", image, REC709_LUMINANCE, optimize=False) / image.shape[1]
@@ -139,15 +139,15 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
     if model.model == "preetham":
         zenith = daylight.preetham_zenith_cd_m2(model.sun_altitude_rad, model.turbidity)
         half = clear_sky(above[:, :rows], model.sun_altitude_rad, model.turbidity, pale=0.0)
-        image = _mirrored(zenith * half)
+        image = _mirror(zenith * half)
         return np.concatenate([image, _land(image, below, model)])
     night_lux = daylight.night_illuminance_lux(model.cloudiness)
     day_lux = daylight.sky_illuminance_lux(model.sun_altitude_rad, model.cloudiness) - night_lux
     image = np.zeros(above.shape, np.float32)
     if day_lux > _NEGLIGIBLE * night_lux:
-        image += _scaled(_daylit(above, model), day_lux)
+        image += _scale_to_lux(_daylight(above, model), day_lux)
     if night_lux > _NEGLIGIBLE * day_lux:
-        image += _scaled(_night(above, model), night_lux)
+        image += _scale_to_lux(_night(above, model), night_lux)
     return np.concatenate([image, _land(image, below, model)])
 
 
@@ -165,7 +165,7 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float =
     towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
     angle = np.arccos(np.clip(towards, -1.0, 1.0))
 
-    # Gradation is the same along a row, and all three formulas ask for the same cosines.
+    # Gradation is constant along a row, and all three formulas share the same cosines.
     rows_up, cosine_squared = up[:, :1], np.clip(towards, -1.0, 1.0) ** 2
 
     def relative(coefficients: tuple[tuple[float, float], ...]) -> Array:
@@ -202,38 +202,38 @@ def _perez(up: Array, angle: Array, cosine_squared: Array, c: list[float]) -> Ar
     return luminance
 
 
-def _mirrored(half: Array) -> Float32:
+def _mirror(half: Array) -> Float32:
     """Both sides of the plane through the sun and the zenith, which differ in clouds only."""
     return np.concatenate([half, half[:, ::-1]], axis=1).astype(np.float32)
 
 
-def _daylit(d: Array, model: SkyModel) -> Float32:
-    """What the sun lights, any unit: clear air, clouds in it, a closed deck."""
+def _daylight(d: Array, model: SkyModel) -> Float32:
+    """Sky lit by the sun, any unit: clear air, clouds in it, a closed deck."""
     altitude = model.sun_altitude_rad
     half = d[:, : d.shape[1] // 2]
     by_day = clear_sky(half, max(altitude, math.radians(1.5)), model.turbidity)
     dusk = 1.0 - _ramp(-1.0, 6.0, model.sun_altitude_deg)
-    by_day = _scaled(by_day, 1.0)
+    by_day = _scale_to_lux(by_day, 1.0)
     if dusk > 0.0:
-        by_day = by_day * (1.0 - dusk) + _scaled(_twilight(half, model), 1.0) * dusk
-    image = _mirrored(by_day)
+        by_day = by_day * (1.0 - dusk) + _scale_to_lux(_twilight(half, model), 1.0) * dusk
+    image = _mirror(by_day)
     if model.cloudiness == 0.0:
         return image
     cover, light = cloud_layer(d, model.cloudiness, altitude, model.seed)
-    # A white cloud sends back what sun and sky throw on it.
+    # A white cloud reflects all light of sun and sky.
     clear_lux = daylight.sky_illuminance_lux(altitude)
     sun_lux = daylight.sun_illuminance_lux(altitude, model.turbidity) * max(math.sin(altitude), 0.1)
     warm = np.array(daylight.sun_color(max(altitude, 0.01), model.turbidity))
     lit = (0.7 * sun_lux * warm + 1.3 * clear_lux * _DECK) / (math.pi * clear_lux)
     towards = half[..., 0] * math.cos(altitude) + half[..., 2] * math.sin(altitude)
-    rim = _mirrored(1.0 + 0.9 * np.exp((towards - 1.0) / 0.03))
+    rim = _mirror(1.0 + 0.9 * np.exp((towards - 1.0) / 0.03))
     _lay(image, cover, (light * rim)[..., None] * lit.astype(np.float32))
     closed = _ramp(0.6, 0.95, model.cloudiness)
     if closed == 0.0:
-        return _scaled(image, 1.0)
+        return _scale_to_lux(image, 1.0)
     shade = np.float32(0.72) + np.float32(0.5) * np.where(cover > 0.0, light, np.float32(0.5))
     deck: Float32 = overcast_sky(d[:, :1]).astype(np.float32) * shade[..., None]
-    return _scaled(image, 1.0 - closed) + _scaled(deck, closed)
+    return _scale_to_lux(image, 1.0 - closed) + _scale_to_lux(deck, closed)
 
 
 def _lay(image: Float32, cover: Float32, clouds: Float32) -> None:
@@ -275,7 +275,7 @@ def _night(d: Array, model: SkyModel) -> Float32:
 
 
 def _land(image: Float32, d: Array, model: SkyModel) -> Float32:
-    """What lies below the horizon: land that sun and sky light, hazy where it is far."""
+    """Land below the horizon, lit by sun and sky, hazy in the distance."""
     altitude = model.sun_altitude_rad
     sun = sun_lux(model) * max(math.sin(altitude), 0.0) * np.array(daylight.sun_color(altitude))
     light = _level_light(image) + sun
@@ -287,7 +287,7 @@ def _land(image: Float32, d: Array, model: SkyModel) -> Float32:
     return mixed
 
 
-def _scaled(image: Image, lux: float) -> Image:
+def _scale_to_lux(image: Image, lux: float) -> Image:
     """A sky, or its half, that gives that illuminance on level ground."""
     scaled: Image = image * image.dtype.type(lux / float(luminance(_level_light(image))))
     return scaled

@@ -8,25 +8,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, circle, cone, lathe, sweep
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
-from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
+from gen_data.generator.assets.vehicles.vehicle_materials import materials
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 STYLES = ("city", "mountain", "road")
 
@@ -58,71 +54,60 @@ class _Frame:
     lean_rad: float
 
 
-_FRAMES = {
-    "city": _Frame(0.54, 0.345, (-0.12, 0.29), (-0.27, 0.74), (-0.33, 0.95), (0.27, 0.86),
-                   (0.33, 0.68), 0.3, (0.16, 0.28, 1.1), 0.021, 0.2),
-    "mountain": _Frame(0.55, 0.345, (-0.12, 0.31), (-0.26, 0.73), (-0.31, 0.97), (0.29, 0.85),
-                       (0.34, 0.73), 0.92, (0.34, 0.32, 1.02), 0.028, 0.55),
-    "road": _Frame(0.495, 0.335, (-0.09, 0.27), (-0.24, 0.8), (-0.28, 0.98), (0.29, 0.86),
-                   (0.335, 0.7), 0.97, (0.43, 0.2, 0.95), 0.013, 0.8),
-}  # fmt: skip
+_FRAMES = load_table(__package__, "bicycles", _Frame)
 
 
 def bicycle(seed: int) -> Solid:
-    """A bicycle that stands upright with nobody on it."""
+    """A bicycle without rider, upright."""
     rng = variant_rng("bicycle", seed)
-    frame = _FRAMES[_style(seed)]
-    parts = _machine(_style(seed), frame, uniform_between(0.0, 2.0 * math.pi, rng), rng)
-    paint = hex_to_linear(choose(_PAINTS, rng))
+    frame = _FRAMES[in_turn(STYLES, seed)]
+    parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi), rng)
+    paint = hex_to_linear(rng.choose(_PAINTS))
     return _solid(parts, frame, materials(rng, paint), 1.0)
 
 
 def bicycle_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts(_style(seed), {"rider": "no"})
+    return Facts(in_turn(STYLES, seed), {"rider": "no"})
 
 
 def cyclist(seed: int) -> Solid:
     """A bicycle with its rider."""
     rng = variant_rng("cyclist", seed)
-    frame, turn = _FRAMES[_style(seed)], uniform_between(0.0, 2.0 * math.pi, rng)
-    parts = _machine(_style(seed), frame, turn, rng)
+    frame, turn = _FRAMES[in_turn(STYLES, seed)], rng.between(0.0, 2.0 * math.pi)
+    parts = _machine(in_turn(STYLES, seed), frame, turn, rng)
     parts += people.rider(_seat(frame, turn), rng)
-    paint = hex_to_linear(choose(_PAINTS, rng))
+    paint = hex_to_linear(rng.choose(_PAINTS))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng))
     return _solid(parts, frame, finish, 1.7)
 
 
 def cyclist_facts(seed: int) -> Facts:
     """The kind of bicycle."""
-    return Facts(_style(seed), {"rider": "yes"})
+    return Facts(in_turn(STYLES, seed), {"rider": "yes"})
 
 
 def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
     """A thin wheel about the origin, its axle along Y."""
     ring = circle(tyre_m, 6) + np.array([radius_m - tyre_m, 0.0])
-    tyre = lathe([*map(tuple, ring), tuple(ring[0])], 24, VehicleSlot.TYRE)
+    tyre = lathe([*map(tuple, ring), tuple(ring[0])], 24, Slot.TYRE)
     rim = lathe(
         [(radius_m - 1.7 * tyre_m - 0.014, h) for h in (0.6 * tyre_m, -0.6 * tyre_m)]
         + [(radius_m - 1.4 * tyre_m, h) for h in (-0.7 * tyre_m, 0.7 * tyre_m)]
         + [(radius_m - 1.7 * tyre_m - 0.014, 0.6 * tyre_m)],
         24,
-        VehicleSlot.RIM,
+        Slot.RIM,
     )
-    hub = cone((0.022, -0.035), (0.022, 0.035), 6, VehicleSlot.CHROME)
+    hub = cone((0.022, -0.035), (0.022, 0.035), 6, Slot.CHROME)
     wires = []
     for k in range(spokes):
         turn = 2.0 * math.pi * k / spokes
         end = (radius_m - 2.2 * tyre_m) * np.array([math.cos(turn), math.sin(turn), 0.0])
         start = np.array([0.02 * end[1], -0.02 * end[0], 0.03 * (-1) ** k])
         wires.append(
-            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=VehicleSlot.CHROME)
+            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=Slot.CHROME)
         )
     return join_patches([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
-
-
-def _style(seed: int) -> str:
-    return STYLES[seed % len(STYLES)]
 
 
 def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top: float) -> Solid:
@@ -134,39 +119,43 @@ def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top:
         Keypoint("taillight", (frame.saddle[0] - 0.14, 0.0, frame.saddle[1] - 0.1), 0.06),
     )
     hull = [
-        collision_hulls.box((-reach, -0.05, 0.0), (reach, 0.05, 0.7)),
-        collision_hulls.box((-0.45, -0.28, 0.25), (0.45, 0.28, top)),
+        hulls.box((-reach, -0.05, 0.0), (reach, 0.05, 0.7)),
+        hulls.box((-0.45, -0.28, 0.25), (0.45, 0.28, top)),
     ]
     return make_solid([drop_uvs(part) for part in parts], finish, hull, points)
 
 
-def _machine(style: str, frame: _Frame, turn_rad: float, rng: Rng) -> list[Patch]:
+def _machine(style: str, frame: _Frame, turn_rad: float, rng: VariantRng) -> list[Patch]:
     """The bicycle itself; ``turn_rad`` is the left crank's angle."""
     wheel = spoked_wheel(frame.wheel_m, frame.tyre_m, 14)
     parts = [wheel.moved(sign * frame.axle, 0.0, frame.wheel_m) for sign in (1.0, -1.0)]
     parts += [*_tubes(frame), *_bars(style, frame), *_drive(frame, turn_rad)]
     x, z = frame.saddle
-    parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), VehicleSlot.TRIM))
-    parts.append(limb([_at((x + 0.1, z)), _at((x + 0.15, z))], (0.03, 0.016), VehicleSlot.TRIM))
+    parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), Slot.TRIM))
+    parts.append(
+        limb([_in_plane((x + 0.1, z)), _in_plane((x + 0.15, z))], (0.03, 0.016), Slot.TRIM)
+    )
     x, z = frame.head
-    parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), VehicleSlot.HEADLIGHT))
+    parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), Slot.HEADLIGHT))
     x, z = frame.saddle
-    parts.append(blob((x - 0.14, 0.0, z - 0.1), (0.018, 0.03, 0.025), VehicleSlot.TAILLIGHT))
+    parts.append(blob((x - 0.14, 0.0, z - 0.1), (0.018, 0.03, 0.025), Slot.TAILLIGHT))
     if style == "city":
         parts += [_mudguard(frame, 1.0, (0.2, 2.0)), _mudguard(frame, -1.0, (0.8, 3.3))]
         parts += _rack(frame)
-        if is_drawn(0.5, rng):
-            parts.append(block((0.3, -0.18, 0.98), (0.55, 0.18, 1.18), 0.02, VehicleSlot.TRIM))
+        if rng.chance(0.5):
+            parts.append(block((0.3, -0.18, 0.98), (0.55, 0.18, 1.18), 0.02, Slot.TRIM))
     return parts
 
 
 def _tubes(frame: _Frame) -> list[Patch]:
-    crank, seat, head, fork = (_at(p) for p in (frame.crank, frame.seat, frame.head, frame.fork))
+    crank, seat, head, fork = (
+        _in_plane(p) for p in (frame.crank, frame.seat, frame.head, frame.fork)
+    )
     step = crank + frame.step * (seat - crank)
     radius = 0.017
     bars = [(crank, seat), (step, head - 0.12 * (head - fork)), (crank, fork), (head, fork)]
-    parts = [limb(bar, (radius, radius), VehicleSlot.PAINT, 6) for bar in bars]
-    parts.append(limb([seat, _at(frame.saddle)], (0.013, 0.013), VehicleSlot.CHROME, 6))
+    parts = [limb(bar, (radius, radius), Slot.PAINT, 6) for bar in bars]
+    parts.append(limb([seat, _in_plane(frame.saddle)], (0.013, 0.013), Slot.CHROME, 6))
     for sign in (1.0, -1.0):
         out = np.array([0.0, sign * 0.055, 0.0])
         rear = np.array([-frame.axle, sign * 0.065, frame.wheel_m])
@@ -176,14 +165,14 @@ def _tubes(frame: _Frame) -> list[Patch]:
             (seat + 0.3 * out, rear),
             (fork + out, front),
         ):
-            parts.append(limb([start, end], (0.012, 0.009), VehicleSlot.PAINT, 5))
+            parts.append(limb([start, end], (0.012, 0.009), Slot.PAINT, 5))
     return parts
 
 
 def _bars(style: str, frame: _Frame) -> list[Patch]:
     x, y, z = frame.grip
     stem = np.array([frame.head[0] - 0.01, 0.0, z - (0.0 if style == "road" else 0.03)])
-    parts = [limb([_at(frame.head), stem], (0.014, 0.014), VehicleSlot.CHROME, 6)]
+    parts = [limb([_in_plane(frame.head), stem], (0.014, 0.014), Slot.CHROME, 6)]
     for sign in (1.0, -1.0):
         grip = np.array([x, sign * y, z])
         corner = np.array([stem[0] + 0.06, sign * (y - 0.04), z])
@@ -196,12 +185,10 @@ def _bars(style: str, frame: _Frame) -> list[Patch]:
                 grip + np.array([0.01, 0.0, -0.11]),
                 grip + np.array([-0.1, 0.0, -0.13]),
             ]
-        parts.append(limb(path, (0.012,) * len(path), VehicleSlot.TRIM, 5))
+        parts.append(limb(path, (0.012,) * len(path), Slot.TRIM, 5))
         tip = grip + np.array([-0.09, sign * 0.02, 0.0])
         if style != "road":
-            parts.append(
-                limb([grip + 0.5 * (grip - tip), tip], (0.016, 0.016), VehicleSlot.TRIM, 6)
-            )
+            parts.append(limb([grip + 0.5 * (grip - tip), tip], (0.016, 0.016), Slot.TRIM, 6))
     return parts
 
 
@@ -213,26 +200,26 @@ def _pedals(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
 
 
 def _drive(frame: _Frame, turn_rad: float) -> list[Patch]:
-    ring = lathe([(0.0, -0.004), (0.09, -0.004), (0.09, 0.004), (0.0, 0.004)], 16, VehicleSlot.TRIM)
+    ring = lathe([(0.0, -0.004), (0.09, -0.004), (0.09, 0.004), (0.0, 0.004)], 16, Slot.TRIM)
     x, z = frame.crank
     parts = [ring.rotated("x", 0.5 * math.pi).moved(x, -0.05, z)]
     for sign, pedal in zip((1.0, -1.0), _pedals(frame, turn_rad), strict=True):
         axle, (px, py, pz) = np.array([x, sign * 0.07, z]), pedal
         arm = [axle, np.array([px, sign * 0.07, pz])]
-        parts.append(limb(arm, (0.012, 0.01), VehicleSlot.CHROME, 5))
+        parts.append(limb(arm, (0.012, 0.01), Slot.CHROME, 5))
         parts.append(
             block(
                 (px - 0.045, py - 0.045, pz - 0.012),
                 (px + 0.045, py + 0.045, pz + 0.012),
                 0.0,
-                VehicleSlot.TRIM,
+                Slot.TRIM,
             )
         )
     rear = np.array([-frame.axle, -0.05, frame.wheel_m])
     for up in (1.0, -1.0):
         near, far = (np.array([0.0, 0.0, up * r]) for r in (0.085, 0.035))
         chain = [np.array([x, -0.05, z]) + near, rear + far]
-        parts.append(limb(chain, (0.005, 0.005), VehicleSlot.TRIM, 4))
+        parts.append(limb(chain, (0.005, 0.005), Slot.TRIM, 4))
     return parts
 
 
@@ -249,17 +236,17 @@ def _mudguard(frame: _Frame, sign: float, arc_rad: tuple[float, float]) -> Patch
     )
     section = np.array([(0.004, 0.0), (-0.006, 0.028), (-0.006, -0.028)])
     return join_patches(
-        sweep(np.array(pair), section, up=(0.0, 0.0, 1.0), slot=VehicleSlot.PAINT)
+        sweep(np.array(pair), section, up=(0.0, 0.0, 1.0), slot=Slot.PAINT)
         for pair in pairwise(path)
     )
 
 
 def _rack(frame: _Frame) -> list[Patch]:
     x, z = -frame.axle, 2.0 * frame.wheel_m + 0.07
-    top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, VehicleSlot.TRIM)
+    top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, Slot.TRIM)
     stays = [
         limb([np.array([x, s * 0.07, frame.wheel_m]), np.array([x - 0.1, s * 0.06, z])],
-             (0.006, 0.006), VehicleSlot.TRIM, 4)
+             (0.006, 0.006), Slot.TRIM, 4)
         for s in (1.0, -1.0)
     ]  # fmt: skip
     return [top, *stays]
@@ -281,5 +268,5 @@ def _soles(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
     return left, right
 
 
-def _at(point: tuple[float, float]) -> Array:
+def _in_plane(point: tuple[float, float]) -> Array:
     return np.array([point[0], 0.0, point[1]])

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import Point2, grid, spline
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot
@@ -24,8 +25,9 @@ Mask = NDArray[np.bool_]
 Level = Callable[[Patch], Array]
 """Values at the corners of a patch, shape [n, 3]; positive inside."""
 
-# How far lines stand in front of what they are drawn on.
+# Distance of lines from the surface under them.
 _PROUD_M = 0.002
+BODY_ROWS = load_table(__package__, "body_rows", tuple[tuple[float, float, float, float], ...])
 _END_SHARES = (0.0, 0.32, 0.58, 0.78, 0.92)
 
 
@@ -80,6 +82,14 @@ class Row:
     front_m: float
     rear_m: float
     half_m: float
+
+
+def body_rows(name: str, front_m: float, rear_m: float, half_m: float) -> list[Row]:
+    """Rows of the table ``body_rows.yaml`` for a body between two x, ``half_m`` wide to a side."""
+    return [
+        Row(rise, front_m - front, rear_m + rear, share * half_m)
+        for rise, front, rear, share in BODY_ROWS[name]
+    ]
 
 
 def plan(front: Point2, rear: Point2, sides: int) -> BodyOutline:
@@ -139,6 +149,7 @@ def split_patch(patch: Patch, level: Level) -> tuple[Patch, Patch, Array]:
     The level is taken to be linear along edges. The line is segments, shape [n, 2, 3] [m].
     """
     value = np.round(level(patch), 9)
+    # Corners that an earlier cut left on this line, but for rounding, must not be cut to slivers.
     value = np.where(np.abs(value) < 1e-7, 0.0, value)
     inside = [take_triangles(patch, np.all(value >= 0, axis=1) & np.any(value > 0, axis=1))]
     outside = [take_triangles(patch, np.all(value <= 0, axis=1))]
@@ -154,8 +165,8 @@ def split_patch(patch: Patch, level: Level) -> tuple[Patch, Patch, Array]:
     v = v[rows, turn]
     touching = v[:, 0] == 0
     lines = []
-    for chosen, pieces in ((touching, _halved(data[touching], v[touching])),
-                           (~touching, _tipped(data[~touching], v[~touching]))):  # fmt: skip
+    for chosen, pieces in ((touching, _halve_triangles(data[touching], v[touching])),
+                           (~touching, _cut_tips(data[~touching], v[~touching]))):  # fmt: skip
         for corners, positive in pieces[0]:
             for keep, side in ((positive, inside), (~positive, outside)):
                 slots = part.slots[chosen][keep]
@@ -203,34 +214,34 @@ def gap(patch: Patch, x_m: float, width_m: float, slot: int, *levels: Level) -> 
 
 
 def level_above(axis: str, limit_m: float, slope: float = 0.0, over: str = "x") -> Level:
-    """Inside is where the coordinate exceeds ``limit_m + slope * over``."""
+    """Positive where a coordinate exceeds ``limit_m + slope * over``."""
     i, j = "xyz".index(axis), "xyz".index(over)
     return lambda p: p.corners_m[..., i] - limit_m - slope * p.corners_m[..., j]
 
 
 def level_below(axis: str, limit_m: float, slope: float = 0.0, over: str = "x") -> Level:
-    """Inside is where the coordinate is smaller than ``limit_m + slope * over``."""
+    """Positive where a coordinate is smaller than ``limit_m + slope * over``."""
     i, j = "xyz".index(axis), "xyz".index(over)
     return lambda p: limit_m + slope * p.corners_m[..., j] - p.corners_m[..., i]
 
 
 def level_between(axis: str, low_m: float, high_m: float) -> tuple[Level, Level]:
-    """Inside is where the coordinate lies between two values."""
+    """Two levels, both positive where a coordinate lies between two values."""
     return level_above(axis, low_m), level_below(axis, high_m)
 
 
 def stations_along(low: float, high: float) -> tuple[Level, Level]:
-    """Inside is where the place along the ring lies between two values."""
+    """Two levels, both positive where the place along the ring lies between two values."""
     return (lambda p: p.uvs[..., 0] - low), (lambda p: high - p.uvs[..., 0])
 
 
 def rows_between(low: float, high: float) -> tuple[Level, Level]:
-    """Inside is where the row lies between two values; the lid begins at 1."""
+    """Two levels, both positive where the row lies between two values; the lid begins at 1."""
     return (lambda p: p.uvs[..., 1] - low), (lambda p: high - p.uvs[..., 1])
 
 
 def round_x_z(x_m: float, z_m: float, radius_m: float, beyond_y_m: float) -> Level:
-    """Inside is a cylinder across the vehicle, as far out as ``beyond_y_m``."""
+    """Positive in a cylinder across the vehicle, outside of ``beyond_y_m``."""
 
     def level(p: Patch) -> Array:
         x, y, z = (p.corners_m[..., i] for i in range(3))
@@ -240,7 +251,7 @@ def round_x_z(x_m: float, z_m: float, radius_m: float, beyond_y_m: float) -> Lev
 
 
 def mirror_half(half: Patch, swaps: Sequence[tuple[int, int]] = ()) -> Patch:
-    """A left half and its mirror image, whose slots are exchanged as named."""
+    """A left half and its mirror image, which exchanges the pairs of slots in ``swaps``."""
     slots = half.slots.copy()
     for left, right in swaps:
         slots[half.slots == left] = right
@@ -274,8 +285,8 @@ def take_triangles(patch: Patch, chosen: Mask) -> Patch:
 Pieces = tuple[list[tuple[Array, Mask]], Array]
 
 
-def _halved(data: Array, value: Array) -> Pieces:
-    """Triangles whose first corner is on the line, and the side each is on."""
+def _halve_triangles(data: Array, value: Array) -> Pieces:
+    """Cut triangles whose first corner lies on the line; with the side of each piece."""
     a, b, c = (data[:, i] for i in range(3))
     d = _crossing(b, c, value[:, 1], value[:, 2])
     pieces = [(np.stack([a, b, d], axis=1), value[:, 1] > 0),
@@ -283,8 +294,8 @@ def _halved(data: Array, value: Array) -> Pieces:
     return pieces, np.stack([a, d], axis=1)
 
 
-def _tipped(data: Array, value: Array) -> Pieces:
-    """Triangles whose first corner is alone on its side: a tip and two of the rest."""
+def _cut_tips(data: Array, value: Array) -> Pieces:
+    """Cut triangles whose first corner is alone on its side: one tip, two other pieces."""
     a, b, c = (data[:, i] for i in range(3))
     d, e = (_crossing(a, data[:, i], value[:, 0], value[:, i]) for i in (1, 2))
     tip = value[:, 0] > 0
@@ -294,7 +305,7 @@ def _tipped(data: Array, value: Array) -> Pieces:
 
 
 def _crossing(a: Array, b: Array, at_a: Array, at_b: Array) -> Array:
-    """Where the level is 0 between two points; the same whichever comes first."""
+    """Points where the level is 0 between two points; independent of their order."""
     share = (at_a / (at_a - at_b))[:, None]
     point: Array = a + share * (b - a)
     return np.round(point, 9)

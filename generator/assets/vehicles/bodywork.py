@@ -1,4 +1,4 @@
-"""Cars and vans: a lower body with a hood, a glass house on it, and what is fitted to them."""
+"""Cars and vans: lower body with hood, glass house, and fittings."""
 
 from __future__ import annotations
 
@@ -7,30 +7,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import Point2, block, rounded_box
 from gen_data.generator.assets.vehicles import body_shell
 from gen_data.generator.assets.vehicles.body_shell import (
+    BODY_ROWS,
     BodyOutline,
     Curve,
     Level,
     Row,
     assign_slot,
+    body_rows,
     level_above,
     level_below,
     level_between,
     rows_between,
     stations_along,
 )
-from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, VehicleSlot
+from gen_data.generator.assets.vehicles.vehicle_materials import SIDES
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
 from gen_data.generator.core.asset_types import Keypoint
 
 
 @dataclass(frozen=True)
 class Design:
-    """What distinguishes one car or van from another.
+    """Design of a car or van.
 
     Shares are of the length from the front bumper; heights are above the ground.
 
@@ -93,7 +97,7 @@ class Design:
 
     @property
     def axles(self) -> Axles:
-        """Where the wheels are."""
+        """Position and size of the wheels."""
         front, tyre = 0.5 * self.length_m - self.front_axle_m, 0.66 * self.wheel_radius_m
         return Axles(
             front_m=front,
@@ -120,28 +124,16 @@ class Design:
         )
 
 
-# Share of the height, how far front and rear stand back [m], share of the half width.
-_LOWER = (
-    (0.0, 0.12, 0.13, 0.9), (0.07, 0.055, 0.065, 0.958), (0.17, 0.02, 0.03, 0.985),
-    (0.32, 0.0, 0.0, 1.0), (0.5, 0.008, 0.004, 0.99), (0.66, 0.025, 0.018, 1.0),
-    (0.8, 0.055, 0.038, 0.992), (0.91, 0.1, 0.06, 0.975), (0.97, 0.155, 0.09, 0.95),
-    (1.0, 0.23, 0.14, 0.915),
-)  # fmt: skip
-# Share of the height, share of the windscreen's run, of the rear window's, of the lean inwards.
-_HOUSE = (
-    (0.0, 0.0, 0.0, 0.0), (0.2, 0.19, 0.18, 0.15), (0.52, 0.51, 0.48, 0.48),
-    (0.82, 0.81, 0.77, 0.85), (0.93, 0.94, 0.91, 1.03), (0.98, 1.04, 1.03, 1.17),
-    (1.0, 1.13, 1.16, 1.36),
-)  # fmt: skip
+DESIGNS = load_table(__package__, "designs", Design)
 
 
 def bodywork(design: Design, steer_deg: float) -> Patch:
-    """Everything, both sides."""
+    """The whole vehicle, both sides."""
     ring = body_shell.plan(*design.body_ends, sides=20)
     plain = _lower(design, ring)
     lower, wells = design.axles.wells(_lower_paint(design, ring, plain), design.half_m)
     gaps = _gaps(design, design.axles.wells(plain, design.half_m)[0])
-    half = join_patches([lower, *wells, *gaps, _house(design), *_fitted(design)])
+    half = join_patches([lower, *wells, *gaps, _house(design), *_fittings(design)])
     middle = [*_plates(design), *design.axles.wheels(steer_deg)]
     return join_patches(
         [body_shell.mirror_half(half, SIDES), *(body_shell.drop_uvs(p) for p in middle)]
@@ -157,9 +149,9 @@ def collision(design: Design) -> list[Array]:
         design.x(0.5 * (design.roof_end + design.rear_base)),
     )
     return [
-        collision_hulls.box((-x, -y, design.clearance_m), (x, y, design.belt_m)),
-        collision_hulls.box((rear, -house, design.belt_m), (front, house, design.height_m)),
-        collision_hulls.box((axles.rear_m - axles.radius_m, -0.9 * y, 0.0),
+        hulls.box((-x, -y, design.clearance_m), (x, y, design.belt_m)),
+        hulls.box((rear, -house, design.belt_m), (front, house, design.height_m)),
+        hulls.box((axles.rear_m - axles.radius_m, -0.9 * y, 0.0),
                   (axles.front_m + axles.radius_m, 0.9 * y, design.clearance_m)),
     ]  # fmt: skip
 
@@ -173,13 +165,13 @@ def keypoints(design: Design) -> tuple[Keypoint, ...]:
 
 def _lower(design: Design, ring: BodyOutline) -> Patch:
     x, y = 0.5 * design.length_m, design.half_m
-    rows = [Row(rise, x - front, -x + rear, share * y) for rise, front, rear, share in _LOWER]
+    rows = body_rows("car", x, -x, y)
 
     def floor(at: Array) -> Array:
         return np.full_like(at, design.clearance_m)
 
     body = body_shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
-    # What lies under the glass house is never seen.
+    # The part under the glass house is never visible.
     hidden = np.all(
         (body.uvs[..., 1] >= 1.0)
         & (body.corners_m[..., 0] < design.x(design.cowl) - 0.35)
@@ -194,25 +186,24 @@ def _lower_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
     """Bumpers, lamps, grille and the gaps around doors and lids."""
     x, floor = 0.5 * design.length_m, design.clearance_m
     sill = floor + (0.15 if design.cladding else 0.07)
-    patch = assign_slot(patch, VehicleSlot.UNDERBODY, *rows_between(-2.0, 0.0))
-    patch = assign_slot(patch, VehicleSlot.TRIM, *rows_between(0.0, 2.0), level_below("z", sill))
+    patch = assign_slot(patch, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
+    patch = assign_slot(patch, Slot.TRIM, *rows_between(0.0, 2.0), level_below("z", sill))
     if design.cladding:
         axles = design.axles
         for x_m in (axles.front_m, axles.rear_m):
             arch = body_shell.round_x_z(x_m, axles.radius_m, axles.arch_m + 0.055, 0.4)
-            patch = assign_slot(patch, VehicleSlot.TRIM, *rows_between(0.0, 1.0), arch)
+            patch = assign_slot(patch, Slot.TRIM, *rows_between(0.0, 1.0), arch)
     patch = _front_paint(design, ring, patch)
     patch = _rear_paint(design, ring, patch)
     hood = level_between("x", x - 0.3, design.x(design.cowl) + 0.1)
-    return assign_slot(patch, VehicleSlot.TRIM, *rows_between(0.975, 0.988), *hood)
+    return assign_slot(patch, Slot.TRIM, *rows_between(0.975, 0.988), *hood)
 
 
 def _gaps(design: Design, plain: Patch) -> list[Patch]:
     """The lines around the doors."""
     sides = (rows_between(0.1, 0.99)[0], rows_between(0.1, 0.99)[1], level_above("y", 0.5))
     return [
-        body_shell.gap(plain, design.x(share), 0.009, VehicleSlot.TRIM, *sides)
-        for share in design.seams
+        body_shell.gap(plain, design.x(share), 0.009, Slot.TRIM, *sides) for share in design.seams
     ]
 
 
@@ -226,21 +217,21 @@ def _front_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
         *level_between("z", z - 0.085, z + 0.075),
         level_above("z", z - 0.17, 0.13 / y, "y"),
     )
-    patch = assign_slot(patch, VehicleSlot.TRIM, *bezel)
+    patch = assign_slot(patch, Slot.TRIM, *bezel)
     lens = (front, *stations_along(ring.front(0.52), ring.front(0.93) + 0.022),
             *level_between("z", z - 0.055, z + 0.066))  # fmt: skip
-    patch = assign_slot(patch, VehicleSlot.HEADLIGHT, *lens)
+    patch = assign_slot(patch, Slot.HEADLIGHT, *lens)
     turn = (front, *stations_along(ring.front(0.8), ring.front(0.93) + 0.01),
             *level_between("z", z - 0.055, z - 0.025))  # fmt: skip
-    patch = assign_slot(patch, VehicleSlot.INDICATOR_LEFT, *turn)
+    patch = assign_slot(patch, Slot.INDICATOR_LEFT, *turn)
     grille = (front, level_below("y", 0.4 * y), *level_between("z", z - 0.11, z + 0.04))
-    patch = assign_slot(patch, VehicleSlot.TRIM, *grille)
+    patch = assign_slot(patch, Slot.TRIM, *grille)
     intake = (
         front,
         level_below("y", 0.68 * y),
         *level_between("z", design.clearance_m + 0.08, z - 0.28),
     )
-    return assign_slot(patch, VehicleSlot.TRIM, *intake)
+    return assign_slot(patch, Slot.TRIM, *intake)
 
 
 def _rear_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
@@ -253,29 +244,27 @@ def _rear_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
         *stations_along(ring.rear(0.93) - 0.02, ring.rear(inner)),
         *rows_between(0.1, 0.985),
     )
-    patch = assign_slot(patch, VehicleSlot.TAILLIGHT, *reach, *level_between("z", low, high))
+    patch = assign_slot(patch, Slot.TAILLIGHT, *reach, *level_between("z", low, high))
     stop = (rear, *stations_along(ring.rear(0.93) - 0.02, ring.rear(0.5 * inner + 0.4)))
     patch = assign_slot(
         patch,
-        VehicleSlot.BRAKELIGHT,
+        Slot.BRAKELIGHT,
         *stop,
         *rows_between(0.1, 0.985),
         *level_between("z", low, 0.5 * (low + high)),
     )
     wink = (rear, *stations_along(ring.rear(0.9), ring.rear(0.5 * inner + 0.4)))
     height = level_between("z", low, low + 0.28 * (high - low))
-    patch = assign_slot(
-        patch, VehicleSlot.INDICATOR_LEFT, *wink, *rows_between(0.1, 0.985), *height
-    )
+    patch = assign_slot(patch, Slot.INDICATOR_LEFT, *wink, *rows_between(0.1, 0.985), *height)
     lid = (rear, level_below("y", 0.7 * y), *level_between("z", z - 0.335, z - 0.327))
-    patch = assign_slot(patch, VehicleSlot.TRIM, *lid)
+    patch = assign_slot(patch, Slot.TRIM, *lid)
     skirt = (
         rear,
         level_below("y", 0.72 * y),
         level_below("z", design.clearance_m + 0.17),
         *rows_between(0, 2),
     )
-    return assign_slot(patch, VehicleSlot.TRIM, *skirt)
+    return assign_slot(patch, Slot.TRIM, *skirt)
 
 
 def _house(design: Design) -> Patch:
@@ -288,7 +277,7 @@ def _house(design: Design) -> Patch:
     rows = [
         Row(rise, x[0] + front * (x[1] - x[0]), x[3] + rear * (x[2] - x[3]),
             wide + lean * (narrow - wide))
-        for rise, front, rear, lean in _HOUSE
+        for rise, front, rear, lean in BODY_ROWS["glass_house"]
     ]  # fmt: skip
     top = design.height_m - crown
     middle = 0.55 * x[1] + 0.45 * x[2]
@@ -300,12 +289,12 @@ def _house(design: Design) -> Patch:
 
     house = body_shell.stack(ring, rows, base, roof, crown_m=crown, lid_rows=2)
     _, house, _ = body_shell.split_patch(house, lambda p: -p.uvs[..., 1])
-    return _glazed(design, ring, house)
+    return _glaze(design, ring, house)
 
 
-def _glazed(design: Design, ring: BodyOutline, house: Patch) -> Patch:
+def _glaze(design: Design, ring: BodyOutline, house: Patch) -> Patch:
     glass: list[tuple[Level, ...]] = [
-        (*stations_along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91)),
+        (*stations_along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91))
     ]
     if design.rear_window:
         glass.append((*stations_along(ring.rear(0.8), 2.0), *rows_between(0.16, 0.87)))
@@ -314,47 +303,41 @@ def _glazed(design: Design, ring: BodyOutline, house: Patch) -> Patch:
              level_above("x", design.x(design.windows_to), -0.25, "z"))  # fmt: skip
     glass.append(sides)
     for levels in glass:
-        house = assign_slot(house, VehicleSlot.GLASS, *levels)
+        house = assign_slot(house, Slot.GLASS, *levels)
     for share in design.pillars:
         post = level_between("x", design.x(share) - 0.035, design.x(share) + 0.035)
-        house = assign_slot(house, VehicleSlot.TRIM, *post, *sides)
+        house = assign_slot(house, Slot.TRIM, *post, *sides)
     return house
 
 
-def _fitted(design: Design) -> Iterable[Patch]:
+def _fittings(design: Design) -> Iterable[Patch]:
     """Mirror, door handles, roof rail: the left one of each."""
     shoulder = design.shoulder()
     y = design.half_m
     mirror_x = design.x(design.cowl + 0.42 * (design.header - design.cowl))
     z = float(shoulder(np.array(mirror_x))) + 0.1
     yield (
-        rounded_box((0.13, 0.2, 0.14), 0.045, 1)
-        .moved(mirror_x, y + 0.07, z)
-        .painted(VehicleSlot.PAINT)
+        rounded_box((0.13, 0.2, 0.14), 0.045, 1).moved(mirror_x, y + 0.07, z).painted(Slot.PAINT)
     )
     face = block((mirror_x - 0.07, y - 0.01, z - 0.05), (mirror_x - 0.06, y + 0.15, z + 0.05))
-    yield face.painted(VehicleSlot.CHROME)
+    yield face.painted(Slot.CHROME)
     yield block(
-        (mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, VehicleSlot.TRIM
+        (mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM
     )
     for share in design.seams[1:]:
         x = design.x(share) + 0.16
         z = float(shoulder(np.array(x))) - 0.13
-        yield block((x - 0.1, 0.95 * y, z), (x + 0.1, y + 0.012, z + 0.03), 0.0, VehicleSlot.PAINT)
+        yield block((x - 0.1, 0.95 * y, z), (x + 0.1, y + 0.012, z + 0.03), 0.0, Slot.PAINT)
     if design.rails:
         front, rear = design.x(design.header + 0.05), design.x(design.roof_end - 0.04)
         at = design.roof_share * y - 0.06
         top = design.height_m
-        yield block(
-            (rear, at - 0.015, top - 0.06), (front, at + 0.015, top), 0.0, VehicleSlot.CHROME
-        )
+        yield block((rear, at - 0.015, top - 0.06), (front, at + 0.015, top), 0.0, Slot.CHROME)
 
 
 def _plates(design: Design) -> Iterable[Patch]:
     x = 0.5 * design.length_m
     z = design.lamp_m[0] - 0.2
-    yield block((x - 0.03, -0.26, z - 0.055), (x + 0.008, 0.26, z + 0.055), 0.0, VehicleSlot.PLATE)
+    yield block((x - 0.03, -0.26, z - 0.055), (x + 0.008, 0.26, z + 0.055), 0.0, Slot.PLATE)
     z = design.lamp_m[1] - 0.2 if not design.upright_lamps else design.lamp_m[1] - 0.3
-    yield block(
-        (-x - 0.002, -0.26, z - 0.055), (-x + 0.05, 0.26, z + 0.055), 0.0, VehicleSlot.PLATE
-    )
+    yield block((-x - 0.002, -0.26, z - 0.055), (-x + 0.05, 0.26, z + 0.055), 0.0, Slot.PLATE)

@@ -4,21 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
-from gen_data.generator.assets.vehicles import body_shell
-from gen_data.generator.assets.vehicles.body_shell import Row, assign_slot, level_above, level_below
-from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, VehicleSlot, materials
+from gen_data.generator.assets.vehicles.body_shell import (
+    BodyOutline,
+    Curve,
+    assign_slot,
+    body_rows,
+    drop_uvs,
+    level_above,
+    level_below,
+    level_between,
+    mirror_half,
+    plan,
+    refine_patch,
+    rows_between,
+    stack,
+    stations_along,
+    take_triangles,
+)
+from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
 
 _LIVERIES = (
@@ -27,103 +38,75 @@ _LIVERIES = (
 )  # fmt: skip
 _FLOOR_M = 0.26
 _HALF_M = 1.275
-# Share of the height, how far front and rear stand back [m], share of the half width.
-_ROWS = (
-    (0.0, 0.1, 0.1, 0.97), (0.03, 0.02, 0.02, 0.995), (0.1, 0.0, 0.0, 1.0), (0.2, 0.0, 0.0, 1.0),
-    (0.32, 0.01, 0.0, 1.0), (0.6, 0.06, 0.01, 1.0), (0.84, 0.12, 0.03, 0.995),
-    (0.94, 0.16, 0.05, 0.985), (0.98, 0.22, 0.1, 0.95), (1.0, 0.32, 0.2, 0.86),
-)  # fmt: skip
 
 
 def bus(seed: int) -> Solid:
-    """A city bus with its doors on the right. Slots and keypoints as every vehicle's."""
+    """A city bus with its doors on the right. Slots and keypoints are those of all vehicles."""
     rng = variant_rng("bus", seed)
-    x, top = 0.5 * uniform_between(11.2, 12.2, rng), uniform_between(2.95, 3.08, rng)
+    x, top = 0.5 * rng.between(11.2, 12.2), rng.between(2.95, 3.08)
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, 0)
-    livery = choose(_LIVERIES, rng)
-    body = _body(x, top, axles, striped=is_drawn(0.6, rng))
-    body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if is_drawn(0.5, rng) else ())), top)
-    parts = [body, *(body_shell.drop_uvs(p) for p in [*axles.wheels(0.0), *_fitted(x, top)])]
+    livery = rng.choose(_LIVERIES)
+    body = _body(x, top, axles, striped=rng.chance(0.6))
+    body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if rng.chance(0.5) else ())), top)
+    parts = [body, *(drop_uvs(p) for p in [*axles.wheels(0.0), *_fittings(x, top)])]
     colors = [hex_to_linear(code) for code in livery]
     hull = [
-        collision_hulls.box((-x, -_HALF_M, _FLOOR_M), (x, _HALF_M, top)),
-        collision_hulls.box(
-            (axles.rear_m - 0.48, -1.1, 0.0), (axles.front_m + 0.48, 1.1, _FLOOR_M)
-        ),
+        hulls.box((-x, -_HALF_M, _FLOOR_M), (x, _HALF_M, top)),
+        hulls.box((axles.rear_m - 0.48, -1.1, 0.0), (axles.front_m + 0.48, 1.1, _FLOOR_M)),
     ]
     points = axles.keypoints((x - 0.1, 0.95, 0.72), (-x + 0.06, 1.1, 1.1))
     return make_solid([join_patches(parts)], materials(rng, colors[0], colors[1]), hull, points)
 
 
-def bus_facts(**_: object) -> Facts:
-    """Its kind."""
-    return Facts("city_bus")
-
-
 def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
-    ring = body_shell.plan((40.0, 3.6), (60.0, 7.0), sides=16)
-    rows = [Row(rise, x - front, -x + rear, share * _HALF_M) for rise, front, rear, share in _ROWS]
+    ring = plan((40.0, 3.6), (60.0, 7.0), sides=16)
+    rows = body_rows("bus", x, -x, _HALF_M)
 
-    def level(height_m: float) -> body_shell.Curve:
+    def level(height_m: float) -> Curve:
         return lambda at: np.full_like(at, height_m)
 
-    half = body_shell.stack(
-        ring, rows, level(_FLOOR_M), level(top - 0.04), crown_m=0.04, lid_rows=2
-    )
-    half = assign_slot(half, VehicleSlot.UNDERBODY, *body_shell.rows_between(-2.0, 0.0))
-    half = _painted(half, ring, top, striped=striped)
+    half = stack(ring, rows, level(_FLOOR_M), level(top - 0.04), crown_m=0.04, lid_rows=2)
+    half = assign_slot(half, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
+    half = _paint_body(half, ring, top, striped=striped)
     around = [hub + 0.28 * k for hub in (axles.front_m, axles.rear_m) for k in (-2, -1, 0, 1, 2)]
     near = (half.corners_m[..., 2].min(axis=1) < 1.1) & (half.corners_m[..., 1].max(axis=1) > 0.9)
-    low = body_shell.refine_patch(body_shell.take_triangles(half, near), "x", around)
+    low = refine_patch(take_triangles(half, near), "x", around)
     low, wells = axles.wells(low, _HALF_M)
-    return body_shell.mirror_half(
-        join_patches([body_shell.take_triangles(half, ~near), low, *wells]), SIDES
-    )
+    return mirror_half(join_patches([take_triangles(half, ~near), low, *wells]), SIDES)
 
 
-def _painted(half: Patch, ring: body_shell.BodyOutline, top: float, *, striped: bool) -> Patch:
+def _paint_body(half: Patch, ring: BodyOutline, top: float, *, striped: bool) -> Patch:
     """Stripe, windows, lamps."""
     if striped:
-        half = assign_slot(
-            half, VehicleSlot.SECOND_PAINT, *body_shell.level_between("z", 0.55, 0.95)
-        )
-    half = assign_slot(
-        half, VehicleSlot.TRIM, *body_shell.rows_between(0.0, 0.5), level_below("z", 0.36)
-    )
+        half = assign_slot(half, Slot.SECOND_PAINT, *level_between("z", 0.55, 0.95))
+    half = assign_slot(half, Slot.TRIM, *rows_between(0.0, 0.5), level_below("z", 0.36))
     corner, tail = ring.front(0.92), ring.rear(0.92)
-    front = (*body_shell.stations_along(-1.0, corner), level_above("x", 0.0))
-    half = assign_slot(
-        half, VehicleSlot.GLASS, *front, *body_shell.level_between("z", 0.98, top - 0.12)
-    )
-    rear = (*body_shell.stations_along(ring.rear(0.84), 2.0), level_below("x", 0.0))
-    half = assign_slot(
-        half, VehicleSlot.GLASS, *rear, *body_shell.level_between("z", 1.75, top - 0.45)
-    )
-    side = (
-        *body_shell.stations_along(corner + 0.004, tail - 0.003),
-        *body_shell.level_between("z", 1.12, top - 0.38),
-    )
-    half = assign_slot(half, VehicleSlot.GLASS, *side)
+    front = (*stations_along(-1.0, corner), level_above("x", 0.0))
+    half = assign_slot(half, Slot.GLASS, *front, *level_between("z", 0.98, top - 0.12))
+    rear = (*stations_along(ring.rear(0.84), 2.0), level_below("x", 0.0))
+    half = assign_slot(half, Slot.GLASS, *rear, *level_between("z", 1.75, top - 0.45))
+    side = (*stations_along(corner + 0.004, tail - 0.003), *level_between("z", 1.12, top - 0.38))
+    half = assign_slot(half, Slot.GLASS, *side)
     lamp = (
-        *body_shell.stations_along(ring.front(0.6), corner),
-        *body_shell.level_between("z", 0.62, 0.82),
+        *stations_along(ring.front(0.6), corner),
+        *level_between("z", 0.62, 0.82),
         level_above("x", 0.0),
     )
-    half = assign_slot(half, VehicleSlot.HEADLIGHT, *lamp)
+    half = assign_slot(half, Slot.HEADLIGHT, *lamp)
     wink = (
-        *body_shell.stations_along(ring.front(0.84), corner),
-        *body_shell.level_between("z", 0.82, 0.88),
+        *stations_along(ring.front(0.84), corner),
+        *level_between("z", 0.82, 0.88),
         level_above("x", 0),
     )
-    half = assign_slot(half, VehicleSlot.INDICATOR_LEFT, *wink)
+    half = assign_slot(half, Slot.INDICATOR_LEFT, *wink)
     for slot, low, high in (
-        (VehicleSlot.TAILLIGHT, 1.0, 1.18),
-        (VehicleSlot.BRAKELIGHT, 1.18, 1.32),
-        (VehicleSlot.INDICATOR_LEFT, 1.32, 1.44),
+        (Slot.TAILLIGHT, 1.0, 1.18),
+        (Slot.BRAKELIGHT, 1.18, 1.32),
+        (Slot.INDICATOR_LEFT, 1.32, 1.44),
     ):
         lens = (
-            *body_shell.stations_along(tail, ring.rear(0.78)),
-            *body_shell.level_between("z", low, high),
+            *stations_along(tail, ring.rear(0.78)),
+            *level_between("z", low, high),
             level_below("x", 0),
         )
         half = assign_slot(half, slot, *lens)
@@ -134,36 +117,32 @@ def _doors(body: Patch, fronts_m: tuple[float, ...], top: float) -> Patch:
     """Glazed double doors on the right side."""
     for front in fronts_m:
         for k in (0, 1):
-            leaf = body_shell.level_between(
-                "x", front - 0.62 * (k + 1) + 0.03, front - 0.62 * k - 0.02
-            )
+            leaf = level_between("x", front - 0.62 * (k + 1) + 0.03, front - 0.62 * k - 0.02)
             body = assign_slot(
                 body,
-                VehicleSlot.GLASS,
+                Slot.GLASS,
                 level_below("y", -0.9),
                 *leaf,
-                *body_shell.level_between("z", 0.4, top - 0.45),
+                *level_between("z", 0.4, top - 0.45),
             )
     return body
 
 
-def _fitted(x: float, top: float) -> list[Patch]:
+def _fittings(x: float, top: float) -> list[Patch]:
     """Pillars, display, mirrors, plates, cooling unit."""
     parts = [
-        block((x - 0.35, -0.75, top - 0.37), (x - 0.105, 0.75, top - 0.15), 0.0, VehicleSlot.TRIM),
-        block((x - 0.03, -0.26, 0.42), (x + 0.006, 0.26, 0.53), 0.0, VehicleSlot.PLATE),
-        block((-x - 0.006, -0.26, 0.62), (-x + 0.05, 0.26, 0.73), 0.0, VehicleSlot.PLATE),
-        block((-1.6, -0.85, top - 0.05), (1.2, 0.85, top + 0.12), 0.05, VehicleSlot.PAINT),
+        block((x - 0.35, -0.75, top - 0.37), (x - 0.105, 0.75, top - 0.15), 0.0, Slot.TRIM),
+        block((x - 0.03, -0.26, 0.42), (x + 0.006, 0.26, 0.53), 0.0, Slot.PLATE),
+        block((-x - 0.006, -0.26, 0.62), (-x + 0.05, 0.26, 0.73), 0.0, Slot.PLATE),
+        block((-1.6, -0.85, top - 0.05), (1.2, 0.85, top + 0.12), 0.05, Slot.PAINT),
     ]
     for sign in (1.0, -1.0):
         y = sign * 1.36
-        parts.append(
-            block((x + 0.02, y - 0.11, 1.75), (x + 0.14, y + 0.11, 2.2), 0.04, VehicleSlot.TRIM)
-        )
+        parts.append(block((x + 0.02, y - 0.11, 1.75), (x + 0.14, y + 0.11, 2.2), 0.04, Slot.TRIM))
         arm = sorted((sign * 1.1, y))
-        parts.append(block((x - 0.3, arm[0], 2.2), (x + 0.1, arm[1], 2.25), 0.0, VehicleSlot.TRIM))
+        parts.append(block((x - 0.3, arm[0], 2.2), (x + 0.1, arm[1], 2.25), 0.0, Slot.TRIM))
         for k in range(1, 7):
             at, edge = x - 0.9 - 1.45 * k, sorted((sign * 1.2, sign * (_HALF_M + 0.003)))
             parts.append(block((at - 0.03, edge[0], 1.13), (at + 0.03, edge[1], top - 0.39), 0.0,
-                               VehicleSlot.TRIM))  # fmt: skip
+                               Slot.TRIM))  # fmt: skip
     return parts

@@ -7,17 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.surface_shapes import block, circle, sweep
-from gen_data.generator.assets.procedural.variant_rng import choose, is_drawn, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
-from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
+from gen_data.generator.assets.vehicles.vehicle_materials import materials
 from gen_data.generator.assets.vehicles.wheels import wheel
 from gen_data.generator.core.asset_types import Keypoint
 from gen_data.generator.core.se3 import Vec3
@@ -42,31 +44,24 @@ class _Build:
     lean_rad: float
 
 
-_BUILDS = {
-    "naked": _Build(0.71, 0.31, 0.14, (-0.25, 0.81), (0.28, 0.36, 1.05), (-0.1, 0.19, 0.36),
-                    (0.36, 0.98), (0.36, 0.98), 0.3),
-    "sport": _Build(0.7, 0.305, 0.15, (-0.28, 0.83), (0.36, 0.31, 0.93), (-0.24, 0.18, 0.4),
-                    (0.37, 0.92), (0.37, 0.92), 0.72),
-    "scooter": _Build(0.64, 0.235, 0.11, (-0.27, 0.79), (0.26, 0.33, 1.02), (0.15, 0.14, 0.31),
-                      (0.35, 0.95), (0.48, 0.56), 0.08),
-}  # fmt: skip
+_BUILDS = load_table(__package__, "motorcycles", _Build)
 
 
 def motorcycle(seed: int) -> Solid:
     """A motorcycle; two of three have a rider."""
     rng = variant_rng("motorcycle", seed)
-    style = _style(seed)
+    style = in_turn(STYLES, seed)
     build = _BUILDS[style]
     parts = [*_running_gear(build), *_lamps(style, build), *_bodies(style, build)]
-    ridden = _ridden(seed)
+    ridden = _is_ridden(seed)
     if ridden:
         parts += people.rider(_seat(build), rng)
-    paint = hex_to_linear(choose(_PAINTS, rng))
+    paint = hex_to_linear(rng.choose(_PAINTS))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng), plate_rows=2)
     reach = build.axle + build.wheel_m
     hull = [
-        collision_hulls.box((-reach, -0.12, 0.0), (reach, 0.12, 0.75)),
-        collision_hulls.box((-0.6, -0.36, 0.3), (0.5, 0.36, 1.65 if ridden else 1.1)),
+        hulls.box((-reach, -0.12, 0.0), (reach, 0.12, 0.75)),
+        hulls.box((-0.6, -0.36, 0.3), (0.5, 0.36, 1.65 if ridden else 1.1)),
     ]
     z = build.wheel_m
     head, tail = _lamp_places(style, build)
@@ -80,16 +75,12 @@ def motorcycle(seed: int) -> Solid:
 
 
 def motorcycle_facts(seed: int) -> Facts:
-    """Its kind, and whether somebody rides it."""
-    return Facts(_style(seed), {"rider": "yes" if _ridden(seed) else "no"})
+    """Its kind, and whether it has a rider."""
+    return Facts(in_turn(STYLES, seed), {"rider": "yes" if _is_ridden(seed) else "no"})
 
 
-def _style(seed: int) -> str:
-    return STYLES[seed % len(STYLES)]
-
-
-def _ridden(seed: int) -> bool:
-    return is_drawn(2.0 / 3.0, variant_rng("motorcycle rider", seed))
+def _is_ridden(seed: int) -> bool:
+    return variant_rng("motorcycle rider", seed).chance(2.0 / 3.0)
 
 
 def _running_gear(build: _Build) -> list[Patch]:
@@ -106,21 +97,19 @@ def _running_gear(build: _Build) -> list[Patch]:
             limb(
                 [hub, np.array([build.fork[0], 0.0, build.fork[1]]) + side],
                 (0.024, 0.021),
-                VehicleSlot.CHROME,
+                Slot.CHROME,
                 7,
             )
         )
         rear = np.array([-build.axle, 0.0, build.wheel_m]) + side
-        parts.append(
-            limb([rear, np.array([-0.12, 0.0, 0.42]) + side], (0.022, 0.03), VehicleSlot.TRIM, 5)
-        )
+        parts.append(limb([rear, np.array([-0.12, 0.0, 0.42]) + side], (0.022, 0.03), Slot.TRIM, 5))
         grip = np.array([gx, sign * gy, gz])
         bar = [np.array([head_x, 0.0, head_z + 0.03]), np.array([gx + 0.1, sign * (gy - 0.12), gz]),
                grip + np.array([-0.03, sign * 0.04, 0.0])]  # fmt: skip
-        parts.append(limb(bar, (0.014, 0.014, 0.018), VehicleSlot.TRIM, 6))
+        parts.append(limb(bar, (0.014, 0.014, 0.018), Slot.TRIM, 6))
         glass = np.array([gx + 0.1, sign * (gy - 0.06), gz + 0.17])
-        parts.append(limb([bar[1], glass], (0.006, 0.006), VehicleSlot.TRIM, 4))
-        parts.append(blob(glass, (0.02, 0.065, 0.04), VehicleSlot.TRIM))
+        parts.append(limb([bar[1], glass], (0.006, 0.006), Slot.TRIM, 4))
+        parts.append(blob(glass, (0.02, 0.065, 0.04), Slot.TRIM))
     return [*parts, _guard(build, 1.0, (0.7, 2.3)), _guard(build, -1.0, (0.7, 2.2))]
 
 
@@ -131,7 +120,7 @@ def _guard(build: _Build, sign: float, arc_rad: tuple[float, float]) -> Patch:
     x, z = sign * build.axle + radius * np.cos(turn), build.wheel_m + radius * np.sin(turn)
     path = np.stack([x, 0.0 * turn, z], axis=1)
     section = circle(1.0, 6) * np.array([0.014, 0.5 * build.tyre_m + 0.012])
-    return sweep(path, section, up=(0.0, 0.0, 1.0), slot=VehicleSlot.PAINT)
+    return sweep(path, section, up=(0.0, 0.0, 1.0), slot=Slot.PAINT)
 
 
 def _lamp_places(style: str, build: _Build) -> tuple[Vec3, Vec3]:
@@ -144,14 +133,14 @@ def _lamp_places(style: str, build: _Build) -> tuple[Vec3, Vec3]:
 def _lamps(style: str, build: _Build) -> list[Patch]:
     (hx, _, hz), (tx, _, tz) = _lamp_places(style, build)
     parts = [
-        blob((hx - 0.03, 0.0, hz), (0.09, 0.1, 0.095), VehicleSlot.TRIM),
-        blob((hx, 0.0, hz), (0.075, 0.085, 0.08), VehicleSlot.HEADLIGHT),
-        blob((tx, 0.0, tz), (0.05, 0.09, 0.035), VehicleSlot.TAILLIGHT),
-        blob((tx - 0.02, 0.0, tz), (0.04, 0.045, 0.03), VehicleSlot.BRAKELIGHT),
-        block((tx - 0.05, -0.09, tz - 0.25), (tx - 0.03, 0.09, tz - 0.1), 0.0, VehicleSlot.PLATE),
-        block((tx - 0.03, -0.03, tz - 0.2), (tx + 0.12, 0.03, tz - 0.02), 0.0, VehicleSlot.TRIM),
+        blob((hx - 0.03, 0.0, hz), (0.09, 0.1, 0.095), Slot.TRIM),
+        blob((hx, 0.0, hz), (0.075, 0.085, 0.08), Slot.HEADLIGHT),
+        blob((tx, 0.0, tz), (0.05, 0.09, 0.035), Slot.TAILLIGHT),
+        blob((tx - 0.02, 0.0, tz), (0.04, 0.045, 0.03), Slot.BRAKELIGHT),
+        block((tx - 0.05, -0.09, tz - 0.25), (tx - 0.03, 0.09, tz - 0.1), 0.0, Slot.PLATE),
+        block((tx - 0.03, -0.03, tz - 0.2), (tx + 0.12, 0.03, tz - 0.02), 0.0, Slot.TRIM),
     ]
-    for sign, slot in ((1.0, VehicleSlot.INDICATOR_LEFT), (-1.0, VehicleSlot.INDICATOR_RIGHT)):
+    for sign, slot in ((1.0, Slot.INDICATOR_LEFT), (-1.0, Slot.INDICATOR_RIGHT)):
         parts.append(blob((hx - 0.04, sign * 0.16, hz - 0.04), (0.03, 0.045, 0.022), slot))
         parts.append(blob((tx, sign * 0.14, tz - 0.03), (0.03, 0.045, 0.022), slot))
     return parts
@@ -164,7 +153,7 @@ def _bodies(style: str, build: _Build) -> list[Patch]:
     tail = [np.array(p) for p in ((x + 0.05, 0.0, z - 0.07), (-0.55, 0.0, z - 0.01),
                                   (-0.76, 0.0, z + 0.05))]  # fmt: skip
     parts = [
-        blob((0.1, 0.0, 0.86), (0.3, 0.15, 0.14), VehicleSlot.PAINT, 0.12),
+        blob((0.1, 0.0, 0.86), (0.3, 0.15, 0.14), Slot.PAINT, 0.12),
         limb(
             [
                 np.array([x + 0.25, 0.0, z - 0.02]),
@@ -172,21 +161,21 @@ def _bodies(style: str, build: _Build) -> list[Patch]:
                 np.array([-0.62, 0.0, z + 0.03]),
             ],
             (0.075, 0.115, 0.08),
-            VehicleSlot.TRIM,
+            Slot.TRIM,
             8,
         ),
-        limb(tail, (0.11, 0.095, 0.05), VehicleSlot.PAINT, 8),
-        block((-0.18, -0.15, 0.3), (0.22, 0.15, 0.6), 0.05, VehicleSlot.UNDERBODY),
-        blob((0.14, 0.0, 0.58), (0.15, 0.17, 0.14), VehicleSlot.RIM, -0.5),
-        blob((-0.05, 0.0, 0.4), (0.19, 0.2, 0.12), VehicleSlot.RIM),
+        limb(tail, (0.11, 0.095, 0.05), Slot.PAINT, 8),
+        block((-0.18, -0.15, 0.3), (0.22, 0.15, 0.6), 0.05, Slot.UNDERBODY),
+        blob((0.14, 0.0, 0.58), (0.15, 0.17, 0.14), Slot.RIM, -0.5),
+        blob((-0.05, 0.0, 0.4), (0.19, 0.2, 0.12), Slot.RIM),
     ]
     for sign in (1.0, -1.0):
         frame = [np.array([0.33, sign * 0.08, 0.88]), np.array([0.0, sign * 0.16, 0.72]),
                  np.array([-0.16, sign * 0.12, 0.42])]  # fmt: skip
-        parts.append(limb(frame, (0.03, 0.03, 0.03), VehicleSlot.TRIM, 6))
+        parts.append(limb(frame, (0.03, 0.03, 0.03), Slot.TRIM, 6))
     pipe = [np.array(p) for p in ((0.25, -0.1, 0.5), (0.2, -0.12, 0.27), (-0.15, -0.15, 0.25),
                                   (-0.45, -0.19, 0.38), (-0.78, -0.2, 0.5))]  # fmt: skip
-    parts.append(limb(pipe, (0.025, 0.025, 0.03, 0.055, 0.055), VehicleSlot.CHROME, 8))
+    parts.append(limb(pipe, (0.025, 0.025, 0.03, 0.055, 0.055), Slot.CHROME, 8))
     if style == "sport":
         parts += _fairing()
     return parts
@@ -194,12 +183,12 @@ def _bodies(style: str, build: _Build) -> list[Patch]:
 
 def _fairing() -> list[Patch]:
     parts = [
-        blob((0.42, 0.0, 0.86), (0.26, 0.19, 0.17), VehicleSlot.PAINT, 0.35),
-        blob((0.36, 0.0, 1.0), (0.17, 0.14, 0.13), VehicleSlot.GLASS, 0.5),
-        blob((0.08, 0.0, 0.34), (0.3, 0.19, 0.12), VehicleSlot.PAINT, -0.1),
+        blob((0.42, 0.0, 0.86), (0.26, 0.19, 0.17), Slot.PAINT, 0.35),
+        blob((0.36, 0.0, 1.0), (0.17, 0.14, 0.13), Slot.GLASS, 0.5),
+        blob((0.08, 0.0, 0.34), (0.3, 0.19, 0.12), Slot.PAINT, -0.1),
     ]
     for sign in (1.0, -1.0):
-        parts.append(blob((0.16, sign * 0.15, 0.6), (0.3, 0.06, 0.24), VehicleSlot.PAINT, 0.4))
+        parts.append(blob((0.16, sign * 0.15, 0.6), (0.3, 0.06, 0.24), Slot.PAINT, 0.4))
     return parts
 
 
@@ -211,19 +200,19 @@ def _scooter(build: _Build) -> list[Patch]:
         np.array(shield),
         circle(1.0, 10),
         up=(0.0, 1.0, 0.0),
-        slot=VehicleSlot.PAINT,
+        slot=Slot.PAINT,
         scale=np.array([(0.12, 0.07), (0.22, 0.07), (0.2, 0.06), (0.17, 0.05)]),
     )
     return [
         wide,
-        blob((0.39, 0.0, 0.98), (0.13, 0.16, 0.1), VehicleSlot.PAINT),
-        block((-0.15, -0.17, 0.22), (0.36, 0.17, 0.29), 0.02, VehicleSlot.TRIM),
-        blob((-0.45, 0.0, 0.52), (0.42, 0.2, 0.24), VehicleSlot.PAINT, 0.06),
+        blob((0.39, 0.0, 0.98), (0.13, 0.16, 0.1), Slot.PAINT),
+        block((-0.15, -0.17, 0.22), (0.36, 0.17, 0.29), 0.02, Slot.TRIM),
+        blob((-0.45, 0.0, 0.52), (0.42, 0.2, 0.24), Slot.PAINT, 0.06),
         limb([np.array([x + 0.2, 0.0, z - 0.05]), np.array([x - 0.05, 0.0, z - 0.06]),
-              np.array([x - 0.4, 0.0, z - 0.01])], (0.09, 0.13, 0.09), VehicleSlot.TRIM, 8),
-        block((-0.7, 0.06, 0.17), (-0.25, 0.14, 0.34), 0.04, VehicleSlot.UNDERBODY),
+              np.array([x - 0.4, 0.0, z - 0.01])], (0.09, 0.13, 0.09), Slot.TRIM, 8),
+        block((-0.7, 0.06, 0.17), (-0.25, 0.14, 0.34), 0.04, Slot.UNDERBODY),
         limb([np.array([-0.3, -0.13, 0.24]), np.array([-0.78, -0.15, 0.32])], (0.04, 0.055),
-             VehicleSlot.CHROME, 8),
+             Slot.CHROME, 8),
     ]  # fmt: skip
 
 

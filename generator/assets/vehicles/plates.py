@@ -1,7 +1,7 @@
 """Licence plates: letters and digits of straight strokes, in a format that no country has.
 
-Glyphs stand on a grid of 4 by 6. Letters that are easily taken for digits are left out, as many
-countries do.
+Glyphs stand on a grid of 4 by 6. Letters that are easily confused with digits are left out, as
+in many countries.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
 from gen_data.generator.assets.procedural.textures import artwork as art
-from gen_data.generator.assets.procedural.variant_rng import choose, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import TextureData
-from gen_data.generator.core.streams import Rng
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -22,22 +22,7 @@ SEEDS = 500
 """Plates that vehicles draw from; others can be asked for."""
 FAMILY = "texture/licence_plate"
 
-# Strokes of each glyph; two digits are a point: x to the right, y up.
-GLYPHS = {
-    "A": "00 26 40,12 32", "B": "00 06 36 45 44 33 03,33 42 41 30 00",
-    "C": "45 36 16 05 01 10 30 41", "D": "00 06 36 45 41 30 00", "E": "46 06 00 40,03 33",
-    "F": "46 06 00,03 33", "G": "45 36 16 05 01 10 30 41 43 23", "H": "06 00,46 40,03 43",
-    "J": "46 41 30 10 01", "K": "06 00,46 02,24 40", "L": "06 00 40", "M": "00 06 23 46 40",
-    "N": "00 06 40 46", "P": "00 06 36 45 44 33 03", "R": "00 06 36 45 44 33 03,23 40",
-    "S": "45 36 16 05 04 13 33 42 41 30 10 01", "T": "06 46,26 20", "U": "06 01 10 30 41 46",
-    "V": "06 20 46", "W": "06 10 24 30 46", "X": "06 40,46 00", "Y": "06 23 46,23 20",
-    "Z": "06 46 00 40",
-    "0": "05 01 10 30 41 45 36 16 05", "1": "04 26 20", "2": "05 16 36 45 44 00 40",
-    "3": "05 16 36 45 44 33 42 41 30 10 01,13 33", "4": "30 36 02 42",
-    "5": "46 06 03 33 42 41 30 10 01", "6": "45 36 16 05 01 10 30 41 42 33 03",
-    "7": "06 46 10", "8": "13 04 05 16 36 45 44 33 13 02 01 10 30 41 42 33",
-    "9": "01 10 30 41 45 36 16 05 04 13 43",
-}  # fmt: skip
+GLYPHS = load_table(__package__, "glyphs", str)
 _LETTERS = "ABCDEFGHJKLMNPRSTUVWXYZ"
 _DIGITS = "0123456789"
 _PATTERNS = ("LL DDDD", "LLL DDD", "DD LLL D", "L DDD LL", "LL DD LL")
@@ -56,10 +41,10 @@ _STROKE = 0.95
 
 
 def plate_text(seed: int) -> str:
-    """What stands on a plate; groups are separated by a space."""
+    """Text of a plate; groups are separated by a space."""
     rng = variant_rng("licence_plate", seed)
-    pattern = choose(_PATTERNS, rng)
-    return "".join(_drawn(place, rng) for place in pattern)
+    pattern = rng.choose(_PATTERNS)
+    return "".join(_draw_character(place, rng) for place in pattern)
 
 
 def plate_id(seed: int, rows: int) -> str:
@@ -84,7 +69,7 @@ def licence_plate(seed: int, rows: int) -> TextureData:
     if rows not in _DRAWN_PX:
         raise ValueError(f"a licence plate has 1 or 2 rows, not {rows}")
     ground, ink = (
-        hex_to_srgb8(c) for c in choose(_SCHEMES, variant_rng("licence_plate/colors", seed))
+        hex_to_srgb8(c) for c in variant_rng("licence_plate/colors", seed).choose(_SCHEMES)
     )
     width, height = _DRAWN_PX[rows]
     image = art.canvas(width, height, ground)
@@ -125,7 +110,7 @@ def _strokes(letter: str) -> Iterator[list[tuple[int, int]]]:
             yield [(int(point[0]), int(point[1])) for point in stroke.split()]
 
 
-def _drawn(place: str, rng: Rng) -> str:
+def _draw_character(place: str, rng: VariantRng) -> str:
     if place == " ":
         return place
-    return choose(_LETTERS if place == "L" else _DIGITS, rng)
+    return rng.choose(_LETTERS if place == "L" else _DIGITS)

@@ -1,4 +1,4 @@
-"""Someone who sits on two wheels: limbs between hips, grips and pedals.
+"""Riders of two-wheelers: limbs between hips, grips and pedals.
 
 Lengths are shares of stature from Drillis and Contini, "Body segment parameters", 1966.
 """
@@ -14,10 +14,9 @@ import numpy as np
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.procedural.surface_shapes import ball, circle, spline, sweep
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between
-from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 _SKINS = ("#f0cdb0", "#e0b08c", "#c68e64", "#8d5a3a", "#5a3825")
 _TOPS = ("#1f3a5f", "#b3231d", "#20242a", "#e8e6e0", "#d9d12a", "#2f6b4a", "#6b6f76", "#d96a1f")
@@ -31,11 +30,11 @@ _TORSO_M = 0.275 * _STATURE_M
 
 @dataclass(frozen=True)
 class Seat:
-    """Where the rider touches the vehicle, metres; left (y > 0) before right.
+    """Points of contact between rider and vehicle [m]; left (y > 0) before right.
 
     Attributes:
         hips: Middle of the hip joints.
-        grips, soles: Hands' and feet's places.
+        grips, soles: Positions of hands and feet.
         lean_rad: Of the trunk, forward from upright.
         full_face: Whether the helmet covers the face.
     """
@@ -47,18 +46,18 @@ class Seat:
     full_face: bool
 
 
-def draw_clothes(rng: Rng) -> tuple[Vec3, ...]:
+def draw_clothes(rng: VariantRng) -> tuple[Vec3, ...]:
     """Colours of skin, top, bottom, shoes and helmet, linear RGB."""
     codes = (_SKINS, _TOPS, _BOTTOMS, ("#18181a", "#e2e2de", "#4a3627"), _HELMETS)
-    return tuple(hex_to_linear(choose(options, rng)) for options in codes)
+    return tuple(hex_to_linear(rng.choose(options)) for options in codes)
 
 
-def rider(seat: Seat, rng: Rng) -> list[Patch]:
+def rider(seat: Seat, rng: VariantRng) -> list[Patch]:
     """The rider's body."""
     hips = np.array(seat.hips)
     spine = np.array([math.sin(seat.lean_rad), 0.0, math.cos(seat.lean_rad)])
     neck = hips + (_TORSO_M + 0.05) * spine
-    parts = [*_trunk(hips, spine), *_head(neck, seat, uniform_between(-0.1, 0.15, rng))]
+    parts = [*_trunk(hips, spine), *_head(neck, seat, rng.between(-0.1, 0.15))]
     for sign, grip, sole in zip((1.0, -1.0), seat.grips, seat.soles, strict=True):
         shoulder = hips + _TORSO_M * spine + np.array([0.0, sign * 0.175, 0.0])
         parts += _arm(shoulder, np.array(grip), sign)
@@ -88,7 +87,7 @@ def blob(centre: Sequence[float] | Array, half: Vec3, slot: int, pitch_rad: floa
 
 
 def joint(start: Array, end: Array, first_m: float, second_m: float, towards: Array) -> Array:
-    """Where a limb of two bones bends; it bends towards a direction, or not if it cannot reach."""
+    """Joint of a limb of two bones that bends towards a direction; straight if it cannot reach."""
     reach = end - start
     distance = math.sqrt(float((reach**2).sum()))
     along = (distance**2 + first_m**2 - second_m**2) / (2.0 * distance)
@@ -105,11 +104,9 @@ def _trunk(hips: Array, spine: Array) -> list[Patch]:
     sizes = np.array([(0.1, 0.09), (0.17, 0.125), (0.155, 0.11), (0.185, 0.115), (0.14, 0.08),
                       (0.06, 0.06)])  # fmt: skip
     points = np.array(path)
-    top = sweep(
-        points[1:], circle(1.0, 10), up=(0.0, 1.0, 0.0), scale=sizes[1:], slot=VehicleSlot.TOP
-    )
+    top = sweep(points[1:], circle(1.0, 10), up=(0.0, 1.0, 0.0), scale=sizes[1:], slot=Slot.TOP)
     seat = sweep(points[:3], circle(1.0, 10), up=(0.0, 1.0, 0.0), scale=0.98 * sizes[:3],
-                 slot=VehicleSlot.BOTTOM)  # fmt: skip
+                 slot=Slot.BOTTOM)  # fmt: skip
     return [top, seat]
 
 
@@ -118,23 +115,18 @@ def _head(neck: Array, seat: Seat, nod_rad: float) -> list[Patch]:
     throat = limb(
         [neck - np.array([0.01, 0.0, 0.03]), middle - np.array([0.01, 0.0, 0.04])],
         (0.06, 0.055),
-        VehicleSlot.SKIN,
+        Slot.SKIN,
     )
     if seat.full_face:
         shell = blob(
-            middle + np.array([0.005, 0.0, 0.01]),
-            (0.148, 0.122, 0.145),
-            VehicleSlot.HELMET,
-            nod_rad,
+            middle + np.array([0.005, 0.0, 0.01]), (0.148, 0.122, 0.145), Slot.HELMET, nod_rad
         )
         visor = blob(
-            middle + np.array([0.05, 0.0, 0.02]), (0.11, 0.113, 0.058), VehicleSlot.GLASS, nod_rad
+            middle + np.array([0.05, 0.0, 0.02]), (0.11, 0.113, 0.058), Slot.GLASS, nod_rad
         )
         return [throat, shell, visor]
-    face = blob(middle, (0.1, 0.078, 0.12), VehicleSlot.SKIN, nod_rad)
-    helmet = blob(
-        middle + np.array([-0.015, 0.0, 0.065]), (0.14, 0.1, 0.085), VehicleSlot.HELMET, nod_rad
-    )
+    face = blob(middle, (0.1, 0.078, 0.12), Slot.SKIN, nod_rad)
+    helmet = blob(middle + np.array([-0.015, 0.0, 0.065]), (0.14, 0.1, 0.085), Slot.HELMET, nod_rad)
     return [throat, face, helmet]
 
 
@@ -142,18 +134,18 @@ def _arm(shoulder: Array, grip: Array, sign: float) -> list[Patch]:
     out = np.array([-0.3, 0.8 * sign, -0.8])
     elbow = joint(shoulder, grip, _UPPER_ARM_M, _FOREARM_M, out)
     wrist = elbow + 0.85 * (grip - elbow)
-    sleeve = limb([shoulder, elbow, wrist], (0.062, 0.047, 0.036), VehicleSlot.TOP)
-    return [sleeve, blob(grip + 0.02 * (wrist - grip), (0.045, 0.045, 0.04), VehicleSlot.SKIN)]
+    sleeve = limb([shoulder, elbow, wrist], (0.062, 0.047, 0.036), Slot.TOP)
+    return [sleeve, blob(grip + 0.02 * (wrist - grip), (0.045, 0.045, 0.04), Slot.SKIN)]
 
 
 def _leg(hip: Array, sole: Array, sign: float) -> list[Patch]:
     ankle = sole + np.array([-0.09, 0.0, 0.085])
     knee = joint(hip, ankle, _THIGH_M, _SHIN_M, np.array([1.0, 0.12 * sign, 0.5]))
-    trouser = limb([hip, knee, ankle], (0.088, 0.062, 0.045), VehicleSlot.BOTTOM)
+    trouser = limb([hip, knee, ankle], (0.088, 0.062, 0.045), Slot.BOTTOM)
     heel, toe = ankle + np.array([-0.05, 0.0, -0.05]), sole + np.array([0.13, 0.0, 0.03])
     shoe = limb(
         [heel, 0.5 * (heel + toe) + np.array([0.0, 0.0, 0.012]), toe],
         (0.045, 0.05, 0.032),
-        VehicleSlot.SHOES,
+        Slot.SHOES,
     )
     return [trouser, shoe]

@@ -4,148 +4,109 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
-from gen_data.generator.assets.vehicles import body_shell
-from gen_data.generator.assets.vehicles.body_shell import Row, assign_slot, level_above, level_below
-from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, VehicleSlot, materials
+from gen_data.generator.assets.vehicles.body_shell import (
+    Curve,
+    assign_slot,
+    body_rows,
+    drop_uvs,
+    gap,
+    level_above,
+    level_below,
+    level_between,
+    mirror_half,
+    plan,
+    rows_between,
+    stack,
+    stations_along,
+)
+from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
 
 _CABS = ("#e6e6e3", "#e6e6e3", "#1d4f96", "#b3231d", "#2d6b45", "#d9a514", "#3d4247")
 _BOXES = ("#e4e4e0", "#e4e4e0", "#dcdcd6", "#c9ccce", "#2a5c9c", "#b52b22", "#e0b022")
 _FLOOR_M = 0.42
 _HALF_M = 1.16
-# Share of the height, how far front and rear stand back [m], share of the half width.
-_ROWS = (
-    (0.0, 0.08, 0.0, 0.98), (0.04, 0.01, 0.0, 1.0), (0.14, 0.0, 0.0, 1.0), (0.26, 0.01, 0.0, 1.0),
-    (0.4, 0.03, 0.0, 1.0), (0.52, 0.06, 0.0, 1.0), (0.86, 0.26, 0.0, 0.95),
-    (0.94, 0.33, 0.01, 0.93), (0.985, 0.42, 0.04, 0.88), (1.0, 0.56, 0.1, 0.8),
-)  # fmt: skip
 
 
 def truck(seed: int) -> Solid:
-    """A box truck. Slots and keypoints as every vehicle's; the box is the second paint."""
+    """A box truck. Slots and keypoints are those of all vehicles; the box is the second paint."""
     rng = variant_rng("truck", seed)
-    x, cab, roof = (
-        0.5 * uniform_between(6.6, 9.8, rng),
-        uniform_between(1.75, 2.05, rng),
-        uniform_between(2.45, 2.75, rng),
-    )
-    top = max(roof + 0.25, uniform_between(3.0, 3.75, rng))
-    radius = uniform_between(0.42, 0.49, rng)
-    axles = Axles(
-        x - 1.22, -x + uniform_between(1.6, 2.0, rng), 1.0, radius, 0.27, radius + 0.08, 0, True
-    )
+    x, cab, roof = (0.5 * rng.between(6.6, 9.8), rng.between(1.75, 2.05), rng.between(2.45, 2.75))
+    top = max(roof + 0.25, rng.between(3.0, 3.75))
+    radius = rng.between(0.42, 0.49)
+    axles = Axles(x - 1.22, -x + rng.between(1.6, 2.0), 1.0, radius, 0.27, radius + 0.08, 0, True)
     parts = [_cab(x, cab, roof, axles)]
     fitted = [*axles.wheels(0.0), *_load(x, cab, top), *_chassis(x, cab, axles), *_lamps(x)]
-    if is_drawn(0.6, rng):
+    if rng.chance(0.6):
         fitted.append(_spoiler(x, cab, roof, top))
-    parts += [body_shell.drop_uvs(p) for p in fitted]
-    cab_paint, box_paint = (hex_to_linear(choose(codes, rng)) for codes in (_CABS, _BOXES))
+    parts += [drop_uvs(p) for p in fitted]
+    cab_paint, box_paint = (hex_to_linear(rng.choose(codes)) for codes in (_CABS, _BOXES))
     hull = [
-        collision_hulls.box((x - cab, -_HALF_M, _FLOOR_M), (x, _HALF_M, roof)),
-        collision_hulls.box((-x, -1.25, 0.95), (x - cab - 0.12, 1.25, top)),
-        collision_hulls.box((-x + 0.4, -1.1, 0.0), (x - 0.6, 1.1, 0.95)),
+        hulls.box((x - cab, -_HALF_M, _FLOOR_M), (x, _HALF_M, roof)),
+        hulls.box((-x, -1.25, 0.95), (x - cab - 0.12, 1.25, top)),
+        hulls.box((-x + 0.4, -1.1, 0.0), (x - 0.6, 1.1, 0.95)),
     ]
     points = axles.keypoints((x - 0.08, 0.95, 0.72), (-x + 0.02, 1.0, 0.8))
     return make_solid([join_patches(parts)], materials(rng, cab_paint, box_paint), hull, points)
 
 
-def truck_facts(**_: object) -> Facts:
-    """Its kind."""
-    return Facts("box_truck")
-
-
 def _cab(x: float, length: float, roof: float, axles: Axles) -> Patch:
-    ring = body_shell.plan((14.0, 3.0), (40.0, 9.0), sides=9)
-    rows = [
-        Row(rise, x - front, x - length + rear, share * _HALF_M)
-        for rise, front, rear, share in _ROWS
-    ]
+    ring = plan((14.0, 3.0), (40.0, 9.0), sides=9)
+    rows = body_rows("truck", x, x - length, _HALF_M)
 
-    def level(height_m: float) -> body_shell.Curve:
+    def level(height_m: float) -> Curve:
         return lambda at: np.full_like(at, height_m)
 
-    half = body_shell.stack(
-        ring, rows, level(_FLOOR_M), level(roof - 0.05), crown_m=0.05, lid_rows=2
-    )
-    half = assign_slot(half, VehicleSlot.UNDERBODY, *body_shell.rows_between(-2.0, 0.0))
+    half = stack(ring, rows, level(_FLOOR_M), level(roof - 0.05), crown_m=0.05, lid_rows=2)
+    half = assign_slot(half, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
     belt = _FLOOR_M + 0.5 * (roof - _FLOOR_M)
-    half = assign_slot(
-        half, VehicleSlot.TRIM, *body_shell.rows_between(0.0, 1.0), level_below("z", 0.6)
-    )
+    half = assign_slot(half, Slot.TRIM, *rows_between(0.0, 1.0), level_below("z", 0.6))
     corner = ring.front(0.9)
-    screen = (
-        *body_shell.stations_along(-1.0, corner),
-        *body_shell.level_between("z", belt - 0.05, roof - 0.3),
-    )
-    half = assign_slot(half, VehicleSlot.GLASS, *screen)
+    screen = (*stations_along(-1.0, corner), *level_between("z", belt - 0.05, roof - 0.3))
+    half = assign_slot(half, Slot.GLASS, *screen)
     door = x - length + 0.42
-    side = (*body_shell.stations_along(ring.front(0.92) + 0.04, 1.0), level_above("x", door))
-    window = (*side, *body_shell.level_between("z", belt, roof - 0.33))
-    half = assign_slot(half, VehicleSlot.GLASS, *window)
+    side = (*stations_along(ring.front(0.92) + 0.04, 1.0), level_above("x", door))
+    window = (*side, *level_between("z", belt, roof - 0.33))
+    half = assign_slot(half, Slot.GLASS, *window)
     grille = (
         level_above("x", x - 0.4),
         level_below("y", 0.78),
-        *body_shell.level_between("z", 0.92, belt - 0.24),
+        *level_between("z", 0.92, belt - 0.24),
     )
-    half = assign_slot(half, VehicleSlot.TRIM, *grille)
-    lamp = (
-        *body_shell.stations_along(ring.front(0.66), ring.front(0.92)),
-        *body_shell.level_between("z", 0.63, 0.82),
-    )
-    half = assign_slot(half, VehicleSlot.HEADLIGHT, *lamp, level_above("x", x - 0.6))
-    wink = (
-        *body_shell.stations_along(ring.front(0.83), ring.front(0.92) + 0.03),
-        level_above("x", x - 0.7),
-    )
-    half = assign_slot(
-        half, VehicleSlot.INDICATOR_LEFT, *wink, *body_shell.level_between("z", 0.82, 0.9)
-    )
+    half = assign_slot(half, Slot.TRIM, *grille)
+    lamp = (*stations_along(ring.front(0.66), ring.front(0.92)), *level_between("z", 0.63, 0.82))
+    half = assign_slot(half, Slot.HEADLIGHT, *lamp, level_above("x", x - 0.6))
+    wink = (*stations_along(ring.front(0.83), ring.front(0.92) + 0.03), level_above("x", x - 0.7))
+    half = assign_slot(half, Slot.INDICATOR_LEFT, *wink, *level_between("z", 0.82, 0.9))
     panels, wells = axles.wells(half, _HALF_M)
     gaps = [
-        body_shell.gap(
-            panels,
-            at,
-            0.012,
-            VehicleSlot.TRIM,
-            level_above("y", 0.7),
-            *body_shell.rows_between(0.1, 0.93),
-        )
+        gap(panels, at, 0.012, Slot.TRIM, level_above("y", 0.7), *rows_between(0.1, 0.93))
         for at in (door - 0.08, x - 0.42)
     ]
-    return body_shell.mirror_half(join_patches([panels, *wells, *gaps]), SIDES)
+    return mirror_half(join_patches([panels, *wells, *gaps]), SIDES)
 
 
 def _load(x: float, cab: float, top: float) -> list[Patch]:
     """The box, its frame and the doors behind."""
     front = x - cab - 0.12
-    parts = [block((-x + 0.03, -1.235, 0.98), (front, 1.235, top), 0.02, VehicleSlot.SECOND_PAINT)]
+    parts = [block((-x + 0.03, -1.235, 0.98), (front, 1.235, top), 0.02, Slot.SECOND_PAINT)]
     for y in (-1.225, 1.225):
         for z in (0.98, top - 0.06):
-            parts.append(
-                block((-x, y - 0.025, z), (front, y + 0.025, z + 0.07), 0.0, VehicleSlot.CHROME)
-            )
-        parts.append(
-            block((-x, y - 0.025, 0.98), (-x + 0.08, y + 0.025, top), 0.0, VehicleSlot.CHROME)
-        )
+            parts.append(block((-x, y - 0.025, z), (front, y + 0.025, z + 0.07), 0.0, Slot.CHROME))
+        parts.append(block((-x, y - 0.025, 0.98), (-x + 0.08, y + 0.025, top), 0.0, Slot.CHROME))
     for y in (-0.62, -0.1, 0.1, 0.62):
         parts.append(
-            block((-x, y - 0.015, 1.05), (-x + 0.04, y + 0.015, top - 0.1), 0.0, VehicleSlot.CHROME)
+            block((-x, y - 0.015, 1.05), (-x + 0.04, y + 0.015, top - 0.1), 0.0, Slot.CHROME)
         )
-    parts.append(
-        block((-x + 0.02, -0.006, 1.05), (-x + 0.04, 0.006, top - 0.1), 0.0, VehicleSlot.TRIM)
-    )
+    parts.append(block((-x + 0.02, -0.006, 1.05), (-x + 0.04, 0.006, top - 0.1), 0.0, Slot.TRIM))
     return parts
 
 
@@ -160,36 +121,30 @@ def _chassis(x: float, cab: float, axles: Axles) -> list[Patch]:
     for x_m in (axles.front_m, axles.rear_m):
         parts.append(block((x_m - 0.07, -0.9, axles.radius_m - 0.07),
                            (x_m + 0.07, 0.9, axles.radius_m + 0.07)))  # fmt: skip
-    tank = block((guard[1] - 0.9, 0.6, 0.4), (guard[1] - 0.1, 1.1, 0.85), 0.08, VehicleSlot.CHROME)
-    made = [p.painted(VehicleSlot.UNDERBODY) for p in parts]
+    tank = block((guard[1] - 0.9, 0.6, 0.4), (guard[1] - 0.1, 1.1, 0.85), 0.08, Slot.CHROME)
+    made = [p.painted(Slot.UNDERBODY) for p in parts]
     for sign in (1.0, -1.0):
         y = sorted((sign * 1.17, sign * 1.2))
         for z in (0.48, 0.72):
-            made.append(
-                block((guard[0], y[0], z), (guard[1], y[1], z + 0.1), 0.0, VehicleSlot.CHROME)
-            )
-    made.append(block((-x + 0.05, -1.15, 0.42), (-x + 0.13, 1.15, 0.54), 0.0, VehicleSlot.TRIM))
+            made.append(block((guard[0], y[0], z), (guard[1], y[1], z + 0.1), 0.0, Slot.CHROME))
+    made.append(block((-x + 0.05, -1.15, 0.42), (-x + 0.13, 1.15, 0.54), 0.0, Slot.TRIM))
     return [*made, tank]
 
 
 def _lamps(x: float) -> list[Patch]:
     """Lamps behind, plates, mirrors."""
     parts = [
-        block((x - 0.04, -0.26, 0.46), (x + 0.006, 0.26, 0.57), 0.0, VehicleSlot.PLATE),
-        block((-x + 0.02, -0.26, 0.66), (-x + 0.06, 0.26, 0.77), 0.0, VehicleSlot.PLATE),
+        block((x - 0.04, -0.26, 0.46), (x + 0.006, 0.26, 0.57), 0.0, Slot.PLATE),
+        block((-x + 0.02, -0.26, 0.66), (-x + 0.06, 0.26, 0.77), 0.0, Slot.PLATE),
     ]
-    for sign, wink in ((1.0, VehicleSlot.INDICATOR_LEFT), (-1.0, VehicleSlot.INDICATOR_RIGHT)):
-        for slot, inner in (
-            (VehicleSlot.TAILLIGHT, 0.78),
-            (VehicleSlot.BRAKELIGHT, 0.92),
-            (wink, 1.06),
-        ):
+    for sign, wink in ((1.0, Slot.INDICATOR_LEFT), (-1.0, Slot.INDICATOR_RIGHT)):
+        for slot, inner in ((Slot.TAILLIGHT, 0.78), (Slot.BRAKELIGHT, 0.92), (wink, 1.06)):
             y = sorted((sign * inner, sign * (inner + 0.13)))
             parts.append(block((-x + 0.01, y[0], 0.73), (-x + 0.08, y[1], 0.87), 0.0, slot))
         y = sorted((sign * 1.2, sign * 1.38))
-        parts.append(block((x - 0.42, y[0], 1.65), (x - 0.3, y[1], 2.1), 0.03, VehicleSlot.TRIM))
+        parts.append(block((x - 0.42, y[0], 1.65), (x - 0.3, y[1], 2.1), 0.03, Slot.TRIM))
         y = sorted((sign * 1.0, sign * 1.25))
-        parts.append(block((x - 0.45, y[0], 2.1), (x - 0.4, y[1], 2.14), 0.0, VehicleSlot.TRIM))
+        parts.append(block((x - 0.45, y[0], 2.1), (x - 0.4, y[1], 2.14), 0.0, Slot.TRIM))
     return parts
 
 
@@ -202,4 +157,4 @@ def _spoiler(x: float, cab: float, roof: float, top: float) -> Patch:
     quads += [[*left], [*right[::-1]]]
     points = np.array(quads)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3, 3)[:, ::-1]
     wedge = Patch(points, np.zeros((len(points), 3, 2)), np.zeros(len(points), dtype=np.int64))
-    return wedge.painted(VehicleSlot.PAINT)
+    return wedge.painted(Slot.PAINT)

@@ -1,4 +1,4 @@
-"""The slots that all vehicles share, and what they are made of."""
+"""Material slots that all vehicles share, and their materials."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from enum import IntEnum
 import numpy as np
 
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
-from gen_data.generator.assets.procedural.variant_rng import uniform_between
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.vehicles import plates
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
 
 
 class VehicleSlot(IntEnum):
-    """Number of a material in what ``materials`` returns."""
+    """Index of a material in the result of ``materials``."""
 
     PAINT = 0
     GLASS = 1
@@ -49,7 +48,7 @@ _PAINTS = (
 )  # fmt: skip
 
 
-def draw_paint(rng: Rng) -> Vec3:
+def draw_paint(rng: VariantRng) -> Vec3:
     """Colour of a private car, linear RGB."""
     shares = np.cumsum([weight for weight, _ in _PAINTS])
     index = int(np.searchsorted(shares, float(rng.random()), side="right"))
@@ -57,7 +56,7 @@ def draw_paint(rng: Rng) -> Vec3:
 
 
 def materials(
-    rng: Rng,
+    rng: VariantRng,
     paint: Vec3,
     second: Vec3 = (0.8, 0.8, 0.78),
     clothes: tuple[Vec3, ...] = (),
@@ -72,11 +71,11 @@ def materials(
         clothes: Skin, top, bottom, shoes and helmet of a rider.
         plate_rows: Of the licence plate.
     """
-    tint = uniform_between(0.015, 0.035, rng)
-    rim = uniform_between(0.35, 0.75, rng) if rng.random() < 0.75 else 0.04
+    tint = rng.between(0.015, 0.035)
+    rim = rng.between(0.35, 0.75) if rng.random() < 0.75 else 0.04
     skin, top, bottom, shoes, helmet = clothes or ((0.4,) * 3,) * 5
     return (
-        Material(paint, uniform_between(0.15, 0.25, rng), specular=0.6, role="paint"),
+        Material(paint, rng.between(0.15, 0.25), specular=0.6, role="paint"),
         Material((tint, 1.1 * tint, 1.15 * tint), 0.05, specular=0.8, role="glass"),
         Material((0.013, 0.013, 0.014), 0.5, specular=0.35, role="trim"),
         Material((0.008, 0.008, 0.008), 0.9, role="underbody"),
@@ -98,7 +97,7 @@ def materials(
     )
 
 
-def _plate(rng: Rng, rows: int) -> Material:
+def _plate(rng: VariantRng, rows: int) -> Material:
     seed = int(rng.random() * plates.SEEDS)
     texture = plates.plate_id(seed, rows)
     return Material((0.9, 0.9, 0.9), 0.4, texture=texture, printed=True, role="plate")

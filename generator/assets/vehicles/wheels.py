@@ -1,4 +1,4 @@
-"""Wheels of everything with an axle, and the wells they turn in."""
+"""Wheels of all vehicles, and their wheel wells."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, circle, fan, lathe
 from gen_data.generator.assets.vehicles.body_shell import round_x_z, split_patch
-from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot
+from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.core.asset_types import Keypoint
 from gen_data.generator.core.se3 import Vec3
 
@@ -29,10 +29,10 @@ def wheel(radius_m: float, width_m: float, spokes: int, rim_share: float = 0.68)
     back = [(0.9 * rim, 0.2 * half), (0.0, 0.2 * half)]
     hub = [(0.2 * rim, 0.2 * half), (0.19 * rim, 0.8 * half), (0.0, 0.84 * half)]
     parts = [
-        lathe(tread, _SEGMENTS, VehicleSlot.TYRE),
-        lathe(lip, _SEGMENTS, VehicleSlot.RIM),
-        lathe(back, _SEGMENTS, VehicleSlot.UNDERBODY),
-        lathe(hub, 10, VehicleSlot.RIM),
+        lathe(tread, _SEGMENTS, Slot.TYRE),
+        lathe(lip, _SEGMENTS, Slot.RIM),
+        lathe(back, _SEGMENTS, Slot.UNDERBODY),
+        lathe(hub, 10, Slot.RIM),
         *_spokes(rim, half, spokes),
     ]
     # A lathe's axle is Z: turned so that its top faces +Y, and a corner of the tread down.
@@ -44,15 +44,15 @@ def _spokes(rim: float, half: float, count: int) -> list[Patch]:
     if count == 0:
         plate = [(0.92 * rim, 0.55 * half), (0.62 * rim, 0.75 * half), (0.55 * rim, 0.45 * half),
                  (0.0, 0.45 * half)]  # fmt: skip
-        return [lathe(plate, _SEGMENTS, VehicleSlot.RIM)]
+        return [lathe(plate, _SEGMENTS, Slot.RIM)]
     width = 1.25 * rim / (count + 1.5)
     bar = block((0.12 * rim, -0.5 * width, 0.45 * half), (0.92 * rim, 0.5 * width, 0.82 * half))
-    # The lower face is never seen.
+    # The lower face is never visible.
     up = np.cross(
         bar.corners_m[:, 1] - bar.corners_m[:, 0], bar.corners_m[:, 2] - bar.corners_m[:, 0]
     )
     kept = (up[:, 2] > -1e-12) & (np.abs(up[:, 0]) < 1e-12)
-    seen = Patch(bar.corners_m[kept], bar.uvs[kept], bar.slots[kept]).painted(VehicleSlot.RIM)
+    seen = Patch(bar.corners_m[kept], bar.uvs[kept], bar.slots[kept]).painted(Slot.RIM)
     return [seen.rotated("z", 2 * math.pi * (k + 0.25) / count) for k in range(count)]
 
 
@@ -92,7 +92,7 @@ class Axles:
             yield side.rotated("z", turn).moved(x, sign * self.hub_y_m, self.radius_m)
 
     def wells(self, patch: Patch, half_m: float) -> tuple[Patch, list[Patch]]:
-        """A left half of a body with holes for the wheels, and what is behind the holes."""
+        """Cut wheel openings into a left half of a body; also return the wells behind them."""
         inner = half_m - _WELL_M
         made = []
         for x in (self.front_m, self.rear_m):
@@ -118,7 +118,7 @@ class Axles:
 
 
 def _well(edge_m: Array, hub_m: tuple[float, float], radius_m: float, inner_y_m: float) -> Patch:
-    """The inside of a wheel well behind an edge, as segments [n, 2, 3]; it looks at the hub."""
+    """The inside of a wheel well behind an edge, as segments [n, 2, 3]; it faces the hub."""
     inner = edge_m.copy()
     inner[..., 1] = inner_y_m
     a, b, c, d = edge_m[:, 0], edge_m[:, 1], inner[:, 1], inner[:, 0]
@@ -130,4 +130,4 @@ def _well(edge_m: Array, hub_m: tuple[float, float], radius_m: float, inner_y_m:
     liner = Patch(corners, np.zeros((len(corners), 3, 2)), np.zeros(len(corners), dtype=np.int64))
     x, z = circle(radius_m, 14, hub_m).T
     wall = fan(np.stack([x, np.full_like(x, inner_y_m), np.maximum(z, 0.16)], axis=1)[::-1])
-    return join_patches([liner, wall]).painted(VehicleSlot.UNDERBODY)
+    return join_patches([liner, wall]).painted(Slot.UNDERBODY)

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gen_data.generator.assets.procedural.surface_shapes import UvRect
-from gen_data.generator.assets.procedural.variant_rng import uniform_between
+from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.core.asset_types import TextureData
-from gen_data.generator.core.streams import Rng
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -35,7 +34,7 @@ def canvas(w: int, h: int, fill: Color) -> Image:
 
 
 def pen(image: Image) -> ImageDraw:
-    """What draws on an image, in pixels."""
+    """Drawing context of an image; coordinates in pixels."""
     from PIL.ImageDraw import Draw
 
     return Draw(image)
@@ -89,7 +88,7 @@ def text(image: Image, box: Box, text: str, fill: Color, bold: int) -> None:
     image.paste(fill, ((x0 + x1 - w) // 2, (y0 + y1 - h) // 2), small)
 
 
-def lines(image: Image, box: Box, ink: Color, ground: Color, rng: Rng) -> None:
+def lines(image: Image, box: Box, ink: Color, ground: Color, rng: VariantRng) -> None:
     """Text too small to read: words as dashes."""
     draw = pen(image)
     x0, y0, x1, y1 = pixels(image, box)
@@ -97,15 +96,14 @@ def lines(image: Image, box: Box, ink: Color, ground: Color, rng: Rng) -> None:
     for y in range(y0, y1 - pitch, pitch):
         x = float(x0)
         while x < x1 - 6:
-            word = uniform_between(4, 22, rng)
+            word = rng.between(4, 22)
             draw.rectangle(
-                [x, y, min(x + word, x1), y + max(1, pitch // 3)],
-                fill=blend(ink, ground, 0.25),
+                [x, y, min(x + word, x1), y + max(1, pitch // 3)], fill=blend(ink, ground, 0.25)
             )
             x += word + 4
 
 
-def table(image: Image, box: Box, ink: Color, rng: Rng) -> None:
+def table(image: Image, box: Box, ink: Color, rng: VariantRng) -> None:
     """Nutrition facts."""
     draw = pen(image)
     x0, y0, x1, y1 = pixels(image, box)
@@ -116,13 +114,13 @@ def table(image: Image, box: Box, ink: Color, rng: Rng) -> None:
         draw.line([x0, y, x1, y], fill=(40, 40, 40), width=1)
         h = max(1, (y1 - y0) // rows // 4)
         draw.rectangle(
-            [x0 + 4, y + h, x0 + 4 + uniform_between(0.2, 0.5, rng) * (x1 - x0), y + 2 * h],
+            [x0 + 4, y + h, x0 + 4 + rng.between(0.2, 0.5) * (x1 - x0), y + 2 * h],
             fill=(60, 60, 60),
         )
         draw.rectangle([x1 - 0.2 * (x1 - x0), y + h, x1 - 4, y + 2 * h], fill=(60, 60, 60))
 
 
-def barcode(image: Image, box: Box, rng: Rng) -> None:
+def barcode(image: Image, box: Box, rng: VariantRng) -> None:
     """Bars of one to three units and thirteen digits."""
     draw = pen(image)
     x0, y0, x1, y1 = pixels(image, box)
@@ -130,10 +128,10 @@ def barcode(image: Image, box: Box, rng: Rng) -> None:
     x, end, unit = x0 + 0.08 * (x1 - x0), x1 - 0.08 * (x1 - x0), max(1.0, (x1 - x0) / 75)
     foot = y1 - 0.18 * (y1 - y0)
     while x < end:
-        bar, gap = unit * int(uniform_between(1, 4, rng)), unit * int(uniform_between(1, 4, rng))
+        bar, gap = unit * int(rng.between(1, 4)), unit * int(rng.between(1, 4))
         draw.rectangle([x, y0 + 0.08 * (y1 - y0), x + bar - 1, foot], fill=(15, 15, 15))
         x += bar + gap
-    digits = "".join(str(int(uniform_between(0, 10, rng))) for _ in range(13))
+    digits = "".join(str(int(rng.between(0, 10))) for _ in range(13))
     text(
         image,
         (x0 / image.width + 0.02, foot / image.height, x1 / image.width - 0.02, y1 / image.height),
@@ -163,16 +161,12 @@ def burst(image: Image, centre: Place, radius: float, fill: Color, ink: Color) -
     w, h = image.size
     text(
         image,
-        (
-            (cx - 0.6 * radius) / w,
-            (cy - 0.3 * radius) / h,
-            (cx + 0.6 * radius) / w,
-            (cy + 0.3 * radius) / h,
-        ),
+        ((cx - 0.6 * radius) / w, (cy - 0.3 * radius) / h, (cx + 0.6 * radius) / w,
+         (cy + 0.3 * radius) / h),
         "NEW",
         ink,
         2,
-    )
+    )  # fmt: skip
 
 
 def gradient(image: Image, top: Color, bottom: Color) -> None:

@@ -20,9 +20,8 @@ from gen_data.generator.assets.procedural.textures.texture_images import (
     mix_colors,
     texture,
 )
-from gen_data.generator.assets.procedural.variant_rng import choose, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
-from gen_data.generator.core.streams import Rng
 
 _BRIGHT = ("#d7261e", "#f2a71b", "#f7d423", "#2e9e4f", "#1f6fb5", "#7b3fa0", "#f0f0ec", "#12a3a3")
 # Distance from the centre to the pentagons and hexagons of a truncated icosahedron of edge 1
@@ -41,7 +40,7 @@ def ball_cover(seed: int) -> TextureData:
 
 
 def _directions() -> Float32:
-    """Direction of each pixel as ``shapes.ball`` lays out its UVs."""
+    """Direction of each pixel as ``surface_shapes.ball`` lays out its UVs."""
     y, x = rows_and_columns()
     polar, turn = math.pi * (0.5 - y), 2 * math.pi * (x - 0.5)
     flat = np.cos(polar)
@@ -49,7 +48,7 @@ def _directions() -> Float32:
     return np.stack(parts, axis=2).astype(np.float32)
 
 
-def _tennis(d: Float32, rng: Rng) -> Float32:
+def _tennis(d: Float32, rng: VariantRng) -> Float32:
     """Felt with the seam along a curve that winds around."""
     turn = np.arctan2(d[..., 1], d[..., 0])
     seam = smoothstep(0.075, 0.05, np.abs(d[..., 2] - 0.55 * np.cos(2 * turn)))
@@ -57,15 +56,15 @@ def _tennis(d: Float32, rng: Rng) -> Float32:
     return mix_colors(felt, color("#eceee0"), seam)
 
 
-def _beach(d: Float32, rng: Rng) -> Float32:
+def _beach(d: Float32, rng: VariantRng) -> Float32:
     """Six gores in two or three colours, white caps."""
-    colors = np.stack([draw_color(_BRIGHT, 0.04, rng) for _ in range(choose((2, 3), rng))])
+    colors = np.stack([draw_color(_BRIGHT, 0.04, rng) for _ in range(rng.choose((2, 3)))])
     gore = np.floor(np.arctan2(d[..., 1], d[..., 0]) / (math.pi / 3)).astype(np.int64) + 3
     cap = smoothstep(0.955, 0.96, np.abs(d[..., 2]))
     return mix_colors(colors[gore % len(colors)], color("#f2f2ee"), cap)
 
 
-def _basket(d: Float32, rng: Rng) -> Float32:
+def _basket(d: Float32, rng: VariantRng) -> Float32:
     """Orange leather with black channels and pebbles."""
     x, y, z = d[..., 0], d[..., 1], d[..., 2]
     bow = np.abs(np.abs(y) - 0.62 - 0.22 * x**2)
@@ -77,7 +76,7 @@ def _basket(d: Float32, rng: Rng) -> Float32:
     return mix_colors(leather, color("#1d1815"), line)
 
 
-def _foot(d: Float32, rng: Rng) -> Float32:
+def _foot(d: Float32, rng: VariantRng) -> Float32:
     """Twelve dark pentagons and twenty white hexagons."""
     golden = 0.5 * (1 + math.sqrt(5))
     corners = np.array(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gen_data.generator.assets.procedural.material_presets import PALETTES
 from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     blur_image,
@@ -20,49 +21,15 @@ from gen_data.generator.assets.procedural.textures.texture_images import (
     mix_colors,
     texture,
 )
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
-from gen_data.generator.core.streams import Rng
-
-_CLOTH = (
-    "#e8e3d8",
-    "#2f3e5c",
-    "#7a8b99",
-    "#8c2f39",
-    "#3f5b45",
-    "#c9a66b",
-    "#2b2b2e",
-    "#b5643c",
-    "#5d6b70",
-    "#d7b7b0",
-    "#476b8a",
-    "#9a8f7d",
-)
-_CARPETS = (
-    "#6e6a66",
-    "#8c7b68",
-    "#45506b",
-    "#7c2f34",
-    "#a39a8b",
-    "#3e5148",
-    "#b7ab9a",
-    "#2f3033",
-    "#5c4a5e",
-    "#86919b",
-)
-_HIDES = ("#5a3825", "#2a1d17", "#8a5a34", "#1c1b1b", "#a87a4f", "#6b2a22", "#c9b497", "#39434d")
 
 
 def fabric(seed: int) -> TextureData:
     """Plain or twill weave, plain-coloured, striped or checked; 0.15 m per repeat."""
     rng = variant_rng("fabric", seed)
-    yarns = choose((32, 64, 64), rng)
-    twill = is_drawn(0.4, rng)
+    yarns = rng.choose((32, 64, 64))
+    twill = rng.chance(0.4)
     y, x = rows_and_columns()
     wave_y, wave_x = 0.5 * fbm((8, 8), 2, rng) / yarns, 0.5 * fbm((8, 8), 2, rng) / yarns
     v, u = (y + wave_y) * yarns, (x + wave_x) * yarns
@@ -84,12 +51,12 @@ def fabric(seed: int) -> TextureData:
 def carpet(seed: int) -> TextureData:
     """Cut or looped pile; 0.5 m per repeat."""
     rng = variant_rng("carpet", seed)
-    cells = choose((64, 96, 128), rng)
+    cells = rng.choose((64, 96, 128))
     tufts = worley((cells, cells), rng, 0.9)
-    base, fleck = draw_color(_CARPETS, 0.06, rng), draw_color(_CARPETS, 0.06, rng)
-    spread = uniform_between(0.1, 0.4, rng)
+    base, fleck = (draw_color(PALETTES["carpets"], 0.06, rng) for _ in range(2))
+    spread = rng.between(0.1, 0.4)
     tone = tufts.of_each(1 + spread * (uniform(tufts.count, rng) - 0.5))
-    flecked = tufts.of_each((uniform(tufts.count, rng) < choose((0.0, 0.0, 0.15, 0.4), rng)) * 0.7)
+    flecked = tufts.of_each((uniform(tufts.count, rng) < rng.choose((0.0, 0.0, 0.15, 0.4))) * 0.7)
     lying = fbm((3, 3), 4, rng)
     depth = smoothstep(0.95, 0.15, tufts.nearest)
     albedo = mix_colors(np.broadcast_to(base, (SIZE_PX, SIZE_PX, 3)), fleck, flecked)
@@ -100,12 +67,12 @@ def carpet(seed: int) -> TextureData:
 def leather(seed: int) -> TextureData:
     """Grained leather; 0.2 m per repeat."""
     rng = variant_rng("leather", seed)
-    cells = choose((28, 40, 56), rng)
+    cells = rng.choose((28, 40, 56))
     grain = worley((cells, cells), rng, 0.95)
     bend = 6.0 * fbm((8, 8), 3, rng)
     crease = warp_image(grain.second - grain.nearest, bend, np.roll(bend, 171, axis=1))
     pebble = blur_image(smoothstep(0.02, 0.3, crease))
-    base = draw_color(_HIDES, 0.08, rng)
+    base = draw_color(PALETTES["hides"], 0.08, rng)
     worn = 0.08 * fbm((3, 3), 4, rng) + 0.03 * fbm((64, 64), 2, rng)
     albedo = base * (0.72 + 0.28 * pebble + worn)[..., None]
     return texture(albedo, 0.95 - 0.25 * pebble, 2.2 * pebble + 0.3 * fbm((64, 64), 2, rng))
@@ -116,7 +83,7 @@ def cardboard(seed: int) -> TextureData:
     rng = variant_rng("cardboard", seed)
     base = draw_color(("#b08a5e", "#a67f55", "#bd9a6d", "#c7a57b", "#9c774e"), 0.05, rng)
     _, x = rows_and_columns()
-    flutes = np.sin(2 * np.pi * choose((64, 80), rng) * x) + 0 * x.T
+    flutes = np.sin(2 * np.pi * rng.choose((64, 80)) * x) + 0 * x.T
     clouds, fine = fbm((4, 4), 4, rng), fbm((128, 128), 2, rng)
     fibres = np.abs(perlin((40, 170), rng)) + np.abs(perlin((170, 40), rng))
     specks = smoothstep(0.62, 0.8, perlin((120, 120), rng))
@@ -125,11 +92,11 @@ def cardboard(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), None, (0.5 * flutes + 0.6 * fine).astype(np.float32))
 
 
-def _yarn_colors(yarns: int, rng: Rng) -> tuple[Float32, Float32]:
+def _yarn_colors(yarns: int, rng: VariantRng) -> tuple[Float32, Float32]:
     """Colour of each warp and each weft yarn, shape [yarns, 3]."""
-    first, second = draw_color(_CLOTH, 0.06, rng), draw_color(_CLOTH, 0.06, rng)
-    kind = choose(("plain", "plain", "melange", "stripes", "check"), rng)
-    band = choose((yarns // 4, yarns // 8), rng)
+    first, second = (draw_color(PALETTES["cloth"], 0.06, rng) for _ in range(2))
+    kind = rng.choose(("plain", "plain", "melange", "stripes", "check"))
+    band = rng.choose((yarns // 4, yarns // 8))
     number = np.arange(yarns)
     banded = (number // band % 2 == 0).astype(np.float32)[:, None]
     striped = (first * (1 - banded) + second * banded).astype(np.float32)

@@ -15,33 +15,22 @@ from gen_data.generator.assets.procedural.noise import (
 )
 from gen_data.generator.assets.procedural.textures.texture_images import (
     color,
+    colors_in_turn,
     draw_color,
     mix_colors,
     texture,
 )
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
-from gen_data.generator.core.streams import Rng
-
-# Ground and blush of apples.
-_APPLES = (
-    ("#d9b24a", "#b01f2a"),
-    ("#c9382f", "#8a1620"),
-    ("#a8bf4a", "#93b03a"),
-    ("#d8c45a", "#c8442f"),
-    ("#a3202b", "#6f121b"),
-    ("#cfd06a", "#c9b83f"),
-    ("#b8c25a", "#b0362f"),
-)
 
 
 def apple_skin(seed: int) -> TextureData:
     """Streaks from stalk to blossom over a paler ground, with pores."""
     rng = variant_rng("apple_skin", seed)
-    ground, blush = (color(code) for code in _APPLES[seed % len(_APPLES)])
+    ground, blush = colors_in_turn("apples", seed)
     y, _ = rows_and_columns()
     streaks = 0.6 * fbm((2, 40), 3, rng) + 0.3 * fbm((6, 90), 2, rng)
-    patches = fbm((2, 2), 3, rng) + uniform_between(-0.2, 0.4, rng)
+    patches = fbm((2, 2), 3, rng) + rng.between(-0.2, 0.4)
     cover = smoothstep(-0.5, 0.6, patches + 0.6 * streaks)
     albedo = mix_colors(ground, blush, cover)
     hollow = smoothstep(0.12, 0.02, y) + smoothstep(0.9, 1.0, y)
@@ -71,7 +60,7 @@ def citrus_peel(seed: int) -> TextureData:
 def banana_peel(seed: int) -> TextureData:
     """Yellow, greener towards the ends, dark tips and ripening spots."""
     rng = variant_rng("banana_peel", seed)
-    ripe = uniform_between(0.0, 1.0, rng)
+    ripe = rng.between(0.0, 1.0)
     base = mix_colors(
         color("#d3c83c"), color("#ecc22c"), np.full((SIZE_PX, SIZE_PX), ripe, dtype=np.float32)
     )
@@ -95,7 +84,7 @@ def pear_skin(seed: int) -> TextureData:
     codes = ("#b5b83a", "#c7b548", "#96a03a", "#9c7a45", "#b8bd58")
     base, blush = (
         draw_color(codes, 0.05, rng),
-        color(choose(("#b0583a", "#a88a3a", "#8f9a3a"), rng)),
+        color(rng.choose(("#b0583a", "#a88a3a", "#8f9a3a"))),
     )
     albedo = mix_colors(base, blush, 0.7 * smoothstep(0.0, 0.9, fbm((2, 2), 4, rng)))
     albedo = mix_colors(albedo, color("#6f5a2c"), 0.55 * _dots(56, 0.25, rng))
@@ -108,7 +97,7 @@ def pear_skin(seed: int) -> TextureData:
     return texture(mix_colors(albedo, color("#8a6a3a"), 0.6 * russet))
 
 
-def _dots(cells: int, radius: float, rng: Rng) -> Float32:
+def _dots(cells: int, radius: float, rng: VariantRng) -> Float32:
     """Scattered specks of varied size in [0, 1]."""
     points = worley((cells, cells), rng)
     size = radius * uniform(points.count, rng) ** 2

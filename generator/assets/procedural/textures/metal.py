@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gen_data.generator.assets.procedural.material_presets import PALETTES
 from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     fbm,
@@ -17,23 +18,8 @@ from gen_data.generator.assets.procedural.textures.texture_images import (
     mix_colors,
     texture,
 )
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
-from gen_data.generator.core.streams import Rng
-
-_METALS = ("#c6c7c8", "#b7b9bb", "#d5d6d7", "#c9b27c", "#a8aaad", "#8f9194", "#c48f6b")
-_PAINTS = (
-    "#2e5e8c",
-    "#c23b2a",
-    "#e0b02a",
-    "#3d7a4c",
-    "#d9dad6",
-    "#44484d",
-    "#e07b2a",
-    "#6f8fa3",
-    "#1f2a33",
-    "#7d8a6a",
-)
 
 
 def brushed_metal(seed: int) -> TextureData:
@@ -47,17 +33,17 @@ def brushed_metal(seed: int) -> TextureData:
         start=np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32),
     )
     clouds = fbm((2, 3), 4, rng)
-    base = draw_color(_METALS, 0.05, rng)
-    shade = 1 + uniform_between(0.05, 0.11, rng) * strokes + 0.03 * clouds
+    base = draw_color(PALETTES["bare_metals"], 0.05, rng)
+    shade = 1 + rng.between(0.05, 0.11) * strokes + 0.03 * clouds
     return texture(base * shade[..., None], 0.75 + 0.2 * strokes + 0.08 * clouds, 0.7 * strokes)
 
 
 def painted_metal(seed: int) -> TextureData:
     """Lacquered sheet with chips, scratches and grime; 0.6 m per repeat."""
     rng = variant_rng("painted_metal", seed)
-    paint = draw_color(_PAINTS, 0.06, rng)
+    paint = draw_color(PALETTES["metal_paints"], 0.06, rng)
     peel, grime = fbm((90, 90), 2, rng), smoothstep(0.0, 0.9, fbm((3, 3), 5, rng, 0.6))
-    wear = uniform_between(0.55, 0.95, rng)
+    wear = rng.between(0.55, 0.95)
     flakes = fbm((7, 7), 6, rng, 0.62) + 0.25 * fbm((2, 2), 2, rng)
     bare = smoothstep(wear, wear + 0.05, flakes)
     rim = smoothstep(wear - 0.09, wear - 0.02, flakes) * (1 - bare)
@@ -74,11 +60,11 @@ def painted_metal(seed: int) -> TextureData:
     return texture(albedo, rough, 0.35 * peel - 1.5 * bare - 0.5 * scratches)
 
 
-def _scratches(rng: Rng) -> Float32:
+def _scratches(rng: VariantRng) -> Float32:
     """Thin arcs in [0, 1], periodic."""
     y, x = rows_and_columns()
     total = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
-    for _ in range(int(uniform_between(8, 26, rng))):
+    for _ in range(int(rng.between(8, 26))):
         cy, cx, turn, length, bow = (float(t) for t in rng.random(5))
         s, c = np.sin(2 * np.pi * turn), np.cos(2 * np.pi * turn)
         dy, dx = (y - cy + 0.5) % 1.0 - 0.5, (x - cx + 0.5) % 1.0 - 0.5

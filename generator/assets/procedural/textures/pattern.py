@@ -1,4 +1,4 @@
-"""Abstract patterns: what domain randomization paints on anything."""
+"""Abstract patterns for domain randomization."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from gen_data.generator.assets.procedural.noise import (
     worley,
 )
 from gen_data.generator.assets.procedural.textures.texture_images import mix_colors, ramp, texture
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
-from gen_data.generator.core.streams import Rng
 
 
 def checker(seed: int) -> TextureData:
     """Two-coloured squares; any scale."""
     rng = variant_rng("checker", seed)
-    count = 2 * choose((1, 2, 3, 4, 6, 8), rng)
+    count = 2 * rng.choose((1, 2, 3, 4, 6, 8))
     y, x = rows_and_columns()
     odd = (np.floor(y * count) + np.floor(x * count)) % 2
     first, second = _contrast(rng)
@@ -34,10 +33,10 @@ def stripes(seed: int) -> TextureData:
     """Straight stripes of two to four colours, upright, level or diagonal; any scale."""
     rng = variant_rng("stripes", seed)
     y, x = rows_and_columns()
-    down, across = choose(((0, 1), (1, 0), (1, 1), (-1, 1)), rng)
-    position = choose((2, 3, 4, 6, 9), rng) * (down * y + across * x)
+    down, across = rng.choose(((0, 1), (1, 0), (1, 1), (-1, 1)))
+    position = rng.choose((2, 3, 4, 6, 9)) * (down * y + across * x)
     position = position - np.floor(position)
-    colors = [_vivid(rng) for _ in range(choose((2, 2, 3, 4), rng))]
+    colors = [_vivid(rng) for _ in range(rng.choose((2, 2, 3, 4)))]
     edges = np.cumsum(0.3 + uniform(len(colors), rng))
     band = np.searchsorted(edges[:-1] / edges[-1], position, side="right")
     return texture(np.stack(colors)[band])
@@ -46,32 +45,32 @@ def stripes(seed: int) -> TextureData:
 def perlin_noise(seed: int) -> TextureData:
     """Colourful clouds; any scale."""
     rng = variant_rng("perlin_noise", seed)
-    cells = choose((2, 3, 5, 8, 12), rng)
-    field = fbm((cells, cells), choose((1, 3, 6), rng), rng)
+    cells = rng.choose((2, 3, 5, 8, 12))
+    field = fbm((cells, cells), rng.choose((1, 3, 6)), rng)
     field = 0.5 + 0.5 * np.clip(field / (2.2 * field.std()), -1, 1)
-    count = choose((2, 3, 4), rng)
+    count = rng.choose((2, 3, 4))
     return texture(ramp([(i / (count - 1), _vivid(rng)) for i in range(count)], field))
 
 
 def voronoi_noise(seed: int) -> TextureData:
     """Cells of random colours, some with borders; any scale."""
     rng = variant_rng("voronoi_noise", seed)
-    cells = choose((4, 6, 9, 14, 22), rng)
+    cells = rng.choose((4, 6, 9, 14, 22))
     points = worley((cells, cells), rng)
-    palette = np.stack([_vivid(rng) for _ in range(choose((3, 5, 8), rng))])
+    palette = np.stack([_vivid(rng) for _ in range(rng.choose((3, 5, 8)))])
     which = (uniform(points.count, rng) * len(palette)).astype(np.int64)
     albedo = points.of_each(palette[which].astype(np.float64))
-    shade = choose((0.0, 0.4), rng) * points.nearest
-    border = choose((0.0, 0.0, 1.0), rng) * smoothstep(0.1, 0.03, points.second - points.nearest)
+    shade = rng.choose((0.0, 0.4)) * points.nearest
+    border = rng.choose((0.0, 0.0, 1.0)) * smoothstep(0.1, 0.03, points.second - points.nearest)
     return texture(mix_colors(albedo * (1 - shade)[..., None], _vivid(rng), border))
 
 
-def _vivid(rng: Rng) -> Float32:
+def _vivid(rng: VariantRng) -> Float32:
     """A colour that is even over hue, from grey to saturated and from dark to light."""
     hue, saturation, value = (
         6.0 * float(rng.random()),
-        uniform_between(0.1, 1.0, rng),
-        uniform_between(0.12, 0.97, rng),
+        rng.between(0.1, 1.0),
+        rng.between(0.12, 0.97),
     )
     channels = [
         value * (1 - saturation * min(max(abs(math.remainder(hue - shift, 6.0)) - 1.0, 0.0), 1.0))
@@ -80,7 +79,7 @@ def _vivid(rng: Rng) -> Float32:
     return np.array(channels, dtype=np.float32)
 
 
-def _contrast(rng: Rng) -> tuple[Float32, Float32]:
+def _contrast(rng: VariantRng) -> tuple[Float32, Float32]:
     """Two colours whose brightness differs."""
     first = _vivid(rng)
     second = _vivid(rng)

@@ -13,152 +13,24 @@ from typing import TYPE_CHECKING
 
 from gen_data.generator.assets.procedural import cans, cartons
 from gen_data.generator.assets.procedural.bottles import LABEL_ASPECT
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
 from gen_data.generator.assets.procedural.textures import artwork as art
 from gen_data.generator.assets.procedural.textures.artwork import Box, Color, Place
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.core.asset_types import TextureData
-from gen_data.generator.core.streams import Rng
 
 if TYPE_CHECKING:
     from PIL.Image import Image
     from PIL.ImageDraw import ImageDraw
 
 _FRUIT = ((200, 40, 40), (240, 150, 30), (120, 40, 110), (235, 200, 50), (110, 160, 50))
-# Ground, second colour, accent, ink.
-_SCHEMES = (
-    ("#f6f2e7", "#c8202f", "#f2b705", "#2a1a14"),
-    ("#12355b", "#f2f2ee", "#e94f37", "#f2f2ee"),
-    ("#1f7a4d", "#f3f0df", "#f2c14e", "#f3f0df"),
-    ("#f4d35e", "#d1495b", "#2e4057", "#2e2420"),
-    ("#ffffff", "#0f6fb8", "#7ac143", "#12324a"),
-    ("#c1121f", "#fdf0d5", "#f2b705", "#fdf0d5"),
-    ("#3d2a5c", "#e7c6ff", "#f7b801", "#ffffff"),
-    ("#f7ede2", "#84a59d", "#f28482", "#3a3a3a"),
-    ("#111417", "#c9a24b", "#8d1b24", "#f0e9d8"),
-    ("#e76f51", "#264653", "#f4e3b2", "#fff6e0"),
-    ("#9fd3e6", "#ffffff", "#e63946", "#1d3557"),
-    ("#f2a6c0", "#ffffff", "#7a1f4b", "#5a1236"),
-    ("#5c3a21", "#e8c99b", "#d98e04", "#fff1d6"),
-    ("#0b8f8c", "#ffffff", "#ffd23f", "#ffffff"),
-    ("#ff8c1a", "#ffffff", "#3a2a8c", "#2b1a10"),
-    ("#dfe5e8", "#4a5a66", "#d62828", "#1f2a30"),
-)
-_STARTS = (
-    "Sol",
-    "Ver",
-    "Kin",
-    "Bra",
-    "Lun",
-    "Mar",
-    "Tol",
-    "Fen",
-    "Ori",
-    "Zan",
-    "Pel",
-    "Gra",
-    "Nor",
-    "Cas",
-    "Dul",
-    "Ha",
-    "Riv",
-    "Ost",
-    "Quil",
-    "Tam",
-)
-_ENDS = (
-    "ara",
-    "ello",
-    "ix",
-    "on",
-    "ita",
-    "berg",
-    "ova",
-    "ette",
-    "um",
-    "ino",
-    "ay",
-    "eva",
-    "or",
-    "ula",
-    "ano",
-    "is",
-    "enda",
-    "ik",
-    "ora",
-    "ey",
-)
-_PRODUCTS = (
-    "CRISPY FLAKES",
-    "GREEN TEA",
-    "TOMATO SOUP",
-    "SEA SALT",
-    "ORANGE & LIME",
-    "DARK ROAST",
-    "WHOLE OATS",
-    "RED BEANS",
-    "FRESH CITRUS",
-    "CLASSIC COLA",
-    "PEACH ICED TEA",
-    "BASIL PESTO",
-    "CORN & PEAS",
-    "WILD BERRY",
-    "COCOA CRUNCH",
-    "SPARKLING",
-    "HONEY NUT",
-    "SOFT CARE",
-    "MOUNTAIN",
-    "GINGER ALE",
-)
-_NOTES = (
-    "new recipe",
-    "no added sugar",
-    "since 1926",
-    "100% natural",
-    "family size",
-    "extra fresh",
-    "original",
-    "with real fruit",
-    "crunchy!",
-    "light",
-)
-_VOLUMES = ("330 ml", "500 ml", "750 ml", "1 L")
-_WEIGHTS = ("250 g", "375 g", "400 g", "500 g")
-_PRAISE = ("A quiet triumph", "Impossible to put down", "Warm and wise", "The book of the year")
-_TITLES = (
-    "THE LONG",
-    "A QUIET",
-    "WINTER",
-    "THE LAST",
-    "BEYOND THE",
-    "NORTH OF",
-    "THE PAPER",
-    "SEVEN",
-    "NIGHT",
-    "THE GLASS",
-)
-_SUBJECTS = (
-    "HARBOUR",
-    "GARDEN",
-    "RIVER",
-    "MACHINE",
-    "LETTERS",
-    "ISLAND",
-    "ORCHARD",
-    "SIGNAL",
-    "HOUSE",
-    "MEADOW",
-)
+_WORDS = load_table(__package__, "printed_matter", tuple[str, ...])
 
 
 @dataclass(frozen=True, slots=True)
 class _Design:
-    """What all faces of one product share."""
+    """Colours, words and layout that all faces of one product share."""
 
     ground: Color
     second: Color
@@ -176,19 +48,14 @@ class _Design:
 def label(seed: int) -> TextureData:
     """Wrap-around label of a bottle or jar; the front is in the middle. 512 x 256."""
     rng = variant_rng("label", seed)
-    image = _wrap(
-        int(art.SIZE_PX * 1.5),
-        LABEL_ASPECT,
-        _design(seed, rng, _VOLUMES),
-        rng,
-    )
+    image = _wrap(int(art.SIZE_PX * 1.5), LABEL_ASPECT, _design(seed, rng, _WORDS["volumes"]), rng)
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX // 2)
 
 
 def can_label(seed: int) -> TextureData:
     """All around a can; the front is in the middle."""
     rng = variant_rng("can_label", seed)
-    sizes = _WEIGHTS if cans.can_size(seed).food else ("330 ml", "500 ml")
+    sizes = _WORDS["weights"] if cans.can_size(seed).food else ("330 ml", "500 ml")
     image = _wrap(int(art.SIZE_PX * 1.5), cans.label_aspect(seed), _design(seed, rng, sizes), rng)
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX)
 
@@ -208,8 +75,8 @@ def book_cover(seed: int) -> TextureData:
     from gen_data.generator.assets.procedural import books
 
     rng = variant_rng("book_cover", seed)
-    words = choose(_TITLES, rng), choose(_SUBJECTS, rng)
-    design = replace(_design(seed, rng), product=" ".join(words), note=choose(_PRAISE, rng))
+    words = rng.choose(_WORDS["titles"]), rng.choose(_WORDS["subjects"])
+    design = replace(_design(seed, rng), product=" ".join(words), note=rng.choose(_WORDS["praise"]))
     length, width, thickness = books.book_size_m(seed)
     scale = 560.0 / length
     h = int(length * scale)
@@ -221,23 +88,25 @@ def book_cover(seed: int) -> TextureData:
     return art.atlas(faces, books.COVER_ATLAS, design.ground)
 
 
-def _design(seed: int, rng: Rng, sizes: Sequence[str] = _WEIGHTS) -> _Design:
-    ground, second, accent, ink = (hex_to_srgb8(code) for code in _SCHEMES[seed % len(_SCHEMES)])
-    if is_drawn(0.3, rng):
+def _design(seed: int, rng: VariantRng, sizes: Sequence[str] = _WORDS["weights"]) -> _Design:
+    schemes = _WORDS["schemes"]
+    codes = in_turn(schemes, seed).split()
+    ground, second, accent, ink = (hex_to_srgb8(code) for code in codes)
+    if rng.chance(0.3):
         second, accent = accent, second
-    name = choose(_STARTS, rng) + choose(_ENDS, rng)
+    name = rng.choose(_WORDS["starts"]) + rng.choose(_WORDS["ends"])
     return _Design(
         ground,
         second,
         accent,
         ink,
-        brand=name.upper() if is_drawn(0.5, rng) else name,
-        product=choose(_PRODUCTS, rng),
-        note=choose(_NOTES, rng),
-        size=choose(sizes, rng),
-        layout=int(uniform_between(0, 5, rng)),
-        picture=int(uniform_between(0, 5, rng)),
-        bold=int(uniform_between(1, 5, rng)),
+        brand=name.upper() if rng.chance(0.5) else name,
+        product=rng.choose(_WORDS["products"]),
+        note=rng.choose(_WORDS["notes"]),
+        size=rng.choose(sizes),
+        layout=int(rng.between(0, 5)),
+        picture=int(rng.between(0, 5)),
+        bold=int(rng.between(1, 5)),
     )
 
 
@@ -258,11 +127,11 @@ def _box_print(name: str, seed: int, size_m: tuple[float, float, float]) -> Text
     return art.atlas(faces, cartons.CARTON_ATLAS, design.ground)
 
 
-def _wrap(width: int, aspect: float, design: _Design, rng: Rng) -> Image:
+def _wrap(width: int, aspect: float, design: _Design, rng: VariantRng) -> Image:
     """Front in the middle, information half on each end; the ends meet in the plain ground."""
     height = max(48, int(width / aspect))
     canvas = art.canvas(width, height, design.ground)
-    # What is seen at once of a cylinder is less than half of it.
+    # Less than half of a cylinder is visible at once.
     front = _front(int(0.42 * width), height, design, rng)
     canvas.paste(front, (int(0.29 * width), 0))
     end = int(0.25 * width)
@@ -272,8 +141,8 @@ def _wrap(width: int, aspect: float, design: _Design, rng: Rng) -> Image:
     return canvas
 
 
-def _front(w: int, h: int, design: _Design, rng: Rng) -> Image:
-    """The face that sells: ground, picture, brand, product, note, size."""
+def _front(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
+    """Front of a package: ground, picture, brand, product, note, size."""
     image = art.canvas(w, h, design.ground)
     _ground(image, design, rng)
     tall = h > 0.8 * w
@@ -296,12 +165,12 @@ def _front(w: int, h: int, design: _Design, rng: Rng) -> Image:
     size = (0.68, 0.91, 0.95, 0.97) if tall else (0.44, 0.78, 0.6, 0.88)
     art.text(image, note, design.note, design.ink, 0)
     art.text(image, size, design.size, design.ink, 1)
-    if tall and is_drawn(0.5, rng):
+    if tall and rng.chance(0.5):
         art.burst(image, (0.85, 0.5), 0.11 * w, design.accent, design.ground)
     return image
 
 
-def _ground(image: Image, design: _Design, rng: Rng) -> None:
+def _ground(image: Image, design: _Design, rng: VariantRng) -> None:
     """Gradient, split, wave, diagonal or plain."""
     w, h = image.size
     draw = art.pen(image)
@@ -310,7 +179,7 @@ def _ground(image: Image, design: _Design, rng: Rng) -> None:
     elif design.layout == 1:
         draw.rectangle([0, 0, w, int(0.31 * h)], fill=design.second)
     elif design.layout == 2:
-        bend, phase = uniform_between(0.01, 0.035, rng), uniform_between(0.0, 6.0, rng)
+        bend, phase = rng.between(0.01, 0.035), rng.between(0.0, 6.0)
         edge = [(x, h * (0.27 + bend * math.sin(phase + 5.0 * x / w))) for x in range(0, w + 8, 4)]
         draw.polygon([(0, 0), (w + 8, 0), *edge[::-1]], fill=design.second)
         draw.line([(x, y + 0.015 * h) for x, y in edge], fill=design.accent, width=max(2, h // 60))
@@ -321,43 +190,43 @@ def _ground(image: Image, design: _Design, rng: Rng) -> None:
         draw.ellipse([-0.35 * w, -0.35 * h, 1.35 * w, 0.33 * h], fill=design.second)
 
 
-def _picture(image: Image, box: Box, design: _Design, rng: Rng) -> None:
-    """A simple picture of what is inside."""
+def _picture(image: Image, box: Box, design: _Design, rng: VariantRng) -> None:
+    """Draw a simple picture of the contents."""
     x0, y0, x1, y1 = art.pixels(image, box)
     radius = min(x1 - x0, y1 - y0) // 2
     draw = (_bowl, _fruits, _leaves, _landscape, _rings)[design.picture]
     draw(art.pen(image), ((x0 + x1) // 2, (y0 + y1) // 2), radius, design, rng)
 
 
-def _bowl(pen: ImageDraw, at: Place, r: float, design: _Design, rng: Rng) -> None:
+def _bowl(pen: ImageDraw, at: Place, r: float, design: _Design, rng: VariantRng) -> None:
     """A bowl heaped with flakes."""
     cx, cy = at
     rim = art.blend(design.accent, (255, 255, 255), 0.5)
     pen.ellipse([cx - r, cy - 0.35 * r, cx + r, cy + 0.25 * r], fill=rim)
     for _ in range(26):
-        turn, reach = uniform_between(0, 2 * math.pi, rng), uniform_between(0, 0.8, rng) * r
+        turn, reach = rng.between(0, 2 * math.pi), rng.between(0, 0.8) * r
         x, y = cx + reach * math.cos(turn), cy - 0.1 * r + 0.28 * reach * math.sin(turn)
-        shade = art.blend((214, 150, 60), (120, 60, 20), uniform_between(0.0, 0.7, rng))
+        shade = art.blend((214, 150, 60), (120, 60, 20), rng.between(0.0, 0.7))
         pen.ellipse([x - 0.13 * r, y - 0.09 * r, x + 0.13 * r, y + 0.09 * r], fill=shade)
     pen.pieslice([cx - r, cy - 0.95 * r, cx + r, cy + 0.95 * r], 2, 178, fill=design.accent)
 
 
-def _fruits(pen: ImageDraw, at: Place, r: float, _: _Design, rng: Rng) -> None:
+def _fruits(pen: ImageDraw, at: Place, r: float, _: _Design, rng: VariantRng) -> None:
     """Three fruits in a heap."""
     for dx, dy in ((-0.42, 0.2), (0.4, 0.25), (0.0, -0.25)):
-        art.fruit(pen, (at[0] + dx * r, at[1] + dy * r), 0.5 * r, choose(_FRUIT, rng))
+        art.fruit(pen, (at[0] + dx * r, at[1] + dy * r), 0.5 * r, rng.choose(_FRUIT))
 
 
-def _leaves(pen: ImageDraw, at: Place, r: float, _: _Design, rng: Rng) -> None:
+def _leaves(pen: ImageDraw, at: Place, r: float, _: _Design, rng: VariantRng) -> None:
     """A rosette of leaves."""
     foot = at[0], at[1] + 0.5 * r
     for i in range(7):
         turn = math.pi * (i / 6 + 1)
         tip = foot[0] + r * math.cos(turn), foot[1] + r * math.sin(turn)
-        art.leaf(pen, foot, tip, art.blend((60, 130, 60), (20, 80, 40), uniform_between(0, 1, rng)))
+        art.leaf(pen, foot, tip, art.blend((60, 130, 60), (20, 80, 40), rng.between(0, 1)))
 
 
-def _landscape(pen: ImageDraw, at: Place, r: float, design: _Design, _: Rng) -> None:
+def _landscape(pen: ImageDraw, at: Place, r: float, design: _Design, _: VariantRng) -> None:
     """A sun over hills."""
     cx, cy = at
     pen.ellipse([cx - 0.5 * r, cy - 0.9 * r, cx + 0.5 * r, cy + 0.1 * r], fill=design.accent)
@@ -371,7 +240,7 @@ def _landscape(pen: ImageDraw, at: Place, r: float, design: _Design, _: Rng) -> 
         pen.polygon([(cx - r, cy + r), *hills, (cx + r, cy + r)], fill=grass)
 
 
-def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: Rng) -> None:
+def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: VariantRng) -> None:
     """Concentric rings."""
     cx, cy = at
     for i in range(5, 0, -1):
@@ -381,7 +250,7 @@ def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: Rng) -> None
         )
 
 
-def _info(w: int, h: int, design: _Design, rng: Rng) -> Image:
+def _info(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     """Small print, a table of nutrition and a bar code."""
     image = art.canvas(w, h, art.blend(design.ground, (255, 255, 255), 0.25))
     paper = art.blend(design.ground, (255, 255, 255), 0.25)
@@ -393,7 +262,7 @@ def _info(w: int, h: int, design: _Design, rng: Rng) -> Image:
     return image
 
 
-def _side(w: int, h: int, design: _Design, rng: Rng) -> Image:
+def _side(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     """Brand upright along the side, some small print below."""
     image = art.canvas(w, h, design.second)
     ink = _readable(design, design.second)
@@ -412,7 +281,7 @@ def _strip(w: int, h: int, design: _Design) -> Image:
     return image
 
 
-def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: Rng) -> Image:
+def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: VariantRng) -> Image:
     image = art.canvas(w, h, design.ground)
     _ground(image, design, rng)
     _picture(image, (0.12, 0.4, 0.88, 0.82), design, rng)
@@ -423,7 +292,7 @@ def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: R
     art.text(
         image,
         (0.2, 0.895, 0.8, 0.945),
-        f"{design.brand} {choose(_ENDS, rng).title()}",
+        f"{design.brand} {rng.choose(_WORDS['ends']).title()}",
         _readable(design, design.second),
         1,
     )
@@ -439,7 +308,7 @@ def _spine(w: int, h: int, design: _Design) -> Image:
     return strip.rotate(-90, expand=True)
 
 
-def _back_cover(w: int, h: int, design: _Design, rng: Rng) -> Image:
+def _back_cover(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     image = art.canvas(w, h, design.ground)
     art.text(image, (0.1, 0.08, 0.9, 0.15), f"“{design.note}”", design.ink, 1)
     art.lines(image, (0.1, 0.2, 0.9, 0.62), design.ink, design.ground, rng)

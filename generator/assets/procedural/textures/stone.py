@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gen_data.generator.assets.procedural.material_presets import PALETTES
 from gen_data.generator.assets.procedural.noise import (
     SIZE_PX,
     blur_image,
@@ -16,55 +17,25 @@ from gen_data.generator.assets.procedural.noise import (
 )
 from gen_data.generator.assets.procedural.textures.texture_images import (
     color,
+    colors_in_turn,
     draw_color,
     mix_colors,
     texture,
 )
-from gen_data.generator.assets.procedural.variant_rng import (
-    choose,
-    is_drawn,
-    uniform_between,
-    variant_rng,
-)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
-from gen_data.generator.core.streams import Rng
-
-_MARBLES = (
-    ("#eceae6", "#8d8f94"),
-    ("#f1efe9", "#b59a6a"),
-    ("#e2d9c8", "#9b7f5e"),
-    ("#26272a", "#cfcac0"),
-    ("#2f4a3e", "#b7c9bb"),
-    ("#8c4a3c", "#e3cfc2"),
-    ("#d9dcdd", "#5f666e"),
-    ("#3a3330", "#c6a06a"),
-)
-_CHIPS = ("#f2efe8", "#2f2f31", "#8b6b4e", "#b9573c", "#5e7f78", "#d9b36c", "#6e6f74", "#a9b7b0")
-_BRICKS = ("#9c4a35", "#8a3f2d", "#b0623f", "#7b4636", "#c07a52", "#d8d2c6", "#6b4a3f", "#a88768")
-_TILES = (
-    "#f0efeb",
-    "#e6e0d2",
-    "#d7dcdc",
-    "#9fb4b8",
-    "#3f5d6b",
-    "#7e9a80",
-    "#c9a98b",
-    "#b9b4ac",
-    "#55585c",
-    "#efe6d0",
-)
 
 
 def marble(seed: int) -> TextureData:
     """Polished marble; 0.8 m per repeat."""
     rng = variant_rng("marble", seed)
-    ground, vein_color = (color(code) for code in _MARBLES[seed % len(_MARBLES)])
+    ground, vein_color = colors_in_turn("marbles", seed)
     clouds = fbm((3, 3), 5, rng)
     veins = np.zeros_like(clouds)
     for cells, width, weight in (((2, 2), 0.06, 1.0), ((4, 3), 0.045, 0.6), ((8, 8), 0.03, 0.35)):
-        ridge = np.abs(_folded(cells, rng))
+        ridge = np.abs(_folded_noise(cells, rng))
         presence = smoothstep(-0.25, 0.5, fbm((2, 2), 2, rng))
-        thickness = width * uniform_between(0.6, 1.6, rng)
+        thickness = width * rng.between(0.6, 1.6)
         veins = np.maximum(veins, weight * presence / (1 + (ridge / thickness) ** 2))
     albedo = mix_colors(ground, vein_color, 0.28 * smoothstep(-0.3, 0.9, clouds) + 0.75 * veins)
     return texture(albedo + 0.012 * fbm((64, 64), 2, rng)[..., None], 0.9 + 0.1 * veins)
@@ -76,12 +47,12 @@ def terrazzo(seed: int) -> TextureData:
     ground = draw_color(
         ("#d9d5cc", "#c5c3be", "#e7e2d6", "#6d6e70", "#b8a999", "#dadfdd"), 0.06, rng
     )
-    palette = [color(choose(_CHIPS, rng)) for _ in range(choose((2, 3, 4), rng))]
+    palette = [color(rng.choose(PALETTES["chips"])) for _ in range(rng.choose((2, 3, 4)))]
     albedo = ground + 0.02 * fbm((16, 16), 4, rng)[..., None]
     chips_everywhere = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
     for cells, share in ((9, 0.75), (18, 0.7), (36, 0.5), (70, 0.35)):
         points = worley((cells, cells), rng)
-        kept = uniform(points.count, rng) < share * uniform_between(0.6, 1.0, rng)
+        kept = uniform(points.count, rng) < share * rng.between(0.6, 1.0)
         size = 0.12 + 0.2 * uniform(points.count, rng)
         inside = smoothstep(0.0, 0.08, points.second - points.nearest - points.of_each(size))
         chip = inside * points.of_each(kept.astype(np.float64)) * (1 - chips_everywhere)
@@ -99,12 +70,7 @@ def concrete(seed: int) -> TextureData:
     clouds, fine = fbm((3, 3), 6, rng, 0.6), fbm((48, 48), 4, rng, 0.7)
     stains = smoothstep(0.1, 0.8, fbm((2, 2), 5, rng, 0.6))
     pores = _pores(40, 0.32, 0.2, rng) + _pores(90, 0.3, 0.12, rng)
-    shade = (
-        1
-        + uniform_between(0.05, 0.12, rng) * clouds
-        + 0.05 * fine
-        - uniform_between(0.02, 0.14, rng) * stains
-    )
+    shade = 1 + rng.between(0.05, 0.12) * clouds + 0.05 * fine - rng.between(0.02, 0.14) * stains
     albedo = base * shade[..., None]
     albedo = albedo * (1 - 0.45 * np.clip(pores, 0, 1))[..., None]
     return texture(albedo, 0.9 - 0.12 * stains, 0.5 * fine + 0.8 * clouds - 2.0 * pores)
@@ -128,7 +94,7 @@ def plaster(seed: int) -> TextureData:
     base = draw_color(codes, 0.04, rng)
     grain = fbm((40, 40), 4, rng, 0.75)
     strokes = fbm((6, 9), 5, rng, 0.6)
-    rough = uniform_between(0.15, 1.0, rng)
+    rough = rng.between(0.15, 1.0)
     shade = 1 + 0.02 * strokes + 0.035 * rough * grain
     return texture(base * shade[..., None], None, rough * 1.6 * grain + 1.2 * strokes)
 
@@ -136,15 +102,15 @@ def plaster(seed: int) -> TextureData:
 def brick(seed: int) -> TextureData:
     """A wall in running bond; 1 m per repeat."""
     rng = variant_rng("brick", seed)
-    courses, per_course = choose(((12, 4), (14, 5), (10, 4)), rng)
+    courses, per_course = rng.choose(((12, 4), (14, 5), (10, 4)))
     edge, number = _courses(courses, per_course, 0.5, rng)
-    joint = uniform_between(2.5, 4.5, rng)
+    joint = rng.between(2.5, 4.5)
     wobble = 1.2 * fbm((24, 24), 3, rng)
     face = smoothstep(joint, joint + 2.0, edge + wobble)
     bricks = courses * per_course
-    base = draw_color(_BRICKS, 0.08, rng)
-    other = draw_color(_BRICKS, 0.08, rng)
-    pick_other = (uniform(bricks, rng) < uniform_between(0.0, 0.35, rng)).astype(np.float64)
+    base = draw_color(PALETTES["bricks"], 0.08, rng)
+    other = draw_color(PALETTES["bricks"], 0.08, rng)
+    pick_other = (uniform(bricks, rng) < rng.between(0.0, 0.35)).astype(np.float64)
     tone = 0.72 + 0.33 * uniform(bricks, rng)
     tints = (base + (other - base) * pick_other[:, None]) * tone[:, None]
     grit = fbm((48, 48), 4, rng, 0.7)
@@ -160,21 +126,19 @@ def brick(seed: int) -> TextureData:
 def tiles(seed: int) -> TextureData:
     """Ceramic tiles with grout: square, subway or checkered; 1 m per repeat."""
     rng = variant_rng("tiles", seed)
-    kind = choose(("square", "square", "subway", "checkered"), rng)
+    kind = rng.choose(("square", "square", "subway", "checkered"))
     courses, per_course = {"square": (4, 4), "subway": (10, 5), "checkered": (6, 6)}[kind]
     if kind == "square":
-        courses = per_course = choose((3, 4, 5, 8), rng)
+        courses = per_course = rng.choose((3, 4, 5, 8))
     edge, number = _courses(courses, per_course, 0.5 if kind == "subway" else 0.0, rng)
-    joint = uniform_between(1.5, 3.0, rng)
+    joint = rng.between(1.5, 3.0)
     face = smoothstep(joint, joint + 1.5, edge)
-    first, second = draw_color(_TILES, 0.05, rng), draw_color(_TILES, 0.05, rng)
+    first, second = (draw_color(PALETTES["tiles"], 0.05, rng) for _ in range(2))
     odd = (number // per_course + number % per_course) % 2 if kind == "checkered" else 0 * number
     tone = (0.96 + 0.08 * uniform(courses * per_course, rng)).astype(np.float32)[number]
     albedo = mix_colors(np.broadcast_to(first, (*odd.shape, 3)), second, odd.astype(np.float32))
-    if is_drawn(0.5, rng):
-        albedo = (
-            albedo * (1 + uniform_between(0.02, 0.07, rng) * fbm((6, 6), 5, rng, 0.6))[..., None]
-        )
+    if rng.chance(0.5):
+        albedo = albedo * (1 + rng.between(0.02, 0.07) * fbm((6, 6), 5, rng, 0.6))[..., None]
     albedo = albedo * tone[..., None]
     grout = draw_color(("#cfcbc3", "#9b9994", "#e6e3dc", "#6b6a68"), 0.05, rng)
     grout_image = grout * (1 + 0.06 * perlin((64, 64), rng))[..., None]
@@ -184,7 +148,7 @@ def tiles(seed: int) -> TextureData:
     )
 
 
-def _folded(cells: tuple[int, int], rng: Rng) -> Float32:
+def _folded_noise(cells: tuple[int, int], rng: VariantRng) -> Float32:
     """Noise bent by noise: its zero lines wander like veins."""
     y, x = rows_and_columns()
     bend = 0.9 * fbm(cells, 4, rng, 0.55)
@@ -196,7 +160,7 @@ def _folded(cells: tuple[int, int], rng: Rng) -> Float32:
     return folded
 
 
-def _pores(cells: int, radius: float, share: float, rng: Rng) -> Float32:
+def _pores(cells: int, radius: float, share: float, rng: VariantRng) -> Float32:
     """Round holes of varied size in a part of the cells, in [0, 1]."""
     points = worley((cells, cells), rng, 0.7)
     size = radius * (0.3 + 0.7 * uniform(points.count, rng))
@@ -206,7 +170,7 @@ def _pores(cells: int, radius: float, share: float, rng: Rng) -> Float32:
 
 
 def _courses(
-    courses: int, per_course: int, offset: float, rng: Rng
+    courses: int, per_course: int, offset: float, rng: VariantRng
 ) -> tuple[Float32, np.ndarray[tuple[int, ...], np.dtype[np.int64]]]:
     """Distance to the nearest joint [px] and number of the brick, for rows of equal bricks."""
     y, x = rows_and_columns()

@@ -1,4 +1,4 @@
-"""From colours and heights in floating point to the 8-bit images of a texture."""
+"""Conversion of floating-point colours and heights to the 8-bit images of a texture."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between
+from gen_data.generator.assets.procedural.material_presets import PALETTES, hex_to_srgb8
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn
 from gen_data.generator.core.asset_types import Float32, TextureData, UInt8
-from gen_data.generator.core.streams import Rng
 
 
 def texture(
@@ -53,11 +52,17 @@ def color(code: str) -> Float32:
     return channels
 
 
-def draw_color(codes: Sequence[str], spread: float, rng: Rng) -> Float32:
+def colors_in_turn(palette: str, seed: int) -> tuple[Float32, ...]:
+    """Colours of one entry of a palette, entries taken in turn by seed; see ``color``."""
+    entries = PALETTES[palette]
+    return tuple(color(code) for code in in_turn(entries, seed).split())
+
+
+def draw_color(codes: Sequence[str], spread: float, rng: VariantRng) -> Float32:
     """One of the colours with its brightness and tint moved a little."""
-    base = color(choose(codes, rng))
-    level = uniform_between(-spread, spread, rng)
-    tint = np.array([uniform_between(-0.3, 0.3, rng) * spread for _ in range(3)], dtype=np.float32)
+    base = color(rng.choose(codes))
+    level = rng.between(-spread, spread)
+    tint = np.array([rng.between(-0.3, 0.3) * spread for _ in range(3)], dtype=np.float32)
     moved: Float32 = np.clip(base * np.float32(1.0 + level) + tint, 0.01, 0.97)
     return moved
 

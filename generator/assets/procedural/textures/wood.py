@@ -12,30 +12,20 @@ from gen_data.generator.assets.procedural.noise import (
     smoothstep,
     uniform,
 )
-from gen_data.generator.assets.procedural.textures.texture_images import color, mix_colors, texture
-from gen_data.generator.assets.procedural.variant_rng import choose, uniform_between, variant_rng
-from gen_data.generator.core.asset_types import Float32, TextureData
-from gen_data.generator.core.streams import Rng
-
-# Light and dark wood of: oak, beech, pine, walnut, cherry, ash, teak, wenge, birch.
-_SPECIES = (
-    ("#c8a478", "#a67c50"),
-    ("#d2a67c", "#bb8a60"),
-    ("#e0bd88", "#c18f55"),
-    ("#7d5a3e", "#4f3524"),
-    ("#b06f45", "#8a4f2e"),
-    ("#d8c3a0", "#b79c74"),
-    ("#a9763f", "#7a4f26"),
-    ("#4b3629", "#2c1e17"),
-    ("#e3cda6", "#cbb083"),
+from gen_data.generator.assets.procedural.textures.texture_images import (
+    colors_in_turn,
+    mix_colors,
+    texture,
 )
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.core.asset_types import Float32, TextureData
 
 
 def wood_grain(seed: int) -> TextureData:
     """One board; 0.4 m per repeat."""
     rng = variant_rng("wood_grain", seed)
     rings, fibre = _grain(rng)
-    light, dark = (color(code) for code in _SPECIES[seed % len(_SPECIES)])
+    light, dark = colors_in_turn("timber", seed)
     albedo = mix_colors(light, dark, 0.75 * rings + 0.35 * fibre)
     return texture(albedo, 0.85 + 0.15 * fibre, -0.8 * fibre - 0.3 * rings)
 
@@ -44,9 +34,9 @@ def wood_planks(seed: int) -> TextureData:
     """Boards laid side by side, ends staggered; 1.2 m per repeat."""
     rng = variant_rng("wood_planks", seed)
     rings, fibre = _grain(rng)
-    light, dark = (color(code) for code in _SPECIES[seed % len(_SPECIES)])
-    rows = choose((4, 6, 8, 8, 10), rng)
-    per_row = choose((1, 2, 2, 3), rng)
+    light, dark = colors_in_turn("timber", seed)
+    rows = rng.choose((4, 6, 8, 8, 10))
+    per_row = rng.choose((1, 2, 2, 3))
     y, x = rows_and_columns()
     row = np.floor(y * rows).astype(np.int64) + np.zeros_like(x, dtype=np.int64)
     along = (x + uniform(rows, rng).astype(np.float32)[row]) * per_row
@@ -59,26 +49,26 @@ def wood_planks(seed: int) -> TextureData:
     rings, fibre = rings[at], fibre[at]
     tone = (uniform(rows * per_row, rng).astype(np.float32) - 0.5)[plank]
     albedo = mix_colors(light, dark, 0.6 * rings + 0.3 * fibre + 0.35 * tone)
-    albedo *= (1.0 + uniform_between(0.05, 0.2, rng) * tone)[..., None]
+    albedo *= (1.0 + rng.between(0.05, 0.2) * tone)[..., None]
     side = np.abs(y * rows - np.round(y * rows)) * SIZE_PX / rows
     end = np.abs(along - np.round(along)) * SIZE_PX / per_row
-    width = uniform_between(1.0, 2.2, rng)
+    width = rng.between(1.0, 2.2)
     gap = 1 - smoothstep(0.3 * width, width, np.minimum(side, end))
     albedo = mix_colors(albedo, 0.25 * dark, 0.85 * gap)
     rough = 0.8 + 0.15 * fibre + 0.2 * gap
     return texture(albedo, rough, -0.5 * fibre - 2.0 * gap)
 
 
-def _grain(rng: Rng) -> tuple[Float32, Float32]:
+def _grain(rng: VariantRng) -> tuple[Float32, Float32]:
     """Growth rings and fibres, both in about [0, 1]."""
     y, _ = rows_and_columns()
-    count = choose((6, 9, 12, 16), rng)
+    count = rng.choose((6, 9, 12, 16))
     # Quarter-sawn boards have straight lines, flat-sawn ones wander.
-    bend = uniform_between(0.4, 2.2, rng)
+    bend = rng.between(0.4, 2.2)
     phase = count * y + bend * fbm((3, 1), 2, rng) + 0.1 * fbm((40, 4), 2, rng)
     ring = phase - np.floor(phase)
     # Early wood is wide and pale, late wood a thin dark line that ends abruptly.
-    rings = ring ** np.float32(uniform_between(1.2, 3.0, rng)) * (1 - smoothstep(0.93, 1.0, ring))
+    rings = ring ** np.float32(rng.between(1.2, 3.0)) * (1 - smoothstep(0.93, 1.0, ring))
     streaks = np.abs(perlin((128, 4), rng)) + 0.5 * np.abs(perlin((256, 8), rng))
     pores = smoothstep(0.5, 0.85, perlin((170, 17), rng) + 0.25 * rings)
     rings = rings * (0.6 + 0.4 * smoothstep(-0.5, 0.5, fbm((4, 2), 2, rng)))

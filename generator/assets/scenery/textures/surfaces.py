@@ -14,7 +14,7 @@ from gen_data.generator.assets.procedural.noise import (
     worley,
 )
 from gen_data.generator.assets.procedural.textures.texture_images import texture
-from gen_data.generator.assets.procedural.variant_rng import uniform_between, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.core.asset_types import TextureData
 
 
@@ -70,7 +70,7 @@ def bark(seed: int) -> TextureData:
     ridge = np.abs(fbm((4, 12), 4, rng, 0.55))
     furrow = smoothstep(0.2, 0.02, warp_image(ridge, 0 * bend, bend))
     fine = fbm((16, 64), 3, rng)
-    depth = uniform_between(0.45, 0.65, rng)
+    depth = rng.between(0.45, 0.65)
     shade = (0.8 + 0.1 * fbm((4, 4), 4, rng) + 0.1 * fine) * (1 - depth * furrow)
     albedo = shade[..., None] * np.array([1.0, 0.97, 0.93])
     height = 1.2 * fine - 5.0 * furrow

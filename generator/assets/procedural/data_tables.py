@@ -1,0 +1,28 @@
+"""Tables of content: colours, words, measures and designs, in YAML files beside the modules."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import TypeVar
+
+import yaml
+
+from gen_data.generator.core.serialization import from_plain
+
+T = TypeVar("T")
+
+
+def load_table(package: str, name: str, kind: type[T]) -> Mapping[str, T]:
+    """Rows of the file ``<name>.yaml`` of a package, by key, in the file's order.
+
+    Args:
+        package: Full name of the package.
+        name: Of the file, without its ending.
+        kind: Type of a row: a dataclass, or an annotation made of tuples and plain types.
+
+    Raises:
+        KeyError, TypeError: if a row has other fields than the type.
+    """
+    rows = yaml.safe_load((files(package) / f"{name}.yaml").read_text(encoding="utf-8"))
+    return {key: from_plain(kind, row) for key, row in rows.items()}

@@ -1,0 +1,61 @@
+"""Tables of content beside the modules: typed rows by key, in the file's order."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from gen_data.generator import assets
+from gen_data.generator.assets.procedural.bottles import BOTTLES, BottleStyle
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.vehicles.bodywork import DESIGNS, Design
+
+VEHICLES = "gen_data.generator.assets.vehicles"
+TABLES = sorted(Path(assets.__path__[0]).rglob("*.yaml"))
+
+
+def test_rows_have_the_type_of_the_table() -> None:
+    """Lists become tuples, whole numbers fractions where the field is one."""
+    wine = BOTTLES["wine"]
+
+    assert isinstance(wine, BottleStyle)
+    assert wine.height_m == (0.29, 0.32)
+    assert isinstance(wine.depth, float)
+    assert not wine.clear
+
+
+def test_rows_keep_the_order_of_the_file() -> None:
+    """Seeds take the styles in turn, so the order is part of every variant."""
+    assert list(BOTTLES) == ["wine", "beer", "water", "soda", "ketchup", "detergent"]
+
+
+def test_a_row_takes_the_fields_that_it_leaves_out_from_another() -> None:
+    """YAML's merge key: an estate is a sedan with other measures."""
+    sedan, estate = DESIGNS["sedan"], DESIGNS["estate"]
+
+    assert (sedan.rails, estate.rails) == (False, True)
+    assert estate.width_m == sedan.width_m
+
+
+def test_a_table_of_another_type_is_refused() -> None:
+    """A field that the type has not is an error, not ignored."""
+    with pytest.raises(KeyError):
+        load_table(VEHICLES, "bicycles", Design)
+
+
+@pytest.mark.parametrize("path", TABLES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_no_key_is_given_twice(path: Path) -> None:
+    """YAML would silently keep the last."""
+    for node in _mappings(yaml.compose(path.read_text("utf-8"))):
+        keys = [key.value for key, _ in node.value]
+        assert len(keys) == len(set(keys)), path
+
+
+def _mappings(node: yaml.Node) -> list[yaml.MappingNode]:
+    if isinstance(node, yaml.MappingNode):
+        return [node, *(m for _, value in node.value for m in _mappings(value))]
+    if isinstance(node, yaml.SequenceNode):
+        return [m for item in node.value for m in _mappings(item)]
+    return []
