@@ -35,6 +35,13 @@ MAX_GAP_M = 0.01
 _MAX_ELEMENTS = 500_000
 _MAX_ROADS = 5_000
 _MAX_LENGTH_M = 50_000.0
+_MAX_LANES_M = 5e5
+"""Total length of all lanes; building lane graph and surface takes time in proportion."""
+_MAX_TURN_RAD = 100.0
+"""Largest turn of one geometry: the quadrature of spirals takes memory in proportion."""
+_MAX_POLY3_M, _MAX_SLOPE = 1_000.0, 100.0
+_MAX_LANE_WIDTH_M, _MAX_REACH_M = 100.0, 1e4
+_CHECK_STEP_M = 10.0
 
 Contact = Literal["start", "end"]
 
@@ -186,17 +193,26 @@ def read_opendrive(data: bytes, place: str) -> Network:
     if len(elements) > _MAX_ROADS:
         raise AssetError(f"{place}: more than {_MAX_ROADS} roads; cut out the part that matters")
     roads: dict[str, Road] = {}
+    lanes_m = 0.0
     for element in elements:
         road_id = element.get("id", "")
         where = f"{place}: road '{road_id[:40]}'"
         if not road_id or road_id in roads:
             raise AssetError(f"{where}: its id is missing or taken; give it one of its own")
         try:
-            roads[road_id] = _road(element)
+            roads[road_id] = road = _road(element)
+            lanes_m += sum(len(x.lanes) * (x.end_m - x.start_m) for x in road.sections)
+            if lanes_m <= _MAX_LANES_M:
+                _check_extents(road)
         except KeyError as error:
             raise AssetError(f"{where}: {error} is missing; add it") from None
         except ValueError as error:
             raise AssetError(f"{where}: {error}") from None
+        if lanes_m > _MAX_LANES_M:
+            raise AssetError(
+                f"{place}: more than {_MAX_LANES_M / 1e3:g} km of lanes; cut out the part that "
+                "matters"
+            )
     junctions = {}
     for element in root.findall("junction"):
         name = element.get("id", "")
@@ -234,6 +250,33 @@ def _road(element: Element) -> Road:
     )
 
 
+def _check_extents(road: Road) -> None:
+    """Raise ValueError if a lane is too wide, or the road lies too far aside, up or down."""
+    for section in road.sections:
+        steps = math.ceil((section.end_m - section.start_m) / _CHECK_STEP_M)
+        s_m = np.linspace(section.start_m, section.end_m, steps + 1)
+        # Overflow yields inf or NaN, which no comparison below accepts.
+        with np.errstate(over="ignore", invalid="ignore"):
+            widths_m = {
+                number: float(np.abs(lane.width_m(s_m - section.start_m)).max())
+                for number, lane in section.lanes.items()
+            }
+            edges_m = np.stack(list(road.boundaries_m(section, s_m).values()))
+            heights_m = road.elevation_m(s_m) + edges_m * np.tan(road.superelevation_rad(s_m))
+        for number, width_m in widths_m.items():
+            if not width_m <= _MAX_LANE_WIDTH_M:
+                raise ValueError(
+                    f"lane {number} is {width_m:.3g} m wide; at most {_MAX_LANE_WIDTH_M:g} m are "
+                    "read, correct its width"
+                )
+        reach_m = float(np.maximum(np.abs(edges_m), np.abs(heights_m)).max())
+        if not reach_m <= _MAX_REACH_M:
+            raise ValueError(
+                f"it reaches {reach_m:.3g} m aside, up or down; at most {_MAX_REACH_M:g} m are "
+                "read, correct its elevation and lane offset"
+            )
+
+
 def _line(element: Element) -> ReferenceLine:
     pieces: list[Placed] = []
     s = 0.0
@@ -266,15 +309,37 @@ def _curve(geometry: Element) -> Curve:
         if kind.tag == "line":
             return Line(length_m)
         if kind.tag == "arc":
-            return Arc(length_m, _number(kind, "curvature"))
+            return Arc(length_m, _curvature(kind, "curvature", length_m))
         if kind.tag == "spiral":
-            return Spiral(length_m, _number(kind, "curvStart"), _number(kind, "curvEnd"))
+            start, end = (_curvature(kind, name, length_m) for name in ("curvStart", "curvEnd"))
+            return Spiral(length_m, start, end)
         if kind.tag == "poly3":
-            return Poly3(length_m, _coefficients(kind, ""))
+            return _poly3(length_m, _coefficients(kind, ""))
         if kind.tag == "paramPoly3":
-            end = length_m if kind.get("pRange", "normalized") == "arcLength" else 1.0
-            return ParamPoly3(length_m, _coefficients(kind, "U"), _coefficients(kind, "V"), end)
+            p_end = length_m if kind.get("pRange", "normalized") == "arcLength" else 1.0
+            return ParamPoly3(length_m, _coefficients(kind, "U"), _coefficients(kind, "V"), p_end)
     raise ValueError("a geometry is neither line, arc, spiral, poly3 nor paramPoly3; convert it")
+
+
+def _curvature(element: Element, name: str, length_m: float) -> float:
+    curvature = _number(element, name)
+    if abs(curvature) * length_m > _MAX_TURN_RAD:
+        raise ValueError(
+            f"a curvature of {curvature:g} per metre over {length_m:g} m turns by more than "
+            f"{_MAX_TURN_RAD:g} rad; correct it"
+        )
+    return curvature
+
+
+def _poly3(length_m: float, v: tuple[float, float, float, float]) -> Poly3:
+    """A cubic whose arc length can be inverted in bounded time."""
+    slope = max(abs(v[1]), 2.0 * abs(v[2]) * length_m, 3.0 * abs(v[3]) * length_m**2)
+    if slope > _MAX_SLOPE or length_m > _MAX_POLY3_M:
+        raise ValueError(
+            f"a poly3 with a slope of {slope:.3g} over {length_m:g} m; at most {_MAX_SLOPE:g} over "
+            f"{_MAX_POLY3_M:g} m are read, export it as paramPoly3"
+        )
+    return Poly3(length_m, v)
 
 
 def _coefficients(element: Element, suffix: str) -> tuple[float, float, float, float]:

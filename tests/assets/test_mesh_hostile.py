@@ -139,6 +139,10 @@ MESHES: dict[str, tuple[str, bytes | str]] = {
     "negative mesh gltf": ("a.gltf", gltf(nodes=[{"mesh": -1}])),
     "self-parent gltf": ("a.gltf", gltf(nodes=[{"children": [0]}])),
     "cycle of 20,000 nodes gltf": ("a.gltf", gltf(nodes=chain(20_000))),
+    "200,000 nodes glb": (
+        "a.glb", glb(gltf(nodes=[{"mesh": 0}] * 200_000, scenes=[{"nodes": [*range(200_000)]}]))),
+    "200,000 primitives glb": (
+        "a.glb", glb(gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 0}}] * 200_000}]))),
     "count of two billion gltf": ("a.gltf", gltf(accessors=accessor(count=2**31))),
     "zero count gltf": ("a.gltf", gltf(accessors=accessor(count=0))),
     "no view gltf": (

@@ -131,7 +131,7 @@ def test_a_bomb_is_refused_before_it_fills_the_disk(
     ("limits", "message"),
     [
         (Limits(members=1), "more than 1 members"),
-        (Limits(file_bytes=4), "at most 4"),
+        (Limits(file_bytes=4), "more than 4"),
         (Limits(total_bytes=6), "exceed 6 bytes"),
     ],
 )

@@ -37,6 +37,8 @@ _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_MAX_PARTS = 50_000
+"""Bound on nodes, and on primitives of all nodes: each takes about 0.1 ms."""
 _HARMLESS = ("KHR_materials_", "KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_")
 
 
@@ -66,9 +68,12 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
             *(_slot(document, m) if materials else MaterialSlot() for m in described),
             MaterialSlot(),
         )
+        meshes = _mesh_instances(document)
+        if sum(len(mesh["primitives"]) for _, mesh in meshes) > _MAX_PARTS:
+            raise ValueError(f"more than {_MAX_PARTS} primitives; join them")
         parts = [
             part
-            for matrix, mesh in _placed_meshes(document)
+            for matrix, mesh in meshes
             for part in _primitives(document, mesh, matrix, slots)
         ]
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
@@ -120,9 +125,11 @@ def _at(items: Sequence[Any], index: Any, what: str) -> Any:
     return items[index]
 
 
-def _placed_meshes(document: _Document) -> list[tuple[Float64, Mapping[str, Any]]]:
+def _mesh_instances(document: _Document) -> list[tuple[Float64, Mapping[str, Any]]]:
     """``(matrix [4, 4], mesh)`` of every node of the default scene, in document order."""
     nodes, meshes = _list(document, "nodes"), _list(document, "meshes")
+    if len(nodes) > _MAX_PARTS:
+        raise ValueError(f"{len(nodes)} nodes, at most {_MAX_PARTS}; join them")
     scenes = _list(document, "scenes")
     if scenes:
         roots = list(_at(scenes, document.tree.get("scene", 0), "scene").get("nodes", []))
