@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.dedup import first_occurrences
-from gen_data.generator.assets.triangle_soup import Float64, TriangleSoup
+from gen_data.generator.assets.triangle_soup import Float64, TriangleSoup, first_occurrences
 from gen_data.generator.core.asset_types import ConvexParts
 from gen_data.generator.core.errors import AssetError
 

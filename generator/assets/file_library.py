@@ -29,9 +29,15 @@ from gen_data.generator.assets.folder_index import (
     user_folder,
 )
 from gen_data.generator.assets.image_decoding import decode_image, decode_radiance
-from gen_data.generator.assets.importer import VERSION, ImportedMesh, import_link, import_object
+from gen_data.generator.assets.importer import (
+    VERSION,
+    ImportedMesh,
+    import_link,
+    import_object,
+    import_road_network,
+    road_network_lanes,
+)
 from gen_data.generator.assets.installed_packs import pack_assets
-from gen_data.generator.assets.opendrive_files import import_road_network, road_network_lanes
 from gen_data.generator.assets.robot_models import robot_model
 from gen_data.generator.assets.texture_maps import compose_texture, find_maps
 from gen_data.generator.assets.urdf import Urdf, read_urdf

@@ -14,28 +14,33 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from gen_data.generator.assets.alpha_trim import trim_unreached_holes
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.convex_decomposition import convex_parts, single_hull
 from gen_data.generator.assets.folder_index import Finish, MeshEntry, Region, RobotEntry
 from gen_data.generator.assets.image_decoding import decode_image
 from gen_data.generator.assets.mesh_decimation import decimate
 from gen_data.generator.assets.normal_form import NormalForm, check_coordinates, normal_form
-from gen_data.generator.assets.primitive_solids import box, cylinder, sphere
 from gen_data.generator.assets.readers import read_mesh
 from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
 from gen_data.generator.assets.readers.usd import open_stage
+from gen_data.generator.assets.roads.network_surface import network_solid
+from gen_data.generator.assets.texture_maps import texel_indices, trim_unreached_holes
 from gen_data.generator.assets.triangle_soup import (
     Float64,
-    Int64,
     MaterialSlot,
     TriangleSoup,
+    box,
+    cylinder,
     join_soups,
+    sphere,
 )
 from gen_data.generator.assets.urdf import Shape, Urdf, read_urdf
 from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Lane
 from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.roads.opendrive import Network, read_opendrive
+from gen_data.generator.roads.opendrive_lanes import network_lanes
 
 VERSION = 5
 """Raised whenever the same files would come out as other geometry."""
@@ -336,7 +341,7 @@ def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
         chosen = soup.face_slots == k
         if slot.material.texture and soup.uvs is not None and chosen.any():
             image = decode_image(folder.read(slot.material.texture), slot.material.texture)
-            rows, columns = _pixels(soup.uvs[chosen].reshape(-1, 2), image.shape[:2])
+            rows, columns = texel_indices(soup.uvs[chosen].reshape(-1, 2), image.shape)
             median = np.median(image[rows, columns], axis=0) / 255.0
             own = slot.declared_color
             color = srgb_to_linear((float(median[0]), float(median[1]), float(median[2])))
@@ -345,13 +350,6 @@ def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
             slot = replace(slot, material=material)  # noqa: PLW2901
         slots.append(slot)
     return replace(soup, slots=tuple(slots), uvs=None)
-
-
-def _pixels(uvs: Float64, shape: tuple[int, ...]) -> tuple[Int64, Int64]:
-    height, width = shape[:2]
-    columns = np.floor(uvs[:, 0] * width).astype(np.int64) % width
-    rows = np.floor((1.0 - uvs[:, 1]) * height).astype(np.int64) % height
-    return rows, columns
 
 
 def upright_transform(entry: MeshEntry) -> Float64:
@@ -409,3 +407,18 @@ def _scaling(scale: float, shift: Float64) -> Float64:
     matrix[:, :3] = scale * np.eye(3)
     matrix[:, 3] = shift
     return matrix
+
+
+def import_road_network(folder: Folder, relative: str) -> ImportedMesh:
+    """The surface of an OpenDRIVE file's roads. Raises AssetError if it is unfit."""
+    solid = network_solid(_network(folder, relative))
+    return ImportedMesh(solid.mesh, solid.collision, {}, solid.keypoints)
+
+
+def road_network_lanes(folder: Folder, relative: str) -> tuple[Lane, ...]:
+    """The lanes of an OpenDRIVE file, in the frame of its surface. Raises AssetError."""
+    return network_lanes(_network(folder, relative))
+
+
+def _network(folder: Folder, relative: str) -> Network:
+    return read_opendrive(folder.read(relative), str(folder.root / relative))

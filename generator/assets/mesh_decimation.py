@@ -6,8 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.assets.dedup import first_occurrences
-from gen_data.generator.assets.triangle_soup import Float64, TriangleSoup, join_soups
+from gen_data.generator.assets.triangle_soup import (
+    Float64,
+    TriangleSoup,
+    first_occurrences,
+    join_soups,
+)
 
 _CALM = 3.0
 """How boldly edges are collapsed, from 1 to 10: slower and smoother than the library's 7."""
@@ -31,7 +35,7 @@ def decimate(soup: TriangleSoup, max_faces: int) -> TriangleSoup:
     first_slot = np.array([materials.index(material) for material in materials])[soup.face_slots]
     parts = []
     for k in np.unique(first_slot):
-        slot, chosen = soup.slots[k], soup.kept(first_slot == k)
+        slot, chosen = soup.slots[k], soup.select(first_slot == k)
         corners, uvs = chosen.corners, chosen.uvs if slot.material.texture else None
         if len(chosen) > _FEW:
             corners, uvs = _collapsed(corners, uvs, max(int(len(chosen) * share), _FEW))

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.assets.dedup import first_occurrences
 from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.triangle_soup import Float64, Int64, TriangleSoup
+from gen_data.generator.assets.triangle_soup import Float64, Int64, TriangleSoup, first_occurrences
 from gen_data.generator.core.asset_types import Material, MeshData
 from gen_data.generator.core.errors import AssetError
 
@@ -153,13 +152,13 @@ def _welded(soup: TriangleSoup) -> tuple[TriangleSoup, Int64]:
     )
     soup = replace(soup, corners=points[first][faces])
     distinct &= (face_crosses(soup.corners) != 0.0).any(axis=1)
-    soup, faces = soup.kept(distinct), faces[distinct]
+    soup, faces = soup.select(distinct), faces[distinct]
     if not len(faces):
         return soup, faces
     _, originals = first_occurrences(np.sort(faces, axis=1, kind="stable"))
     chosen = np.zeros(len(faces), dtype=bool)
     chosen[originals] = True
-    return soup.kept(chosen), faces[chosen]
+    return soup.select(chosen), faces[chosen]
 
 
 def face_crosses(corners: Float64) -> Float64:

@@ -184,8 +184,8 @@ def _open_tar_member(archive: tarfile.TarFile, info: tarfile.TarInfo) -> IO[byte
 
 def _containers(wanted: tuple[str, ...]) -> tuple[str, ...]:
     """Patterns of the archives that hold wanted members."""
-    splits = (pattern.partition(f"{suffix}/") + (suffix,) for pattern in wanted for suffix in _INNER)
-    return tuple(outer + suffix for outer, slash, _, suffix in splits if slash)
+    splits = ((p.partition(f"{suffix}/"), suffix) for p in wanted for suffix in _INNER)
+    return tuple(outer + suffix for (outer, slash, _), suffix in splits if slash)
 
 
 def _is_inside(name: str) -> bool:

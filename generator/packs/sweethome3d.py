@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.file_references import find_referenced_files
+from gen_data.generator.assets.content_hashes import find_referenced_files
 from gen_data.generator.assets.folder_index import (
     Finish,
     FolderIndex,

@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_data.generator.core.asset_types import Float32, Material, MeshData
 from gen_data.generator.usd.material_writer import BOX_UV, UV, TextureFinder, define_material
-from gen_data.generator.usd.stage_files import open_stage_for_writing
+from gen_data.generator.usd.prims import open_stage_for_writing
 
 MESH = "Mesh"
 ASSET = "/Asset"

@@ -11,7 +11,7 @@ from typing import Any
 
 from gen_data.generator.core.scene import Camera
 from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.usd.xforms import T_CAMERA_USD, set_transforms
+from gen_data.generator.usd.prims import T_CAMERA_USD, set_transforms
 
 PIXEL = 2.0**-11
 """Width of a pixel on the sensor, in tenths of a metre, USD's unit for it: about 49 micrometres. A

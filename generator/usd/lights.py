@@ -14,7 +14,7 @@ from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.photometry import luminance_cd_m2
 from gen_data.generator.core.scene import Environment, Light
 from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.usd.xforms import along_minus_z, set_transforms
+from gen_data.generator.usd.prims import along_minus_z, set_transforms
 
 RADIUS_M_MIN = 1e-3
 """A point is written as a ball of this size: it has a radiance, which USD asks for."""

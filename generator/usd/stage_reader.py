@@ -20,7 +20,7 @@ from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.usd.cameras import read_camera_pose
 from gen_data.generator.usd.lights import check_light, read_light
 from gen_data.generator.usd.mesh_reader import MeshPrim, read_mesh_prim
-from gen_data.generator.usd.prim_names import unique_name
+from gen_data.generator.usd.prims import unique_name
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 """Of layers; ``.usdz`` is an archive of them."""

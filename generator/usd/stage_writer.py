@@ -28,9 +28,13 @@ from gen_data.generator.usd.asset_layer import MESH, bind_materials
 from gen_data.generator.usd.cameras import define_camera
 from gen_data.generator.usd.lights import define_light, define_sky
 from gen_data.generator.usd.material_writer import TextureFinder
-from gen_data.generator.usd.prim_names import unique_name
-from gen_data.generator.usd.stage_files import open_stage_for_writing
-from gen_data.generator.usd.xforms import scale_pose, set_transforms, set_values
+from gen_data.generator.usd.prims import (
+    open_stage_for_writing,
+    scale_pose,
+    set_transforms,
+    set_values,
+    unique_name,
+)
 
 WORLD = "/World"
 Look = tuple[str, tuple[Material, ...]]

@@ -9,8 +9,13 @@ import numpy as np
 import pytest
 
 from gen_data.generator.assets.normal_form import NormalForm, normal_form
-from gen_data.generator.assets.primitive_solids import box, cylinder, sphere
-from gen_data.generator.assets.triangle_soup import MaterialSlot, TriangleSoup
+from gen_data.generator.assets.triangle_soup import (
+    MaterialSlot,
+    TriangleSoup,
+    box,
+    cylinder,
+    sphere,
+)
 from gen_data.generator.core.asset_types import Material, MeshData
 from gen_data.generator.core.errors import AssetError
 

@@ -15,8 +15,8 @@ from PIL import Image
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.primitive_solids import box, sphere
 from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.assets.triangle_soup import box, sphere
 from gen_data.generator.core.errors import AssetError
 
 CUBE_OBJ = """mtllib cube.mtl

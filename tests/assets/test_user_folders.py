@@ -16,7 +16,7 @@ from gen_data.generator.assets import discovery
 from gen_data.generator.assets.folder_index import MeshEntry
 from gen_data.generator.assets.importer import upright_transform
 from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.primitive_solids import box
+from gen_data.generator.assets.triangle_soup import box
 from gen_data.generator.core.asset_types import Symmetry
 from gen_data.generator.core.errors import AssetError, ConfigError, UnknownAsset
 from gen_data.generator.core.kinematics import link_poses

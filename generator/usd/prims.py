@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import chain, count
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.se3 import SE3, Array
 
 T_CAMERA_USD = SE3((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
@@ -47,3 +51,38 @@ def along_minus_z(direction: Sequence[float]) -> SE3:
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
     return SE3.from_matrix(matrix)
+
+
+def unique_name(name: str, taken: set[str]) -> str:
+    """A valid identifier that tells the name and is not taken; it is taken from now on."""
+    from pxr import Tf
+
+    base = str(Tf.MakeValidIdentifier(name))
+    candidates = chain([base], (f"{base}_{k}" for k in count(2)))
+    chosen = next(c for c in candidates if c not in taken)
+    taken.add(chosen)
+    return chosen
+
+
+@contextmanager
+def open_stage_for_writing(path: Path, root: str) -> Iterator[Any]:
+    """An empty stage in metres, Z up, with an Xform ``root``; written when all is in it.
+
+    Raises:
+        StorageError: if it cannot be written.
+    """
+    from pxr import Tf, Usd, UsdGeom
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        stage = Usd.Stage.CreateNew(str(path))
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+        stage.SetDefaultPrim(stage.DefinePrim(root, "Xform"))
+        yield stage
+        stage.GetRootLayer().Save()
+    except Tf.ErrorException as error:
+        lines = str(error).strip().splitlines() or ["unknown reason"]
+        raise StorageError(
+            f"{path}: cannot be written ({lines[-1][:120]}); check space and rights"
+        ) from None
