@@ -180,7 +180,7 @@ def test_images_inside_the_meshes_of_a_urdf_are_refused(tmp_path: Path) -> None:
             f"<collision>{collision}</collision></link></robot>"
         )
     library = open_library([folder], cache_dir=tmp_path / "cache")
-    with pytest.raises(AssetError, match="holds its images inside"):
+    with pytest.raises(AssetError, match="has embedded images"):
         library.mesh("user/seen")
     assert len(library.convex_parts("user/felt").parts_m) == 1
 

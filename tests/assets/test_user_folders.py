@@ -151,7 +151,7 @@ def test_a_users_robot_is_as_good_as_ours(folder: Path, tmp_path: Path) -> None:
     assert "tip" not in robot.collisions
     assert library.bounds_m("user/arm/upper")[1] == pytest.approx((0.03, 0.03, 0.4))
     assert library.materials("user/arm/base")[0].base_color == (0.85, 0.0, 0.0)
-    with pytest.raises(AssetError, match="does not collide"):
+    with pytest.raises(AssetError, match="without collision geometry"):
         library.convex_parts("user/arm/tip")
 
 
@@ -289,7 +289,7 @@ def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
         ("front: x, yaw_deg: 90", "front or yaw_deg, not both"),
         ("front: -z", "front is -z, but z points up"),
         ("unit: yards", "unit"),
-        ("symmetries: [{axis: [0, 0, 0]}]", "an axis of some length"),
+        ("symmetries: [{axis: [0, 0, 0]}]", "an axis with non-zero length"),
         ("symmetries: [{axis: z, fold: 1}]", "fold"),
         ("materials: {'*': {maps: {}}}", "expected an image"),
         ("materials: {'*': {maps: {orm: a.png, metallic: b.png}}}", "not both"),
@@ -446,7 +446,7 @@ def test_a_folder_that_cannot_be_read_is_named(
     error = PermissionError(13, "Permission denied", str(folder / "locked"))
     monkeypatch.setattr(os, "scandir", raising(error))
     with pytest.raises(AssetError, match=r"locked: Permission denied; a folder of assets"):
-        discovery.files_below(folder)
+        discovery.list_files(folder)
 
 
 def raising(error: Exception) -> Callable[..., NoReturn]:
