@@ -114,9 +114,8 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     matrix = upright_transform(entry)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
-    soup = _split_regions(
-        soup.transformed(_scaling_matrix(scale, shift)), entry.regions, place, asset_id
-    )
+    scaling = _scaling_matrix(scale, shift)
+    soup = _split_regions(soup.transformed(scaling), entry.regions, place, asset_id)
     mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
     if collides:
         solid = join_soups(collides).transformed(matrix).transformed(scaling)
@@ -145,17 +144,10 @@ def import_link(
         solids = [_make_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
         check_coordinates(join_soups(solids), place)
         # One hull per element and group, as simulators treat the collision meshes of a URDF.
-        collision = ConvexParts(
-            tuple(
-                part
-                for solid in solids
-                for part in (
-                    convex_parts(solid, place, 1)
-                    if _has_groups(solid)
-                    else single_hull(solid, place)
-                ).parts_m
-            )
-        )
+        hulls = [
+            convex_parts(s, place, 1) if _has_groups(s) else single_hull(s, place) for s in solids
+        ]
+        collision = ConvexParts(tuple(part for hull in hulls for part in hull.parts_m))
     return ImportedMesh(mesh, collision, {})
 
 

@@ -89,11 +89,11 @@ class Library:
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """The asset's own materials, one per mesh slot."""
-        return self._of_mesh(asset_id).materials
+        return self._summarize(asset_id).materials
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
-        return self._of_mesh(asset_id).bounds_m
+        return self._summarize(asset_id).bounds_m
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
@@ -101,7 +101,7 @@ class Library:
             imported = self._imported(asset_id)
             if imported.mesh is None:
                 return imported.keypoints
-        return self._of_mesh(asset_id).keypoints
+        return self._summarize(asset_id).keypoints
 
     def lanes(self, asset_id: str) -> tuple[Lane, ...]:
         """Lanes of a road network (``.xodr``), in its own frame; empty for other assets."""

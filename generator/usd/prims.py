@@ -1,4 +1,4 @@
-"""Poses and values of prims, at one instant or through time."""
+"""Helpers for writing stages: files, prim names, values and transforms over time."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.se3 import SE3, Array
 
 T_CAMERA_USD = SE3((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
-"""A USD camera looks along -Z with +Y up; ours along +Z with -Y up."""
+"""USD's camera looks along -Z with +Y up, this project's along +Z with -Y up."""
 
 
 def set_values(attribute: Any, values: Sequence[Any]) -> None:
-    """Give an attribute one value per time code; one for all times where they are equal."""
+    """Set an attribute per time code, or once for all times if all values are equal."""
     if all(value == values[0] for value in values):
         attribute.Set(values[0])
         return
@@ -27,7 +27,7 @@ def set_values(attribute: Any, values: Sequence[Any]) -> None:
 
 
 def set_transforms(prim: Any, matrices: Sequence[Array]) -> None:
-    """Put a prim where column-vector matrices [4, 4] say, one per time code."""
+    """Set a prim's transform to column-vector matrices [4, 4], one per time code."""
     from pxr import Gf, UsdGeom
 
     rows = [Gf.Matrix4d(*np.asarray(m).T.ravel().tolist()) for m in matrices]
@@ -35,14 +35,14 @@ def set_transforms(prim: Any, matrices: Sequence[Array]) -> None:
 
 
 def scale_pose(pose: SE3, scale: float) -> Array:
-    """A pose behind a uniform scale, as a matrix [4, 4]."""
+    """Matrix [4, 4] that scales uniformly, then applies the pose."""
     matrix = pose.matrix()
     matrix[:3, :3] *= scale
     return matrix
 
 
 def along_minus_z(direction: Sequence[float]) -> SE3:
-    """The rotation that turns -Z, along which USD's lights shine, into a direction."""
+    """Rotation from -Z, the direction of USD's lights, to the given direction."""
     z = -np.asarray(direction, dtype=np.float64)
     z = z / np.sqrt((z * z).sum())
     helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
@@ -54,7 +54,7 @@ def along_minus_z(direction: Sequence[float]) -> SE3:
 
 
 def unique_name(name: str, taken: set[str]) -> str:
-    """A valid identifier that tells the name and is not taken; it is taken from now on."""
+    """Make a valid, unused prim name from a name, and add it to ``taken``."""
     from pxr import Tf
 
     base = str(Tf.MakeValidIdentifier(name))
@@ -66,7 +66,7 @@ def unique_name(name: str, taken: set[str]) -> str:
 
 @contextmanager
 def open_stage_for_writing(path: Path, root: str) -> Iterator[Any]:
-    """An empty stage in metres, Z up, with an Xform ``root``; written when all is in it.
+    """Create a stage in metres, Z up, with an Xform ``root``; save it when the block ends.
 
     Raises:
         StorageError: if it cannot be written.

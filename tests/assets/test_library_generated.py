@@ -59,9 +59,9 @@ def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> N
     ("asset_id", "reason"),
     [
         ("mug?sede=1", "did you mean 'seed'"),
-        ("mug?seed=-1", "whole number from 0"),
-        ("mug?seed=1.5", "whole number from 0"),
-        ("mug?seed=red", "whole number from 0"),
+        ("mug?seed=-1", "integer from 0"),
+        ("mug?seed=1.5", "integer from 0"),
+        ("mug?seed=red", "integer from 0"),
         ("table?size_m=1,2", "expects 3 numbers"),
         ("table?size_m=wide", "expects 3 numbers"),
         ("table?style=3", "expects a word"),

@@ -217,7 +217,7 @@ def test_a_follower_cannot_be_told_to_stand_elsewhere(folder: Path, tmp_path: Pa
     """Home positions that contradict the URDF are refused."""
     (folder / "hand.urdf").write_text(HAND)
     (folder / "assets.yaml").write_text(HAND_INDEX % "finger: 0.3, knuckle: 0.3")
-    with pytest.raises(AssetError, match=r"'knuckle', which mimics 'finger' and is at -0\.2"):
+    with pytest.raises(AssetError, match=r"'knuckle' contradicts -0\.2 by its leader 'finger'"):
         open_library([folder], cache_dir=tmp_path / "cache").robot("user/hand")
 
 

@@ -229,7 +229,7 @@ def broken(folder: Path, kind: str) -> None:
     stage = new_stage(folder / "bad.usda")
     if kind == "no mesh":
         UsdLux.SphereLight.Define(stage, "/Lamp")
-    elif kind == "not read":
+    elif kind == "not supported":
         UsdGeom.Cube.Define(stage, "/Cube")
     else:
         mesh = add_quad(stage, "/Quad")
@@ -242,7 +242,7 @@ def broken(folder: Path, kind: str) -> None:
         elif kind.startswith("roughness"):
             material = shiny(stage, "/M", float(kind.rstrip(",").split()[-1]))
             UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
-        elif kind == "fit together":
+        elif kind == "inconsistent":
             mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 9])
         elif kind == "No such file":
             stage.GetRootLayer().subLayerPaths.append("./lost.usda")
@@ -263,12 +263,12 @@ def broken(folder: Path, kind: str) -> None:
     "fault",
     [
         "no mesh",
-        "not read",
+        "not supported",
         "is missing",
         "UsdPreviewSurface",
         "roughness is 1.5,",
         "roughness is -0.5,",
-        "fit together",
+        "inconsistent",
         "No such file",
         "outside",
         "in an archive outside",
