@@ -248,6 +248,8 @@ class FileLibrary:
 
     def _asset(self, one: IndexedAsset) -> Asset:
         entry = one.entry
+        # Robots and images have the default values of a mesh entry's own fields.
+        mesh = entry if isinstance(entry, MeshEntry) else MeshEntry(file="-")
         return Asset(
             asset_id=one.asset_id,
             kind=one.kind,
@@ -257,13 +259,11 @@ class FileLibrary:
             author=one.origin.author,
             source=one.origin.source,
             sha256=self._key(one),
-            mass_kg=entry.mass_kg if isinstance(entry, MeshEntry) else 0.0,
-            stackable=isinstance(entry, MeshEntry) and entry.stackable,
-            subcategory=entry.subcategory if isinstance(entry, MeshEntry) else "",
-            attributes=tuple(sorted(entry.attributes.items()))
-            if isinstance(entry, MeshEntry)
-            else (),
-            symmetries=_symmetries(entry),
+            mass_kg=mesh.mass_kg,
+            stackable=mesh.stackable,
+            subcategory=mesh.subcategory,
+            attributes=tuple(sorted(mesh.attributes.items())),
+            symmetries=_convert_symmetries(mesh),
         )
 
     def _key(self, one: IndexedAsset) -> str:
@@ -301,9 +301,9 @@ class FileLibrary:
                 raise AssetError(f"{folder.root / name}: changed while it was read; start again")
 
 
-def _symmetries(entry: Entry) -> tuple[Symmetry, ...]:
+def _convert_symmetries(entry: MeshEntry) -> tuple[Symmetry, ...]:
     found = []
-    for symmetry in entry.symmetries if isinstance(entry, MeshEntry) else ():
+    for symmetry in entry.symmetries:
         x, y, z = symmetry.direction()
         length = math.sqrt(x * x + y * y + z * z)
         axis = (x / length, y / length, z / length)

@@ -19,7 +19,7 @@ from gen_data.generator.assets.convex_decomposition import convex_parts, single_
 from gen_data.generator.assets.folder_index import Finish, MeshEntry, Region, RobotEntry
 from gen_data.generator.assets.image_decoding import decode_image
 from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.normal_form import NormalForm, check_coordinates, normal_form
+from gen_data.generator.assets.normal_form import check_coordinates, normal_form
 from gen_data.generator.assets.readers import read_mesh
 from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
 from gen_data.generator.assets.readers.usd import open_stage
@@ -116,7 +116,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     scale, shift = scale_and_shift(soup, entry, place)
     scaling = _scaling_matrix(scale, shift)
     soup = _split_regions(soup.transformed(scaling), entry.regions, place, asset_id)
-    mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
+    mesh = normal_form(soup, place, max_faces=entry.max_faces)
     if collides:
         solid = join_soups(collides).transformed(matrix).transformed(scaling)
         check_coordinates(solid, place)
@@ -139,7 +139,7 @@ def import_link(
         if entry.palette:
             soup = _palette_colors(folder, soup)
         soup = _apply_finishes(soup, entry.materials, place, robot_id)
-        mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
+        mesh = normal_form(soup, place, max_faces=entry.max_faces)
     if link.collisions:
         solids = [_make_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
         check_coordinates(join_soups(solids), place)

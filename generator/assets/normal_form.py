@@ -18,6 +18,7 @@ from gen_data.generator.core.asset_types import Material, MeshData
 from gen_data.generator.core.errors import AssetError
 
 CREASE_DEG = 40.0
+MAX_FACES = 20_000
 MAX_TEXTURED_FACES = 1_000_000
 _MIN_EXTENT_M, _MAX_EXTENT_M, _MAX_COORDINATE_M = 1e-4, 1e3, 1e4
 _MAX_UV = 1e4
@@ -25,20 +26,9 @@ _WELD = 1e-6
 """Welding distance, as a share of the largest extent."""
 
 
-@dataclass(frozen=True)
-class NormalForm:
-    """Parameters of the import.
-
-    Attributes:
-        crease_deg: Edges with a larger angle between the faces' normals stay sharp.
-        max_faces: Triangle budget.
-    """
-
-    crease_deg: float = CREASE_DEG
-    max_faces: int = 20_000
-
-
-def normal_form(soup: TriangleSoup, place: str, form: NormalForm = NormalForm()) -> MeshData:
+def normal_form(
+    soup: TriangleSoup, place: str, max_faces: int = MAX_FACES, crease_deg: float = CREASE_DEG
+) -> MeshData:
     """Convert a soup in metres, Z up, to a mesh.
 
     The file's normals are kept if they agree with the triangles and are not all flat; otherwise
@@ -47,7 +37,8 @@ def normal_form(soup: TriangleSoup, place: str, form: NormalForm = NormalForm())
     Args:
         soup: Triangles; ``Material.texture`` empty or a texture id.
         place: Name of the mesh in error messages.
-        form: Parameters of the import.
+        max_faces: Triangle budget.
+        crease_deg: Edges with a larger angle between the faces' normals stay sharp.
 
     Raises:
         AssetError: if nothing usable is left, or the size is out of bounds.
@@ -61,12 +52,12 @@ def normal_form(soup: TriangleSoup, place: str, form: NormalForm = NormalForm())
         raise AssetError(
             f"{place}: {len(soup)} textured triangles, at most {MAX_TEXTURED_FACES}; decimate it"
         )
-    if len(soup) > form.max_faces:
-        soup, faces = _weld(decimate(soup, form.max_faces))
+    if len(soup) > max_faces:
+        soup, faces = _weld(decimate(soup, max_faces))
     soup, faces = _orient_outward(soup, faces)
     soup = replace(soup, uvs=_reset_invalid_uvs(soup.uvs) if textured else None)
     own = _valid_normals(soup)
-    return make_mesh(soup, _crease_normals(soup, faces, form.crease_deg) if own is None else own)
+    return make_mesh(soup, _crease_normals(soup, faces, crease_deg) if own is None else own)
 
 
 def _reset_invalid_uvs(uvs: Float64 | None) -> Float64 | None:

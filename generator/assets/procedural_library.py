@@ -45,6 +45,7 @@ TABLES = (
 KIND = "asset_family"
 """Third-party packages add families through the entry-point group ``gen_data.asset_family``."""
 S = TypeVar("S", bound=Sized)
+F = TypeVar("F", Family, TextureFamily, EnvironmentFamily)
 
 
 class ProceduralLibrary:
@@ -71,11 +72,7 @@ class ProceduralLibrary:
     def names(self) -> Iterator[str]:
         """Yield every id offered for selection, and the names of families that need parameters."""
         for name, family in self._families.items():
-            yield from (
-                (f"{name}?seed={k}" for k in range(family.variants))
-                if (family.variants)
-                else (name,)
-            )
+            yield from [f"{name}?seed={k}" for k in range(family.variants)] or [name]
 
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
         """Yield the assets offered for selection of a kind that have every tag."""
@@ -106,9 +103,7 @@ class ProceduralLibrary:
 
     def imported(self, asset_id: AssetId) -> ImportedMesh:
         """Geometry of an object."""
-        family = self._families[asset_id.name]
-        if not isinstance(family, Family):
-            raise AssetError(f"asset '{asset_id}': is of kind {_kind(family)}, not an object")
+        family = self._find(asset_id, Family, "an object")
 
         def compute() -> ImportedMesh:
             solid = family.build(**_merge_arguments(asset_id, family))
@@ -118,29 +113,30 @@ class ProceduralLibrary:
 
     def texture(self, asset_id: AssetId) -> TextureData:
         """Images of a texture."""
-        family = self._families[asset_id.name]
-        if not isinstance(family, TextureFamily):
-            raise AssetError(f"asset '{asset_id}': is of kind {_kind(family)}, not a texture")
+        family = self._find(asset_id, TextureFamily, "a texture")
+        arguments = _merge_arguments(asset_id, family)
         return self._result(
-            asset_id,
-            family,
-            lambda: family.build(**_merge_arguments(asset_id, family)),
-            pack_texture,
-            unpack_texture,
+            asset_id, family, lambda: family.build(**arguments), pack_texture, unpack_texture
         )
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
-        family = self._families[asset_id.name]
-        if not isinstance(family, EnvironmentFamily):
-            raise AssetError(f"asset '{asset_id}': is of kind {_kind(family)}, not an environment")
+        family = self._find(asset_id, EnvironmentFamily, "an environment")
+        arguments = _merge_arguments(asset_id, family)
         return self._result(
             asset_id,
             family,
-            lambda: family.build(**_merge_arguments(asset_id, family)),
+            lambda: family.build(**arguments),
             lambda radiance: {"radiance": radiance},
             lambda arrays: arrays["radiance"],
         )
+
+    def _find(self, asset_id: AssetId, kind: type[F], expected: str) -> F:
+        """The id's family. Raises AssetError if it is of another kind."""
+        family = self._families[asset_id.name]
+        if not isinstance(family, kind):
+            raise AssetError(f"asset '{asset_id}': is of kind {_kind(family)}, not {expected}")
+        return family
 
     def _result(
         self,

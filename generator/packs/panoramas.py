@@ -12,6 +12,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from gen_data.generator.assets.folder_index import FolderIndex, ImageEntry
 from gen_data.generator.assets.image_decoding import read_exr
@@ -22,26 +23,9 @@ from gen_data.generator.core.errors import AssetError
 _DATA_URL = re.compile(rb"base64,([A-Za-z0-9+/=]+)")
 _SUFFIX = ".exr.js"
 
-TAGS: dict[str, tuple[str, ...]] = {
-    "apartment": ("indoor",),
-    "bridge": ("indoor",),
-    "city": ("outdoor", "urban"),
-    "dawn": ("outdoor", "sunset"),
-    "esplanade": ("indoor",),
-    "forest": ("outdoor", "nature"),
-    "hall": ("indoor",),
-    "lab": ("indoor", "industrial"),
-    "lobby": ("indoor",),
-    "night": ("outdoor", "night", "nature"),
-    "park": ("outdoor", "nature"),
-    "sky": ("outdoor", "nature"),
-    "studio": ("indoor", "studio"),
-    "sunrise": ("outdoor", "sunset"),
-    "sunset": ("outdoor", "sunset"),
-    "venice": ("outdoor", "sunset", "urban"),
-    "warehouse": ("indoor", "industrial"),
-    "workshop": ("indoor", "industrial"),
-}
+TAGS: dict[str, list[str]] = yaml.safe_load(
+    Path(__file__).with_name("panoramas.yaml").read_text(encoding="utf-8")
+)
 
 
 def convert(source: Path, target: Path) -> None:

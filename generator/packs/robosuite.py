@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import yaml
+
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.folder_index import Finish, FolderIndex, GripperEntry, RobotEntry
 from gen_data.generator.assets.installed_packs import TAG, write_index
@@ -42,32 +44,11 @@ class Arm:
     touching: tuple[tuple[str, str], ...] = ()
 
 
-ARMS = (
-    Arm(
-        name="ur5e",
-        author="Universal Robots; robosuite contributors",
-        home={
-            "shoulder_pan_joint": -0.470,
-            "shoulder_lift_joint": -1.735,
-            "elbow_joint": 2.480,
-            "wrist_1_joint": -2.275,
-            "wrist_2_joint": -1.590,
-            "wrist_3_joint": -1.991,
-        },
-    ),
-    Arm(
-        name="sawyer",
-        author="Rethink Robotics; robosuite contributors",
-        home={
-            "right_j0": 0.0,
-            "right_j1": -1.18,
-            "right_j2": 0.0,
-            "right_j3": 2.18,
-            "right_j4": 0.0,
-            "right_j5": 0.57,
-            "right_j6": -1.57,
-        },
-    ),
+ARMS = tuple(
+    Arm(**arm)
+    for arm in yaml.safe_load(
+        Path(__file__).with_name("robosuite.yaml").read_text(encoding="utf-8")
+    )
 )
 
 

@@ -48,7 +48,7 @@ def test_list_finds_assets_by_tags(tmp_path: Path) -> None:
     ("arguments", "code", "said"),
     [
         (("install", "catalog"), 2, "did you mean 'catalogue'"),
-        (("install", "all", "--from", "archive"), 2, "--from is the archive of one pack"),
+        (("install", "all", "--from", "archive"), 2, "--from takes the archive of one pack"),
         (("install", "hdri", "--from", "archive"), 3, "sha256 is"),
         (("install", "hdri", "--from", "nowhere"), 2, "does not exist"),
         (("remove", "hdri"), 3, "not installed"),
