@@ -165,7 +165,7 @@ def test_glb_comes_upright_with_its_embedded_image(tmp_path: Path) -> None:
 
 
 def test_images_inside_the_meshes_of_a_urdf_are_refused(tmp_path: Path) -> None:
-    """Nobody would serve them; collision meshes may have them, since nobody looks."""
+    """A link cannot provide them; collision meshes may have them, since they are invisible."""
     tree, binary = textured_triangle(tmp_path)
     folder = tmp_path / "assets"
     folder.mkdir()

@@ -72,7 +72,7 @@ def test_every_vehicle_that_drives_has_wheels_in_order() -> None:
 
 
 def test_only_standing_people_are_pedestrians() -> None:
-    """Whoever sits or lies has no place on a pavement."""
+    """Sitting and lying people are not placed on pavements."""
     people = read_selection().groups["people"].models
     assert len(people) == 29
     for choice in people:

@@ -1,4 +1,4 @@
-"""Stages as assets: what OpenUSD wrote is what is read, and bad files are told apart."""
+"""Stages as assets: import matches OpenUSD's own files, and bad files have distinct errors."""
 
 from __future__ import annotations
 
@@ -338,7 +338,7 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
 def test_an_impossible_light_of_a_stage_is_refused(
     tmp_path: Path, attribute: str, value: object, said: str
 ) -> None:
-    """One error that names the file and the light; nothing is made of it."""
+    """One error names the file and the light; nothing is imported."""
     (tmp_path / "props").mkdir()
     stage = new_stage(tmp_path / "props/s.usda")
     add_quad(stage, "/Quad")
