@@ -26,6 +26,10 @@ _NAME = "digests.json"
 _MISSING = ""
 _TICK_NS = 2_000_000_000
 """Coarsest resolution of a file system's time stamps (FAT: two seconds)."""
+# Each matches the rest of its line as a whole: splitting it in the pattern takes quadratic time.
+_MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
+_MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]([^\n]*)", re.MULTILINE)
+_MAX_FILES = 2000
 
 
 class ContentHashes:
@@ -105,12 +109,6 @@ def _state(status: stat_result) -> list[int]:
 def _now_ns() -> int:
     """Current time [ns] of the clock that file time stamps use."""
     return time.time_ns()
-
-
-# Each matches the rest of its line as a whole: splitting it in the pattern takes quadratic time.
-_MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
-_MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]([^\n]*)", re.MULTILINE)
-_MAX_FILES = 2000
 
 
 def find_referenced_files(folder: Folder, relative: str) -> tuple[str, ...]:

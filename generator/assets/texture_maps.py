@@ -13,6 +13,13 @@ from gen_data.generator.assets.triangle_soup import Float64, Int64, MaterialSlot
 from gen_data.generator.core.asset_types import TextureData, UInt8
 
 _MARK = "maps;"
+HOLES_MIN = 0.02
+"""Smallest share of a slot's area in holes for which they are kept."""
+# Barycentric weights of sample points well inside a triangle: its border may touch a seam.
+_INSIDE = np.array(
+    [[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 0.5], [2, 0.5, 2], [0.5, 2, 2]]
+)
+_WEIGHTS = _INSIDE / _INSIDE.sum(axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,15 +122,6 @@ def _resize(image: UInt8, width: int, height: int) -> UInt8:
         return np.ascontiguousarray(image)
     resized: UInt8 = cv2.resize(np.ascontiguousarray(image), (width, height))
     return resized
-
-
-HOLES_MIN = 0.02
-"""Smallest share of a slot's area in holes for which they are kept."""
-# Barycentric weights of sample points well inside a triangle: its border may touch a seam.
-_INSIDE = np.array(
-    [[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 0.5], [2, 0.5, 2], [0.5, 2, 2]]
-)
-_WEIGHTS = _INSIDE / _INSIDE.sum(axis=1, keepdims=True)
 
 
 def trim_unreached_holes(soup: TriangleSoup, image: Callable[[str], UInt8]) -> TriangleSoup:

@@ -14,6 +14,8 @@ from gen_data.generator.core.se3 import Vec3
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
+SEGMENTS = 32
+_BOX_QUADS = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
 
 
 _PLAIN = Material()
@@ -164,10 +166,6 @@ def first_occurrences(keys: Int64) -> tuple[Int64, Int64]:
     numbers = np.zeros(len(keys), dtype=np.int64)
     numbers[order] = rank[group]
     return numbers, first[rank_order]
-
-
-SEGMENTS = 32
-_BOX_QUADS = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
 
 
 def box(size_m: tuple[float, float, float]) -> Float64:
