@@ -1,4 +1,4 @@
-"""Meshes, collision parts and images to plain arrays and back, bit by bit."""
+"""Lossless conversion of meshes, collision parts and images to plain arrays and back."""
 
 from __future__ import annotations
 
@@ -24,22 +24,26 @@ _IMAGE = "image/"
 
 
 def pack_imported(imported: ImportedMesh) -> Arrays:
-    """Plain arrays that hold an imported asset."""
+    """Convert an imported asset to plain arrays."""
     arrays: Arrays = {f"{_IMAGE}{name}": image for name, image in imported.images.items()}
     if imported.mesh is not None:
         arrays |= {name: getattr(imported.mesh, name) for name in _MESH_ARRAYS}
-        arrays["materials"] = _text(canonical_json(imported.mesh.materials))
+        arrays["materials"] = _encode_text(canonical_json(imported.mesh.materials))
     if imported.collision is not None:
         parts = imported.collision.parts_m
         arrays["part_sizes"] = np.array([len(part) for part in parts], dtype=np.int64)
         arrays["parts_m"] = np.concatenate(parts) if parts else np.zeros((0, 3))
     if imported.keypoints:
-        arrays["keypoints"] = _text(canonical_json(imported.keypoints))
+        arrays["keypoints"] = _encode_text(canonical_json(imported.keypoints))
     return arrays
 
 
 def unpack_imported(arrays: Arrays) -> ImportedMesh:
-    """The imported asset that plain arrays hold. Raises KeyError or ValueError if they do not."""
+    """Restore an imported asset.
+
+    Raises:
+        KeyError, ValueError: if the arrays hold no imported asset.
+    """
     mesh = collision = None
     if "materials" in arrays:
         materials = json.loads(arrays["materials"].tobytes())
@@ -59,19 +63,19 @@ def unpack_imported(arrays: Arrays) -> ImportedMesh:
     return ImportedMesh(mesh, collision, images, keypoints)
 
 
-_FURTHER = ("roughness", "normal", "metallic", "occlusion", "emission", "alpha")
+_OPTIONAL_IMAGES = ("roughness", "normal", "metallic", "occlusion", "emission", "alpha")
 
 
 def pack_texture(texture: TextureData) -> Arrays:
-    """Plain arrays that hold a texture."""
-    further = {name: getattr(texture, name) for name in _FURTHER}
-    return {"albedo": texture.albedo, **{k: v for k, v in further.items() if v is not None}}
+    """Convert a texture to plain arrays."""
+    optional = {name: getattr(texture, name) for name in _OPTIONAL_IMAGES}
+    return {"albedo": texture.albedo, **{k: v for k, v in optional.items() if v is not None}}
 
 
 def unpack_texture(arrays: Arrays) -> TextureData:
-    """The texture that plain arrays hold. Raises KeyError if they do not."""
-    return TextureData(arrays["albedo"], **{name: arrays.get(name) for name in _FURTHER})
+    """Restore a texture. Raises KeyError if the arrays hold none."""
+    return TextureData(arrays["albedo"], **{name: arrays.get(name) for name in _OPTIONAL_IMAGES})
 
 
-def _text(text: str) -> UInt8:
+def _encode_text(text: str) -> UInt8:
     return np.frombuffer(text.encode(), dtype=np.uint8)

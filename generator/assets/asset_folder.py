@@ -1,8 +1,8 @@
-"""A folder of assets: the only door through which asset files are opened.
+"""Safe access to a folder of assets; all asset files are opened through it.
 
-Every path is resolved, symbolic links included, and must stay inside the folder; only regular
-files of bounded size are read; what was read is remembered by digest, so that a file that changes
-between hashing and parsing is noticed.
+Every path is resolved, including symbolic links, and must stay inside the folder. Only regular
+files of bounded size are read. The digest of every file read is recorded, to detect files that
+change between hashing and parsing.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 
 @dataclass
 class Folder:
-    """Reads files below ``root``.
+    """Reader of files below ``root``.
 
     Attributes:
         root: The folder; nothing outside it is ever opened.
-        digests: ``{path relative to the root: sha256}`` of what was read through this object.
+        digests: ``{path relative to the root: sha256}`` of the files read through this object.
     """
 
     root: Path
     digests: dict[str, str] = field(default_factory=dict)
 
     def read(self, relative: str) -> bytes:
-        """The bytes of a file.
+        """Read the bytes of a file.
 
         Raises:
-            AssetError: if it is missing, no regular file, unreadable, too large or outside.
+            AssetError: if it is missing, unreadable, too large, outside, or not a regular file.
         """
         path = self.path(relative)
         try:
-            # Non-blocking: opening a FIFO for reading would otherwise wait for a writer.
+            # Non-blocking, because opening a FIFO for reading otherwise waits for a writer.
             descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
             with os.fdopen(descriptor, "rb") as file:
                 status = os.fstat(file.fileno())
@@ -52,7 +52,7 @@ class Folder:
                         f"{path}: {status.st_size} bytes; at most {MAX_FILE_BYTES} are read, "
                         "decimate or split it"
                     )
-                # No more than was measured: a file that grows meanwhile is another file.
+                # A fixed size: reading to the end of a file that grows meanwhile has no bound.
                 data = file.read(status.st_size)
         except OSError as error:
             raise AssetError(f"{path}: {error.strerror}; check the path and its rights") from None
@@ -60,7 +60,7 @@ class Folder:
         return data
 
     def path(self, relative: str) -> Path:
-        """Where a file lies. Raises AssetError if that is outside the folder."""
+        """Resolve the path of a file. Raises AssetError if it is outside the folder."""
         shown = self.root / relative[:80]
         if "\0" in relative or len(relative) > _MAX_REFERENCE:
             raise AssetError(f"{str(shown)!r}: not a usable file name; rename it")
@@ -74,14 +74,14 @@ class Folder:
         return path
 
     def exists(self, relative: str) -> bool:
-        """Whether a regular file of that name lies inside the folder."""
+        """Whether the folder holds a regular file of that name."""
         try:
             return self.path(relative).is_file()
         except AssetError:
             return False
 
     def refer(self, base: str, reference: str) -> str:
-        """The path, relative to the root, that a file ``base`` means by ``reference``.
+        """Resolve a reference in the file ``base`` to a path relative to the root.
 
         Raises:
             AssetError: if it is a URL, absolute, or leaves the folder.

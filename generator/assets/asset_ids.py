@@ -1,7 +1,7 @@
 """Asset ids: ``family?key=value&key=value`` or a plain path such as ``pybullet/teddy``.
 
-Values are numbers, lists of numbers separated by commas, or words. The canonical form has its keys
-sorted and its numbers in their shortest form, so that equal assets have equal ids.
+Values are numbers, comma-separated lists of numbers, or words. The canonical form has sorted keys
+and numbers in their shortest form, so that equal assets have equal ids.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class AssetId:
     """A parsed asset id.
 
     Attributes:
-        name: What stands before ``?``.
-        parameters: What stands after it; empty for plain ids.
+        name: The part before ``?``.
+        parameters: The part after it; empty for plain ids.
     """
 
     name: str
@@ -46,7 +46,7 @@ class AssetId:
 
 
 def parse_asset_id(text: str) -> AssetId:
-    """The asset id that a text spells.
+    """Parse an asset id.
 
     Raises:
         AssetError: if it is malformed.
@@ -64,17 +64,17 @@ def parse_asset_id(text: str) -> AssetId:
             raise AssetError(f"asset '{text}': '{pair}' is not of the form key=value")
         if key in parameters:
             raise AssetError(f"asset '{text}': '{key}' is given twice")
-        parameters[key] = _value(text, key, value)
+        parameters[key] = _parse_value(text, key, value)
     return AssetId(name, parameters)
 
 
 def canonical_id(text: str) -> str:
-    """The canonical form of an asset id. Raises AssetError if it is malformed."""
+    """Canonical form of an asset id. Raises AssetError if it is malformed."""
     return str(parse_asset_id(text)) if "?" in text else text
 
 
 def format_parameter(value: ParameterValue) -> str:
-    """A parameter as an id spells it; numbers in the shortest form that reads back equal."""
+    """Format a parameter for an id; numbers in the shortest form that parses to the same value."""
     if isinstance(value, str):
         return value
     if isinstance(value, tuple):
@@ -84,12 +84,12 @@ def format_parameter(value: ParameterValue) -> str:
     return repr(value)
 
 
-def _value(text: str, key: str, value: str) -> ParameterValue:
+def _parse_value(text: str, key: str, value: str) -> ParameterValue:
     if "," in value:
-        items = [_number(item) for item in value.split(",")]
+        items = [_parse_number(item) for item in value.split(",")]
         if None not in items:
             return tuple(float(item) for item in items if item is not None)
-    elif (number := _number(value)) is not None:
+    elif (number := _parse_number(value)) is not None:
         return number
     elif _WORD.fullmatch(value):
         return value
@@ -98,7 +98,7 @@ def _value(text: str, key: str, value: str) -> ParameterValue:
     )
 
 
-def _number(text: str) -> float | int | None:
+def _parse_number(text: str) -> float | int | None:
     if _INTEGER.fullmatch(text):
         return int(text)
     if _NUMBER.fullmatch(text):

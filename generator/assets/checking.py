@@ -1,4 +1,4 @@
-"""Whether the assets of a user's folder can be used, and what they are taken for."""
+"""Checks of the assets in a user's folder: usability, size, unit and orientation."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from gen_data.generator.core.kinematics import link_poses
 from gen_data.generator.core.se3 import SE3, Vec3
 
 _SMALLEST_M, _LARGEST_M = 0.001, 20.0
-"""Longest edges beyond which the unit is doubtful."""
+"""Longest edges outside this range suggest a wrong unit."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One asset of a folder.
+    """Result of checking one asset.
 
     Attributes:
         category: Empty for images.
         triangles: 0 for images.
-        size_m: Edges of its bounding box, of a robot at home; None for images.
-        unit: How the file's numbers become metres; empty for images.
-        up: Axis of the file that points up; empty where the file says so itself.
-        error: Why it cannot be used; empty if it can.
-        warnings: What is doubtful.
+        size_m: Edges of its bounding box, for robots in the home position; None for images.
+        unit: Source of the scale to metres; empty for images.
+        up: Axis of the file that points up; empty if the file itself states it.
+        error: Reason why it cannot be used; empty if it can.
+        warnings: Doubtful properties.
     """
 
     asset_id: str
@@ -49,11 +49,11 @@ class Finding:
 
 
 def check_folder(root: Path, library: Library) -> Iterator[Finding]:
-    """Use every asset of a folder once.
+    """Import every asset of a folder and report on it.
 
     Args:
         root: A user's folder.
-        library: A library that has it among its folders.
+        library: A library that includes this folder.
 
     Raises:
         AssetError: if the folder cannot be read.
@@ -67,7 +67,7 @@ def check_folder(root: Path, library: Library) -> Iterator[Finding]:
 
 
 def _inspect(one: IndexedAsset, library: Library) -> Finding:
-    """What an asset is. Raises AssetError if it cannot be used."""
+    """Import an asset. Raises AssetError if it cannot be used."""
     origin = () if one.origin.licence not in ("", "unknown") else ("no licence is given",)
     if one.kind == "texture":
         library.texture(one.asset_id)
@@ -75,28 +75,33 @@ def _inspect(one: IndexedAsset, library: Library) -> Finding:
     if one.kind == "environment":
         library.environment(one.asset_id)
         return Finding(one.asset_id, one.kind, "", warnings=origin)
-    triangles, low, high = (_robot if one.kind == "robot" else _object)(one, library)
+    triangles, low, high = (_measure_robot if one.kind == "robot" else _measure_object)(
+        one, library
+    )
     size_m = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
+    warnings = (*_find_doubts(one, max(size_m)), *origin)
+    unit, up = _describe_unit(one), _describe_up(one)
     return Finding(
-        one.asset_id, one.kind, one.category(), triangles, size_m, _unit(one), _up(one),
-        warnings=(*_doubts(one, max(size_m)), *origin),
-    )  # fmt: skip
+        one.asset_id, one.kind, one.category(), triangles, size_m, unit, up, warnings=warnings
+    )
 
 
-def _object(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
-    """Number of triangles and bounding box of an object that can be seen and collide."""
+def _measure_object(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
+    """Number of triangles and bounding box of an object."""
     library.convex_parts(one.asset_id)
     return (len(library.mesh(one.asset_id).faces), *library.bounds_m(one.asset_id))
 
 
-def _robot(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
-    """Number of triangles and bounding box of a robot at home."""
+def _measure_robot(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
+    """Number of triangles and bounding box of a robot in its home position."""
     robot = library.robot(one.asset_id)
     poses = link_poses(robot, SE3(), robot.home)
     for asset_id in robot.collisions.values():
         library.convex_parts(asset_id)
     if not robot.visuals:
-        raise AssetError(f"asset '{one.asset_id}': no link shows anything; give one a <visual>")
+        raise AssetError(
+            f"asset '{one.asset_id}': no link has visual geometry; give one a <visual>"
+        )
     meshes = {link: library.mesh(asset_id) for link, asset_id in robot.visuals.items()}
     points = np.concatenate(
         [poses[k].apply(mesh.vertices_m.astype(np.float64)) for k, mesh in meshes.items()]
@@ -107,8 +112,8 @@ def _robot(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
     return triangles, (x, y, z), (far_x, far_y, far_z)
 
 
-def _unit(one: IndexedAsset) -> str:
-    """How an entry says that numbers become metres."""
+def _describe_unit(one: IndexedAsset) -> str:
+    """Source of an entry's scale to metres."""
     entry = one.entry
     if not isinstance(entry, MeshEntry):
         return "m"
@@ -119,8 +124,8 @@ def _unit(one: IndexedAsset) -> str:
     return entry.unit or "m (assumed)"
 
 
-def _up(one: IndexedAsset) -> str:
-    """Axis that an entry, or a convention of the format, says to be up."""
+def _describe_up(one: IndexedAsset) -> str:
+    """Up axis by the entry or by the format's convention."""
     entry = one.entry
     if not isinstance(entry, MeshEntry):
         return "z"
@@ -129,11 +134,11 @@ def _up(one: IndexedAsset) -> str:
     return entry.up or f"{entry.up_axis()} (assumed)"
 
 
-def _doubts(one: IndexedAsset, longest_m: float) -> Iterator[str]:
-    """Signs of a wrong unit."""
+def _find_doubts(one: IndexedAsset, longest_m: float) -> Iterator[str]:
+    """Yield warnings about a possibly wrong unit."""
     if not isinstance(one.entry, MeshEntry) or one.entry.file.lower().endswith(".xodr"):
         return
-    if longest_m > _LARGEST_M and _unit(one) == "m (assumed)":
+    if longest_m > _LARGEST_M and _describe_unit(one) == "m (assumed)":
         options = (f"{u} ({METRES_PER_UNIT[u] * longest_m:.4g} m)" for u in ("mm", "cm", "in"))
         yield f"{longest_m:.4g} m long; its unit may be {', '.join(options)}"
     elif longest_m < _SMALLEST_M:

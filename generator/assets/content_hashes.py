@@ -1,29 +1,44 @@
-"""Content hashes of assets' files, remembered until a file may have changed."""
+"""The files that assets consist of, and their content hashes.
+
+Hashes are cached until a file may have changed.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import json
+import re
 import time
+from collections.abc import Iterator
 from hashlib import sha256
 from os import stat_result
+from pathlib import PurePosixPath
 from typing import Any
+from urllib.parse import unquote
 
 from gen_data.generator.assets.asset_cache import DiskCache
 from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.file_references import references_of
+from gen_data.generator.assets.urdf import read_urdf
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.usd.stage_reader import SUFFIXES, layer_references
 
 _NAME = "digests.json"
 _MISSING = ""
 _TICK_NS = 2_000_000_000
-"""No file system's clock is coarser (FAT's counts two seconds)."""
+"""Coarsest resolution of a file system's time stamps (FAT: two seconds)."""
+# Each matches the rest of its line as a whole: splitting it in the pattern takes quadratic time.
+_MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
+_MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]([^\n]*)", re.MULTILINE)
+_MAX_FILES = 2000
 
 
 class ContentHashes:
-    """``{file: sha256}`` of everything that an asset consists of.
+    """``{file: sha256}`` of all files of an asset.
 
-    A digest is trusted while the file's inode, size, modification and change times are those that
-    it had when it was hashed. Programs can set the modification time, so the change time counts,
-    which they cannot. A file that was changed within a tick of the clock before it was hashed may
-    have changed once more in that tick: it is hashed again.
+    A digest stays valid while the file's device, inode, size, modification and change times are
+    those recorded with it. The change time is included because programs can set the modification
+    time but not the change time. A file that changed less than one clock tick before it was hashed
+    may change again within that tick without a new time stamp, so it is always hashed again.
     """
 
     def __init__(self, cache: DiskCache) -> None:
@@ -44,22 +59,25 @@ class ContentHashes:
         if not (isinstance(rows, list) and rows and all(_is_current(folder, r) for r in rows)):
             rows = [
                 _hash(folder, file) if exists else [file, [], _MISSING]
-                for file, exists in references_of(folder, relative).items()
+                for file, exists in find_references(folder, relative).items()
             ]
             self._known[name] = rows
             self._changed = True
         return {file: digest for file, _, digest in rows if digest != _MISSING}
 
     def save(self) -> None:
-        """Write down what was learnt, if anything."""
+        """Store new digests on disk, if there are any."""
         if self._changed and self._known is not None:
-            # Other processes may have learnt something else meanwhile.
+            # Merge: other processes may have stored digests meanwhile.
             self._cache.store_json(_NAME, {**self._cache.load_json(_NAME), **self._known})
             self._changed = False
 
 
 def _hash(folder: Folder, file: str) -> list[Any]:
-    """Name, state and digest of a file. The state is read first: changes later than that count."""
+    """Name, state and digest of a file.
+
+    The state is read before the content, so that a later change invalidates the digest.
+    """
     state, now_ns = _state(folder.path(file).stat()), _now_ns()
     if max(state[3:]) > now_ns - _TICK_NS:
         state = []
@@ -67,7 +85,7 @@ def _hash(folder: Folder, file: str) -> list[Any]:
 
 
 def _is_current(folder: Folder, row: Any) -> bool:
-    """Whether a row's digest is still that of its file."""
+    """Whether a row's digest is still valid."""
     try:
         file, state, digest = row
         if digest == _MISSING:
@@ -89,5 +107,70 @@ def _state(status: stat_result) -> list[int]:
 
 
 def _now_ns() -> int:
-    """Time [ns] by the clock that files' times are taken from."""
+    """Current time [ns] of the clock that file time stamps use."""
     return time.time_ns()
+
+
+def find_referenced_files(folder: Folder, relative: str) -> tuple[str, ...]:
+    """Find a file and all existing files it refers to, directly or not, sorted by name.
+
+    Raises:
+        AssetError: if the file itself is missing, or an unreadable URDF.
+    """
+    return tuple(name for name, exists in find_references(folder, relative).items() if exists)
+
+
+def find_references(folder: Folder, relative: str) -> dict[str, bool]:
+    """Find a file and everything it refers to: ``{name: whether it exists}``, sorted by name.
+
+    Raises:
+        AssetError: if the file itself is missing, or an unreadable URDF.
+    """
+    found: dict[str, bool] = {}
+    pending = [relative]
+    while pending:
+        name = pending.pop()
+        if name in found:
+            continue
+        found[name] = name == relative or folder.exists(name)
+        if not found[name]:
+            continue
+        if len(found) > _MAX_FILES:
+            raise AssetError(
+                f"{folder.root / relative}: refers to more than {_MAX_FILES} files; split it"
+            )
+        for reference in _references(folder, name):
+            # References that leave the folder are skipped here; the reader refuses those it needs.
+            with contextlib.suppress(AssetError):
+                pending.append(folder.refer(name, reference))
+    return dict(sorted(found.items()))
+
+
+def _references(folder: Folder, name: str) -> Iterator[str]:
+    suffix = PurePosixPath(name).suffix.lower()
+    if suffix == ".urdf":
+        depth = len(PurePosixPath(name).parent.parts)
+        yield from ("../" * depth + file for file in read_urdf(folder, name).files())
+    elif suffix in (".obj", ".mtl"):
+        data = folder.read(name)
+        if suffix == ".obj":
+            references = [rest.strip() for rest in _MTLLIB.findall(data)]
+        else:
+            # Options precede the file's name.
+            references = [rest.split()[-1] for rest in _MAP.findall(data) if rest.strip()]
+        yield from (reference.decode("utf-8", errors="replace") for reference in references)
+    elif suffix == ".gltf":
+        yield from (unquote(uri) for uri in _uris(folder.read(name)))
+    elif suffix in SUFFIXES:
+        yield from layer_references(folder.path(name))
+
+
+def _uris(data: bytes) -> list[str]:
+    """URIs of files in a glTF document; none if it is malformed, which its reader reports."""
+    try:
+        tree = json.loads(data)
+        items = [*tree.get("buffers", []), *tree.get("images", [])]
+        uris = [item["uri"] for item in items if "uri" in item]
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        return []
+    return [uri for uri in uris if isinstance(uri, str) and not uri.startswith("data:")]

@@ -1,9 +1,9 @@
 """Collision geometry: bounded unions of small convex hulls.
 
-A solid that its hull describes badly is cut in two by the axis-aligned plane that saves the most
-volume, again and again, until the pieces are convex enough or the bound is reached: the greedy
-core of approximate convex decomposition (Lien and Amato, "Approximate convex decomposition of
-polyhedra", SPM 2007), in which cutting the surface is enough, because a clipped surface and the
+A solid that differs much from its hull is cut repeatedly by the axis-aligned plane that reduces the
+hulls' volume most, until the pieces are nearly convex or their number reaches the bound. This is
+the greedy core of approximate convex decomposition (Lien and Amato, "Approximate convex
+decomposition of polyhedra", SPM 2007). Only the surface is cut, because a clipped surface and the
 clipped solid have the same hull.
 """
 
@@ -14,30 +14,29 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.dedup import first_occurrences
-from gen_data.generator.assets.triangle_soup import Float64, TriangleSoup
+from gen_data.generator.assets.triangle_soup import Float64, TriangleSoup, first_occurrences
 from gen_data.generator.core.asset_types import ConvexParts
 from gen_data.generator.core.errors import AssetError
 
 MAX_PARTS = 24
 MAX_VERTICES = 64
 _CUTS = (0.25, 0.5, 0.75)
-_ENOUGH = 0.02
-"""A cut must save this share of the first hull's volume."""
-_DEEP = 0.15
-"""A pocket is deeper than this share of the extent."""
+_MIN_SAVING = 0.02
+"""Smallest saving of a cut, as a share of the whole hull's volume."""
+_MIN_POCKET_DEPTH = 0.15
+"""Smallest depth of a pocket, as a share of the extent."""
 _MIN_THICKNESS = 0.02
-"""Flat parts are given this share of their largest extent as thickness."""
-_SCOUTS = 256
-"""While a cut is chosen, hulls are taken of about this many points."""
-_CROWD = 4096
-"""Of more points than this, only the extreme ones are looked at: qhull crawls on round shapes."""
+"""Thickness given to flat parts, as a share of their largest extent."""
+_SAMPLE_DIRECTIONS = 256
+"""Upper bound on the points of the approximate hulls that rank cuts."""
+_MANY_POINTS = 4096
+"""Above this number only extreme points are used: qhull is slow on round shapes."""
 
 
 def convex_parts(soup: TriangleSoup, place: str, max_parts: int = MAX_PARTS) -> ConvexParts:
-    """Collision parts of triangles: one hull for each group if the file has several.
+    """Collision parts of a soup: one hull per group if there are several.
 
-    A single group is cut into up to ``max_parts`` parts if that follows its surface much better.
+    A single group is cut into up to ``max_parts`` parts where that fits its surface much better.
 
     Raises:
         AssetError: if no hull can be made.
@@ -51,30 +50,30 @@ def convex_parts(soup: TriangleSoup, place: str, max_parts: int = MAX_PARTS) -> 
 
 
 def single_hull(soup: TriangleSoup, place: str) -> ConvexParts:
-    """The convex hull of everything. Raises AssetError if there is none."""
+    """Convex hull of the whole soup. Raises AssetError if it has no volume."""
     return ConvexParts((hull_vertices(soup.corners.reshape(-1, 3), place),))
 
 
 def hull_vertices(points: Float64, place: str, max_vertices: int = MAX_VERTICES) -> Float64:
     """Vertices [n, 3] of the convex hull of points, at most ``max_vertices``.
 
-    Larger hulls start from their extreme points along the axes and grow by the point that lies
-    farthest outside, as in quickhull, which keeps the error small for the number.
+    Larger hulls start from their extreme points along the axes and diagonals and grow by the point
+    that lies farthest outside, as in quickhull; this keeps the error small for the number.
 
     Raises:
         AssetError: if the points lie on a line or are too few.
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    points = _solid(_distinct(points))
-    if len(points) > _CROWD:
-        points = points[sorted({*_scouts(points), *_extremes(points)})]
+    points = _thicken_if_flat(_drop_duplicates(points))
+    if len(points) > _MANY_POINTS:
+        points = points[sorted({*_extreme_indices(points), *_corner_indices(points)})]
     try:
         hull = ConvexHull(points)
         points = points[np.sort(hull.vertices, kind="stable")]
         if len(points) <= max_vertices:
             return points
-        chosen = _extremes(points)
+        chosen = _corner_indices(points)
         growing = ConvexHull(points[chosen], incremental=True)
         while len(chosen) < max_vertices:
             normals, offsets = growing.equations[:, :3], growing.equations[:, 3]
@@ -93,23 +92,23 @@ def hull_vertices(points: Float64, place: str, max_vertices: int = MAX_VERTICES)
 
 
 def decompose(soup: TriangleSoup, max_parts: int) -> list[Float64]:
-    """Triangles of a soup in pieces that are nearly convex, each [m, 3, 3]."""
+    """Cut a soup into at most ``max_parts`` nearly convex pieces, each [m, 3, 3]."""
     pieces = [_Piece.of(soup.corners)]
-    enough = _ENOUGH * pieces[0].volume
-    cuts = [_first_cut(pieces[0], enough)]
+    enough = _MIN_SAVING * pieces[0].volume
+    cuts = [_find_first_cut(pieces[0], enough)]
     for _ in range(max_parts - 1):
         best = int(np.argmax([cut.saving for cut in cuts]))
         if cuts[best].saving <= enough:
             break
         halves = cuts[best].halves
         pieces[best : best + 1] = halves
-        cuts[best : best + 1] = [_best_cut(half) for half in halves]
+        cuts[best : best + 1] = [_find_best_cut(half) for half in halves]
     return [piece.corners for piece in pieces]
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """Part of a surface, and the volume of its hull."""
+    """Part of a surface [m, 3, 3], and the volume of its hull."""
 
     corners: Float64
     volume: float
@@ -121,38 +120,38 @@ class _Piece:
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """Two halves of a piece, and how much less volume their hulls have than the piece's."""
+    """Halves of a piece, and the volume by which their hulls are smaller than the piece's."""
 
     halves: tuple[_Piece, ...] = ()
     saving: float = 0.0
 
 
-def _first_cut(piece: _Piece, enough: float) -> _Cut:
-    """The cut that saves most, by itself or together with the cut after it.
+def _find_first_cut(piece: _Piece, enough: float) -> _Cut:
+    """The cut that saves most, alone or together with the next one.
 
-    Half a bowl is as full as the whole one; a quarter is not.
+    Halving a bowl does not fit it better; quartering does. Hence the look-ahead by one cut.
     """
-    cut = _best_cut(piece)
+    cut = _find_best_cut(piece)
     if cut.saving > enough or not _has_pocket(piece):
         return cut
     for axis in range(3):
         halving = _cut_at(piece, axis, 0.5)
-        saving = halving.saving + sum(_best_cut(half).saving for half in halving.halves)
+        saving = halving.saving + sum(_find_best_cut(half).saving for half in halving.halves)
         if saving > cut.saving:
             cut = _Cut(halving.halves, saving)
     return cut
 
 
-def _best_cut(piece: _Piece) -> _Cut:
+def _find_best_cut(piece: _Piece) -> _Cut:
     cuts = [_cut_at(piece, axis, share) for axis in range(3) for share in _CUTS]
     return cuts[int(np.argmax([cut.saving for cut in cuts]))]
 
 
 def _cut_at(piece: _Piece, axis: int, share: float) -> _Cut:
-    """The cut at a share of the extent along an axis; an empty one if a side has nothing."""
+    """Cut at a share of the extent along an axis; an empty cut if one side is empty."""
     low, high = piece.corners[..., axis].min(), piece.corners[..., axis].max()
     at = low + share * (high - low)
-    clipped = [_clipped(piece.corners, axis, at, side) for side in (1.0, -1.0)]
+    clipped = [_clip_triangles(piece.corners, axis, at, side) for side in (1.0, -1.0)]
     if not all(len(half) for half in clipped):
         return _Cut()
     halves = tuple(_Piece.of(half) for half in clipped)
@@ -160,7 +159,7 @@ def _cut_at(piece: _Piece, axis: int, share: float) -> _Cut:
 
 
 def _has_pocket(piece: _Piece) -> bool:
-    """Whether one must go far from some triangle, straight away from it, to leave the hull."""
+    """Whether some triangle lies deep inside the hull, measured along its normal."""
     hull = _hull(piece.corners.reshape(-1, 3))
     if hull is None:
         return False
@@ -173,19 +172,21 @@ def _has_pocket(piece: _Piece) -> bool:
     facing = np.einsum("ij,kj->ik", outward, hull.equations[:, :3], optimize=False)
     depth = -np.einsum("ij,kj->ik", centres, hull.equations[:, :3], optimize=False)
     depth = np.maximum(depth - hull.equations[:, 3], 0.0)
-    ways_out = np.where(facing > 1e-6, depth / np.maximum(facing, 1e-6), np.inf).min(axis=1)
+    exits = np.where(facing > 1e-6, depth / np.maximum(facing, 1e-6), np.inf).min(axis=1)
     points = piece.corners.reshape(-1, 3)
-    return float(ways_out.max()) > _DEEP * float((points.max(axis=0) - points.min(axis=0)).max())
+    return float(exits.max()) > _MIN_POCKET_DEPTH * float(
+        (points.max(axis=0) - points.min(axis=0)).max()
+    )
 
 
-def _clipped(corners: Float64, axis: int, at: float, side: float) -> Float64:
-    """The part of triangles with ``side * (coordinate - at) >= 0``."""
+def _clip_triangles(corners: Float64, axis: int, at: float, side: float) -> Float64:
+    """Part of the triangles with ``side * (coordinate - at) >= 0``."""
     height = side * (corners[..., axis] - at)
     above = height >= 0.0
     whole = corners[above.all(axis=1)]
     split = above.any(axis=1) & ~above.all(axis=1)
     corners, height, above = corners[split], height[split], above[split]
-    # Turned so that the corner that is alone on its side comes first.
+    # Rotate each triangle so that the corner that is alone on its side comes first.
     alone = np.where(above.sum(axis=1) == 1, np.argmax(above, axis=1), np.argmin(above, axis=1))
     turn = (alone[:, None] + np.arange(3)) % 3
     corners = np.take_along_axis(corners, turn[..., None], axis=1)
@@ -205,26 +206,29 @@ def _hull_volume(points: Float64) -> float:
 
 
 def _hull(points: Float64) -> Any:
-    """Hull of the most extreme points; None if they are flat."""
+    """Hull of the most extreme points; None if they are coplanar."""
     from scipy.spatial import ConvexHull, QhullError
 
-    points = _distinct(points)
-    if len(points) > _SCOUTS:
-        points = points[_scouts(points)]
+    points = _drop_duplicates(points)
+    if len(points) > _SAMPLE_DIRECTIONS:
+        points = points[_extreme_indices(points)]
     try:
         return ConvexHull(points) if len(points) > 3 else None
     except QhullError:
         return None
 
 
-def _distinct(points: Float64) -> Float64:
+def _drop_duplicates(points: Float64) -> Float64:
     extent = float((points.max(axis=0) - points.min(axis=0)).max())
     _, first = first_occurrences(np.rint(points / max(extent * 1e-6, 1e-12)).astype(np.int64))
     return points[first]
 
 
 def _directions(count: int) -> Float64:
-    """Unit vectors spread evenly over the sphere (Vogel's spiral), on a decimal grid."""
+    """Unit vectors spread evenly over the sphere (Vogel's spiral).
+
+    Rounded, because the last bits of sine and cosine differ between C libraries.
+    """
     k = np.arange(count) + 0.5
     z = 1.0 - 2.0 * k / count
     radius = np.sqrt(1.0 - z * z)
@@ -232,21 +236,21 @@ def _directions(count: int) -> Float64:
     return np.round(np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1), 9)
 
 
-def _scouts(points: Float64) -> list[int]:
-    """Numbers of the points that are extreme in some of many directions."""
-    heights = np.einsum("ij,kj->ik", points, _directions(_SCOUTS), optimize=False)
+def _extreme_indices(points: Float64) -> list[int]:
+    """Indices of the points that are extreme in any of many directions."""
+    heights = np.einsum("ij,kj->ik", points, _directions(_SAMPLE_DIRECTIONS), optimize=False)
     return sorted({int(k) for k in np.argmax(heights, axis=0)})
 
 
-def _extremes(points: Float64) -> list[int]:
-    """Numbers of points that span a volume: extreme along the axes and the diagonals."""
+def _corner_indices(points: Float64) -> list[int]:
+    """Indices of points that span a volume: extreme along the axes and diagonals."""
     signs = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)]
     heights = np.einsum("ij,kj->ik", points, np.array(signs, dtype=np.float64), optimize=False)
     return sorted({int(k) for k in np.argmax(heights, axis=0)})
 
 
-def _solid(points: Float64) -> Float64:
-    """Points as they are; flat ones doubled to both sides of their plane."""
+def _thicken_if_flat(points: Float64) -> Float64:
+    """Duplicate coplanar points to both sides of their plane; return others unchanged."""
     centred = points - points.mean(axis=0)
     covariance = np.einsum("ni,nj->ij", centred, centred, optimize=False)
     values, vectors = np.linalg.eigh(covariance)

@@ -1,4 +1,4 @@
-"""The files of a user's folder: a bounded walk, and the names that follow from paths."""
+"""Files of a user's folder, and the asset ids and categories that follow from their paths."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from pathlib import Path, PurePosixPath
 from gen_data.generator.core.errors import AssetError
 
 MAX_ENTRIES = 100_000
-"""Files and folders that are looked at; more are not a folder of assets but a whole disk."""
+"""Bound on files and folders visited; more suggest a whole disk instead of an asset folder."""
 
 
-def files_below(root: Path) -> tuple[str, ...]:
-    """All files in a folder and the folders below it, relative to it, sorted part by part.
+def list_files(root: Path) -> tuple[str, ...]:
+    """List all files below a folder, relative to it, sorted part by part.
 
-    Folders and files whose names begin with a dot, and links to folders, are passed over.
+    Hidden files and folders (leading dot) and links to folders are skipped.
 
     Raises:
         AssetError: if a folder cannot be read, or there are more than ``MAX_ENTRIES`` entries.
     """
     found: list[PurePosixPath] = []
     visited = 0
-    for folder, names, files in os.walk(root, onerror=_refuse):
+    for folder, names, files in os.walk(root, onerror=_raise_unreadable):
         names[:] = [name for name in names if not name.startswith(".")]
         visited += len(names) + len(files)
         if visited > MAX_ENTRIES:
@@ -36,29 +36,31 @@ def files_below(root: Path) -> tuple[str, ...]:
 
 
 def is_pattern(file: str) -> bool:
-    """Whether a path stands for all files that match it."""
+    """Whether a path contains wildcards."""
     return any(character in file for character in "*?[")
 
 
-def matching(pattern: str, files: tuple[str, ...]) -> tuple[str, ...]:
-    """Files that match a pattern, part by part; ``**`` stands for any number of folders."""
+def match_files(pattern: str, files: tuple[str, ...]) -> tuple[str, ...]:
+    """Select files that match a pattern part by part; ``**`` matches any number of folders."""
     parts = PurePosixPath(pattern).parts
     return tuple(file for file in files if _matches(PurePosixPath(file).parts, parts))
 
 
-def id_of(file: str) -> str:
-    """The asset id that a path without its suffix makes."""
+def asset_id_from_path(file: str) -> str:
+    """Asset id of a file: its path without suffix, in permitted characters."""
     path = PurePosixPath(file)
-    return "/".join(word_of(part).lstrip("-") or "_" for part in (*path.parent.parts, path.stem))
+    return "/".join(
+        sanitize_word(part).lstrip("-") or "_" for part in (*path.parent.parts, path.stem)
+    )
 
 
-def category_of(root: Path, file: str) -> str:
-    """The name of the folder that holds a file."""
+def category_from_path(root: Path, file: str) -> str:
+    """Name of the folder that holds a file."""
     return PurePosixPath(file).parent.name or root.resolve().name
 
 
-def word_of(text: str) -> str:
-    """A text with everything replaced by ``_`` that a tag may not hold."""
+def sanitize_word(text: str) -> str:
+    """Replace all characters that a tag may not hold by ``_``."""
     return "".join(c if c.isascii() and (c.isalnum() or c in "_-") else "_" for c in text) or "_"
 
 
@@ -70,8 +72,7 @@ def _matches(parts: tuple[str, ...], patterns: tuple[str, ...]) -> bool:
     return bool(parts) and fnmatchcase(parts[0], patterns[0]) and _matches(parts[1:], patterns[1:])
 
 
-def _refuse(error: OSError) -> None:
+def _raise_unreadable(error: OSError) -> None:
     raise AssetError(
-        f"{error.filename}: {error.strerror}; a folder of assets must be readable with all that "
-        "is in it"
+        f"{error.filename}: {error.strerror}; all folders inside an asset folder must be readable"
     ) from None

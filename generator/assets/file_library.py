@@ -1,4 +1,4 @@
-"""Assets that lie in files: pybullet's, those of installed packs, and the user's."""
+"""Assets from files: pybullet's, those of installed packs, and the user's."""
 
 from __future__ import annotations
 
@@ -29,9 +29,15 @@ from gen_data.generator.assets.folder_index import (
     user_folder,
 )
 from gen_data.generator.assets.image_decoding import decode_image, decode_radiance
-from gen_data.generator.assets.importer import VERSION, ImportedMesh, import_link, import_object
+from gen_data.generator.assets.importer import (
+    VERSION,
+    ImportedMesh,
+    import_link,
+    import_object,
+    import_road_network,
+    road_network_lanes,
+)
 from gen_data.generator.assets.installed_packs import pack_assets
-from gen_data.generator.assets.opendrive_files import import_road_network, road_network_lanes
 from gen_data.generator.assets.robot_models import robot_model
 from gen_data.generator.assets.texture_maps import compose_texture, find_maps
 from gen_data.generator.assets.urdf import Urdf, read_urdf
@@ -53,7 +59,7 @@ T = TypeVar("T", bound=np.generic)
 
 
 class FileLibrary:
-    """The part of the library that is read from folders.
+    """Part of the library that is read from folders.
 
     Ids are those of the indices; ``<robot>/<link>`` is a robot's link, ``<stage>/<piece>`` a
     stage's mesh, and ``<asset>#<image>`` an image that an asset's materials refer to.
@@ -73,7 +79,7 @@ class FileLibrary:
         self._keys: dict[str, str] = {}
 
     def names(self) -> Iterator[str]:
-        """Every id."""
+        """Yield every asset id."""
         yield from self._entries()
 
     def user_counts(self) -> Counter[str]:
@@ -81,18 +87,18 @@ class FileLibrary:
         return Counter(one.kind for one in self._entries().values() if one.root in self._user_roots)
 
     def __contains__(self, asset_id: str) -> bool:
-        """Whether an asset, a robot's link or a stage's piece has that id."""
+        """Whether the id names an asset, a robot's link or a stage's piece."""
         return asset_id in self._entries() or self._part(asset_id) is not None
 
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
-        """All assets of a kind that carry every tag."""
+        """Yield all assets of a kind that have every tag."""
         for one in self._entries().values():
             if one.kind == kind and tags.issubset(one.tags()):
                 yield self._asset(one)
         self._digests.save()
 
     def get(self, asset_id: str) -> Asset:
-        """The asset, or a robot's link or a stage's piece as an object of its own."""
+        """Description of an asset; robot links and stage pieces count as objects."""
         part = self._part(asset_id)
         if part is None:
             asset = self._asset(self._entries()[asset_id])
@@ -103,7 +109,7 @@ class FileLibrary:
         return asset
 
     def imported(self, asset_id: str) -> ImportedMesh:
-        """Geometry of an object, of a robot's link or of a stage's piece."""
+        """Geometry of an object, a robot's link or a stage's piece."""
         part = self._part(asset_id)
         one = part[0] if part else self._entries()[asset_id]
         entry, folder = one.entry, Folder(one.root)
@@ -117,7 +123,7 @@ class FileLibrary:
             elif isinstance(entry, MeshEntry):
                 made = import_object(folder, entry, one.asset_id, name)
             else:
-                raise AssetError(f"asset '{asset_id}': is no object but one of kind {one.kind}")
+                raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an object")
             self._check_unchanged(one, folder)
             return pack_imported(made)
 
@@ -141,15 +147,15 @@ class FileLibrary:
         """Kinematics of a robot."""
         one = self._entries()[asset_id]
         if not isinstance(one.entry, RobotEntry):
-            raise AssetError(f"asset '{asset_id}': is no robot but one of kind {one.kind}")
+            raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not a robot")
         return robot_model(asset_id, self._urdf(one), one.entry, str(one.root / one.entry.file))
 
     def stage(self, asset_id: str) -> StageModel:
-        """What a stage holds."""
+        """Pieces, lights and cameras of a stage."""
         one = self._entries()[asset_id]
         entry = one.entry
         if not isinstance(entry, MeshEntry) or not is_stage(entry):
-            raise AssetError(f"asset '{asset_id}': is no stage; give a .usd, .usda, .usdc or .usdz")
+            raise AssetError(f"asset '{asset_id}': not a stage; give a .usd, .usda, .usdc or .usdz")
         if asset_id not in self._stages:
             folder = Folder(one.root)
             self._stages[asset_id] = stage_model(folder, entry, asset_id)
@@ -157,14 +163,14 @@ class FileLibrary:
         return self._stages[asset_id]
 
     def texture(self, texture_id: str) -> TextureData:
-        """Images of a listed texture, or of a mesh's material (``<asset>#<image>``)."""
+        """Images of a texture entry, or of a mesh's material (``<asset>#<image>``)."""
         owner, _, name = texture_id.partition("#")
         part = self._part(owner)
         one = part[0] if part else self._entries()[owner]
         folder = Folder(one.root)
         if not name:
             if not isinstance(one.entry, TextureEntry):
-                raise AssetError(f"asset '{owner}': is no texture but one of kind {one.kind}")
+                raise AssetError(f"asset '{owner}': is of kind {one.kind}, not a texture")
             name = one.entry.texture_name()
         maps = find_maps(name)
         if maps is not None:
@@ -177,11 +183,11 @@ class FileLibrary:
     def _image(
         self, owner: str, one: IndexedAsset, folder: Folder, name: str, *, alpha: bool
     ) -> UInt8:
-        """Pixels of an image inside a mesh file or beside it."""
+        """Pixels of an image, embedded in a mesh file or beside it."""
         if one.kind == "object" and name in (images := self.imported(owner).images):
             return images[name]
         place = str(folder.root / name)
-        return self._of_file(
+        return self._decode_cached(
             folder, name, place, "rgba" if alpha else "albedo",
             lambda: decode_image(folder.read(name), place, alpha=alpha),
         )  # fmt: skip
@@ -190,19 +196,19 @@ class FileLibrary:
         """Pixels of a panorama."""
         one = self._entries()[asset_id]
         if one.kind != "environment":
-            raise AssetError(f"asset '{asset_id}': is no environment but one of kind {one.kind}")
+            raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an environment")
         folder, name = Folder(one.root), one.entry.file
         place = str(folder.root / name)
-        return self._of_file(
+        return self._decode_cached(
             folder, name, place, "radiance", lambda: decode_radiance(folder.read(name), place)
         )  # fmt: skip
 
-    def _of_file(
+    def _decode_cached(
         self, folder: Folder, name: str, place: str, what: str, compute: Callable[[], NDArray[T]]
     ) -> NDArray[T]:
-        """What an image file says, in the store under the hash of its bytes."""
+        """Decode an image file, or take it from the store by the hash of its bytes."""
         if not folder.exists(name):
-            raise AssetError(f"{place}: no such image; put it there or correct what refers to it")
+            raise AssetError(f"{place}: no such image; add it or correct the reference to it")
         digests = self._digests.of(folder, name)
         key: dict[str, object] = {"format": FORMAT, "image": digests[name]}
         if what == "rgba":
@@ -214,17 +220,17 @@ class FileLibrary:
     def _entries(self) -> dict[str, IndexedAsset]:
         if self._listed is None:
             self._listed = {}
-            for one in _everything(self._packs, self._user_roots):
+            for one in _list_everything(self._packs, self._user_roots):
                 if one.asset_id in self._listed:
                     raise AssetError(
-                        f"asset '{one.asset_id}': both {self._listed[one.asset_id].root} and "
-                        f"{one.root} have it; rename one of them"
+                        f"asset '{one.asset_id}': defined in {self._listed[one.asset_id].root} and "
+                        f"in {one.root}; rename one of them"
                     )
                 self._listed[one.asset_id] = one
         return self._listed
 
     def _part(self, asset_id: str) -> tuple[IndexedAsset, str] | None:
-        """Robot and link of an id ``<robot>/<link>``, stage and piece of ``<stage>/<piece>``."""
+        """Split ``<robot>/<link>`` and ``<stage>/<piece>``; None for other ids."""
         whole, slash, part = asset_id.rpartition("/")
         one = self._entries().get(whole) if slash else None
         if one is None or asset_id in self._entries():
@@ -242,6 +248,8 @@ class FileLibrary:
 
     def _asset(self, one: IndexedAsset) -> Asset:
         entry = one.entry
+        # Robots and images have the default values of a mesh entry's own fields.
+        mesh = entry if isinstance(entry, MeshEntry) else MeshEntry(file="-")
         return Asset(
             asset_id=one.asset_id,
             kind=one.kind,
@@ -251,17 +259,15 @@ class FileLibrary:
             author=one.origin.author,
             source=one.origin.source,
             sha256=self._key(one),
-            mass_kg=entry.mass_kg if isinstance(entry, MeshEntry) else 0.0,
-            stackable=isinstance(entry, MeshEntry) and entry.stackable,
-            subcategory=entry.subcategory if isinstance(entry, MeshEntry) else "",
-            attributes=tuple(sorted(entry.attributes.items()))
-            if isinstance(entry, MeshEntry)
-            else (),
-            symmetries=_symmetries(entry),
+            mass_kg=mesh.mass_kg,
+            stackable=mesh.stackable,
+            subcategory=mesh.subcategory,
+            attributes=tuple(sorted(mesh.attributes.items())),
+            symmetries=_convert_symmetries(mesh),
         )
 
     def _key(self, one: IndexedAsset) -> str:
-        """Hash of the files and of everything that the import does with them."""
+        """Hash of the files and of all parameters of their import."""
         if one.asset_id not in self._keys:
             self._keys[one.asset_id] = content_key(
                 {
@@ -277,7 +283,7 @@ class FileLibrary:
         return self._keys[one.asset_id]
 
     def _files(self, one: IndexedAsset) -> dict[str, str]:
-        """Digests of an asset's files as they were when it was first asked for."""
+        """Digests of an asset's files at its first use."""
         if one.asset_id not in self._hashed:
             folder = Folder(one.root)
             self._hashed[one.asset_id] = {
@@ -288,16 +294,16 @@ class FileLibrary:
         return self._hashed[one.asset_id]
 
     def _check_unchanged(self, one: IndexedAsset, folder: Folder) -> None:
-        """What was parsed is what was hashed."""
+        """Raise AssetError if a file that was parsed differs from the file that was hashed."""
         known = self._files(one)
         for name, digest in folder.digests.items():
             if known.get(name, digest) != digest:
                 raise AssetError(f"{folder.root / name}: changed while it was read; start again")
 
 
-def _symmetries(entry: Entry) -> tuple[Symmetry, ...]:
+def _convert_symmetries(entry: MeshEntry) -> tuple[Symmetry, ...]:
     found = []
-    for symmetry in entry.symmetries if isinstance(entry, MeshEntry) else ():
+    for symmetry in entry.symmetries:
         x, y, z = symmetry.direction()
         length = math.sqrt(x * x + y * y + z * z)
         axis = (x / length, y / length, z / length)
@@ -309,7 +315,7 @@ def _is_road_network(entry: Entry) -> bool:
     return isinstance(entry, MeshEntry) and entry.file.lower().endswith(ROAD_SUFFIX)
 
 
-def _everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:
+def _list_everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:
     yield from list_assets(read_index(_BUILT_IN), _pybullet_data())
     yield from pack_assets(packs)
     for root in user_roots:
@@ -317,7 +323,7 @@ def _everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsse
 
 
 def _pybullet_data() -> Path:
-    """Where pybullet's data lies; found without importing it."""
+    """Folder of pybullet's data, found without importing it."""
     spec = importlib.util.find_spec("pybullet_data")
     if spec is None or spec.origin is None:
         raise AssetError("pybullet_data: not installed; pip install pybullet")

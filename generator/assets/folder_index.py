@@ -1,8 +1,8 @@
-"""``assets.yaml``: what the files of a folder are, and how they come to the normal form.
+"""``assets.yaml``: index of the assets in a folder, with the parameters of their import.
 
-The same document describes a user's folder and what pybullet installs (``pybullet.yaml``). A folder
-without one offers every mesh, URDF file and panorama in it, named and categorised by file and
-folder.
+The same format describes a user's folder and the files of pybullet (``pybullet.yaml``). Without an
+index, every mesh, URDF file and panorama of a folder is an asset, named by its path and categorised
+by its folder.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.discovery import (
-    category_of,
-    files_below,
-    id_of,
+    asset_id_from_path,
+    category_from_path,
     is_pattern,
-    matching,
-    word_of,
+    list_files,
+    match_files,
+    sanitize_word,
 )
 from gen_data.generator.assets.readers import MESH_SUFFIXES
 from gen_data.generator.assets.texture_maps import TextureMaps as Maps
@@ -36,10 +36,10 @@ from gen_data.generator.core.se3 import Vec3
 
 INDEX_NAME = "assets.yaml"
 ROAD_SUFFIX = ".xodr"
-"""Road networks: objects whose mesh is the surface of the roads."""
+"""Suffix of road networks: objects whose mesh is the road surface."""
 PANORAMA_SUFFIXES = frozenset({".hdr", ".exr"})
 USER_TAG = "user"
-"""Every asset of a user's folder carries it."""
+"""Tag of every asset of a user's folder."""
 METRES_PER_UNIT = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 
 Length = Annotated[float, Field(gt=0.0)]
@@ -53,14 +53,14 @@ Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_\-]*$", max_length
 
 
 class TextureMaps(Strict):
-    """Image files of one surface, relative to the folder; all are stretched to one size.
+    """Image files of one surface, relative to the folder; all are resized to the largest.
 
     Attributes:
         color: sRGB.
-        alpha: Grey: where it is darker than half, there is a hole.
+        alpha: Grey; values below one half are holes.
         normal: Tangent space, +Y up (OpenGL).
         orm: Occlusion in red, roughness in green, metallic in blue, as glTF packs them.
-        roughness, metallic, occlusion: Instead of ``orm``: grey images.
+        roughness, metallic, occlusion: Grey images, instead of ``orm``.
         emission: sRGB.
     """
 
@@ -86,7 +86,7 @@ class TextureMaps(Strict):
         return tuple(sorted({file for file in self.model_dump().values() if file}))
 
     def name(self) -> str:
-        """Name of the texture that these images make; see ``texture_maps``."""
+        """Name of the combined texture; see ``texture_maps``."""
         orm = self.orm
         return Maps(
             albedo=self.color,
@@ -100,7 +100,7 @@ class TextureMaps(Strict):
 
 
 class Finish(Strict):
-    """What to change in a material; what is not given stays as the file has it."""
+    """Changes to a material; omitted fields keep the file's values."""
 
     base_color: tuple[Fraction, Fraction, Fraction] | None = None
     """Linear RGB."""
@@ -111,24 +111,24 @@ class Finish(Strict):
     """Weight of a clear coat."""
     coat_roughness: Fraction | None = None
     transmission: Fraction | None = None
-    """Share of the light under the surface that goes through."""
+    """Share of the light entering the surface that is transmitted."""
     ior: Annotated[float, Field(ge=1.0, le=4.0)] | None = None
     thin: bool | None = None
-    """What transmits is a pane; false: a solid body that refracts."""
+    """True: transmission as through a thin pane; false: through a refracting solid."""
     opacity: Fraction | None = None
     emission_cd_m2: tuple[Luminance, Luminance, Luminance] | None = None
     printed: bool | None = None
-    """The image is part of what the object is: randomizers leave it alone."""
+    """The image identifies the object; randomizers do not change it."""
     textured: Literal[False] | None = None
-    """False: without the image that the file gives it."""
+    """False: drop the file's image."""
     maps: TextureMaps | None = None
-    """Images instead of the file's own; ``base_color``, ``roughness`` and ``metallic`` multiply
-    them, by default with 1."""
+    """Images instead of the file's; ``base_color``, ``roughness`` and ``metallic`` multiply them
+    (default 1)."""
     texture_scale_m: Annotated[float, Field(gt=0.0)] | None = None
-    """Length of one repeat of the images, projected from three sides; by default the mesh's own
-    texture coordinates place them."""
+    """Length of one repeat of the images in triplanar projection; by default the mesh's texture
+    coordinates are used."""
     role: Word | None = None
-    """What it is on its object: paint, glass, tyre, ...; see ``core.asset_types``."""
+    """Function on the object: paint, glass, tyre, ...; see ``core.asset_types``."""
 
 
 class Point(Strict):
@@ -141,40 +141,40 @@ class Point(Strict):
 
 
 class SymmetryEntry(Strict):
-    """A turn that leaves the object as it looks, as BOP's ``models_info.json`` lists them."""
+    """Rotational symmetry of an object, as in BOP's ``models_info.json``."""
 
     axis: Literal["x", "y", "z"] | tuple[float, float, float]
-    """Of the finished asset's frame."""
+    """In the frame of the finished asset."""
     fold: Annotated[int, Field(ge=2, le=360)] | None = None
-    """Number of equal turns in a circle: 4 = every 90 degrees; by default every angle."""
+    """Order of the symmetry: 4 = every 90 degrees; by default every angle."""
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """A point that the axis goes through."""
+    """A point on the axis."""
 
     @model_validator(mode="after")
     def _check_axis(self) -> SymmetryEntry:
         if not any(self.direction()):
-            raise ValueError("expected an axis of some length")
+            raise ValueError("expected an axis with non-zero length")
         return self
 
     def direction(self) -> Vec3:
-        """The axis as numbers, of any length."""
+        """Axis vector, not normalised."""
         named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
         return named[self.axis] if isinstance(self.axis, str) else self.axis
 
 
 class Region(Strict):
-    """Triangles of a material that are something of their own: a lamp in a textured body."""
+    """Triangles of a material that get their own finish, such as a lamp in a textured body."""
 
     material: str
-    """Pattern of the material's name in the file."""
+    """``fnmatch`` pattern of the material's name in the file."""
     low_m: tuple[float, float, float]
     high_m: tuple[float, float, float]
-    """Corners of the box that holds their centres, in the frame of the finished asset."""
+    """Box that contains the triangles' centres, in the frame of the finished asset."""
     finish: Finish
 
 
 class Origin(Strict):
-    """Licence, author and source; an entry inherits from its document what it does not give."""
+    """Licence, author and source; entries inherit missing values from their document."""
 
     licence: str = ""
     author: str = ""
@@ -187,47 +187,47 @@ class MeshEntry(Origin):
     id: Id | None = None
     """By default the file's path without its suffix."""
     file: str
-    """Mesh, URDF, OpenUSD or OpenDRIVE file, relative to the folder; with ``*``, ``?`` or ``**``,
-    all files that match."""
+    """Mesh, URDF, OpenUSD or OpenDRIVE file, relative to the folder; ``*``, ``?`` and ``**``
+    select all matching files."""
     category: Category | None = None
-    """What labels call it; by default the name of the file's folder."""
+    """Category in labels; by default the name of the file's folder."""
     subcategory: str = ""
     """A finer name than the category."""
     attributes: dict[Word, Word] = Field(default_factory=dict)
-    """Further facts that labels carry."""
+    """Additional attributes in labels."""
     tags: tuple[Word, ...] = ()
     count: Annotated[int, Field(ge=1, le=100_000)] = 1
-    """More than 1: a series; in ``id`` and ``file``, ``000`` stands for the number, from 0."""
+    """More than 1: a series; ``000`` in ``id`` and ``file`` is replaced by the number, from 0."""
     except_for: tuple[Annotated[int, Field(ge=0)], ...] = ()
-    """Numbers that a series leaves out."""
+    """Numbers missing from the series."""
     scale: Annotated[float, Field(gt=0.0)] = 1.0
     """Metres per unit of the file."""
     unit: Literal["mm", "cm", "m", "in", "ft"] | None = None
-    """Of the file's coordinates; instead of scale."""
+    """Unit of the file's coordinates; instead of scale."""
     size_m: Length | tuple[Length, Length, Length] | None = None
     """Longest edge of the bounding box, or its edges along X, Y and Z; instead of scale. Three
     edges must agree with the file's proportions to within 5 %."""
     up: Literal["x", "y", "z"] | None = None
-    """Axis of the file that points up; by default y for glTF, what a USD stage says, and z for
-    all else."""
+    """Axis of the file that points up; by default y for glTF, the stage's own for USD, z for
+    other formats."""
     front: Axis | None = None
-    """Axis of the file that points to the front, which becomes +X; instead of yaw_deg."""
+    """Axis of the file that points forward and becomes +X; instead of yaw_deg."""
     yaw_deg: float = 0.0
-    """Turn about the vertical that brings the front to +X."""
+    """Rotation about the vertical that turns the front to +X."""
     origin: Literal["center", "floor"] = "center"
-    """Of the bounding box: its centre, or the centre of its bottom (furniture)."""
+    """Origin of the asset: centre of the bounding box, or of its bottom face (furniture)."""
     mass_kg: Annotated[float, Field(ge=0.0)] = 0.0
     stackable: bool = False
     collision: str = ""
-    """Mesh file whose groups collide; by default what the URDF says, else the mesh itself."""
+    """Mesh file with the collision geometry; by default the URDF's, else the mesh itself."""
     parts: Annotated[int, Field(ge=1, le=24)] = 8
-    """Bound on the convex parts that a concave mesh without a collision file is cut into."""
+    """Largest number of convex parts of a concave mesh without a collision file."""
     max_faces: Annotated[int, Field(ge=100)] = 20_000
     materials: dict[str, Finish] = Field(default_factory=dict)
-    """By the material's name in the file, or a pattern of it (``*`` = every other); the name
-    itself goes before patterns, long patterns before short ones."""
+    """Finishes by material name or pattern (``*`` = all others). Exact names take precedence over
+    patterns, longer patterns over shorter ones."""
     regions: tuple[Region, ...] = ()
-    """Applied in this order, after ``materials``."""
+    """Applied in order, after ``materials``."""
     keypoints: tuple[Point, ...] = ()
 
     symmetries: tuple[SymmetryEntry, ...] = ()
@@ -245,34 +245,34 @@ class MeshEntry(Origin):
         if self.front is not None and self.front[-1] == self.up_axis():
             raise ValueError(f"front is {self.front}, but {self.up_axis()} points up")
         if is_pattern(self.file) and (self.id is not None or self.count > 1):
-            raise ValueError("a file pattern has neither id nor count: every file has its own id")
+            raise ValueError("a file pattern takes neither id nor count: every file has its own id")
         return self
 
     def metres_per_unit(self) -> float:
-        """Metres per unit of the file, where no size is given."""
+        """Metres per unit of the file, if no size is given."""
         return METRES_PER_UNIT[self.unit] if self.unit else self.scale
 
     def up_axis(self) -> str:
-        """Axis of the file that points up; USD stages are turned by their readers."""
+        """Axis of the file that points up; the reader of USD stages already turns them to Z up."""
         return self.up or ("y" if self.file.lower().endswith((".glb", ".gltf")) else "z")
 
     def files(self) -> tuple[str, ...]:
         """The files that it names."""
         images = [f.maps for f in (*self.materials.values(), *(r.finish for r in self.regions))]
-        return _files(self.file, self.collision, *images)
+        return _unique_files(self.file, self.collision, *images)
 
 
 class GripperEntry(Strict):
-    """How a robot holds things; see ``gen_data.generator.core.asset_types.Gripper``."""
+    """Gripper of a robot; see ``gen_data.generator.core.asset_types.Gripper``."""
 
     link: str
     grasp_offset_m: float
-    """From the link's origin to the point between the finger tips, along the link's Z."""
+    """Distance from the link's origin to the point between the finger tips, along the link's Z."""
     finger_joints: tuple[str, ...]
-    """Joints that close the hand; those that mimic one of them need not be listed."""
+    """Joints that close the gripper; joints that mimic them may be omitted."""
     stroke_m: Annotated[float, Field(gt=0.0)]
     open_at: Literal["lower", "upper"] = "upper"
-    """Limit of the finger joints at which the hand is open (Robotiq's: lower)."""
+    """Limit of the finger joints at which the gripper is open (Robotiq: lower)."""
 
 
 class RobotEntry(Origin):
@@ -284,23 +284,23 @@ class RobotEntry(Origin):
     category: Category = "robot"
     tags: tuple[Word, ...] = ()
     home: dict[str, float] = Field(default_factory=dict)
-    """Position [rad or m] per joint; by default 0, or the middle where 0 is out of limits."""
+    """Position [rad or m] per joint; by default 0, or mid-range if 0 is outside the limits."""
     gripper: GripperEntry | None = None
     touching: tuple[tuple[str, str], ...] = ()
-    """Link pairs that touch by design, besides neighbours."""
+    """Link pairs in permanent contact, besides neighbours."""
     palette: bool = False
-    """The meshes' images only hold their colours: each material takes its median colour."""
+    """The meshes' images are colour palettes: each material takes the median colour it uses."""
     max_faces: Annotated[int, Field(ge=100)] = 2_000
     """Per link."""
     materials: dict[str, Finish] = Field(default_factory=dict)
 
     def files(self) -> tuple[str, ...]:
         """The files that it names."""
-        return _files(self.file, *(finish.maps for finish in self.materials.values()))
+        return _unique_files(self.file, *(finish.maps for finish in self.materials.values()))
 
 
 class TextureEntry(Origin):
-    """A texture: an image, or the images of one surface."""
+    """A texture: one image, or several images of one surface."""
 
     id: Id | None = None
     file: str = ""
@@ -322,7 +322,7 @@ class TextureEntry(Origin):
 
     def files(self) -> tuple[str, ...]:
         """The files that it names."""
-        return _files(self.file, self.maps)
+        return _unique_files(self.file, self.maps)
 
 
 class ImageEntry(Origin):
@@ -338,7 +338,7 @@ class ImageEntry(Origin):
 
 
 class FolderIndex(Origin):
-    """``assets.yaml``: what the files of a folder are."""
+    """Content of ``assets.yaml``."""
 
     assets: tuple[MeshEntry, ...] = ()
     robots: tuple[RobotEntry, ...] = ()
@@ -346,6 +346,7 @@ class FolderIndex(Origin):
     environments: tuple[ImageEntry, ...] = ()
 
 
+Model = TypeVar("Model", bound=Strict)
 Entry = MeshEntry | RobotEntry | TextureEntry | ImageEntry
 Kind = Literal["object", "robot", "texture", "environment"]
 
@@ -357,7 +358,7 @@ class IndexedAsset:
     Attributes:
         asset_id: Unique in the library.
         root: Folder that ``entry.file`` is relative to.
-        origin: Licence, author and source, the document's where the entry gives none.
+        origin: Licence, author and source, inherited from the document where missing.
         common_tags: Tags of every asset of its folder.
     """
 
@@ -369,30 +370,35 @@ class IndexedAsset:
     common_tags: tuple[str, ...] = ()
 
     def tags(self) -> tuple[str, ...]:
-        """What it is selected by: its own tags, its folder's, and its category as one word."""
+        """Its own tags, its folder's, and its category as one word."""
         own = {*self.entry.tags, *self.common_tags, self.category().replace(" ", "_")} - {""}
         return tuple(sorted(own))
 
     def category(self) -> str:
-        """What labels call it; empty for images."""
+        """Category in labels; empty for images."""
         if isinstance(self.entry, MeshEntry):
-            return self.entry.category or category_of(self.root, self.entry.file)
+            return self.entry.category or category_from_path(self.root, self.entry.file)
         return self.entry.category if isinstance(self.entry, RobotEntry) else ""
 
 
 def read_index(path: Path) -> FolderIndex:
-    """The index in a YAML file. Raises ConfigError naming every fault with its place."""
-    problems = Problems()
-    index = validate(load_yaml(path), FolderIndex, problems)
+    """Read an index. Raises ConfigError listing every fault with its place."""
+    return read_document(path, FolderIndex)[0]
+
+
+def read_document(path: Path, model: type[Model]) -> tuple[Model, Node]:
+    """Read and validate a YAML file. Raises ConfigError listing every fault with its place."""
+    problems, document = Problems(), load_yaml(path)
+    value = validate(document, model, problems)
     problems.raise_if_any()
-    assert index is not None
-    return index
+    assert value is not None
+    return value, document
 
 
 def list_assets(
     index: FolderIndex, root: Path, prefix: str = "", common_tags: tuple[str, ...] = ()
 ) -> Iterator[IndexedAsset]:
-    """Every asset of an index; series and patterns are written out."""
+    """Yield every asset of an index, with series and patterns expanded."""
     files: tuple[str, ...] | None = None
     for kind, entries in _sections(index):
         for entry in entries:
@@ -402,14 +408,14 @@ def list_assets(
                 source=entry.source or index.source,
             )
             if is_pattern(entry.file) and files is None:
-                files = files_below(root)
-            for one in _expanded(entry, files or ()):
-                name = one.id or id_of(one.file)
+                files = list_files(root)
+            for one in _expand(entry, files or ()):
+                name = one.id or asset_id_from_path(one.file)
                 yield IndexedAsset(f"{prefix}{name}", kind, root, one, origin, common_tags)
 
 
 def user_folder(root: Path) -> Iterator[IndexedAsset]:
-    """The assets of a user's folder, by its index or, without one, by the files in it.
+    """Yield the assets of a user's folder, from its index or, without one, from its files.
 
     Raises:
         AssetError: if the folder does not exist or cannot be read.
@@ -423,32 +429,30 @@ def user_folder(root: Path) -> Iterator[IndexedAsset]:
 
 
 def _user_index(root: Path, path: Path) -> FolderIndex:
-    """The index of a user's folder, whose files exist."""
-    problems, document = Problems(), load_yaml(path)
-    index = validate(document, FolderIndex, problems)
-    problems.raise_if_any()
-    assert index is not None
+    """Read the index of a user's folder and check that its files exist."""
+    index, document = read_document(path, FolderIndex)
+    problems = Problems()
     _check_files(index, root, document, problems)
     problems.raise_if_any()
     return index
 
 
 def _check_files(index: FolderIndex, root: Path, document: Node, problems: Problems) -> None:
-    """Note every file that is missing, and every pattern that matches none."""
+    """Report every missing file and every pattern without a match."""
     folder, below = Folder(root), None
     for section in ("assets", "robots", "textures", "environments"):
         entries: tuple[Entry, ...] = getattr(index, section)
         for number, entry in enumerate(entries):
             missing = [
                 file
-                for file in {f for one in _series(entry) for f in one.files()}
+                for file in {f for one in _expand_series(entry) for f in one.files()}
                 if not is_pattern(file) and not folder.exists(file)
             ]
-            if is_pattern(entry.file) and not matching(entry.file, below or files_below(root)):
+            if is_pattern(entry.file) and not match_files(entry.file, below or list_files(root)):
                 missing.append(entry.file)
             if not missing:
                 continue
-            below = below or files_below(root)
+            below = below or list_files(root)
             name = min(missing)
             entry_node = document.get(section, number) or document
             position, field = find_text(entry_node, name) or (entry_node.position, "file")
@@ -458,41 +462,48 @@ def _check_files(index: FolderIndex, root: Path, document: Node, problems: Probl
 
 
 def _count_by_suffix(files: tuple[str, ...]) -> str:
-    """``12 .obj, 3 .png``, the most frequent first."""
+    """Number of files by suffix, most frequent first: ``12 .obj, 3 .png``."""
     counts = Counter(PurePosixPath(file).suffix.lower() or "without suffix" for file in files)
     return ", ".join(f"{count} {suffix}" for suffix, count in counts.most_common(6)) or "no file"
 
 
 def _index_files(root: Path) -> FolderIndex:
-    """An index of a folder's files; meshes that a URDF uses are not listed twice."""
+    """Index a folder's files, except for meshes that a URDF uses."""
     files, panoramas = [], []
-    for name in files_below(root):
+    for name in list_files(root):
         suffix = PurePosixPath(name).suffix.lower()
         if suffix in {*MESH_SUFFIXES, ".urdf", ROAD_SUFFIX}:
             files.append(name)
         elif suffix in PANORAMA_SUFFIXES:
             panoramas.append(name)
-    used = {f for name in files if name.lower().endswith(".urdf") for f in _meshes_of(root, name)}
+    used = {f for name in files if name.lower().endswith(".urdf") for f in _urdf_meshes(root, name)}
     return FolderIndex(
         licence="unknown",
         author="unknown",
         source=str(root.resolve().name),
         assets=tuple(
-            MeshEntry(id=id_of(name), file=name, category=category_of(root, name),
-                      tags=(word_of(category_of(root, name)),))
-            for name in files if name not in used
+            MeshEntry(
+                id=asset_id_from_path(name),
+                file=name,
+                category=(category := category_from_path(root, name)),
+                tags=(sanitize_word(category),),
+            )
+            for name in files
+            if name not in used
         ),
-        environments=tuple(ImageEntry(id=id_of(name), file=name) for name in panoramas),
-    )  # fmt: skip
+        environments=tuple(
+            ImageEntry(id=asset_id_from_path(name), file=name) for name in panoramas
+        ),
+    )
 
 
-def _meshes_of(root: Path, urdf: str) -> tuple[str, ...]:
+def _urdf_meshes(root: Path, urdf: str) -> tuple[str, ...]:
     from gen_data.generator.assets.urdf import read_urdf
 
     try:
         return read_urdf(Folder(root), urdf).files()
     except AssetError:
-        # Listed all the same: its import reports the fault.
+        # The URDF is listed nevertheless; its import reports the fault.
         return ()
 
 
@@ -505,29 +516,29 @@ def _sections(index: FolderIndex) -> tuple[tuple[Kind, tuple[Entry, ...]], ...]:
     )
 
 
-def _files(*parts: str | TextureMaps | None) -> tuple[str, ...]:
-    """Files and the images of maps, each once, sorted."""
+def _unique_files(*parts: str | TextureMaps | None) -> tuple[str, ...]:
+    """Files and images of maps, sorted and without duplicates."""
     names: set[str] = set()
     for part in parts:
         names |= set(part.files()) if isinstance(part, TextureMaps) else {part or ""}
     return tuple(sorted(names - {""}))
 
 
-def _expanded(entry: Entry, files: tuple[str, ...]) -> Iterator[Entry]:
-    """One entry per file that it stands for."""
+def _expand(entry: Entry, files: tuple[str, ...]) -> Iterator[Entry]:
+    """Yield one entry per file of a pattern or series."""
     if not is_pattern(entry.file):
-        yield from _series(entry)
+        yield from _expand_series(entry)
         return
-    for file in matching(entry.file, files):
-        yield entry.model_copy(update={"id": id_of(file), "file": file})
+    for file in match_files(entry.file, files):
+        yield entry.model_copy(update={"id": asset_id_from_path(file), "file": file})
 
 
-def _series(entry: Entry) -> Iterator[Entry]:
+def _expand_series(entry: Entry) -> Iterator[Entry]:
     if not isinstance(entry, MeshEntry) or entry.count == 1:
         yield entry
         return
     left_out = frozenset(entry.except_for)
-    name = entry.id or id_of(entry.file)
+    name = entry.id or asset_id_from_path(entry.file)
     for k in (k for k in range(entry.count) if k not in left_out):
         number = f"{k:03d}"
         yield entry.model_copy(

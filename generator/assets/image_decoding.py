@@ -1,4 +1,4 @@
-"""Image files to arrays, with limits that are checked before anything is decoded."""
+"""Decoding of image files; size limits are checked before decoding."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from gen_data.generator.core.errors import AssetError
 MAX_SIDE_PX = 16_384
 MAX_PIXELS = 64_000_000
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
-# Of the brightest texel.
-_RINGING = 1e-4
+# Largest negative value, as a share of the brightest texel: resampling filters ring.
+_MAX_RINGING = 1e-4
 _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
 _WITH_ALPHA = ("RGBA", "LA", "PA")
 
 
 def decode_image(data: bytes, place: str, *, alpha: bool = False) -> UInt8:
-    """Pixels in sRGB, uint8 [height, width, 3].
+    """Decode an image to sRGB, uint8 [height, width, 3].
 
     Args:
         data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA.
-        place: What error messages call it.
-        alpha: Whether transparency is wanted: it makes a fourth channel where there is any.
+        place: Name of the image in error messages.
+        alpha: Keep transparency as a fourth channel, if any pixel is transparent.
 
     Raises:
         AssetError: if it is unreadable, or larger than 16,384 pixels a side or 64 megapixels.
@@ -58,14 +58,14 @@ def decode_image(data: bytes, place: str, *, alpha: bool = False) -> UInt8:
 
 
 def decode_radiance(data: bytes, place: str) -> Float32:
-    """Equirectangular panorama as ``AssetLibrary.environment`` promises it: mean luminance 1.
+    """Decode an equirectangular panorama, float32 [height, width, 3], to mean luminance 1.
 
     Args:
         data: A Radiance .hdr or an OpenEXR file, twice as wide as high.
-        place: What error messages call it.
+        place: Name of the file in error messages.
 
     Raises:
-        AssetError: if it is unreadable, too large, of another shape, dark, negative or not finite.
+        AssetError: if it is unreadable, too large, of another shape, black, negative or not finite.
     """
     read = read_exr if data[:4] == _EXR_MAGIC else _read_radiance
     rgb = read(data, place).astype(np.float64)
@@ -73,16 +73,16 @@ def decode_radiance(data: bytes, place: str) -> Float32:
     if width != 2 * height:
         raise AssetError(f"{place}: {width} x {height} px; a panorama is twice as wide as high")
     _check_texels(rgb, place)
-    # Filters ring a little below zero; what goes further is no light.
+    # Resampling filters ring slightly below zero; _check_texels refuses larger negative values.
     rgb = np.maximum(rgb, 0.0)
     radiance: Float32 = (rgb / _mean_luminance(rgb)).astype(np.float32)
     if not np.isfinite(radiance).all():
-        raise AssetError(f"{place}: one texel outshines all others; save it again from its source")
+        raise AssetError(f"{place}: a single texel dominates; export it again")
     return radiance
 
 
 def read_exr(data: bytes, place: str) -> Float32:
-    """RGB pixels of an OpenEXR image, float32 [height, width, 3].
+    """Decode an OpenEXR image to RGB, float32 [height, width, 3].
 
     Raises:
         AssetError: if it is unreadable, too large, or lacks a colour.
@@ -109,7 +109,7 @@ def read_exr(data: bytes, place: str) -> Float32:
 
 
 def _read_radiance(data: bytes, place: str) -> Float32:
-    """RGB pixels of a Radiance image, float32 [height, width, 3]."""
+    """Decode a Radiance image to RGB, float32 [height, width, 3]."""
     import cv2
 
     width, height = _radiance_size(data, place)
@@ -120,14 +120,14 @@ def _read_radiance(data: bytes, place: str) -> Float32:
         bgr = None
     if bgr is None or bgr.ndim != 3 or bgr.shape[2] != 3 or bgr.dtype != np.float32:
         raise AssetError(f"{place}: unreadable panorama; save it again as Radiance .hdr")
-    # A panorama's centre column is its front; ours is +X, with the left half to the left of it.
+    # OpenCV decodes to BGR. The centre column is the front, +X, as everywhere in this project.
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
 def _check_texels(rgb: NDArray[np.float64], place: str) -> None:
     finite = np.isfinite(rgb)
     brightest = float(np.where(finite, rgb, 0.0).max())
-    impossible = ~finite | (rgb < -_RINGING * brightest)
+    impossible = ~finite | (rgb < -_MAX_RINGING * brightest)
     if impossible.any():
         row, column, channel = (int(v) for v in np.argwhere(impossible)[0])
         raise AssetError(
@@ -139,7 +139,7 @@ def _check_texels(rgb: NDArray[np.float64], place: str) -> None:
 
 
 def _radiance_size(data: bytes, place: str) -> tuple[int, int]:
-    """Width and height that a Radiance header claims."""
+    """Width and height stated in a Radiance header."""
     lines = data[:4096].split(b"\n")
     for line in lines if data[:2] == b"#?" else ():
         words = line.split()
@@ -151,10 +151,11 @@ def _radiance_size(data: bytes, place: str) -> tuple[int, int]:
 
 
 def _mean_luminance(rgb: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
-    """Mean over the sphere of the luminance (Rec. 709) of an equirectangular image."""
+    """Mean luminance (Rec. 709) of an equirectangular image over the sphere."""
     height = rgb.shape[0]
     edges = np.array([math.cos(math.pi * k / height) for k in range(height + 1)])
     rows = luminance(rgb).mean(axis=1)
+    # By Archimedes, a band of the sphere has an area in proportion to its height, cos - cos.
     return float((rows * 0.5 * (edges[:-1] - edges[1:])).sum())
 
 

@@ -1,8 +1,8 @@
-"""From files to the normal form: one object, or one link of a robot.
+"""Import of files into the normal form: objects, robot links and road networks.
 
-Objects get their origin at the centre of their bounding box (furniture: at the centre of its
-bottom), close to the centre of mass, since physics takes the origin for it. Links keep the frame
-of the URDF. Mesh and collision parts always share one frame.
+Objects get their origin at the centre of their bounding box (furniture: of its bottom face), close
+to the centre of mass, because physics uses the origin as such. Links keep the frame of the URDF.
+Mesh and collision parts always share one frame.
 """
 
 from __future__ import annotations
@@ -14,40 +14,45 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from gen_data.generator.assets.alpha_trim import trim_unreached_holes
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.convex_decomposition import convex_parts, single_hull
 from gen_data.generator.assets.folder_index import Finish, MeshEntry, Region, RobotEntry
 from gen_data.generator.assets.image_decoding import decode_image
 from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.normal_form import NormalForm, check_coordinates, normal_form
-from gen_data.generator.assets.primitive_solids import box, cylinder, sphere
+from gen_data.generator.assets.normal_form import check_coordinates, normal_form
 from gen_data.generator.assets.readers import read_mesh
 from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
 from gen_data.generator.assets.readers.usd import open_stage
+from gen_data.generator.assets.roads.network_surface import network_solid
+from gen_data.generator.assets.texture_maps import texel_indices, trim_unreached_holes
 from gen_data.generator.assets.triangle_soup import (
     Float64,
-    Int64,
     MaterialSlot,
     TriangleSoup,
+    box,
+    cylinder,
     join_soups,
+    sphere,
 )
 from gen_data.generator.assets.urdf import Shape, Urdf, read_urdf
 from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Lane
 from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.roads.opendrive import Network, read_opendrive
+from gen_data.generator.roads.opendrive_lanes import network_lanes
 
 VERSION = 5
-"""Raised whenever the same files would come out as other geometry."""
+"""Increased whenever the same files are imported as different geometry."""
 SIZE_TOLERANCE = 0.05
-"""Share of the longest edge by which the edges of a mesh may differ from those that are stated."""
+"""Largest deviation of a mesh's edges from the stated ones, as a share of the longest edge."""
 _AXES = {
     "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
     "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
 }  # fmt: skip
 _DEFAULT_FRONT = {"x": "-z", "y": "x", "z": "x"}
-_WHITEST = 0.85
-"""Files say 1 for white; no matt surface reflects more than fresh snow does (about 0.85)."""
+_MAX_ALBEDO = 0.85
+"""Upper bound on diffuse albedo, that of fresh snow; files often use 1 for white."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +60,11 @@ class ImportedMesh:
     """An asset in the normal form.
 
     Attributes:
-        mesh: None for a robot link that only collides.
-        collision: None for a robot link that is only seen.
-        images: ``{name: uint8 [h, w, 3]}`` of the images inside the file, with a fourth channel
-            where they are transparent; a material's texture ``<asset id>#<name>`` refers to one of
-            these or to a file of the folder, or to several
-            (``gen_data.generator.assets.texture_maps``).
+        mesh: None for a robot link without visual geometry.
+        collision: None for a robot link without collision geometry.
+        images: ``{name: uint8 [h, w, 3 or 4]}`` of embedded images; transparent ones have four
+            channels. A material's texture ``<asset id>#<name>`` refers to one of these, to a file
+            of the folder, or to several images (``gen_data.generator.assets.texture_maps``).
         keypoints: Named points in the asset's frame.
     """
 
@@ -71,7 +75,7 @@ class ImportedMesh:
 
     @property
     def nbytes(self) -> int:
-        """Bytes held by its arrays."""
+        """Total size of its arrays [bytes]."""
         held = sum(image.nbytes for image in self.images.values())
         if self.collision is not None:
             held += sum(part.nbytes for part in self.collision.parts_m)
@@ -79,17 +83,17 @@ class ImportedMesh:
 
 
 def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = "") -> ImportedMesh:
-    """An object from its mesh or URDF file. Raises AssetError if it is unfit.
+    """Import an object from its mesh or URDF file. Raises AssetError if it is unusable.
 
     Args:
-        folder: Where its files lie.
-        entry: What they are.
-        asset_id: Of the entry.
-        piece: Name of the only mesh of a stage that is wanted; empty = all of it is.
+        folder: Folder of its files.
+        entry: Index entry.
+        asset_id: Id of the entry.
+        piece: Name of a single mesh of a stage; empty = the whole file.
     """
     place = str(folder.root / entry.file)
     if piece:
-        source = _piece(folder, entry, piece)
+        source = _read_piece(folder, entry, piece)
         looks, collides, images = [source.soup], list[TriangleSoup](), source.images
         asset_id = f"{asset_id}/{piece}" if images else asset_id
         entry = entry.model_copy(update={"origin": "center"})
@@ -110,14 +114,15 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     matrix = upright_transform(entry)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
-    soup = _with_regions(soup.transformed(_scaling(scale, shift)), entry.regions, place, asset_id)
-    mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
+    scaling = _scaling_matrix(scale, shift)
+    soup = _split_regions(soup.transformed(scaling), entry.regions, place, asset_id)
+    mesh = normal_form(soup, place, max_faces=entry.max_faces)
     if collides:
-        solid = join_soups(collides).transformed(matrix).transformed(_scaling(scale, shift))
+        solid = join_soups(collides).transformed(matrix).transformed(scaling)
         check_coordinates(solid, place)
         collision = convex_parts(solid, place, entry.parts)
     else:
-        collision = convex_parts(_solid_of(mesh, entry.max_faces), place, entry.parts)
+        collision = convex_parts(_collision_soup(mesh, entry.max_faces), place, entry.parts)
     keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
     return ImportedMesh(mesh, collision, decoded, keypoints)
 
@@ -125,46 +130,41 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
 def import_link(
     folder: Folder, entry: RobotEntry, robot_id: str, urdf: Urdf, link_name: str
 ) -> ImportedMesh:
-    """One link of a robot, in the link's frame. Raises AssetError if it is unfit."""
+    """Import one link of a robot, in the link's frame. Raises AssetError if it is unusable."""
     link = urdf.links[link_name]
     place = f"{folder.root / entry.file}: link '{link_name}'"
     mesh = collision = None
     if link.visuals:
-        soup = join_soups([_shape_soup(folder, shape, SE3()) for shape in link.visuals])
+        soup = join_soups([_make_shape_soup(folder, shape, SE3()) for shape in link.visuals])
         if entry.palette:
             soup = _palette_colors(folder, soup)
         soup = _apply_finishes(soup, entry.materials, place, robot_id)
-        mesh = normal_form(soup, place, NormalForm(max_faces=entry.max_faces))
+        mesh = normal_form(soup, place, max_faces=entry.max_faces)
     if link.collisions:
-        solids = [_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
+        solids = [_make_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
         check_coordinates(join_soups(solids), place)
-        # One hull per element and group: what a URDF collides with is taken as convex.
-        collision = ConvexParts(
-            tuple(
-                part
-                for solid in solids
-                for part in (
-                    convex_parts(solid, place, 1) if _grouped(solid) else single_hull(solid, place)
-                ).parts_m
-            )
-        )
+        # One hull per element and group, as simulators treat the collision meshes of a URDF.
+        hulls = [
+            convex_parts(s, place, 1) if _has_groups(s) else single_hull(s, place) for s in solids
+        ]
+        collision = ConvexParts(tuple(part for hull in hulls for part in hull.parts_m))
     return ImportedMesh(mesh, collision, {})
 
 
-def _solid_of(mesh: MeshData, max_faces: int) -> TriangleSoup:
-    """Triangles of a mesh as a solid to collide with, few enough to be cut up quickly."""
+def _collision_soup(mesh: MeshData, max_faces: int) -> TriangleSoup:
+    """Triangles of a mesh for collision, decimated so that decomposition stays fast."""
     soup = TriangleSoup.of(mesh.vertices_m.astype(np.float64)[mesh.faces])
     return decimate(soup, max_faces) if len(soup) > max_faces else soup
 
 
-def _grouped(soup: TriangleSoup) -> bool:
+def _has_groups(soup: TriangleSoup) -> bool:
     return bool((soup.face_groups != soup.face_groups[0]).any())
 
 
 def _read_geometry(
     folder: Folder, entry: MeshEntry
 ) -> tuple[list[TriangleSoup], list[TriangleSoup], Mapping[str, bytes]]:
-    """What is seen, what collides (empty = the same), and embedded images, as the files have it."""
+    """Visual soups, collision soups (empty = the visual ones) and embedded images of an entry."""
     images: Mapping[str, bytes] = {}
     collides: list[TriangleSoup] = []
     if entry.file.lower().endswith(".urdf"):
@@ -173,10 +173,10 @@ def _read_geometry(
         visuals = [(s, poses[n]) for n, link in urdf.links.items() for s in link.visuals]
         solids = [(s, poses[n]) for n, link in urdf.links.items() for s in link.collisions]
         if not visuals:
-            raise AssetError(f"{folder.root / entry.file}: shows nothing; give it a <visual>")
-        looks = [_shape_soup(folder, shape, pose) for shape, pose in visuals]
-        if [_geometry(s) for s in solids] != [_geometry(v) for v in visuals]:
-            collides = [_shape_soup(folder, s, pose, materials=False) for s, pose in solids]
+            raise AssetError(f"{folder.root / entry.file}: no visual geometry; give it a <visual>")
+        looks = [_make_shape_soup(folder, shape, pose) for shape, pose in visuals]
+        if [_geometry_key(s) for s in solids] != [_geometry_key(v) for v in visuals]:
+            collides = [_make_shape_soup(folder, s, pose, materials=False) for s, pose in solids]
     else:
         source = read_mesh(folder, entry.file)
         looks, images = [source.soup], source.images
@@ -185,8 +185,8 @@ def _read_geometry(
     return looks, collides, images
 
 
-def _piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
-    """One mesh of a stage. Raises AssetError if there is none of that name."""
+def _read_piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
+    """Read one mesh of a stage. Raises AssetError if there is none of that name."""
     with open_stage(folder, entry.file) as stage:
         pieces = tuple(piece for piece in stage.pieces() if piece.name == name)
         if not pieces:
@@ -194,22 +194,22 @@ def _piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
         return stage.source(pieces)
 
 
-def _geometry(placed: tuple[Shape, SE3]) -> tuple[object, ...]:
+def _geometry_key(placed: tuple[Shape, SE3]) -> tuple[object, ...]:
     shape, pose = placed
     return (shape.kind, shape.file, shape.size, shape.T_link_shape, pose)
 
 
-def _shape_soup(
+def _make_shape_soup(
     folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
 ) -> TriangleSoup:
-    """Triangles of a URDF element in the root frame, with the element's colour."""
+    """Read or make the triangles of a URDF element, in the root frame and its colour."""
     matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
     if shape.kind == "mesh":
         source = read_mesh(folder, shape.file, materials=materials)
         if source.images:
             raise AssetError(
-                f"{folder.root / shape.file}: holds its images inside, which a URDF's meshes may "
-                "not; export it with images as files"
+                f"{folder.root / shape.file}: has embedded images, which a URDF's meshes may not; "
+                "export it with images as files"
             )
         soup = source.soup
         matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
@@ -224,10 +224,9 @@ def _shape_soup(
 
 
 def _apply_color(slot: MaterialSlot, shape: Shape) -> MaterialSlot:
-    """A slot under the material of a URDF element: it colours what the file leaves plain.
+    """Apply the material of a URDF element to a slot without texture.
 
-    White is what descriptions say when they mean nothing in particular: the mesh's own colours
-    stay then.
+    White is the usual placeholder in descriptions; it does not replace the mesh's own colours.
     """
     if shape.color is None or slot.material.texture:
         return slot
@@ -240,14 +239,14 @@ def _apply_color(slot: MaterialSlot, shape: Shape) -> MaterialSlot:
 def _apply_finishes(
     soup: TriangleSoup, finishes: Mapping[str, Finish], place: str, owner: str
 ) -> TriangleSoup:
-    """Slots with the entry's finishes, textures named by their owner, and no impossible whites."""
+    """Apply finishes, prefix textures with their owner, and limit untextured albedo."""
     slots = []
     for slot in soup.slots:
-        finish = _finish_of(slot.name, finishes)
+        finish = _find_finish(slot.name, finishes)
         if slot.missing_library and not slot.from_file and finish is None:
             raise AssetError(
-                f"{place}: material '{slot.name}' should be in {slot.missing_library}, which is "
-                "missing; add that file, or give 'materials' in the asset index"
+                f"{place}: material '{slot.name}' belongs to the missing file "
+                f"{slot.missing_library}; add it, or give 'materials' in the asset index"
             )
         material = slot.material
         if material.texture:
@@ -261,8 +260,8 @@ def _apply_finishes(
     return replace(soup, slots=tuple(slots))
 
 
-def _finish_of(name: str, finishes: Mapping[str, Finish]) -> Finish | None:
-    """The finish under a material's name, else under the longest pattern that fits it."""
+def _find_finish(name: str, finishes: Mapping[str, Finish]) -> Finish | None:
+    """Finish for a material's name, else for the longest matching pattern; None without one."""
     if name in finishes:
         return finishes[name]
     fitting = [pattern for pattern in finishes if fnmatchcase(name, pattern)]
@@ -270,17 +269,17 @@ def _finish_of(name: str, finishes: Mapping[str, Finish]) -> Finish | None:
 
 
 def _check_placeable(material: Material, finish: Finish, soup: TriangleSoup, place: str) -> None:
-    """Raise AssetError if nothing says where a finish's images lie on the surface."""
+    """Raise AssetError if a finish's images have no texture coordinates or scale."""
     if finish.maps is not None and soup.uvs is None and not material.texture_scale_m:
         raise AssetError(
             f"{place} has maps, but the file has no texture coordinates; give texture_scale_m"
         )
 
 
-def _with_regions(
+def _split_regions(
     soup: TriangleSoup, regions: Sequence[Region], place: str, owner: str
 ) -> TriangleSoup:
-    """The soup with a slot of its own for the triangles of each region."""
+    """Give the triangles of each region a slot of their own."""
     for region in regions:
         centers = soup.corners.mean(axis=1)
         inside = ((centers >= region.low_m) & (centers <= region.high_m)).all(axis=1)
@@ -298,9 +297,9 @@ def _with_regions(
 
 
 def _apply_finish(material: Material, finish: Finish, owner: str) -> Material:
-    """What the finish says, and of the file what it leaves.
+    """Override a material with the fields that a finish gives.
 
-    A finish with a colour stands for a surface of its own: what is behind the file's is not seen.
+    A finish with a colour makes the surface opaque, unless it says otherwise.
     """
     changes = {k: v for k, v in finish.model_dump(exclude={"maps"}).items() if v is not None}
     maps = finish.maps
@@ -322,21 +321,22 @@ def _apply_finish(material: Material, finish: Finish, owner: str) -> Material:
 def _limit_white(material: Material) -> tuple[float, float, float]:
     if material.metallic > 0.5 or material.transmission > 0.5:
         return material.base_color
-    red, green, blue = (min(c, _WHITEST) for c in material.base_color)
+    red, green, blue = (min(c, _MAX_ALBEDO) for c in material.base_color)
     return (red, green, blue)
 
 
 def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
-    """Slots whose image only holds a colour take it: the median of what their corners touch.
+    """Replace palette images by a colour per slot: the median over its corners' texels.
 
-    The file's own colour wins where it is darker, since exporters write it beside the image.
+    The file's own colour wins per channel where it is darker, because exporters write it beside
+    the image.
     """
     slots = []
     for k, slot in enumerate(soup.slots):
         chosen = soup.face_slots == k
         if slot.material.texture and soup.uvs is not None and chosen.any():
             image = decode_image(folder.read(slot.material.texture), slot.material.texture)
-            rows, columns = _pixels(soup.uvs[chosen].reshape(-1, 2), image.shape[:2])
+            rows, columns = texel_indices(soup.uvs[chosen].reshape(-1, 2), image.shape)
             median = np.median(image[rows, columns], axis=0) / 255.0
             own = slot.declared_color
             color = srgb_to_linear((float(median[0]), float(median[1]), float(median[2])))
@@ -347,15 +347,8 @@ def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
     return replace(soup, slots=tuple(slots), uvs=None)
 
 
-def _pixels(uvs: Float64, shape: tuple[int, ...]) -> tuple[Int64, Int64]:
-    height, width = shape[:2]
-    columns = np.floor(uvs[:, 0] * width).astype(np.int64) % width
-    rows = np.floor((1.0 - uvs[:, 1]) * height).astype(np.int64) % height
-    return rows, columns
-
-
 def upright_transform(entry: MeshEntry) -> Float64:
-    """Affine map that turns the file's axes to Z up and the front to +X."""
+    """Affine map [3, 4] that turns the file's up axis to Z and its front to +X."""
     up = np.array(_AXES[entry.up_axis()])
     front = np.array(_AXES[entry.front or _DEFAULT_FRONT[entry.up_axis()]])
     axes = np.stack([front, np.cross(up, front), up]) + 0.0
@@ -368,10 +361,10 @@ def upright_transform(entry: MeshEntry) -> Float64:
 
 
 def scale_and_shift(soup: TriangleSoup, entry: MeshEntry, place: str) -> tuple[float, Float64]:
-    """Metres per unit, and how the scaled soup is moved so that its origin is the entry's.
+    """Metres per unit, and the translation [3] of the scaled soup to the entry's origin.
 
     Raises:
-        AssetError: if it is not finite, or has no extent that could become the entry's size.
+        AssetError: if it is not finite, or its extents do not fit the entry's size.
     """
     if not np.isfinite(soup.corners).all():
         raise AssetError(f"{place}: holds vertices that are not finite; export it again")
@@ -387,7 +380,7 @@ def scale_and_shift(soup: TriangleSoup, entry: MeshEntry, place: str) -> tuple[f
 
 
 def _scale_to_size(extents: Float64, size_m: float | Vec3, place: str) -> float:
-    """Metres per unit that give a bounding box its longest edge, or its three edges."""
+    """Metres per unit for which the bounding box has the given longest edge or three edges."""
     extent = float(extents.max())
     if not extent > 0.0:
         raise AssetError(f"{place}: has no extent; export it again")
@@ -398,14 +391,33 @@ def _scale_to_size(extents: Float64, size_m: float | Vec3, place: str) -> float:
     for edge, wanted in zip(scale * extents, size_m, strict=True):
         if abs(edge - wanted) > SIZE_TOLERANCE * max(size_m):
             raise AssetError(
-                f"{place}: its edges are {edges} m at that length, not "
+                f"{place}: scaled to that length, its edges are {edges} m, not "
                 f"{' x '.join(f'{edge:g}' for edge in size_m)} m; correct size_m, up or front"
             )
     return scale
 
 
-def _scaling(scale: float, shift: Float64) -> Float64:
+def _scaling_matrix(scale: float, shift: Float64) -> Float64:
     matrix = np.zeros((3, 4))
     matrix[:, :3] = scale * np.eye(3)
     matrix[:, 3] = shift
     return matrix
+
+
+def import_road_network(folder: Folder, relative: str) -> ImportedMesh:
+    """Import the road surface of an OpenDRIVE file. Raises AssetError if it is unusable."""
+    solid = network_solid(_read_network(folder, relative))
+    return ImportedMesh(solid.mesh, solid.collision, {}, solid.keypoints)
+
+
+def road_network_lanes(folder: Folder, relative: str) -> tuple[Lane, ...]:
+    """Read the lanes of an OpenDRIVE file, in the frame of its surface.
+
+    Raises:
+        AssetError: if it is malformed, or linked lanes do not meet.
+    """
+    return network_lanes(_read_network(folder, relative))
+
+
+def _read_network(folder: Folder, relative: str) -> Network:
+    return read_opendrive(folder.read(relative), str(folder.root / relative))

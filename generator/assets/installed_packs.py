@@ -1,8 +1,8 @@
-"""Asset packs that are installed: what is where, and what it should be.
+"""Installed asset packs: their records and indices.
 
-A pack is a folder of ``packs_dir()`` with a record of its own, ``pack.json``, and, if it offers
-assets by id, an index: the document of ``assets.yaml`` as JSON, which is read a hundred times as
-fast. Installing is ``gen_data.generator.packs``' business.
+A pack is a folder below ``packs_dir()`` with a record, ``pack.json``, and, if it offers assets by
+id, an index: the content of ``assets.yaml`` as JSON, which loads a hundred times faster.
+``gen_data.generator.packs`` installs packs.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from gen_data.generator.core.serialization import canonical_json, from_plain
 RECORD_NAME = "pack.json"
 INDEX_NAME = "index.json"
 TAG = "pack"
-"""Every asset of a pack carries it."""
+"""Tag of every asset of a pack."""
 
 
 @dataclass(frozen=True, slots=True)
 class StoredFile:
-    """What one installed file should be.
+    """Expected state of one installed file.
 
     Attributes:
-        path: Below the pack's folder.
+        path: Relative to the pack's folder.
     """
 
     path: str
@@ -40,12 +40,12 @@ class StoredFile:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What was installed.
+    """Record of an installed pack.
 
     Attributes:
-        version: Of the package it comes from.
-        revision: Of the conversion, raised whenever the same package gives other files.
-        archive_sha256: Of the package's archive.
+        version: Version of the source package.
+        revision: Revision of the conversion, increased whenever it makes different files.
+        archive_sha256: Hash of the package's archive.
         files: All files but the record itself, sorted by path.
     """
 
@@ -59,17 +59,17 @@ class Record:
 
     @property
     def digest(self) -> str:
-        """sha256, in hexadecimal, of everything that was installed."""
+        """Hexadecimal sha256 of the list of all files."""
         return sha256(canonical_json(self.files).encode()).hexdigest()
 
     @property
     def size(self) -> int:
-        """Bytes of all files."""
+        """Total size of all files [bytes]."""
         return sum(file.size for file in self.files)
 
 
 def installed_packs(folder: Path) -> tuple[Record, ...]:
-    """Records of the packs in a folder, sorted by name; none if there is no such folder.
+    """Read the records of the packs in a folder, sorted by name; none if it does not exist.
 
     Raises:
         AssetError: if a record cannot be read.
@@ -78,7 +78,7 @@ def installed_packs(folder: Path) -> tuple[Record, ...]:
 
 
 def read_record(pack: Path) -> Record:
-    """The record in a pack's folder. Raises AssetError if it is damaged."""
+    """Read the record in a pack's folder. Raises AssetError if it is damaged."""
     path = pack / RECORD_NAME
     try:
         return from_plain(Record, json.loads(path.read_bytes()))
@@ -89,15 +89,21 @@ def read_record(pack: Path) -> Record:
         ) from None
 
 
+def write_index(folder: Path, index: FolderIndex) -> None:
+    """Write the index of a pack's folder."""
+    text = index.model_dump_json(exclude_defaults=True)
+    (folder / INDEX_NAME).write_text(text, encoding="utf-8")
+
+
 def pack_assets(folder: Path) -> Iterator[IndexedAsset]:
-    """The assets of all packs in a folder under their ids ``<pack>/<id>``.
+    """Yield the assets of all packs in a folder, with ids ``<pack>/<id>``.
 
     Raises:
         AssetError: if a pack's index is damaged.
     """
     for path in sorted(folder.glob(f"[!.]*/{INDEX_NAME}")):
         try:
-            # Lists stand for tuples, since JSON has no other; all else is read as declared.
+            # JSON mode accepts lists for tuples; all other types stay strict.
             index = FolderIndex.model_validate_json(path.read_bytes())
         except (OSError, ValidationError) as error:
             raise AssetError(

@@ -1,4 +1,4 @@
-"""The library: every mesh, texture, environment and robot by id, in the normal form."""
+"""Asset library: every mesh, texture, environment and robot by id, in the normal form."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from gen_data.generator.core.se3 import Vec3
 def open_library(
     user_roots: Sequence[Path] = (), cache_dir: Path | None = None, packs: Path | None = None
 ) -> Library:
-    """A library of procedural assets, pybullet's, installed packs', and the user's own.
+    """Open a library of procedural assets, pybullet's, installed packs', and the user's own.
 
-    Nothing is read before it is asked for.
+    Files are read on first use.
 
     Args:
         user_roots: Folders with or without an ``assets.yaml``; their ids start with ``user/``.
-        cache_dir: Where normal forms are kept; by default the user's cache folder.
+        cache_dir: Folder of cached normal forms; by default the user's cache folder.
         packs: Folder of installed packs; by default the user's.
     """
     roots = tuple(Path(root) for root in user_roots)
@@ -44,8 +44,8 @@ def open_library(
 
 
 @dataclass(frozen=True, slots=True)
-class _Known:
-    """What is small about an asset with a mesh."""
+class _MeshSummary:
+    """Small properties of an asset with a mesh, kept in memory."""
 
     bounds_m: tuple[Vec3, Vec3]
     materials: tuple[Material, ...]
@@ -53,11 +53,10 @@ class _Known:
 
 
 class Library:
-    """Implements ``AssetLibrary``. One per process; what it caches depends on content only.
+    """Implementation of ``AssetLibrary``; one per process.
 
-    Entries, bounds, materials and keypoints are looked up hundreds of times per scene, so they are
-    remembered: an asset whose files change while a process runs keeps the content that was read
-    first.
+    Entries, bounds, materials and keypoints are used hundreds of times per scene and stay in
+    memory: an asset whose files change while a process runs keeps the content read first.
     """
 
     def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path, packs: Path) -> None:
@@ -67,10 +66,10 @@ class Library:
         self._files = FileLibrary(packs, user_roots, disk, store)
         self._entries: dict[str, Asset] = {}
         self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
-        self._known: dict[str, _Known] = {}
+        self._summaries: dict[str, _MeshSummary] = {}
 
     def get(self, asset_id: str) -> Asset:
-        """The entry of that id. Raises AssetError with the nearest id if unknown."""
+        """Description of an asset. Raises UnknownAsset if there is none."""
         if asset_id not in self._entries:
             generated = self._is_generated(asset_id)
             self._entries[asset_id] = (
@@ -81,7 +80,7 @@ class Library:
         return self._entries[asset_id]
 
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
-        """All assets of the kind that carry every tag, sorted by id; may be empty."""
+        """All assets of a kind that have every tag, sorted by id; may be empty."""
         key = (frozenset(tags), kind)
         if key not in self._found:
             found = [*self._generated.find(*key), *self._files.find(*key)]
@@ -90,48 +89,52 @@ class Library:
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """The asset's own materials, one per mesh slot."""
-        return self._of_mesh(asset_id).materials
+        return self._summarize(asset_id).materials
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
-        return self._of_mesh(asset_id).bounds_m
+        return self._summarize(asset_id).bounds_m
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
-        if asset_id not in self._known:
+        if asset_id not in self._summaries:
             imported = self._imported(asset_id)
             if imported.mesh is None:
                 return imported.keypoints
-        return self._of_mesh(asset_id).keypoints
+        return self._summarize(asset_id).keypoints
 
     def lanes(self, asset_id: str) -> tuple[Lane, ...]:
-        """Lanes of a road network (an ``.xodr`` file), in its own frame; else empty."""
+        """Lanes of a road network (``.xodr``), in its own frame; empty for other assets."""
         return () if self._is_generated(asset_id) else self._files.lanes(asset_id)
 
     def robot(self, asset_id: str) -> RobotModel:
-        """Kinematics of a robot. Raises AssetError if the asset is no robot."""
+        """Kinematics of a robot. Raises AssetError if the asset is not a robot."""
         if self._is_generated(asset_id):
-            raise AssetError(f"asset '{asset_id}': is no robot")
+            raise AssetError(f"asset '{asset_id}': is not a robot")
         return self._files.robot(asset_id)
 
     def stage(self, asset_id: str) -> StageModel:
-        """What a stage file (OpenUSD) holds. Raises AssetError if the asset is no stage."""
+        """Content of an OpenUSD stage. Raises AssetError if the asset is not a stage."""
         if self._is_generated(asset_id):
-            raise AssetError(f"asset '{asset_id}': is no stage")
+            raise AssetError(f"asset '{asset_id}': is not a stage")
         return self._files.stage(asset_id)
 
     def mesh(self, asset_id: str) -> MeshData:
-        """Visual geometry. Also for robot links: ``franka_panda/panda_link3``."""
+        """Visual geometry of an object or a robot link: ``franka_panda/panda_link3``.
+
+        Raises:
+            AssetError: if a link has none.
+        """
         mesh = self._imported(asset_id).mesh
         if mesh is None:
-            raise AssetError(f"asset '{asset_id}': is a link that shows nothing")
+            raise AssetError(f"asset '{asset_id}': is a link without visual geometry")
         return mesh
 
     def convex_parts(self, asset_id: str) -> ConvexParts:
-        """Collision geometry, in the frame of the mesh."""
+        """Collision geometry, in the frame of the mesh. Raises AssetError if a link has none."""
         collision = self._imported(asset_id).collision
         if collision is None:
-            raise AssetError(f"asset '{asset_id}': is a link that does not collide")
+            raise AssetError(f"asset '{asset_id}': is a link without collision geometry")
         return collision
 
     def texture(self, texture_id: str) -> TextureData:
@@ -141,18 +144,18 @@ class Library:
         return self._files.texture(texture_id)
 
     def environment(self, environment_id: str) -> Float32:
-        """Equirectangular relative radiance as ``AssetLibrary`` describes it."""
+        """Equirectangular relative radiance; see ``AssetLibrary.environment``."""
         if self._is_generated(environment_id):
             return self._generated.environment(parse_asset_id(environment_id))
         return self._files.environment(environment_id)
 
-    def _of_mesh(self, asset_id: str) -> _Known:
-        """Raises AssetError if there is no mesh."""
-        if asset_id not in self._known:
+    def _summarize(self, asset_id: str) -> _MeshSummary:
+        """Bounds, materials and keypoints. Raises AssetError if there is no mesh."""
+        if asset_id not in self._summaries:
             mesh = self.mesh(asset_id)
             keypoints = self._imported(asset_id).keypoints
-            self._known[asset_id] = _Known(mesh.bounds_m(), mesh.materials, keypoints)
-        return self._known[asset_id]
+            self._summaries[asset_id] = _MeshSummary(mesh.bounds_m(), mesh.materials, keypoints)
+        return self._summaries[asset_id]
 
     def _imported(self, asset_id: str) -> ImportedMesh:
         if self._is_generated(asset_id):
@@ -160,7 +163,7 @@ class Library:
         return self._files.imported(asset_id)
 
     def _is_generated(self, asset_id: str) -> bool:
-        """Whether an id is computed or read. Raises AssetError if there is no such asset."""
+        """Whether an asset is procedural. Raises UnknownAsset if there is no such asset."""
         name = asset_id.partition("?")[0]
         if name in self._generated:
             return True
@@ -169,7 +172,7 @@ class Library:
         raise UnknownAsset(f"asset '{asset_id[:120]}': {self._nearest(asset_id[:120])}", asset_id)
 
     def _nearest(self, asset_id: str) -> str:
-        """The assets whose ids are like one that does not exist, and those that the user has."""
+        """Suggestions for an unknown id: similar ids, else the content of the user's folders."""
         known = [*self._generated.names(), *self._files.names()]
         ours = [name for name in known if name.startswith("user/")]
         near = did_you_mean(f"user/{asset_id.removeprefix('user/')}", ours) or did_you_mean(
@@ -177,14 +180,14 @@ class Library:
         )
         counts = self._files.user_counts()
         if near or not (counts or asset_id.startswith("user/")):
-            return f"there is none{near}"
+            return f"unknown{near}"
         held = ", ".join(f"{count} {kind}s" for kind, count in sorted(counts.items())) or "nothing"
         some = f": {', '.join(ours[:3])}{', ...' if len(ours) > 3 else ''}" if ours else ""
-        return f"there is none; your asset folders hold {held}{some}"
+        return f"unknown; your asset folders hold {held}{some}"
 
 
 def default_cache_dir() -> Path:
-    """The user's cache folder for this program."""
+    """Cache folder of this program for the current user."""
     from platformdirs import user_cache_path
 
     return user_cache_path("gen-data")

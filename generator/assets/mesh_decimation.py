@@ -1,4 +1,4 @@
-"""Fewer triangles, the same shape."""
+"""Mesh decimation by quadric edge collapse."""
 
 from __future__ import annotations
 
@@ -6,22 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.assets.dedup import first_occurrences
-from gen_data.generator.assets.triangle_soup import Float64, TriangleSoup, join_soups
+from gen_data.generator.assets.triangle_soup import (
+    Float64,
+    TriangleSoup,
+    first_occurrences,
+    join_soups,
+)
 
-_CALM = 3.0
-"""How boldly edges are collapsed, from 1 to 10: slower and smoother than the library's 7."""
-_TOLERATED = 1.25
-"""Times the budget."""
-_FEW = 40
-"""Materials of so few triangles are left alone: each one may be a whole side of a box."""
+_AGGRESSIVENESS = 3.0
+"""From 1 to 10; slower but smoother than the library's default 7."""
+_MAX_OVERSHOOT = 1.25
+"""Largest tolerated number of triangles, as a multiple of the budget."""
+_MIN_FACES = 40
+"""Materials with at most this many triangles stay: each may be a whole side of a box."""
 
 
 def decimate(soup: TriangleSoup, max_faces: int) -> TriangleSoup:
-    """About ``max_faces`` triangles by quadric edge collapse; normals are lost.
+    """Reduce a soup to about ``max_faces`` triangles; normals and groups are lost.
 
-    Each material is thinned out by itself, by the same share, and its border stays as it is: no
-    colour moves and no gap opens. So do the seams of textures. Groups are lost.
+    Each material is decimated separately, in proportion, with fixed borders and texture seams, so
+    that no colour moves and no gap opens.
 
     Source: Garland and Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH
     1997.
@@ -31,22 +35,22 @@ def decimate(soup: TriangleSoup, max_faces: int) -> TriangleSoup:
     first_slot = np.array([materials.index(material) for material in materials])[soup.face_slots]
     parts = []
     for k in np.unique(first_slot):
-        slot, chosen = soup.slots[k], soup.kept(first_slot == k)
+        slot, chosen = soup.slots[k], soup.select(first_slot == k)
         corners, uvs = chosen.corners, chosen.uvs if slot.material.texture else None
-        if len(chosen) > _FEW:
-            corners, uvs = _collapsed(corners, uvs, max(int(len(chosen) * share), _FEW))
+        if len(chosen) > _MIN_FACES:
+            corners, uvs = _collapse_edges(corners, uvs, max(int(len(chosen) * share), _MIN_FACES))
         parts.append(replace(TriangleSoup.of(corners, slot), uvs=uvs))
     return replace(join_soups(parts), face_groups=np.zeros(sum(map(len, parts)), dtype=np.int64))
 
 
-def _collapsed(
+def _collapse_edges(
     corners: Float64, uvs: Float64 | None, max_faces: int
 ) -> tuple[Float64, Float64 | None]:
-    """Corners and UVs of fewer triangles. Corners that differ in UV are never taken for one."""
+    """Corners [m, 3, 3] and UVs after the collapse; corners with different UVs stay separate."""
     import fast_simplification
 
     flat = corners.reshape(-1, 3)
-    # Scaled to unit size: the collapse compares with absolute thresholds.
+    # Scaled to unit size, because the collapse uses absolute thresholds.
     low = flat.min(axis=0)
     scale = float((flat.max(axis=0) - low).max())
     unit = (flat - low) / scale
@@ -59,21 +63,21 @@ def _collapsed(
         points,
         triangles,
         target_count=max_faces,
-        agg=_CALM,
+        agg=_AGGRESSIVENESS,
         return_collapses=True,
         preserve_border=True,
     )
     if uvs is None:
-        if len(faces) > _TOLERATED * max_faces:
-            # Loose sheets are all border: then borders have to give way, too.
+        if len(faces) > _MAX_OVERSHOOT * max_faces:
+            # Loose sheets consist of borders only; these must be collapsed, too.
             fewer_points, faces = fast_simplification.simplify(
-                fewer_points, faces.astype(np.int32), target_count=max_faces, agg=_CALM
+                fewer_points, faces.astype(np.int32), target_count=max_faces, agg=_AGGRESSIVENESS
             )
-        return _placed(fewer_points, scale, low)[faces], None
-    # Where each vertex went. (The points of a replay are single precision: unfit.)
+        return _restore_scale(fewer_points, scale, low)[faces], None
+    # The replay yields the target of each vertex; its points are single precision and not used.
     _, _, merged = fast_simplification.replay_simplification(points, triangles, collapses)
-    # Borders of the charts stay, so that all that was merged lies in one chart; what lay nearest
-    # to where they met counts most.
+    # Chart borders are fixed, so merged vertices lie in one chart and their UVs can be averaged,
+    # weighted by inverse squared distance; the epsilon keeps unmoved vertices finite.
     square = ((points - fewer_points[merged]) ** 2).sum(axis=1)
     weights = 1.0 / (square + 1e-8)
     sums = np.zeros((len(fewer_points), 3))
@@ -82,9 +86,9 @@ def _collapsed(
         sums, merged, np.concatenate([own, np.ones((len(own), 1))], axis=1) * weights[:, None]
     )
     mean: Float64 = (sums[:, :2] / sums[:, 2:])[faces]
-    return _placed(fewer_points, scale, low)[faces], mean
+    return _restore_scale(fewer_points, scale, low)[faces], mean
 
 
-def _placed(unit: Float64, scale: float, low: Float64) -> Float64:
+def _restore_scale(unit: Float64, scale: float, low: Float64) -> Float64:
     placed: Float64 = unit.astype(np.float64) * scale + low
     return placed

@@ -1,8 +1,8 @@
-"""The normal form of meshes, and how triangle soup takes it.
+"""Conversion of triangle soup to the normal form of meshes.
 
-Metres, Z up, counter-clockwise outward; vertices are welded, then split along creases, UV seams and
-nothing else; degenerate and duplicate triangles are gone. All steps are stable sorts and plain
-arithmetic, so that the same file gives the same bytes on every processor.
+Metres, Z up, counter-clockwise outward; vertices are welded, then split at creases and UV seams
+only; degenerate and duplicate triangles are removed. All steps are stable sorts and plain
+arithmetic, so that a file yields the same bytes on every processor.
 """
 
 from __future__ import annotations
@@ -12,49 +12,39 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.assets.dedup import first_occurrences
 from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.triangle_soup import Float64, Int64, TriangleSoup
+from gen_data.generator.assets.triangle_soup import Float64, Int64, TriangleSoup, first_occurrences
 from gen_data.generator.core.asset_types import Material, MeshData
 from gen_data.generator.core.errors import AssetError
 
 CREASE_DEG = 40.0
+MAX_FACES = 20_000
 MAX_TEXTURED_FACES = 1_000_000
 _MIN_EXTENT_M, _MAX_EXTENT_M, _MAX_COORDINATE_M = 1e-4, 1e3, 1e4
 _MAX_UV = 1e4
 _WELD = 1e-6
-"""Vertices nearer than this fraction of the largest extent are one."""
+"""Welding distance, as a share of the largest extent."""
 
 
-@dataclass(frozen=True)
-class NormalForm:
-    """Parameters of the import.
+def normal_form(
+    soup: TriangleSoup, place: str, max_faces: int = MAX_FACES, crease_deg: float = CREASE_DEG
+) -> MeshData:
+    """Convert a soup in metres, Z up, to a mesh.
 
-    Attributes:
-        crease_deg: Edges whose faces differ by more in direction stay sharp.
-        max_faces: Triangle budget.
-    """
-
-    crease_deg: float = CREASE_DEG
-    max_faces: int = 20_000
-
-
-def normal_form(soup: TriangleSoup, place: str, form: NormalForm = NormalForm()) -> MeshData:
-    """The mesh of a soup that is in metres and Z up already.
-
-    The file's own normals are kept where they agree with the triangles and round them off at all;
-    else normals are computed anew.
+    The file's normals are kept if they agree with the triangles and are not all flat; otherwise
+    normals are computed.
 
     Args:
         soup: Triangles; ``Material.texture`` empty or a texture id.
-        place: What error messages call it.
-        form: Parameters of the import.
+        place: Name of the mesh in error messages.
+        max_faces: Triangle budget.
+        crease_deg: Edges with a larger angle between the faces' normals stay sharp.
 
     Raises:
         AssetError: if nothing usable is left, or the size is out of bounds.
     """
     check_coordinates(soup, place)
-    soup, faces = _welded(soup)
+    soup, faces = _weld(soup)
     if not len(soup):
         raise AssetError(f"{place}: all its triangles are degenerate; export it again")
     textured = any(slot.material.texture for slot in soup.slots)
@@ -62,21 +52,21 @@ def normal_form(soup: TriangleSoup, place: str, form: NormalForm = NormalForm())
         raise AssetError(
             f"{place}: {len(soup)} textured triangles, at most {MAX_TEXTURED_FACES}; decimate it"
         )
-    if len(soup) > form.max_faces:
-        soup, faces = _welded(decimate(soup, form.max_faces))
-    soup, faces = _outward(soup, faces)
-    soup = replace(soup, uvs=_sane_uvs(soup.uvs) if textured else None)
-    own = _sane_normals(soup)
-    return make_mesh(soup, _creased(soup, faces, form.crease_deg) if own is None else own)
+    if len(soup) > max_faces:
+        soup, faces = _weld(decimate(soup, max_faces))
+    soup, faces = _orient_outward(soup, faces)
+    soup = replace(soup, uvs=_reset_invalid_uvs(soup.uvs) if textured else None)
+    own = _valid_normals(soup)
+    return make_mesh(soup, _crease_normals(soup, faces, crease_deg) if own is None else own)
 
 
-def _sane_uvs(uvs: Float64 | None) -> Float64 | None:
-    """UVs; those that no repetition explains, which exporters leave on loose corners, are zero."""
+def _reset_invalid_uvs(uvs: Float64 | None) -> Float64 | None:
+    """Set UVs far beyond any repetition to zero: exporters write such values on unused corners."""
     return None if uvs is None else np.where(np.abs(uvs) > _MAX_UV, 0.0, uvs)
 
 
 def check_coordinates(soup: TriangleSoup, place: str) -> None:
-    """The post-conditions that loaders which fail softly leave open.
+    """Check coordinates; readers accept any numbers.
 
     Raises:
         AssetError: if the soup is empty, not finite, too small, too large or far from the origin.
@@ -101,13 +91,13 @@ def check_coordinates(soup: TriangleSoup, place: str) -> None:
 
 
 def make_mesh(soup: TriangleSoup, normals: Float64) -> MeshData:
-    """Indexed mesh of triangles with unit normals [m, 3, 3]; equal corners become one vertex."""
-    slots, slot_of = _merged_slots(soup)
+    """Build an indexed mesh from a soup and unit normals [m, 3, 3]; equal corners are merged."""
+    slots, slot_of = _merge_slots(soup)
     uvs = np.zeros((len(soup), 3, 2)) if soup.uvs is None else soup.uvs
-    # On grids much finer than anything that is seen, so that noise does not split vertices.
+    # Rounded to grids finer than any visible detail, so that noise does not split vertices.
     keys = np.concatenate(
         [
-            np.rint(soup.corners.reshape(-1, 3) / _grid(soup.corners)).astype(np.int64),
+            np.rint(soup.corners.reshape(-1, 3) / _grid_size(soup.corners)).astype(np.int64),
             np.rint(normals.reshape(-1, 3) * 1e4).astype(np.int64),
             np.rint(uvs.reshape(-1, 2) * 1e6).astype(np.int64),
         ],
@@ -127,13 +117,13 @@ def make_mesh(soup: TriangleSoup, normals: Float64) -> MeshData:
     return mesh
 
 
-def _grid(corners: Float64) -> float:
+def _grid_size(corners: Float64) -> float:
     points = corners.reshape(-1, 3)
     return max(float((points.max(axis=0) - points.min(axis=0)).max()) * _WELD, 1e-12)
 
 
-def _merged_slots(soup: TriangleSoup) -> tuple[tuple[Material, ...], Int64]:
-    """Distinct materials that occur, and the slot of each of the soup's."""
+def _merge_slots(soup: TriangleSoup) -> tuple[tuple[Material, ...], Int64]:
+    """Distinct used materials, and the new slot number of each old slot."""
     used = np.bincount(soup.face_slots, minlength=len(soup.slots)) > 0
     materials: dict[Material, int] = {}
     slot_of = np.zeros(len(soup.slots), dtype=np.int64)
@@ -143,35 +133,35 @@ def _merged_slots(soup: TriangleSoup) -> tuple[tuple[Material, ...], Int64]:
     return tuple(materials), slot_of
 
 
-def _welded(soup: TriangleSoup) -> tuple[TriangleSoup, Int64]:
-    """The soup without degenerate and duplicate triangles, and its faces over welded vertices."""
+def _weld(soup: TriangleSoup) -> tuple[TriangleSoup, Int64]:
+    """Drop degenerate and duplicate triangles; return the rest and its welded faces [m, 3]."""
     points = soup.corners.reshape(-1, 3)
-    vertex, first = first_occurrences(np.rint(points / _grid(soup.corners)).astype(np.int64))
+    vertex, first = first_occurrences(np.rint(points / _grid_size(soup.corners)).astype(np.int64))
     faces = vertex.reshape(-1, 3)
     distinct = (
         (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     )
     soup = replace(soup, corners=points[first][faces])
     distinct &= (face_crosses(soup.corners) != 0.0).any(axis=1)
-    soup, faces = soup.kept(distinct), faces[distinct]
+    soup, faces = soup.select(distinct), faces[distinct]
     if not len(faces):
         return soup, faces
     _, originals = first_occurrences(np.sort(faces, axis=1, kind="stable"))
     chosen = np.zeros(len(faces), dtype=bool)
     chosen[originals] = True
-    return soup.kept(chosen), faces[chosen]
+    return soup.select(chosen), faces[chosen]
 
 
 def face_crosses(corners: Float64) -> Float64:
-    """Cross products of two edges [m, 3]: the normal, twice as long as the area."""
+    """Cross product of two edges of each triangle [m, 3]: normals of twice the area's length."""
     crosses: Float64 = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return crosses
 
 
 def corner_angles(corners: Float64) -> Float64:
     """Angle [rad] at each corner of each triangle, [m, 3]."""
-    ahead = _unit(np.roll(corners, -1, axis=1) - corners)
-    behind = _unit(np.roll(corners, 1, axis=1) - corners)
+    ahead = _normalize(np.roll(corners, -1, axis=1) - corners)
+    behind = _normalize(np.roll(corners, 1, axis=1) - corners)
     cosines = np.clip((ahead * behind).sum(axis=2), -1.0, 1.0)
     # Rounded, because the last bits of arccos differ between processors.
     angles: Float64 = np.round(np.arccos(cosines), 6)
@@ -180,19 +170,19 @@ def corner_angles(corners: Float64) -> Float64:
 
 @dataclass(frozen=True, eq=False)
 class _Edges:
-    """Edges shared by exactly two faces.
+    """Edges that exactly two faces share.
 
     Attributes:
         corners: int64 [e, 2, 2]: for each of the two faces, the corner numbers ``3 * face + k`` at
             the edge's smaller and larger vertex.
-        opposed: bool [e]: the faces run along the edge in opposite directions, as they should.
+        opposed: bool [e]: the faces traverse the edge in opposite directions (consistent winding).
     """
 
     corners: Int64
     opposed: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
-def _edges(faces: Int64) -> _Edges:
+def _find_edges(faces: Int64) -> _Edges:
     start = np.arange(faces.size)
     end = start - start % 3 + (start + 1) % 3
     flat = faces.reshape(-1)
@@ -203,7 +193,7 @@ def _edges(faces: Int64) -> _Edges:
     same = (a[1:] == a[:-1]) & (b[1:] == b[:-1])
     before = np.concatenate([[False], same])
     after = np.concatenate([same, [False]])
-    # A pair: equal to the next edge, and neither to the one before nor to the one after that.
+    # A pair equals the next edge, but neither the previous one nor the one after the next.
     after_next = np.concatenate([after[1:], [False]])
     pair = np.flatnonzero(after & ~before & ~after_next)
     one, two = order[pair], order[pair + 1]
@@ -211,16 +201,16 @@ def _edges(faces: Int64) -> _Edges:
     return _Edges(corners, forward[one] != forward[two])
 
 
-def _outward(soup: TriangleSoup, faces: Int64) -> tuple[TriangleSoup, Int64]:
-    """Triangles with one winding per connected piece, outward if the whole encloses space."""
-    edges = _edges(faces)
+def _orient_outward(soup: TriangleSoup, faces: Int64) -> tuple[TriangleSoup, Int64]:
+    """Make winding consistent per connected piece, and outward if the surface is closed."""
+    edges = _find_edges(faces)
     flip = np.zeros(len(faces), dtype=bool)
     if not edges.opposed.all():
         flip = _winding_flips(len(faces), edges)
-        soup, faces = _flipped(soup, faces, flip)
+        soup, faces = _flip_faces(soup, faces, flip)
     watertight = 2 * len(edges.corners) == faces.size
     if (watertight or flip.any()) and signed_volume(soup.corners) < 0.0:
-        soup, faces = _flipped(soup, faces, np.ones(len(faces), dtype=bool))
+        soup, faces = _flip_faces(soup, faces, np.ones(len(faces), dtype=bool))
     return soup, faces
 
 
@@ -231,12 +221,12 @@ def signed_volume(corners: Float64) -> float:
 
 
 def _winding_flips(face_count: int, edges: _Edges) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Which faces to turn so that neighbours agree; each piece follows its majority."""
+    """Mask [m] of the faces to flip so that neighbours agree; the majority of a piece stays."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    # Faces doubled into (as is, turned): an edge links equal sides if it is opposed, else unequal
-    # ones. Sides in one component belong together.
+    # Two nodes per face, (as is, flipped): an opposed edge links equal states, any other edge
+    # unequal ones. A connected component is then a consistent choice of states.
     one, two = edges.corners[:, 0, 0] // 3, edges.corners[:, 1, 0] // 3
     other = np.where(edges.opposed, two, two + face_count)
     mirror = np.where(edges.opposed, two + face_count, two)
@@ -244,7 +234,7 @@ def _winding_flips(face_count: int, edges: _Edges) -> np.ndarray[tuple[int], np.
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), (2 * face_count,) * 2)
     count, label = connected_components(graph, directed=False)
     as_is, turned = label[:face_count], label[face_count:]
-    # Where both sides are one component the surface has no consistent winding (Moebius): leave it.
+    # If both states share a component, no consistent winding exists (Moebius strip): no flips.
     votes = np.bincount(as_is, minlength=count)
     flips: np.ndarray[tuple[int], np.dtype[np.bool_]] = (votes[as_is] < votes[turned]) | (
         (votes[as_is] == votes[turned]) & (turned < as_is)
@@ -252,7 +242,7 @@ def _winding_flips(face_count: int, edges: _Edges) -> np.ndarray[tuple[int], np.
     return flips
 
 
-def _flipped(
+def _flip_faces(
     soup: TriangleSoup, faces: Int64, flip: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 ) -> tuple[TriangleSoup, Int64]:
     turned = soup.flipped()
@@ -271,28 +261,27 @@ def _flipped(
     )
 
 
-def _sane_normals(soup: TriangleSoup) -> Float64 | None:
-    """The file's normals, if they point away from their triangles and smooth anything at all."""
+def _valid_normals(soup: TriangleSoup) -> Float64 | None:
+    """The file's unit normals, if they point outward and at least one differs from its face's."""
     if soup.normals is None or not np.isfinite(soup.normals).all():
         return None
-    normals = _unit(soup.normals)
-    agreement = (normals * _unit(face_crosses(soup.corners))[:, None]).sum(axis=2)
+    normals = _normalize(soup.normals)
+    agreement = (normals * _normalize(face_crosses(soup.corners))[:, None]).sum(axis=2)
     return normals if (agreement > 0.2).all() and (agreement < 0.9999).any() else None
 
 
-def _creased(soup: TriangleSoup, faces: Int64, crease_deg: float) -> Float64:
+def _crease_normals(soup: TriangleSoup, faces: Int64, crease_deg: float) -> Float64:
     """Unit normals [m, 3, 3], smooth within pieces of the surface bounded by creases.
 
-    A corner weighs by its triangle's area and its angle: large flats keep their look beside narrow
-    bevels, and how a quad is cut in two does not matter ("weighted normals", as hard-surface
-    modellers have them).
+    Corners are weighted by area and angle ("weighted normals"): large flat faces stay flat beside
+    narrow bevels, and the diagonal of a quad does not matter.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     crosses = face_crosses(soup.corners)
-    units = _unit(crosses)
-    edges = _edges(faces)
+    units = _normalize(crosses)
+    edges = _find_edges(faces)
     one, two = edges.corners[:, 0, 0] // 3, edges.corners[:, 1, 0] // 3
     cosine = (units[one] * units[two]).sum(axis=1)
     smooth = edges.corners[edges.opposed & (cosine > math.cos(math.radians(crease_deg)))]
@@ -303,12 +292,12 @@ def _creased(soup: TriangleSoup, faces: Int64, crease_deg: float) -> Float64:
     sums: Float64 = np.stack(
         [np.bincount(group, weighted[:, k], minlength=count) for k in range(3)], axis=1
     )
-    normals = _unit(sums)[group].reshape(-1, 3, 3)
-    # Where the sum cancels out (a knife's edge), the face's own normal is as good as any.
+    normals = _normalize(sums)[group].reshape(-1, 3, 3)
+    # Where the sum nearly cancels (a knife's edge), use the face's own normal.
     cancelled = (normals * units[:, None]).sum(axis=2) < 0.05
     return np.where(cancelled[..., None], np.broadcast_to(units[:, None], normals.shape), normals)
 
 
-def _unit(vectors: Float64) -> Float64:
+def _normalize(vectors: Float64) -> Float64:
     lengths = np.sqrt((vectors**2).sum(axis=-1, keepdims=True))
     return vectors / np.where(lengths > 0.0, lengths, 1.0)

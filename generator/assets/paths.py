@@ -1,4 +1,4 @@
-"""Where asset packs are installed."""
+"""Location of installed asset packs."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import os
 from pathlib import Path
 
 VARIABLE = "GEN_DATA_ASSETS"
-"""Environment variable that names another folder for installed assets."""
+"""Environment variable with another folder for installed assets."""
 
 
 def packs_dir() -> Path:
-    """The folder that holds one folder per installed asset pack; it need not exist."""
+    """Folder with one subfolder per installed asset pack; it need not exist."""
     chosen = os.environ.get(VARIABLE)
     if chosen:
         return Path(chosen) / "packs"

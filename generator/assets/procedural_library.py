@@ -1,4 +1,4 @@
-"""Assets that are computed: families of objects, textures and environments."""
+"""Procedural assets: families of objects, textures and environments."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
 from gen_data.generator.core.plugins import loaded, package_of, third_party
 
 VERSION = 2
-"""Raised whenever what all families are made with gives other geometry."""
+"""Increased whenever code shared by all families generates different geometry."""
 _MAX_SEED = 2**31 - 1
 _PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
 
@@ -45,55 +45,52 @@ TABLES = (
 KIND = "asset_family"
 """Third-party packages add families through the entry-point group ``gen_data.asset_family``."""
 S = TypeVar("S", bound=Sized)
+F = TypeVar("F", Family, TextureFamily, EnvironmentFamily)
 
 
 class ProceduralLibrary:
-    """The part of the library that needs no file. Names are what ids say before ``?``."""
+    """Part of the library that needs no file. Names are the part of ids before ``?``."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
         self._families: dict[str, AnyFamily] = {
             _PREFIXES[_kind(family)] + name: family
-            for table in _tables()
+            for table in _import_tables()
             for name, family in table.items()
         }
         self._packages: dict[str, str] = {}
-        for name, family, package in _third_party():
+        for name, family, package in _load_third_party():
             full_name = _PREFIXES[_kind(family)] + name
             if full_name not in self._families:
                 self._families[full_name] = family
                 self._packages[full_name] = package
 
     def __contains__(self, name: str) -> bool:
-        """Whether there is a family of that name."""
+        """Whether a family has that name."""
         return name in self._families
 
     def names(self) -> Iterator[str]:
-        """Every id that is offered for selection, and the families that need parameters."""
+        """Yield every id offered for selection, and the names of families that need parameters."""
         for name, family in self._families.items():
-            yield from (
-                (f"{name}?seed={k}" for k in range(family.variants))
-                if (family.variants)
-                else (name,)
-            )
+            yield from [f"{name}?seed={k}" for k in range(family.variants)] or [name]
 
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
-        """Assets offered for selection that are of a kind and carry every tag."""
+        """Yield the assets offered for selection of a kind that have every tag."""
         for name, family in self._families.items():
-            if _kind(family) == kind and tags.issubset(_tags(name, family)):
+            if _kind(family) == kind and tags.issubset(_list_tags(name, family)):
                 for k in range(family.variants):
                     yield self.get(AssetId(name, {"seed": k}))
 
     def get(self, asset_id: AssetId) -> Asset:
-        """The asset of an id whose name is known. Raises AssetError on wrong parameters."""
+        """Describe the asset of an id with a known name. Raises AssetError on wrong parameters."""
         family = self._families[asset_id.name]
-        facts = _facts(asset_id, family)
+        facts = _read_facts(asset_id, family)
         origin = family.origin
         return Asset(
             asset_id=str(asset_id),
             kind=_kind(family),
             category=family.category if isinstance(family, Family) else family.name,
-            tags=_tags(asset_id.name, family),
+            tags=_list_tags(asset_id.name, family),
             licence=origin.licence,
             author=origin.author,
             source=origin.source,
@@ -106,51 +103,48 @@ class ProceduralLibrary:
 
     def imported(self, asset_id: AssetId) -> ImportedMesh:
         """Geometry of an object."""
-        family = self._families[asset_id.name]
-        if not isinstance(family, Family):
-            raise AssetError(f"asset '{asset_id}': is no object but one of kind {_kind(family)}")
+        family = self._find(asset_id, Family, "an object")
 
         def compute() -> ImportedMesh:
-            solid = family.build(**_arguments(asset_id, family))
+            solid = family.build(**_merge_arguments(asset_id, family))
             return ImportedMesh(solid.mesh, solid.collision, {}, solid.keypoints)
 
         return self._result(asset_id, family, compute, pack_imported, unpack_imported)
 
     def texture(self, asset_id: AssetId) -> TextureData:
         """Images of a texture."""
-        family = self._families[asset_id.name]
-        if not isinstance(family, TextureFamily):
-            raise AssetError(f"asset '{asset_id}': is no texture but one of kind {_kind(family)}")
+        family = self._find(asset_id, TextureFamily, "a texture")
+        arguments = _merge_arguments(asset_id, family)
         return self._result(
-            asset_id,
-            family,
-            lambda: family.build(**_arguments(asset_id, family)),
-            pack_texture,
-            unpack_texture,
+            asset_id, family, lambda: family.build(**arguments), pack_texture, unpack_texture
         )
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
-        family = self._families[asset_id.name]
-        if not isinstance(family, EnvironmentFamily):
-            raise AssetError(
-                f"asset '{asset_id}': is no environment but one of kind {_kind(family)}"
-            )
+        family = self._find(asset_id, EnvironmentFamily, "an environment")
+        arguments = _merge_arguments(asset_id, family)
         return self._result(
             asset_id,
             family,
-            lambda: family.build(**_arguments(asset_id, family)),
+            lambda: family.build(**arguments),
             lambda radiance: {"radiance": radiance},
             lambda arrays: arrays["radiance"],
         )
+
+    def _find(self, asset_id: AssetId, kind: type[F], expected: str) -> F:
+        """The id's family. Raises AssetError if it is of another kind."""
+        family = self._families[asset_id.name]
+        if not isinstance(family, kind):
+            raise AssetError(f"asset '{asset_id}': is of kind {_kind(family)}, not {expected}")
+        return family
 
     def _result(
         self,
         asset_id: AssetId,
         family: AnyFamily,
         compute: Callable[[], S],
-        packed: Callable[[S], Arrays],
-        unpacked: Callable[[Arrays], S],
+        pack: Callable[[S], Arrays],
+        unpack: Callable[[Arrays], S],
     ) -> S:
         key = self._key(asset_id, family)
         offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
@@ -158,12 +152,12 @@ class ProceduralLibrary:
         try:
             if not stored:
                 return self._store.computed(key, compute)
-            return self._store.get(key, lambda: packed(compute()), unpacked)
+            return self._store.get(key, lambda: pack(compute()), unpack)
         except ValueError as error:
-            raise AssetError(f"asset '{asset_id}': cannot be made: {error}") from error
+            raise AssetError(f"asset '{asset_id}': {error}") from error
 
     def _key(self, asset_id: AssetId, family: AnyFamily) -> str:
-        arguments = _arguments(asset_id, family)
+        arguments = _merge_arguments(asset_id, family)
         parameters = {name: format_parameter(value) for name, value in arguments.items()}
         content = {
             "family": asset_id.name,
@@ -176,7 +170,7 @@ class ProceduralLibrary:
         return content_key(content)
 
 
-def _tables() -> Iterator[Mapping[str, AnyFamily]]:
+def _import_tables() -> Iterator[Mapping[str, AnyFamily]]:
     for name in TABLES:
         module = importlib.import_module(name)
         for table in ("FAMILIES", "TEXTURES", "ENVIRONMENTS"):
@@ -184,28 +178,28 @@ def _tables() -> Iterator[Mapping[str, AnyFamily]]:
 
 
 @cache
-def _third_party() -> tuple[tuple[str, AnyFamily, str], ...]:
+def _load_third_party() -> tuple[tuple[str, AnyFamily, str], ...]:
     """Name, family and package of every entry point of the group ``gen_data.asset_family``.
 
     Raises:
-        ConfigError: one of them cannot be imported, or is no family.
+        ConfigError: one of them cannot be imported, or is not a family.
     """
     found = []
     for name, entry in sorted(third_party(KIND).items()):
         family = loaded(entry.value, f"{KIND} '{name}'")
         if not isinstance(family, (Family, TextureFamily, EnvironmentFamily)):
             raise ConfigError(
-                f"{KIND} '{name}': {entry.value} is no Family, TextureFamily or EnvironmentFamily;"
-                " see gen_data.generator.assets.procedural.family"
+                f"{KIND} '{name}': {entry.value} is not a Family, TextureFamily or "
+                "EnvironmentFamily; see gen_data.generator.assets.procedural.family"
             )
         found.append((name, family, package_of(entry)))
     return tuple(found)
 
 
-def _facts(asset_id: AssetId, family: AnyFamily) -> Facts:
+def _read_facts(asset_id: AssetId, family: AnyFamily) -> Facts:
     if not isinstance(family, Family) or family.facts is None:
         return Facts()
-    return family.facts(**_arguments(asset_id, family))
+    return family.facts(**_merge_arguments(asset_id, family))
 
 
 def _kind(family: AnyFamily) -> Any:
@@ -214,18 +208,18 @@ def _kind(family: AnyFamily) -> Any:
     return "texture" if isinstance(family, TextureFamily) else "environment"
 
 
-def _tags(name: str, family: AnyFamily) -> tuple[str, ...]:
-    """Its own tags, its name and its category as one word."""
+def _list_tags(name: str, family: AnyFamily) -> tuple[str, ...]:
+    """Sorted tags of a family: its own, its name, and its category as one word."""
     category = family.category if isinstance(family, Family) else family.name
     words = {*family.tags, name.rpartition("/")[2], category.replace(" ", "_"), "procedural"}
     return tuple(sorted(words))
 
 
-def _arguments(asset_id: AssetId, family: AnyFamily) -> dict[str, Any]:
+def _merge_arguments(asset_id: AssetId, family: AnyFamily) -> dict[str, Any]:
     """Every parameter of a family's function, from the id or by default.
 
     Raises:
-        AssetError: if the id has a parameter that the family has not, or of another type.
+        AssetError: if the id has an unknown parameter, or one of the wrong type.
     """
     defaults: dict[str, Any] = dict(family.parameters)
     if family.variants or not isinstance(family, Family):
@@ -236,18 +230,20 @@ def _arguments(asset_id: AssetId, family: AnyFamily) -> dict[str, Any]:
                 f"asset '{asset_id}': '{asset_id.name}' has no parameter '{key}'"
                 f"{did_you_mean(key, defaults)}; expected {', '.join(sorted(defaults)) or 'none'}"
             )
-        defaults[key] = _like(asset_id, key, value, defaults[key])
+        defaults[key] = _check_type(asset_id, key, value, defaults[key])
     return defaults
 
 
-def _like(asset_id: AssetId, key: str, value: ParameterValue, default: Any) -> ParameterValue:
-    """The value, if it is of the default's type; whole numbers serve as fractions."""
+def _check_type(asset_id: AssetId, key: str, value: ParameterValue, default: Any) -> ParameterValue:
+    """Check that a value has the default's type; convert integers to float where needed."""
     if key == "seed" and not (isinstance(value, int) and 0 <= value <= _MAX_SEED):
-        raise AssetError(f"asset '{asset_id}': seed is not a whole number from 0 to {_MAX_SEED}")
+        raise AssetError(f"asset '{asset_id}': seed is not an integer from 0 to {_MAX_SEED}")
     if isinstance(default, tuple):
         if isinstance(value, tuple) and len(value) == len(default):
             return value
-        raise AssetError(f"asset '{asset_id}': {key} expects {len(default)} numbers with commas")
+        raise AssetError(
+            f"asset '{asset_id}': {key} expects {len(default)} comma-separated numbers"
+        )
     if isinstance(default, str) != isinstance(value, str) or isinstance(value, tuple):
         expected = "a word" if isinstance(default, str) else "a number"
         raise AssetError(f"asset '{asset_id}': {key} expects {expected}")

@@ -1,4 +1,4 @@
-"""From a URDF and its entry to a RobotModel."""
+"""Robot models from a URDF and its index entry."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.kinematics import POSITION_DECIMALS, finger_links, positions_of
 from gen_data.generator.core.se3 import SE3
 
-_SLACK = 10.0**-POSITION_DECIMALS
-"""Positions that differ by less are the same [rad or m]."""
+_TOLERANCE = 10.0**-POSITION_DECIMALS
+"""Tolerance when comparing positions [rad or m]."""
 
 
 def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> RobotModel:
-    """Kinematics of a robot; link ``l`` looks and collides as asset ``<robot id>/l``.
+    """Kinematics of a robot; asset ``<robot id>/l`` is the geometry of link ``l``.
 
     Raises:
-        AssetError: if the entry names joints or links that the URDF lacks, or a position beyond
-            its joint's limits.
+        AssetError: if the entry names unknown joints or links, or a position outside its joint's
+            limits.
     """
     _check_names(urdf, entry, place)
     robot = RobotModel(
@@ -28,11 +28,11 @@ def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> Rob
         joints=urdf.joints,
         visuals={n: f"{robot_id}/{n}" for n, link in urdf.links.items() if link.visuals},
         collisions={n: f"{robot_id}/{n}" for n, link in urdf.links.items() if link.collisions},
-        home=_home(urdf, entry, place),
-        gripper=_gripper(entry),
+        home=_home_positions(urdf, entry, place),
+        gripper=_make_gripper(entry),
         no_collide=frozenset(),
     )
-    return replace(robot, no_collide=frozenset(_touching_pairs(robot) | set(entry.touching)))
+    return replace(robot, no_collide=frozenset(_permanent_contacts(robot) | set(entry.touching)))
 
 
 def _check_names(urdf: Urdf, entry: RobotEntry, place: str) -> None:
@@ -49,32 +49,32 @@ def _check_names(urdf: Urdf, entry: RobotEntry, place: str) -> None:
         for name in names:
             if name not in known:
                 raise AssetError(
-                    f"{place}: it has no {what} '{name}'{did_you_mean(name, known)}; "
+                    f"{place}: no {what} '{name}'{did_you_mean(name, known)}; "
                     f"correct the entry '{entry.id}' of the asset index"
                 )
 
 
-def _home(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, ...]:
-    """A position per movable joint; joints that mimic others follow them.
+def _home_positions(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, ...]:
+    """Home position of every movable joint; mimic joints follow their leaders.
 
     Raises:
-        AssetError: if a position is beyond its joint's limits, or the entry gives a position to a
-            joint that follows another and is elsewhere then.
+        AssetError: if a position is outside its joint's limits, or the entry gives a mimic joint a
+            position that contradicts its leader's.
     """
     movable = [joint for joint in urdf.joints if joint.movable]
     given = {j.name: entry.home.get(j.name, _default_position(j)) for j in movable if not j.mimic}
     positions = positions_of(urdf.joints, given)
     for joint, position in zip(movable, positions, strict=True):
         correct = f"correct the entry '{entry.id}' of the asset index"
-        if not joint.lower - _SLACK <= position <= joint.upper + _SLACK:
+        if not joint.lower - _TOLERANCE <= position <= joint.upper + _TOLERANCE:
             raise AssetError(
                 f"{place}: home position {position} of joint '{joint.name}' is not within "
                 f"[{joint.lower}, {joint.upper}]; {correct}"
             )
-        if abs(entry.home.get(joint.name, position) - position) > _SLACK:
+        if abs(entry.home.get(joint.name, position) - position) > _TOLERANCE:
             raise AssetError(
-                f"{place}: home position {entry.home[joint.name]} of joint '{joint.name}', which "
-                f"mimics '{joint.mimic}' and is at {position:g} then; {correct}"
+                f"{place}: home position {entry.home[joint.name]} of joint '{joint.name}' "
+                f"contradicts {position:g} by its leader '{joint.mimic}'; {correct}"
             )
     return positions
 
@@ -83,7 +83,7 @@ def _default_position(joint: Joint) -> float:
     return 0.0 if joint.lower <= 0.0 <= joint.upper else 0.5 * (joint.lower + joint.upper)
 
 
-def _gripper(entry: RobotEntry) -> Gripper | None:
+def _make_gripper(entry: RobotEntry) -> Gripper | None:
     if entry.gripper is None:
         return None
     return Gripper(
@@ -95,8 +95,8 @@ def _gripper(entry: RobotEntry) -> Gripper | None:
     )
 
 
-def _touching_pairs(robot: RobotModel) -> set[tuple[str, str]]:
-    """Pairs of links in one rigid piece, in pieces that a joint connects, and in the fingers."""
+def _permanent_contacts(robot: RobotModel) -> set[tuple[str, str]]:
+    """Link pairs within a rigid group, within adjacent groups, and within the gripper."""
     piece = {robot.links[0]: 0}
     connected: set[tuple[int, int]] = set()
     for joint in robot.joints:
@@ -110,6 +110,6 @@ def _touching_pairs(robot: RobotModel) -> set[tuple[str, str]]:
         for b in names[k + 1 :]
         if piece[a] == piece[b] or (piece[a], piece[b]) in connected
     }
-    # The bars of a linkage overlap where pins join them.
+    # The bars of a finger linkage overlap at their pins.
     fingers = finger_links(robot)
     return pairs | {(a, b) for k, a in enumerate(fingers) for b in fingers[k + 1 :]}

@@ -1,29 +1,38 @@
-"""Textures that are made of several images: which image, and which of its channels, says what."""
+"""Textures made of several images, and the image channels they use."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from urllib.parse import quote, unquote
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gen_data.generator.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
 from gen_data.generator.core.asset_types import TextureData, UInt8
 
 _MARK = "maps;"
+HOLES_MIN = 0.02
+"""Smallest share of a slot's area in holes for which they are kept."""
+# Barycentric weights of sample points well inside a triangle: its border may touch a seam.
+_INSIDE = np.array(
+    [[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 0.5], [2, 0.5, 2], [0.5, 2, 2]]
+)
+_WEIGHTS = _INSIDE / _INSIDE.sum(axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, slots=True)
 class TextureMaps:
-    """The images of one material, by the names that readers give them; empty = there is none.
+    """Image names of one material, as readers give them; empty = none.
 
-    All but ``albedo``, ``normal`` and ``emission`` take one channel: ``wood.png!1`` is its green.
+    All but ``albedo``, ``normal`` and ``emission`` use one channel: ``wood.png!1`` is green.
 
     Attributes:
-        albedo, normal, emission: Colours; the first and last in sRGB.
+        albedo, normal, emission: RGB images; albedo and emission in sRGB.
         alpha: Coverage.
         roughness, metallic, occlusion: Factors.
-        cutoff: Coverage in [0, 1] from which on there is no hole.
+        cutoff: Coverage in [0, 1] below which there is a hole.
     """
 
     albedo: str = ""
@@ -36,7 +45,7 @@ class TextureMaps:
     cutoff: float = 0.5
 
     def name(self) -> str:
-        """One name for all of them: that of the albedo if there is nothing else."""
+        """Name that encodes all of them; the albedo's own name if it is the only image."""
         images = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "cutoff"}
         given = {key: image for key, image in images.items() if image}
         if not set(given) - {"albedo"}:
@@ -51,7 +60,7 @@ class TextureMaps:
 
 
 def find_maps(name: str) -> TextureMaps | None:
-    """The maps that a name stands for; None if it is that of a single image."""
+    """Parse the maps encoded in a name; None if it names a single image."""
     if not name.startswith(_MARK):
         return None
     parts = dict(part.partition("=")[::2] for part in name.removeprefix(_MARK).split(";"))
@@ -60,17 +69,18 @@ def find_maps(name: str) -> TextureMaps | None:
 
 
 def compose_texture(maps: TextureMaps, image: Callable[[str], UInt8]) -> TextureData:
-    """The texture of several images, all at the size of the largest.
+    """Compose a texture of several images, all resized to the largest.
 
     Args:
-        maps: Which ones.
-        image: Pixels of an image, uint8 [height, width, 3], or 4 where it has transparency.
+        maps: Names of the images.
+        image: Returns the pixels of an image, uint8 [height, width, 3], or 4 channels if it is
+            transparent.
     """
     pixels = {name: image(name) for name in maps.images()}
     height, width = max((p.shape[:2] for p in pixels.values()), key=lambda s: s[0] * s[1])
 
     def color(name: str) -> UInt8 | None:
-        return _resized(pixels[name][..., :3], width, height) if name else None
+        return _resize(pixels[name][..., :3], width, height) if name else None
 
     def channel(name: str) -> UInt8 | None:
         if not name:
@@ -79,7 +89,7 @@ def compose_texture(maps: TextureMaps, image: Callable[[str], UInt8]) -> Texture
         whole = pixels[file]
         at = int(number or 0)
         full = np.full(whole.shape[:2], 255, np.uint8)
-        return _resized(whole[..., at] if at < whole.shape[2] else full, width, height)
+        return _resize(whole[..., at] if at < whole.shape[2] else full, width, height)
 
     alpha = channel(maps.alpha)
     if alpha is not None:
@@ -97,10 +107,60 @@ def compose_texture(maps: TextureMaps, image: Callable[[str], UInt8]) -> Texture
     )
 
 
-def _resized(image: UInt8, width: int, height: int) -> UInt8:
+def texel_indices(uvs: Float64, shape: tuple[int, ...]) -> tuple[Int64, Int64]:
+    """Rows and columns of the texels at UVs [..., 2] of a repeated image [height, width]."""
+    height, width = shape[:2]
+    columns = np.floor(uvs[..., 0] * width).astype(np.int64) % width
+    rows = np.floor((1.0 - uvs[..., 1]) * height).astype(np.int64) % height
+    return rows, columns
+
+
+def _resize(image: UInt8, width: int, height: int) -> UInt8:
     import cv2
 
     if image.shape[:2] == (height, width):
         return np.ascontiguousarray(image)
     resized: UInt8 = cv2.resize(np.ascontiguousarray(image), (width, height))
     return resized
+
+
+def trim_unreached_holes(soup: TriangleSoup, image: Callable[[str], UInt8]) -> TriangleSoup:
+    """Drop coverage maps whose holes the mesh hardly reaches.
+
+    Texture atlases are transparent around their charts. Faces touch those areas at seams only,
+    where holes would be pinholes; without them the mesh stays solid and renders faster.
+
+    Args:
+        soup: Its slots name images as readers do.
+        image: Returns the pixels of an image, uint8 [height, width, 3 or 4].
+    """
+    slots = [_trim_slot(soup, k, slot, image) for k, slot in enumerate(soup.slots)]
+    return replace(soup, slots=tuple(slots))
+
+
+def _trim_slot(
+    soup: TriangleSoup, number: int, slot: MaterialSlot, image: Callable[[str], UInt8]
+) -> MaterialSlot:
+    maps = find_maps(slot.material.texture)
+    if maps is None or not maps.alpha:
+        return slot
+    name, _, channel = maps.alpha.partition("!")
+    pixels, at = image(name), int(channel or 0)
+    faces = soup.face_slots == number
+    if soup.uvs is not None and at < pixels.shape[2] and faces.any():
+        holes = pixels[..., at] < maps.cutoff * 255.0
+        if _hole_share(soup.corners[faces], soup.uvs[faces], holes) >= HOLES_MIN:
+            return slot
+    solid = replace(maps, alpha="", cutoff=0.5)
+    return replace(slot, material=replace(slot.material, texture=solid.name()))
+
+
+def _hole_share(corners: Float64, uvs: Float64, holes: NDArray[np.bool_]) -> float:
+    """Share of the area of triangles [m, 3, 3] that lies in holes of an image."""
+    rows, columns = texel_indices(
+        np.einsum("sc,mcd->msd", _WEIGHTS, uvs, optimize=False), holes.shape
+    )
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.sqrt((sides * sides).sum(axis=1))
+    face_shares = holes[rows, columns].mean(axis=1)
+    return float((face_shares * areas).sum() / max(float(areas.sum()), 1e-30))

@@ -1,8 +1,10 @@
-"""Triangle soup: what every file format is read into before it takes the normal form."""
+"""Triangle soup: the common intermediate of all mesh formats before the normal form."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,8 @@ from gen_data.generator.core.se3 import Vec3
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
+SEGMENTS = 32
+_BOX_QUADS = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
 
 
 _PLAIN = Material()
@@ -23,11 +27,10 @@ class MaterialSlot:
 
     Attributes:
         name: Its name in the file; empty = unnamed.
-        from_file: Whether the mesh file itself says what it looks like; otherwise whoever refers
-            to the mesh may.
-        declared_color: Linear RGB that the file gives beside an image, though it means nothing
-            there.
-        missing_library: File that should have defined it and is not there; empty = none.
+        from_file: Whether the mesh file itself defines the material; otherwise a file that refers
+            to the mesh may define it.
+        declared_color: Linear RGB that the file gives beside an image, where it has no effect.
+        missing_library: Missing file that should define the material; empty = none.
     """
 
     name: str = ""
@@ -39,14 +42,14 @@ class MaterialSlot:
 
 @dataclass(frozen=True, eq=False)
 class TriangleSoup:
-    """Triangles that share nothing.
+    """Triangles without shared vertices.
 
     Attributes:
         corners: float64 [m, 3, 3]: triangle, corner, xyz, in the unit and axes of the file.
-        uvs: float64 [m, 3, 2], (0, 0) at the image's bottom left; None = there are none.
-        normals: float64 [m, 3, 3] as the file gives them, not checked; None = there are none.
+        uvs: float64 [m, 3, 2], (0, 0) at the image's bottom left; None = none.
+        normals: float64 [m, 3, 3] as in the file, unchecked; None = none.
         face_slots: int64 [m].
-        face_groups: int64 [m]: named object of the file that the triangle belongs to.
+        face_groups: int64 [m]: number of the named object in the file.
         slots: One per value of ``face_slots``.
     """
 
@@ -59,7 +62,7 @@ class TriangleSoup:
 
     @classmethod
     def of(cls, corners: Float64, slot: MaterialSlot | None = None) -> TriangleSoup:
-        """Bare triangles of one slot."""
+        """Make a soup of one slot without UVs and normals from corners [m, 3, 3]."""
         zeros = np.zeros(len(corners), dtype=np.int64)
         return cls(corners, None, None, zeros, zeros, (slot or MaterialSlot(),))
 
@@ -68,18 +71,18 @@ class TriangleSoup:
         return len(self.corners)
 
     def transformed(self, matrix: Float64) -> TriangleSoup:
-        """The soup under an affine map [3, 4]; mirrored triangles are turned the right way out."""
+        """Apply an affine map [3, 4]; mirroring maps also reverse the winding."""
         linear = matrix[:, :3]
         corners = apply_affine(matrix, self.corners)
         normals = self.normals
         if normals is not None:
-            # Normals follow the cofactor matrix, which also exists for singular maps.
+            # Normals transform by the cofactor matrix, which unlike the inverse always exists.
             normals = np.einsum("ij,...j->...i", _cofactors(linear), normals, optimize=False)
         moved = replace(self, corners=corners, normals=normals)
         return moved.flipped() if _determinant(linear) < 0.0 else moved
 
     def flipped(self) -> TriangleSoup:
-        """Every triangle with the opposite winding."""
+        """Reverse the winding of every triangle."""
         return replace(
             self,
             corners=self.corners[:, ::-1],
@@ -87,8 +90,8 @@ class TriangleSoup:
             normals=None if self.normals is None else -self.normals[:, ::-1],
         )
 
-    def kept(self, chosen: NDArray[np.bool_]) -> TriangleSoup:
-        """Some of the triangles."""
+    def select(self, chosen: NDArray[np.bool_]) -> TriangleSoup:
+        """Select triangles by a mask [m]."""
         return replace(
             self,
             corners=self.corners[chosen],
@@ -100,7 +103,7 @@ class TriangleSoup:
 
 
 def apply_affine(matrix: Float64, points: Float64) -> Float64:
-    """Points [..., 3] under an affine map [3, 4] or [4, 4]."""
+    """Map points [..., 3] by an affine matrix [3, 4] or [4, 4]."""
     moved: Float64 = (
         np.einsum("ij,...j->...i", matrix[:3, :3], points, optimize=False) + matrix[:3, 3]
     )
@@ -108,10 +111,9 @@ def apply_affine(matrix: Float64, points: Float64) -> Float64:
 
 
 def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
-    """All triangles of several soups; slots and groups stay apart.
+    """Concatenate soups; their slots and groups stay separate.
 
-    UVs and normals survive where a part has them: missing UVs become zero, missing normals make
-    all normals unknown.
+    If any soup has UVs, missing ones become zero. Normals are kept only if all soups have them.
     """
     if len(soups) == 1:
         return soups[0]
@@ -144,3 +146,56 @@ def _cofactors(m: Float64) -> Float64:
 
 def _determinant(m: Float64) -> float:
     return float((m[0] * np.cross(m[1], m[2])).sum())
+
+
+def first_occurrences(keys: Int64) -> tuple[Int64, Int64]:
+    """Number the distinct rows of ``keys`` [n, k] in order of first occurrence.
+
+    Returns:
+        The number of each row [n], and the index of the first row with each number.
+    """
+    order = np.lexsort(keys.T[::-1])
+    ordered = keys[order]
+    starts = np.concatenate([[True], (ordered[1:] != ordered[:-1]).any(axis=1)])
+    group = np.cumsum(starts) - 1
+    # lexsort is stable: the first row of a group is its first occurrence.
+    first = order[starts]
+    rank_order = np.argsort(first, kind="stable")
+    rank = np.zeros(len(first), dtype=np.int64)
+    rank[rank_order] = np.arange(len(first))
+    numbers = np.zeros(len(keys), dtype=np.int64)
+    numbers[order] = rank[group]
+    return numbers, first[rank_order]
+
+
+def box(size_m: tuple[float, float, float]) -> Float64:
+    """Triangles [12, 3, 3] of a box centred at the origin."""
+    x, y, z = (0.5 * side for side in size_m)
+    corners = np.array([(i * x, j * y, k * z) for k in (-1, 1) for j in (-1, 1) for i in (-1, 1)])
+    return np.array([[corners[i] for i in t] for q in _BOX_QUADS for t in (q[:3], (q[0], *q[2:]))])
+
+
+def cylinder(radius_m: float, length_m: float) -> Float64:
+    """Triangles [4 * SEGMENTS, 3, 3] of a cylinder about Z, centred at the origin."""
+    return _revolve([(0.0, -0.5 * length_m), (radius_m, -0.5 * length_m),
+                      (radius_m, 0.5 * length_m), (0.0, 0.5 * length_m)])  # fmt: skip
+
+
+def sphere(radius_m: float) -> Float64:
+    """Triangles [m, 3, 3] of a sphere centred at the origin."""
+    steps = SEGMENTS // 2
+    angles = [math.pi * (k / steps - 0.5) for k in range(steps + 1)]
+    return _revolve([(radius_m * math.cos(a), radius_m * math.sin(a)) for a in angles])
+
+
+def _revolve(profile: list[tuple[float, float]]) -> Float64:
+    """Triangles of a profile (radius, height), bottom to top, revolved about Z."""
+    triangles: list[tuple[tuple[float, float, float], ...]] = []
+    turns = [2.0 * math.pi * k / SEGMENTS for k in range(SEGMENTS)]
+    ring = [(math.cos(a), math.sin(a)) for a in turns]
+    for (r0, z0), (r1, z1) in pairwise(profile):
+        for (cx, cy), (nx, ny) in zip(ring, [*ring[1:], ring[0]], strict=True):
+            a, b = (r0 * cx, r0 * cy, z0), (r0 * nx, r0 * ny, z0)
+            c, d = (r1 * nx, r1 * ny, z1), (r1 * cx, r1 * cy, z1)
+            triangles += [(a, b, c), (a, c, d)]
+    return np.array(triangles, dtype=np.float64)

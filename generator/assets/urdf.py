@@ -1,7 +1,7 @@
-"""URDF: links, joints, and what they look like.
+"""URDF reader: links, joints and geometry.
 
 Source: ROS wiki, urdf/XML. Document type declarations are refused, so that no entity is ever
-expanded; elements that describe neither kinematics nor geometry are ignored.
+expanded. Elements that describe neither kinematics nor geometry are ignored.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Shape:
         size: Scale of a mesh; edges of a box; (radius, length, 0); (radius, 0, 0).
         T_link_shape: Its pose.
         material: Name of the material; empty = unnamed.
-        color: sRGB of the material; None = none is given.
+        color: sRGB of the material; None = not given.
     """
 
     kind: str
@@ -47,7 +47,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid part and its geometry."""
+    """A rigid link and its geometry."""
 
     name: str
     visuals: tuple[Shape, ...]
@@ -67,7 +67,7 @@ class Urdf:
     joints: tuple[Joint, ...]
 
     def files(self) -> tuple[str, ...]:
-        """Every mesh file it refers to, sorted."""
+        """Every mesh file it refers to, sorted and without duplicates."""
         shapes = [s for link in self.links.values() for s in (*link.visuals, *link.collisions)]
         return tuple(sorted({s.file for s in shapes if s.file}))
 
@@ -80,10 +80,10 @@ class Urdf:
 
 
 def read_urdf(folder: Folder, relative: str) -> Urdf:
-    """The robot in a URDF file.
+    """Read a URDF file.
 
     Raises:
-        AssetError: if it is malformed, is no tree of links, or refers outside the folder.
+        AssetError: if it is malformed, its links form no tree, or it refers outside the folder.
     """
     place = str(folder.root / relative)
     root = parse_xml(folder.read(relative), place, "robot", "a URDF", _MAX_ELEMENTS)
@@ -91,27 +91,28 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
     try:
         colors = dict(_named_colors(root))
         links: dict[str, Link] = {}
-        for name, at in _distinct(root, "link"):
+        for name, at in _iterate_unique(root, "link"):
             shapes = (
-                tuple(_shapes(folder, relative, at, tag, colors)) for tag in ("visual", "collision")
+                tuple(_read_shapes(folder, relative, at, tag, colors))
+                for tag in ("visual", "collision")
             )
             links[name] = Link(name, *shapes)
-        elements = [element for _, element in _distinct(root, "joint")]
+        elements = [element for _, element in _iterate_unique(root, "joint")]
         joints = []
         for at in elements:
-            joints.append(_joint(at))
+            joints.append(_read_joint(at))
         for k, joint in enumerate(joints):
             at = elements[k]
             leader_of(joint, joints)
         at = root
-        return _ordered(links, joints)
+        return _sort_links(links, joints)
     except (ValueError, KeyError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else error
         raise AssetError(f"{place}{place_of(at)}: malformed URDF ({reason}); correct it") from None
 
 
-def _distinct(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
-    """Name and element of every child of a kind."""
+def _iterate_unique(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
+    """Yield name and element of every child of a kind. Raises ValueError for duplicate names."""
     seen: set[str] = set()
     for element in root.findall(tag):
         name = element.attrib["name"]
@@ -124,50 +125,56 @@ def _distinct(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
 
 
 def _named_colors(root: Element) -> Iterator[tuple[str, Vec3]]:
-    """Colours of named materials, wherever they are defined; the first definition counts."""
+    """Yield name and sRGB of all named materials; the first definition comes last and wins."""
     for material in reversed(root.findall(".//material")):
         color = material.find("color")
         if color is not None and material.get("name"):
-            yield material.attrib["name"], _numbers(color.attrib["rgba"], 4)[:3]  # type: ignore[misc]
+            yield material.attrib["name"], _parse_numbers(color.attrib["rgba"], 4)[:3]  # type: ignore[misc]
 
 
-def _shapes(
+def _read_shapes(
     folder: Folder, relative: str, link: Element, tag: str, colors: dict[str, Vec3]
 ) -> Iterator[Shape]:
     for element in link.findall(tag):
         geometry = element.find("geometry")
         if geometry is None or not len(geometry):
             continue
-        shape = _shape(folder, relative, geometry[0], _pose(element.find("origin")))
+        shape = _read_shape(folder, relative, geometry[0], _read_pose(element.find("origin")))
         material = element.find("material")
         if material is not None:
             color = material.find("color")
             name = material.get("name", "")
-            own = _vector(color.attrib["rgba"].rsplit(None, 1)[0]) if color is not None else None
+            own = (
+                _parse_vector(color.attrib["rgba"].rsplit(None, 1)[0])
+                if color is not None
+                else None
+            )
             shape = replace(shape, material=name, color=own or colors.get(name))
         yield shape
 
 
-def _shape(folder: Folder, relative: str, element: Element, pose: SE3) -> Shape:
+def _read_shape(folder: Folder, relative: str, element: Element, pose: SE3) -> Shape:
     get = element.attrib
     if element.tag == "mesh":
-        file = _mesh_file(folder, relative, get["filename"])
+        file = _resolve_mesh(folder, relative, get["filename"])
         scale = get.get("scale", "1 1 1").split()
-        return Shape("mesh", file, _vector(" ".join(scale * 3 if len(scale) == 1 else scale)), pose)
+        return Shape(
+            "mesh", file, _parse_vector(" ".join(scale * 3 if len(scale) == 1 else scale)), pose
+        )
     if element.tag == "box":
-        return Shape("box", "", _vector(get["size"]), pose)
+        return Shape("box", "", _parse_vector(get["size"]), pose)
     if element.tag in ("cylinder", "capsule"):
         return Shape("cylinder", "", (float(get["radius"]), float(get["length"]), 0.0), pose)
     if element.tag == "sphere":
         return Shape("sphere", "", (float(get["radius"]), 0.0, 0.0), pose)
-    raise ValueError(f"geometry <{element.tag[:40]}> is not known")
+    raise ValueError(f"unknown geometry <{element.tag[:40]}>")
 
 
-def _mesh_file(folder: Folder, relative: str, name: str) -> str:
-    """The file that ``package://x/y`` or a relative path means, below the folder.
+def _resolve_mesh(folder: Folder, relative: str, name: str) -> str:
+    """Resolve ``package://x/y`` or a relative path to a file below the folder.
 
-    A package is the folder of that name beside or above the URDF; older descriptions leave the
-    package's name out, so the path is also tried as it stands.
+    A package is the folder of that name beside or above the URDF. Older descriptions omit the
+    package's name, so the path is also tried unchanged.
     """
     if not name.startswith("package://"):
         return folder.refer(relative, name)
@@ -182,7 +189,7 @@ def _mesh_file(folder: Folder, relative: str, name: str) -> str:
     return next((c for c in candidates if folder.exists(c)), candidates[0])
 
 
-def _joint(element: Element) -> Joint:
+def _read_joint(element: Element) -> Joint:
     name, kind = element.attrib["name"], element.attrib["type"]
     if kind not in _KINDS:
         raise ValueError(f"joint '{name[:40]}' is of type '{kind[:40]}', not {sorted(_KINDS)}")
@@ -199,32 +206,34 @@ def _joint(element: Element) -> Joint:
     return Joint(
         name=name,
         kind=kind,  # type: ignore[arg-type]
-        parent=_child(element, "parent"),
-        child=_child(element, "child"),
-        T_parent_joint=_pose(element.find("origin")),
-        axis=(1.0, 0.0, 0.0) if kind == "fixed" or axis is None else _unit(axis.attrib["xyz"]),
+        parent=_linked_name(element, "parent"),
+        child=_linked_name(element, "child"),
+        T_parent_joint=_read_pose(element.find("origin")),
+        axis=(1.0, 0.0, 0.0)
+        if kind == "fixed" or axis is None
+        else _parse_axis(axis.attrib["xyz"]),
         lower=lower,
         upper=upper,
         mimic="" if mimic is None or kind == "fixed" else mimic.attrib["joint"],
         speed_max=0.0 if limit is None else abs(float(limit.get("velocity", 0.0))),
-        mimic_multiplier=1.0 if mimic is None else _number(mimic.get("multiplier", "1")),
-        mimic_offset=0.0 if mimic is None else _number(mimic.get("offset", "0")),
+        mimic_multiplier=1.0 if mimic is None else _parse_number(mimic.get("multiplier", "1")),
+        mimic_offset=0.0 if mimic is None else _parse_number(mimic.get("offset", "0")),
     )
 
 
-def _child(element: Element, tag: str) -> str:
+def _linked_name(element: Element, tag: str) -> str:
     child = element.find(tag)
     if child is None:
         raise ValueError(f"joint '{element.attrib['name'][:40]}' has no {tag}")
     return child.attrib["link"]
 
 
-def _ordered(links: dict[str, Link], joints: list[Joint]) -> Urdf:
-    """Links root first, in the order of the joints. Raises ValueError if they form no tree."""
+def _sort_links(links: dict[str, Link], joints: list[Joint]) -> Urdf:
+    """Sort links depth first from the root. Raises ValueError if they form no tree."""
     by_parent: dict[str, list[Joint]] = {}
     for joint in joints:
         if joint.parent not in links or joint.child not in links:
-            raise ValueError(f"joint '{joint.name[:40]}' joins a link that does not exist")
+            raise ValueError(f"joint '{joint.name[:40]}' refers to a missing link")
         by_parent.setdefault(joint.parent, []).append(joint)
     children = [joint.child for joint in joints]
     roots = [name for name in links if name not in set(children)]
@@ -241,16 +250,20 @@ def _ordered(links: dict[str, Link], joints: list[Joint]) -> Urdf:
     return Urdf({name: links[name] for name in order}, tuple(ordered_joints))
 
 
-def _pose(origin: Element | None) -> SE3:
+def _read_pose(origin: Element | None) -> SE3:
     if origin is None:
         return SE3()
     return SE3(
-        _vector(origin.get("xyz", "0 0 0")), _quaternion(*_vector(origin.get("rpy", "0 0 0")))
+        _parse_vector(origin.get("xyz", "0 0 0")),
+        _quaternion(*_parse_vector(origin.get("rpy", "0 0 0"))),
     )
 
 
 def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Fixed-axis roll, pitch, yaw (URDF) as a quaternion, rounded off its decimal noise."""
+    """Quaternion (w, x, y, z) of fixed-axis roll, pitch, yaw [rad].
+
+    Rounded, because the last bits of sine and cosine differ between C libraries.
+    """
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -259,24 +272,24 @@ def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, fl
     return (round(w, 12), round(x, 12), round(y, 12), round(z, 12))
 
 
-def _unit(text: str) -> Vec3:
-    x, y, z = _vector(text)
+def _parse_axis(text: str) -> Vec3:
+    x, y, z = _parse_vector(text)
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-9:
         raise ValueError("a joint axis of length zero")
     return (x / length, y / length, z / length)
 
 
-def _number(text: str) -> float:
-    return _numbers(text, 1)[0]
+def _parse_number(text: str) -> float:
+    return _parse_numbers(text, 1)[0]
 
 
-def _vector(text: str) -> Vec3:
-    x, y, z = _numbers(text, 3)
+def _parse_vector(text: str) -> Vec3:
+    x, y, z = _parse_numbers(text, 3)
     return (x, y, z)
 
 
-def _numbers(text: str, count: int) -> tuple[float, ...]:
+def _parse_numbers(text: str, count: int) -> tuple[float, ...]:
     numbers = tuple(float(word) for word in text.split())
     if len(numbers) != count or not all(math.isfinite(n) for n in numbers):
         raise ValueError(f"'{text[:40]}' is not {'a number' if count == 1 else f'{count} numbers'}")

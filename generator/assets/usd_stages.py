@@ -1,4 +1,4 @@
-"""A whole OpenUSD stage: where its meshes are, its lights, its cameras."""
+"""Content of an OpenUSD stage: placement of its meshes, lights and cameras."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def is_stage(entry: Entry) -> bool:
 
 
 def stage_model(folder: Folder, entry: MeshEntry, asset_id: str) -> StageModel:
-    """The stage in an entry's file, turned and scaled as the entry says.
+    """Read a stage, oriented and scaled by its entry.
 
     Raises:
         AssetError: if it cannot be read, or the entry gives a size instead of a scale.
     """
     place = str(folder.root / entry.file)
     if entry.size_m is not None:
-        raise AssetError(f"{place}: a stage has no size of its own; give scale, not size_m")
+        raise AssetError(f"{place}: size_m does not apply to a stage; give scale")
     matrix = upright_transform(entry)
     T_model_stage = SE3.from_matrix(matrix)
     entry = entry.model_copy(update={"origin": "center"})
@@ -53,14 +53,17 @@ def stage_model(folder: Folder, entry: MeshEntry, asset_id: str) -> StageModel:
     scale = entry.metres_per_unit()
     return StageModel(
         tuple(pieces),
-        tuple(_placed(light, T_model_stage, scale) for light in lights),
-        tuple((name, _scaled(T_model_stage @ pose, scale)) for name, pose in cameras),
+        tuple(_transform_light(light, T_model_stage, scale) for light in lights),
+        tuple((name, _scale_translation(T_model_stage @ pose, scale)) for name, pose in cameras),
     )
 
 
-def _placed(light: Light, T_model_stage: SE3, scale: float) -> Light:
-    """The light in the model's frame; what it lights, now farther away, is as bright as before."""
-    place = _scaled(T_model_stage @ SE3(light.position_m), scale)
+def _transform_light(light: Light, T_model_stage: SE3, scale: float) -> Light:
+    """Transform a light to the model's frame.
+
+    Intensity grows with the square of the scale, so that the illuminance of the scaled scene stays.
+    """
+    place = _scale_translation(T_model_stage @ SE3(light.position_m), scale)
     return replace(
         light,
         position_m=place.translation_m,
@@ -72,6 +75,6 @@ def _placed(light: Light, T_model_stage: SE3, scale: float) -> Light:
     )
 
 
-def _scaled(pose: SE3, scale: float) -> SE3:
+def _scale_translation(pose: SE3, scale: float) -> SE3:
     x, y, z = pose.translation_m
     return replace(pose, translation_m=(scale * x, scale * y, scale * z))

@@ -1,4 +1,4 @@
-"""``gen-data assets``: packs of assets that are fetched once, and the user's own folders."""
+"""``gen-data assets``: installable packs, the asset library, and the user's own folders."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _EVERY = "all"
 
 @click.group()
 def assets() -> None:
-    """Install, list, verify and remove packs of assets; show the library; check own folders."""
+    """Install, list, verify and remove asset packs; show the library; check your own folders."""
 
 
 @assets.command()
@@ -33,9 +33,9 @@ def assets() -> None:
     "--from",
     "archive",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="The package's archive, instead of fetching it; for one pack.",
+    help="Use this archive instead of fetching the package; for a single pack.",
 )
-@click.option("--again", is_flag=True, help="Also what is installed already.")
+@click.option("--again", is_flag=True, help="Reinstall packs that are already installed.")
 def install(names: tuple[str, ...], archive: Path | None, again: bool) -> None:
     """Install packs, or `all`: fetch the pinned package, check its sha256, convert it."""
     from gen_data.generator.assets.paths import packs_dir
@@ -45,28 +45,28 @@ def install(names: tuple[str, ...], archive: Path | None, again: bool) -> None:
 
     packs = PACKS if _EVERY in names else tuple(find_pack(name) for name in names)
     if archive is not None and len(packs) != 1:
-        raise ConfigError(f"--from is the archive of one pack; {len(packs)} packs were named")
+        raise ConfigError(f"--from takes the archive of one pack; {len(packs)} packs were given")
     folder = packs_dir()
     for pack in packs:
         if is_installed(pack, folder) and not again:
-            click.echo(f"{pack.name}: {pack.source} is installed")
+            click.echo(f"{pack.name}: {pack.source} is already installed")
             continue
         started_s = time.perf_counter()
         record = install_pack(pack, folder, archive)
         click.echo(
-            f"{pack.name}: {pack.source}, {len(record.files)} files, {_mb(record.size)}, "
+            f"{pack.name}: {pack.source}, {len(record.files)} files, {_format_mb(record.size)}, "
             f"{time.perf_counter() - started_s:.0f} s, licence {pack.licence}"
         )
-        _prepare(pack.name)
+        _warm_cache(pack.name)
 
 
 @assets.command("list")
 @click.argument("tags", nargs=-1)
 @click.option("--folder", "folders", multiple=True, type=FOLDER, help="A folder of your assets.")
 def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
-    """List all packs; with TAGS or --folder, the assets that carry all tags.
+    """List all packs; with TAGS or --folder, the assets that have all tags.
 
-    A folder alone lists what it holds.
+    A folder without tags lists its own assets.
     """
     if tags or folders:
         _list_assets(tags or ("user",), folders)
@@ -82,7 +82,7 @@ def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
         record = records.get(pack.name)
         state = "-"
         if record is not None:
-            state = _mb(record.size) if is_installed(pack, folder) else "out of date"
+            state = _format_mb(record.size) if is_installed(pack, folder) else "out of date"
         click.echo(f"{pack.name:<10} {state:>12}  {pack.summary} ({pack.source}, {pack.licence})")
     click.echo(f"folder: {folder}")
 
@@ -96,7 +96,7 @@ def show(asset_id: str, folders: tuple[Path, ...]) -> None:
 
     library = open_library(folders)
     asset = library.get(asset_id)
-    for name, value in _facts(asset).items():
+    for name, value in _describe_asset(asset).items():
         click.echo(f"{name:<12} {value}")
     if asset.kind != "object":
         return
@@ -113,9 +113,11 @@ def show(asset_id: str, folders: tuple[Path, ...]) -> None:
 
 @assets.command()
 @click.argument("folder", type=FOLDER)
-@click.option("--sheet", type=click.Path(path_type=Path), help="Write pictures of all to this PNG.")
+@click.option(
+    "--sheet", type=click.Path(path_type=Path), help="Write pictures of all assets to this PNG."
+)
 def check(folder: Path, sheet: Path | None) -> None:
-    """Use every asset of your FOLDER once: what it is taken for, and what is wrong with it."""
+    """Import every asset of your FOLDER; report its category, size, unit and faults."""
     from gen_data.generator.assets.checking import check_folder
     from gen_data.generator.assets.library import open_library
 
@@ -146,7 +148,7 @@ def schema() -> None:
 @assets.command()
 @click.argument("names", nargs=-1, metavar="[PACK]...")
 def verify(names: tuple[str, ...]) -> None:
-    """Hash every file of installed packs again; without PACK, of all that are installed."""
+    """Compare installed packs (default: all) with their records by hashing every file."""
     from gen_data.generator.assets.installed_packs import installed_packs
     from gen_data.generator.assets.paths import packs_dir
     from gen_data.generator.packs.install import verify as verify_pack
@@ -171,8 +173,8 @@ def remove(names: tuple[str, ...]) -> None:
         click.echo(f"{name}: removed")
 
 
-def _prepare(pack: str) -> None:
-    """Import a pack's objects now, so that no run has to: the cache keeps their normal form."""
+def _warm_cache(pack: str) -> None:
+    """Import a pack's objects into the cache, so that the first run starts faster."""
     from gen_data.generator.assets.library import open_library
 
     library = open_library()
@@ -199,7 +201,7 @@ def _list_assets(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
 
 
 def _print_findings(findings: Sequence[Finding]) -> None:
-    """A table, and below it what is wrong in full."""
+    """Print a table, followed by all errors and warnings in full."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -210,7 +212,7 @@ def _print_findings(findings: Sequence[Finding]) -> None:
         state = "cannot be used" if one.error else "doubtful" if one.warnings else "ok"
         cells = (one.asset_id, one.kind, one.category, str(one.triangles or ""), size, one.unit)
         table.add_row(*(Text(cell) for cell in (*cells, one.up, state)))
-    # Wide enough for a log file; a terminal has its own width.
+    # A fixed width for log files; a terminal uses its own.
     console = Console()
     Console(width=None if console.is_terminal else 160).print(table)
     for one in findings:
@@ -220,7 +222,7 @@ def _print_findings(findings: Sequence[Finding]) -> None:
 
 
 def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) -> None:
-    """Pictures of assets with their ids below, on one PNG."""
+    """Write one PNG with captioned pictures of assets."""
     from gen_data.generator.preview.contact_sheet import Tile, arrange_tiles, pictures, write_sheet
     from gen_data.generator.preview.thumbnails import thumbnail
     from gen_data.generator.renderers.warp.renderer import WarpRenderer
@@ -237,7 +239,7 @@ def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) ->
     click.echo(f"{path}: {len(asset_ids)} pictures")
 
 
-def _facts(asset: Asset) -> dict[str, str]:
+def _describe_asset(asset: Asset) -> dict[str, str]:
     facts = {
         "id": asset.asset_id,
         "kind": asset.kind,
@@ -258,5 +260,5 @@ def _facts(asset: Asset) -> dict[str, str]:
     return {name: value for name, value in facts.items() if value}
 
 
-def _mb(size: int) -> str:
+def _format_mb(size: int) -> str:
     return f"{size / 1e6:.1f} MB"

@@ -1,8 +1,9 @@
-"""Wanted members out of archives nobody has looked into: zip, tar, deb, and archives inside them.
+"""Extract selected members from untrusted archives: zip, tar, deb, and archives inside them.
 
-Nothing is ever extracted wholesale. Members are streamed one by one below the target folder, as
-plain files; a wanted member that is a link or a device, or whose path leaves the folder, is
-refused, and so is an archive that inflates beyond the limits.
+Members are streamed one by one below the target folder as regular files. An archive is refused if a
+wanted member is a link or a device, or leaves the folder, or if the archive exceeds a limit.
+``tarfile``'s ``data`` filter is too lenient for this: it follows links inside the folder and strips
+leading slashes silently.
 """
 
 from __future__ import annotations
@@ -17,32 +18,34 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
-from typing import IO, cast
+from typing import IO
 
 from gen_data.generator.core.errors import AssetError
 
-_CHUNK = 1 << 20
 _INNER = (".sh3f", ".zip")
-"""Members that are archives themselves and are looked into."""
+"""Suffixes of members that are archives themselves and are searched too."""
 _MAX_DEPTH = 2
+_RATIO_MARGIN_BYTES = 1 << 20
+"""Small archives may inflate by this much more, whatever their ratio."""
 _AR_MAGIC = b"!<arch>\n"
-# What the readers of the standard library raise on damaged, encrypted or exotic archives.
+# Raised by the standard library's readers on damaged, encrypted or exotic archives.
 _UNREADABLE = (tarfile.TarError, zipfile.BadZipFile, lzma.LZMAError, gzip.BadGzipFile, zlib.error,
                EOFError, NotImplementedError, RuntimeError, ValueError)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How much an archive may hold.
+    """Upper bounds on an archive's content.
 
     Attributes:
         members: Entries, wanted or not.
-        file_bytes: Of one member.
-        total_bytes: Of all wanted members.
+        file_bytes: Size of one wanted member.
+        total_bytes: Size of all wanted members.
         ratio: Inflated bytes per byte of the archive.
     """
 
@@ -52,67 +55,20 @@ class Limits:
     ratio: float = 100.0
 
 
-@dataclass
-class _Extraction:
-    """One archive on its way into a folder, and what it has cost so far."""
+@dataclass(frozen=True, slots=True)
+class _Member:
+    """Entry of an archive.
 
-    archive: Path
-    target: Path
-    wanted: tuple[str, ...]
-    limits: Limits
-    archive_bytes: int
-    members: int = 0
-    inflated: int = 0
-    written: int = 0
-    names: list[str] = field(default_factory=list)
+    Attributes:
+        size: Its stated size [bytes]; ``open`` yields no more than that.
+        regular: False for folders, links and devices.
+        open: None for entries that are never written: folders, and archives that are searched.
+    """
 
-    def refuse(self, what: str) -> AssetError:
-        """An error about this archive."""
-        return AssetError(f"{self.archive}: {what}; nothing was installed")
-
-    def count(self, size: int) -> None:
-        """Account for a member before it is looked at."""
-        self.members += 1
-        self.inflated += size
-        limits = self.limits
-        if self.members > limits.members:
-            raise self.refuse(f"holds more than {limits.members} members")
-        if self.inflated > limits.ratio * self.archive_bytes + _CHUNK:
-            raise self.refuse(f"inflates to more than {limits.ratio:g} times its size")
-
-    def wants(self, name: str) -> bool:
-        """Whether any pattern fits a member's path."""
-        return any(fnmatchcase(name, pattern) for pattern in self.wanted)
-
-    def write(self, name: str, size: int, stream: IO[bytes]) -> None:
-        """A wanted member to its place. What it claims as its size is not believed."""
-        limits = self.limits
-        if size > limits.file_bytes:
-            raise self.refuse(f"member '{name[:120]}' has {size} bytes, at most "
-                              f"{limits.file_bytes} are taken")  # fmt: skip
-        path = self.place(name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        taken = 0
-        try:
-            with path.open("xb") as file:
-                while chunk := stream.read(_CHUNK):
-                    taken += len(chunk)
-                    self.written += len(chunk)
-                    if taken > size or self.written > limits.total_bytes:
-                        raise self.refuse(f"member '{name[:120]}' is larger than it claims, or all "
-                                          f"exceed {limits.total_bytes} bytes")  # fmt: skip
-                    file.write(chunk)
-        except FileExistsError:
-            raise self.refuse(f"holds '{name[:120]}' twice") from None
-        self.names.append(name)
-
-    def place(self, name: str) -> Path:
-        """Where a member goes, inside the target. Raises AssetError if it would leave it."""
-        parts = name.split("/")
-        bad = {"", ".", ".."} & set(parts)
-        if bad or "\\" in name or "\0" in name or len(name) > 1024:
-            raise self.refuse(f"member {name[:120]!r} lies outside its folder")
-        return self.target.joinpath(*parts)
+    name: str
+    size: int
+    regular: bool
+    open: Callable[[], AbstractContextManager[IO[bytes]]] | None
 
 
 def extract(
@@ -122,9 +78,10 @@ def extract(
 
     Args:
         archive: A zip, a tar (plain, gzip, bzip2, xz) or a Debian package.
-        wanted: Patterns as ``fnmatch`` has them; ``*`` also stands for slashes.
+        wanted: ``fnmatch`` patterns; ``*`` also matches slashes. Members of an archive inside the
+            archive follow its path and a slash.
         target: A folder; members keep their paths below it.
-        limits: By default, fit for asset packages.
+        limits: By default, suitable for asset packages.
 
     Returns:
         Paths of the members written, in the order of the archive.
@@ -132,112 +89,125 @@ def extract(
     Raises:
         AssetError: if it is unreadable, holds none of the wanted members, or must be refused.
     """
-    job = _Extraction(archive, target, wanted, limits or Limits(), archive.stat().st_size)
     try:
         with archive.open("rb") as file:
-            _walk(job, file, "", 0)
+            names = tuple(_extract(archive, file, wanted, target, limits or Limits()))
     except _UNREADABLE as error:
-        raise job.refuse(f"unreadable archive ({error})") from None
-    if not job.names:
-        raise job.refuse("holds none of the wanted members")
-    return tuple(job.names)
+        raise _refusal(archive, f"unreadable archive ({error})") from None
+    if not names:
+        raise _refusal(archive, "holds none of the wanted members")
+    return names
 
 
-def _walk(job: _Extraction, file: IO[bytes], prefix: str, depth: int) -> None:
+def _extract(
+    archive: Path, file: IO[bytes], wanted: tuple[str, ...], target: Path, limits: Limits
+) -> Iterator[str]:
+    """Write the wanted members and yield their names."""
+    inflated = written = 0
+    inflated_max = limits.ratio * archive.stat().st_size + _RATIO_MARGIN_BYTES
+    for number, member in enumerate(_members(file, _containers(wanted))):
+        # Unwanted members count too: skipping them in a compressed stream costs as much time.
+        inflated += member.size
+        if number >= limits.members:
+            raise _refusal(archive, f"holds more than {limits.members} members")
+        if inflated > inflated_max:
+            raise _refusal(archive, f"inflates to more than {limits.ratio:g} times its size")
+        if member.open is None or not any(fnmatchcase(member.name, p) for p in wanted):
+            continue
+        shown = f"member {member.name[:120]!r}"
+        written += member.size
+        if not member.regular:
+            raise _refusal(archive, f"{shown} is a link or a device, not a regular file")
+        if member.size > limits.file_bytes:
+            raise _refusal(
+                archive, f"{shown} has {member.size} bytes, more than {limits.file_bytes}"
+            )
+        if written > limits.total_bytes:
+            raise _refusal(archive, f"the wanted members exceed {limits.total_bytes} bytes")
+        if not _is_inside(member.name):
+            raise _refusal(archive, f"{shown} lies outside its folder")
+        path = target / member.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with path.open("xb") as output, member.open() as stream:
+                shutil.copyfileobj(stream, output)
+        except FileExistsError:
+            raise _refusal(archive, f"holds {member.name[:120]!r} twice") from None
+        yield member.name
+
+
+def _members(
+    file: IO[bytes], containers: tuple[str, ...], prefix: str = "", depth: int = 0
+) -> Iterator[_Member]:
+    """All entries, each archive inside followed by its own; read lazily, in file order."""
     head = file.read(len(_AR_MAGIC))
     file.seek(0)
     if head == _AR_MAGIC:
-        _walk_tar(job, _debian_data(job, file), prefix, depth)
-    elif head[:4] == b"PK\x03\x04":
-        _walk_zip(job, file, prefix, depth)
-    else:
-        _walk_tar(job, file, prefix, depth)
+        _seek_debian_data(file)
+    for entry in (_zip_members if head.startswith(b"PK\x03\x04") else _tar_members)(file):
+        member = replace(entry, name=prefix + entry.name)
+        if not (
+            member.open is not None
+            and member.regular
+            and depth < _MAX_DEPTH
+            and any(fnmatchcase(member.name, pattern) for pattern in containers)
+        ):
+            yield member
+            continue
+        yield replace(member, open=None)
+        with tempfile.TemporaryFile() as spool:
+            with member.open() as stream:
+                shutil.copyfileobj(stream, spool)
+            spool.seek(0)
+            yield from _members(spool, containers, f"{member.name}/", depth + 1)
 
 
-def _walk_zip(job: _Extraction, file: IO[bytes], prefix: str, depth: int) -> None:
+def _zip_members(file: IO[bytes]) -> Iterator[_Member]:
     with zipfile.ZipFile(file) as archive:
         for info in archive.infolist():
-            name = prefix + info.filename
-            mode = info.external_attr >> 16
-            # Archives made on other systems have no mode at all.
-            plain = not info.is_dir() and (stat.S_IFMT(mode) in (0, stat.S_IFREG))
-            job.count(info.file_size)
-            if not info.is_dir():
-                _take(job, name, info.file_size, plain, partial(archive.open, info), depth)
+            # The upper half holds the Unix mode; archives made on other systems have none.
+            kind = stat.S_IFMT(info.external_attr >> 16)
+            opener = None if info.is_dir() else partial(archive.open, info)
+            yield _Member(info.filename, info.file_size, kind in (0, stat.S_IFREG), opener)
 
 
-def _walk_tar(job: _Extraction, file: IO[bytes], prefix: str, depth: int) -> None:
+def _tar_members(file: IO[bytes]) -> Iterator[_Member]:
     with tarfile.open(fileobj=file, mode="r|*") as archive:
         for info in archive:
-            name = prefix + info.name.removeprefix("./")
-            job.count(info.size)
-            if not info.isdir():
-                _take(job, name, info.size, info.isreg(), partial(_opened, archive, info), depth)
+            opener = None if info.isdir() else partial(_open_tar_member, archive, info)
+            yield _Member(info.name.removeprefix("./"), info.size, info.isreg(), opener)
 
 
-def _opened(archive: tarfile.TarFile, info: tarfile.TarInfo) -> IO[bytes]:
-    stream = archive.extractfile(info)
-    return stream if stream is not None else io.BytesIO()
+def _open_tar_member(archive: tarfile.TarFile, info: tarfile.TarInfo) -> IO[bytes]:
+    return archive.extractfile(info) or io.BytesIO()
 
 
-def _take(
-    job: _Extraction,
-    name: str,
-    size: int,
-    plain: bool,
-    opened: Callable[[], IO[bytes]],
-    depth: int,
-) -> None:
-    """A member to its place; an archive inside the archive member by member."""
-    if plain and depth < _MAX_DEPTH and any(fnmatchcase(name, p) for p in _inner(job.wanted)):
-        with tempfile.TemporaryFile() as spool:
-            with opened() as stream:
-                shutil.copyfileobj(stream, spool, _CHUNK)
-            spool.seek(0)
-            _walk(job, spool, f"{name}/", depth + 1)
-    elif job.wants(name):
-        if not plain:
-            raise job.refuse(f"member '{name[:120]}' is no plain file but a link or a device")
-        with opened() as stream:
-            job.write(name, size, stream)
+def _containers(wanted: tuple[str, ...]) -> tuple[str, ...]:
+    """Patterns of the archives that hold wanted members."""
+    splits = ((p.partition(f"{suffix}/"), suffix) for p in wanted for suffix in _INNER)
+    return tuple(outer + suffix for (outer, slash, _), suffix in splits if slash)
 
 
-def _inner(wanted: tuple[str, ...]) -> Iterator[str]:
-    """Patterns of the archives that wanted members lie in."""
-    for pattern in wanted:
-        for suffix in _INNER:
-            outer, slash, _ = pattern.partition(f"{suffix}/")
-            if slash:
-                yield outer + suffix
+def _is_inside(name: str) -> bool:
+    """Whether a member's path stays below the folder it is written to."""
+    bad_parts = {"", ".", ".."} & set(name.split("/"))
+    return not (bad_parts or "\\" in name or "\0" in name or len(name) > 1024)
 
 
-def _debian_data(job: _Extraction, file: IO[bytes]) -> IO[bytes]:
-    """The tar with the files of a Debian package.
+def _seek_debian_data(file: IO[bytes]) -> None:
+    """Move to the tar with the files of a Debian package; that tar marks its own end.
 
     Source: deb(5), ar(5): 60-byte headers with the name in bytes 0-15 and the size in 48-57;
     members start at even offsets.
     """
     file.seek(len(_AR_MAGIC))
     while len(header := file.read(60)) == 60:
-        name, size = header[:16].decode("ascii").strip().rstrip("/"), int(header[48:58])
+        name, size = header[:16].decode("ascii").strip(), int(header[48:58])
         if name.startswith("data.tar"):
-            return cast(IO[bytes], _Window(file, size))
+            return
         file.seek(size + size % 2, io.SEEK_CUR)
-    raise job.refuse("holds no data.tar and is no Debian package")
+    raise ValueError("no data.tar, hence no Debian package")
 
 
-class _Window(io.RawIOBase):
-    """The next bytes of a file as a file of their own."""
-
-    def __init__(self, file: IO[bytes], size: int) -> None:
-        self._file, self._left = file, size
-
-    def readable(self) -> bool:
-        """It is."""
-        return True
-
-    def read(self, size: int = -1) -> bytes:
-        """At most that many bytes, none at its end."""
-        data = self._file.read(self._left if size < 0 else min(size, self._left))
-        self._left -= len(data)
-        return data
+def _refusal(archive: Path, reason: str) -> AssetError:
+    return AssetError(f"{archive}: {reason}; nothing was installed")

@@ -1,4 +1,4 @@
-"""Archives of packs, brought by the ordinary client of each registry."""
+"""Download of pack archives with the ordinary client of each registry."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_NETWORK = (
     "eai_again", "econnrefused", "connection refused", "network is unreachable", "enetunreach",
     "timed out", "etimedout", "connection failed", "could not connect", "max retries",
 )  # fmt: skip
-"""What the clients say, in lower case, when there is no way to their registry."""
+"""Parts of the clients' messages, in lower case, when their registry is unreachable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +27,10 @@ class Client:
     """A package client.
 
     Attributes:
-        program: Looked up on PATH.
-        arguments: Fetch one package into the working folder; ``{package}``, ``{version}``.
-        remedy: What to do when the program is missing.
+        program: Name on PATH.
+        arguments: Arguments to fetch one package into the working folder, with placeholders
+            ``{package}`` and ``{version}``.
+        remedy: Advice if the program is missing.
     """
 
     program: str
@@ -54,10 +55,10 @@ CLIENTS: dict[ClientName, Client] = {
 
 
 def fetch(pack: Pack, folder: Path) -> Path:
-    """The archive of a pack, fetched into an empty folder.
+    """Fetch the archive of a pack into an empty folder; return its path.
 
     Raises:
-        AssetError: the client is missing, there is no network, or it fails otherwise.
+        AssetError: if the client is missing, has no network, or fails otherwise.
     """
     command = _command(pack)
     try:
@@ -66,18 +67,18 @@ def fetch(pack: Pack, folder: Path) -> Path:
             errors="replace", timeout=_TIMEOUT_S, stdin=subprocess.DEVNULL, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise _failed(pack, command, f"took longer than {_TIMEOUT_S} s") from None
+        raise _client_error(pack, command, f"took longer than {_TIMEOUT_S} s") from None
     files = sorted(path for path in folder.iterdir() if path.is_file())
     if done.returncode != 0 or len(files) != 1:
         said = (done.stderr + done.stdout).strip()
         if any(words in said.lower() for words in _NO_NETWORK):
-            raise _failed(pack, command, "found no network")
-        raise _failed(pack, command, f"failed: {said[-600:] or 'it brought no file'}")
+            raise _client_error(pack, command, "found no network")
+        raise _client_error(pack, command, f"failed: {said[-600:] or 'it fetched no file'}")
     return files[0]
 
 
 def check_archive(pack: Pack, archive: Path) -> None:
-    """Raise AssetError unless a file is the archive that the table means, bit by bit."""
+    """Raise AssetError unless a file has the pinned hash of a pack's archive."""
     try:
         digest = file_digest(archive)
     except OSError as error:
@@ -90,7 +91,7 @@ def check_archive(pack: Pack, archive: Path) -> None:
 
 
 def file_digest(path: Path) -> str:
-    """sha256 of a file, in hexadecimal."""
+    """Hexadecimal sha256 of a file."""
     digest = sha256()
     with path.open("rb") as file:
         while chunk := file.read(1 << 20):
@@ -110,12 +111,12 @@ def _command(pack: Pack) -> list[str]:
             f"{pack.source} elsewhere and give it with --from FILE"
         )
     names = {"package": pack.package, "version": pack.version}
-    # What they say is matched, so that it has to be in English.
+    # Messages are matched, so they must be in English.
     english = ["/usr/bin/env", "LC_ALL=C"]
     return english + start + [argument.format(**names) for argument in client.arguments]
 
 
-def _failed(pack: Pack, command: list[str], what: str) -> AssetError:
+def _client_error(pack: Pack, command: list[str], what: str) -> AssetError:
     return AssetError(
         f"pack '{pack.name}': '{' '.join([Path(command[2]).name, *command[3:]])}' {what}\n"
         f"  Fetch {pack.source} elsewhere and give it with --from FILE; nothing was installed"

@@ -1,7 +1,7 @@
-"""Install, verify and remove packs: whole or not at all.
+"""Atomic installation, verification and removal of packs.
 
-Everything happens in a scratch folder beside the installed packs and ends with one rename. A lock
-keeps two installations apart; scratch folders of processes that were killed go with the next one.
+All work happens in a scratch folder beside the installed packs and ends with one rename. A lock
+prevents concurrent installations; the next one removes scratch folders of killed processes.
 """
 
 from __future__ import annotations
@@ -26,37 +26,37 @@ _LOCK = ".lock"
 
 
 def install(pack: Pack, folder: Path, archive: Path | None = None) -> Record:
-    """Fetch, convert and install a pack; one that is installed already is exchanged.
+    """Fetch, convert and install a pack; replace an installed one.
 
     Args:
-        pack: From the table.
-        folder: Of installed packs; made if it is missing.
-        archive: The package's archive, where it need not be fetched.
+        pack: Entry of the table.
+        folder: Folder of installed packs; created if missing.
+        archive: The package's archive, if it need not be fetched.
 
     Returns:
-        The record of what was installed.
+        The record of the installed pack.
 
     Raises:
-        AssetError: it cannot be fetched, is not the pinned archive, or cannot be converted.
-        StorageError: the folder cannot be written, or another process is installing.
+        AssetError: if it cannot be fetched, is not the pinned archive, or cannot be converted.
+        StorageError: if the folder cannot be written, or another process is installing.
     """
     with _storage(folder), _scratch(folder) as scratch:
         if archive is None:
-            archive = fetch(pack, _made(scratch / "archive"))
+            archive = fetch(pack, _make_folder(scratch / "archive"))
         check_archive(pack, archive)
-        source, target = _made(scratch / "source"), _made(scratch / "target")
+        source, target = _make_folder(scratch / "source"), _make_folder(scratch / "target")
         extract(archive, pack.wanted, source)
         pack.convert(source, target)
-        record = _record(pack, target)
+        record = _make_record(pack, target)
         (target / RECORD_NAME).write_text(canonical_json(record) + "\n", encoding="utf-8")
-        # A pack that survives a power cut must not be one of empty files.
+        # Without a sync, a power cut after the rename may leave a pack of empty files.
         os.sync()
         _exchange(target, folder / pack.name, scratch / "old")
     return record
 
 
 def is_installed(pack: Pack, folder: Path) -> bool:
-    """Whether the pack is there in the version and conversion that the table means."""
+    """Whether the pack is installed in the table's version and revision."""
     if not (folder / pack.name / RECORD_NAME).exists():
         return False
     record = read_record(folder / pack.name)
@@ -64,25 +64,25 @@ def is_installed(pack: Pack, folder: Path) -> bool:
 
 
 def remove(name: str, folder: Path) -> None:
-    """Remove an installed pack at one stroke. Raises AssetError if it is not installed."""
+    """Remove an installed pack atomically. Raises AssetError if it is not installed."""
     installed = folder / name
-    _must_be_there(name, folder)
+    _require_installed(name, folder)
     with _storage(folder), _scratch(folder) as scratch:
         installed.rename(scratch / "old")
 
 
 def verify(name: str, folder: Path) -> Record:
-    """Hash every file of a pack again.
+    """Hash every file of a pack and compare it with the record.
 
     Raises:
-        AssetError: the pack is not installed.
-        VerificationError: a file is missing, changed, or was not installed.
+        AssetError: if the pack is not installed.
+        VerificationError: if a file is missing, changed, or was not installed.
     """
-    _must_be_there(name, folder)
+    _require_installed(name, folder)
     pack = folder / name
     record = read_record(pack)
     should = {file.path: file for file in record.files}
-    found = {file.path: file for file in _files(pack) if file.path != RECORD_NAME}
+    found = {file.path: file for file in _list_files(pack) if file.path != RECORD_NAME}
     for path in sorted({*should, *found}):
         expected, actual = should.get(path), found.get(path)
         if expected != actual:
@@ -94,14 +94,14 @@ def verify(name: str, folder: Path) -> Record:
     return record
 
 
-def _must_be_there(name: str, folder: Path) -> None:
+def _require_installed(name: str, folder: Path) -> None:
     if not (folder / name / RECORD_NAME).is_file():
         raise AssetError(
             f"pack '{name}': not installed in {folder}; gen-data assets install {name}"
         )
 
 
-def _record(pack: Pack, target: Path) -> Record:
+def _make_record(pack: Pack, target: Path) -> Record:
     return Record(
         name=pack.name,
         version=pack.version,
@@ -109,11 +109,11 @@ def _record(pack: Pack, target: Path) -> Record:
         archive_sha256=pack.sha256,
         licence=pack.licence,
         source=pack.source,
-        files=_files(target),
+        files=_list_files(target),
     )
 
 
-def _files(folder: Path) -> tuple[StoredFile, ...]:
+def _list_files(folder: Path) -> tuple[StoredFile, ...]:
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     return tuple(
         StoredFile(path.relative_to(folder).as_posix(), path.stat().st_size, file_digest(path))
@@ -134,7 +134,7 @@ def _exchange(new: Path, final: Path, old: Path) -> None:
 
 @contextlib.contextmanager
 def _scratch(folder: Path) -> Iterator[Path]:
-    """A folder for unfinished work on the same file system, for one process at a time."""
+    """Scratch folder on the same file system, for one process at a time."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / _LOCK).open("a") as lock:
         try:
@@ -154,7 +154,7 @@ def _scratch(folder: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _storage(folder: Path) -> Iterator[None]:
-    """What the file system refuses, in words."""
+    """Turn OSError into StorageError with a remedy."""
     try:
         yield
     except GenDataError:
@@ -166,6 +166,6 @@ def _storage(folder: Path) -> Iterator[None]:
         ) from None
 
 
-def _made(folder: Path) -> Path:
+def _make_folder(folder: Path) -> Path:
     folder.mkdir()
     return folder

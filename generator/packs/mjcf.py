@@ -1,8 +1,8 @@
-"""MJCF bodies to URDF: the part of the format that robot descriptions use.
+"""Conversion of MJCF bodies to URDF, for the part of the format that robot descriptions use.
 
-Source: MuJoCo documentation, "XML Reference". Read are nested bodies with at most one joint each,
-hinge or slide, through their own origin; geoms of type mesh, box, cylinder and sphere; materials'
-colours; and defaults of geoms by class. Quaternions are w x y z; sizes are half-extents.
+Source: MuJoCo documentation, "XML Reference". Supported are nested bodies with at most one joint
+each, hinge or slide, through their own origin; geoms of type mesh, box, cylinder and sphere;
+material colours; and defaults of geoms by class. Quaternions are w x y z; sizes are half-extents.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _KINDS = {"hinge": "revolute", "slide": "prismatic"}
 
 @dataclass(frozen=True)
 class Mjcf:
-    """One description.
+    """Parsed MJCF file.
 
     Attributes:
-        folder: Of the description; meshes are relative to it.
-        body: Its outermost body.
+        folder: Folder of the file; mesh paths are relative to it.
+        body: Outermost body.
         meshes: ``{name: (file, scale)}``.
         colors: ``{material: "r g b a"}``.
         defaults: ``{class: attributes of its geoms}``.
@@ -43,7 +43,7 @@ class Mjcf:
 
 
 def read_mjcf(folder: Folder, relative: str) -> Mjcf:
-    """The description in an MJCF file. Raises AssetError if it is malformed."""
+    """Read an MJCF file. Raises AssetError if it is malformed."""
     place = str(folder.root / relative)
     root = parse_xml(folder.read(relative), place, "mujoco", "an MJCF", _MAX_ELEMENTS)
     body = root.find("worldbody/body")
@@ -74,56 +74,56 @@ def add_bodies(robot: Element, mjcf: Mjcf, parent: str = "") -> tuple[str, ...]:
 
     Args:
         robot: The URDF so far.
-        mjcf: What is appended.
-        parent: Link that the outermost body is fixed to; empty = it is the robot's root.
+        mjcf: Description to append.
+        parent: Link to which the outermost body is fixed; empty = it is the robot's root.
 
     Returns:
-        Every mesh file that they show or collide with, relative to the folder that was read.
+        Mesh files used, relative to the asset folder.
 
     Raises:
-        AssetError: if a body moves in a way that URDF joints cannot.
+        AssetError: if URDF cannot express a body's joints.
     """
-    return tuple(dict.fromkeys(_add(robot, mjcf, mjcf.body, parent)))
+    return tuple(dict.fromkeys(_add_body(robot, mjcf, mjcf.body, parent)))
 
 
-def _add(robot: Element, mjcf: Mjcf, body: Element, parent: str) -> Iterator[str]:
+def _add_body(robot: Element, mjcf: Mjcf, body: Element, parent: str) -> Iterator[str]:
     name = body.attrib["name"]
     link = SubElement(robot, "link", name=name)
     for geom in body.findall("geom"):
-        yield from _shape(link, mjcf, geom)
+        yield from _add_shape(link, mjcf, geom)
     if parent:
-        _joint(robot, body, parent)
+        _add_joint(robot, body, parent)
     for child in body.findall("body"):
-        yield from _add(robot, mjcf, child, name)
+        yield from _add_body(robot, mjcf, child, name)
 
 
-def _joint(robot: Element, body: Element, parent: str) -> None:
+def _add_joint(robot: Element, body: Element, parent: str) -> None:
     name, joints = body.attrib["name"], body.findall("joint")
     moving = joints[0] if joints else None
     kind = "fixed" if moving is None else _KINDS.get(moving.get("type", "hinge"), "")
-    if len(joints) > 1 or not kind or (moving is not None and _moved(moving)):
-        raise AssetError(f"body '{name}': only one hinge or slide through its origin is read")
+    if len(joints) > 1 or not kind or (moving is not None and _is_offset(moving)):
+        raise AssetError(f"body '{name}': only one hinge or slide through its origin is supported")
     joint = SubElement(
         robot, "joint", type=kind, name=f"{name}_mount" if moving is None else moving.attrib["name"]
     )
     SubElement(joint, "parent", link=parent)
     SubElement(joint, "child", link=name)
-    _origin(joint, body)
+    _add_origin(joint, body)
     if moving is not None:
         lower, upper = moving.attrib["range"].split()
         SubElement(joint, "axis", xyz=moving.get("axis", "0 0 1"))
         SubElement(joint, "limit", lower=lower, upper=upper, effort="0", velocity="0")
 
 
-def _moved(joint: Element) -> bool:
+def _is_offset(joint: Element) -> bool:
     return any(float(x) != 0.0 for x in joint.get("pos", "0 0 0").split())
 
 
-def _shape(link: Element, mjcf: Mjcf, geom: Element) -> Iterator[str]:
+def _add_shape(link: Element, mjcf: Mjcf, geom: Element) -> Iterator[str]:
     attributes = {**mjcf.defaults.get(geom.get("class", ""), {}), **geom.attrib}
     seen = attributes.get("group") == _VISUAL_GROUP
     element = SubElement(link, "visual" if seen else "collision")
-    _origin(element, geom)
+    _add_origin(element, geom)
     geometry = SubElement(element, "geometry")
     size = [float(x) for x in attributes.get("size", "").split()]
     kind = attributes.get("type", "sphere")
@@ -139,7 +139,7 @@ def _shape(link: Element, mjcf: Mjcf, geom: Element) -> Iterator[str]:
     elif kind == "sphere":
         SubElement(geometry, "sphere", radius=repr(size[0]))
     else:
-        raise AssetError(f"link '{link.get('name')}': geoms of type '{kind}' are not read")
+        raise AssetError(f"link '{link.get('name')}': geoms of type '{kind}' are not supported")
     name = attributes.get("material", "")
     color = mjcf.colors.get(name, attributes.get("rgba", ""))
     if seen and color:
@@ -147,8 +147,8 @@ def _shape(link: Element, mjcf: Mjcf, geom: Element) -> Iterator[str]:
         SubElement(material, "color", rgba=color)
 
 
-def _origin(element: Element, source: Element) -> None:
-    """Position and roll, pitch, yaw of an MJCF element's ``pos`` and ``quat``."""
+def _add_origin(element: Element, source: Element) -> None:
+    """Add an ``<origin>`` with position and roll, pitch, yaw from MJCF's ``pos`` and ``quat``."""
     w, x, y, z = (float(v) for v in source.get("quat", "1 0 0 0").split())
     norm = math.sqrt(w * w + x * x + y * y + z * z)
     r = SE3(quaternion_wxyz=(w / norm, x / norm, y / norm, z / norm)).rotation()

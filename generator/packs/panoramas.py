@@ -1,7 +1,7 @@
-"""The hdri pack: panoramas in OpenEXR, wrapped in JavaScript, to Radiance files.
+"""Converter of the hdri pack: OpenEXR panoramas inside JavaScript to Radiance files.
 
-Radiance (Ward, "Real pixels", Graphics Gems II, 1991) keeps the range and 1 % of precision, and is
-what panoramas of users come in: the library needs no second reader.
+Radiance (Ward, "Real pixels", Graphics Gems II, 1991) keeps the full range at 1 % precision, and is
+the usual format of user panoramas.
 """
 
 from __future__ import annotations
@@ -12,43 +12,27 @@ import re
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from gen_data.generator.assets.folder_index import FolderIndex, ImageEntry
 from gen_data.generator.assets.image_decoding import read_exr
-from gen_data.generator.assets.installed_packs import INDEX_NAME, TAG
+from gen_data.generator.assets.installed_packs import TAG, write_index
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.errors import AssetError
 
 _DATA_URL = re.compile(rb"base64,([A-Za-z0-9+/=]+)")
 _SUFFIX = ".exr.js"
 
-TAGS: dict[str, tuple[str, ...]] = {
-    "apartment": ("indoor",),
-    "bridge": ("indoor",),
-    "city": ("outdoor", "urban"),
-    "dawn": ("outdoor", "sunset"),
-    "esplanade": ("indoor",),
-    "forest": ("outdoor", "nature"),
-    "hall": ("indoor",),
-    "lab": ("indoor", "industrial"),
-    "lobby": ("indoor",),
-    "night": ("outdoor", "night", "nature"),
-    "park": ("outdoor", "nature"),
-    "sky": ("outdoor", "nature"),
-    "studio": ("indoor", "studio"),
-    "sunrise": ("outdoor", "sunset"),
-    "sunset": ("outdoor", "sunset"),
-    "venice": ("outdoor", "sunset", "urban"),
-    "warehouse": ("indoor", "industrial"),
-    "workshop": ("indoor", "industrial"),
-}
+TAGS: dict[str, list[str]] = yaml.safe_load(
+    Path(__file__).with_name("panoramas.yaml").read_text(encoding="utf-8")
+)
 
 
 def convert(source: Path, target: Path) -> None:
     """Write every panorama as Radiance .hdr, and their index.
 
     Raises:
-        AssetError: a panorama is missing or unreadable.
+        AssetError: if a panorama is missing or unreadable.
     """
     found = {path.name.removesuffix(_SUFFIX): path for path in source.rglob(f"*{_SUFFIX}")}
     entries = []
@@ -66,12 +50,11 @@ def convert(source: Path, target: Path) -> None:
         source="npm @pmndrs/assets 1.7.0",
         environments=tuple(entries),
     )
-    text = index.model_dump_json(exclude_defaults=True)
-    (target / INDEX_NAME).write_text(text, encoding="utf-8")
+    write_index(target, index)
 
 
 def exr_bytes(script: bytes, place: str) -> bytes:
-    """The file that a JavaScript module holds as a data URL. Raises AssetError if it has none."""
+    """Decode the data URL in a JavaScript module. Raises AssetError if it has none."""
     match = _DATA_URL.search(script)
     try:
         return base64.b64decode(match[1] if match else b"=", validate=True)
@@ -80,9 +63,9 @@ def exr_bytes(script: bytes, place: str) -> bytes:
 
 
 def encode_radiance(rgb: Float32) -> bytes:
-    """A Radiance .hdr file of an image, uncompressed.
+    """Encode RGB [height, width, 3] as an uncompressed Radiance .hdr file.
 
-    Source: Ward's ``color.c``: the largest component gives the shared exponent, e = 128 biased.
+    Source: Ward's ``color.c``: the largest component gives the shared exponent, with bias 128.
     """
     height, width = rgb.shape[:2]
     rgb = np.maximum(rgb.astype(np.float64), 0.0)

@@ -1,4 +1,4 @@
-"""The robots pack: arms of robosuite with a parallel gripper, from MJCF to URDF."""
+"""Converter of the robots pack: robosuite's arms with a parallel gripper, from MJCF to URDF."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import yaml
+
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.folder_index import Finish, FolderIndex, GripperEntry, RobotEntry
-from gen_data.generator.assets.installed_packs import INDEX_NAME, TAG
+from gen_data.generator.assets.installed_packs import TAG, write_index
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.packs.mjcf import add_bodies, read_mjcf
 
@@ -19,12 +21,12 @@ _FLANGE = "right_hand"
 _HAND = "gripper_base"
 _FINGERS = ("l_finger_joint", "r_finger_joint")
 _CLOSED_M = 0.01855
-"""Inner face of a finger pad from the middle at position 0 of its joint: 0.01 + 0.01725 (finger,
-tip) - 0.0047 - 0.004 (pad)."""
+"""Distance of a pad's inner face from the middle at joint position 0: 0.01 + 0.01725 (finger, tip)
+- 0.0047 - 0.004 (pad)."""
 _STROKE_M = 0.078
-"""Twice the pad's distance from the middle at the joint's upper limit, 0.020833."""
+"""Twice a pad's distance from the middle at the joint's upper limit, 0.020833."""
 _GRASP_M = 0.109
-"""From the hand's origin to robosuite's grip site."""
+"""Distance from the hand's origin to robosuite's grip site."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +34,8 @@ class Arm:
     """An arm of the package.
 
     Attributes:
-        home: Position per joint [rad], robosuite's initial one.
-        touching: Link pairs that touch by design.
+        home: Initial joint positions [rad] in robosuite.
+        touching: Link pairs in permanent contact.
     """
 
     name: str
@@ -42,40 +44,19 @@ class Arm:
     touching: tuple[tuple[str, str], ...] = ()
 
 
-ARMS = (
-    Arm(
-        name="ur5e",
-        author="Universal Robots; robosuite contributors",
-        home={
-            "shoulder_pan_joint": -0.470,
-            "shoulder_lift_joint": -1.735,
-            "elbow_joint": 2.480,
-            "wrist_1_joint": -2.275,
-            "wrist_2_joint": -1.590,
-            "wrist_3_joint": -1.991,
-        },
-    ),
-    Arm(
-        name="sawyer",
-        author="Rethink Robotics; robosuite contributors",
-        home={
-            "right_j0": 0.0,
-            "right_j1": -1.18,
-            "right_j2": 0.0,
-            "right_j3": 2.18,
-            "right_j4": 0.0,
-            "right_j5": 0.57,
-            "right_j6": -1.57,
-        },
-    ),
+ARMS = tuple(
+    Arm(**arm)
+    for arm in yaml.safe_load(
+        Path(__file__).with_name("robosuite.yaml").read_text(encoding="utf-8")
+    )
 )
 
 
 def convert(source: Path, target: Path) -> None:
-    """Write a URDF per arm, the meshes that it uses, and the index.
+    """Write a URDF per arm, its meshes, and the index.
 
     Raises:
-        AssetError: if a description is missing or not understood.
+        AssetError: if a description is missing or unsupported.
     """
     folder = Folder(source / _ROOT)
     for arm in ARMS:
@@ -83,7 +64,7 @@ def convert(source: Path, target: Path) -> None:
         files = add_bodies(robot, read_mjcf(folder, f"robots/{arm.name}/robot.xml"))
         files += add_bodies(robot, read_mjcf(folder, _GRIPPER), _FLANGE)
         for joint in _FINGERS:
-            _from_closed(robot, joint)
+            _shift_finger_zero(robot, joint)
         indent(robot)
         (target / f"{arm.name}.urdf").write_bytes(tostring(robot, encoding="utf-8"))
         for file in files:
@@ -93,13 +74,12 @@ def convert(source: Path, target: Path) -> None:
     index = FolderIndex(
         licence="MIT (package robosuite)",
         source="PyPI robosuite 1.5.2",
-        robots=tuple(_entry(arm) for arm in ARMS),
+        robots=tuple(_index_entry(arm) for arm in ARMS),
     )
-    text = index.model_dump_json(exclude_defaults=True)
-    (target / INDEX_NAME).write_text(text, encoding="utf-8")
+    write_index(target, index)
 
 
-def _entry(arm: Arm) -> RobotEntry:
+def _index_entry(arm: Arm) -> RobotEntry:
     fingers = dict.fromkeys(_FINGERS, _STROKE_M / 2.0)
     return RobotEntry(
         id=arm.name,
@@ -119,12 +99,12 @@ def _entry(arm: Arm) -> RobotEntry:
     )
 
 
-def _from_closed(robot: Element, name: str) -> None:
-    """Count a finger's joint from closed outwards, as the project's grippers do."""
+def _shift_finger_zero(robot: Element, name: str) -> None:
+    """Redefine a finger joint: 0 is closed and positive opens, as for the project's grippers."""
     joint = next((j for j in robot.findall("joint") if j.get("name") == name), None)
     origin = joint.find("origin") if joint is not None else None
     if joint is None or origin is None:
-        raise AssetError(f"gripper: has no joint '{name}'")
+        raise AssetError(f"gripper: no joint '{name}'")
     x, y, z = (float(v) for v in origin.attrib["xyz"].split())
     side = 1.0 if y > 0.0 else -1.0
     origin.set("xyz", f"{x!r} {round(y - side * _CLOSED_M, 9)!r} {z!r}")

@@ -1,7 +1,7 @@
-"""The catalogue pack: what ``catalogue.yaml`` selects of the 820 models of Sweet Home 3D.
+"""Converter of the catalogue pack: models of Sweet Home 3D selected by ``catalogue.yaml``.
 
-The package holds one zip per author or licence, each with OBJ models and a properties file that
-gives their sizes in centimetres and their creators.
+The package holds one zip per author or licence, each with OBJ models and a properties file with
+their sizes [cm] and creators.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.file_references import find_referenced_files
+from gen_data.generator.assets.content_hashes import find_referenced_files
 from gen_data.generator.assets.folder_index import (
     Finish,
     FolderIndex,
@@ -25,42 +25,41 @@ from gen_data.generator.assets.folder_index import (
     Point,
     Region,
     Word,
+    read_document,
 )
-from gen_data.generator.assets.installed_packs import INDEX_NAME, TAG
+from gen_data.generator.assets.installed_packs import TAG, write_index
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import load_yaml
 from gen_data.generator.core.errors import AssetError
 
 SELECTION = Path(__file__).with_name("catalogue.yaml")
-_FACTS = "PluginFurnitureCatalog.properties"
-_FACT = re.compile(r"(\w+)#(\d+)=(.*)")
+_PROPERTIES_NAME = "PluginFurnitureCatalog.properties"
+_PROPERTY = re.compile(r"(\w+)#(\d+)=(.*)")
 _SOURCE = "Sweet Home 3D furniture (Debian sweethome3d-furniture 1.8-1)"
 _LICENCES = {"BlendSwap-CC-0": "CC0-1.0"}
 _LICENCE = "CC-BY-3.0; converted, decimated, re-coloured"
 _DENSITY = 250.0
-"""Mass per volume of the bounding box [kg/m^3]: household things are half air, half light."""
+"""Assumed mass per volume of the bounding box [kg/m^3]: household objects are light and partly
+empty."""
 
 _GRASPABLE_M = 0.07 + 1e-9
-"""What parallel grippers open to, a little less."""
+"""Slightly less than the usual opening of parallel grippers."""
 
 Place = tuple[float, float, float]
 
 
 class Lamp(Strict):
-    """Triangles of a textured model that are a lamp: those in two mirrored boxes."""
+    """Triangles of a textured model in two mirrored boxes that form a pair of lamps."""
 
     material: str
     """Pattern of the material's name."""
     finish: str
     low_m: Place
     high_m: Place
-    """Corners of the box on the left, in the frame of the finished asset."""
+    """Corners of the left box, in the frame of the finished asset."""
 
 
 class Shared(Strict):
-    """What the models of a group have in common, and each may say for itself."""
+    """Properties shared by a group of models; each model may override them."""
 
     category: str = ""
     subcategory: str = ""
@@ -68,27 +67,27 @@ class Shared(Strict):
     tags: tuple[Word, ...] = ()
     origin: Literal["center", "floor"] | None = None
     yaw_deg: float | None = None
-    """Turn about the vertical that brings the front to +X; the catalogue's front is -Y."""
+    """Rotation about the vertical that turns the front to +X; the catalogue's front is -Y."""
     max_faces: Annotated[int, Field(ge=100)] | None = None
     mass_kg: Annotated[float, Field(gt=0.0)] | None = None
-    """By default guessed from the size."""
+    """By default estimated from the size."""
     parts: Annotated[int, Field(ge=1, le=24)] | None = None
-    """Bound on the convex parts that it collides with."""
+    """Largest number of convex collision parts."""
     materials: dict[str, str] = Field(default_factory=dict)
-    """Name of a finish by pattern of the material's name."""
+    """Names of finishes by pattern of the material's name."""
 
 
 class ModelChoice(Shared):
-    """One model."""
+    """A selected model."""
 
     id: Id
     model: str
     """Its OBJ file in the catalogue."""
     size_m: Annotated[float, Field(gt=0.0)] | None = None
-    """Longest edge; by default what the catalogue says."""
+    """Longest edge; by default the catalogue's."""
     stackable: bool = False
     keypoints: dict[Word, Place] = Field(default_factory=dict)
-    """Off the middle (y > 0) a point stands for two: ``<name>_left`` and ``<name>_right``."""
+    """A point with y != 0 is mirrored to a pair: ``<name>_left`` and ``<name>_right``."""
     lamps: tuple[Lamp, ...] = ()
 
 
@@ -99,7 +98,7 @@ class Group(Shared):
 
 
 class Selection(Strict):
-    """The document."""
+    """Content of ``catalogue.yaml``."""
 
     finishes: dict[str, Finish]
     groups: dict[str, Group]
@@ -107,10 +106,10 @@ class Selection(Strict):
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """What the package says about a model.
+    """Properties of a model in the package.
 
     Attributes:
-        folder: Of the zip it comes from.
+        folder: Folder of its extracted zip.
         size_m: Width, depth, height.
     """
 
@@ -135,29 +134,24 @@ def convert(source: Path, target: Path) -> None:
                 raise AssetError(f"{source}: holds no model '{choice.model}' ({choice.id})")
             model = models[choice.model]
             entries.append(mesh_entry(choice, group, model, selection.finishes))
-            _copy(Folder(model.folder), choice.model, target)
+            _copy_model(Folder(model.folder), choice.model, target)
     index = FolderIndex(licence=_LICENCE, source=_SOURCE, assets=tuple(entries))
-    text = index.model_dump_json(exclude_defaults=True)
-    (target / INDEX_NAME).write_text(text, encoding="utf-8")
+    write_index(target, index)
 
 
 def read_selection(path: Path = SELECTION) -> Selection:
-    """The selected models. Raises ConfigError naming every fault with its place."""
-    problems = Problems()
-    selection = validate(load_yaml(path), Selection, problems)
-    problems.raise_if_any()
-    assert selection is not None
-    return selection
+    """Read the selected models. Raises ConfigError listing every fault with its place."""
+    return read_document(path, Selection)[0]
 
 
 def read_models(source: Path) -> dict[str, Model]:
-    """Every model of the package by its OBJ file."""
+    """Read the properties of every model of the package, by OBJ file."""
     models: dict[str, Model] = {}
-    for path in sorted(source.rglob(_FACTS)):
+    for path in sorted(source.rglob(_PROPERTIES_NAME)):
         facts: dict[str, dict[str, str]] = {}
         # Java's properties files are Latin-1.
         for line in path.read_text(encoding="latin-1").splitlines():
-            match = _FACT.fullmatch(line.strip())
+            match = _PROPERTY.fullmatch(line.strip())
             if match:
                 facts.setdefault(match[2], {})[match[1]] = match[3].strip()
         licence = _LICENCES.get(path.parent.name.removesuffix(".sh3f"), _LICENCE)
@@ -173,7 +167,7 @@ def read_models(source: Path) -> dict[str, Model]:
 def mesh_entry(
     choice: ModelChoice, group: Group, model: Model, finishes: Mapping[str, Finish]
 ) -> MeshEntry:
-    """How the library shall import a selected model."""
+    """Index entry of a selected model."""
     width, depth, height = model.size_m
     size_m = choice.size_m or max(model.size_m)
     scale = size_m / max(model.size_m)
@@ -188,17 +182,19 @@ def mesh_entry(
         tags=_tags(choice, group, min(model.size_m) * scale),
         size_m=size_m,
         up="y",
-        yaw_deg=_first(choice.yaw_deg, group.yaw_deg, 90.0),
+        yaw_deg=_first_given(choice.yaw_deg, group.yaw_deg, 90.0),
         origin=choice.origin or group.origin or "center",
-        mass_kg=_first(choice.mass_kg, group.mass_kg, float(f"{guess_kg:.2g}")),
+        mass_kg=_first_given(choice.mass_kg, group.mass_kg, float(f"{guess_kg:.2g}")),
         stackable=choice.stackable,
         max_faces=choice.max_faces or group.max_faces or 4000,
         parts=choice.parts or group.parts or 8,
         materials={pattern: finishes[name] for pattern, name in named.items()},
         keypoints=tuple(
-            p for name, place in choice.keypoints.items() for p in _points(name, place)
+            p for name, place in choice.keypoints.items() for p in _mirror_points(name, place)
         ),
-        regions=tuple(region for lamp in choice.lamps for region in _regions(lamp, finishes)),
+        regions=tuple(
+            region for lamp in choice.lamps for region in _mirror_regions(lamp, finishes)
+        ),
         licence=model.licence,
         author=model.creator,
     )
@@ -211,11 +207,11 @@ def _tags(choice: ModelChoice, group: Group, thickness_m: float) -> tuple[str, .
     return tuple(sorted(tags))
 
 
-def _first(*values: float | None) -> float:
+def _first_given(*values: float | None) -> float:
     return next(value for value in values if value is not None)
 
 
-def _points(name: str, place: Place) -> tuple[Point, ...]:
+def _mirror_points(name: str, place: Place) -> tuple[Point, ...]:
     x, y, z = place
     if y == 0.0:
         return (Point(name=name, position_m=place, radius_m=_radius_m(name, place)),)
@@ -226,15 +222,15 @@ def _points(name: str, place: Place) -> tuple[Point, ...]:
 
 
 def _radius_m(name: str, place: Place) -> float:
-    """Lamps are at the surface; hubs can lie a wheel's radius, their own height, below the tyre.
+    """Radius of a keypoint: lamps lie at the surface, wheel hubs up to a wheel's radius below it.
 
-    So deep they are where a wheel is seen from ahead, or turned. A tenth more is for hubs that
-    were measured a little low; bodywork before the far wheels is much thicker.
+    That depth, the hub's own height, occurs where a wheel is seen from ahead or is turned. The
+    extra tenth covers hubs measured slightly low; bodywork before the far wheels is much thicker.
     """
     return round(1.1 * place[2], 3) if name.startswith("wheel") else 0.15
 
 
-def _regions(lamp: Lamp, finishes: Mapping[str, Finish]) -> tuple[Region, Region]:
+def _mirror_regions(lamp: Lamp, finishes: Mapping[str, Finish]) -> tuple[Region, Region]:
     (x0, y0, z0), (x1, y1, z1) = lamp.low_m, lamp.high_m
     finish = finishes[lamp.finish]
     return (
@@ -243,8 +239,8 @@ def _regions(lamp: Lamp, finishes: Mapping[str, Finish]) -> tuple[Region, Region
     )
 
 
-def _copy(folder: Folder, model: str, target: Path) -> None:
-    """A model and the files it refers to, under their own names."""
+def _copy_model(folder: Folder, model: str, target: Path) -> None:
+    """Copy a model and the files it refers to, under their own names."""
     for name in find_referenced_files(folder, model):
         path = target / name
         if not path.exists():

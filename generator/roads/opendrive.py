@@ -1,8 +1,9 @@
-"""OpenDRIVE: roads with lanes of varying width, and junctions, from ``.xodr`` files.
+"""Reader of OpenDRIVE files (``.xodr``): roads with lanes of varying width, and junctions.
 
-Source: ASAM OpenDRIVE 1.4 (Rev. H) to 1.7. Read are reference lines, elevation, superelevation,
-lane offsets, lane sections with widths, heights, marks and links, and junction connections. What
-describes neither lanes nor surface (objects, signals, controllers, railways) is ignored.
+Source: ASAM OpenDRIVE 1.4 (Rev. H) to 1.7. Supported are reference lines, elevation,
+superelevation, lane offsets, lane sections with widths, heights, marks and links, and junction
+connections. Elements that describe neither lanes nor surface (objects, signals, controllers,
+railways) are ignored.
 """
 
 from __future__ import annotations
@@ -31,20 +32,27 @@ from gen_data.generator.roads.reference_line import (
 )
 
 MAX_GAP_M = 0.01
-"""Pieces of a reference line must meet this closely."""
+"""Largest gap between consecutive pieces of a reference line."""
 _MAX_ELEMENTS = 500_000
 _MAX_ROADS = 5_000
 _MAX_LENGTH_M = 50_000.0
+_MAX_LANES_M = 5e5
+"""Total length of all lanes; building lane graph and surface takes time in proportion."""
+_MAX_TURN_RAD = 100.0
+"""Largest turn of one geometry: the quadrature of spirals takes memory in proportion."""
+_MAX_POLY3_M, _MAX_SLOPE = 1_000.0, 100.0
+_MAX_LANE_WIDTH_M, _MAX_REACH_M = 100.0, 1e4
+_CHECK_STEP_M = 10.0
 
 Contact = Literal["start", "end"]
 
 
 @dataclass(frozen=True, slots=True)
 class Piecewise:
-    """A function of s made of cubics; 0 before the first and without any.
+    """Piecewise cubic function of s; 0 before the first piece.
 
     Attributes:
-        pieces: ``(start, a, b, c, d)``, by rising start.
+        pieces: ``(start, a, b, c, d)``, sorted by start.
     """
 
     pieces: tuple[tuple[float, float, float, float, float], ...] = ()
@@ -63,7 +71,7 @@ class Mark:
     """A line on the outer edge of a lane.
 
     Attributes:
-        kind: ``solid``, ``broken``, ``none``, ... as the file says.
+        kind: ``solid``, ``broken``, ``none``, ... as in the file.
     """
 
     kind: str
@@ -75,9 +83,9 @@ class LaneRecord:
     """A lane of one section; ``number`` is positive to the left of the reference line.
 
     Attributes:
-        width_m: By distance from the section's start.
-        height_m: Of its inner and outer edge over the road; None = the file says nothing.
-        predecessor, successor: Numbers in the sections before and after; None = no link.
+        width_m: Width by distance from the section's start.
+        height_m: Heights of its inner and outer edge over the road; None = not given.
+        predecessor, successor: Lane numbers in the adjacent sections; None = no link.
     """
 
     number: int
@@ -91,7 +99,7 @@ class LaneRecord:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A stretch of a road with the same lanes throughout; ``lanes`` by number, with 0."""
+    """Stretch of a road with a constant set of lanes; ``lanes`` by number, including 0."""
 
     start_m: float
     end_m: float
@@ -100,7 +108,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class RoadLink:
-    """What lies before or behind a road: a road's start or end, or a junction."""
+    """Predecessor or successor of a road: the start or end of a road, or a junction."""
 
     junction: bool
     target: str
@@ -112,9 +120,9 @@ class Road:
     """One road of a file.
 
     Attributes:
-        junction: Id of the junction that it crosses; empty = none.
-        left_hand: Whether its traffic keeps left.
-        speed_m_s: The limit; 0 = none is given.
+        junction: Id of the junction it belongs to; empty = none.
+        left_hand: Whether traffic keeps left.
+        speed_m_s: Speed limit; 0 = not given.
     """
 
     road_id: str
@@ -130,7 +138,7 @@ class Road:
     speed_m_s: float
 
     def boundaries_m(self, section: Section, s_m: Array) -> dict[int, Array]:
-        """``t`` of each lane's outer edge by number; 0 is the middle, at the lane offset."""
+        """``t`` [n] of each lane's outer edge by number; 0 is the centre, at the lane offset."""
         edges = {0: self.lane_offset_m(s_m)}
         for side in (1, -1):
             t = edges[0]
@@ -149,7 +157,7 @@ class Road:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A way through a junction; ``lanes`` are pairs (from, to) of numbers."""
+    """Connection through a junction; ``lanes`` are pairs (from, to) of lane numbers."""
 
     incoming: str
     connecting: str
@@ -159,12 +167,12 @@ class Connection:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """A file.
+    """Content of a file.
 
     Attributes:
-        roads: By id, in the file's order.
-        junctions: Connections by the junction's id.
-        place: What error messages call the file.
+        roads: Roads by id, in the file's order.
+        junctions: Connections by junction id.
+        place: Name of the file in error messages.
     """
 
     roads: Mapping[str, Road]
@@ -173,11 +181,11 @@ class Network:
 
 
 def read_opendrive(data: bytes, place: str) -> Network:
-    """The roads of an OpenDRIVE file.
+    """Read the roads of an OpenDRIVE file.
 
     Raises:
-        AssetError: malformed, incomplete, with gaps, or with links to what it has not; the message
-            names the road.
+        AssetError: if it is malformed, incomplete, too large, or has gaps or broken links; the
+            message names the road.
     """
     root = parse_xml(data, place, "OpenDRIVE", "an OpenDRIVE file", _MAX_ELEMENTS)
     elements = root.findall("road")
@@ -186,22 +194,31 @@ def read_opendrive(data: bytes, place: str) -> Network:
     if len(elements) > _MAX_ROADS:
         raise AssetError(f"{place}: more than {_MAX_ROADS} roads; cut out the part that matters")
     roads: dict[str, Road] = {}
+    lanes_m = 0.0
     for element in elements:
         road_id = element.get("id", "")
         where = f"{place}: road '{road_id[:40]}'"
         if not road_id or road_id in roads:
             raise AssetError(f"{where}: its id is missing or taken; give it one of its own")
         try:
-            roads[road_id] = _road(element)
+            roads[road_id] = road = _read_road(element)
+            lanes_m += sum(len(x.lanes) * (x.end_m - x.start_m) for x in road.sections)
+            if lanes_m <= _MAX_LANES_M:
+                _check_extents(road)
         except KeyError as error:
             raise AssetError(f"{where}: {error} is missing; add it") from None
         except ValueError as error:
             raise AssetError(f"{where}: {error}") from None
+        if lanes_m > _MAX_LANES_M:
+            raise AssetError(
+                f"{place}: more than {_MAX_LANES_M / 1e3:g} km of lanes; cut out the part that "
+                "matters"
+            )
     junctions = {}
     for element in root.findall("junction"):
         name = element.get("id", "")
         try:
-            junctions[name] = tuple(_connection(e) for e in element.findall("connection"))
+            junctions[name] = tuple(_read_connection(e) for e in element.findall("connection"))
         except (KeyError, ValueError) as error:
             raise AssetError(f"{place}: junction '{name[:40]}': malformed ({error})") from None
     network = Network(roads, junctions, place)
@@ -209,39 +226,66 @@ def read_opendrive(data: bytes, place: str) -> Network:
     return network
 
 
-def _road(element: Element) -> Road:
-    line = _line(element)
-    length_m = _number(element, "length")
+def _read_road(element: Element) -> Road:
+    line = _read_line(element)
+    length_m = _read_number(element, "length")
     if abs(length_m - line.length_m) > MAX_GAP_M:
         raise ValueError(
             f"its length is {length_m:g} m, that of its geometry {line.length_m:g} m; correct one"
         )
-    lanes = _child(element, "lanes")
+    lanes = _require_child(element, "lanes")
     junction = element.get("junction", "-1")
     speed = element.find("type/speed")
     return Road(
         road_id=element.attrib["id"],
         junction="" if junction == "-1" else junction,
         line=line,
-        elevation_m=_piecewise(element.findall("elevationProfile/elevation")),
-        superelevation_rad=_piecewise(element.findall("lateralProfile/superelevation")),
-        lane_offset_m=_piecewise(lanes.findall("laneOffset")),
-        sections=_sections(lanes, line.length_m),
-        predecessor=_road_link(element.find("link/predecessor")),
-        successor=_road_link(element.find("link/successor")),
+        elevation_m=_read_piecewise(element.findall("elevationProfile/elevation")),
+        superelevation_rad=_read_piecewise(element.findall("lateralProfile/superelevation")),
+        lane_offset_m=_read_piecewise(lanes.findall("laneOffset")),
+        sections=_read_sections(lanes, line.length_m),
+        predecessor=_read_road_link(element.find("link/predecessor")),
+        successor=_read_road_link(element.find("link/successor")),
         left_hand=element.get("rule", "RHT") == "LHT",
-        speed_m_s=0.0 if speed is None else _speed(speed),
+        speed_m_s=0.0 if speed is None else _read_speed(speed),
     )
 
 
-def _line(element: Element) -> ReferenceLine:
+def _check_extents(road: Road) -> None:
+    """Raise ValueError if a lane is too wide, or the road lies too far aside, up or down."""
+    for section in road.sections:
+        steps = math.ceil((section.end_m - section.start_m) / _CHECK_STEP_M)
+        s_m = np.linspace(section.start_m, section.end_m, steps + 1)
+        # Overflow yields inf or NaN, which no comparison below accepts.
+        with np.errstate(over="ignore", invalid="ignore"):
+            widths_m = {
+                number: float(np.abs(lane.width_m(s_m - section.start_m)).max())
+                for number, lane in section.lanes.items()
+            }
+            edges_m = np.stack(list(road.boundaries_m(section, s_m).values()))
+            heights_m = road.elevation_m(s_m) + edges_m * np.tan(road.superelevation_rad(s_m))
+        for number, width_m in widths_m.items():
+            if not width_m <= _MAX_LANE_WIDTH_M:
+                raise ValueError(
+                    f"lane {number} is {width_m:.3g} m wide; at most {_MAX_LANE_WIDTH_M:g} m are "
+                    "read, correct its width"
+                )
+        reach_m = float(np.maximum(np.abs(edges_m), np.abs(heights_m)).max())
+        if not reach_m <= _MAX_REACH_M:
+            raise ValueError(
+                f"it reaches {reach_m:.3g} m aside, up or down; at most {_MAX_REACH_M:g} m are "
+                "read, correct its elevation and lane offset"
+            )
+
+
+def _read_line(element: Element) -> ReferenceLine:
     pieces: list[Placed] = []
     s = 0.0
     for geometry in element.findall("planView/geometry"):
-        curve = _curve(geometry)
-        x, y, heading = (_number(geometry, name) for name in ("x", "y", "hdg"))
-        if abs(_number(geometry, "s") - s) > MAX_GAP_M:
-            raise ValueError(f"its geometry has a gap at s = {s:g} m; let the pieces follow on")
+        curve = _read_curve(geometry)
+        x, y, heading = (_read_number(geometry, name) for name in ("x", "y", "hdg"))
+        if abs(_read_number(geometry, "s") - s) > MAX_GAP_M:
+            raise ValueError(f"its geometry has a gap at s = {s:g} m; make the pieces contiguous")
         piece = Placed(s, x, y, heading, curve)
         if pieces:
             end = ReferenceLine((pieces[-1],)).poses(np.array([s]))[0]
@@ -258,41 +302,65 @@ def _line(element: Element) -> ReferenceLine:
     return ReferenceLine(tuple(pieces))
 
 
-def _curve(geometry: Element) -> Curve:
-    length_m = _number(geometry, "length")
+def _read_curve(geometry: Element) -> Curve:
+    length_m = _read_number(geometry, "length")
     if not 0.0 < length_m <= _MAX_LENGTH_M:
         raise ValueError(f"a geometry is {length_m:g} m long; expected 0 to {_MAX_LENGTH_M:g} m")
     for kind in geometry:
         if kind.tag == "line":
             return Line(length_m)
         if kind.tag == "arc":
-            return Arc(length_m, _number(kind, "curvature"))
+            return Arc(length_m, _read_curvature(kind, "curvature", length_m))
         if kind.tag == "spiral":
-            return Spiral(length_m, _number(kind, "curvStart"), _number(kind, "curvEnd"))
+            start, end = (
+                _read_curvature(kind, name, length_m) for name in ("curvStart", "curvEnd")
+            )
+            return Spiral(length_m, start, end)
         if kind.tag == "poly3":
-            return Poly3(length_m, _coefficients(kind, ""))
+            return _check_poly3(length_m, _read_cubic(kind, ""))
         if kind.tag == "paramPoly3":
-            end = length_m if kind.get("pRange", "normalized") == "arcLength" else 1.0
-            return ParamPoly3(length_m, _coefficients(kind, "U"), _coefficients(kind, "V"), end)
+            p_end = length_m if kind.get("pRange", "normalized") == "arcLength" else 1.0
+            return ParamPoly3(length_m, _read_cubic(kind, "U"), _read_cubic(kind, "V"), p_end)
     raise ValueError("a geometry is neither line, arc, spiral, poly3 nor paramPoly3; convert it")
 
 
-def _coefficients(element: Element, suffix: str) -> tuple[float, float, float, float]:
-    a, b, c, d = (_number(element, letter + suffix) for letter in "abcd")
+def _read_curvature(element: Element, name: str, length_m: float) -> float:
+    curvature = _read_number(element, name)
+    if abs(curvature) * length_m > _MAX_TURN_RAD:
+        raise ValueError(
+            f"a curvature of {curvature:g} per metre over {length_m:g} m turns by more than "
+            f"{_MAX_TURN_RAD:g} rad; correct it"
+        )
+    return curvature
+
+
+def _check_poly3(length_m: float, v: tuple[float, float, float, float]) -> Poly3:
+    """A cubic whose arc length can be inverted in bounded time."""
+    slope = max(abs(v[1]), 2.0 * abs(v[2]) * length_m, 3.0 * abs(v[3]) * length_m**2)
+    if slope > _MAX_SLOPE or length_m > _MAX_POLY3_M:
+        raise ValueError(
+            f"a poly3 with a slope of {slope:.3g} over {length_m:g} m; at most {_MAX_SLOPE:g} over "
+            f"{_MAX_POLY3_M:g} m are read, export it as paramPoly3"
+        )
+    return Poly3(length_m, v)
+
+
+def _read_cubic(element: Element, suffix: str) -> tuple[float, float, float, float]:
+    a, b, c, d = (_read_number(element, letter + suffix) for letter in "abcd")
     return (a, b, c, d)
 
 
-def _sections(lanes: Element, length_m: float) -> tuple[Section, ...]:
+def _read_sections(lanes: Element, length_m: float) -> tuple[Section, ...]:
     elements = lanes.findall("laneSection")
     if not elements:
         raise ValueError("it has no lane sections; add one")
-    starts = [_number(element, "s") for element in elements]
+    starts = [_read_number(element, "s") for element in elements]
     ends = [*starts[1:], length_m]
     if abs(starts[0]) > MAX_GAP_M or any(a >= b for a, b in zip(starts, ends, strict=True)):
-        raise ValueError("its lane sections do not start at s = 0 and rise; sort them")
+        raise ValueError("its lane sections do not start at s = 0 in ascending order; sort them")
     made = []
     for element, start, end in zip(elements, starts, ends, strict=True):
-        records = [_lane(lane) for lane in element.iterfind("*/lane")]
+        records = [_read_lane(lane) for lane in element.iterfind("*/lane")]
         numbers = {record.number: record for record in records}
         for side in (1, -1):
             here = sorted((n for n in numbers if n * side > 0), key=abs)
@@ -302,19 +370,21 @@ def _sections(lanes: Element, length_m: float) -> tuple[Section, ...]:
     return tuple(made)
 
 
-def _lane(element: Element) -> LaneRecord:
+def _read_lane(element: Element) -> LaneRecord:
     mark = element.find("roadMark")
     height = element.find("height")
     links = {tag: element.find(f"link/{tag}") for tag in ("predecessor", "successor")}
     number = int(element.attrib["id"])
-    width = _piecewise(element.findall("width"), "sOffset")
+    width = _read_piecewise(element.findall("width"), "sOffset")
     if number != 0 and not width.pieces:
         raise ValueError(f"lane {number} has no width; add one")
     return LaneRecord(
         number=number,
         kind=element.get("type", "none"),
         width_m=width,
-        height_m=None if height is None else (_number(height, "inner"), _number(height, "outer")),
+        height_m=None
+        if height is None
+        else (_read_number(height, "inner"), _read_number(height, "outer")),
         mark=Mark("none", 0.0)
         if mark is None
         else Mark(mark.get("type", "none"), float(mark.get("width", "0.12")) or 0.12),
@@ -322,23 +392,23 @@ def _lane(element: Element) -> LaneRecord:
     )
 
 
-def _piecewise(elements: Iterable[Element], start: str = "s") -> Piecewise:
-    pieces = [(_number(e, start), *_coefficients(e, "")) for e in elements]
+def _read_piecewise(elements: Iterable[Element], start: str = "s") -> Piecewise:
+    pieces = [(_read_number(e, start), *_read_cubic(e, "")) for e in elements]
     return Piecewise(tuple(sorted(pieces)))
 
 
-def _road_link(element: Element | None) -> RoadLink | None:
+def _read_road_link(element: Element | None) -> RoadLink | None:
     if element is None:
         return None
     junction = element.get("elementType", "road") == "junction"
-    return RoadLink(junction, element.attrib["elementId"], _contact(element))
+    return RoadLink(junction, element.attrib["elementId"], _read_contact(element))
 
 
-def _connection(element: Element) -> Connection:
+def _read_connection(element: Element) -> Connection:
     return Connection(
         incoming=element.attrib["incomingRoad"],
         connecting=element.attrib["connectingRoad"],
-        contact=_contact(element),
+        contact=_read_contact(element),
         lanes=tuple(
             (int(link.attrib["from"]), int(link.attrib["to"]))
             for link in element.findall("laneLink")
@@ -346,11 +416,11 @@ def _connection(element: Element) -> Connection:
     )
 
 
-def _contact(element: Element) -> Contact:
+def _read_contact(element: Element) -> Contact:
     return "end" if element.get("contactPoint", "start") == "end" else "start"
 
 
-def _speed(element: Element) -> float:
+def _read_speed(element: Element) -> float:
     text = element.get("max", "")
     if text in ("no limit", "undefined", ""):
         return 0.0
@@ -358,14 +428,14 @@ def _speed(element: Element) -> float:
     return float(text) * factor
 
 
-def _number(element: Element, name: str) -> float:
+def _read_number(element: Element, name: str) -> float:
     value = float(element.attrib[name])
     if not math.isfinite(value):
         raise ValueError(f"{name} is not finite; correct it")
     return value
 
 
-def _child(element: Element, tag: str) -> Element:
+def _require_child(element: Element, tag: str) -> Element:
     child = element.find(tag)
     if child is None:
         raise ValueError(f"it has no <{tag}>; add it")
@@ -373,7 +443,7 @@ def _child(element: Element, tag: str) -> Element:
 
 
 def _check_links(network: Network) -> None:
-    """Every link leads somewhere. Raises AssetError."""
+    """Raise AssetError for links without a target."""
     for road in network.roads.values():
         for word, link in (("predecessor", road.predecessor), ("successor", road.successor)):
             known = network.junctions if link and link.junction else network.roads
@@ -388,7 +458,7 @@ def _check_links(network: Network) -> None:
                 if lane.successor is not None and lane.successor not in after:
                     raise AssetError(
                         f"{network.place}: road '{road.road_id}': lane {lane.number} goes on as "
-                        f"lane {lane.successor}, which the next section has not; correct the link"
+                        f"lane {lane.successor}, which the next section lacks; correct the link"
                     )
     for name, connections in network.junctions.items():
         for one in connections:

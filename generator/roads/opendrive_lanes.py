@@ -1,4 +1,4 @@
-"""The lane graph of an OpenDRIVE file, about an origin in its middle."""
+"""Lane graph of an OpenDRIVE file, relative to an origin at its centre."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ KINDS: dict[str, LaneKind] = {
     "sidewalk": "sidewalk",
     "walking": "sidewalk",
 }
-"""Lane types of the standard that things move or stand on; others only have a surface."""
+"""Lane types of the standard that carry traffic; others only have a surface."""
 RAISED_M = 0.12
-"""Height of sidewalks of which the file does not tell one."""
+"""Default height of sidewalks."""
 MAX_LINK_GAP_M = 0.1
-"""Lanes that are linked must meet this closely."""
+"""Largest gap between linked lanes."""
 DEFAULT_SPEED_M_S = 13.9
 _STEP_M = 2.0
 _SIGN_KINDS = frozenset({"sidewalk", "parking"})
-"""Run with the street on their left, whatever side the traffic keeps to."""
+"""Kinds that always run with the street on their left, whichever side traffic keeps to."""
 
 Key = tuple[str, int, int]
 
 
 def origin_m(network: Network) -> tuple[float, float]:
-    """Middle of all reference lines, in whole metres: file coordinates may be far from zero."""
+    """Centre of all reference lines, in whole metres; file coordinates may be far from zero."""
     ends = np.concatenate(
         [road.line.points(stations(0.0, road.line.length_m, 20.0), np.zeros(1))
          for road in network.roads.values()]
@@ -53,7 +53,7 @@ def origin_m(network: Network) -> tuple[float, float]:
 
 
 def stations(start_m: float, end_m: float, step_m: float) -> Array:
-    """Even arc lengths from start to end, at most a step apart."""
+    """Evenly spaced arc lengths [n] from start to end, at most one step apart."""
     return np.linspace(start_m, end_m, max(1, math.ceil((end_m - start_m) / step_m - 1e-9)) + 1)
 
 
@@ -68,7 +68,7 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
     """Every lane, in the frame whose origin is ``origin_m``.
 
     Raises:
-        AssetError: linked lanes do not meet; the message names the road.
+        AssetError: if linked lanes do not meet; the message names the road.
     """
     x, y = origin_m(network)
     T_body_file = SE3((-x, -y, 0.0))
@@ -79,16 +79,16 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
             for number in sorted(section.lanes):
                 kind = KINDS.get(section.lanes[number].kind)
                 if number != 0 and kind is not None:
-                    made[road.road_id, index, number] = _lane(
+                    made[road.road_id, index, number] = _make_lane(
                         road, index, section, number, T_body_file
                     )
-            extra += _beside(road, index, section, T_body_file)
+            extra += _make_side_lanes(road, index, section, T_body_file)
     linked = []
     for key, lane in made.items():
-        after = [k for k in _after(network, key) if k in made and made[k].kind == lane.kind]
+        after = [k for k in _next_keys(network, key) if k in made and made[k].kind == lane.kind]
         for other in after:
             _check_gap(network, key, lane, made[other])
-        linked.append(_with_links(network, lane, key, after, made))
+        linked.append(_link_lane(network, lane, key, after, made))
     return (*linked, *extra)
 
 
@@ -99,12 +99,12 @@ def runs_forward(road: Road, number: int, kind: str) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class _Course:
-    """A lane's edges.
+class _LaneEdges:
+    """Sampled edges of a lane.
 
     Attributes:
         s_m: Arc lengths [n].
-        inner_m, outer_m: ``t`` of its edges at them [n].
+        inner_m, outer_m: ``t`` of its edges [n].
     """
 
     s_m: Array
@@ -112,30 +112,30 @@ class _Course:
     outer_m: Array
 
 
-def _course(road: Road, section: Section, number: int, step_m: float = _STEP_M) -> _Course:
+def _trace_edges(road: Road, section: Section, number: int, step_m: float = _STEP_M) -> _LaneEdges:
     s = stations(section.start_m, section.end_m, step_m)
     edges = road.boundaries_m(section, s)
     side = 1 if number > 0 else -1
-    return _Course(s, edges[number - side], edges[number])
+    return _LaneEdges(s, edges[number - side], edges[number])
 
 
-def _lane(road: Road, index: int, section: Section, number: int, T_body_file: SE3) -> Lane:
+def _make_lane(road: Road, index: int, section: Section, number: int, T_body_file: SE3) -> Lane:
     record = section.lanes[number]
-    course = _course(road, section, number)
+    course = _trace_edges(road, section, number)
     lift = np.full(len(course.s_m), 0.5 * sum(heights_m(record)))
     points = road.points(course.s_m, 0.5 * (course.inner_m + course.outer_m), lift)
     low_m, high_m = heights_m(record)
     inner = road.points(course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2].mean()
     outer = road.points(course.s_m, course.outer_m, np.full(len(lift), high_m))[:, 2].mean()
     width_m = round(float(np.abs(course.outer_m - course.inner_m).mean()), 6)
-    # The inner edge of a lane with a negative number is on the left, seen along the road.
+    # Lanes with negative numbers have their inner edge on the left, seen along the road.
     bank = float(inner - outer) / width_m * (1.0 if number < 0 else -1.0) if width_m else 0.0
     if not runs_forward(road, number, record.kind):
         points, bank = points[::-1], -bank
     kind = KINDS[record.kind]
     drives = kind == "driving"
     return Lane(
-        name=_name((road.road_id, index, number)),
+        name=_lane_name((road.road_id, index, number)),
         kind=kind,
         center_m=world_points(points, T_body_file),
         width_m=width_m,
@@ -146,8 +146,8 @@ def _lane(road: Road, index: int, section: Section, number: int, T_body_file: SE
     )
 
 
-def _beside(road: Road, index: int, section: Section, T_body_file: SE3) -> list[Lane]:
-    """Furniture on sidewalks, and house fronts along the outer edges of roads."""
+def _make_side_lanes(road: Road, index: int, section: Section, T_body_file: SE3) -> list[Lane]:
+    """Furniture lanes on sidewalks, and frontage lanes along the outer edges of roads."""
     made: list[Lane] = []
     for side in (1, -1):
         numbers = sorted((n for n in section.lanes if n * side > 0), key=abs)
@@ -159,14 +159,14 @@ def _beside(road: Road, index: int, section: Section, T_body_file: SE3) -> list[
             ("furniture", n, 0.0) for n in numbers if KINDS.get(section.lanes[n].kind) == "sidewalk"
         ]
         for kind, number, share in lines:
-            course = _course(road, section, number)
+            course = _trace_edges(road, section, number)
             into = share * (course.outer_m - course.inner_m)
             if kind == "furniture":
                 into = side * np.minimum(FURNITURE_M, 0.5 * np.abs(course.outer_m - course.inner_m))
             lift = np.full(len(course.s_m), heights_m(section.lanes[number])[1])
             points = road.points(course.s_m, course.inner_m + into, lift)
             points = points if side < 0 else points[::-1]
-            name = f"{_name((road.road_id, index, number))}/{kind}"
+            name = f"{_lane_name((road.road_id, index, number))}/{kind}"
             width = 0.6 if kind == "furniture" else 0.0
             made.append(
                 Lane(name, kind, world_points(points, T_body_file), width, road=road.road_id)
@@ -174,35 +174,35 @@ def _beside(road: Road, index: int, section: Section, T_body_file: SE3) -> list[
     return made
 
 
-def _name(key: Key) -> str:
+def _lane_name(key: Key) -> str:
     return f"{key[0]}.{key[1]}.{key[2]}"
 
 
-def _with_links(
+def _link_lane(
     network: Network, lane: Lane, key: Key, after: list[Key], made: dict[Key, Lane]
 ) -> Lane:
-    """The lane with its successors, and its neighbours that run the same way."""
+    """Add successors, and adjacent lanes of the same kind, to a lane."""
     road, section, number = key
     side = 1 if number > 0 else -1
     kind = network.roads[road].sections[section].lanes[number].kind
 
     def beside(step: int) -> str:
         other = (road, section, number + step)
-        return _name(other) if other in made and made[other].kind == lane.kind else ""
+        return _lane_name(other) if other in made and made[other].kind == lane.kind else ""
 
-    # Towards the middle is -side in t, and left is +t for whoever runs along the road.
+    # The centre lies at -side in t; left is +t for traffic along the road.
     inner_is_left = runs_forward(network.roads[road], number, kind) == (side < 0)
     left, right = (-side, side) if inner_is_left else (side, -side)
     return replace(
         lane,
-        successors=tuple(sorted(_name(k) for k in after)),
+        successors=tuple(sorted(_lane_name(k) for k in after)),
         left=beside(left),
         right=beside(right),
     )
 
 
-def _after(network: Network, key: Key) -> list[Key]:
-    """Keys of the lanes that a lane leads to."""
+def _next_keys(network: Network, key: Key) -> list[Key]:
+    """Keys of a lane's successors."""
     road = network.roads[key[0]]
     record = road.sections[key[1]].lanes[key[2]]
     forward = runs_forward(road, record.number, record.kind)
@@ -214,9 +214,9 @@ def _after(network: Network, key: Key) -> list[Key]:
     if link is None:
         return []
     if not link.junction:
-        return [] if target is None else [_entry(network, link.target, link.contact, target)]
+        return [] if target is None else [_entry_key(network, link.target, link.contact, target)]
     return [
-        _entry(network, one.connecting, one.contact, to)
+        _entry_key(network, one.connecting, one.contact, to)
         for one in network.junctions[link.target]
         if one.incoming == road.road_id
         for origin, to in one.lanes
@@ -224,7 +224,7 @@ def _after(network: Network, key: Key) -> list[Key]:
     ]
 
 
-def _entry(network: Network, road_id: str, contact: Contact, number: int) -> Key:
+def _entry_key(network: Network, road_id: str, contact: Contact, number: int) -> Key:
     sections = network.roads[road_id].sections
     return (road_id, 0 if contact == "start" else len(sections) - 1, number)
 

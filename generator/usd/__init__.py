@@ -1,5 +1,5 @@
-"""OpenUSD: the one package that speaks it, in both directions.
+"""Import and export of OpenUSD stages.
 
-USD multiplies row vectors from the left, looks along -Z with +Y up, and measures in whatever unit
-and axes a stage declares; nothing of that leaves this package.
+USD multiplies row vectors from the left, its cameras look along -Z with +Y up, and each stage
+declares its unit and up axis. This package converts all of that to the project's conventions.
 """

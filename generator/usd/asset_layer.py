@@ -1,4 +1,4 @@
-"""The layer of one asset: its mesh, and the materials that it has by itself."""
+"""Layer of one asset: its mesh and default materials."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_data.generator.core.asset_types import Float32, Material, MeshData
 from gen_data.generator.usd.material_writer import BOX_UV, UV, TextureFinder, define_material
-from gen_data.generator.usd.stage_files import open_stage_for_writing
+from gen_data.generator.usd.prims import open_stage_for_writing
 
 MESH = "Mesh"
 ASSET = "/Asset"
@@ -31,24 +31,24 @@ def write_asset_layer(path: Path, mesh: MeshData, textures: TextureFinder) -> No
 def bind_materials(
     stage: Any, mesh_path: str, scope: str, materials: Sequence[Material], textures: TextureFinder
 ) -> None:
-    """Define the materials of a mesh's slots in a scope, and bind them to it and its subsets."""
+    """Define the materials of a mesh's slots in a scope; bind them to the mesh and its subsets."""
     from pxr import Usd, UsdGeom, UsdShade
 
     mesh = stage.GetPrimAtPath(mesh_path)
-    # All children: those of a class are abstract, and are not listed otherwise.
+    # All prims, because children of a class are abstract and filtered out by default.
     children = mesh.GetFilteredChildren(Usd.PrimAllPrimsPredicate)
     subsets = [child for child in children if child.IsA(UsdGeom.Subset)]
-    parts = {_slot_of(part.GetName()): part for part in subsets} or {0: mesh}
+    parts = {_slot_number(part.GetName()): part for part in subsets} or {0: mesh}
     UsdGeom.Scope.Define(stage, scope)
     for slot, part in parts.items():
         material = define_material(stage, f"{scope}/{SLOT}{slot}", materials[slot], textures)
         UsdShade.MaterialBindingAPI.Apply(part).Bind(material)
         if part is not mesh and slot == min(parts):
-            # For readers that do not know subsets.
+            # For readers without support for subsets.
             UsdShade.MaterialBindingAPI.Apply(mesh).Bind(material)
 
 
-def _slot_of(subset: str) -> int:
+def _slot_number(subset: str) -> int:
     return int(subset.removeprefix(SLOT))
 
 
@@ -82,9 +82,10 @@ def _define_mesh(stage: Any, path: str, mesh: MeshData) -> None:
 
 
 def _box_uvs(mesh: MeshData) -> Float32:
-    """Coordinates [m] of every face's corners, float32 [3 * m, 2], along its dominant axis.
+    """Planar coordinates [m] of all face corners, float32 [3 * m, 2], along the dominant axis.
 
-    What the renderer blends where the surface turns changes at once here: USD has no node for it.
+    The renderer blends the three projections; here they switch per face, because USD has no
+    triplanar node.
     """
     corners = mesh.vertices_m[mesh.faces]
     crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

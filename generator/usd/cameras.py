@@ -1,6 +1,6 @@
-"""Cameras, both ways.
+"""Import and export of cameras.
 
-USD's camera is a pinhole: what a lens bends is written as attributes beside it
+USD's camera is a pinhole; lens distortion is written as additional attributes
 (``genData:lens:model``, ``genData:lens:coefficients``, ``genData:lens:halfField`` in radians).
 """
 
@@ -11,16 +11,16 @@ from typing import Any
 
 from gen_data.generator.core.scene import Camera
 from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.usd.xforms import T_CAMERA_USD, set_transforms
+from gen_data.generator.usd.prims import T_CAMERA_USD, set_transforms
 
 PIXEL = 2.0**-11
-"""Width of a pixel on the sensor, in tenths of a metre, USD's unit for it: about 49 micrometres. A
-power of two, so that whole pixels have exact apertures."""
+"""Pixel width on the sensor in tenths of a scene unit, USD's unit for apertures: about 49
+micrometres. A power of two, so that apertures of whole pixels are exact."""
 CLIPPING_M = (0.01, 100_000.0)
 
 
 def define_camera(stage: Any, path: str, steps: Sequence[Camera]) -> None:
-    """A camera whose frustum is its intrinsics, and where it is at every time code."""
+    """Define a camera from its intrinsics, with a pose per time code."""
     from pxr import Gf, Sdf, UsdGeom
 
     k = steps[0].intrinsics

@@ -1,4 +1,4 @@
-"""Light sources, both ways (UsdLux: radiance in nits, colours linear)."""
+"""Import and export of lights (UsdLux: radiance in nits, linear colours)."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.photometry import luminance_cd_m2
 from gen_data.generator.core.scene import Environment, Light
 from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.usd.xforms import along_minus_z, set_transforms
+from gen_data.generator.usd.prims import along_minus_z, set_transforms
 
 RADIUS_M_MIN = 1e-3
-"""A point is written as a ball of this size: it has a radiance, which USD asks for."""
+"""Smallest radius of exported spheres: USD gives radiance, which points do not have."""
 
 DIPPED_RAD = 0.2
-"""Half angle of the spot that stands for a dipped headlight."""
+"""Half angle of the spot that approximates a dipped headlight."""
 
 T_WORLD_DOME = SE3((0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5))
-"""USD's sky has its pole along +Y and the image's centre along +Z; ours along +Z and +X."""
+"""USD's sky has its pole along +Y and the image's centre along +Z; here +Z and +X."""
 
 
 def define_light(stage: Any, path: str, steps: Sequence[Light]) -> None:
-    """A light, and where it is at every time code."""
+    """Define a light, with a pose per time code."""
     from pxr import UsdLux
 
-    steps = [_without_cutoff(step) for step in steps]
+    steps = [_approximate_cutoff(step) for step in steps]
     light = steps[0]
     if light.kind == "sun":
         prim = UsdLux.DistantLight.Define(stage, path)
         prim.CreateAngleAttr(math.degrees(2.0 * light.angular_radius_rad))
-        # Normalised, a distant light's intensity is the illuminance of what faces it.
+        # The intensity of a normalised distant light is the illuminance of a surface facing it.
         prim.CreateNormalizeAttr(True)
         prim.CreateIntensityAttr(light.illuminance_lux)
     elif light.kind == "rectangle":
@@ -51,17 +51,17 @@ def define_light(stage: Any, path: str, steps: Sequence[Light]) -> None:
         radius_m = max(light.radius_m, RADIUS_M_MIN)
         prim = UsdLux.SphereLight.Define(stage, path)
         prim.CreateRadiusAttr(radius_m)
-        prim.CreateIntensityAttr(light.intensity_cd / _disc_m2(radius_m))
+        prim.CreateIntensityAttr(light.intensity_cd / _disk_area_m2(radius_m))
         if light.kind == "spot":
             shaping = UsdLux.ShapingAPI.Apply(prim.GetPrim())
             shaping.CreateShapingConeAngleAttr(math.degrees(light.cone_rad))
             shaping.CreateShapingConeSoftnessAttr(1.0 - light.even)
     prim.CreateColorAttr(light.color)
-    set_transforms(prim.GetPrim(), [_pose(step).matrix() for step in steps])
+    set_transforms(prim.GetPrim(), [_light_pose(step).matrix() for step in steps])
 
 
 def define_sky(stage: Any, path: str, environment: Environment, image: str) -> None:
-    """Light from all around; ``image`` is a panorama of mean luminance 1."""
+    """Define a dome light; ``image`` is the path of a panorama of mean luminance 1."""
     from pxr import UsdLux
 
     prim = UsdLux.DomeLight.Define(stage, path)
@@ -72,31 +72,31 @@ def define_sky(stage: Any, path: str, environment: Environment, image: str) -> N
 
 
 def read_light(prim: Any, name: str, T_stage_light: Array) -> Light | None:
-    """A light in the stage's frame, metres and Z up; None if the prim is no light of these kinds.
+    """Read a light, in metres, Z up; None if the prim is not a supported light.
 
     Args:
-        prim: Of any type.
-        name: What it will be called.
+        prim: Prim of any type.
+        name: Name of the light.
         T_stage_light: Column-vector matrix [4, 4], scale included.
     """
     from pxr import UsdLux
 
     if prim.IsA(UsdLux.DistantLight):
-        return _sun(UsdLux.DistantLight(prim), name, T_stage_light)
+        return _read_sun(UsdLux.DistantLight(prim), name, T_stage_light)
     if prim.IsA(UsdLux.SphereLight):
-        return _lamp(UsdLux.SphereLight(prim), name, T_stage_light)
+        return _read_sphere(UsdLux.SphereLight(prim), name, T_stage_light)
     if prim.IsA(UsdLux.RectLight):
-        return _rectangle(UsdLux.RectLight(prim), name, T_stage_light)
+        return _read_rectangle(UsdLux.RectLight(prim), name, T_stage_light)
     if prim.IsA(UsdLux.DiskLight):
-        return _disk(UsdLux.DiskLight(prim), name, T_stage_light)
+        return _read_disk(UsdLux.DiskLight(prim), name, T_stage_light)
     return None
 
 
 def check_light(light: Light, place: str) -> Light:
-    """The light, if it can be.
+    """Check and return a light.
 
     Raises:
-        AssetError: a number of it is not finite, or what must not be negative is.
+        AssetError: if a number is not finite, negative where it must not be, or a panel is empty.
     """
     strengths = {
         "intensity": light.intensity_cd,
@@ -110,17 +110,19 @@ def check_light(light: Light, place: str) -> Light:
     for name, value in strengths.items():
         if not (math.isfinite(value) and value >= 0.0):
             raise AssetError(
-                f"{place}: light '{light.name}' has {name} {value:g}; expected a number from 0 on"
+                f"{place}: light '{light.name}' has {name} {value:g}; expected a finite number >= 0"
             )
     if (light.kind == "disk" and light.radius_m == 0.0) or min(light.size_m) == 0.0:
-        raise AssetError(f"{place}: light '{light.name}' has no area; give it one, or take it out")
+        raise AssetError(f"{place}: light '{light.name}' has no area; set its size or remove it")
     if not all(math.isfinite(v) for v in (*light.color, *light.position_m, *light.direction)):
-        raise AssetError(f"{place}: light '{light.name}' is not finite; check its place and color")
+        raise AssetError(
+            f"{place}: light '{light.name}' is not finite; check its position and color"
+        )
     return light
 
 
-def _sun(sun: Any, name: str, T_stage_light: Array) -> Light:
-    color, strength = _color_and_strength(sun)
+def _read_sun(sun: Any, name: str, T_stage_light: Array) -> Light:
+    color, strength = _read_color(sun)
     half_rad = math.radians(0.5 * float(sun.GetAngleAttr().Get()))
     if not sun.GetNormalizeAttr().Get() and half_rad > 0.0:
         strength *= math.pi * math.sin(half_rad) ** 2
@@ -134,24 +136,24 @@ def _sun(sun: Any, name: str, T_stage_light: Array) -> Light:
     )
 
 
-def _rectangle(panel: Any, name: str, T_stage_light: Array) -> Light:
+def _read_rectangle(panel: Any, name: str, T_stage_light: Array) -> Light:
     across = (_length(T_stage_light[:3, 0]), _length(T_stage_light[:3, 1]))
     width_m = float(panel.GetWidthAttr().Get()) * across[0]
     height_m = float(panel.GetHeightAttr().Get()) * across[1]
     x, y, z = (float(v) for v in T_stage_light[:3, 0] / across[0])
-    light = _panel(panel, Light(name, "rectangle"), T_stage_light, width_m * height_m)
+    light = _read_panel(panel, Light(name, "rectangle"), T_stage_light, width_m * height_m)
     return replace(light, size_m=(width_m, height_m), side=(x, y, z))
 
 
-def _disk(panel: Any, name: str, T_stage_light: Array) -> Light:
+def _read_disk(panel: Any, name: str, T_stage_light: Array) -> Light:
     radius_m = float(panel.GetRadiusAttr().Get()) * _length(T_stage_light[:3, 0])
-    light = _panel(panel, Light(name, "disk"), T_stage_light, _disc_m2(radius_m))
+    light = _read_panel(panel, Light(name, "disk"), T_stage_light, _disk_area_m2(radius_m))
     return replace(light, radius_m=radius_m)
 
 
-def _panel(panel: Any, light: Light, T_stage_light: Array, area_m2: float) -> Light:
-    """A panel without its size; normalised ones send out the same whatever their area."""
-    color, strength = _color_and_strength(panel)
+def _read_panel(panel: Any, light: Light, T_stage_light: Array, area_m2: float) -> Light:
+    """Read a panel without its size; normalised panels emit the same power at any area."""
+    color, strength = _read_color(panel)
     x, y, z = (float(v) for v in T_stage_light[:3, 3])
     return replace(
         light,
@@ -162,15 +164,15 @@ def _panel(panel: Any, light: Light, T_stage_light: Array, area_m2: float) -> Li
     )
 
 
-def _lamp(ball: Any, name: str, T_stage_light: Array) -> Light:
-    """A sphere; a spot where it is shaped to less than a half space."""
+def _read_sphere(ball: Any, name: str, T_stage_light: Array) -> Light:
+    """Read a sphere light; a spot if its cone is narrower than a half space."""
     from pxr import UsdLux
 
-    color, strength = _color_and_strength(ball)
+    color, strength = _read_color(ball)
     x, y, z = (float(v) for v in T_stage_light[:3, 3])
     radius_m = float(ball.GetRadiusAttr().Get()) * _length(T_stage_light[:3, 0])
-    # Normalised power is spread over the ball's surface, four times the disc that is seen.
-    disc_m2 = 0.25 if ball.GetNormalizeAttr().Get() else _disc_m2(radius_m)
+    # Normalised power is per surface area of the sphere, four times its visible disc.
+    disc_m2 = 0.25 if ball.GetNormalizeAttr().Get() else _disk_area_m2(radius_m)
     light = Light(
         name,
         "sphere",
@@ -189,8 +191,8 @@ def _lamp(ball: Any, name: str, T_stage_light: Array) -> Light:
     return replace(light, kind="spot", cone_rad=math.radians(float(angle_deg)), even=even)
 
 
-def _without_cutoff(light: Light) -> Light:
-    """A dipped headlight as the round spot below its cut-off, which is all that USD can say."""
+def _approximate_cutoff(light: Light) -> Light:
+    """Replace a dipped headlight by a round spot below its cut-off; USD has no cut-off."""
     if light.cutoff <= 0.0:
         return light
     down = math.tan(DIPPED_RAD) + light.cutoff
@@ -204,7 +206,7 @@ def _minus_z(T_stage_light: Array) -> Vec3:
     return (x, y, z)
 
 
-def _pose(light: Light) -> SE3:
+def _light_pose(light: Light) -> SE3:
     if light.kind == "rectangle":
         z = -np.asarray(light.direction, dtype=np.float64)
         x = np.asarray(light.side, dtype=np.float64)
@@ -216,8 +218,8 @@ def _pose(light: Light) -> SE3:
     return SE3(at, turn.quaternion_wxyz)
 
 
-def _color_and_strength(lux: Any) -> tuple[Vec3, float]:
-    """Colour of luminance 1 (Rec. 709), and the intensity that goes with it."""
+def _read_color(lux: Any) -> tuple[Vec3, float]:
+    """Read a colour, normalised to luminance 1 (Rec. 709), and the corresponding intensity."""
     red, green, blue = (float(c) for c in lux.GetColorAttr().Get())
     relative = float(luminance(np.array([red, green, blue])))
     strength = float(lux.GetIntensityAttr().Get()) * 2.0 ** float(lux.GetExposureAttr().Get())
@@ -226,7 +228,7 @@ def _color_and_strength(lux: Any) -> tuple[Vec3, float]:
     return (red / relative, green / relative, blue / relative), strength * relative
 
 
-def _disc_m2(radius_m: float) -> float:
+def _disk_area_m2(radius_m: float) -> float:
     return math.pi * radius_m * radius_m
 
 

@@ -1,4 +1,4 @@
-"""Materials as UsdPreviewSurface networks ("UsdPreviewSurface Specification", version 2.6)."""
+"""Export of materials as UsdPreviewSurface networks (specification version 2.6)."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import Any
 from gen_data.generator.core.asset_types import Material
 
 UV, BOX_UV = "st", "stBox"
-"""Texture coordinates of a mesh, and those in metres that stand for triplanar mapping."""
+"""Primvars of a mesh's texture coordinates, and of those [m] that replace triplanar mapping."""
 
 
 @dataclass(frozen=True, slots=True)
 class TextureFiles:
-    """Images of a texture, as the layer at hand refers to them; empty = there is none.
+    """Image paths of a texture, relative to the current layer; empty = none.
 
     Attributes:
         shares: Occlusion in red, metallic in blue.
-        alpha: Coverage; below a half there is a hole.
+        alpha: Coverage; values below one half are holes.
     """
 
     albedo: str
@@ -34,7 +34,7 @@ TextureFinder = Callable[[str], TextureFiles]
 
 
 def define_material(stage: Any, path: str, material: Material, textures: TextureFinder) -> Any:
-    """A material prim with its network; returned as ``UsdShade.Material``."""
+    """Define a material with its network; return the ``UsdShade.Material``."""
     from pxr import Sdf, UsdShade
 
     shade = UsdShade.Material.Define(stage, path)
@@ -42,7 +42,7 @@ def define_material(stage: Any, path: str, material: Material, textures: Texture
     shader.CreateIdAttr("UsdPreviewSurface")
     shader.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(0)
     number = Sdf.ValueTypeNames.Float
-    ior = material.ior if material.transmission else _index_of(material.specular)
+    ior = material.ior if material.transmission else _refractive_index(material.specular)
     shader.CreateInput("metallic", number).Set(material.metallic)
     shader.CreateInput("ior", number).Set(ior)
     if any(material.emission_cd_m2):
@@ -60,7 +60,7 @@ def define_material(stage: Any, path: str, material: Material, textures: Texture
 
 
 def _define_layers(shader: Any, material: Material) -> None:
-    """Coat, transmission and opacity, where there are any."""
+    """Define coat, transmission and opacity where the material has them."""
     from pxr import Sdf
 
     number = Sdf.ValueTypeNames.Float
@@ -75,7 +75,7 @@ def _define_layers(shader: Any, material: Material) -> None:
 
 
 def _connect_images(shader: Any, images: _Images, files: TextureFiles) -> None:
-    """Let images, times the numbers that inputs hold, decide instead of these."""
+    """Connect images; the inputs' constant values become the images' scale factors."""
     from pxr import Gf, Sdf
 
     def connect(name: str, node: Any, output: str) -> None:
@@ -113,7 +113,7 @@ def _connect_images(shader: Any, images: _Images, files: TextureFiles) -> None:
 
 
 class _Images:
-    """Texture nodes of one material, all at the same coordinates."""
+    """Texture nodes of one material, which share their coordinates."""
 
     def __init__(self, stage: Any, path: str, material: Material) -> None:
         from pxr import Sdf, UsdShade
@@ -134,7 +134,7 @@ class _Images:
             self._uvs = scale.CreateOutput("result", Sdf.ValueTypeNames.Float2)
 
     def add(self, name: str, file: str, space: str, factors: tuple[float, ...]) -> Any:
-        """A node that reads one image and multiplies it."""
+        """Define a node that reads an image and scales it."""
         from pxr import Sdf, UsdShade
 
         node = UsdShade.Shader.Define(self._stage, f"{self._path}/{name}")
@@ -148,8 +148,8 @@ class _Images:
         return node
 
 
-def _index_of(specular: float) -> float:
-    """Index of refraction whose reflectance at normal incidence is ``0.08 * specular``.
+def _refractive_index(specular: float) -> float:
+    """Refractive index whose reflectance at normal incidence is ``0.08 * specular``.
 
     Source: Fresnel at normal incidence, F0 = ((n - 1) / (n + 1))^2, solved for n.
     """

@@ -1,4 +1,4 @@
-"""Mesh prims: polygons, corner by corner, and what they look like."""
+"""Import of mesh prims: triangulated polygons and their materials."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.usd.material_reader import PLAIN, BoundMaterial, read_look
+from gen_data.generator.usd.material_reader import PLAIN, BoundMaterial, read_bound_material
 
 Int64 = NDArray[np.int64]
 
@@ -21,27 +21,27 @@ class MeshPrim:
 
     Attributes:
         corners: float64 [m, 3, 3].
-        uvs: float64 [m, 3, 2] as the looks use them; None = there are none.
-        normals: float64 [m, 3, 3]; None = there are none.
-        face_slots: int64 [m], indices into ``looks``.
+        uvs: float64 [m, 3, 2] as the materials use them; None = none.
+        normals: float64 [m, 3, 3]; None = none.
+        face_slots: int64 [m], indices into ``materials``.
     """
 
     corners: Array
     uvs: Array | None
     normals: Array | None
     face_slots: Int64
-    looks: tuple[BoundMaterial, ...]
+    materials: tuple[BoundMaterial, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class _Topology:
-    """How polygons are cut into triangles.
+    """Triangulation of polygons.
 
     Attributes:
-        points: int64 [corners], the point of each corner of each polygon.
+        points: int64 [corners], point of each polygon corner.
         fans: int64 [m, 3], corners of the triangles.
-        polygon: int64 [m], the polygon of each triangle.
-        polygons: How many there are.
+        polygon: int64 [m], polygon of each triangle.
+        polygons: Number of polygons.
     """
 
     points: Int64
@@ -51,29 +51,29 @@ class _Topology:
 
 
 def read_mesh_prim(prim: Any, place: str) -> MeshPrim:
-    """Triangles and looks of a mesh.
+    """Read triangles and materials of a mesh.
 
     Raises:
-        AssetError: if arrays contradict each other, or its material is not read.
+        AssetError: if its arrays are inconsistent, or its material is unsupported.
     """
     from pxr import Usd, UsdGeom
 
     where = f"{place}: {prim.GetPath()}"
     mesh, time = UsdGeom.Mesh(prim), Usd.TimeCode.EarliestTime()
     points = np.array(mesh.GetPointsAttr().Get(time) or [], dtype=np.float64).reshape(-1, 3)
-    topology = _topology(mesh, len(points), where)
-    slots, looks = _looks(prim, topology.polygons, place)
+    topology = _read_topology(mesh, len(points), where)
+    slots, materials = _read_materials(prim, topology.polygons, place)
     face_slots = slots[topology.polygon]
     return MeshPrim(
         corners=points[topology.points[topology.fans]],
-        uvs=_uvs(prim, topology, face_slots, looks),
-        normals=_normals(mesh, topology),
+        uvs=_read_uvs(prim, topology, face_slots, materials),
+        normals=_read_normals(mesh, topology),
         face_slots=face_slots,
-        looks=looks,
+        materials=materials,
     )
 
 
-def _topology(mesh: Any, point_count: int, where: str) -> _Topology:
+def _read_topology(mesh: Any, point_count: int, where: str) -> _Topology:
     from pxr import Usd, UsdGeom
 
     time = Usd.TimeCode.EarliestTime()
@@ -81,7 +81,7 @@ def _topology(mesh: Any, point_count: int, where: str) -> _Topology:
     points = np.array(mesh.GetFaceVertexIndicesAttr().Get(time) or [], dtype=np.int64)
     fits = len(counts) and counts.min() >= 3 and counts.sum() == len(points)
     if not fits or points.min() < 0 or points.max() >= point_count:
-        raise AssetError(f"{where}: its faces and points do not fit together; export it again")
+        raise AssetError(f"{where}: its faces and points are inconsistent; export it again")
     starts = np.cumsum(counts) - counts
     first = np.repeat(starts, counts - 2)
     sizes = counts - 2
@@ -92,8 +92,10 @@ def _topology(mesh: Any, point_count: int, where: str) -> _Topology:
     return _Topology(points, fans, np.repeat(np.arange(len(counts)), sizes), len(counts))
 
 
-def _looks(prim: Any, polygons: int, place: str) -> tuple[Int64, tuple[BoundMaterial, ...]]:
-    """The slot of every polygon, and what the slots look like: the mesh, then its subsets."""
+def _read_materials(
+    prim: Any, polygons: int, place: str
+) -> tuple[Int64, tuple[BoundMaterial, ...]]:
+    """Slot of every polygon, and the slots' materials: the mesh's, then its subsets'."""
     from pxr import UsdShade
 
     slots = np.zeros(polygons, dtype=np.int64)
@@ -104,30 +106,30 @@ def _looks(prim: Any, polygons: int, place: str) -> tuple[Int64, tuple[BoundMate
         prims.append(subset.GetPrim())
     used = set(np.unique(slots).tolist())
     return slots, tuple(
-        read_look(p, prim, place) if k in used else PLAIN for k, p in enumerate(prims)
+        read_bound_material(p, prim, place) if k in used else PLAIN for k, p in enumerate(prims)
     )
 
 
-def _uvs(
-    prim: Any, topology: _Topology, face_slots: Int64, looks: tuple[BoundMaterial, ...]
+def _read_uvs(
+    prim: Any, topology: _Topology, face_slots: Int64, materials: tuple[BoundMaterial, ...]
 ) -> Array | None:
-    """Texture coordinates that each triangle's look asks for; None if no look finds its own."""
+    """Texture coordinates by each triangle's material; None if no material has any."""
     uvs = np.zeros((len(topology.fans), 3, 2))
     found = False
-    for slot, look in enumerate(looks):
-        values = _per_corner(prim, look.uv_name, topology) if look.mapped else None
+    for slot, material in enumerate(materials):
+        values = _read_primvar(prim, material.uv_name, topology) if material.has_images else None
         if values is not None:
             chosen = face_slots == slot
-            turned = np.einsum("ij,...j->...i", look.uv_matrix[:, :2], values, optimize=False)
-            uvs[chosen] = (turned + look.uv_matrix[:, 2])[topology.fans[chosen]]
+            linear = np.einsum("ij,...j->...i", material.uv_matrix[:, :2], values, optimize=False)
+            uvs[chosen] = (linear + material.uv_matrix[:, 2])[topology.fans[chosen]]
             found = True
     return uvs if found else None
 
 
-def _normals(mesh: Any, topology: _Topology) -> Array | None:
+def _read_normals(mesh: Any, topology: _Topology) -> Array | None:
     from pxr import Usd
 
-    values = _per_corner(mesh.GetPrim(), "normals", topology)
+    values = _read_primvar(mesh.GetPrim(), "normals", topology)
     if values is None:
         given = mesh.GetNormalsAttr().Get(Usd.TimeCode.EarliestTime())
         if not given:
@@ -141,8 +143,8 @@ def _normals(mesh: Any, topology: _Topology) -> Array | None:
     return normals
 
 
-def _per_corner(prim: Any, name: str, topology: _Topology) -> Array | None:
-    """A primvar's value at every corner; None if there is none, or it does not fit."""
+def _read_primvar(prim: Any, name: str, topology: _Topology) -> Array | None:
+    """Values of a primvar per corner; None if it is missing or does not fit the mesh."""
     from pxr import Usd, UsdGeom
 
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
@@ -155,7 +157,7 @@ def _per_corner(prim: Any, name: str, topology: _Topology) -> Array | None:
 
 
 def _expand_to_corners(values: Array, interpolation: str, topology: _Topology) -> Array | None:
-    """Values per constant, polygon, point or corner as values per corner; None if too few."""
+    """Expand values per mesh, polygon, point or corner to corners; None if there are too few."""
     from pxr import UsdGeom
 
     tokens = UsdGeom.Tokens

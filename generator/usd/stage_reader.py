@@ -1,7 +1,7 @@
-"""What a stage holds: meshes with their looks, lights, cameras; in metres, Z up.
+"""Import of stages: meshes with materials, lights and cameras, in metres, Z up.
 
-Everything is read at the earliest time code. Meshes are taken as polygons whatever their
-subdivision scheme; what is invisible or a guide or proxy is left out.
+Everything is read at the earliest time code. Meshes are read as polygons, whatever their
+subdivision scheme; invisible prims, guides and proxies are skipped.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.usd.cameras import read_camera_pose
 from gen_data.generator.usd.lights import check_light, read_light
 from gen_data.generator.usd.mesh_reader import MeshPrim, read_mesh_prim
-from gen_data.generator.usd.prim_names import unique_name
+from gen_data.generator.usd.prims import unique_name
 
 SUFFIXES = (".usd", ".usda", ".usdc")
-"""Of layers; ``.usdz`` is an archive of them."""
-_UNREAD = ("PointInstancer", "Cube", "Sphere", "Cylinder", "Cone", "Capsule", "BasisCurves")
+"""Suffixes of layers; ``.usdz`` is an archive of layers."""
+_UNSUPPORTED = ("PointInstancer", "Cube", "Sphere", "Cylinder", "Cone", "Capsule", "BasisCurves")
 
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """What a labelled prim is.
+    """Semantic label of a prim.
 
     Attributes:
         prim: Its path without the leading slash.
@@ -46,7 +46,7 @@ class StagePart:
 
     Attributes:
         name: Its path as one identifier, unique in the stage.
-        label: Of the nearest labelled prim above it; None if there is none.
+        label: Label of the prim or its nearest labelled ancestor; None if there is none.
     """
 
     name: str
@@ -59,7 +59,7 @@ class OpenStage:
     """A stage that is open for reading.
 
     Raises:
-        AssetError: if the file is no stage.
+        AssetError: if the file is not a stage.
     """
 
     def __init__(self, path: Path, place: str) -> None:
@@ -67,7 +67,7 @@ class OpenStage:
 
         self.place = place
         try:
-            with _quiet():
+            with _collect_warnings():
                 self._stage = Usd.Stage.Open(str(path))
         except Tf.ErrorException:
             raise AssetError(
@@ -80,48 +80,48 @@ class OpenStage:
         self._to_metres[:3, :3] = metres * turn
 
     def layers(self) -> tuple[str, ...]:
-        """Paths of all files that it was composed of, those in archives behind the archive's."""
+        """Paths of all files it is composed of; layers in an archive follow the archive's path."""
         return tuple(str(x.realPath) for x in self._stage.GetUsedLayers() if x.realPath)
 
     def pieces(self) -> tuple[StagePart, ...]:
         """Every visible mesh, in the stage's order.
 
         Raises:
-            AssetError: if there is none, or geometry that is not read.
+            AssetError: if there is none, or unsupported geometry.
         """
         from pxr import UsdGeom
 
         taken: set[str] = set()
         found = []
         for prim in self._visible():
-            if prim.GetTypeName() in _UNREAD:
+            if prim.GetTypeName() in _UNSUPPORTED:
                 raise AssetError(
                     f"{self.place}: {prim.GetPath()} is of type {prim.GetTypeName()}, which is not "
-                    "read; export it as meshes"
+                    "supported; export it as meshes"
                 )
             if prim.IsA(UsdGeom.Mesh):
-                name = unique_name(_flat(prim), taken)
-                found.append(StagePart(name, _label_of(prim), prim, self._pose(prim)))
+                name = unique_name(_flat_name(prim), taken)
+                found.append(StagePart(name, _find_label(prim), prim, self._pose(prim)))
         if not found:
             raise AssetError(f"{self.place}: holds no mesh; export it with its meshes")
         return tuple(found)
 
     def mesh(self, piece: StagePart) -> MeshPrim:
-        """Polygons and looks of a piece, in its prim's own frame and unit.
+        """Triangles and materials of a piece, in its prim's own frame and unit.
 
         Raises:
-            AssetError: if they are inconsistent, or its material is not read.
+            AssetError: if they are inconsistent, or its material is unsupported.
         """
-        with _quiet():
+        with _collect_warnings():
             return read_mesh_prim(piece.prim, self.place)
 
     def lights(self) -> tuple[Light, ...]:
-        """Lamps, panels and suns; skies and other kinds are left out.
+        """Sphere, panel and distant lights; domes and other kinds are skipped.
 
         Raises:
-            AssetError: a light is negative or not finite.
+            AssetError: if a light is negative or not finite.
         """
-        read = [read_light(prim, _flat(prim), self._pose(prim)) for prim in self._visible()]
+        read = [read_light(prim, _flat_name(prim), self._pose(prim)) for prim in self._visible()]
         return tuple(check_light(light, self.place) for light in read if light is not None)
 
     def cameras(self) -> tuple[tuple[str, SE3], ...]:
@@ -129,7 +129,7 @@ class OpenStage:
         from pxr import UsdGeom
 
         return tuple(
-            (_flat(prim), read_camera_pose(self._pose(prim)))
+            (_flat_name(prim), read_camera_pose(self._pose(prim)))
             for prim in self._visible()
             if prim.IsA(UsdGeom.Camera)
         )
@@ -156,14 +156,14 @@ class OpenStage:
 
 
 def layer_references(path: Path) -> Sequence[str]:
-    """What one layer refers to, as it says it: layers, and files that attributes name.
+    """References of one layer, verbatim: layers, and files named by attributes.
 
-    Empty if the layer is unreadable, which its reader will tell.
+    Empty if the layer is unreadable, which its reader reports.
     """
     from pxr import Tf, UsdUtils
 
     try:
-        with _quiet():
+        with _collect_warnings():
             lists = UsdUtils.ExtractExternalReferences(str(path))
     except Tf.ErrorException:
         return ()
@@ -171,8 +171,8 @@ def layer_references(path: Path) -> Sequence[str]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep what the library warns of from the terminal; its errors are raised all the same."""
+def _collect_warnings() -> Iterator[None]:
+    """Keep the library's warnings off the terminal; its errors are still raised."""
     from pxr import UsdUtils
 
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
@@ -182,11 +182,11 @@ def _quiet() -> Iterator[None]:
         delegate.TakeUncoalescedDiagnostics()
 
 
-def _flat(prim: Any) -> str:
+def _flat_name(prim: Any) -> str:
     return str(prim.GetPath()).strip("/").replace("/", "_")
 
 
-def _label_of(prim: Any) -> Label | None:
+def _find_label(prim: Any) -> Label | None:
     from pxr import UsdSemantics
 
     while prim and not prim.IsPseudoRoot():
@@ -195,6 +195,6 @@ def _label_of(prim: Any) -> Label | None:
         if chosen:
             labels = UsdSemantics.LabelsAPI(prim, chosen[0]).GetLabelsAttr().Get()
             if labels:
-                return Label(_flat(prim), str(labels[0]))
+                return Label(_flat_name(prim), str(labels[0]))
         prim = prim.GetParent()
     return None

@@ -1,17 +1,17 @@
-"""A scene, or a sequence of its instants, as a stage.
+"""Export of a scene, or a sequence of its instants, as a stage.
 
 ::
 
     /World                  default prim
         /<instance>         its frame; labels: category (if annotated), instance_id
-            /<body>         at its place in it
+            /<body>         its pose in that frame
                 /look       reference to the layer of its mesh
-        /Background/<body>  what has no instance
+        /Background/<body>  bodies without an instance
         /Lights, /Cameras
-        /Prototypes         classes: meshes with materials other than their own
+        /Prototypes         classes: meshes with overridden materials
 
-A body that changes its look has one ``look`` per mesh and set of materials, and shows one at a
-time. Step ``k`` of a sequence is time code ``k``.
+A body whose appearance changes has one ``look`` per mesh and set of materials, of which one is
+visible at a time. Step ``k`` of a sequence is time code ``k``.
 """
 
 from __future__ import annotations
@@ -28,24 +28,28 @@ from gen_data.generator.usd.asset_layer import MESH, bind_materials
 from gen_data.generator.usd.cameras import define_camera
 from gen_data.generator.usd.lights import define_light, define_sky
 from gen_data.generator.usd.material_writer import TextureFinder
-from gen_data.generator.usd.prim_names import unique_name
-from gen_data.generator.usd.stage_files import open_stage_for_writing
-from gen_data.generator.usd.xforms import scale_pose, set_transforms, set_values
+from gen_data.generator.usd.prims import (
+    open_stage_for_writing,
+    scale_pose,
+    set_transforms,
+    set_values,
+    unique_name,
+)
 
 WORLD = "/World"
 Look = tuple[str, tuple[Material, ...]]
-"""Mesh asset, and materials; empty = its own."""
+"""Mesh asset, and materials; empty = the asset's own."""
 
 
 @dataclass(frozen=True, slots=True)
 class StageFiles:
-    """The files that a stage refers to: made when asked for, named as the stage refers to them.
+    """Providers of the files that a stage refers to, created on demand; all return relative paths.
 
     Attributes:
-        layer: Of an asset.
-        textures: Of a texture.
-        panorama: Of an environment.
-        materials: Not a file: an asset's own materials, one per slot.
+        layer: Layer of an asset.
+        textures: Images of a texture.
+        panorama: Image of an environment.
+        materials: An asset's own materials, one per slot (no file).
     """
 
     layer: Callable[[str], str]
@@ -55,7 +59,7 @@ class StageFiles:
 
 
 def write_stage(path: Path, steps: Sequence[Scene], step_s: float, files: StageFiles) -> None:
-    """Write the stage of a sequence; of a single scene if it is given one step.
+    """Write the stage of a sequence, or of a single scene (one step).
 
     Raises:
         StorageError: if it cannot be written.
@@ -74,10 +78,7 @@ def write_stage(path: Path, steps: Sequence[Scene], step_s: float, files: StageF
 
 
 class _Writer:
-    """Defines the prims of one stage.
-
-    Remembers which names are taken, and which looks have a prototype already.
-    """
+    """Writer of the prims of one stage; keeps track of used names and existing prototypes."""
 
     def __init__(self, stage: Any, files: StageFiles) -> None:
         self._stage, self._files = stage, files
@@ -87,7 +88,7 @@ class _Writer:
         self._prototypes: dict[Look, str] = {}
 
     def path(self, parent: str, name: str) -> str:
-        """Path of a child that does not exist yet; the parent is made where it is missing."""
+        """Unused path for a new child; a missing parent is created."""
         if not self._stage.GetPrimAtPath(parent):
             self._stage.DefinePrim(parent, "Scope")
         return f"{parent}/{unique_name(name, self._taken.setdefault(parent, set()))}"
@@ -104,7 +105,7 @@ class _Writer:
         still = (f"{WORLD}/Background", [IDENTITY] * len(steps))
         for k, body in enumerate(steps[0].bodies):
             parent, parents = frames.get(body.instance_id, still)
-            # Tools that attach labels, or look for them, do not enter shared instances.
+            # Labelling tools do not enter shared instances.
             shared = body.instance_id not in annotated
             at = [step.bodies[k] for step in steps]
             self._body(parent, parents, at, shared=shared)
@@ -138,7 +139,7 @@ class _Writer:
                 for T_world_parent, body in zip(parents, steps, strict=True)
             ],
         )
-        looks = [self._look_of(body) for body in steps]
+        looks = [self._find_look(body) for body in steps]
         for look in dict.fromkeys(looks):
             child = self._stage.DefinePrim(self.path(path, "look"), "Xform")
             self._refer(child, look)
@@ -148,16 +149,16 @@ class _Writer:
                 shown = [tokens.inherited if one == look else tokens.invisible for one in looks]
                 set_values(UsdGeom.Imageable(child).CreateVisibilityAttr(), shown)
 
-    def _look_of(self, body: Body) -> Look:
-        """What a body looks like, with textures at the size that its scale gives them."""
+    def _find_look(self, body: Body) -> Look:
+        """Mesh and materials of a body, with texture scales adapted to the body's scale."""
         own = self._files.materials(body.asset)
-        worn = tuple(
+        materials = tuple(
             replace(m, texture_scale_m=m.texture_scale_m / body.scale)
             if body.scale != 1.0 and m.texture_scale_m
             else m
             for m in body.materials or own
         )
-        return (body.asset, () if worn == own else worn)
+        return (body.asset, () if materials == own else materials)
 
     def _refer(self, prim: Any, look: Look) -> None:
         asset, materials = look

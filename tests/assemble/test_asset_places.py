@@ -26,7 +26,7 @@ def test_an_unknown_asset_is_told_where_the_configuration_names_it(
     with pytest.raises(UnknownAsset) as told, open_pipeline(load_config(str(path))):
         pass
     assert str(told.value).startswith(f"{path}:3:28: elements")
-    assert f"asset '{wrong}': there is none" in str(told.value)
+    assert f"asset '{wrong}': unknown" in str(told.value)
 
 
 def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: Path) -> None:

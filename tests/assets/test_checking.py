@@ -37,7 +37,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_every_asset_is_found_out_about(folder: Path, tmp_path: Path) -> None:
-    """One that is broken does not hide the others."""
+    """A broken asset does not hide the others."""
     library = open_library([folder], cache_dir=tmp_path / "cache")
     found = {finding.asset_id: finding for finding in check_folder(folder, library)}
     assert list(found) == ["user/bolt", "user/broken", "user/crate", "user/arm"]
@@ -67,7 +67,7 @@ def test_a_robot_is_measured_at_home(folder: Path, tmp_path: Path) -> None:
 
 
 def test_the_command_fails_if_an_asset_cannot_be_used(folder: Path) -> None:
-    """And tells which, and why."""
+    """The message names the asset and the reason."""
     result = CliRunner().invoke(assets, ["check", str(folder)])
     assert isinstance(result.exception, AssetError)
     assert "1 of 4 assets cannot be used" in str(result.exception)
@@ -103,7 +103,7 @@ def test_a_folder_is_listed(folder: Path) -> None:
 
 
 def test_the_schema_describes_the_index() -> None:
-    """With the sections of the document."""
+    """It lists the sections of the document."""
     printed = CliRunner().invoke(assets, ["schema"], catch_exceptions=False)
     described = json.loads(printed.output)
     assert {"assets", "robots", "textures", "environments"} <= set(described["properties"])

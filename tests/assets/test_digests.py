@@ -1,4 +1,4 @@
-"""Digests of files are remembered, and never trusted where a file may have changed."""
+"""Cached digests of files are never used when a file may have changed."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ import pytest
 from gen_data.generator.assets import content_hashes
 from gen_data.generator.assets.asset_cache import DiskCache
 from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.content_hashes import ContentHashes
-from gen_data.generator.assets.file_references import find_referenced_files
+from gen_data.generator.assets.content_hashes import ContentHashes, find_referenced_files
 
 OLD = b"o " + b"a" * 40 + b"\n"
 NEW = b"o " + b"b" * 40 + b"\n"
@@ -32,13 +31,13 @@ def folder(tmp_path: Path) -> Folder:
 
 @pytest.fixture
 def settled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every digest is learnt an hour after the files have changed last."""
+    """Every digest is computed an hour after the last change of the files."""
     now_ns = time.time_ns
     monkeypatch.setattr(content_hashes, "_now_ns", lambda: now_ns() + 3_600_000_000_000)
 
 
 def digest_of(folder: Folder, cache: Path) -> str:
-    """What a process of its own says of the file."""
+    """Digest of the file by a new process."""
     known = ContentHashes(DiskCache(cache))
     found = known.of(Folder(folder.root), "a.obj")["a.obj"]
     known.save()
@@ -65,7 +64,7 @@ def replace(path: Path, data: bytes) -> None:
 def test_changed_bytes_are_noticed_though_size_and_time_are_kept(
     folder: Folder, tmp_path: Path, change: object
 ) -> None:
-    """And the true file, restored with the same means, has its true digest again."""
+    """The original file, restored in the same way, has its original digest again."""
     path = folder.root / "a.obj"
     assert digest_of(folder, tmp_path / "cache") == sha256(OLD).hexdigest()
     for data in (NEW, OLD, NEW):
@@ -77,7 +76,7 @@ def test_changed_bytes_are_noticed_though_size_and_time_are_kept(
 def test_a_file_that_did_not_change_is_not_read_again(
     folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nor does a new modification time alone change the digest."""
+    """A new modification time alone does not change the digest."""
     before = digest_of(folder, tmp_path / "cache")
     with monkeypatch.context() as patch:
         patch.setattr(Folder, "read", lambda *_: pytest.fail("read again"))
@@ -87,7 +86,7 @@ def test_a_file_that_did_not_change_is_not_read_again(
 
 
 def test_a_file_as_young_as_its_digest_is_read_again(folder: Folder, tmp_path: Path) -> None:
-    """Clocks of file systems tick slowly: it may have changed once more within one tick."""
+    """File system clocks are coarse: the file may change again within one tick."""
     assert digest_of(folder, tmp_path / "cache") == sha256(OLD).hexdigest()
     stored = DiskCache(tmp_path / "cache").load_json("digests.json")
     ((name, rows),) = stored.items()

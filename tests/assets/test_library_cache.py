@@ -34,7 +34,7 @@ def entries(folder: Path) -> list[Path]:
 
 
 def test_cold_warm_and_another_cache_give_the_same_bytes(tmp_path: Path) -> None:
-    """What comes from the cache is what was computed."""
+    """Cached values equal computed ones."""
     cold = open_library(cache_dir=tmp_path / "a")
     warm = open_library(cache_dir=tmp_path / "a")
     other = open_library(cache_dir=tmp_path / "b")
@@ -117,7 +117,7 @@ def test_memory_is_bounded_and_forgets_the_oldest(tmp_path: Path) -> None:
 
 
 def test_opening_reads_nothing(tmp_path: Path) -> None:
-    """A library can be opened on a folder that does not exist; asking tells what is wrong."""
+    """A library opens with a missing folder; the first query reports the fault."""
     library = open_library([tmp_path / "missing"], cache_dir=tmp_path / "cache")
     assert not (tmp_path / "cache").exists()
     with pytest.raises(Exception, match="no such folder"):

@@ -59,11 +59,11 @@ def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> N
     ("asset_id", "reason"),
     [
         ("mug?sede=1", "did you mean 'seed'"),
-        ("mug?seed=-1", "whole number from 0"),
-        ("mug?seed=1.5", "whole number from 0"),
-        ("mug?seed=red", "whole number from 0"),
-        ("table?size_m=1,2", "expects 3 numbers"),
-        ("table?size_m=wide", "expects 3 numbers"),
+        ("mug?seed=-1", "integer from 0"),
+        ("mug?seed=1.5", "integer from 0"),
+        ("mug?seed=red", "integer from 0"),
+        ("table?size_m=1,2", "expects 3 comma-separated numbers"),
+        ("table?size_m=wide", "expects 3 comma-separated numbers"),
         ("table?style=3", "expects a word"),
         ("table?size_m=0,0,0", "table"),
         ("mgu?seed=3", "did you mean 'mug"),
@@ -79,9 +79,9 @@ def test_wrong_parameters_are_refused_with_the_right_ones(
 
 def test_kinds_are_not_confused(library: Library) -> None:
     """A mug has no pixels, and is no robot."""
-    with pytest.raises(AssetError, match="no texture"):
+    with pytest.raises(AssetError, match="not a texture"):
         library.texture("mug?seed=0")
-    with pytest.raises(AssetError, match="no environment"):
+    with pytest.raises(AssetError, match="not an environment"):
         library.environment("mug?seed=0")
-    with pytest.raises(AssetError, match="no robot"):
+    with pytest.raises(AssetError, match="not a robot"):
         library.robot("mug?seed=0")

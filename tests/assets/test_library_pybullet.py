@@ -128,7 +128,7 @@ def test_neither_duck_nor_bicycle_are_offered(library: Library) -> None:
 
 
 def test_every_asset_names_licence_author_and_source(library: Library) -> None:
-    """What a data set's attribution is made from."""
+    """Source of a data set's attribution."""
     for kind in ("object", "robot", "texture", "environment"):
         for asset in library.find((), kind):
             assert asset.licence

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from gen_data.generator.assets.convex_decomposition import convex_parts, hull_vertices
-from gen_data.generator.assets.primitive_solids import box, sphere
-from gen_data.generator.assets.triangle_soup import TriangleSoup, join_soups
+from gen_data.generator.assets.triangle_soup import TriangleSoup, box, join_soups, sphere
 from gen_data.generator.core.errors import AssetError
 
 

@@ -139,6 +139,10 @@ MESHES: dict[str, tuple[str, bytes | str]] = {
     "negative mesh gltf": ("a.gltf", gltf(nodes=[{"mesh": -1}])),
     "self-parent gltf": ("a.gltf", gltf(nodes=[{"children": [0]}])),
     "cycle of 20,000 nodes gltf": ("a.gltf", gltf(nodes=chain(20_000))),
+    "200,000 nodes glb": (
+        "a.glb", glb(gltf(nodes=[{"mesh": 0}] * 200_000, scenes=[{"nodes": [*range(200_000)]}]))),
+    "200,000 primitives glb": (
+        "a.glb", glb(gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 0}}] * 200_000}]))),
     "count of two billion gltf": ("a.gltf", gltf(accessors=accessor(count=2**31))),
     "zero count gltf": ("a.gltf", gltf(accessors=accessor(count=0))),
     "no view gltf": (
@@ -327,7 +331,7 @@ def test_a_roughness_that_does_not_exist_is_told_by_name(tmp_path: Path) -> None
 
 
 def test_a_missing_texture_is_told(tmp_path: Path) -> None:
-    """Grey instead of a picture would be a silent error in every label's image."""
+    """Grey instead of an image would be a silent error."""
     folder = tmp_path / "assets"
     folder.mkdir()
     (folder / "a.mtl").write_text("newmtl m\nmap_Kd gone.png\n")
@@ -349,7 +353,7 @@ def test_a_texture_outside_the_folder_is_refused(tmp_path: Path, reference: str)
 
 @pytest.mark.parametrize("kind", ["fifo", "directory", "link outside", "link loop", "device link"])
 def test_only_regular_files_inside_the_folder_are_read(tmp_path: Path, kind: str) -> None:
-    """A FIFO would wait for ever, a device would never end."""
+    """Reading a FIFO blocks for ever, a device never ends."""
     folder = tmp_path / "assets"
     folder.mkdir()
     (tmp_path / "secret.obj").write_text(TETRAHEDRON)
@@ -370,20 +374,20 @@ def test_only_regular_files_inside_the_folder_are_read(tmp_path: Path, kind: str
 
 @pytest.mark.parametrize("name", ["a\0b", "x" * 5000, "../" * 30 + "etc/passwd", "/etc/passwd"])
 def test_strange_names_are_refused(tmp_path: Path, name: str) -> None:
-    """Whatever an index says, the folder is not left."""
+    """No index entry leads outside the folder."""
     with pytest.raises(AssetError):
         Folder(tmp_path).read(name)
 
 
 def test_image_ids_cannot_leave_the_folder(tmp_path: Path) -> None:
-    """A texture id is not a path to everywhere."""
+    """A texture id is not an arbitrary path."""
     library = open_library(cache_dir=tmp_path / "cache")
     with pytest.raises(AssetError):
         library.texture("pybullet/teddy#../../../../../../etc/passwd")
 
 
 def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path: Path) -> None:
-    """What is hashed is what is parsed."""
+    """The hashed content is the parsed content."""
     folder = tmp_path / "assets"
     folder.mkdir()
     (folder / "a.obj").write_text(TETRAHEDRON)
@@ -433,7 +437,7 @@ def test_reading_takes_no_more_memory_than_the_file(tmp_path: Path) -> None:
 def test_an_stl_with_too_many_triangles_is_refused_before_it_is_decoded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its header says how many there are."""
+    """The header states their number."""
     (tmp_path / "a.stl").write_bytes(stl(4, 4))
     monkeypatch.setattr("gen_data.generator.assets.readers.mesh_source.MAX_FACES", 3)
     monkeypatch.setattr(TriangleSoup, "of", lambda *_: pytest.fail("decoded"))

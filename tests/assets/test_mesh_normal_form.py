@@ -8,9 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.normal_form import NormalForm, normal_form
-from gen_data.generator.assets.primitive_solids import box, cylinder, sphere
-from gen_data.generator.assets.triangle_soup import MaterialSlot, TriangleSoup
+from gen_data.generator.assets.normal_form import normal_form
+from gen_data.generator.assets.triangle_soup import (
+    MaterialSlot,
+    TriangleSoup,
+    box,
+    cylinder,
+    sphere,
+)
 from gen_data.generator.core.asset_types import Material, MeshData
 from gen_data.generator.core.errors import AssetError
 
@@ -55,9 +60,7 @@ def test_a_cylinder_is_smooth_around_and_sharp_at_its_rims() -> None:
 @pytest.mark.parametrize("crease_deg", [5.0, 60.0])
 def test_the_crease_angle_decides_what_is_smooth(crease_deg: float) -> None:
     """A 32-sided cylinder has 11.25 degrees between its sides."""
-    mesh = normal_form(
-        TriangleSoup.of(cylinder(0.05, 0.2)), "can", NormalForm(crease_deg=crease_deg)
-    )
+    mesh = normal_form(TriangleSoup.of(cylinder(0.05, 0.2)), "can", crease_deg=crease_deg)
     flat = np.repeat(face_normals(mesh), 3, axis=0)
     deviation = (mesh.normals[mesh.faces.reshape(-1)] * flat).sum(axis=1).min()
     expected = 1.0 if crease_deg < 11.25 else math.cos(math.radians(11.25 / 2))
@@ -126,7 +129,7 @@ def test_a_dense_mesh_is_thinned_out_to_its_budget_and_keeps_its_shape() -> None
         face_slots=upper,
         slots=(MaterialSlot("a", red, True), MaterialSlot("b", blue, True)),
     )
-    mesh = normal_form(soup, "ball", NormalForm(max_faces=1000))
+    mesh = normal_form(soup, "ball", max_faces=1000)
     assert len(corners) > 3500
     assert 800 < len(mesh.faces) < 1200
     assert np.abs(np.linalg.norm(mesh.vertices_m, axis=1) - 0.1).max() < 0.004

@@ -15,8 +15,8 @@ from PIL import Image
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.primitive_solids import box, sphere
 from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.assets.triangle_soup import box, sphere
 from gen_data.generator.core.errors import AssetError
 
 CUBE_OBJ = """mtllib cube.mtl
@@ -165,7 +165,7 @@ def test_glb_comes_upright_with_its_embedded_image(tmp_path: Path) -> None:
 
 
 def test_images_inside_the_meshes_of_a_urdf_are_refused(tmp_path: Path) -> None:
-    """Nobody would serve them; collision meshes may have them, since nobody looks."""
+    """A link cannot provide them; collision meshes may have them, since they are invisible."""
     tree, binary = textured_triangle(tmp_path)
     folder = tmp_path / "assets"
     folder.mkdir()
@@ -180,7 +180,7 @@ def test_images_inside_the_meshes_of_a_urdf_are_refused(tmp_path: Path) -> None:
             f"<collision>{collision}</collision></link></robot>"
         )
     library = open_library([folder], cache_dir=tmp_path / "cache")
-    with pytest.raises(AssetError, match="holds its images inside"):
+    with pytest.raises(AssetError, match="has embedded images"):
         library.mesh("user/seen")
     assert len(library.convex_parts("user/felt").parts_m) == 1
 

@@ -80,7 +80,7 @@ def test_a_little_ringing_below_zero_is_dark() -> None:
 def test_what_is_no_panorama_is_refused_and_nothing_is_kept(
     tmp_path: Path, make: Callable[[], bytes], said: str
 ) -> None:
-    """One error that names the file and what is wrong; the cache stays empty."""
+    """One error names the file and the fault; the cache stays empty."""
     folder, cache = tmp_path / "mine", tmp_path / "cache"
     folder.mkdir()
     (folder / "sky.exr").write_bytes(make())

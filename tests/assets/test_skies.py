@@ -181,13 +181,13 @@ def test_preethams_zenith_is_as_bright_as_published() -> None:
     ],
 )
 def test_preethams_sky_is_clear_and_by_day(given: dict[str, float], said: str) -> None:
-    """What it does not know is refused."""
+    """Unknown parameters are refused."""
     with pytest.raises(ValueError, match=said):
         luminance_cd_m2(SkyModel(model="preetham", **given), 64)
 
 
 def test_an_unknown_model_of_the_sky_is_refused() -> None:
-    """With those that there are."""
+    """The message lists the known ones."""
     with pytest.raises(ValueError, match="expected one of measured, preetham"):
         luminance_cd_m2(SkyModel(model="hosek"), 64)
 
@@ -204,7 +204,7 @@ def test_overcast_zenith_is_three_times_the_horizon() -> None:
 @pytest.mark.parametrize("cloudiness", [0.0, 0.4, 1.0])
 @pytest.mark.parametrize("altitude_deg", [50.0, 5.0, -4.0, -40.0])
 def test_image_gives_the_illuminance_of_the_formula(altitude_deg: float, cloudiness: float) -> None:
-    """Whatever the clouds look like, level ground gets what the tables say."""
+    """Level ground receives the tabulated illuminance under any clouds."""
     model = SkyModel(3, altitude_deg, 2.5, cloudiness)
     image = luminance_cd_m2(model, 128)
     expected = daylight.sky_illuminance_lux(math.radians(altitude_deg), cloudiness)
@@ -244,7 +244,7 @@ def test_clouds_cover_more_the_cloudier_it_is() -> None:
 
 
 def test_same_arguments_make_the_same_bytes() -> None:
-    """And another seed makes other clouds."""
+    """Another seed makes other clouds."""
     first, again, other = (sky(seed, 30.0, 2.5, 0.4, 0.18) for seed in (1, 1, 2))
 
     assert first.tobytes() == again.tobytes()

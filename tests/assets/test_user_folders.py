@@ -16,7 +16,7 @@ from gen_data.generator.assets import discovery
 from gen_data.generator.assets.folder_index import MeshEntry
 from gen_data.generator.assets.importer import upright_transform
 from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.primitive_solids import box
+from gen_data.generator.assets.triangle_soup import box
 from gen_data.generator.core.asset_types import Symmetry
 from gen_data.generator.core.errors import AssetError, ConfigError, UnknownAsset
 from gen_data.generator.core.kinematics import link_poses
@@ -39,7 +39,7 @@ ARM = """<robot name="arm">
 
 
 def write_box(path: Path, size: tuple[float, float, float]) -> None:
-    """A box as a mesh file of the type that the suffix says."""
+    """A box as a mesh file in the format of the suffix."""
     path.parent.mkdir(parents=True, exist_ok=True)
     corners = box(size)
     mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(36).reshape(-1, 3), process=False)
@@ -106,7 +106,7 @@ def test_a_wrong_index_is_told_with_line_and_column(folder: Path, tmp_path: Path
 
 
 def test_scale_and_size_exclude_each_other(folder: Path, tmp_path: Path) -> None:
-    """One size."""
+    """Only one way to state the size is accepted."""
     (folder / "assets.yaml").write_text(
         "assets: [{id: a, file: a.obj, category: x, size_m: 1, scale: 2}]\n"
     )
@@ -151,12 +151,12 @@ def test_a_users_robot_is_as_good_as_ours(folder: Path, tmp_path: Path) -> None:
     assert "tip" not in robot.collisions
     assert library.bounds_m("user/arm/upper")[1] == pytest.approx((0.03, 0.03, 0.4))
     assert library.materials("user/arm/base")[0].base_color == (0.85, 0.0, 0.0)
-    with pytest.raises(AssetError, match="does not collide"):
+    with pytest.raises(AssetError, match="without collision geometry"):
         library.convex_parts("user/arm/tip")
 
 
 def test_a_robot_entry_that_names_a_missing_joint_is_refused(folder: Path, tmp_path: Path) -> None:
-    """With the nearest name."""
+    """The message suggests the nearest name."""
     (folder / "arm.urdf").write_text(ARM)
     (folder / "assets.yaml").write_text(
         "robots: [{id: arm, file: arm.urdf, home: {sholder: 1.0}}]\n"
@@ -184,7 +184,7 @@ def test_textures_and_panoramas_can_be_listed(folder: Path, tmp_path: Path) -> N
     # Both hemispheres weigh the same: (12 + 4) / 2 = 8.
     assert radiance[0, 0] == pytest.approx([1.5] * 3, rel=0.01)
     assert radiance[-1, 0] == pytest.approx([0.5] * 3, rel=0.01)
-    with pytest.raises(AssetError, match="no texture"):
+    with pytest.raises(AssetError, match="not a texture"):
         library.texture("user/sky")
 
 
@@ -217,7 +217,7 @@ def test_a_follower_cannot_be_told_to_stand_elsewhere(folder: Path, tmp_path: Pa
     """Home positions that contradict the URDF are refused."""
     (folder / "hand.urdf").write_text(HAND)
     (folder / "assets.yaml").write_text(HAND_INDEX % "finger: 0.3, knuckle: 0.3")
-    with pytest.raises(AssetError, match=r"'knuckle', which mimics 'finger' and is at -0\.2"):
+    with pytest.raises(AssetError, match=r"'knuckle' contradicts -0\.2 by its leader 'finger'"):
         open_library([folder], cache_dir=tmp_path / "cache").robot("user/hand")
 
 
@@ -264,13 +264,13 @@ def sized(folder: Path, tmp_path: Path, entry: str, name: str = "a.obj") -> tupl
 def test_units_edges_and_axes(
     folder: Path, tmp_path: Path, entry: str, size: tuple[float, ...]
 ) -> None:
-    """By hand for a box of 1 x 2 x 3: what points up stands, what points to the front lies on X."""
+    """By hand for a box of 1 x 2 x 3: the up axis becomes Z, the front axis X."""
     assert sized(folder, tmp_path, entry) == pytest.approx(size, rel=1e-6)
 
 
 @pytest.mark.parametrize(("up", "front"), [("z", "-y"), ("y", "z"), ("y", "-x"), ("x", "y")])
 def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
-    """As a turn: nothing is mirrored."""
+    """It is a rotation: nothing is mirrored."""
     names = {"x": (1.0, 0, 0), "y": (0, 1.0, 0), "z": (0, 0, 1.0), "-x": (-1.0, 0, 0),
              "-y": (0, -1.0, 0), "-z": (0, 0, -1.0)}  # fmt: skip
     turn = upright_transform(MeshEntry.model_validate({"file": "a.obj", "up": up, "front": front}))[
@@ -289,7 +289,7 @@ def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
         ("front: x, yaw_deg: 90", "front or yaw_deg, not both"),
         ("front: -z", "front is -z, but z points up"),
         ("unit: yards", "unit"),
-        ("symmetries: [{axis: [0, 0, 0]}]", "an axis of some length"),
+        ("symmetries: [{axis: [0, 0, 0]}]", "an axis with non-zero length"),
         ("symmetries: [{axis: z, fold: 1}]", "fold"),
         ("materials: {'*': {maps: {}}}", "expected an image"),
         ("materials: {'*': {maps: {orm: a.png, metallic: b.png}}}", "not both"),
@@ -304,8 +304,8 @@ def test_a_contradiction_is_refused_with_its_place(
 
 
 def test_edges_that_do_not_fit_the_file_are_refused(folder: Path, tmp_path: Path) -> None:
-    """They show that an axis is wrong."""
-    with pytest.raises(AssetError, match=r"0\.1 x 0\.2 x 0\.3 m .*not 0\.1 x 0\.3 x 0\.2 m"):
+    """They reveal a wrong axis."""
+    with pytest.raises(AssetError, match=r"0\.1 x 0\.2 x 0\.3 m, not 0\.1 x 0\.3 x 0\.2 m"):
         sized(folder, tmp_path, "size_m: [0.1, 0.3, 0.2]")
 
 
@@ -343,7 +343,7 @@ def test_a_pattern_stands_for_every_file_that_matches(folder: Path, tmp_path: Pa
 def test_a_missing_file_is_told_with_its_place(
     folder: Path, tmp_path: Path, entry: str, fault: str
 ) -> None:
-    """With the nearest name, or what the folder has."""
+    """The message suggests the nearest name, or summarises the folder."""
     write_box(folder / "cup.stl", (0.1, 0.1, 0.1))
     (folder / "assets.yaml").write_text(f"assets:\n  - {entry}\n")
     with pytest.raises(ConfigError, match=rf"assets\.yaml:{fault}"):
@@ -401,7 +401,7 @@ def test_images_need_to_be_placed(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_panorama_needs_no_index(folder: Path, tmp_path: Path) -> None:
-    """As a mesh does not."""
+    """Neither does a mesh."""
     import cv2
 
     cv2.imwrite(str(folder / "hall.hdr"), np.full((8, 16, 3), 2.0, np.float32))
@@ -434,7 +434,7 @@ def test_a_tree_that_is_no_folder_of_assets_is_refused(
 
 
 def test_proc_is_refused_without_a_traceback(tmp_path: Path) -> None:
-    """It is endless, changes while it is read, and holds what cannot be read."""
+    """It is endless, changes while it is read, and holds unreadable files."""
     with pytest.raises(AssetError, match=r"/proc"):
         open_library([Path("/proc")], cache_dir=tmp_path / "cache").find({"user"})
 
@@ -442,11 +442,11 @@ def test_proc_is_refused_without_a_traceback(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_read_is_named(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As the system says why."""
+    """The message gives the system's reason."""
     error = PermissionError(13, "Permission denied", str(folder / "locked"))
     monkeypatch.setattr(os, "scandir", raising(error))
-    with pytest.raises(AssetError, match=r"locked: Permission denied; a folder of assets"):
-        discovery.files_below(folder)
+    with pytest.raises(AssetError, match=r"locked: Permission denied; all folders"):
+        discovery.list_files(folder)
 
 
 def raising(error: Exception) -> Callable[..., NoReturn]:

@@ -1,4 +1,4 @@
-"""``gen-data assets``: what it says, and how it ends."""
+"""``gen-data assets``: output and exit codes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def gen_data(*arguments: str, home: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_list_names_every_pack_and_the_folder(tmp_path: Path) -> None:
-    """Nothing is installed; nothing is made by looking."""
+    """Nothing is installed; listing creates no files."""
     done = gen_data("assets", "list", home=tmp_path)
     assert done.returncode == 0
     for name in ("people", "catalogue", "hdri", "robots"):
@@ -32,7 +32,7 @@ def test_list_names_every_pack_and_the_folder(tmp_path: Path) -> None:
 
 
 def test_show_tells_what_an_asset_is(tmp_path: Path) -> None:
-    """Of any asset of the library."""
+    """It works for any asset of the library."""
     done = gen_data("assets", "show", "pybullet/teddy", home=tmp_path)
     assert done.returncode == 0
     assert "teddy bear" in done.stdout and "zlib" in done.stdout and "triangles" in done.stdout
@@ -48,7 +48,7 @@ def test_list_finds_assets_by_tags(tmp_path: Path) -> None:
     ("arguments", "code", "said"),
     [
         (("install", "catalog"), 2, "did you mean 'catalogue'"),
-        (("install", "all", "--from", "archive"), 2, "--from is the archive of one pack"),
+        (("install", "all", "--from", "archive"), 2, "--from takes the archive of one pack"),
         (("install", "hdri", "--from", "archive"), 3, "sha256 is"),
         (("install", "hdri", "--from", "nowhere"), 2, "does not exist"),
         (("remove", "hdri"), 3, "not installed"),
@@ -67,7 +67,7 @@ def test_errors_have_one_message_and_their_exit_code(
 
 
 def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
-    """``--help`` is for people in a hurry: neither numpy nor pydantic is loaded."""
+    """``--help`` must be fast: neither numpy nor pydantic is loaded."""
     code = (
         "import sys; from gen_data.generator.cli.main import cli;"
         "cli.main(['--help'], standalone_mode=False);"

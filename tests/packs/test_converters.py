@@ -72,7 +72,7 @@ def test_every_vehicle_that_drives_has_wheels_in_order() -> None:
 
 
 def test_only_standing_people_are_pedestrians() -> None:
-    """Whoever sits or lies has no place on a pavement."""
+    """Sitting and lying people are not placed on pavements."""
     people = read_selection().groups["people"].models
     assert len(people) == 29
     for choice in people:
@@ -301,11 +301,11 @@ def test_gimbal_lock_keeps_the_rotation(tmp_path: Path) -> None:
     """A quarter turn about Y has no unique roll and yaw, but one rotation."""
     from xml.etree.ElementTree import Element
 
-    from gen_data.generator.packs.mjcf import _origin
+    from gen_data.generator.packs.mjcf import _add_origin
 
     for w, x, y, z in ((1, 0, 1, 0), (1, 0, -1, 0), (0.5, 0.5, 0.5, 0.5), (1, 2, 3, 4)):
         element = Element("visual")
-        _origin(element, Element("geom", quat=f"{w} {x} {y} {z}"))
+        _add_origin(element, Element("geom", quat=f"{w} {x} {y} {z}"))
         roll, pitch, yaw = (float(v) for v in element[0].attrib["rpy"].split())
         norm = math.sqrt(w * w + x * x + y * y + z * z)
         expected = SE3((0, 0, 0), (w / norm, x / norm, y / norm, z / norm)).rotation()

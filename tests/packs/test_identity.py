@@ -1,4 +1,4 @@
-"""A data set names the packs it may draw from, and whom it owes thanks."""
+"""A data set records the packs it may draw from, and their attribution."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def installed_box(tmp_path: Path, side: str) -> None:
 
 
 def test_without_packs_a_plan_names_none(factory: PipelineFactory) -> None:
-    """So that data sets of procedural assets never care."""
+    """Data sets of procedural assets are independent of packs."""
     assert not [name for name in make_plan(factory).versions if name.startswith("pack ")]
 
 

@@ -56,17 +56,17 @@ def fake_client(folder: Path, program: str, script: str) -> None:
 
 
 def library_with(folder: Path, tmp_path: Path) -> Library:
-    """A library that sees the packs in a folder."""
+    """A library with the packs in a folder."""
     return open_library(cache_dir=tmp_path / "cache", packs=folder)
 
 
 def names_in(folder: Path) -> set[str]:
-    """What lies in a folder, its lock aside."""
+    """Names in a folder, except for its lock."""
     return {path.name for path in folder.iterdir()} - {".lock"}
 
 
 def test_an_installed_pack_joins_the_library(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    """Under ids that start with its name, with its own licence and author."""
+    """Its assets have ids that start with its name, and their own licence and author."""
     record = install(pack, tmp_path / "packs", archive)
     assert {file.path for file in record.files} == {"box.obj", "index.json"}
     library = library_with(tmp_path / "packs", tmp_path)
@@ -77,7 +77,7 @@ def test_an_installed_pack_joins_the_library(pack: Pack, archive: Path, tmp_path
 
 
 def test_without_packs_the_library_is_as_before(tmp_path: Path) -> None:
-    """A folder that does not exist costs nothing and is not made."""
+    """A missing folder is fine and is not created."""
     library = library_with(tmp_path / "packs", tmp_path)
     assert library.find(("pack",)) == ()
     assert not (tmp_path / "packs").exists()
@@ -86,7 +86,7 @@ def test_without_packs_the_library_is_as_before(tmp_path: Path) -> None:
 def test_another_archive_is_refused_and_nothing_installed(
     pack: Pack, archive: Path, tmp_path: Path
 ) -> None:
-    """One byte is enough; both sums are told."""
+    """One byte is enough; the message gives both sums."""
     archive.write_bytes(archive.read_bytes() + b"\0")
     with pytest.raises(AssetError, match=f"expected {pack.sha256}"):
         install(pack, tmp_path / "packs", archive)
@@ -113,7 +113,7 @@ def test_the_client_fetches_the_pinned_version(
 def test_a_missing_client_is_named(
     pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With what to do instead."""
+    """The message gives an alternative."""
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(AssetError, match=r"'npm' is not on PATH.*--from FILE"):
         install(replace(pack, client="npm"), tmp_path / "packs")
@@ -131,7 +131,7 @@ def test_a_missing_client_is_named(
 def test_no_network_and_other_failures_are_told_apart(
     said: str, told: str, pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What the client says is shown unless the reason is plain."""
+    """The client's message is shown unless the reason is known."""
     fake_client(tmp_path / "bin", "pip", f'echo "{said}" >&2; exit 1')
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
     with pytest.raises(AssetError, match=told):
@@ -158,7 +158,7 @@ def test_a_killed_installation_leaves_nothing_behind(
 
 
 def test_a_failed_exchange_keeps_the_old_pack(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    """A converter that cannot cope changes nothing."""
+    """A failing converter changes nothing."""
     folder = tmp_path / "packs"
     install(pack, folder, archive)
     with pytest.raises(AssetError, match="none of the wanted"):
@@ -169,7 +169,7 @@ def test_a_failed_exchange_keeps_the_old_pack(pack: Pack, archive: Path, tmp_pat
 def test_two_installations_at_once_are_kept_apart(
     pack: Pack, archive: Path, tmp_path: Path
 ) -> None:
-    """The second one is told to wait."""
+    """The second one is refused."""
     import fcntl
 
     folder = tmp_path / "packs"
@@ -212,7 +212,7 @@ def test_a_removed_pack_is_gone(pack: Pack, archive: Path, tmp_path: Path) -> No
 def test_a_new_revision_of_the_conversion_is_out_of_date(
     pack: Pack, archive: Path, tmp_path: Path
 ) -> None:
-    """So that an upgrade of gen-data asks for it."""
+    """An upgrade of gen-data then requires a new installation."""
     folder = tmp_path / "packs"
     assert not is_installed(pack, folder)
     install(pack, folder, archive)
@@ -228,7 +228,7 @@ def test_installing_twice_gives_the_same_digest(pack: Pack, archive: Path, tmp_p
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_without_rights_is_told(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    """With the way out."""
+    """The message gives a remedy."""
     tmp_path.joinpath("packs").mkdir(mode=0o500)
     with pytest.raises(StorageError, match="GEN_DATA_ASSETS"):
         install(pack, tmp_path / "packs", archive)
@@ -244,7 +244,7 @@ def test_a_damaged_record_says_what_to_do(pack: Pack, archive: Path, tmp_path: P
 
 
 def test_an_unknown_pack_is_answered_with_the_nearest() -> None:
-    """And with all names."""
+    """The message lists all names."""
     with pytest.raises(Exception, match="did you mean 'catalogue'"):
         find_pack("catalog")
 

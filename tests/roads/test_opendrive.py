@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.roads.opendrive import read_opendrive
 from gen_data.generator.roads.opendrive_lanes import network_lanes, origin_m
 from gen_data.scene_templates.road_network import RoadNetwork
-from tests.roads.xodr import town
+from tests.roads.xodr import LANES, town
 
 
 def test_lanes_are_where_the_file_says() -> None:
@@ -76,6 +77,13 @@ def test_a_file_in_a_user_folder_is_an_asset_with_lanes(tmp_path: Path) -> None:
         ('<lane id="2" type="sidewalk">', '<lane id="5" type="sidewalk">',
          "not numbered without gaps"),
         ('<elevation s="0" a="5"', '<elevation s="0"', "road '1': 'a' is missing"),
+        ('curvEnd="0.02"', 'curvEnd="1e9"', "road '2': a curvature of 1e+09 per metre"),
+        ('arc curvature="0.02"', 'arc curvature="-1e9"', "road '3': a curvature of -1e+09"),
+        ('<spiral curvStart="0" curvEnd="0.02"/>', '<poly3 a="0" b="0" c="0" d="1e300"/>',
+         "road '2': a poly3 with a slope"),
+        ('a="3.25"', 'a="1e9"', "road '1': lane 1 is 1e+09 m wide"),
+        ('a="3.25" b="0"', 'a="3.25" b="1e300"', "road '1': lane 1 is 1e+302 m wide"),
+        ('<elevation s="0" a="5"', '<elevation s="0" a="1e9"', "road '1': it reaches 1e+09 m"),
         ("<OpenDRIVE>", "<Open>", "malformed XML"),
         ('<?xml version="1.0"?>', '<!DOCTYPE x [<!ENTITY e "a">]>', "declares a document type"),
     ],
@@ -87,6 +95,21 @@ def test_a_wrong_file_is_refused_with_its_road(old: str, new: str, message: str)
     with pytest.raises(AssetError, match=r"^town\.xodr") as caught:
         read_opendrive(text.replace(old, new, 1).encode(), "town.xodr")
     assert message in str(caught.value)
+
+
+def test_a_file_with_more_lanes_than_a_city_is_refused_at_once() -> None:
+    """Three hundred roads, each as long as a road may be, would take minutes."""
+    lanes = LANES.replace("<link>", "<!--").replace("</link>", "-->")
+    roads = "".join(
+        f'<road id="{k}" length="50000"><planView>'
+        f'<geometry s="0" x="0" y="{100 * k}" hdg="0" length="50000"><line/></geometry>'
+        f"</planView>{lanes}</road>"
+        for k in range(300)
+    )
+    started_s = time.process_time()
+    with pytest.raises(AssetError, match=r"more than 500 km of lanes; cut out the part"):
+        read_opendrive(f"<OpenDRIVE>{roads}</OpenDRIVE>".encode(), "country.xodr")
+    assert time.process_time() - started_s < 5.0
 
 
 def test_a_gap_between_pieces_is_refused() -> None:

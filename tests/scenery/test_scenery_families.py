@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural_library import TABLES, _tables
+from gen_data.generator.assets.procedural_library import TABLES, _import_tables
 from gen_data.generator.assets.scenery import FAMILIES, TEXTURES
 from gen_data.generator.core.errors import AssetError
 
@@ -99,7 +99,7 @@ def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
 
 def test_materials_have_known_roles_and_textures_that_exist(built: tuple[str, Solid]) -> None:
     """Randomizers look for roles; a texture's family must be in one of the tables."""
-    textures = {name for table in _tables() for name in table}
+    textures = {name for table in _import_tables() for name in table}
 
     assert TABLES
     for material in built[1].mesh.materials:

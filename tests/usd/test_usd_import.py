@@ -1,4 +1,4 @@
-"""Stages as assets: what OpenUSD wrote is what is read, and bad files are told apart."""
+"""Stages as assets: import matches OpenUSD's own files, and bad files have distinct errors."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def broken(folder: Path, kind: str) -> None:
     stage = new_stage(folder / "bad.usda")
     if kind == "no mesh":
         UsdLux.SphereLight.Define(stage, "/Lamp")
-    elif kind == "not read":
+    elif kind == "not supported":
         UsdGeom.Cube.Define(stage, "/Cube")
     else:
         mesh = add_quad(stage, "/Quad")
@@ -242,7 +242,7 @@ def broken(folder: Path, kind: str) -> None:
         elif kind.startswith("roughness"):
             material = shiny(stage, "/M", float(kind.rstrip(",").split()[-1]))
             UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
-        elif kind == "fit together":
+        elif kind == "inconsistent":
             mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 9])
         elif kind == "No such file":
             stage.GetRootLayer().subLayerPaths.append("./lost.usda")
@@ -263,12 +263,12 @@ def broken(folder: Path, kind: str) -> None:
     "fault",
     [
         "no mesh",
-        "not read",
+        "not supported",
         "is missing",
         "UsdPreviewSurface",
         "roughness is 1.5,",
         "roughness is -0.5,",
-        "fit together",
+        "inconsistent",
         "No such file",
         "outside",
         "in an archive outside",
@@ -338,7 +338,7 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
 def test_an_impossible_light_of_a_stage_is_refused(
     tmp_path: Path, attribute: str, value: object, said: str
 ) -> None:
-    """One error that names the file and the light; nothing is made of it."""
+    """One error names the file and the light; nothing is imported."""
     (tmp_path / "props").mkdir()
     stage = new_stage(tmp_path / "props/s.usda")
     add_quad(stage, "/Quad")

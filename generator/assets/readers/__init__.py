@@ -1,4 +1,4 @@
-"""Mesh files to triangle soup, one reader per format."""
+"""Readers of mesh files, one per format; all return triangle soup."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ MESH_SUFFIXES = frozenset(_READERS)
 
 
 def read_mesh(folder: Folder, relative: str, *, materials: bool = True) -> MeshSource:
-    """Triangles of a mesh file, read according to its suffix.
+    """Read a mesh file with the reader for its suffix.
 
     Args:
-        folder: Where it lies.
+        folder: Folder of the file.
         relative: Its path in the folder.
-        materials: Whether to read what it looks like, too.
+        materials: Whether to read materials, too.
 
     Raises:
         AssetError: if the file is missing, malformed, empty, or too large.
@@ -45,7 +45,7 @@ def read_mesh(folder: Folder, relative: str, *, materials: bool = True) -> MeshS
     suffix = PurePosixPath(relative).suffix.lower()
     if suffix not in _READERS:
         raise AssetError(
-            f"{path}: meshes of type '{suffix}' are not read{did_you_mean(suffix, _READERS)}; "
+            f"{path}: meshes of type '{suffix}' are not supported{did_you_mean(suffix, _READERS)}; "
             f"convert it to one of {', '.join(sorted(_READERS))}"
         )
     source = _READERS[suffix](folder, relative, materials)

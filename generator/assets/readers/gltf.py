@@ -1,6 +1,6 @@
 """glTF 2.0, text and binary (Khronos, "glTF 2.0 specification", 2021).
 
-Read are triangles, the first UV set, and materials as gltf_materials says. Morph targets, skins,
+Triangles, the first UV set and materials (see ``gltf_materials``) are read. Morph targets, skins,
 animations, cameras and lights are ignored; compressed geometry is refused.
 """
 
@@ -37,12 +37,19 @@ _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_HARMLESS = ("KHR_materials_", "KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_")
+_MAX_PARTS = 50_000
+"""Bound on nodes, and on primitives of all nodes: each takes about 0.1 ms."""
+_SUPPORTED_EXTENSIONS = (
+    "KHR_materials_",
+    "KHR_texture_transform",
+    "KHR_mesh_quantization",
+    "KHR_lights_",
+)
 
 
 @dataclass
 class _Document:
-    """A parsed file, with the bytes of its buffers and embedded images once they were asked for."""
+    """A parsed file; buffers and embedded images are loaded on first use."""
 
     folder: Folder
     relative: str
@@ -53,23 +60,27 @@ class _Document:
 
 
 def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
-    """Triangles of the default scene of a glTF file, in its own axes (Y up).
+    """Read the triangles of the default scene of a glTF file, in its own axes (Y up).
 
     Raises:
-        AssetError: if it is malformed, claims more than it holds, or needs an extension.
+        AssetError: if it is malformed, states more data than it holds, or requires an unsupported
+            extension.
     """
     data = folder.read(relative)
     try:
-        document = _document(folder, relative, data)
-        described = _list(document, "materials")
+        document = _parse_document(folder, relative, data)
+        described = _get_list(document, "materials")
         slots = (
-            *(_slot(document, m) if materials else MaterialSlot() for m in described),
+            *(_make_slot(document, m) if materials else MaterialSlot() for m in described),
             MaterialSlot(),
         )
+        meshes = _mesh_instances(document)
+        if sum(len(mesh["primitives"]) for _, mesh in meshes) > _MAX_PARTS:
+            raise ValueError(f"more than {_MAX_PARTS} primitives; join them")
         parts = [
             part
-            for matrix, mesh in _placed_meshes(document)
-            for part in _primitives(document, mesh, matrix, slots)
+            for matrix, mesh in meshes
+            for part in _read_primitives(document, mesh, matrix, slots)
         ]
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else str(error)[:120]
@@ -81,18 +92,18 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
     return MeshSource(join_soups(parts), document.images)
 
 
-def _document(folder: Folder, relative: str, data: bytes) -> _Document:
-    text, binary = _chunks(data) if data[:4] == b"glTF" else (data, b"")
+def _parse_document(folder: Folder, relative: str, data: bytes) -> _Document:
+    text, binary = _split_chunks(data) if data[:4] == b"glTF" else (data, b"")
     tree = json.loads(text.decode("utf-8"))
     if not isinstance(tree, dict):
-        raise ValueError("no JSON object")
+        raise ValueError("not a JSON object")
     for extension in tree.get("extensionsRequired", []):
-        if not str(extension).startswith(_HARMLESS):
-            raise ValueError(f"it needs {extension}, which is not read")
+        if not str(extension).startswith(_SUPPORTED_EXTENSIONS):
+            raise ValueError(f"it requires the unsupported {extension}")
     return _Document(folder, relative, tree, binary)
 
 
-def _chunks(data: bytes) -> tuple[bytes, bytes]:
+def _split_chunks(data: bytes) -> tuple[bytes, bytes]:
     _, version, length = struct.unpack_from("<4sII", data.ljust(12, b"\0"))
     if version != 2 or length != len(data):
         raise ValueError(f"its header says version {version}, {length} of {len(data)} bytes")
@@ -107,25 +118,27 @@ def _chunks(data: bytes) -> tuple[bytes, bytes]:
     return chunks[_JSON_CHUNK], chunks.get(_BINARY_CHUNK, b"")
 
 
-def _list(document: _Document, key: str) -> list[Any]:
+def _get_list(document: _Document, key: str) -> list[Any]:
     value = document.tree.get(key, [])
     if not isinstance(value, list):
-        raise TypeError(f"'{key}' is no list")
+        raise TypeError(f"'{key}' is not a list")
     return value
 
 
-def _at(items: Sequence[Any], index: Any, what: str) -> Any:
+def _get_item(items: Sequence[Any], index: Any, what: str) -> Any:
     if not isinstance(index, int) or not 0 <= index < len(items):
         raise ValueError(f"{what} {index} does not exist")
     return items[index]
 
 
-def _placed_meshes(document: _Document) -> list[tuple[Float64, Mapping[str, Any]]]:
-    """``(matrix [4, 4], mesh)`` of every node of the default scene, in document order."""
-    nodes, meshes = _list(document, "nodes"), _list(document, "meshes")
-    scenes = _list(document, "scenes")
+def _mesh_instances(document: _Document) -> list[tuple[Float64, Mapping[str, Any]]]:
+    """``(matrix [4, 4], mesh)`` of every mesh node of the default scene, in document order."""
+    nodes, meshes = _get_list(document, "nodes"), _get_list(document, "meshes")
+    if len(nodes) > _MAX_PARTS:
+        raise ValueError(f"{len(nodes)} nodes, at most {_MAX_PARTS}; join them")
+    scenes = _get_list(document, "scenes")
     if scenes:
-        roots = list(_at(scenes, document.tree.get("scene", 0), "scene").get("nodes", []))
+        roots = list(_get_item(scenes, document.tree.get("scene", 0), "scene").get("nodes", []))
     else:
         children = {c for node in nodes for c in node.get("children", [])}
         roots = [k for k in range(len(nodes)) if k not in children]
@@ -134,13 +147,13 @@ def _placed_meshes(document: _Document) -> list[tuple[Float64, Mapping[str, Any]
     pending = [(index, np.eye(4)) for index in reversed(roots)]
     while pending:
         index, parent = pending.pop()
-        node = _at(nodes, index, "node")
+        node = _get_item(nodes, index, "node")
         if index in visited:
             raise ValueError(f"node {index} has two parents or is its own ancestor")
         visited.add(index)
         matrix = _product(parent, _local_matrix(node))
         if "mesh" in node:
-            placed.append((matrix, _at(meshes, node["mesh"], "mesh")))
+            placed.append((matrix, _get_item(meshes, node["mesh"], "mesh")))
         pending += [(child, matrix) for child in reversed(node.get("children", []))]
     return placed
 
@@ -168,36 +181,36 @@ def _product(a: Float64, b: Float64) -> Float64:
     return product
 
 
-def _primitives(
+def _read_primitives(
     document: _Document, mesh: Mapping[str, Any], matrix: Float64, slots: tuple[MaterialSlot, ...]
 ) -> list[TriangleSoup]:
     soups = []
     for primitive in mesh["primitives"]:
         if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
             continue
-        slot = _at(slots, primitive.get("material", len(slots) - 1), "material")
-        soups.append(_primitive(document, primitive, slot).transformed(matrix[:3]))
+        slot = _get_item(slots, primitive.get("material", len(slots) - 1), "material")
+        soups.append(_read_primitive(document, primitive, slot).transformed(matrix[:3]))
     return soups
 
 
-def _primitive(
+def _read_primitive(
     document: _Document, primitive: Mapping[str, Any], slot: MaterialSlot
 ) -> TriangleSoup:
     attributes = primitive["attributes"]
-    positions = _accessor(document, attributes["POSITION"], 3).astype(np.float64)
+    positions = _read_accessor(document, attributes["POSITION"], 3).astype(np.float64)
     if "indices" in primitive:
-        indices = _accessor(document, primitive["indices"], 1).astype(np.int64)[:, 0]
+        indices = _read_accessor(document, primitive["indices"], 1).astype(np.int64)[:, 0]
     else:
         indices = np.arange(len(positions))
-    faces = _faces(indices, primitive.get("mode", _TRIANGLES))
+    faces = _index_triangles(indices, primitive.get("mode", _TRIANGLES))
     if len(faces) > MAX_FACES:
         raise ValueError(f"more than {MAX_FACES} triangles")
     if len(faces) and (faces.max() >= len(positions) or faces.min() < 0):
         raise ValueError("an index out of range")
-    uvs = _optional(document, attributes, "TEXCOORD_0", 2, len(positions))
-    normals = _optional(document, attributes, "NORMAL", 3, len(positions))
+    uvs = _optional_attribute(document, attributes, "TEXCOORD_0", 2, len(positions))
+    normals = _optional_attribute(document, attributes, "NORMAL", 3, len(positions))
     if uvs is not None:
-        # glTF counts rows of the image from the top.
+        # glTF measures V from the top of the image.
         uvs = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1)
     zeros = np.zeros(len(faces), dtype=np.int64)
     return TriangleSoup(
@@ -210,7 +223,7 @@ def _primitive(
     )
 
 
-def _faces(indices: Int64, mode: int) -> Int64:
+def _index_triangles(indices: Int64, mode: int) -> Int64:
     if mode == _TRIANGLES:
         return indices[: len(indices) // 3 * 3].reshape(-1, 3)
     if mode == _FAN:
@@ -221,24 +234,24 @@ def _faces(indices: Int64, mode: int) -> Int64:
     return faces
 
 
-def _optional(
+def _optional_attribute(
     document: _Document, attributes: Mapping[str, Any], name: str, width: int, count: int
 ) -> Float64 | None:
     if name not in attributes:
         return None
-    values = _accessor(document, attributes[name], width).astype(np.float64)
+    values = _read_accessor(document, attributes[name], width).astype(np.float64)
     if len(values) != count:
         raise ValueError(f"{name} has {len(values)} entries for {count} positions")
     return values
 
 
-def _accessor(document: _Document, index: Any, width: int) -> NDArray[Any]:
-    """The values of an accessor, shape [count, width]; integers marked normalized become floats."""
-    accessor = _at(_list(document, "accessors"), index, "accessor")
+def _read_accessor(document: _Document, index: Any, width: int) -> NDArray[Any]:
+    """Values of an accessor [count, width]; normalized integers become floats."""
+    accessor = _get_item(_get_list(document, "accessors"), index, "accessor")
     if "sparse" in accessor or "bufferView" not in accessor:
-        raise ValueError(f"accessor {index} is sparse or empty, which is not read")
-    view = _at(_list(document, "bufferViews"), accessor["bufferView"], "buffer view")
-    data = _view(document, view)
+        raise ValueError(f"accessor {index} is sparse or empty, which is not supported")
+    view = _get_item(_get_list(document, "bufferViews"), accessor["bufferView"], "buffer view")
+    data = _view_bytes(document, view)
     dtype = np.dtype(_COMPONENTS[accessor["componentType"]])
     if _WIDTHS.get(accessor["type"]) != width:
         raise ValueError(f"accessor {index} has type {accessor['type']}")
@@ -246,28 +259,28 @@ def _accessor(document: _Document, index: Any, width: int) -> NDArray[Any]:
     item = dtype.itemsize * width
     stride = int(view.get("byteStride", 0)) or item
     if count < 1 or offset < 0 or stride < item or offset + stride * (count - 1) + item > len(data):
-        raise ValueError(f"accessor {index} claims more than its buffer holds")
+        raise ValueError(f"accessor {index} exceeds its buffer")
     values: NDArray[Any] = np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
     if accessor.get("normalized") and dtype.kind in "iu":
         values = np.maximum(values / np.iinfo(dtype).max, -1.0)
     return values
 
 
-def _view(document: _Document, view: Mapping[str, Any]) -> bytes:
+def _view_bytes(document: _Document, view: Mapping[str, Any]) -> bytes:
     number = view["buffer"]
     if number not in document.buffers:
-        buffer = _at(_list(document, "buffers"), number, "buffer")
+        buffer = _get_item(_get_list(document, "buffers"), number, "buffer")
         document.buffers[number] = (
-            _from_uri(document, buffer["uri"]) if "uri" in buffer else document.binary
+            _read_uri(document, buffer["uri"]) if "uri" in buffer else document.binary
         )
     data = document.buffers[number]
     offset, length = int(view.get("byteOffset", 0)), int(view["byteLength"])
     if offset < 0 or length < 0 or offset + length > len(data):
-        raise ValueError("a buffer view claims more than its buffer holds")
+        raise ValueError("a buffer view exceeds its buffer")
     return data[offset : offset + length]
 
 
-def _from_uri(document: _Document, uri: str) -> bytes:
+def _read_uri(document: _Document, uri: str) -> bytes:
     if not uri.startswith("data:"):
         relative = document.folder.refer(document.relative, unquote(uri))
         return document.folder.read(relative)
@@ -277,7 +290,7 @@ def _from_uri(document: _Document, uri: str) -> bytes:
         raise ValueError("a data URI that is not base64") from None
 
 
-def _slot(document: _Document, description: Mapping[str, Any]) -> MaterialSlot:
+def _make_slot(document: _Document, description: Mapping[str, Any]) -> MaterialSlot:
     place = f"{document.folder.root / document.relative}"
 
     def pixels(name: str) -> UInt8:
@@ -285,24 +298,24 @@ def _slot(document: _Document, description: Mapping[str, Any]) -> MaterialSlot:
         return decode_image(encoded, f"{place}#{name}", alpha=True)
 
     name = str(description.get("name", ""))
-    images = Images(lambda reference: _image(document, reference), cache(pixels))
+    images = Images(lambda reference: _image_name(document, reference), cache(pixels))
     try:
         return MaterialSlot(name, gltf_material(description, images), from_file=True)
     except ValueError as error:
         raise ValueError(f"material '{name[:40]}': {error}") from None
 
 
-def _image(document: _Document, reference: Mapping[str, Any]) -> str:
-    """Name of the image of a texture reference; embedded images are named by their number."""
-    texture = _at(_list(document, "textures"), reference["index"], "texture")
+def _image_name(document: _Document, reference: Mapping[str, Any]) -> str:
+    """Name of a texture reference's image: its path, or the number of an embedded image."""
+    texture = _get_item(_get_list(document, "textures"), reference["index"], "texture")
     number = texture.get("source")
-    image = _at(_list(document, "images"), number, "image")
+    image = _get_item(_get_list(document, "images"), number, "image")
     if "uri" in image and not image["uri"].startswith("data:"):
         return document.folder.refer(document.relative, unquote(image["uri"]))
     name = str(number)
     if "uri" in image:
-        document.images[name] = _from_uri(document, image["uri"])
+        document.images[name] = _read_uri(document, image["uri"])
     else:
-        view = _at(_list(document, "bufferViews"), image["bufferView"], "buffer view")
-        document.images[name] = _view(document, view)
+        view = _get_item(_get_list(document, "bufferViews"), image["bufferView"], "buffer view")
+        document.images[name] = _view_bytes(document, view)
     return name

@@ -1,4 +1,4 @@
-"""What a reader hands on, and the conversions that formats share."""
+"""Result type of mesh readers, and conversions that formats share."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gen_data.generator.core.se3 import Vec3
 
 MAX_FACES = 5_000_000
 EVEN = 3.0
-"""Channels of images that spread less than this [1/255] say one thing."""
+"""Image channels with a smaller standard deviation [1/255] count as uniform."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshSource:
-    """A mesh file.
+    """Content of a mesh file.
 
     Attributes:
         soup: Its triangles. ``Material.texture`` is an image's path relative to the folder, or a
@@ -31,36 +31,36 @@ class MeshSource:
 
 
 def check_face_count(count: int, place: str) -> None:
-    """Raise AssetError if a file has more triangles than are read."""
+    """Raise AssetError if a file has more than ``MAX_FACES`` triangles."""
     if count > MAX_FACES:
         raise AssetError(f"{place}: {count} triangles, at most {MAX_FACES}; decimate it")
 
 
 def fraction(value: object, name: str) -> float:
-    """A number in [0, 1]. Raises ValueError, naming it, if it is none."""
-    number = _number(value, name)
-    # Exporters round: a hair beyond an end means the end.
+    """Parse a number in [0, 1]. Raises ValueError with its name if it is out of range."""
+    number = _parse_number(value, name)
+    # Exporters round: tolerate values slightly outside.
     if not -1e-4 <= number <= 1.0 + 1e-4:
         raise ValueError(f"{name} is {number:g}, not in [0, 1]")
     return min(max(number, 0.0), 1.0)
 
 
 def clamp_min(low: float, value: object, name: str) -> float:
-    """A finite number that is not below ``low``. Raises ValueError, naming it, if it is none."""
-    number = _number(value, name)
+    """Parse a finite number of at least ``low``. Raises ValueError with its name otherwise."""
+    number = _parse_number(value, name)
     if not low - 1e-6 <= number < math.inf:
         raise ValueError(f"{name} is {number:g}, not a number of at least {low:g}")
     return max(number, low)
 
 
-def _number(value: object, name: str) -> float:
+def _parse_number(value: object, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"{name} is no number")
+        raise ValueError(f"{name} is not a number")
     return float(value)
 
 
 def srgb_to_linear(color: Vec3) -> Vec3:
-    """Linear RGB of sRGB in [0, 1] (IEC 61966-2-1)."""
+    """Convert sRGB in [0, 1] to linear RGB (IEC 61966-2-1)."""
     red, green, blue = (_linear(min(max(c, 0.0), 1.0)) for c in color)
     return (red, green, blue)
 

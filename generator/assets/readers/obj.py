@@ -31,7 +31,7 @@ from gen_data.generator.core.errors import AssetError
 
 @dataclass
 class _Statements:
-    """The lines of an OBJ file, sorted by what they say."""
+    """Statements of an OBJ file by kind."""
 
     positions: list[str] = field(default_factory=list)
     texcoords: list[str] = field(default_factory=list)
@@ -46,19 +46,19 @@ class _Statements:
 
 
 def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
-    """Triangles of an OBJ file with the materials of its MTL files.
+    """Read an OBJ file with the materials of its MTL files.
 
-    Polygons are cut into fans. Each ``o`` (or, where there is none, each ``g``) is a group.
+    Polygons become triangle fans. Each ``o`` (or, where there is none, each ``g``) is a group.
 
     Raises:
         AssetError: on malformed numbers, indices out of range, or forbidden references.
     """
     text = folder.read(relative).decode("utf-8", errors="replace").replace("\\\n", " ")
     try:
-        statements = _statements(text)
+        statements = _parse_statements(text)
         if not materials:
             statements.libraries.clear()
-        soup = _soup(statements, _slots(folder, relative, statements))
+        soup = _build_soup(statements, _read_slots(folder, relative, statements))
     except ValueError as error:
         raise AssetError(
             f"{folder.root / relative}: malformed OBJ ({error}); export it again"
@@ -66,7 +66,7 @@ def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
     return MeshSource(soup)
 
 
-def _statements(text: str) -> _Statements:
+def _parse_statements(text: str) -> _Statements:
     s = _Statements()
     material, object_count, group_count = 0, 0, 0
     s.materials[""] = 0
@@ -81,10 +81,10 @@ def _statements(text: str) -> _Statements:
         elif key == "f":
             tokens = rest.split()
             if len(tokens) == 2:
-                # An edge that an exporter left behind.
+                # A stray edge, as some exporters write.
                 continue
             if "-" in rest:
-                tokens = [_absolute(token, s) for token in tokens]
+                tokens = [_make_absolute(token, s) for token in tokens]
             s.corners += tokens
             s.polygon_sizes.append(len(tokens))
             s.polygon_materials.append(material)
@@ -101,8 +101,8 @@ def _statements(text: str) -> _Statements:
     return s
 
 
-def _absolute(token: str, s: _Statements) -> str:
-    """A corner whose negative indices, which count backwards, are made positive."""
+def _make_absolute(token: str, s: _Statements) -> str:
+    """Replace the negative indices of a corner, which count backwards, by positive ones."""
     counts = (len(s.positions), len(s.texcoords), len(s.normals))
     parts = token.split("/")
     for k, (part, count) in enumerate(zip(parts, counts, strict=False)):
@@ -114,23 +114,23 @@ def _absolute(token: str, s: _Statements) -> str:
     return "/".join(parts)
 
 
-def _soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup:
+def _build_soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup:
     sizes = np.array(s.polygon_sizes, dtype=np.int64)
     if (sizes < 3).any():
         raise ValueError("a face with fewer than three corners")
     if (sizes - 2).sum() > MAX_FACES:
         raise ValueError(f"more than {MAX_FACES} triangles")
-    fans = _fans(sizes)
+    fans = _split_fans(sizes)
     polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
-    indices = _indices(s.corners)[fans]
-    positions = _table(s.positions, 3, "v")
-    texcoords = _table(s.texcoords, 2, "vt")
-    normals = _table(s.normals, 3, "vn")
+    indices = _parse_indices(s.corners)[fans]
+    positions = _parse_table(s.positions, 3, "v")
+    texcoords = _parse_table(s.texcoords, 2, "vt")
+    normals = _parse_table(s.normals, 3, "vn")
     groups = s.polygon_objects if max(s.polygon_objects, default=0) else s.polygon_groups
     return TriangleSoup(
-        corners=_looked_up(positions, indices[..., 0], "vertex", required=True),
-        uvs=_looked_up(texcoords, indices[..., 1], "vt") if len(texcoords) else None,
-        normals=_looked_up(normals, indices[..., 2], "vn")
+        corners=_look_up(positions, indices[..., 0], "vertex", required=True),
+        uvs=_look_up(texcoords, indices[..., 1], "vt") if len(texcoords) else None,
+        normals=_look_up(normals, indices[..., 2], "vn")
         if len(normals) and (indices[..., 2] > 0).all()
         else None,
         face_slots=np.array(s.polygon_materials, dtype=np.int64)[polygon],
@@ -139,8 +139,8 @@ def _soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup:
     )
 
 
-def _fans(sizes: Int64) -> Int64:
-    """Corner numbers [m, 3] of the fan triangles of polygons with the given corner counts."""
+def _split_fans(sizes: Int64) -> Int64:
+    """Corner indices [m, 3] of the fan triangles of polygons with the given corner counts."""
     starts = np.cumsum(sizes) - sizes
     counts = sizes - 2
     first = np.repeat(starts, counts)
@@ -148,8 +148,8 @@ def _fans(sizes: Int64) -> Int64:
     return np.stack([first, first + step + 1, first + step + 2], axis=1)
 
 
-def _indices(tokens: list[str]) -> Int64:
-    """Index triples [n, 3] of ``v/vt/vn`` tokens; 0 where a part is absent."""
+def _parse_indices(tokens: list[str]) -> Int64:
+    """Parse ``v/vt/vn`` tokens to index triples [n, 3]; 0 where a part is absent."""
     rows = [(token + "//").split("/", 3)[:3] for token in tokens]
     flat = [int(part) if part else 0 for row in rows for part in row]
     if flat and max(flat) >= 2**31:
@@ -157,8 +157,8 @@ def _indices(tokens: list[str]) -> Int64:
     return np.array(flat, dtype=np.int64).reshape(-1, 3)
 
 
-def _table(lines: list[str], width: int, name: str) -> Float64:
-    """Numbers [n, width] of the statements of one kind; further numbers on a line are ignored."""
+def _parse_table(lines: list[str], width: int, name: str) -> Float64:
+    """Parse the numbers [n, width] of one kind of statement; extra numbers are ignored."""
     rows = [line.split(None, width)[:width] for line in lines]
     if any(len(row) < min(width, 2) for row in rows):
         raise ValueError(f"a '{name}' with too few numbers")
@@ -168,15 +168,15 @@ def _table(lines: list[str], width: int, name: str) -> Float64:
     return table.reshape(-1, width)
 
 
-def _looked_up(table: Float64, indices: Int64, name: str, *, required: bool = False) -> Float64:
+def _look_up(table: Float64, indices: Int64, name: str, *, required: bool = False) -> Float64:
     if (indices < 0).any() or (indices > len(table)).any() or (required and (indices < 1).any()):
         raise ValueError(f"a face with a {name} index out of range 1..{len(table)}")
-    # Index 0 means absent: it looks up a row of zeros put in front.
+    # Index 0 means absent and selects the row of zeros prepended here.
     looked_up: Float64 = np.concatenate([np.zeros((1, table.shape[1])), table])[indices]
     return looked_up
 
 
-def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[MaterialSlot, ...]:
+def _read_slots(folder: Folder, relative: str, s: _Statements) -> tuple[MaterialSlot, ...]:
     defined: dict[str, Material] = {}
     missing = ""
     for library in s.libraries:
@@ -188,7 +188,7 @@ def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[MaterialSlot,
     return tuple(
         MaterialSlot(
             name,
-            _untinted(defined[name]),
+            _drop_tint(defined[name]),
             from_file=True,
             declared_color=defined[name].base_color,
         )
@@ -200,16 +200,16 @@ def _slots(folder: Folder, relative: str, s: _Statements) -> tuple[MaterialSlot,
 
 @dataclass
 class _Definition:
-    """What an MTL file says of one material."""
+    """Definition of one material in an MTL file."""
 
     material: Material = field(default_factory=Material)
     maps: TextureMaps = field(default_factory=TextureMaps)
     dissolved: bool = False
 
-    def finished(self) -> Material:
+    def build_material(self) -> Material:
         maps = self.maps
         if maps.alpha:
-            # The transparency of an image is in its fourth channel, if it is that of its colour.
+            # The coverage is in the alpha channel if colour and coverage share an image.
             own = maps.alpha == maps.albedo
             maps = replace(maps, alpha=f"{maps.alpha}!{3 if own else 0}")
         return replace(self.material, texture=maps.name())
@@ -225,14 +225,16 @@ def _read_mtl(folder: Folder, relative: str) -> dict[str, Material]:
             definitions[name] = _Definition()
         elif name in definitions and (key in _NUMBERS or key in _IMAGES):
             try:
-                _add(definitions[name], key, rest, lambda file: folder.refer(relative, file))
+                _apply_statement(
+                    definitions[name], key, rest, lambda file: folder.refer(relative, file)
+                )
             except (ValueError, IndexError) as error:
                 reason = f" ({error})" if str(error).startswith(f"{key} is") else ""
                 raise AssetError(
                     f"{folder.root / relative}: material '{name}': malformed '{key}'{reason}; "
                     "export it again"
                 ) from None
-    return {name: definition.finished() for name, definition in definitions.items()}
+    return {name: definition.build_material() for name, definition in definitions.items()}
 
 
 _NUMBERS = frozenset({"Kd", "Ke", "Ns", "Ni", "Pr", "Pm", "Pc", "Pcr", "d", "Tr"})
@@ -246,8 +248,8 @@ _IMAGES = {
 }
 
 
-def _add(known: _Definition, key: str, rest: str, refer: Callable[[str], str]) -> None:
-    """Take one statement in. Raises ValueError or IndexError if it is malformed."""
+def _apply_statement(known: _Definition, key: str, rest: str, refer: Callable[[str], str]) -> None:
+    """Apply one statement. Raises ValueError or IndexError if it is malformed."""
     if key in _IMAGES:
         image: dict[str, Any] = {_IMAGES[key]: refer(_image_name(rest))}
         known.maps = replace(known.maps, **image)
@@ -265,20 +267,20 @@ def _add(known: _Definition, key: str, rest: str, refer: Callable[[str], str]) -
             roughness = shininess_to_roughness(numbers[0])
             known.material = replace(known.material, roughness=roughness)
     elif key == "Ni":
-        # Less than 1 is how exporters say that they do not know.
+        # Exporters write values below 1 for an unknown index.
         known.material = replace(known.material, ior=numbers[0] if numbers[0] > 1.0 else 1.5)
     elif key in ("d", "Tr"):
-        _dissolve(known, key, numbers[-1])
+        _set_opacity(known, key, numbers[-1])
     else:
         names = {"Pr": "roughness", "Pm": "metallic", "Pc": "coat", "Pcr": "coat_roughness"}
         share: dict[str, Any] = {names[key]: fraction(numbers[0], key)}
         known.material = replace(known.material, **share)
 
 
-def _dissolve(known: _Definition, key: str, number: float) -> None:
-    """Opacity by ``d``, or by ``Tr``, which is the contrary, where ``d`` is not given.
+def _set_opacity(known: _Definition, key: str, number: float) -> None:
+    """Set opacity from ``d`` or, without one, from its complement ``Tr``.
 
-    Nothing that is drawn is fully transparent: some exporters swap the two.
+    Full transparency is read as opaque, because some exporters swap the two.
     """
     opacity = fraction(number, key) if key == "d" else 1.0 - fraction(number, key)
     if key == "d" or not known.dissolved:
@@ -287,7 +289,7 @@ def _dissolve(known: _Definition, key: str, number: float) -> None:
 
 
 def _image_name(rest: str) -> str:
-    """The file of a ``map_`` statement behind its options, each a word and numbers."""
+    """File of a ``map_`` statement, after its options (a word and numbers each)."""
     tokens = rest.split()
     while len(tokens) > 1 and tokens[0].startswith("-"):
         tokens.pop(0)
@@ -304,6 +306,6 @@ def _is_number(token: str) -> bool:
     return True
 
 
-def _untinted(material: Material) -> Material:
-    """Textured materials without a tint: exporters write arbitrary greys beside an image."""
+def _drop_tint(material: Material) -> Material:
+    """Make a textured material white: exporters write arbitrary greys beside an image."""
     return replace(material, base_color=(1.0, 1.0, 1.0)) if material.texture else material

@@ -1,4 +1,4 @@
-"""Stanford PLY, parsed by trimesh behind a check of what its header claims."""
+"""Stanford PLY, parsed by trimesh after a check of the header."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _ELEMENT = re.compile(rb"^element\s+(\S+)\s+(\S+)\s*$", re.MULTILINE)
 
 
 def read_ply(folder: Folder, relative: str, _materials: bool) -> MeshSource:
-    """Triangles of a PLY file; colours per vertex are ignored.
+    """Read a PLY file; vertex colours are ignored.
 
     Raises:
-        AssetError: if the header claims more than the file can hold, or parsing fails.
+        AssetError: if the header states more elements than the file can hold, or parsing fails.
     """
     data = folder.read(relative)
     path = folder.root / relative
@@ -29,13 +29,13 @@ def read_ply(folder: Folder, relative: str, _materials: bool) -> MeshSource:
     counts = [count for _, count in _ELEMENT.findall(header.replace(b"\r", b""))]
     if not header.startswith(b"ply") or not end:
         raise AssetError(f"{path}: not a PLY file; export it again")
-    # Every element of every list takes a byte at least: a larger count is a lie.
+    # Every element takes at least one byte, so a larger count is false.
     if not all(c.isdigit() and len(c) < 12 and int(c) <= len(data) for c in counts):
-        raise AssetError(f"{path}: its header claims more than it holds; export it again")
-    return MeshSource(TriangleSoup.of(_triangles(data, str(path))))
+        raise AssetError(f"{path}: its header states more elements than it holds; export it again")
+    return MeshSource(TriangleSoup.of(_parse_triangles(data, str(path))))
 
 
-def _triangles(data: bytes, path: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def _parse_triangles(data: bytes, path: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     import trimesh
 
     try:

@@ -14,27 +14,27 @@ _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribut
 
 
 def read_stl(folder: Folder, relative: str, _materials: bool) -> MeshSource:
-    """Triangles of an STL file; its facet normals carry no information and are ignored.
+    """Read an STL file; its redundant facet normals are ignored.
 
     Raises:
-        AssetError: if the file is neither a whole binary nor an ASCII STL.
+        AssetError: if the file is neither a complete binary nor an ASCII STL.
     """
     data = folder.read(relative)
-    # Binary files may also begin with "solid": only the size tells for certain.
+    # Binary files may also begin with "solid"; only the size is decisive.
     count = int.from_bytes(data[80:_HEADER_BYTES], "little")
     if len(data) >= _HEADER_BYTES and len(data) == _HEADER_BYTES + _RECORD.itemsize * count:
         check_face_count(count, str(folder.root / relative))
         records = np.frombuffer(data, dtype=_RECORD, offset=_HEADER_BYTES)
         return MeshSource(TriangleSoup.of(records["corners"].astype(np.float64)))
-    corners = _ascii(data) if data.lstrip()[:5].lower() == b"solid" else None
+    corners = _parse_ascii(data) if data.lstrip()[:5].lower() == b"solid" else None
     if corners is None:
         raise AssetError(
-            f"{folder.root / relative}: neither a whole binary nor an ASCII STL; export it again"
+            f"{folder.root / relative}: neither a complete binary nor an ASCII STL; export it again"
         )
     return MeshSource(TriangleSoup.of(corners))
 
 
-def _ascii(data: bytes) -> Float64 | None:
+def _parse_ascii(data: bytes) -> Float64 | None:
     words = [line.split() for line in data.lower().split(b"\n")]
     try:
         rows = [[float(x) for x in w[1:4]] for w in words if w and w[0] == b"vertex"]

@@ -1,7 +1,7 @@
-"""OpenUSD: layers, text and binary, and usdz archives.
+"""OpenUSD: text and binary layers, and usdz archives.
 
-Read are meshes, subsets, UsdPreviewSurface with its images, transforms, instances, unit and up
-axis. Nothing outside the asset folder is opened: what layers refer to is looked at beforehand.
+Supported are meshes, subsets, UsdPreviewSurface with images, transforms, instances, unit and up
+axis. Nothing outside the asset folder is opened: references of layers are checked beforehand.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ ARCHIVE = ".usdz"
 
 
 def read_usd(folder: Folder, relative: str, materials: bool) -> MeshSource:
-    """Triangles of all visible meshes of a stage, in metres, Z up.
+    """Read all visible meshes of a stage, in metres, Z up.
 
     Raises:
-        AssetError: if it is malformed or holds no mesh, refers to what is missing or outside the
-            folder, or has a material that is not read.
+        AssetError: if it is malformed or holds no mesh, has a missing reference or one outside the
+            folder, or an unsupported material.
     """
     with open_stage(folder, relative) as stage:
         return stage.source(stage.pieces(), materials=materials)
@@ -45,8 +45,8 @@ class StageFile:
     """An open stage in a folder.
 
     Attributes:
-        folder: Where its files are: the user's, or that of an unpacked archive.
-        packed: Whether it is such an archive.
+        folder: Folder of its files: the user's, or that of an unpacked archive.
+        packed: Whether it comes from an archive.
     """
 
     stage: OpenStage
@@ -54,78 +54,80 @@ class StageFile:
     packed: bool
 
     def pieces(self) -> tuple[StagePart, ...]:
-        """Its visible meshes."""
+        """Visible meshes."""
         return self.stage.pieces()
 
     def source(self, pieces: tuple[StagePart, ...], *, materials: bool = True) -> MeshSource:
-        """Triangles of some of its meshes, each a group."""
+        """Read some of its meshes, each as a group."""
         images: dict[str, bytes] = {}
         soups = []
         for piece in pieces:
             mesh = self.stage.mesh(piece)
             slots = tuple(
-                self._slot(k, images) if materials else MaterialSlot() for k in mesh.looks
+                self._make_slot(k, images) if materials else MaterialSlot() for k in mesh.materials
             )
             zeros = np.zeros(len(mesh.corners), dtype=np.int64)
             soup = TriangleSoup(mesh.corners, mesh.uvs, mesh.normals, mesh.face_slots, zeros, slots)
             soups.append(soup.transformed(piece.T_stage_prim[:3]))
         return MeshSource(join_soups(soups), images)
 
-    def _slot(self, look: BoundMaterial, images: dict[str, bytes]) -> MaterialSlot:
-        roughness, rough_map = self._mapped(look.material.roughness, look.roughness_image)
-        metallic, metal_map = self._mapped(look.material.metallic, look.metallic_image)
-        material = self._veiled(look)
+    def _make_slot(self, bound: BoundMaterial, images: dict[str, bytes]) -> MaterialSlot:
+        roughness, rough_map = self._factor_or_channel(
+            bound.material.roughness, bound.roughness_image
+        )
+        metallic, metal_map = self._factor_or_channel(bound.material.metallic, bound.metallic_image)
+        material = self._apply_opacity_image(bound)
         maps = TextureMaps(
-            albedo=self._name(look.texture),
-            alpha=self._channel(look.cover_image),
-            normal=self._name(look.normal_image),
+            albedo=self._relative_name(bound.texture),
+            alpha=self._channel_name(bound.alpha_image),
+            normal=self._relative_name(bound.normal_image),
             roughness=rough_map,
             metallic=metal_map,
-            occlusion=self._channel(look.occlusion_image),
-            emission=self._name(look.emission_image),
-            cutoff=look.cutoff,
+            occlusion=self._channel_name(bound.occlusion_image),
+            emission=self._relative_name(bound.emission_image),
+            cutoff=bound.cutoff,
         )
         material = replace(material, roughness=roughness, metallic=metallic, texture=maps.name())
         if self.packed:
             images |= {name: self.folder.read(name) for name in maps.images()}
-        return MaterialSlot(look.name, material, from_file=True)
+        return MaterialSlot(bound.name, material, from_file=True)
 
-    def _mapped(self, value: float, image: tuple[str, int]) -> tuple[float, str]:
-        """A number and the channel that multiplies it, or what an even channel makes of it."""
+    def _factor_or_channel(self, value: float, image: tuple[str, int]) -> tuple[float, str]:
+        """Factor and channel; a uniform channel is multiplied into the factor."""
         if not image[0]:
             return value, ""
         channel = self._pixels(image)
         if float(channel.std()) < EVEN:
             return round(value * float(channel.mean()) / 255.0, 4), ""
-        return value, self._channel(image)
+        return value, self._channel_name(image)
 
-    def _veiled(self, look: BoundMaterial) -> Material:
-        """The material under the mean of an image of its opacity."""
-        if not look.veil_image[0]:
-            return look.material
-        kept = float(self._pixels(look.veil_image).mean()) / 255.0
+    def _apply_opacity_image(self, bound: BoundMaterial) -> Material:
+        """Multiply the opacity by the mean of its image."""
+        if not bound.opacity_image[0]:
+            return bound.material
+        kept = float(self._pixels(bound.opacity_image).mean()) / 255.0
         return replace(
-            look.material,
-            opacity=round(look.material.opacity * kept, 4),
+            bound.material,
+            opacity=round(bound.material.opacity * kept, 4),
             transmission=0.0,
         )
 
     def _pixels(self, image: tuple[str, int]) -> UInt8:
-        """One channel of an image; white where a fourth is asked for and there is none."""
+        """One channel of an image; white if the image lacks it."""
         path, channel = image
-        data = self.folder.read(self._name(path))
+        data = self.folder.read(self._relative_name(path))
         pixels = decode_image(data, f"{self.stage.place}: {path}", alpha=True)
         whole = channel < pixels.shape[2]
         return pixels[..., channel] if whole else np.full(pixels.shape[:2], 255, np.uint8)
 
-    def _channel(self, image: tuple[str, int]) -> str:
-        return f"{self._name(image[0])}!{image[1]}" if image[0] else ""
+    def _channel_name(self, image: tuple[str, int]) -> str:
+        return f"{self._relative_name(image[0])}!{image[1]}" if image[0] else ""
 
-    def _name(self, path: str) -> str:
-        """An image's path relative to the folder; empty for none.
+    def _relative_name(self, path: str) -> str:
+        """Path of an image relative to the folder; empty for none.
 
         Raises:
-            AssetError: if it is outside.
+            AssetError: if it is outside the folder.
         """
         if not path:
             return ""
@@ -141,7 +143,7 @@ class StageFile:
 
 @contextmanager
 def open_stage(folder: Folder, relative: str) -> Iterator[StageFile]:
-    """A stage, open while the block lasts.
+    """Open a stage for the duration of the block.
 
     Raises:
         AssetError: if it cannot be read, or refers to layers that are missing or outside.
@@ -149,16 +151,16 @@ def open_stage(folder: Folder, relative: str) -> Iterator[StageFile]:
     place = str(folder.root / relative)
     if PurePosixPath(relative).suffix.lower() != ARCHIVE:
         _check_layers(folder, relative)
-        yield StageFile(_composed(folder, relative, place), folder, packed=False)
+        yield StageFile(_open_composed(folder, relative, place), folder, packed=False)
         return
     with TemporaryDirectory(prefix="gen-data-usdz-") as name:
         inside = Folder(Path(name))
-        first = _unpacked(folder.read(relative), inside, place)
+        first = _unpack(folder.read(relative), inside, place)
         _check_layers(inside, first)
-        yield StageFile(_composed(inside, first, place), inside, packed=True)
+        yield StageFile(_open_composed(inside, first, place), inside, packed=True)
 
 
-def _composed(folder: Folder, relative: str, place: str) -> OpenStage:
+def _open_composed(folder: Folder, relative: str, place: str) -> OpenStage:
     stage = OpenStage(folder.path(relative), place)
     root = folder.root.resolve()
     if not all(Path(layer).resolve().is_relative_to(root) for layer in stage.layers()):
@@ -167,7 +169,7 @@ def _composed(folder: Folder, relative: str, place: str) -> OpenStage:
 
 
 def _check_layers(folder: Folder, relative: str) -> None:
-    """Refuse layers outside the folder, and missing ones, before anything opens them."""
+    """Raise AssetError for layers that are missing or outside, before USD opens any of them."""
     pending, seen = [relative], set()
     while pending:
         name = pending.pop()
@@ -176,17 +178,17 @@ def _check_layers(folder: Folder, relative: str) -> None:
         seen.add(name)
         folder.read(name)
         for reference in layer_references(folder.path(name)):
-            # ``room.usdz[lamp.usda]`` is a layer within an archive.
+            # ``room.usdz[lamp.usda]`` refers to a layer inside an archive.
             file = reference.partition("[")[0]
             if PurePosixPath(file).suffix.lower() in (*SUFFIXES, ARCHIVE):
                 pending.append(folder.refer(name, file))
 
 
-def _unpacked(data: bytes, target: Folder, place: str) -> str:
-    """Write the files of an archive to a folder; name of the first, which is the root layer.
+def _unpack(data: bytes, target: Folder, place: str) -> str:
+    """Unpack an archive to a folder; return the name of its first file, the root layer.
 
-    An archive's files are stored as they are ("usdz File Format Specification"): it cannot unpack
-    to more than it is.
+    The files must be stored uncompressed ("usdz File Format Specification"), so the unpacked size
+    cannot exceed the archive's.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
