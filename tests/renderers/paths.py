@@ -41,13 +41,13 @@ def replicates_of(
     max_bounces: int = 16,
 ) -> np.ndarray:
     """Independent images of as many seeds, [count, h, w, 3]: their spread is the true error."""
-    stock = DeviceCache(library, open_device("cpu"))
-    tracer = PathTracer(stock, settings_of(samples, max_bounces))
-    view = pack_view(camera, stock)
+    cache = DeviceCache(library, open_device("cpu"))
+    tracer = PathTracer(cache, settings_of(samples, max_bounces))
+    view = pack_view(camera, cache)
     shape = (view.height, view.width, 3)
     images = []
     for seed in range(count):
-        world = pack_world(scene, camera, stock)
+        world = pack_world(scene, camera, cache)
         traced = tracer.radiance(scene, camera, world, view, seed=seed, lights=lights)
         images.append(traced.numpy().reshape(shape).astype(np.float64))
     return np.stack(images)

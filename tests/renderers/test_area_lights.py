@@ -103,7 +103,7 @@ def _at_points(  # noqa: ANN202, PLR0917
     s = make_brdf(table, wp.vec3(1.0, 1.0, 1.0), roughness, 1.0, 0.5, n_v)
     alpha = s.roughness * s.roughness
     ray = n[i] * (2.0 * n_v) - v[i]
-    way = analytic_lights.towards_mirror(lamps[0], beam, p[i], ray, alpha)
+    way = analytic_lights.representative_direction(lamps[0], beam, p[i], ray, alpha)
     n_l = wp.max(wp.dot(n[i], way), 1.0e-3)
     wider = analytic_lights.lobe_widening(lamps[0], beam, alpha)
     if share > 0.0:

@@ -43,9 +43,9 @@ def ring_of_boxes() -> Scene:
 def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
     """Vertices are projected by Intrinsics; most bodies are left out all the same."""
     scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
-    stock = DeviceCache(FakeLibrary(MESHES), open_device("cpu"))
+    cache = DeviceCache(FakeLibrary(MESHES), open_device("cpu"))
     kept = set(
-        bodies_within(pack_world(scene, camera, stock).placed, pack_view(camera, stock), margin)
+        bodies_within(pack_world(scene, camera, cache).placed, pack_view(camera, cache), margin)
     )
     size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
     needed = set()
@@ -75,12 +75,12 @@ def test_whatever_is_drawn_was_projected() -> None:
     """The narrow test alone keeps bodies that the wide one refuses: those must not be drawn."""
     meshes = {"slab": box_mesh((8.0, 0.4, 1.0))}
     scene = slabs_all_around()
-    stock = DeviceCache(FakeLibrary(meshes), open_device("cpu"))
+    cache = DeviceCache(FakeLibrary(meshes), open_device("cpu"))
     apart = 0
     for target in ((1.0, 0.2, 0.1), (-1.0, 0.4, -0.3), (0.2, 1.0, 0.5)):
         camera = camera_at((0.0, 0.0, 0.0), target)
-        world, view = pack_world(scene, camera, stock), pack_view(camera, stock)
-        projected = project_vertices(world, view, stock)
+        world, view = pack_world(scene, camera, cache), pack_view(camera, cache)
+        projected = project_vertices(world, view, cache)
         narrow = bodies_within(world.placed, view, 0.0)
         apart += len(np.setdiff1d(narrow, projected.reached))
         assert np.isin(projected.in_view, projected.reached).all()

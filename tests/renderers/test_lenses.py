@@ -137,9 +137,9 @@ def test_a_lens_without_coefficients_is_a_pinhole() -> None:
 
 def test_a_pinhole_has_no_table_of_directions() -> None:
     """It costs what it did."""
-    stock = DeviceCache(LIBRARY, open_device("cpu"))
+    cache = DeviceCache(LIBRARY, open_device("cpu"))
 
-    view = pack_view(ahead(Intrinsics(8, 6, 5.0, 5.0, 4.0, 3.0)), stock)
+    view = pack_view(ahead(Intrinsics(8, 6, 5.0, 5.0, 4.0, 3.0)), cache)
 
     assert view.lens == 0
     assert not view.directions
@@ -423,7 +423,7 @@ def look_up(view: View, points: wp.array(dtype=wp.vec3), pixels: wp.array(dtype=
 )
 def test_reflections_look_points_up_where_they_are_seen(k: Intrinsics) -> None:
     """The kernels' projection is that of Intrinsics; none outside the image or the field."""
-    stock = DeviceCache(LIBRARY, open_device("cpu"))
+    cache = DeviceCache(LIBRARY, open_device("cpu"))
     points = np.random.default_rng(2).normal(size=(4000, 3))
     places = k.project(points)
     inside = ((places >= 0.0) & (places < (k.width_px, k.height_px))).all(axis=1)
@@ -433,7 +433,7 @@ def test_reflections_look_points_up_where_they_are_seen(k: Intrinsics) -> None:
     near = inside & (np.abs(places - np.round(places)).min(axis=1) < 1e-2)
 
     pixels = wp.zeros(4000, dtype=int, device="cpu")
-    inputs = [pack_view(ahead(k), stock), wp.array(points, dtype=wp.vec3, device="cpu")]
+    inputs = [pack_view(ahead(k), cache), wp.array(points, dtype=wp.vec3, device="cpu")]
     wp.launch(look_up, 4000, inputs, [pixels], device="cpu")
 
     found = pixels.numpy()

@@ -11,7 +11,7 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.realtime.light_visibility import pixel_parts
+from gen_data.generator.renderers.warp.realtime.light_visibility import pixel_samples
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
@@ -69,7 +69,7 @@ def test_anti_aliasing_does_not_touch_labels() -> None:
 @pytest.mark.parametrize("n", [2, 4, 8])
 def test_parts_of_a_pixel_share_no_row_and_no_column(n: int) -> None:
     """So that nearly upright and nearly level edges get n + 1 shades."""
-    parts = pixel_parts(n)
+    parts = pixel_samples(n)
 
     for axis in range(2):
         assert sorted(parts[:, axis]) == [(k + 0.5) / n for k in range(n)]

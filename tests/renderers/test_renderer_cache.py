@@ -82,12 +82,12 @@ def test_another_scene_is_packed_anew() -> None:
 
 def test_textures_of_several_bodies_find_their_places() -> None:
     """Materials with and without textures, in any order of bodies."""
-    stock = DeviceCache(LIBRARY, open_device("cpu"))
+    cache = DeviceCache(LIBRARY, open_device("cpu"))
     plain, brick, wood = (Material(texture=name) for name in ("", "brick", "ash"))
     looks = ((plain,), (brick,), (wood,), (plain,), (brick,))
     bodies = tuple(Body(f"{k}", "box", materials=look) for k, look in enumerate(looks))
 
-    record = pack_world(Scene("t", bodies), EYES[0], stock).record
+    record = pack_world(Scene("t", bodies), EYES[0], cache).record
 
     assert record.surfaces.numpy()["texture"].tolist() == [-1, 1, 0, -1, 1]
     assert len(record.textures.numpy()) == 2

@@ -129,7 +129,7 @@ def test_slices_of_time_hold_every_row_once_around_its_instant(
     for part in slices:
         rows = slice(part.band.first, part.band.end)
         shares[rows] += part.weights
-        instants[rows] += part.weights * (part.band.moment.scene.time_s - scene.time_s)
+        instants[rows] += part.weights * (part.band.state.scene.time_s - scene.time_s)
 
     np.testing.assert_allclose(shares, 1.0, atol=1e-5)
     delays = scene.cameras[0].shutter.row_delays_s(12)
@@ -140,16 +140,16 @@ def test_slices_of_time_hold_every_row_once_around_its_instant(
 def test_rows_in_which_nothing_moves_are_rendered_once(readout_s: float) -> None:
     """In the slice nearest to their instant; others in every slice of their exposure."""
     scene = world(shutter=Shutter(0.01, readout_s, samples=4))
-    moment = CameraState.of(scene, scene.cameras[0])
+    state = CameraState.of(scene, scene.cameras[0])
     blurred = np.arange(LENS.height_px) >= 40
-    slices = split_slices(moment, 4, blurred)
+    slices = split_slices(state, 4, blurred)
     shares, times = np.zeros(LENS.height_px), np.zeros(LENS.height_px, int)
     delays = scene.cameras[0].shutter.row_delays_s(LENS.height_px)
     for part in slices:
         rows = slice(part.band.first, part.band.end)
         shares[rows] += part.weights
         times[rows] += part.weights > 0.0
-        offset_s = part.band.moment.scene.time_s - scene.time_s
+        offset_s = part.band.state.scene.time_s - scene.time_s
         once = np.flatnonzero(part.weights == 1.0) + part.band.first
         assert (np.abs(offset_s - delays[once]) <= 0.5 * 0.0025 + 1e-9).all()
 
@@ -222,16 +222,16 @@ def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, len
         wall, replace(LAMP, scale=0.7), shutter=Shutter(0.0, 0.05), time_s=0.0,
         lens=replace(LENS, lens=lens),
     )  # fmt: skip
-    studio = renderer._studio
-    near = render_view(CameraState.of(scene, scene.cameras[0]), studio)
-    whole_bands = make_bands(near.moment, [0])
-    rows = make_bands(near.moment, list(range(0, LENS.height_px, 5)))
+    context = renderer._context
+    near = render_view(CameraState.of(scene, scene.cameras[0]), context)
+    whole_bands = make_bands(near.state, [0])
+    rows = make_bands(near.state, list(range(0, LENS.height_px, 5)))
 
     def light(see):  # noqa: ANN001, ANN202
-        return integrate_light(see, studio)
+        return integrate_light(see, context)
 
-    one, images = render_bands(whole_bands, LABELS, studio, near, light)
-    other, banded = render_bands(rows, LABELS, studio, near, light)
+    one, images = render_bands(whole_bands, LABELS, context, near, light)
+    other, banded = render_bands(rows, LABELS, context, near, light)
     for channel in LABELS:
         assert np.array_equal(images[channel], banded[channel]), channel
     assert np.array_equal(one.hits, other.hits)

@@ -303,8 +303,8 @@ def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:
         for k in range(40)
     )
     scene = street(Weather(), DARK, *lamps, SUN)
-    stock = DeviceCache(library, open_device("cpu"))
-    records = pack_world(scene, AHEAD, stock).record.lamps.numpy()
+    cache = DeviceCache(library, open_device("cpu"))
+    records = pack_world(scene, AHEAD, cache).record.lamps.numpy()
     ground = np.stack([np.linspace(1.0, 20.0, 60), np.zeros(60), np.zeros(60)], axis=-1)
     up = np.tile([0.0, 0.0, 1.0], (60, 1))
 

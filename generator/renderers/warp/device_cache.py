@@ -52,7 +52,7 @@ class DeviceCache:
         self.device = device
         self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
         self.scenes: ObjectCache[Any] = ObjectCache(1)
-        self.looks: ObjectCache[Any] = ObjectCache(_BODIES)
+        self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
         self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
         self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
         self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)

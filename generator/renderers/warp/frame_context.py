@@ -30,7 +30,7 @@ class RenderContext:
         paths: What makes the light of the path-traced tier; None in the realtime tier.
     """
 
-    stock: DeviceCache
+    cache: DeviceCache
     settings: RenderSettings
     paths: PathTracer | None = None
 
@@ -59,57 +59,57 @@ class RowBand:
 
     first: int
     end: int
-    moment: CameraState
+    state: CameraState
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CameraView:
     """What a camera, or a band of its rows, sees; ``seen`` is valid until the next one is drawn."""
 
-    moment: CameraState
+    state: CameraState
     world: PackedWorld
     view: records.View
-    seen: GBuffer
+    gbuffer: GBuffer
 
 
-def is_moving(moment: CameraState, open_s: float) -> bool:
+def is_moving(state: CameraState, open_s: float) -> bool:
     """Whether anything differs between the ends of a span of time around a moment."""
-    scene = moment.scene
+    scene = state.scene
     start_s, end_s = scene.time_s - 0.5 * open_s, scene.time_s + 0.5 * open_s
     travelling = any(t.start_s < end_s and t.end_s > start_s for t in scene.tracks)
     return travelling or any(start_s < change.time_s <= end_s for change in scene.changes)
 
 
 def render_view(
-    moment: CameraState,
-    studio: RenderContext,
+    state: CameraState,
+    context: RenderContext,
     rows: tuple[int, int] | None = None,
-    near: CameraView | None = None,
+    reference: CameraView | None = None,
 ) -> CameraView:
     """The surfaces at all pixel centres, or at those of some rows.
 
     Args:
-        moment: What, and from where.
-        studio: Assets and settings.
+        state: What, and from where.
+        context: Assets and settings.
         rows: The first, and the one after the last; None = all.
-        near: The same world at another instant: what is the same need not be packed again.
+        reference: The same world at another instant: what is the same need not be packed again.
     """
-    world = pack_moment(moment, studio, near)
-    view = pack_view(moment.camera, studio.stock)
+    world = pack_state(state, context, reference)
+    view = pack_view(state.camera, context.cache)
     if rows is not None:
         view = crop_rows(view, *rows)
     return CameraView(
-        moment, world, view, find_visible(world, view, studio.stock, studio.settings.visibility)
+        state, world, view, find_visible(world, view, context.cache, context.settings.visibility)
     )
 
 
-def pack_moment(
-    moment: CameraState, studio: RenderContext, near: CameraView | None = None
+def pack_state(
+    state: CameraState, context: RenderContext, reference: CameraView | None = None
 ) -> PackedWorld:
     """The world on the device; arguments as of ``render_view``."""
-    if near is not None and _same_looks(near.moment.scene, moment.scene):
-        return repack_moved(near.world, moment.scene, moment.camera, studio.stock)
-    return pack_world(moment.scene, moment.camera, studio.stock)
+    if reference is not None and _same_looks(reference.state.scene, state.scene):
+        return repack_moved(reference.world, state.scene, state.camera, context.cache)
+    return pack_world(state.scene, state.camera, context.cache)
 
 
 def _same_looks(one: Scene, other: Scene) -> bool:

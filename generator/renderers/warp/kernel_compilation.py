@@ -51,7 +51,7 @@ def compile_kernels(device: str) -> None:
         return
     with stamp.with_suffix(".lock").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not stamp.exists() and _compiled(device, cores):
+        if not stamp.exists() and _compile_in_parallel(device, cores):
             stamp.touch()
 
 
@@ -66,7 +66,7 @@ def load_kernels(device_name: str, names: Sequence[str]) -> None:
         wp.load_module(module, device=device)
 
 
-def _compiled(device: str, cores: int) -> bool:
+def _compile_in_parallel(device: str, cores: int) -> bool:
     """Deal the modules out to as many processes as there are cores; whether all succeeded."""
     shares = [EVERY_FRAME[k::cores] for k in range(min(cores, len(EVERY_FRAME)))]
     here = [sys.executable, "-m", __name__, str(os.getpid()), device]

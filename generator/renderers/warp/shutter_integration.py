@@ -29,9 +29,12 @@ from gen_data.generator.renderers.warp.frame_context import (
     is_moving,
     render_view,
 )
-from gen_data.generator.renderers.warp.realtime.realtime_shading import add_falling, radiance_image
+from gen_data.generator.renderers.warp.realtime.realtime_shading import (
+    add_precipitation,
+    radiance_image,
+)
 from gen_data.generator.renderers.warp.scene.light_selection import main_lamp_numbers
-from gen_data.generator.renderers.warp.scene.scene_packing import add_own_record, repack_moved
+from gen_data.generator.renderers.warp.scene.scene_packing import copy_world, repack_moved
 from gen_data.generator.renderers.warp.shading_dispatch import shade_pixels, smooth_edges
 from gen_data.generator.renderers.warp.visibility.amodal_rolling import rolling_silhouettes
 from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
@@ -62,54 +65,61 @@ class Slice:
 
 
 def expose_shutter(
-    scene: Scene, camera: Camera, channels: frozenset[Channel], studio: RenderContext
+    scene: Scene, camera: Camera, channels: frozenset[Channel], context: RenderContext
 ) -> SensorReading | None:
     """The image of a camera whose shutter is open for a while; None if nothing moves meanwhile."""
     open_s = camera.shutter.open_s
     if not open_s > 0.0:
         return None
-    moment = CameraState.of(scene, camera)
-    if not is_moving(moment, open_s):
+    state = CameraState.of(scene, camera)
+    if not is_moving(state, open_s):
         return None
-    near = render_view(moment, studio)
-    pace = plan_sampling(near)
-    bands = split_bands(near, pace)
-    if len(bands) == 1 and pace.samples == 1:
+    reference = render_view(state, context)
+    sampling = plan_sampling(reference)
+    bands = split_bands(reference, sampling)
+    if len(bands) == 1 and sampling.samples == 1:
         return None
-    near = _with_main_lamps(near, studio)
+    reference = _keep_main_lamps(reference, context)
     drawn = channels - FLOW - {Channel.AMODAL}
     if Channel.AMODAL in channels:
         drawn = drawn | {Channel.INSTANCE}
-    shown, images = _images(near, bands, drawn, pace, studio)
+    gbuffer, images = _render_images(reference, bands, drawn, sampling, context)
     outlines: dict[int, Silhouette] = {}
     if Channel.AMODAL in channels:
-        outlines = rolling_silhouettes(bands, images[Channel.INSTANCE], studio, near)
-    images |= flow_images(near, shown, channels, studio)
+        outlines = rolling_silhouettes(bands, images[Channel.INSTANCE], context, reference)
+    images |= flow_images(reference, gbuffer, channels, context)
     return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
 
-def _images(
-    near: CameraView,
+def _render_images(
+    reference: CameraView,
     bands: Sequence[RowBand],
     channels: frozenset[Channel],
-    pace: ShutterSampling,
-    studio: RenderContext,
+    sampling: ShutterSampling,
+    context: RenderContext,
 ) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
     """What pixels show, labels of it and, if asked for, radiance."""
     labels = channels - {Channel.RADIANCE}
     if Channel.RADIANCE not in channels:
-        return render_bands(bands, labels, studio, near)
-    light = partial(integrate_light, studio=studio)
-    if pace.samples > 1:
-        shown, images = render_bands(bands, labels, studio, near)
-        mean = _averaged(split_slices(near.moment, pace.samples, pace.blurred), light, near, studio)
+        return render_bands(bands, labels, context, reference)
+    light = partial(integrate_light, context=context)
+    if sampling.samples > 1:
+        gbuffer, images = render_bands(bands, labels, context, reference)
+        mean = _average_slices(
+            split_slices(reference.state, sampling.samples, sampling.blurred),
+            light,
+            reference,
+            context,
+        )
     else:
-        shown, images = render_bands(bands, labels, studio, near, light)
+        gbuffer, images = render_bands(bands, labels, context, reference, light)
         mean = images[Channel.RADIANCE]
-    radiance = _on_device(mean, wp.vec3, studio)
-    depths = _on_device(shown.z_m, float, studio)
-    add_falling(near.world, near.moment.camera, near.view, depths, radiance, studio.stock)
-    return shown, images | {Channel.RADIANCE: radiance_image(radiance, near.view)}
+    radiance = _to_device(mean, wp.vec3, context)
+    depths = _to_device(gbuffer.z_m, float, context)
+    add_precipitation(
+        reference.world, reference.state.camera, reference.view, depths, radiance, context.cache
+    )
+    return gbuffer, images | {Channel.RADIANCE: radiance_image(radiance, reference.view)}
 
 
 def split_slices(
@@ -147,44 +157,46 @@ def split_slices(
     return slices
 
 
-def _averaged(
-    slices: Sequence[Slice], light: RadianceFunction, near: CameraView, studio: RenderContext
+def _average_slices(
+    slices: Sequence[Slice], light: RadianceFunction, reference: CameraView, context: RenderContext
 ) -> Float32:
     """Means over slices of what comes from every pixel [cd/m^2], float32 [h, w, 3]."""
-    lens = near.moment.camera.intrinsics
+    lens = reference.state.camera.intrinsics
     mean = np.zeros((lens.height_px, lens.width_px, 3), np.float32)
     for part in slices:
         band = part.band
         first, end = add_margin(band, lens.height_px)
-        see = near = render_view(band.moment, studio, (first, end), near)
-        own = light(see)[band.first - first : band.end - first]
+        rendered = reference = render_view(band.state, context, (first, end), reference)
+        own = light(rendered)[band.first - first : band.end - first]
         mean[band.first : band.end] += part.weights[:, None, None] * own
     return mean
 
 
-def integrate_light(see: CameraView, studio: RenderContext) -> Float32:
+def integrate_light(rendered: CameraView, context: RenderContext) -> Float32:
     """What comes from every pixel, anti-aliased; valid until the next call."""
     # What light does to the world's record is of no concern to those who start from it.
-    see = replace(see, world=add_own_record(see.world))
-    scene, camera = see.moment.scene, see.moment.camera
-    radiance = shade_pixels(scene, camera, see.world, see.view, see.seen, studio)
-    smooth_edges(see.world, see.view, see.seen, radiance, studio)
-    image: Float32 = radiance.numpy().reshape(see.view.height, see.view.width, 3)
+    rendered = replace(rendered, world=copy_world(rendered.world))
+    scene, camera = rendered.state.scene, rendered.state.camera
+    radiance = shade_pixels(scene, camera, rendered.world, rendered.view, rendered.gbuffer, context)
+    smooth_edges(rendered.world, rendered.view, rendered.gbuffer, radiance, context)
+    image: Float32 = radiance.numpy().reshape(rendered.view.height, rendered.view.width, 3)
     return image
 
 
-def _with_main_lamps(near: CameraView, studio: RenderContext) -> CameraView:
+def _keep_main_lamps(reference: CameraView, context: RenderContext) -> CameraView:
     """Only those lamps that matter in the middle of the exposure light the whole of it."""
-    chosen = main_lamp_numbers(near.world, near.view, near.seen, studio.settings.max_lamps)
+    chosen = main_lamp_numbers(
+        reference.world, reference.view, reference.gbuffer, context.settings.max_lamps
+    )
     if chosen is None:
-        return near
-    scene, camera = near.moment.scene, near.moment.camera
+        return reference
+    scene, camera = reference.state.scene, reference.state.camera
     scene = replace(scene, lights=tuple(scene.lights[k] for k in chosen))
-    world = repack_moved(near.world, scene, camera, studio.stock)
-    return replace(near, moment=CameraState(scene, camera), world=world)
+    world = repack_moved(reference.world, scene, camera, context.cache)
+    return replace(reference, state=CameraState(scene, camera), world=world)
 
 
-def _on_device(image: Float32, dtype: Any, studio: RenderContext) -> wp.array:
+def _to_device(image: Float32, dtype: Any, context: RenderContext) -> wp.array:
     """An image as kernels have it, flat."""
     flat = image.reshape(-1, *image.shape[2:])
-    return wp.array(flat, dtype=dtype, device=studio.stock.device)
+    return wp.array(flat, dtype=dtype, device=context.cache.device)

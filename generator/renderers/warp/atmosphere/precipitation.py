@@ -105,7 +105,7 @@ def draw_precipitation(
     view: records.View,
     z_m: wp.array,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> bool:
     """Draw what falls over the image, in place; whether anything falls."""
     weather = world.weather
@@ -126,14 +126,14 @@ def draw_precipitation(
     if not len(values):
         return False
     values = values[np.argsort(-values["z_m"], kind="stable")]
-    first, listed = _rows(values, view.height)
-    streaks = wp.array(values, dtype=precipitation.Streak, device=stock.device)
+    first, listed = _streaks_by_row(values, view.height)
+    streaks = wp.array(values, dtype=precipitation.Streak, device=cache.device)
     wp.launch(
-        precipitation.light_streaks, len(values), [view, world.record, streaks], device=stock.device
+        precipitation.light_streaks, len(values), [view, world.record, streaks], device=cache.device
     )
-    lists = [wp.array(a, dtype=wp.int32, device=stock.device) for a in (first, listed)]
+    lists = [wp.array(a, dtype=wp.int32, device=cache.device) for a in (first, listed)]
     inputs = [view.width, z_m, streaks, *lists]
-    wp.launch(precipitation.draw_streaks, view.height, inputs, [radiance], device=stock.device)
+    wp.launch(precipitation.draw_streaks, view.height, inputs, [radiance], device=cache.device)
     return True
 
 
@@ -169,11 +169,11 @@ def make_streaks(
     values["z_m"] = z
     R_world_camera = R_camera_world.T
     values["p_m"] = np.einsum("ij,nj->ni", R_world_camera, p, optimize=False) + T.translation_m
-    _spread_out(values, diameter_m, z, k.fx_px)
+    _fill_shape(values, diameter_m, z, k.fx_px)
     return values
 
 
-def _spread_out(
+def _fill_shape(
     values: NDArray[np.void], diameter_m: Array, depth_m: Array, px_per_rad: Array | float
 ) -> None:
     """Fill in how wide and how opaque traces are, in place."""
@@ -220,7 +220,7 @@ def trace_through_lens(
     values["z_m"] = range_m[kept]
     there = np.einsum("ij,nj->ni", R_camera_world.T, p[kept], optimize=False)
     values["p_m"] = there + T.translation_m
-    _spread_out(values, diameter_m[kept], range_m[kept], _px_per_rad(k, middle[kept]))
+    _fill_shape(values, diameter_m[kept], range_m[kept], _px_per_rad(k, middle[kept]))
     return values
 
 
@@ -271,7 +271,9 @@ def _velocity(name: str, diameter_m: Array, u: Array, seed: int) -> Array:
     return np.stack([drift * np.cos(angle), drift * np.sin(angle), -fall], axis=-1)
 
 
-def _rows(values: NDArray[np.void], height: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _streaks_by_row(
+    values: NDArray[np.void], height: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """The streaks that touch each row, in the order given: starts [height + 1] and numbers."""
     ys = np.stack([values["start_px"][:, 1], values["end_px"][:, 1]])
     margin = values["radius_px"] + 0.5

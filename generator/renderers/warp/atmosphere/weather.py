@@ -23,18 +23,18 @@ from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 _PATCH_DEVIATION = 0.513
 
 
-def expose_ground(world: PackedWorld, lattice: Lattice, stock: DeviceCache) -> None:
+def expose_ground(world: PackedWorld, lattice: Lattice, cache: DeviceCache) -> None:
     """Prepare the world's surfaces for being wet or under snow."""
     weather = world.weather
     if not weather.wetness + weather.puddles + weather.snow_cover:
         return
     points = lattice.width * lattice.height
-    probed = stock.scratch("probed shelter", points, float)
-    exposed = stock.scratch("exposed", points, float)
+    probed = cache.scratch("probed shelter", points, float)
+    exposed = cache.scratch("exposed", points, float)
     inputs = [world.record, lattice]
-    wp.launch(water_reflections.find_shelter, points, inputs, [probed], device=stock.device)
+    wp.launch(water_reflections.probe_exposure, points, inputs, [probed], device=cache.device)
     inputs = [lattice, probed]
-    wp.launch(water_reflections.average_shelter, points, inputs, [exposed], device=stock.device)
+    wp.launch(water_reflections.average_exposure, points, inputs, [exposed], device=cache.device)
     world.record.ground = ground_record(weather, exposed)
 
 
@@ -62,12 +62,12 @@ def fill_air(
     images: lattice_lighting.GBufferRecord,
     lattice: Lattice,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> None:
     """Reflections in water, then fog; in place."""
     if world.weather.wetness + world.weather.puddles > 0.0:
-        _mirror(world, view, images, lattice, radiance, stock)
-    fill_fog(world, view, images, radiance, stock)
+        _add_reflections(world, view, images, lattice, radiance, cache)
+    fill_fog(world, view, images, radiance, cache)
 
 
 def fill_fog(
@@ -75,52 +75,52 @@ def fill_fog(
     view: records.View,
     images: lattice_lighting.GBufferRecord,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> None:
     """Dim what is seen by the fog before it, and add the fog's own light, in place."""
     if world.weather.fog_extinction_per_m > 0.0:
         frame = [view, world.record, images, fog_record(world.weather)]
-        columns, glow = _glow(world, view, frame, stock)
+        columns, glow = _lamp_glow(world, view, frame, cache)
         inputs, n = [*frame, columns, glow], view.width * view.height
-        wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=stock.device)
+        wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=cache.device)
 
 
-def _mirror(
+def _add_reflections(
     world: PackedWorld,
     view: records.View,
     images: lattice_lighting.GBufferRecord,
     lattice: Lattice,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> None:
     """Lay what water on the ground mirrors over the image, in place."""
-    device, n = stock.device, view.width * view.height
+    device, n = cache.device, view.width * view.height
     points = lattice.width * lattice.height
-    share = stock.scratch("water", points, wp.vec2)
-    films, rows = (stock.scratch(name, points, wp.vec4) for name in ("films", "film rows"))
+    share = cache.scratch("water", points, wp.vec2)
+    films, rows = (cache.scratch(name, points, wp.vec4) for name in ("films", "film rows"))
     frame = [view, world.record, images, lattice, radiance]
     wp.launch(water_reflections.mirror_in_films, points, frame, [share, films], device=device)
     for step, source, spread in ((1, films, rows), (lattice.width, rows, films)):
         inputs = [images, lattice, share, source, step]
         wp.launch(water_reflections.blur_films, points, inputs, [spread], device=device)
-    laid = stock.scratch("laid", n, wp.vec4)
+    laid = cache.scratch("laid", n, wp.vec4)
     ripples = min(0.004 * world.weather.rain_mm_h, 0.05)
     inputs = [*frame, ripples, share, films]
     wp.launch(water_reflections.mirror_in_puddles, n, inputs, [laid], device=device)
     wp.launch(water_reflections.lay_water, n, [laid], [radiance], device=device)
 
 
-def _glow(
-    world: PackedWorld, view: records.View, frame: list[Any], stock: DeviceCache
+def _lamp_glow(
+    world: PackedWorld, view: records.View, frame: list[Any], cache: DeviceCache
 ) -> tuple[int, wp.array]:
     """Glow of lamps in fog at a lattice of points, and its columns; 0 where no lamp shines."""
     stride = int(kernels.GLOW_STRIDE)
     columns, rows = (-(-(size - 1) // stride) + 2 for size in (view.width, view.height))
-    glow = stock.scratch("glow", columns * rows, wp.vec3)
+    glow = cache.scratch("glow", columns * rows, wp.vec3)
     if not (world.record.lamps.numpy()["kind"] != LIGHT_KINDS.index("sun")).any():
         return 0, glow
     inputs = [*frame, columns]
-    wp.launch(kernels.glow_at_points, columns * rows, inputs, [glow], device=stock.device)
+    wp.launch(kernels.glow_at_points, columns * rows, inputs, [glow], device=cache.device)
     return columns, glow
 
 

@@ -77,21 +77,21 @@ ALPHA_MIN = 0.03
 """Narrower lobes than this are wider than the material says: no glass is flat to a milliradian."""
 
 
-def infrared_surfaces(looks: Sequence[BodyMaterials], stock: DeviceCache) -> NDArray[np.void]:
+def infrared_surfaces(looks: Sequence[BodyMaterials], cache: DeviceCache) -> NDArray[np.void]:
     """Infrared records of the materials of all bodies, in their order; at least one."""
 
     def records(look: BodyMaterials) -> NDArray[np.void]:
-        return stock.infrared.get(look.materials, lambda: _infrared(look.materials, stock))
+        return cache.infrared.get(look.materials, lambda: _pack_infrared(look.materials, cache))
 
     return stack_records([records(look) for look in looks], Infrared)
 
 
-def _infrared(materials: Sequence[Material], stock: DeviceCache) -> NDArray[np.void]:
+def _pack_infrared(materials: Sequence[Material], cache: DeviceCache) -> NDArray[np.void]:
     values: NDArray[Any] = np.zeros(len(materials), dtype=struct_dtype(Infrared))
     for k, material in enumerate(materials):
         color = np.asarray(material.base_color, dtype=np.float64)
         if material.texture:
-            color = color * mean_albedo(stock, material.texture)
+            color = color * mean_albedo(cache, material.texture)
         values[k] = infrared_fields(material, color)
     return values
 
@@ -131,8 +131,8 @@ def oren_nayar(slope_rad: float) -> tuple[float, float]:
     return 1.0 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09)
 
 
-def mean_albedo(stock: DeviceCache, texture_id: str) -> Array:
+def mean_albedo(cache: DeviceCache, texture_id: str) -> Array:
     """Mean linear colour of a texture: its coarsest level, a single texel."""
-    texels = stock.texture(texture_id).texels.numpy()
+    texels = cache.texture(texture_id).texels.numpy()
     roots = texels[-1:].view(np.uint8)[:3] / 255.0
     return np.asarray(roots * roots, dtype=np.float64)

@@ -74,7 +74,7 @@ def trace_secondary(
     order: NDArray[np.int32] | None,
     infrared: NDArray[np.void],
     labels: HitLabels,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> SecondaryHits | None:
     """What rays meet besides their first hits; None = nothing.
 
@@ -84,7 +84,7 @@ def trace_secondary(
         order: Of the beams.
         infrared: Records of the materials.
         labels: Of the scene.
-        stock: Of the renderer.
+        cache: Of the renderer.
     """
     material = first.hits[:, 1]
     clear = np.append(infrared["clear"] > 0.0, False)[material]
@@ -92,22 +92,22 @@ def trace_secondary(
     if first.puddles is not None:
         mirror = mirror | (first.puddles > PUDDLE_MIN)
     found = []
-    panes, mirrors = (_picked(which, order) for which in (clear, mirror))
+    panes, mirrors = (_select_rays(which, order) for which in (clear, mirror))
     if len(panes):
-        given = [wp.array(panes, dtype=int, device=stock.device), first.ranges_m]
-        found.append(_launched(kernels.look_through, [*inputs, *given], panes, labels, stock))
+        given = [wp.array(panes, dtype=int, device=cache.device), first.ranges_m]
+        found.append(_launch(kernels.trace_behind_panes, [*inputs, *given], panes, labels, cache))
     if len(mirrors):
         water = np.zeros(len(mirrors), np.float32)
         if first.puddles is not None:
             water = np.where(first.puddles[mirrors] > PUDDLE_MIN, first.puddles[mirrors], 0.0)
         given = [
-            wp.array(mirrors, dtype=int, device=stock.device),
+            wp.array(mirrors, dtype=int, device=cache.device),
             first.ranges_m,
             first.on_device,
             first.normals,
-            wp.array(water, dtype=float, device=stock.device),
+            wp.array(water, dtype=float, device=cache.device),
         ]
-        seen = _launched(kernels.look_in_mirrors, [*inputs, *given], mirrors, labels, stock)
+        seen = _launch(kernels.trace_mirrors, [*inputs, *given], mirrors, labels, cache)
         seen[3][:], seen[4][:], seen[5][:] = 0, 0, SURFACES.index("mirrored")
         found.append(seen)
     if not found:
@@ -115,7 +115,7 @@ def trace_secondary(
     return SecondaryHits(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
-def _picked(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
+def _select_rays(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
     """Numbers of the rays that are marked, those of neighbouring beams after each other."""
     if order is None or not which.any():
         return np.flatnonzero(which).astype(np.int32)
@@ -124,20 +124,20 @@ def _picked(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArra
     return rays[which[rays]].astype(np.int32, copy=False)
 
 
-def _launched(
+def _launch(
     kernel: wp.Kernel,
     inputs: Sequence[Any],
-    picked: NDArray[np.int32],
+    selected: NDArray[np.int32],
     labels: HitLabels,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> list[NDArray[Any]]:
     """The fields of SecondaryHits of picked rays that meet something."""
-    count = len(picked)
-    ranges_m, reflectances = (wp.zeros(count, dtype=float, device=stock.device) for _ in range(2))
-    hits_ = wp.zeros(count, dtype=wp.vec2i, device=stock.device)
+    count = len(selected)
+    ranges_m, reflectances = (wp.zeros(count, dtype=float, device=cache.device) for _ in range(2))
+    hits_ = wp.zeros(count, dtype=wp.vec2i, device=cache.device)
     outputs = [ranges_m, reflectances, hits_]
-    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=stock.device)
+    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=cache.device)
     hits = hits_.numpy()
     there = hits[:, 0] >= 0
     seen = (ranges_m.numpy()[there], reflectances.numpy()[there])
-    return [picked[there].astype(np.int64), *seen, *labels.at(hits[there])]
+    return [selected[there].astype(np.int64), *seen, *labels.at(hits[there])]

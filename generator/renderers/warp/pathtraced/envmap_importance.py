@@ -41,7 +41,7 @@ def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]
     part = float(taken.sum()) / max(float((light * areas).sum()), 1e-300)
     # Below what rounding leaves of an even sky.
     part = part if part > 1e-6 else 0.0
-    return part, _cumulated(taken.sum(axis=1)), _cumulated(taken)
+    return part, _cumulate(taken.sum(axis=1)), _cumulate(taken)
 
 
 def _mean_of_texels(values: Array) -> Array:
@@ -53,7 +53,7 @@ def _mean_of_texels(values: Array) -> Array:
     return mean
 
 
-def _cumulated(light: Array) -> NDArray[np.float32]:
+def _cumulate(light: Array) -> NDArray[np.float32]:
     """Shares before each edge along the last axis; even where there is no light."""
     total = light.sum(axis=-1, keepdims=True)
     share = np.where(total > 0.0, light / np.maximum(total, 1e-300), 1.0 / light.shape[-1])

@@ -38,13 +38,16 @@ class BodyMaterials:
     roles: NDArray[np.uint8]
 
 
-def body_materials(scene: Scene, stock: DeviceCache) -> list[BodyMaterials]:
+def body_materials(scene: Scene, cache: DeviceCache) -> list[BodyMaterials]:
     """The materials of every body."""
-    own = [body.materials or stock.materials(body.asset) for body in scene.bodies]
-    return [stock.looks.get(materials, partial(_looks, materials)) for materials in own]
+    own = [body.materials or cache.materials(body.asset) for body in scene.bodies]
+    return [
+        cache.material_records.get(materials, partial(_pack_materials, materials))
+        for materials in own
+    ]
 
 
-def _looks(materials: tuple[Material, ...]) -> BodyMaterials:
+def _pack_materials(materials: tuple[Material, ...]) -> BodyMaterials:
     textures = tuple(sorted({m.texture for m in materials if m.texture}))
     values = np.zeros(len(materials), dtype=struct_dtype(MaterialRecord))
     if materials:

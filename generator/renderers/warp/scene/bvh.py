@@ -38,7 +38,7 @@ def face_boxes(vertices_m: Floats, faces: Ints) -> tuple[Floats, Floats]:
 
 def mesh_tree(vertices_m: Floats, faces: Ints, lows_m: Floats, highs_m: Floats) -> Floats:
     """A tree over a mesh's faces, given their boxes; triangles that a leaf lacks are points."""
-    order, nodes, codes, leaves = _grown(lows_m, highs_m, _WIDTH)
+    order, nodes, codes, leaves = _grow(lows_m, highs_m, _WIDTH)
     lanes = leaves[:, :1] + np.arange(_WIDTH, dtype=np.int32)
     lacking = lanes >= leaves[:, 1:]
     numbers = order[np.minimum(lanes, len(order) - 1)]
@@ -50,16 +50,16 @@ def mesh_tree(vertices_m: Floats, faces: Ints, lows_m: Floats, highs_m: Floats) 
         leaf_groups[:, k:9:3] = corners.transpose(0, 2, 1)
     leaf_groups[:, 9] = numbers.view(np.float32)
     first_leaf = 1 + _NODE_GROUPS * len(nodes)
-    return _packed(nodes, codes, first_leaf + _LEAF_GROUPS * np.arange(len(leaves)), leaf_groups)
+    return _pack(nodes, codes, first_leaf + _LEAF_GROUPS * np.arange(len(leaves)), leaf_groups)
 
 
 def body_tree(lows_m: Floats, highs_m: Floats) -> Floats:
     """A tree over bodies' boxes."""
-    order, nodes, codes, leaves = _grown(lows_m, highs_m, 1)
-    return _packed(nodes, codes, 1 + order[leaves[:, 0]], np.zeros((0, 1, _WIDTH), np.float32))
+    order, nodes, codes, leaves = _grow(lows_m, highs_m, 1)
+    return _pack(nodes, codes, 1 + order[leaves[:, 0]], np.zeros((0, 1, _WIDTH), np.float32))
 
 
-def _packed(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
+def _pack(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
     """One array of groups."""
     if len(leaf_places):
         leaf_codes = -leaf_places[np.maximum(-1 - codes, 0)]
@@ -72,7 +72,7 @@ def _packed(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: 
     return np.concatenate(groups).reshape(-1)
 
 
-def _grown(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, Ints]:
+def _grow(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, Ints]:
     """The order of boxes, and the nodes, codes and leaves of ``growing.grow_tree``."""
     n = len(lows)
     order = np.arange(n, dtype=np.int32)
@@ -84,23 +84,23 @@ def _grown(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, 
     if n == 0:
         nodes[:, ::2], nodes[:, 1::2] = bvh_build.NOWHERE, -bvh_build.NOWHERE
         return order, nodes, codes, leaves
-    boxes = _room()
-    boxes.lows, boxes.highs = _here(lows, wp.vec3), _here(highs, wp.vec3)
-    boxes.order = _here(order, wp.int32)
+    boxes = _workspace()
+    boxes.lows, boxes.highs = _wrap(lows, wp.vec3), _wrap(highs, wp.vec3)
+    boxes.order = _wrap(order, wp.int32)
     todo = np.zeros((_WAITING_MAX, 4), np.int32)
-    outputs = [_here(nodes, wp.float32), _here(codes, wp.int32), _here(leaves, wp.vec2i)]
-    outputs.append(_here(counts, wp.int32))
-    wp.launch(bvh_build.grow_tree, 1, [boxes, leaf, _here(todo, wp.vec4i)], outputs, device="cpu")
+    outputs = [_wrap(nodes, wp.float32), _wrap(codes, wp.int32), _wrap(leaves, wp.vec2i)]
+    outputs.append(_wrap(counts, wp.int32))
+    wp.launch(bvh_build.grow_tree, 1, [boxes, leaf, _wrap(todo, wp.vec4i)], outputs, device="cpu")
     return order, nodes[: counts[0]], codes[: counts[0]], leaves[: counts[1]]
 
 
-def _here(values: NDArray[np.generic], dtype: Any) -> wp.array:
+def _wrap(values: NDArray[np.generic], dtype: Any) -> wp.array:
     """An array of the host's, for kernels on the CPU; it must outlive the kernels."""
     shape = values.shape if dtype in (wp.int32, wp.float32) else values.shape[:-1]
     return wp.array(ptr=values.ctypes.data, dtype=dtype, shape=shape, device="cpu")
 
 
-def _room() -> bvh_build.Boxes:
+def _workspace() -> bvh_build.Boxes:
     boxes = bvh_build.Boxes()
     boxes.bin_lows, boxes.bin_highs, boxes.bin_counts, boxes.costs = _bins()
     return boxes

@@ -31,7 +31,7 @@ class DeviceTexture:
         keep: The device arrays that the record points to.
         texels: One of them: packed colours of all levels, the coarsest last.
         layered: Whether it has maps that plain surfaces do not: emission, metal, occlusion.
-        pierced: Whether it has holes.
+        has_cutouts: Whether it has holes.
     """
 
     record: NDArray[np.void]
@@ -39,7 +39,7 @@ class DeviceTexture:
     texels: wp.array
     nbytes: int
     layered: bool
-    pierced: bool
+    has_cutouts: bool
 
 
 def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
@@ -52,10 +52,10 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     record.height, record.width, record.levels = height, width, len(sizes)
     images = [texels, _NO_TEXELS, _NO_TEXELS, _NO_TEXELS]
     if data.normal is not None:
-        record.has_bumps, images[1] = 1, _means(_with_fourth(data.normal, white))
+        record.has_bumps, images[1] = 1, _mean_levels(_append_channel(data.normal, white))
     if data.metallic is not None or data.occlusion is not None:
         shares = [white if share is None else share for share in (data.metallic, data.occlusion)]
-        record.has_shares, images[2] = 1, _means(cv2.merge([*shares, white, white]))
+        record.has_shares, images[2] = 1, _mean_levels(cv2.merge([*shares, white, white]))
     if data.emission is not None:
         record.has_glow, images[3] = 1, _texels(data.emission, white)[1]
     cover = white[:1, 0] if data.alpha is None else data.alpha.reshape(-1)
@@ -70,7 +70,7 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
         on_device[0],
         sum(values.nbytes for values in images) + cover.nbytes,
         layered=bool(record.has_shares or record.has_glow),
-        pierced=bool(record.has_cover),
+        has_cutouts=bool(record.has_cover),
     )
 
 
@@ -84,7 +84,7 @@ def remove_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
         alpha: Coverage; below 128 there is a hole, [height, width].
     """
     solid = (alpha >= 128).astype(np.float32)[..., None]
-    levels = _halvings(np.concatenate([albedo * solid, solid], axis=2))
+    levels = _mip_levels(np.concatenate([albedo * solid, solid], axis=2))
     filled = levels[-1][..., :3] / np.maximum(levels[-1][..., 3:], 1e-6)
     for level in levels[-2::-1]:
         height, width = level.shape[:2]
@@ -112,32 +112,32 @@ def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint
     the eye as sRGB does and are quick to undo. Roughness is the fourth channel: its square, the
     width of a highlight, is what coarser levels average.
     """
-    finest = _with_fourth(cv2.LUT(albedo, _root_of()), roughness)
+    finest = _append_channel(cv2.LUT(albedo, _sqrt_table()), roughness)
     levels = [finest]
     if max(finest.shape[:2]) > 1:
         squared = finest.astype(np.uint16)
         squared *= squared
         image = halve_image(squared).astype(np.float32) * np.float32(255.0**-2)
-        levels += [_in_bytes(cv2.sqrt(level)) for level in _halvings(image)]
-    return [level.shape[0] * level.shape[1] for level in levels], _packed(levels)
+        levels += [_to_bytes(cv2.sqrt(level)) for level in _mip_levels(image)]
+    return [level.shape[0] * level.shape[1] for level in levels], _pack(levels)
 
 
 @cache
-def _root_of() -> UInt8:
+def _sqrt_table() -> UInt8:
     """Square roots of linear values by sRGB values."""
     return np.floor(np.sqrt(srgb_decode(np.arange(256) / 255.0)) * 255.0 + 0.5).astype(np.uint8)
 
 
-def _means(finest: Pixels) -> NDArray[np.uint32]:
+def _mean_levels(finest: Pixels) -> NDArray[np.uint32]:
     """Four channels of all mip levels, packed one after the other."""
     levels = [finest]
     if max(finest.shape[:2]) > 1:
         image = halve_image(finest).astype(np.float32) * np.float32(1.0 / 255.0)
-        levels += [_in_bytes(level) for level in _halvings(image)]
-    return _packed(levels)
+        levels += [_to_bytes(level) for level in _mip_levels(image)]
+    return _pack(levels)
 
 
-def _halvings(image: Pixels) -> list[Pixels]:
+def _mip_levels(image: Pixels) -> list[Pixels]:
     """An image, and its halves down to one texel."""
     images = [image]
     while max(images[-1].shape[:2]) > 1:
@@ -145,18 +145,18 @@ def _halvings(image: Pixels) -> list[Pixels]:
     return images
 
 
-def _with_fourth(three: Pixels, fourth: Pixels) -> Pixels:
+def _append_channel(three: Pixels, fourth: Pixels) -> Pixels:
     """Three channels and one more."""
     four: Pixels = cv2.merge([*cv2.split(three), fourth])
     return four
 
 
-def _in_bytes(image: Pixels) -> Pixels:
+def _to_bytes(image: Pixels) -> Pixels:
     """Values in [0, 1] as bytes, rounded."""
     steps: Pixels = cv2.convertScaleAbs(image, alpha=255.0).reshape(image.shape)
     return steps
 
 
-def _packed(levels: Sequence[Pixels]) -> NDArray[np.uint32]:
+def _pack(levels: Sequence[Pixels]) -> NDArray[np.uint32]:
     """Four bytes of each texel as one integer, level after level; the first byte lowest."""
     return np.concatenate([level.reshape(-1) for level in levels]).view("<u4")

@@ -47,20 +47,20 @@ class DeviceEnvironment:
 def upload_environment(image: Float32, device: wp.Device) -> DeviceEnvironment:
     """An equirectangular image, shape [h, 2h, 3], ready for kernels, as light without shadows."""
     shown = wp.array(image, dtype=wp.vec3, device=device)
-    return _lit_by(image, (), shown, shown)
+    return _upload(image, (), shown, shown)
 
 
 def upload_split(image: Float32, whole: DeviceEnvironment) -> DeviceEnvironment:
     """The same with its brightest parts as lamps; ``whole`` itself if it has none."""
-    light = _shrunk(image, _SPLIT_HEIGHT)
+    light = _shrink(image, _SPLIT_HEIGHT)
     rest, lamps = remove_peaks(light)
     if not lamps:
         return whole
-    mirrored = wp.array(_dimmed(image, light, rest), dtype=wp.vec3, device=whole.image.device)
-    return _lit_by(rest, lamps, whole.image, mirrored)
+    mirrored = wp.array(_dim(image, light, rest), dtype=wp.vec3, device=whole.image.device)
+    return _upload(rest, lamps, whole.image, mirrored)
 
 
-def _dimmed(image: Float32, light: Float32, rest: Float32) -> Float32:
+def _dim(image: Float32, light: Float32, rest: Float32) -> Float32:
     """The image as much darker as its shrunk copy ``light`` is in ``rest``."""
     if image.shape == rest.shape:
         return rest
@@ -72,17 +72,17 @@ def _dimmed(image: Float32, light: Float32, rest: Float32) -> Float32:
     return dimmed
 
 
-def _lit_by(
+def _upload(
     light: Float32, lamps: tuple[SkyLamp, ...], image: wp.array, rest: wp.array
 ) -> DeviceEnvironment:
     device = image.device
     maps = np.stack(
         [
-            add_border(_smoothed(light, level, device).numpy())
+            add_border(_prefilter_level(light, level, device).numpy())
             for level in range(1, _GLOSSY_LEVELS + 1)
         ]
     )
-    irradiance = irradiance_coefficients(_shrunk(light, _IRRADIANCE_HEIGHT))
+    irradiance = irradiance_coefficients(_shrink(light, _IRRADIANCE_HEIGHT))
     return DeviceEnvironment(
         wp.array(irradiance, dtype=wp.vec3, device=device),
         wp.array(maps, dtype=wp.vec3, device=device),
@@ -119,9 +119,9 @@ def add_border(maps: Float32) -> Float32:
     return wide
 
 
-def _smoothed(image: Float32, level: int, device: wp.Device) -> wp.array:
-    source = _shrunk(image, _SOURCE_HEIGHTS[level - 1])
-    shares = _shares(source.shape[0], level, device.alias)
+def _prefilter_level(image: Float32, level: int, device: wp.Device) -> wp.array:
+    source = _shrink(image, _SOURCE_HEIGHTS[level - 1])
+    shares = _texel_weights(source.shape[0], level, device.alias)
     smoothed = wp.zeros(_GLOSSY_SIZE**2, dtype=wp.vec3, device=device)
     radiance = wp.array(source.reshape(-1, 3), dtype=wp.vec3, device=device)
     wp.launch(prefilter, _GLOSSY_SIZE**2 // 4, [shares, radiance], [smoothed], device=device)
@@ -130,7 +130,7 @@ def _smoothed(image: Float32, level: int, device: wp.Device) -> wp.array:
 
 # Environments of one height share them, and every view may have another environment.
 @lru_cache(maxsize=_GLOSSY_LEVELS)
-def _shares(height: int, level: int, device: str) -> wp.array:
+def _texel_weights(height: int, level: int, device: str) -> wp.array:
     """What ``weigh_texels`` says for environments of a height, float [map texels, texels]."""
     directions, solid = texel_directions(height)
     roughness = level / _GLOSSY_LEVELS
@@ -145,7 +145,7 @@ def _shares(height: int, level: int, device: str) -> wp.array:
     return shares
 
 
-def _shrunk(image: Float32, height: int) -> Float32:
+def _shrink(image: Float32, height: int) -> Float32:
     if image.shape[0] <= height:
         return image
     size = (2 * height, height)

@@ -11,12 +11,12 @@ from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.scene import Environment, Light, Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import see_out
+from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
 from gen_data.generator.renderers.warp.scene.envmap_peaks import SkyLamp
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import (
     PackedWorld,
-    add_own_record,
+    copy_world,
     lamp_records,
     sky_record,
 )
@@ -26,7 +26,7 @@ _SHARE = 0.1
 _FAR_M = 1e3
 
 
-def extract_sky_lights(world: PackedWorld, scene: Scene, stock: DeviceCache) -> PackedWorld:
+def extract_sky_lights(world: PackedWorld, scene: Scene, cache: DeviceCache) -> PackedWorld:
     """The world with lamps for what is brightest in its panorama.
 
     Not where the scene has a sun, which its panorama then lacks; nor where walls shut the panorama
@@ -36,22 +36,22 @@ def extract_sky_lights(world: PackedWorld, scene: Scene, stock: DeviceCache) -> 
     if environment.luminance_cd_m2 <= 0.0 or any(light.kind == "sun" for light in scene.lights):
         return world
     points = _viewpoints(scene)
-    if not _is_open(world, points, _directions_around(), stock):
+    if not _is_open(world, points, _directions_around(), cache):
         return world
-    split = stock.split_environment(environment.image)
-    if not split.lamps or not _matters(split.lamps[0], scene):
+    split = cache.split_environment(environment.image)
+    if not split.lamps or not _is_significant(split.lamps[0], scene):
         return world
     suns = [_sun(lamp, environment) for lamp in split.lamps]
     towards = np.array([np.negative(sun.direction) for sun in suns])
-    if not _is_open(world, points, towards, stock):
+    if not _is_open(world, points, towards, cache):
         return world
-    lit = add_own_record(world)
+    lit = copy_world(world)
     lit.record.sky = sky_record(environment, split)
     added = lamp_records(suns)
     # Mirrored rays find them in the panorama.
     added["shown"] = 1
     lamps = np.concatenate([world.record.lamps.numpy(), added])
-    lit.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=stock.device)
+    lit.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
     return lit
 
 
@@ -72,7 +72,7 @@ def _sun(lamp: SkyLamp, environment: Environment) -> Light:
     )
 
 
-def _matters(lamp: SkyLamp, scene: Scene) -> bool:
+def _is_significant(lamp: SkyLamp, scene: Scene) -> bool:
     """Whether a part of the panorama gives more than a little of the light at the focus."""
     lux = float(luminance(np.asarray(lamp.power))) * scene.environment.luminance_cd_m2
     others = sum(
@@ -98,14 +98,14 @@ def _directions_around() -> Array:
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), up], axis=-1)
 
 
-def _is_open(world: PackedWorld, points: Array, towards: Array, stock: DeviceCache) -> bool:
+def _is_open(world: PackedWorld, points: Array, towards: Array, cache: DeviceCache) -> bool:
     """Whether any of these directions is free at any of these points."""
-    device = stock.device
+    device = cache.device
     free = wp.zeros(1, dtype=wp.int32, device=device)
     inputs = [
         world.record,
         wp.array(points, dtype=wp.vec3, device=device),
         wp.array(towards * _FAR_M, dtype=wp.vec3, device=device),
     ]
-    wp.launch(see_out, len(points), inputs, [free], device=device)
+    wp.launch(count_free_paths, len(points), inputs, [free], device=device)
     return int(free.numpy()[0]) > 0

@@ -65,14 +65,14 @@ def remove_peaks(image: Float32) -> tuple[Float32, tuple[SkyLamp, ...]]:
     Args:
         image: Equirectangular luminance of mean 1, shape [h, 2h, 3].
     """
-    if float(_searched(image).max()) <= _LEVELS[-1]:
+    if float(_search_luminance(image).max()) <= _LEVELS[-1]:
         return image, ()
     sphere = _Sphere(*texel_directions(image.shape[0]), luminance(image.astype(np.float64)))
     rest, found = image.astype(np.float64), []
     for level in _LEVELS:
-        for part, floor in _parts(_searched(rest), level, sphere.luminance.shape):
+        for part, floor in _find_parts(_search_luminance(rest), level, sphere.luminance.shape):
             excess = _excess(rest, part, floor)
-            lamp = _lamp(excess, sphere)
+            lamp = _fit_lamp(excess, sphere)
             if lamp.share > _SHARE and lamp.angular_radius_rad < _RADIUS_RAD_MAX:
                 found.append((lamp, excess))
                 rest = rest - excess
@@ -93,7 +93,7 @@ class _Sphere:
     luminance: Array
 
 
-def _searched(image: Array | Float32) -> Array:
+def _search_luminance(image: Array | Float32) -> Array:
     """Luminance at the size in which parts are looked for."""
     height = image.shape[0]
     if height > _SEARCH_ROWS:
@@ -102,7 +102,7 @@ def _searched(image: Array | Float32) -> Array:
     return luminance(image.astype(np.float64))
 
 
-def _parts(
+def _find_parts(
     small: Array, level: float, shape: tuple[int, ...]
 ) -> Iterator[tuple[NDArray[np.bool_], float]]:
     """Coherent parts brighter than a level: their masks, and the luminance around them.
@@ -122,7 +122,7 @@ def _parts(
     around = np.pad(bright.astype(np.uint8), ((0, 0), (reach, reach)), mode="wrap")
     grown = np.ascontiguousarray(cv2.dilate(around, kernel)[:, reach:-reach])
     count, labels = cv2.connectedComponents(grown, connectivity=8)
-    labels = np.asarray(_joined(labels, count), dtype=np.int32)[labels]
+    labels = np.asarray(_merge_labels(labels, count), dtype=np.int32)[labels]
     flux = small * texel_directions(rows)[1] * bright
     totals = np.bincount(labels.reshape(-1), weights=flux.reshape(-1), minlength=count)
     size = (shape[1], shape[0])
@@ -134,7 +134,7 @@ def _parts(
         yield whole.astype(bool), floor
 
 
-def _joined(labels: NDArray[np.int32], count: int) -> list[int]:
+def _merge_labels(labels: NDArray[np.int32], count: int) -> list[int]:
     """The label that each label stands for where parts meet at the ends of the image."""
     first = list(range(count))
     for left, right in zip(labels[:, 0].tolist(), labels[:, -1].tolist(), strict=True):
@@ -153,7 +153,7 @@ def _excess(image: Array, part: NDArray[np.bool_], floor: float) -> Array:
     return excess
 
 
-def _lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
+def _fit_lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
     """The disc that sends the same flow of light to the scene."""
     weights = luminance(excess) * sphere.solid
     flow = np.array([float((weights * sphere.directions[..., k]).sum()) for k in range(3)])

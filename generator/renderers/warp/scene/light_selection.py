@@ -25,23 +25,23 @@ _TURNED_AWAY = 0.1
 
 
 def keep_main_lamps(
-    world: PackedWorld, view: records.View, seen: GBuffer, stock: DeviceCache, lamps_max: int
+    world: PackedWorld, view: records.View, gbuffer: GBuffer, cache: DeviceCache, lamps_max: int
 ) -> None:
     """Leave the world the lamps that give most of the light at what is seen."""
-    chosen = main_lamp_numbers(world, view, seen, lamps_max)
+    chosen = main_lamp_numbers(world, view, gbuffer, lamps_max)
     if chosen is not None:
         lamps = world.record.lamps.numpy()[chosen]
-        world.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=stock.device)
+        world.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
 
 
 def main_lamp_numbers(
-    world: PackedWorld, view: records.View, seen: GBuffer, lamps_max: int
+    world: PackedWorld, view: records.View, gbuffer: GBuffer, lamps_max: int
 ) -> NDArray[np.int64] | None:
     """Numbers of the lamps that ``keep_main_lamps`` keeps, ascending; None = all."""
     lamps = world.record.lamps.numpy()
     if len(lamps) <= lamps_max:
         return None
-    points, normals = _sparse_points(view, seen)
+    points, normals = _sparse_points(view, gbuffer)
     return main_lamps(lamps, points, normals, lamps_max)
 
 
@@ -110,11 +110,11 @@ def _dot(a: Sequence[Array], b: Sequence[Array] | Sequence[float]) -> Array:
     return product
 
 
-def _sparse_points(view: records.View, seen: GBuffer) -> tuple[Array, Array]:
+def _sparse_points(view: records.View, gbuffer: GBuffer) -> tuple[Array, Array]:
     """Points and normals at every few pixels that see something, world frame."""
     shape = (view.height, view.width)
-    z = seen.z_m.numpy().reshape(shape)[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
-    normals = seen.normals.numpy().reshape(*shape, 3)[::_STRIDE_PX, ::_STRIDE_PX]
+    z = gbuffer.z_m.numpy().reshape(shape)[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
+    normals = gbuffer.normals.numpy().reshape(*shape, 3)[::_STRIDE_PX, ::_STRIDE_PX]
     rows, columns = np.nonzero(np.isfinite(z))
     directions = _directions(view, rows * _STRIDE_PX, columns * _STRIDE_PX)
     p_camera = directions * z[rows, columns, None]

@@ -46,7 +46,7 @@ def cutout_slots(
     surfaces: NDArray[np.void], textures: Mapping[str, DeviceTexture]
 ) -> NDArray[np.int32]:
     """By surface, HOLES where its texture has any, and CLEAR where it casts no shadow."""
-    holes = np.array([*(texture.pierced for texture in textures.values()), False])
+    holes = np.array([*(texture.has_cutouts for texture in textures.values()), False])
     clear = (surfaces["transmission"] > 0.5) | (surfaces["opacity"] < 0.5)
     flags = holes[surfaces["texture"]] * int(records.HOLES) + clear * int(records.CLEAR)
     slots: NDArray[np.int32] = flags.astype(np.int32)

@@ -54,7 +54,7 @@ class PackedWorld:
     Attributes:
         record: The World record.
         keep: Everything on the device that the record points to.
-        placed: Body records on the host, structured array [n].
+        body_records: Body records on the host, structured array [n].
         vertex_count: Of all bodies together.
         weather: Of the scene.
         layered: Whether any surface has more to it than colour, roughness and bumps.
@@ -63,7 +63,7 @@ class PackedWorld:
 
     record: records.World
     keep: tuple[object, ...]
-    placed: NDArray[np.void]
+    body_records: NDArray[np.void]
     vertex_count: int
     weather: Weather
     layered: bool
@@ -72,45 +72,45 @@ class PackedWorld:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Trees:
+class _Hierarchies:
     """What finds bodies for rays: fields of the World record.
 
     Attributes:
         tree: On CUDA empty.
         hierarchy: On the CPU None.
-        pierced: Numbers of bodies.
-        pierced_hierarchy: None where there are none.
+        cutouts: Numbers of bodies.
+        cutout_hierarchy: None where there are none.
     """
 
     tree: wp.array
     hierarchy: wp.Bvh | None
-    pierced: wp.array
-    pierced_hierarchy: wp.Bvh | None
+    cutouts: wp.array
+    cutout_hierarchy: wp.Bvh | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Places:
+class _Placement:
     """Where the bodies of a scene are, whoever looks at them.
 
     Attributes:
-        placed: Body records without what depends on the camera.
+        body_records: Body records without what depends on the camera.
         R_world_mesh, t_world_mesh, scale: Of the bodies, float64 [n, 3, 3], [n, 3] and [n].
         vertex_count, lows_m, highs_m: As of PackedWorld.
         trees: What rays find them by.
     """
 
-    placed: NDArray[np.void]
+    body_records: NDArray[np.void]
     R_world_mesh: Array
     t_world_mesh: Array
     scale: Array
     vertex_count: int
     lows_m: wp.array
     highs_m: wp.array
-    trees: _Trees
+    trees: _Hierarchies
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Packed:
+class _PackedScene:
     """What every camera and scanner shares of one scene.
 
     Attributes:
@@ -122,18 +122,18 @@ class _Packed:
 
     record: records.World
     assets: tuple[object, ...]
-    places: _Places
+    places: _Placement
     layered: bool
 
 
-def pack_world(scene: Scene, camera: Camera, stock: DeviceCache) -> PackedWorld:
+def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
     """The scene as one camera sees it. Cheap enough to be done for every frame."""
-    packed: _Packed = stock.scenes.get(scene, lambda: _packed(scene, stock))
-    return _before(camera, packed, scene.weather, stock)
+    packed: _PackedScene = cache.scenes.get(scene, lambda: _pack_scene(scene, cache))
+    return _pack_for_camera(camera, packed, scene.weather, cache)
 
 
 def repack_moved(
-    world: PackedWorld, scene: Scene, camera: Camera, stock: DeviceCache
+    world: PackedWorld, scene: Scene, camera: Camera, cache: DeviceCache
 ) -> PackedWorld:
     """Another instant of a packed scene: the same assets and materials at other places.
 
@@ -141,45 +141,47 @@ def repack_moved(
         world: As ``pack_world`` made it.
         scene: Poses of bodies and lights may differ from those that were packed.
         camera: Its pose may differ.
-        stock: Assets.
+        cache: Assets.
     """
     _, *assets = world.keep
     meshes = assets[0]
     assert isinstance(meshes, list)
-    body_meshes = [meshes[k] for k in world.placed["geometry"]]
-    places = _places(world.placed.copy(), scene.bodies, body_meshes, stock)
-    record = _copy_of(world.record)
-    record.lamps = to_device(lamp_records(scene.lights), records.LightRecord, stock.device)
-    packed = _Packed(record, tuple(assets), places, world.layered)
-    return _before(camera, packed, world.weather, stock)
+    body_meshes = [meshes[k] for k in world.body_records["geometry"]]
+    places = _place_bodies(world.body_records.copy(), scene.bodies, body_meshes, cache)
+    record = _copy_record(world.record)
+    record.lamps = to_device(lamp_records(scene.lights), records.LightRecord, cache.device)
+    packed = _PackedScene(record, tuple(assets), places, world.layered)
+    return _pack_for_camera(camera, packed, world.weather, cache)
 
 
-def add_own_record(world: PackedWorld) -> PackedWorld:
+def copy_world(world: PackedWorld) -> PackedWorld:
     """The same world, whose lamps, ground and sky can be changed without changing the other's."""
-    return replace(world, record=_copy_of(world.record))
+    return replace(world, record=_copy_record(world.record))
 
 
-def _copy_of(record: records.World) -> records.World:
+def _copy_record(record: records.World) -> records.World:
     copy = records.World()
     for name in records.World.vars:
         setattr(copy, name, getattr(record, name))
     return copy
 
 
-def _before(camera: Camera, packed: _Packed, weather: Weather, stock: DeviceCache) -> PackedWorld:
+def _pack_for_camera(
+    camera: Camera, packed: _PackedScene, weather: Weather, cache: DeviceCache
+) -> PackedWorld:
     """A packed scene with what depends on the camera."""
     places = packed.places
-    placed = places.placed.copy()
-    if len(placed):
-        _see(placed, places, camera)
+    body_records = places.body_records.copy()
+    if len(body_records):
+        _fill_camera_poses(body_records, places, camera)
     # A record of its own: weather and lamps are put into it for one view.
-    record = _copy_of(packed.record)
+    record = _copy_record(packed.record)
     _fill_trees(record, places.trees)
-    record.bodies = to_device(placed, records.BodyRecord, stock.device)
+    record.bodies = to_device(body_records, records.BodyRecord, cache.device)
     return PackedWorld(
         record,
         (places.trees, *packed.assets),
-        placed,
+        body_records,
         places.vertex_count,
         weather,
         packed.layered,
@@ -188,23 +190,23 @@ def _before(camera: Camera, packed: _Packed, weather: Weather, stock: DeviceCach
     )
 
 
-def _packed(scene: Scene, stock: DeviceCache) -> _Packed:
+def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
     asset_ids = sorted({body.asset for body in scene.bodies})
     place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
-    meshes = [stock.mesh(asset_id) for asset_id in asset_ids]
-    looks = body_materials(scene, stock)
+    meshes = [cache.mesh(asset_id) for asset_id in asset_ids]
+    looks = body_materials(scene, cache)
     texture_ids = sorted({texture_id for look in looks for texture_id in look.textures})
-    textures = {texture_id: stock.texture(texture_id) for texture_id in texture_ids}
+    textures = {texture_id: cache.texture(texture_id) for texture_id in texture_ids}
     surfaces = surface_records(looks, textures)
-    environment = stock.environment(scene.environment.image)
-    placed = np.zeros(len(scene.bodies), dtype=struct_dtype(records.BodyRecord))
-    placed["geometry"] = [place[body.asset] for body in scene.bodies]
+    environment = cache.environment(scene.environment.image)
+    body_records = np.zeros(len(scene.bodies), dtype=struct_dtype(records.BodyRecord))
+    body_records["geometry"] = [place[body.asset] for body in scene.bodies]
     counts = np.array([len(look.materials) for look in looks], dtype=np.int64)
-    placed["first_material"] = np.cumsum(counts) - counts
-    placed["pierced"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
+    body_records["first_material"] = np.cumsum(counts) - counts
+    body_records["cutouts"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
     body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
-    places = _places(placed, scene.bodies, body_meshes, stock)
-    device = stock.device
+    places = _place_bodies(body_records, scene.bodies, body_meshes, cache)
+    device = cache.device
     world = records.World()
     geometries = stack_records([mesh.record for mesh in meshes], records.Geometry)
     images = stack_records([texture.record for texture in textures.values()], records.TextureRecord)
@@ -212,55 +214,55 @@ def _packed(scene: Scene, stock: DeviceCache) -> _Packed:
     world.surfaces = to_device(surfaces, records.MaterialRecord, device)
     world.textures = to_device(images, records.TextureRecord, device)
     world.lamps = to_device(lamp_records(scene.lights), records.LightRecord, device)
-    world.lobes = stock.lobes
+    world.lobes = cache.lobes
     world.sky = sky_record(scene.environment, environment)
     layered = bool(surfaces["layered"].any())
-    return _Packed(world, (meshes, textures, environment), places, layered)
+    return _PackedScene(world, (meshes, textures, environment), places, layered)
 
 
-def _places(
-    placed: NDArray[np.void],
+def _place_bodies(
+    body_records: NDArray[np.void],
     bodies: Sequence[Body],
     meshes: Sequence[DeviceMesh],
-    stock: DeviceCache,
-) -> _Places:
+    cache: DeviceCache,
+) -> _Placement:
     """Fill in where bodies are, and put a hierarchy over them."""
-    R, t, scale, vertex_count = _place(placed, bodies, meshes)
-    placed["low_m"], placed["high_m"] = _world_boxes(placed, meshes)
+    R, t, scale, vertex_count = _fill_poses(body_records, bodies, meshes)
+    body_records["low_m"], body_records["high_m"] = _world_boxes(body_records, meshes)
     # Kernels over boxes need one; rays never meet this one.
     nowhere = np.full((1, 3), 1e9, np.float32)
-    low = placed["low_m"] if len(placed) else nowhere
-    high = placed["high_m"] if len(placed) else nowhere
+    low = body_records["low_m"] if len(body_records) else nowhere
+    high = body_records["high_m"] if len(body_records) else nowhere
     lows_m, highs_m = (
-        wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=stock.device)
+        wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=cache.device)
         for corner in (low, high)
     )
-    trees = _trees(placed, lows_m, highs_m, stock.device)
-    return _Places(placed, R, t, scale, vertex_count, lows_m, highs_m, trees)
+    trees = _build_trees(body_records, lows_m, highs_m, cache.device)
+    return _Placement(body_records, R, t, scale, vertex_count, lows_m, highs_m, trees)
 
 
-def _trees(
-    placed: NDArray[np.void], lows_m: wp.array, highs_m: wp.array, device: wp.Device
-) -> _Trees:
-    low, high = (np.ascontiguousarray(placed[name]) for name in ("low_m", "high_m"))
+def _build_trees(
+    body_records: NDArray[np.void], lows_m: wp.array, highs_m: wp.array, device: wp.Device
+) -> _Hierarchies:
+    low, high = (np.ascontiguousarray(body_records[name]) for name in ("low_m", "high_m"))
     tree = np.zeros(0, np.float32) if device.is_cuda else body_tree(low, high)
-    pierced = np.flatnonzero(placed["pierced"]).astype(np.int32)
-    corners = (wp.array(of[pierced], dtype=wp.vec3, device=device) for of in (low, high))
-    return _Trees(
+    cutouts = np.flatnonzero(body_records["cutouts"]).astype(np.int32)
+    corners = (wp.array(of[cutouts], dtype=wp.vec3, device=device) for of in (low, high))
+    return _Hierarchies(
         wp.array(tree, dtype=wp.float32, device=device),
         wp.Bvh(lows_m, highs_m) if device.is_cuda else None,
-        wp.array(pierced, dtype=wp.int32, device=device),
-        wp.Bvh(*corners) if len(pierced) else None,
+        wp.array(cutouts, dtype=wp.int32, device=device),
+        wp.Bvh(*corners) if len(cutouts) else None,
     )
 
 
-def _fill_trees(record: records.World, trees: _Trees) -> None:
-    record.tree, record.pierced = trees.tree, trees.pierced
+def _fill_trees(record: records.World, trees: _Hierarchies) -> None:
+    record.tree, record.cutouts = trees.tree, trees.cutouts
     record.hierarchy = trees.hierarchy.id if trees.hierarchy else 0
-    record.pierced_hierarchy = trees.pierced_hierarchy.id if trees.pierced_hierarchy else 0
+    record.cutout_hierarchy = trees.cutout_hierarchy.id if trees.cutout_hierarchy else 0
 
 
-def pack_view(camera: Camera, stock: DeviceCache) -> records.View:
+def pack_view(camera: Camera, cache: DeviceCache) -> records.View:
     """The camera."""
     k = camera.intrinsics
     view = records.View()
@@ -274,11 +276,11 @@ def pack_view(camera: Camera, stock: DeviceCache) -> records.View:
         view.lens = _LENSES[k.lens.model]
         coefficients = (*k.lens.coefficients, *[0.0] * 8)[:8]
         view.coefficients = records.Coefficients(*coefficients)
-        view.directions = stock.optics(k).directions
+        view.directions = cache.optics(k).directions
     return view
 
 
-def _place(
+def _fill_poses(
     values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh]
 ) -> tuple[Array, Array, Array, int]:
     """Fill in poses and vertex ranges; returns rotations, positions, scales, number of vertices."""
@@ -299,7 +301,7 @@ def _place(
     return R, t, scale, int(counts.sum())
 
 
-def _see(values: NDArray[np.void], places: _Places, camera: Camera) -> None:
+def _fill_camera_poses(values: NDArray[np.void], places: _Placement, camera: Camera) -> None:
     """Fill in where bodies are before a camera.
 
     Products are taken in float64, so that a camera far from the world's origin loses nothing.
@@ -315,15 +317,17 @@ def _see(values: NDArray[np.void], places: _Places, camera: Camera) -> None:
 
 
 def _world_boxes(
-    placed: NDArray[np.void], meshes: Sequence[DeviceMesh]
+    body_records: NDArray[np.void], meshes: Sequence[DeviceMesh]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     if not meshes:
         return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)
-    scale = placed["scale"].astype(np.float64)[:, None]
-    R = placed["R_world_mesh"].astype(np.float64)
+    scale = body_records["scale"].astype(np.float64)[:, None]
+    R = body_records["R_world_mesh"].astype(np.float64)
     low = np.stack([mesh.low_m for mesh in meshes]) * scale
     high = np.stack([mesh.high_m for mesh in meshes]) * scale
-    centre = placed["t_world_mesh"] + np.einsum("nij,nj->ni", R, (low + high) / 2, optimize=False)
+    centre = body_records["t_world_mesh"] + np.einsum(
+        "nij,nj->ni", R, (low + high) / 2, optimize=False
+    )
     half = np.einsum("nij,nj->ni", np.abs(R), (high - low) / 2, optimize=False)
     # A hair of slack keeps flat boxes traversable after rounding to float32.
     half = half + 1e-6 * (1.0 + np.abs(centre))

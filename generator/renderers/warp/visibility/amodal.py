@@ -12,7 +12,7 @@ from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_holes, trace_outlines
+from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutouts, trace_outlines
 from gen_data.generator.renderers.warp.visibility.amodal_lens import trace_masks, union_box
 from gen_data.generator.renderers.warp.visibility.gbuffer import (
     GBuffer,
@@ -31,8 +31,8 @@ def render_silhouettes(
     camera: Camera,
     world: PackedWorld,
     view: records.View,
-    stock: DeviceCache,
-    seen: GBuffer,
+    cache: DeviceCache,
+    gbuffer: GBuffer,
     seen_ids: NDArray[np.uint16],
 ) -> dict[int, Silhouette]:
     """The silhouette of every annotated instance, by instance id.
@@ -42,36 +42,36 @@ def render_silhouettes(
     rasteriser by a pixel at an edge.
     """
     if view.lens == records.PINHOLE:
-        projected = seen.projected or project_vertices(world, view, stock)
-        boxes, drawn = _drawn_masks(scene, world, view, projected, stock)
+        projected = gbuffer.projected or project_vertices(world, view, cache)
+        boxes, drawn = _rasterize_masks(scene, world, view, projected, cache)
     else:
-        boxes, drawn = trace_masks(scene, world, view, camera, stock)
+        boxes, drawn = trace_masks(scene, world, view, camera, cache)
     found: dict[int, Silhouette] = {}
     first = 0
     for instance_id, box in boxes.items():
         end = first + box.width_px * box.height_px
         pixels = drawn[first:end].reshape(box.height_px, box.width_px) > 0
         _unite(pixels, box, seen_ids, instance_id)
-        found[instance_id] = _tight(instance_id, pixels, box)
+        found[instance_id] = _crop(instance_id, pixels, box)
         first = end
     return found
 
 
-def _drawn_masks(
-    scene: Scene, world: PackedWorld, view: records.View, projected: Projected, stock: DeviceCache
+def _rasterize_masks(
+    scene: Scene, world: PackedWorld, view: records.View, projected: Projected, cache: DeviceCache
 ) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
     """Per annotated instance a box that holds its silhouette, and the pixels of all boxes."""
     p_camera, xy = projected.p_camera, projected.xy
     boxes = _boxes_px(scene, world, view, projected)
     canvases, size = _canvases(scene, boxes, projected.reached)
-    mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
-    pierced = has_holes(world.placed)[canvases["body"]]
-    if not pierced.all():
-        drawn_into = wp.array(canvases[~pierced], dtype=Canvas, device=stock.device)
+    mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
+    cutouts = has_cutouts(world.body_records)[canvases["body"]]
+    if not cutouts.all():
+        drawn_into = wp.array(canvases[~cutouts], dtype=Canvas, device=cache.device)
         inputs = [view, world.record, p_camera, xy, drawn_into]
-        wp.launch(draw_silhouettes, len(drawn_into), inputs, [mask], device=stock.device)
-    if pierced.any():
-        trace_outlines(world, view, canvases[pierced], mask)
+        wp.launch(draw_silhouettes, len(drawn_into), inputs, [mask], device=cache.device)
+    if cutouts.any():
+        trace_outlines(world, view, canvases[cutouts], mask)
     drawn: NDArray[np.uint8] = mask.numpy()
     return boxes, drawn
 
@@ -87,7 +87,7 @@ def _boxes_px(
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, BoxPx(0, 0, 0, 0))
     # All bodies at once: asking hundreds of them one by one takes longer than drawing them.
-    first = world.placed["first_vertex"]
+    first = world.body_records["first_vertex"]
     solid = np.flatnonzero(np.diff([*first, world.vertex_count]))
     p_camera, xy = projected.p_camera.numpy(), projected.xy.numpy()
     nearest = np.maximum.reduceat(p_camera[:, 2], first[solid])
@@ -99,12 +99,12 @@ def _boxes_px(
         if instance_id in boxes:
             # A triangle that is cut at the camera's plane may reach anywhere.
             cut = lows[k, 0] == _UNSNAPPED
-            reached = canvas if cut else _within(canvas, lows[k] >> 8, (highs[k] >> 8) + 1)
+            reached = canvas if cut else _clip_to_canvas(canvas, lows[k] >> 8, (highs[k] >> 8) + 1)
             boxes[instance_id] = union_box(boxes[instance_id], reached)
     return boxes
 
 
-def _within(canvas: BoxPx, low: NDArray[np.int32], high: NDArray[np.int32]) -> BoxPx:
+def _clip_to_canvas(canvas: BoxPx, low: NDArray[np.int32], high: NDArray[np.int32]) -> BoxPx:
     x_min, y_min = max(int(low[0]), canvas.x_min), max(int(low[1]), canvas.y_min)
     x_max, y_max = min(int(high[0]), canvas.x_max), min(int(high[1]), canvas.y_max)
     return BoxPx(x_min, y_min, max(x_max, x_min), max(y_max, y_min))
@@ -147,7 +147,7 @@ def _unite(
     pixels[rows, columns] |= window == instance_id
 
 
-def _tight(instance_id: int, pixels: NDArray[np.bool_], box: BoxPx) -> Silhouette:
+def _crop(instance_id: int, pixels: NDArray[np.bool_], box: BoxPx) -> Silhouette:
     tight = tight_box(pixels)
     if tight is None:
         return Silhouette(instance_id, 0, 0, _NOTHING)

@@ -31,10 +31,10 @@ _CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
 
 
 def trace_masks(
-    scene: Scene, world: PackedWorld, view: records.View, camera: Camera, stock: DeviceCache
+    scene: Scene, world: PackedWorld, view: records.View, camera: Camera, cache: DeviceCache
 ) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
     """Per annotated instance a box that holds its silhouette, and the pixels of all boxes."""
-    optics = stock.optics(camera.intrinsics)
+    optics = cache.optics(camera.intrinsics)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, EMPTY)
     of_bodies: dict[int, BoxPx] = {}
@@ -42,20 +42,20 @@ def trace_masks(
     step_rad = _widest_step(optics.nodes)
     for number, body in enumerate(scene.bodies):
         if body.instance_id in boxes:
-            ends_m = np.stack([world.placed[end][number] for end in ("low_m", "high_m")])
+            ends_m = np.stack([world.body_records[end][number] for end in ("low_m", "high_m")])
             axis, half_rad = bounding_cone(ends_m - np.array(camera.T_world_camera.translation_m))
             cosines = optics.nodes @ (R_camera_world @ axis).astype(np.float32)
             # Every pixel that is shown has a node within a diagonal of a cell.
             box = box_around(cosines >= math.cos(min(half_rad + 1.5 * step_rad, math.pi)))
-            of_bodies[number] = _on_canvas(box, view)
+            of_bodies[number] = _clip_to_canvas(box, view)
             boxes[body.instance_id] = union_box(boxes[body.instance_id], of_bodies[number])
-    outlooks, size = _outlooks(scene, boxes, of_bodies)
-    mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
-    if len(outlooks):
-        shape = (len(outlooks), int(outlooks["window"]["height"].max()))
-        records_ = wp.array(outlooks, dtype=AmodalWindow, device=stock.device)
+    windows, size = _window_records(scene, boxes, of_bodies)
+    mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
+    if len(windows):
+        shape = (len(windows), int(windows["window"]["height"].max()))
+        records_ = wp.array(windows, dtype=AmodalWindow, device=cache.device)
         inputs = [view, world.record, optics.nodes_on_device, NODE_STRIDE_PX, Z_NEAR_M, records_]
-        wp.launch(trace_silhouettes, shape, inputs, [mask], device=stock.device)
+        wp.launch(trace_silhouettes, shape, inputs, [mask], device=cache.device)
     pixels: NDArray[np.uint8] = mask.numpy()
     return boxes, pixels
 
@@ -80,15 +80,15 @@ def bounding_cone(ends_m: Array) -> tuple[Array, float]:
     return axis, min(narrow_rad, math.asin(radius_m / distance_m))
 
 
-def box_around(near: NDArray[np.bool_]) -> BoxPx:
+def box_around(marked: NDArray[np.bool_]) -> BoxPx:
     """Pixels around set nodes, counted from the canvas's first, and two cells more; may be empty.
 
     Args:
-        near: By node, [rows, columns].
+        marked: By node, [rows, columns].
     """
-    if not near.any():
+    if not marked.any():
         return EMPTY
-    ys, xs = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
+    ys, xs = np.flatnonzero(marked.any(axis=1)), np.flatnonzero(marked.any(axis=0))
     return BoxPx(
         (int(xs[0]) - 2) * NODE_STRIDE_PX,
         (int(ys[0]) - 2) * NODE_STRIDE_PX,
@@ -117,7 +117,7 @@ def _widest_step(nodes: Float32) -> float:
     return 2.0 * math.asin(min(0.5 * math.sqrt(widest), 1.0))
 
 
-def _on_canvas(box: BoxPx, view: records.View) -> BoxPx:
+def _clip_to_canvas(box: BoxPx, view: records.View) -> BoxPx:
     """The part of a box on the canvas, in image coordinates."""
     inside = box.clipped(3 * view.width, 3 * view.height)
     if inside is None:
@@ -130,7 +130,7 @@ def _on_canvas(box: BoxPx, view: records.View) -> BoxPx:
     )
 
 
-def _outlooks(
+def _window_records(
     scene: Scene, boxes: dict[int, BoxPx], of_bodies: dict[int, BoxPx]
 ) -> tuple[NDArray[np.void], int]:
     """One record per body that may be on the canvas, and the pixels of all instances' boxes."""

@@ -46,31 +46,31 @@ class BandedGBuffer:
     @property
     def intrinsics(self) -> Intrinsics:
         """Of the camera; where it is, the bands say."""
-        return self.bands[0].moment.camera.intrinsics
+        return self.bands[0].state.camera.intrinsics
 
 
-def full_band(moment: CameraState) -> RowBand:
+def full_band(state: CameraState) -> RowBand:
     """All rows at one instant."""
-    return RowBand(0, moment.camera.intrinsics.height_px, moment)
+    return RowBand(0, state.camera.intrinsics.height_px, state)
 
 
-def copy_gbuffer(see: CameraView) -> BandedGBuffer:
+def copy_gbuffer(rendered: CameraView) -> BandedGBuffer:
     """What the pixels of an image of one instant show; a copy."""
-    lens = see.moment.camera.intrinsics
+    lens = rendered.state.camera.intrinsics
     shape = (lens.height_px, lens.width_px)
     return BandedGBuffer(
-        (full_band(see.moment),),
-        see.seen.hits.numpy().reshape(*shape, 2).copy(),
-        see.seen.z_m.numpy().reshape(shape).copy(),
-        see.seen.weights.numpy().reshape(*shape, 2).copy(),
+        (full_band(rendered.state),),
+        rendered.gbuffer.hits.numpy().reshape(*shape, 2).copy(),
+        rendered.gbuffer.z_m.numpy().reshape(shape).copy(),
+        rendered.gbuffer.weights.numpy().reshape(*shape, 2).copy(),
     )
 
 
 def render_bands(
     bands: Sequence[RowBand],
     channels: frozenset[Channel],
-    studio: RenderContext,
-    near: CameraView,
+    context: RenderContext,
+    reference: CameraView,
     light: RadianceFunction | None = None,
 ) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
     """What pixels show, and images of it, each band at its own instant.
@@ -78,11 +78,11 @@ def render_bands(
     Args:
         bands: In order of rows; together all of them.
         channels: Labels.
-        studio: Assets and settings.
-        near: The world at about that time.
+        context: Assets and settings.
+        reference: The world at about that time.
         light: Makes the channel RADIANCE; None = it is not asked for.
     """
-    lens = near.moment.camera.intrinsics
+    lens = reference.state.camera.intrinsics
     shape = (lens.height_px, lens.width_px)
     hits, weights = np.zeros((*shape, 2), np.int32), np.zeros((*shape, 2), np.float32)
     z_m = np.zeros(shape, np.float32)
@@ -91,15 +91,15 @@ def render_bands(
         rows = slice(band.first, band.end)
         first, end = (band.first, band.end) if light is None else add_margin(band, lens.height_px)
         # Neighbours in time have most in common.
-        see = near = render_view(band.moment, studio, (first, end), near)
+        rendered = reference = render_view(band.state, context, (first, end), reference)
         own = slice(band.first - first, band.end - first)
-        seen, rows_px = see.seen, (end - first, lens.width_px)
-        hits[rows] = seen.hits.numpy().reshape(*rows_px, 2)[own]
-        weights[rows] = seen.weights.numpy().reshape(*rows_px, 2)[own]
-        z_m[rows] = seen.z_m.numpy().reshape(rows_px)[own]
-        drawn = label_images(band.moment.scene, see.world, see.view, seen, channels)
+        gbuffer, rows_px = rendered.gbuffer, (end - first, lens.width_px)
+        hits[rows] = gbuffer.hits.numpy().reshape(*rows_px, 2)[own]
+        weights[rows] = gbuffer.weights.numpy().reshape(*rows_px, 2)[own]
+        z_m[rows] = gbuffer.z_m.numpy().reshape(rows_px)[own]
+        drawn = label_images(band.state.scene, rendered.world, rendered.view, gbuffer, channels)
         if light is not None:
-            drawn[Channel.RADIANCE] = light(see)
+            drawn[Channel.RADIANCE] = light(rendered)
         for channel, image in drawn.items():
             parts.setdefault(channel, []).append(image[own].copy())
     images = {channel: np.concatenate(pieces) for channel, pieces in parts.items()}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_holes, trace_over
+from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutouts, trace_over
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve, rasterizer
 
 Method = Literal["auto", "raster", "rays"]
@@ -60,69 +60,71 @@ class GBuffer:
 def find_visible(
     world: PackedWorld,
     view: records.View,
-    stock: DeviceCache,
+    cache: DeviceCache,
     method: Method,
 ) -> GBuffer:
     """The surfaces at all pixel centres of a view."""
     n = view.width * view.height
     # Straight edges have straight images before a pinhole only.
-    drawn = method == "raster" or (method == "auto" and stock.device.is_cpu)
+    drawn = method == "raster" or (method == "auto" and cache.device.is_cpu)
     drawn = drawn and view.lens == records.PINHOLE
-    projected = project_vertices(world, view, stock) if drawn else None
-    seen = GBuffer(
-        stock.scratch("hits", n, wp.vec2i),
-        stock.scratch("z", n, float),
-        stock.scratch("weights", n, wp.vec2),
-        stock.scratch("normals", n, wp.vec3),
+    projected = project_vertices(world, view, cache) if drawn else None
+    gbuffer = GBuffer(
+        cache.scratch("hits", n, wp.vec2i),
+        cache.scratch("z", n, float),
+        cache.scratch("weights", n, wp.vec2),
+        cache.scratch("normals", n, wp.vec3),
         projected,
     )
     if projected is not None:
-        _rasterise(world, view, stock, projected, seen.hits)
+        _rasterise(world, view, cache, projected, gbuffer.hits)
     else:
         inputs = [view, world.record, rasterizer.Z_NEAR_M]
-        wp.launch(ray_queries.trace_pixels, n, inputs, [seen.hits], device=stock.device)
+        wp.launch(ray_queries.trace_pixels, n, inputs, [gbuffer.hits], device=cache.device)
     # One thread per row on the CPU, where threads run one after the other anyway.
-    run = view.width if stock.device.is_cpu else 1
-    outputs = [seen.z_m, seen.weights, seen.normals]
-    inputs = [view, world.record, run, seen.hits]
+    run = view.width if cache.device.is_cpu else 1
+    outputs = [gbuffer.z_m, gbuffer.weights, gbuffer.normals]
+    inputs = [view, world.record, run, gbuffer.hits]
     wp.launch(
         label_resolve.resolve,
         (view.height, view.width // run),
         inputs,
         outputs,
-        device=stock.device,
+        device=cache.device,
     )
-    return seen
+    return gbuffer
 
 
-def project_vertices(world: PackedWorld, view: records.View, stock: DeviceCache) -> Projected:
+def project_vertices(world: PackedWorld, view: records.View, cache: DeviceCache) -> Projected:
     """Vertices as the camera sees them; valid until the next call."""
     count = max(world.vertex_count, 1)
-    reached = bodies_within(world.placed, view, 1.0)
+    reached = bodies_within(world.body_records, view, 1.0)
     # The wider test may refuse a body that the narrower one cannot: it is outside of both.
-    in_view = np.intersect1d(reached, bodies_within(world.placed, view, 0.0))
+    in_view = np.intersect1d(reached, bodies_within(world.body_records, view, 0.0))
     projected = Projected(
         reached,
         in_view,
-        stock.scratch("p camera", count, wp.vec3),
-        stock.scratch("xy", count, wp.vec2i),
+        cache.scratch("p camera", count, wp.vec3),
+        cache.scratch("xy", count, wp.vec2i),
     )
-    bodies = wp.array(projected.reached, dtype=wp.int32, device=stock.device)
+    bodies = wp.array(projected.reached, dtype=wp.int32, device=cache.device)
     inputs = [view, world.record, bodies]
     outputs = [projected.p_camera, projected.xy]
-    wp.launch(rasterizer.project_vertices, len(bodies), inputs, outputs, device=stock.device)
+    wp.launch(rasterizer.project_vertices, len(bodies), inputs, outputs, device=cache.device)
     return projected
 
 
-def bodies_within(placed: NDArray[np.void], view: records.View, margin: float) -> NDArray[np.int32]:
+def bodies_within(
+    body_records: NDArray[np.void], view: records.View, margin: float
+) -> NDArray[np.int32]:
     """Numbers, ascending, of the bodies whose boxes reach into the pyramid of an image.
 
     Args:
-        placed: Body records.
+        body_records: Body records.
         view: The camera.
         margin: How far the pyramid reaches beyond each side of the image, in images.
     """
-    ends = np.stack([placed["low_m"], placed["high_m"]], axis=1).astype(np.float64)
+    ends = np.stack([body_records["low_m"], body_records["high_m"]], axis=1).astype(np.float64)
     picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
     corners = ends[:, picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
     R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
@@ -143,18 +145,18 @@ def bodies_within(placed: NDArray[np.void], view: records.View, margin: float) -
 def _rasterise(
     world: PackedWorld,
     view: records.View,
-    stock: DeviceCache,
+    cache: DeviceCache,
     projected: Projected,
     hits: wp.array,
 ) -> None:
-    nearness = stock.scratch("nearness", view.width * view.height, float)
+    nearness = cache.scratch("nearness", view.width * view.height, float)
     nearness.zero_()
     hits.fill_(wp.vec2i(-1, -1))
     window = rasterizer.Window()
     window.width, window.height = view.width, view.height
-    pierced = has_holes(world.placed)[projected.in_view]
-    bodies = wp.array(projected.in_view[~pierced], dtype=wp.int32, device=stock.device)
+    cutouts = has_cutouts(world.body_records)[projected.in_view]
+    bodies = wp.array(projected.in_view[~cutouts], dtype=wp.int32, device=cache.device)
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
-    wp.launch(rasterizer.draw_bodies, len(bodies), inputs, [nearness, hits], device=stock.device)
-    if pierced.any():
-        trace_over(world, view, projected.in_view[pierced], nearness, hits)
+    wp.launch(rasterizer.draw_bodies, len(bodies), inputs, [nearness, hits], device=cache.device)
+    if cutouts.any():
+        trace_over(world, view, projected.in_view[cutouts], nearness, hits)

@@ -46,41 +46,45 @@ class ShutterSampling:
     blurred: NDArray[np.bool_]
 
 
-def plan_sampling(see: CameraView) -> ShutterSampling:
+def plan_sampling(rendered: CameraView) -> ShutterSampling:
     """How an image is taken while the camera's shutter is open.
 
     Args:
-        see: What the camera sees in the middle of that time.
+        rendered: What the camera sees in the middle of that time.
     """
-    middle, shown = see.moment, copy_gbuffer(see)
+    middle, gbuffer = rendered.state, copy_gbuffer(rendered)
     shutter = middle.camera.shutter
-    ends = [_at_once(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
+    ends = [_global_shutter_band(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
     carriers = find_carriers(middle.scene)
-    points = gather_points(shown, carriers, _STRIDE_PX)
+    points = gather_points(gbuffer, carriers, _STRIDE_PX)
     before, after = (reproject(points, [end], carriers, _STRIDE_PX).image_px for end in ends)
     way = after - before
     length = np.where(np.isfinite(way).all(axis=-1), np.sqrt((way * way).sum(axis=-1)), 0.0)
     vertical = np.where(length > 0.0, np.abs(way[..., 1]), 0.0)
-    speeds = _spread(length.max(axis=1) / shutter.open_s, vertical.max(axis=1), len(shown.z_m))
+    speeds = _dilate_rows(
+        length.max(axis=1) / shutter.open_s, vertical.max(axis=1), len(gbuffer.z_m)
+    )
     wanted = math.ceil(float(speeds.max()) * shutter.exposure_s / BLUR_PX)
     blurred = speeds * shutter.exposure_s > BLUR_PX
     return ShutterSampling(speeds, min(max(wanted, 1), shutter.samples), blurred)
 
 
-def split_bands(see: CameraView, pace: ShutterSampling | None = None) -> tuple[RowBand, ...]:
+def split_bands(
+    rendered: CameraView, sampling: ShutterSampling | None = None
+) -> tuple[RowBand, ...]:
     """Bands of rows within which nothing moves farther than ``BAND_PX``, each at its instant.
 
     Args:
-        see: What the camera sees in the middle of the exposure of the image.
-        pace: Of the image; None = it is to be found out.
+        rendered: What the camera sees in the middle of the exposure of the image.
+        sampling: Of the image; None = it is to be found out.
     """
-    middle = see.moment
+    middle = rendered.state
     shutter = middle.camera.shutter
     if not shutter.rolls or not is_moving(middle, shutter.open_s):
         return (full_band(middle),)
-    pace = pace or plan_sampling(see)
-    per_row_s = abs(shutter.readout_s) / len(pace.speeds_px_s)
-    return make_bands(middle, band_starts(pace.speeds_px_s * per_row_s))
+    sampling = sampling or plan_sampling(rendered)
+    per_row_s = abs(shutter.readout_s) / len(sampling.speeds_px_s)
+    return make_bands(middle, band_starts(sampling.speeds_px_s * per_row_s))
 
 
 def make_bands(middle: CameraState, starts: Sequence[int]) -> tuple[RowBand, ...]:
@@ -104,7 +108,7 @@ def band_starts(motion_px: Array) -> list[int]:
     return [int(row) for row in np.flatnonzero(begins)]
 
 
-def _spread(speeds: Array, travels_px: Array, height: int) -> Array:
+def _dilate_rows(speeds: Array, travels_px: Array, height: int) -> Array:
     """The highest speed of what comes to be in each row while the shutter is open, [height].
 
     Args:
@@ -120,7 +124,7 @@ def _spread(speeds: Array, travels_px: Array, height: int) -> Array:
     return highest
 
 
-def _at_once(moment: CameraState) -> RowBand:
+def _global_shutter_band(state: CameraState) -> RowBand:
     """The whole image of a camera whose rows are all exposed then."""
-    camera = replace(moment.camera, shutter=INSTANT)
-    return full_band(replace(moment, camera=camera))
+    camera = replace(state.camera, shutter=INSTANT)
+    return full_band(replace(state, camera=camera))

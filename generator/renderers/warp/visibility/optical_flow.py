@@ -45,48 +45,55 @@ _NEARER = 2e-3
 
 
 def flow_images(
-    near: CameraView, shown: BandedGBuffer, channels: frozenset[Channel], studio: RenderContext
+    reference: CameraView,
+    gbuffer: BandedGBuffer,
+    channels: frozenset[Channel],
+    context: RenderContext,
 ) -> dict[Channel, NDArray[Any]]:
     """All channels of flow that are asked for, as listed at Channel.
 
     Args:
-        near: The world at the image's instant.
-        shown: What its pixels show, each row at its own.
+        reference: The world at the image's instant.
+        gbuffer: What its pixels show, each row at its own.
         channels: Of any kind.
-        studio: Assets and settings.
+        context: Assets and settings.
     """
     images: dict[Channel, NDArray[Any]] = {}
     if not channels & FLOW:
         return images
-    middle = near.moment
+    middle = reference.state
     step_s = middle.scene.step_s
     carriers = find_carriers(middle.scene)
-    points = gather_points(shown, carriers)
+    points = gather_points(gbuffer, carriers)
     if channels & FORWARD:
-        images |= _carried(points, shown, middle.later(step_s), channels & FORWARD, near, studio)
+        images |= _flow_channels(
+            points, gbuffer, middle.later(step_s), channels & FORWARD, reference, context
+        )
     if channels & BACKWARD and middle.scene.time_s < step_s - 1e-9:
-        images |= _nowhere(points.carriers.shape, channels)
+        images |= _undefined_flow(points.carriers.shape, channels)
     elif channels & BACKWARD:
-        images |= _carried(points, shown, middle.later(-step_s), channels & BACKWARD, near, studio)
+        images |= _flow_channels(
+            points, gbuffer, middle.later(-step_s), channels & BACKWARD, reference, context
+        )
     return images
 
 
-def _carried(
+def _flow_channels(
     points: ScenePoints,
-    shown: BandedGBuffer,
+    gbuffer: BandedGBuffer,
     then: CameraState,
     channels: frozenset[Channel],
-    near: CameraView,
-    studio: RenderContext,
+    reference: CameraView,
+    context: RenderContext,
 ) -> dict[Channel, NDArray[Any]]:
     """Channels of one direction."""
     images: dict[Channel, NDArray[Any]] = {}
     carriers = find_carriers(then.scene)
     bands: Sequence[RowBand] = (full_band(then),)
     if then.camera.shutter.rolls:
-        near = render_view(then, studio, None, near)
-        bands = split_bands(near)
-    points = deform_points(points, shown, then.scene, studio.stock.assets)
+        reference = render_view(then, context, None, reference)
+        bands = split_bands(reference)
+    points = deform_points(points, gbuffer, then.scene, context.cache.assets)
     found = reproject(points, bands, carriers)
     for channel in sorted(channels, key=lambda c: c.value):
         if channel in (Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD):
@@ -97,8 +104,8 @@ def _carried(
             seen = frozenset({Channel.RANGE, Channel.NORMALS})
             # Four times as far as bands allow is a pixel: as sharp as occlusion is told.
             starts = [band.first for band in bands[::4]]
-            _, other = render_bands(make_bands(then, starts), seen, studio, near)
-            images[channel] = find_occluded(points, found, other, shown.intrinsics)
+            _, other = render_bands(make_bands(then, starts), seen, context, reference)
+            images[channel] = find_occluded(points, found, other, gbuffer.intrinsics)
     return images
 
 
@@ -155,7 +162,9 @@ def find_occluded(
     return np.asarray(~(seen & inside), np.uint8)
 
 
-def _nowhere(shape: tuple[int, ...], channels: frozenset[Channel]) -> dict[Channel, NDArray[Any]]:
+def _undefined_flow(
+    shape: tuple[int, ...], channels: frozenset[Channel]
+) -> dict[Channel, NDArray[Any]]:
     """Backward flow before there is anything to look back on."""
     values: dict[Channel, NDArray[Any]] = {
         Channel.FLOW_BACKWARD: np.full((*shape, 2), np.nan, np.float32),

@@ -57,7 +57,7 @@ def optical_depth(fog: Fog, z_m: float, up: float, distance_m: float):
 
 
 @wp.func
-def scattering(cosine: float):
+def phase_function(cosine: float):
     """Part of the light scattered per steradian at an angle; Henyey and Greenstein."""
     g = FORWARD
     q = 1.0 + g * g - 2.0 * g * cosine
@@ -65,7 +65,7 @@ def scattering(cosine: float):
 
 
 @wp.func
-def glow_of_lamp(fog: Fog, lamp: LightRecord, eye: wp.vec3, d: wp.vec3, distance_m: float):
+def lamp_glow(fog: Fog, lamp: LightRecord, eye: wp.vec3, d: wp.vec3, distance_m: float):
     """Light of one lamp that the fog along a ray sends to the eye, without shadows."""
     nearest_m = wp.dot(lamp.position_m - eye, d)
     off = lamp.position_m - eye - d * nearest_m
@@ -85,7 +85,7 @@ def glow_of_lamp(fog: Fog, lamp: LightRecord, eye: wp.vec3, d: wp.vec3, distance
             local = local * wp.exp(-p[2] / fog.height_m)
         # The equiangular density cancels the inverse square of the distance.
         squared = apart_m * apart_m + (t - nearest_m) * (t - nearest_m)
-        part = local * wp.exp(-depth) * scattering(wp.dot(d, beam.direction)) * squared
+        part = local * wp.exp(-depth) * phase_function(wp.dot(d, beam.direction)) * squared
         total += beam.normal_lux * part
     return total * ((end - start) / (apart_m * float(LAMP_POINTS)))
 
@@ -110,7 +110,7 @@ def glow_along(view: View, world: World, images: GBufferRecord, fog: Fog, i: int
     glow = wp.vec3(0.0)
     for j in range(world.lamps.shape[0]):
         if world.lamps[j].kind != SUN:
-            glow += glow_of_lamp(fog, world.lamps[j], view.eye_m, d * (1.0 / length), reach_m)
+            glow += lamp_glow(fog, world.lamps[j], view.eye_m, d * (1.0 / length), reach_m)
     return glow
 
 
@@ -192,7 +192,7 @@ def fill_with_fog(
     air = world.sky.irradiance[0] * world.sky.luminance
     for j in range(world.lamps.shape[0]):
         if world.lamps[j].kind == SUN:
-            air += world.lamps[j].power * scattering(-wp.dot(d, world.lamps[j].direction))
+            air += world.lamps[j].power * phase_function(-wp.dot(d, world.lamps[j].direction))
     lit = radiance[i] * clear + air * (1.0 - clear)
     if columns > 0:
         lit += glow_between(view, world, images, fog, columns, glow, i)

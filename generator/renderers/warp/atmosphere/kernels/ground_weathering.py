@@ -34,7 +34,7 @@ def smooth_ramp(low: float, high: float, x: float):
 
 
 @wp.func
-def scattered(x: int, y: int, seed: int):
+def hash_to_unit(x: int, y: int, seed: int):
     """A number in [0, 1) for each place of a lattice.
 
     Source: Jarzynski and Olano, "Hash functions for GPU rendering", JCGT 2020 (pcg).
@@ -57,8 +57,8 @@ def value_noise(x: float, y: float, seed: int):
     # Without a slope at the lattice's lines, where creases would show.
     u = u * u * (3.0 - 2.0 * u)
     v = v * v * (3.0 - 2.0 * v)
-    low = scattered(i, j, seed) * (1.0 - u) + scattered(i + 1, j, seed) * u
-    high = scattered(i, j + 1, seed) * (1.0 - u) + scattered(i + 1, j + 1, seed) * u
+    low = hash_to_unit(i, j, seed) * (1.0 - u) + hash_to_unit(i + 1, j, seed) * u
+    high = hash_to_unit(i, j + 1, seed) * (1.0 - u) + hash_to_unit(i + 1, j + 1, seed) * u
     return 2.0 * (low * (1.0 - v) + high * v) - 1.0
 
 
@@ -92,7 +92,7 @@ def footprint(view: View, p: wp.vec3, n: wp.vec3, pixels: float):
 
 
 @wp.func
-def widened(footprint_m: float, size_m: float):
+def edge_width(footprint_m: float, size_m: float):
     """How far the edges of patches spread where footprints are not small to them."""
     return wp.min(0.3 * footprint_m / size_m, 1.2)
 
@@ -104,7 +104,7 @@ def puddle_at(world: World, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m:
     # Water stands on what slopes by less than ten degrees.
     if world.ground.puddles > 0.0 and n[2] > 0.985:
         level = fractal_noise(p[0], p[1], 5.0, world.ground.seed)
-        wide = widened(footprint_m, 5.0)
+        wide = edge_width(footprint_m, 5.0)
         edge = world.ground.puddle_level
         depth = smooth_ramp(edge - wide, edge + 0.12 + wide, level)
         depth *= smooth_ramp(0.985, 0.997, n[2]) * exposed
@@ -120,7 +120,7 @@ def snow_rise(world: World, p: wp.vec3, n: wp.vec3, footprint_m: float):
         level = fractal_noise(p[0], p[1], 3.0, world.ground.seed + 16)
         # On slopes it holds where there is most.
         level -= 1.6 * (1.0 - smooth_ramp(0.3, 0.85, n[2]))
-        wide = widened(footprint_m, 3.0)
+        wide = edge_width(footprint_m, 3.0)
         rise = (level - world.ground.snow_level + 0.1 + wide) / (0.25 + 2.0 * wide)
     return wp.clamp(rise, -2.0, 3.0)
 
@@ -181,23 +181,23 @@ def albedo_below_coat(mixable: wp.vec4, albedo: wp.vec3):
 
 
 @wp.func
-def bumps_through(mixable: wp.vec4):
+def bump_visibility(mixable: wp.vec4):
     """How much of a surface's own bumps shows through a mix of coats."""
     return mixable[1] * (1.0 - 0.8 * wp.min(mixed_snow(mixable), 1.0))
 
 
 @wp.func
-def apply_coat(world: World, surface: int, look: SurfaceMaterial, coat: Coat, n: wp.vec3):
+def apply_coat(world: World, surface: int, material: SurfaceMaterial, coat: Coat, n: wp.vec3):
     """The surface as the weather leaves it; ``n`` is its normal without bumps."""
-    look.albedo = albedo_below_coat(coat.mixable, look.albedo)
-    bumps = bumps_through(coat.mixable)
-    look.roughness *= 1.0 - 0.4 * estimate_porosity(world, surface) * coat.wet
+    material.albedo = albedo_below_coat(coat.mixable, material.albedo)
+    bumps = bump_visibility(coat.mixable)
+    material.roughness *= 1.0 - 0.4 * estimate_porosity(world, surface) * coat.wet
     # Water reflects instead; the ground below it shines no more.
-    look.specular *= 1.0 - coat.puddle
+    material.specular *= 1.0 - coat.puddle
     if coat.snow > 0.0:
-        look.roughness += (0.85 - look.roughness) * coat.snow
-        look.metallic *= 1.0 - coat.snow
-        look.specular += (0.3 - look.specular) * coat.snow
+        material.roughness += (0.85 - material.roughness) * coat.snow
+        material.metallic *= 1.0 - coat.snow
+        material.specular += (0.3 - material.specular) * coat.snow
     if bumps < 1.0:
-        look.normal = fast_normalize(look.normal * bumps + n * (1.0 - bumps))
-    return look
+        material.normal = fast_normalize(material.normal * bumps + n * (1.0 - bumps))
+    return material

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.fog import scattering
+from gen_data.generator.renderers.warp.atmosphere.kernels.fog import phase_function
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import beam_from
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
 from gen_data.generator.renderers.warp.scene.kernels.records import (
@@ -49,7 +49,7 @@ def light_streaks(view: View, world: World, streaks: wp.array(dtype=Streak)):
     c = (mean + sky_irradiance(world.sky, wp.vec3(0.0, 0.0, 1.0))) * 0.5
     for j in range(world.lamps.shape[0]):
         beam = beam_from(world.lamps[j], p)
-        c += beam.normal_lux * scattering(wp.dot(d, beam.direction))
+        c += beam.normal_lux * phase_function(wp.dot(d, beam.direction))
     streaks[k].radiance = c
 
 

@@ -62,7 +62,7 @@ FILM_REACH = wp.constant(8)
 
 
 @wp.kernel
-def find_shelter(world: World, lattice: Lattice, exposed: wp.array(dtype=float)):
+def probe_exposure(world: World, lattice: Lattice, exposed: wp.array(dtype=float)):
     """Share of what falls that reaches each point of the lattice, by one ray each."""
     k = wp.tid()
     exposed[k] = 1.0
@@ -71,7 +71,7 @@ def find_shelter(world: World, lattice: Lattice, exposed: wp.array(dtype=float))
 
 
 @wp.kernel
-def average_shelter(
+def average_exposure(
     lattice: Lattice, probed: wp.array(dtype=float), exposed: wp.array(dtype=float)
 ):
     """The mean of find_shelter over points beside each other on the ground."""
@@ -121,7 +121,7 @@ def mean_color(world: World, surface: int):
 
 
 @wp.func
-def mirrored_sky(world: World, d: wp.vec3, width: float):
+def reflected_sky(world: World, d: wp.vec3, width: float):
     """Sky in one direction, with the suns that are blurred over an angle."""
     c = sky_rest(world.sky, d)
     for j in range(world.lamps.shape[0]):
@@ -134,7 +134,7 @@ def mirrored_sky(world: World, d: wp.vec3, width: float):
 
 
 @wp.func
-def mirrored_body(
+def reflected_surface(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -167,7 +167,7 @@ def mirrored_body(
 
 
 @wp.func
-def mirrored(
+def reflected_radiance(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -179,13 +179,13 @@ def mirrored(
     """Radiance along a mirrored ray."""
     m = closest_hit(world, origin, d, MIRRORED_M, HOLES)
     if m.at[0] < 0:
-        return mirrored_sky(world, d, width)
+        return reflected_sky(world, d, width)
     normal = flat_normal(world, m.at)
-    return mirrored_body(view, world, images, radiance, origin, d, m.t, m.at, normal)
+    return reflected_surface(view, world, images, radiance, origin, d, m.t, m.at, normal)
 
 
 @wp.func
-def mirrored_by(
+def facet_reflection(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -203,7 +203,7 @@ def mirrored_by(
     # What a tilted facet mirrors downwards would be the ground it lies on.
     r = fast_normalize(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
     fresnel = fresnel_schlick(WATER_F0, c)
-    seen = mirrored(view, world, images, radiance, origin, r, 0.02 + width) * fresnel
+    seen = reflected_radiance(view, world, images, radiance, origin, r, 0.02 + width) * fresnel
     return wp.vec4(seen[0], seen[1], seen[2], fresnel)
 
 
@@ -243,7 +243,7 @@ def mirror_in_films(
     # The root spreads points evenly over the disk of slopes, as Vogel's spiral has it.
     slope = wp.max(wet[1], 0.25 * FILM_SLOPE) * wp.sqrt(place / 64.0)
     tilt = wp.vec3(wp.cos(GOLDEN_ANGLE * place), wp.sin(GOLDEN_ANGLE * place), 0.0) * slope
-    seen = mirrored_by(
+    seen = facet_reflection(
         view, world, images, radiance, p, lattice.origin_m[k], fast_normalize(n + tilt), FILM_SLOPE
     )
     # Few rays do not find small bright lamps evenly; their lobes are shaded already.
@@ -383,7 +383,7 @@ def mirror_in_puddles(
     tilt_x = fractal_noise(p[0], p[1], 0.09, world.ground.seed + 48) * slope
     tilt_y = fractal_noise(p[0], p[1], 0.09, world.ground.seed + 52) * slope
     m = fast_normalize(n + wp.vec3(tilt_x, tilt_y, 0.0))
-    laid[i] = mirrored_by(view, world, images, radiance, p, origin, m, wet[1]) * wet[0]
+    laid[i] = facet_reflection(view, world, images, radiance, p, origin, m, wet[1]) * wet[0]
 
 
 @wp.kernel

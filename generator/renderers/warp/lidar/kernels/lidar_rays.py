@@ -14,11 +14,11 @@ from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import (
     Boxes,
     Bundle,
     ListedBodies,
+    empty_bundle,
+    extend_bundle,
+    is_box_entered,
     list_bodies,
-    no_rays,
-    ray_enters,
     reciprocals,
-    with_ray,
 )
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
 from gen_data.generator.renderers.warp.scene.kernels.dielectrics import WATER_F0, fresnel_schlick
@@ -131,7 +131,7 @@ class Ray:
 
 
 @wp.func
-def ray_of_beam(axis: wp.vec3, k: int, spread: float):
+def beam_direction(axis: wp.vec3, k: int, spread: float):
     """The axis of a beam, or one of six rays around it."""
     if k == 0:
         return axis
@@ -145,7 +145,7 @@ def ray_of_beam(axis: wp.vec3, k: int, spread: float):
 
 
 @wp.func
-def returned(light: Infrared, cosine: float):
+def backscatter(light: Infrared, cosine: float):
     """Reflectance for light that returns along its way, incidence included.
 
     The diffuse term is Lambert's, ``even * cosine``, or that of a rough surface, whose facets face
@@ -182,15 +182,15 @@ class Nearest:
 
 
 @wp.func
-def mover_frame(travel: BodyMotion, m: int, ray: Ray):
+def mover_frame(motion: BodyMotion, m: int, ray: Ray):
     """Directions of the lidar frame in the mesh frame of mover m when a ray leaves."""
     # Mixed matrices are no rotations, by the square of the small turn between two keys.
-    before = travel.B_mesh_lidar[m, ray.key]
-    return before + (travel.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
+    before = motion.B_mesh_lidar[m, ray.key]
+    return before + (motion.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
 
 
 @wp.func
-def nearer(world: World, travel: BodyMotion, b: int, ray: Ray, hit: Nearest, offset: bool):
+def intersect_body(world: World, motion: BodyMotion, b: int, ray: Ray, hit: Nearest, offset: bool):
     """The hit, or a nearer one on a body.
 
     From the scanner's own frame: what is far from the world's origin loses nothing.
@@ -198,12 +198,12 @@ def nearer(world: World, travel: BodyMotion, b: int, ray: Ray, hit: Nearest, off
     d = world.bodies[b].B_mesh_camera @ ray.direction
     o = world.bodies[b].eye_mesh
     m = int(-1)
-    if travel.keys > 0:
-        m = travel.rows[b]
+    if motion.keys > 0:
+        m = motion.rows[b]
     if m >= 0:
-        B = mover_frame(travel, m, ray)
-        before = travel.eye_mesh[m, ray.key]
-        o = before + (travel.eye_mesh[m, ray.key + 1] - before) * ray.share
+        B = mover_frame(motion, m, ray)
+        before = motion.eye_mesh[m, ray.key]
+        o = before + (motion.eye_mesh[m, ray.key + 1] - before) * ray.share
         o += B @ ray.origin_m
         d = B @ ray.direction
     elif offset:
@@ -219,38 +219,38 @@ def nearer(world: World, travel: BodyMotion, b: int, ray: Ray, hit: Nearest, off
 
 
 @wp.func
-def normal_of(scan: Scan, world: World, travel: BodyMotion, ray: Ray, hit: Nearest):
+def hit_normal(scan: Scan, world: World, motion: BodyMotion, ray: Ray, hit: Nearest):
     """Interpolated unit normal of a hit, lidar frame."""
     g = world.bodies[hit.body].geometry
     corner = face_vertices(world, g, hit.face)
     n = normal_at(world, g, corner[0]) * hit.u
     n += normal_at(world, g, corner[1]) * hit.v
     n += normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
-    if travel.keys > 0:
-        m = travel.rows[hit.body]
+    if motion.keys > 0:
+        m = motion.rows[hit.body]
         if m >= 0:
-            return fast_normalize(wp.transpose(mover_frame(travel, m, ray)) @ n)
+            return fast_normalize(wp.transpose(mover_frame(motion, m, ray)) @ n)
     return wp.transpose(scan.R_world_lidar) @ (
         world.bodies[hit.body].R_world_mesh @ fast_normalize(n)
     )
 
 
 @wp.func
-def ray_number(scan: Scan, travel: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
+def make_ray(scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
     """Ray i of all."""
     beam = i / scan.subrays
     ray = Ray()
-    ray.direction = ray_of_beam(axes[beam], i % scan.subrays, scan.spread)
-    if travel.keys > 0:
-        ray.origin_m = travel.origins_m[beam]
+    ray.direction = beam_direction(axes[beam], i % scan.subrays, scan.spread)
+    if motion.keys > 0:
+        ray.origin_m = motion.origins_m[beam]
         # The last pulse may leave at the last key: it belongs to the step before it.
-        ray.key = wp.min(int(travel.phases[beam]), travel.keys - 2)
-        ray.share = travel.phases[beam] - float(ray.key)
+        ray.key = wp.min(int(motion.phases[beam]), motion.keys - 2)
+        ray.share = motion.phases[beam] - float(ray.key)
     return ray
 
 
 @wp.func
-def eye_of(scan: Scan, ray: Ray, offset: bool):
+def world_origin(scan: Scan, ray: Ray, offset: bool):
     """Where a ray begins, world frame; at the lidar frame's origin unless it is ``offset``."""
     eye_m = scan.eye_m
     if offset:
@@ -262,7 +262,7 @@ def eye_of(scan: Scan, ray: Ray, offset: bool):
 def first_hit(
     scan: Scan,
     world: World,
-    travel: BodyMotion,
+    motion: BodyMotion,
     boxes: Boxes,
     listed: ListedBodies,
     ray: Ray,
@@ -281,8 +281,8 @@ def first_hit(
     hit.range_m = scan.reach_m
     hit.body = -1
     if likely >= 0:
-        hit = nearer(world, travel, likely, ray, hit, offset)
-    eye_m = eye_of(scan, ray, offset)
+        hit = intersect_body(world, motion, likely, ray, hit, offset)
+    eye_m = world_origin(scan, ray, offset)
     inverse = reciprocals(scan.R_world_lidar @ ray.direction)
     count = wp.where(listed.count < 0, boxes.lows_m.shape[0], listed.count)
     for k in range(count):
@@ -293,13 +293,13 @@ def first_hit(
                 break
             b = boxes.listed[listed.row, k]
         if b != likely:
-            if ray_enters(boxes, b, eye_m, inverse, hit.range_m):
-                hit = nearer(world, travel, b, ray, hit, offset)
+            if is_box_entered(boxes, b, eye_m, inverse, hit.range_m):
+                hit = intersect_body(world, motion, b, ray, hit, offset)
     return hit
 
 
 @wp.func
-def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_lidar: wp.vec3):
+def coat_at_hit(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_lidar: wp.vec3):
     """What weather has laid where a ray ends."""
     n = scan.R_world_lidar @ n_lidar
     if wp.dot(n_lidar, ray.direction) > 0.0:
@@ -314,7 +314,7 @@ def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_
 
 
 @wp.func
-def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: float):
+def apply_weather(world: World, light: Infrared, coat: Coat, surface: int, cosine: float):
     """A surface under water and snow.
 
     Water darkens rough ground at every wavelength that it does not absorb (Lekner and Dorf, "Why
@@ -339,7 +339,7 @@ def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: f
 
 
 @wp.func
-def number_at(scan: Scan, order: wp.array(dtype=int), j: int):
+def ray_index(scan: Scan, order: wp.array(dtype=int), j: int):
     """Number of the ray at a place in the order of beams; an empty order leaves all in theirs."""
     i = int(j)
     if order.shape[0] > 0:
@@ -348,19 +348,17 @@ def number_at(scan: Scan, order: wp.array(dtype=int), j: int):
 
 
 @wp.func
-def with_ray_number(
-    bundle: Bundle, scan: Scan, travel: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int
-):
+def add_ray(bundle: Bundle, scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
     """The bundle with ray i of all."""
-    ray = ray_number(scan, travel, axes, i)
-    return with_ray(bundle, eye_of(scan, ray, True), scan.R_world_lidar @ ray.direction)
+    ray = make_ray(scan, motion, axes, i)
+    return extend_bundle(bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction)
 
 
 @wp.kernel
 def scan_beams(
     scan: Scan,
     world: World,
-    travel: BodyMotion,
+    motion: BodyMotion,
     boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
@@ -385,15 +383,15 @@ def scan_beams(
     t = wp.tid()
     for begin in range(t * scan.run, ranges_m.shape[0], scan.threads * scan.run):
         end = wp.min(begin + scan.run, ranges_m.shape[0])
-        bundle = no_rays()
+        bundle = empty_bundle()
         for j in range(begin, end):
-            bundle = with_ray_number(bundle, scan, travel, axes, number_at(scan, order, j))
+            bundle = add_ray(bundle, scan, motion, axes, ray_index(scan, order, j))
         listed = list_bodies(boxes, t, bundle, scan.reach_m)
         last = int(-1)
         for j in range(begin, end):
-            i = number_at(scan, order, j)
-            ray = ray_number(scan, travel, axes, i)
-            hit = first_hit(scan, world, travel, boxes, listed, ray, last, 0.0, travel.keys > 0)
+            i = ray_index(scan, order, j)
+            ray = make_ray(scan, motion, axes, i)
+            hit = first_hit(scan, world, motion, boxes, listed, ray, last, 0.0, motion.keys > 0)
             last = hit.body
             if hit.body < 0:
                 hits[i] = wp.vec2i(-1, -1)
@@ -403,7 +401,7 @@ def scan_beams(
                 if world.ground.covered != 0:
                     puddles[i] = 0.0
             else:
-                n_lidar = normal_of(scan, world, travel, ray, hit)
+                n_lidar = hit_normal(scan, world, motion, ray, hit)
                 cosine = wp.min(wp.abs(wp.dot(n_lidar, ray.direction)), 1.0)
                 material = surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[i] = wp.vec2i(hit.body, material)
@@ -412,23 +410,23 @@ def scan_beams(
                 if lights[material].mirror > 0.0 or world.ground.covered != 0:
                     normals[i] = n_lidar
                 if world.ground.covered == 0:
-                    reflectances[i] = returned(lights[material], cosine)
+                    reflectances[i] = backscatter(lights[material], cosine)
                 else:
-                    coat = coat_of(scan, world, ray, hit.range_m, material, n_lidar)
-                    light = weathered(world, lights[material], coat, material, cosine)
-                    reflectances[i] = returned(light, cosine)
+                    coat = coat_at_hit(scan, world, ray, hit.range_m, material, n_lidar)
+                    light = apply_weather(world, lights[material], coat, material, cosine)
+                    reflectances[i] = backscatter(light, cosine)
                     puddles[i] = coat.puddle * (1.0 - wp.min(coat.snow, 1.0))
 
 
 @wp.kernel
-def look_through(
+def trace_behind_panes(
     scan: Scan,
     world: World,
-    travel: BodyMotion,
+    motion: BodyMotion,
     boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
-    picked: wp.array(dtype=int),
+    selected: wp.array(dtype=int),
     first_m: wp.array(dtype=float),
     ranges_m: wp.array(dtype=float),
     reflectances: wp.array(dtype=float),
@@ -436,27 +434,27 @@ def look_through(
 ):
     """What picked rays, which have met a pane, meet behind it and behind any further pane."""
     t = wp.tid()
-    for begin in range(t * scan.run, picked.shape[0], scan.threads * scan.run):
-        end = wp.min(begin + scan.run, picked.shape[0])
-        bundle = no_rays()
+    for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
+        end = wp.min(begin + scan.run, selected.shape[0])
+        bundle = empty_bundle()
         for j in range(begin, end):
-            bundle = with_ray_number(bundle, scan, travel, axes, picked[j])
+            bundle = add_ray(bundle, scan, motion, axes, selected[j])
         listed = list_bodies(boxes, t, bundle, FAR_M)
         for j in range(begin, end):
             hits[j] = wp.vec2i(-1, -1)
-            ray = ray_number(scan, travel, axes, picked[j])
+            ray = make_ray(scan, motion, axes, selected[j])
             begin_m = ray.origin_m
-            way_m = wp.max(first_m[picked[j]] - LASER_OFFSET_M, 0.0)
+            way_m = wp.max(first_m[selected[j]] - LASER_OFFSET_M, 0.0)
             passed = float(1.0)
             for face in range(FACES_MAX):
                 if passed > 0.0:
                     ray.origin_m = begin_m + ray.direction * way_m
-                    hit = first_hit(scan, world, travel, boxes, listed, ray, -1, way_m, True)
+                    hit = first_hit(scan, world, motion, boxes, listed, ray, -1, way_m, True)
                     if hit.body < 0:
                         passed = 0.0
                     else:
                         way_m += hit.range_m + LASER_OFFSET_M
-                        n = normal_of(scan, world, travel, ray, hit)
+                        n = hit_normal(scan, world, motion, ray, hit)
                         cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
                         material = surface_index(world, wp.vec2i(hit.body, hit.face))
                         clear = lights[material].clear
@@ -464,7 +462,7 @@ def look_through(
                             # Each further pane is overwritten by what is behind it, if anything is.
                             hits[j] = wp.vec2i(hit.body, material)
                             ranges_m[j] = way_m - LASER_OFFSET_M
-                            reflectances[j] = passed * returned(lights[material], cosine)
+                            reflectances[j] = passed * backscatter(lights[material], cosine)
                         if clear == 0.0:
                             passed = 0.0
                         elif face == 0 or hit.range_m > PANE_M:
@@ -473,7 +471,7 @@ def look_through(
 
 
 @wp.func
-def mirrored(ray: Ray, n: wp.vec3, range_m: float):
+def reflect_ray(ray: Ray, n: wp.vec3, range_m: float):
     """A ray after its reflection at a range, where the surface has normal n."""
     facing = wp.dot(n, ray.direction)
     ray.origin_m = ray.origin_m + ray.direction * range_m
@@ -483,14 +481,14 @@ def mirrored(ray: Ray, n: wp.vec3, range_m: float):
 
 
 @wp.kernel
-def look_in_mirrors(
+def trace_mirrors(
     scan: Scan,
     world: World,
-    travel: BodyMotion,
+    motion: BodyMotion,
     boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
-    picked: wp.array(dtype=int),
+    selected: wp.array(dtype=int),
     first_m: wp.array(dtype=float),
     first_hits: wp.array(dtype=wp.vec2i),
     normals: wp.array(dtype=wp.vec3),
@@ -507,30 +505,32 @@ def look_in_mirrors(
         waters: Share of each picked ray's end that is a puddle; 0 = the material mirrors.
     """
     t = wp.tid()
-    for begin in range(t * scan.run, picked.shape[0], scan.threads * scan.run):
-        end = wp.min(begin + scan.run, picked.shape[0])
-        bundle = no_rays()
+    for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
+        end = wp.min(begin + scan.run, selected.shape[0])
+        bundle = empty_bundle()
         for j in range(begin, end):
-            i = picked[j]
-            ray = mirrored(ray_number(scan, travel, axes, i), normals[i], first_m[i])
-            bundle = with_ray(bundle, eye_of(scan, ray, True), scan.R_world_lidar @ ray.direction)
+            i = selected[j]
+            ray = reflect_ray(make_ray(scan, motion, axes, i), normals[i], first_m[i])
+            bundle = extend_bundle(
+                bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction
+            )
         listed = list_bodies(boxes, t, bundle, scan.reach_m)
         last = int(-1)
         for j in range(begin, end):
-            i = picked[j]
-            ray = ray_number(scan, travel, axes, i)
+            i = selected[j]
+            ray = make_ray(scan, motion, axes, i)
             cosine = wp.min(wp.abs(wp.dot(normals[i], ray.direction)), 1.0)
             kept = fresnel_schlick(lights[first_hits[i][1]].mirror, cosine)
             if waters[j] > 0.0:
                 kept = waters[j] * fresnel_schlick(WATER_F0, cosine)
-            ray = mirrored(ray, normals[i], first_m[i])
-            hit = first_hit(scan, world, travel, boxes, listed, ray, last, 0.0, True)
+            ray = reflect_ray(ray, normals[i], first_m[i])
+            hit = first_hit(scan, world, motion, boxes, listed, ray, last, 0.0, True)
             last = hit.body
             hits[j] = wp.vec2i(-1, -1)
             if hit.body >= 0:
-                n = normal_of(scan, world, travel, ray, hit)
+                n = hit_normal(scan, world, motion, ray, hit)
                 material = surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[j] = wp.vec2i(hit.body, material)
                 ranges_m[j] = first_m[i] + LASER_OFFSET_M + hit.range_m
                 cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
-                reflectances[j] = kept * kept * returned(lights[material], cosine)
+                reflectances[j] = kept * kept * backscatter(lights[material], cosine)

@@ -61,7 +61,7 @@ class ListedBodies:
 
 
 @wp.func
-def no_rays():
+def empty_bundle():
     """The bundle of no ray."""
     bundle = Bundle()
     bundle.origin_low_m = wp.vec3(FAR_M)
@@ -72,7 +72,7 @@ def no_rays():
 
 
 @wp.func
-def with_ray(bundle: Bundle, origin_m: wp.vec3, way: wp.vec3):
+def extend_bundle(bundle: Bundle, origin_m: wp.vec3, way: wp.vec3):
     """The bundle with one more ray."""
     bundle.origin_low_m = componentwise_min(bundle.origin_low_m, origin_m)
     bundle.origin_high_m = componentwise_max(bundle.origin_high_m, origin_m)
@@ -82,7 +82,7 @@ def with_ray(bundle: Bundle, origin_m: wp.vec3, way: wp.vec3):
 
 
 @wp.func
-def enters_slab(near_m: float, far_m: float, way_low: float, way_high: float):
+def slab_entry(near_m: float, far_m: float, way_low: float, way_high: float):
     """Least distance at which any ray can be between two planes; FAR_M = none ever is.
 
     Args:
@@ -98,7 +98,7 @@ def enters_slab(near_m: float, far_m: float, way_low: float, way_high: float):
 
 
 @wp.func
-def leaves_slab(near_m: float, far_m: float, way_low: float, way_high: float):
+def slab_exit(near_m: float, far_m: float, way_low: float, way_high: float):
     """Largest distance at which any ray can still be between two planes that it can reach."""
     leave = float(FAR_M)
     if way_low > 0.0:
@@ -109,18 +109,18 @@ def leaves_slab(near_m: float, far_m: float, way_low: float, way_high: float):
 
 
 @wp.func
-def enters_m(bundle: Bundle, low_m: wp.vec3, high_m: wp.vec3):
+def entry_distance(bundle: Bundle, low_m: wp.vec3, high_m: wp.vec3):
     """Least distance at which a ray of a bundle may enter a box; FAR_M where none does."""
     slack = wp.vec3(SLACK_M)
     a = low_m - slack - bundle.origin_high_m
     c = high_m + slack - bundle.origin_low_m
     low, high = bundle.way_low, bundle.way_high
-    enter = enters_slab(a[0], c[0], low[0], high[0])
-    enter = max_of_two(enter, enters_slab(a[1], c[1], low[1], high[1]))
-    enter = max_of_two(enter, enters_slab(a[2], c[2], low[2], high[2]))
-    leave = leaves_slab(a[0], c[0], low[0], high[0])
-    leave = min_of_two(leave, leaves_slab(a[1], c[1], low[1], high[1]))
-    leave = min_of_two(leave, leaves_slab(a[2], c[2], low[2], high[2]))
+    enter = slab_entry(a[0], c[0], low[0], high[0])
+    enter = max_of_two(enter, slab_entry(a[1], c[1], low[1], high[1]))
+    enter = max_of_two(enter, slab_entry(a[2], c[2], low[2], high[2]))
+    leave = slab_exit(a[0], c[0], low[0], high[0])
+    leave = min_of_two(leave, slab_exit(a[1], c[1], low[1], high[1]))
+    leave = min_of_two(leave, slab_exit(a[2], c[2], low[2], high[2]))
     enter = enter * (1.0 - SLACK)
     return wp.where(enter > leave * (1.0 + SLACK), FAR_M, enter)
 
@@ -130,7 +130,7 @@ def list_bodies(boxes: Boxes, row: int, bundle: Bundle, reach_m: float):
     """List what a bundle may meet within reach, the nearest first."""
     count = int(0)
     for b in range(boxes.lows_m.shape[0]):
-        enter = enters_m(bundle, boxes.lows_m[b], boxes.highs_m[b])
+        enter = entry_distance(bundle, boxes.lows_m[b], boxes.highs_m[b])
         if enter < reach_m and enter < FAR_M and count >= 0:
             if count == LISTED_MAX:
                 count = -1
@@ -165,7 +165,7 @@ def reciprocals(way: wp.vec3):
 
 
 @wp.func
-def ray_enters(boxes: Boxes, b: int, origin_m: wp.vec3, inverse: wp.vec3, reach_m: float):
+def is_box_entered(boxes: Boxes, b: int, origin_m: wp.vec3, inverse: wp.vec3, reach_m: float):
     """Whether a ray may enter a body's box before its reach."""
     a = wp.cw_mul(boxes.lows_m[b] - origin_m, inverse)
     c = wp.cw_mul(boxes.highs_m[b] - origin_m, inverse)

@@ -82,7 +82,7 @@ def roughness_to_alpha(roughness: float):
 
 
 @wp.func
-def fifth(c: float):
+def schlick_weight(c: float):
     """(1 - c)^5, Schlick's."""
     d = 1.0 - c
     d2 = d * d
@@ -165,20 +165,20 @@ def reflectance(s: Bsdf, v_h: float):
         r = fresnel_dielectric(v_h, s.ior)
         f = wp.vec3(r, r, r)
     else:
-        k = fifth(wp.min(v_h, 1.0))
+        k = schlick_weight(wp.min(v_h, 1.0))
         f = f * (1.0 - k) + wp.vec3(s.f90, s.f90, s.f90) * k
     return wp.cw_mul(f, s.scale)
 
 
 @wp.func
-def slope(alpha: float, c: float):
+def smith_root(alpha: float, c: float):
     """The root in Smith's functions for one cosine."""
     a2 = alpha * alpha
     return wp.sqrt(a2 + (1.0 - a2) * c * c)
 
 
 @wp.func
-def facets(alpha: float, h: wp.vec3):
+def ggx_density(alpha: float, h: wp.vec3):
     """GGX: the density of facets' normals."""
     # By the tangent's square, which keeps its digits where the lobe is narrow.
     a2 = alpha * alpha
@@ -200,28 +200,28 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
     h = fast_normalize(s.v + l)
     v_h = wp.max(wp.dot(s.v, h), 0.0)
     if s.p_shine > 0.0:
-        lobe = 0.5 * facets(s.alpha, h)
-        root = slope(s.alpha, n_v)
+        lobe = 0.5 * ggx_density(s.alpha, h)
+        root = smith_root(s.alpha, n_v)
         reflected = reflectance(s, v_h)
         p = s.p_shine
         # At an interface the lot between both ways is Fresnel's, facet by facet.
         if s.ior > 0.0:
             p = reflected[0]
-        f += reflected * (lobe * n_l / (n_l * root + n_v * slope(s.alpha, n_l)))
+        f += reflected * (lobe * n_l / (n_l * root + n_v * smith_root(s.alpha, n_l)))
         density += p * lobe / (n_v + root)
     if s.coat > 0.0:
-        lobe = 0.5 * facets(s.coat_alpha, h)
-        root = slope(s.coat_alpha, n_v)
-        k = fifth(wp.min(v_h, 1.0))
+        lobe = 0.5 * ggx_density(s.coat_alpha, h)
+        root = smith_root(s.coat_alpha, n_v)
+        k = schlick_weight(wp.min(v_h, 1.0))
         shine = s.coat * (s.coat_f0 + (1.0 - s.coat_f0) * k) * lobe * n_l
-        shine = shine / (n_l * root + n_v * slope(s.coat_alpha, n_l))
+        shine = shine / (n_l * root + n_v * smith_root(s.coat_alpha, n_l))
         f += wp.vec3(shine, shine, shine)
         density += s.p_coat * lobe / (n_v + root)
     return f, density
 
 
 @wp.func
-def visible_facet(v: wp.vec3, alpha: float, u: wp.vec2):
+def sample_visible_normal(v: wp.vec3, alpha: float, u: wp.vec2):
     """A facet's normal, drawn as often as it is seen from ``v``."""
     # Heitz 2018: stretched by alpha, a GGX surface is a hemisphere.
     w = fast_normalize(wp.vec3(v[0] * alpha, v[1] * alpha, v[2]))
@@ -236,7 +236,7 @@ def visible_facet(v: wp.vec3, alpha: float, u: wp.vec2):
 
 
 @wp.func
-def around_normal(u: wp.vec2):
+def sample_cosine(u: wp.vec2):
     """A direction, drawn in proportion to its cosine."""
     # Malley: evenly on a disk, lifted to the hemisphere, is in proportion to the cosine.
     r = wp.sqrt(u[0])
@@ -257,10 +257,10 @@ def scatter(s: Bsdf, choice: float, u: wp.vec2):
         alpha = s.alpha
         if choice < s.p_coat:
             alpha = s.coat_alpha
-        h = visible_facet(s.v, alpha, u)
+        h = sample_visible_normal(s.v, alpha, u)
         out.l = h * (2.0 * wp.dot(s.v, h)) - s.v
     else:
-        out.l = around_normal(u)
+        out.l = sample_cosine(u)
     if out.l[2] > 0.0:
         f, density = evaluate(s, out.l)
         out.density = density
@@ -282,7 +282,7 @@ def scatter_glass(s: Bsdf, lot: float, u: wp.vec2):
         u: In [0, 1), for the direction.
     """
     out = Scattering()
-    h = visible_facet(s.v, s.alpha, u)
+    h = sample_visible_normal(s.v, s.alpha, u)
     v_h = wp.min(wp.dot(s.v, h), 1.0)
     if lot < fresnel_dielectric(v_h, s.ior):
         out.l = h * (2.0 * v_h) - s.v
@@ -296,6 +296,6 @@ def scatter_glass(s: Bsdf, lot: float, u: wp.vec2):
         n_l = -out.l[2]
         if n_l > 0.0:
             # Over the density of visible facets, all of Walter's BTDF cancels but Smith's G1 of l.
-            passed = 2.0 * n_l / (n_l + slope(s.alpha, n_l))
+            passed = 2.0 * n_l / (n_l + smith_root(s.alpha, n_l))
             out.weight = wp.vec3(passed, passed, passed)
     return out

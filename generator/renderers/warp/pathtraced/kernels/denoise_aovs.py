@@ -46,7 +46,7 @@ def trace_guides(
             colors += wp.vec3(1.0, 1.0, 1.0)
         else:
             v = make_vertex(world, hit, d, 0.0)
-            colors += v.look.albedo
-            normals += v.look.normal
+            colors += v.material.albedo
+            normals += v.material.normal
     albedo[i] = colors * (1.0 / float(samples))
     normal[i] = normals * (1.0 / float(samples))

@@ -139,7 +139,7 @@ def sky_weight(sky: EnvironmentRecord, table: SkyTable, n: wp.vec3):
 
 
 @wp.func
-def in_cone(axis: wp.vec3, sine_squared: float, u: wp.vec2):
+def sample_cone(axis: wp.vec3, sine_squared: float, u: wp.vec2):
     """A direction, drawn evenly from a cone; with one minus its cosine to the axis."""
     # Even in solid angle is even in the cosine (Shirley, Wang and Zimmerman 1996).
     low = u[0] * cone_width(sine_squared)
@@ -165,7 +165,7 @@ def draw_ball(lamp: LightRecord, p: wp.vec3, u: wp.vec2):
     sine = ball_sine(lamp, squared)
     # Inside a ball it fills all directions: it is left to paths that meet it.
     if sine < 1.0:
-        direction, low = in_cone(axis, sine, u)
+        direction, low = sample_cone(axis, sine, u)
         g.direction = direction
         g.density = 1.0 / (2.0 * wp.pi * cone_width(sine))
         g.radiance = ball_radiance(lamp, axis)
@@ -219,7 +219,7 @@ def draw_panel(lamp: LightRecord, p: wp.vec3, u: wp.vec2):
 
 
 @wp.func
-def meet_lamp(lamp: LightRecord, p: wp.vec3, d: wp.vec3):
+def intersect_lamp(lamp: LightRecord, p: wp.vec3, d: wp.vec3):
     """What a ray sees of a lamp."""
     g = LightSample()
     g.direction = d
@@ -261,7 +261,7 @@ def meet_lamp(lamp: LightRecord, p: wp.vec3, d: wp.vec3):
 
 
 @wp.func
-def interval_of(shares: wp.array(dtype=float), last: int, u: float):
+def find_interval(shares: wp.array(dtype=float), last: int, u: float):
     """The largest k < last with ``shares[k] <= u``."""
     low = int(0)
     high = last
@@ -309,9 +309,9 @@ def draw_sky(sky: EnvironmentRecord, table: SkyTable, u: wp.vec2):
     """A direction of the sky, drawn by the brightness of the image."""
     height = table.rows.shape[0] - 1
     width = table.columns.shape[1] - 1
-    row = interval_of(table.rows, height, u[1])
+    row = find_interval(table.rows, height, u[1])
     edges = table.columns[row]
-    column = interval_of(edges, width, u[0])
+    column = find_interval(edges, width, u[0])
     tall = table.rows[row + 1] - table.rows[row]
     wide = edges[column + 1] - edges[column]
     x = (float(column) + wp.min((u[0] - edges[column]) / wide, 1.0)) / float(width)

@@ -39,8 +39,8 @@ from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import (
     draw_ball,
     draw_panel,
     draw_sky,
+    intersect_lamp,
     lamp_weight,
-    meet_lamp,
     power_heuristic,
     sky_density,
     sky_light,
@@ -49,7 +49,7 @@ from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import (
 )
 from gen_data.generator.renderers.warp.pathtraced.kernels.sampler import (
     hash_bits,
-    place_on_curve,
+    morton_index,
     random_number,
     random_pair,
 )
@@ -153,7 +153,7 @@ class Vertex:
 
     p: wp.vec3
     flat: wp.vec3
-    look: SurfaceMaterial
+    material: SurfaceMaterial
     surface: int
     outside: bool
     glow: wp.vec3
@@ -206,28 +206,28 @@ def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
     smooth = face_viewer((R @ n) * side, d)
     v.surface = surface_index(world, hit.at)
     weight = wp.vec2(hit.weight[0] + 1.0 - side, hit.weight[1])
-    v.look = evaluate_material(world, v.surface, hit.at, weight, smooth, width_m, -d)
+    v.material = evaluate_material(world, v.surface, hit.at, weight, smooth, width_m, -d)
     v.glow = world.surfaces[v.surface].emission_cd_m2
     v.opacity = 1.0
     if world.surfaces[v.surface].layered != 0:
-        v = layered(world, v, hit.at, weight, width_m)
+        v = add_layers(world, v, hit.at, weight, width_m)
     if world.ground.covered != 0:
-        v = weathered(world, v, smooth, width_m)
-    v.look.normal = face_viewer(v.look.normal, d)
+        v = add_weather(world, v, smooth, width_m)
+    v.material.normal = face_viewer(v.material.normal, d)
     return v
 
 
 @wp.func(**OUT_OF_LINE)
-def layered(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: float):
+def add_layers(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: float):
     """A surface with all there is to it."""
     maps = maps_at(world, v.surface, at, weight, width_m)
-    v.look.metallic *= maps.metallic
+    v.material.metallic *= maps.metallic
     v.glow = wp.cw_mul(v.glow, maps.glow)
-    v.clear = world.surfaces[v.surface].transmission * (1.0 - v.look.metallic)
+    v.clear = world.surfaces[v.surface].transmission * (1.0 - v.material.metallic)
     if v.clear > 0.0:
         ior = world.surfaces[v.surface].ior
         normal = (ior - 1.0) / (ior + 1.0)
-        v.look.specular = normal * normal / 0.08
+        v.material.specular = normal * normal / 0.08
     v.opacity = world.surfaces[v.surface].opacity
     v.film = world.surfaces[v.surface].coat
     v.film_f0 = COAT_F0
@@ -236,13 +236,13 @@ def layered(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: flo
 
 
 @wp.func(**OUT_OF_LINE)
-def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
+def add_weather(world: World, v: Vertex, n: wp.vec3, width_m: float):
     """A surface as the weather leaves it; ``n`` is its normal without bumps."""
     exposed = float(1.0)
     if n[2] > 0.1:
         exposed = precipitation_exposure(world, offset_origin(v.p, v.flat))
     coat = coat_at(world, v.surface, v.p, n, exposed, width_m)
-    v.look = apply_coat(world, v.surface, v.look, coat, n)
+    v.material = apply_coat(world, v.surface, v.material, coat, n)
     bare = 1.0 - wp.min(coat.snow, 1.0)
     v.clear *= bare
     v.film *= bare
@@ -256,13 +256,13 @@ def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
 
 
 @wp.func
-def pane_leaves(world: World, v: Vertex, d: wp.vec3):
+def straight_transmittance(world: World, v: Vertex, d: wp.vec3):
     """Transmittance of what bends nothing: gaps in opacity, and clear panes."""
     through = wp.vec3(1.0, 1.0, 1.0) * (1.0 - v.opacity)
     if v.clear > 0.0 and is_clear_pane(world, v.surface):
-        cosine = wp.min(wp.abs(wp.dot(v.look.normal, d)), 1.0)
+        cosine = wp.min(wp.abs(wp.dot(v.material.normal, d)), 1.0)
         f = fresnel_dielectric(cosine, world.surfaces[v.surface].ior)
-        through += pane_transmittance(f, v.look.albedo) * (v.opacity * v.clear)
+        through += pane_transmittance(f, v.material.albedo) * (v.opacity * v.clear)
     return through
 
 
@@ -274,25 +274,25 @@ def is_clear_pane(world: World, surface: int):
 
 
 @wp.func
-def lets_straight(world: World, surface: int):
+def may_pass_straight(world: World, surface: int):
     """Whether light may pass a surface unbent."""
     pane = world.surfaces[surface].transmission > 0.0 and is_clear_pane(world, surface)
     return pane or world.surfaces[surface].opacity < 1.0
 
 
 @wp.func
-def light_through(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear: int):
+def transmittance(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear: int):
     """What is left of light from a distance."""
     through = wp.vec3(1.0, 1.0, 1.0)
     if clear != 0:
-        through = light_through_panes(world, o, d, distance_m)
+        through = pane_chain_transmittance(world, o, d, distance_m)
     elif is_intersected(world, path_along(o, d * distance_m), HOLES):
         through = wp.vec3(0.0)
     return through
 
 
 @wp.func(**OUT_OF_LINE)
-def light_through_panes(world: World, o: wp.vec3, d: wp.vec3, distance_m: float):
+def pane_chain_transmittance(world: World, o: wp.vec3, d: wp.vec3, distance_m: float):
     """What is left of light where some surfaces let it through."""
     through = wp.vec3(1.0, 1.0, 1.0)
     origin = o
@@ -304,9 +304,9 @@ def light_through_panes(world: World, o: wp.vec3, d: wp.vec3, distance_m: float)
         going = False
         if hit.at[0] >= 0:
             leaves = wp.vec3(0.0)
-            if lets_straight(world, surface_index(world, hit.at)):
+            if may_pass_straight(world, surface_index(world, hit.at)):
                 v = make_vertex(world, hit, d, 0.0)
-                leaves = pane_leaves(world, v, d)
+                leaves = straight_transmittance(world, v, d)
                 origin = offset_origin(v.p, -v.flat)
             through = wp.cw_mul(through, leaves)
             passages += 1
@@ -318,7 +318,7 @@ def light_through_panes(world: World, o: wp.vec3, d: wp.vec3, distance_m: float)
 
 
 @wp.func
-def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float):
+def hit_lamp_light(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float):
     """Light of the lamps that a stretch of a ray meets, up to a distance from its anchor.
 
     Also 1 where the body at its end shows one of them: that body's own light is the lamp's.
@@ -326,7 +326,7 @@ def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float)
     light = wp.vec3(0.0)
     shown = int(0)
     for j in range(world.lamps.shape[0]):
-        g = meet_lamp(world.lamps[j], a.p, d)
+        g = intersect_lamp(world.lamps[j], a.p, d)
         if g.distance_m > a.way_m and g.distance_m < end_m:
             part = float(1.0)
             if a.density >= 0.0 and budget.lights != 2:
@@ -341,7 +341,7 @@ def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float)
 
 
 @wp.func
-def sky_met(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3):
+def hit_sky_light(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3):
     """Light of the sky that a ray meets."""
     light = wp.vec3(0.0)
     if world.sky.luminance > 0.0:
@@ -356,13 +356,13 @@ def sky_met(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3
 
 
 @wp.func
-def to_frame(v: wp.vec3, x: wp.vec3, y: wp.vec3, n: wp.vec3):
+def to_shading_frame(v: wp.vec3, x: wp.vec3, y: wp.vec3, n: wp.vec3):
     """World to the shading frame."""
     return wp.vec3(wp.dot(x, v), wp.dot(y, v), wp.dot(n, v))
 
 
 @wp.func
-def light_asked(
+def sample_source(
     world: World,
     table: SkyTable,
     budget: Budget,
@@ -383,7 +383,7 @@ def light_asked(
         g = draw_panel(world.lamps[choice.source], o, u)
     else:
         g = draw_ball(world.lamps[choice.source], o, u)
-    l = to_frame(g.direction, x, y, v.look.normal)  # noqa: E741
+    l = to_shading_frame(g.direction, x, y, v.material.normal)  # noqa: E741
     # Above both horizons: light must not leak through a face by its shading normal.
     if g.distance_m > 0.0 and l[2] > 0.0 and wp.dot(g.direction, v.flat) > 0.0:
         f, density = evaluate(s, l)
@@ -394,13 +394,13 @@ def light_asked(
             # Alone, the technique has all the light and needs no weight.
             if budget.lights == 3:
                 part = power_heuristic(asked, density)
-            through = light_through(world, o, g.direction, g.distance_m, budget.clear)
+            through = transmittance(world, o, g.direction, g.distance_m, budget.clear)
             light = wp.cw_mul(f, through) * (part / asked)
     return light
 
 
 @wp.struct
-class Dealt:
+class ChosenLobe:
     """What a vertex is, after the lot.
 
     Attributes:
@@ -421,7 +421,7 @@ ROUGH_PANE = wp.constant(3)
 
 
 @wp.func
-def lot_between(reflected: float, passed: float):
+def reflection_probability(reflected: float, passed: float):
     """Probability of reflection, not too far from what it brings."""
     p = reflected / wp.max(reflected + passed, 1.0e-9)
     if passed > 0.0:
@@ -430,17 +430,17 @@ def lot_between(reflected: float, passed: float):
 
 
 @wp.func(**OUT_OF_LINE)
-def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
+def choose_glass_lobe(world: World, v: Vertex, w: wp.vec3, lot: float):
     """Glass; of panes, whether they reflect or let pass. ``w`` is to where the path comes from."""
-    out = Dealt()
-    tint = v.look.albedo
-    alpha = roughness_to_alpha(v.look.roughness)
+    out = ChosenLobe()
+    tint = v.material.albedo
+    alpha = roughness_to_alpha(v.material.roughness)
     ior = world.surfaces[v.surface].ior
     if world.surfaces[v.surface].thin != 0:
         f = fresnel_dielectric(w[2], ior)
         back = pane_reflectance(f, tint)
         on = pane_transmittance(f, tint)
-        p = lot_between(luminance(back), luminance(on))
+        p = reflection_probability(luminance(back), luminance(on))
         out.bsdf = make_interface(w, alpha, 0.0)
         out.bsdf.f0 = wp.vec3(1.0, 1.0, 1.0)
         out.bsdf.f90 = 1.0
@@ -467,9 +467,9 @@ def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
 
 
 @wp.func
-def deal(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample: wp.uint32):
+def choose_lobe(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample: wp.uint32):
     """What a vertex is; ``w`` points to where the path comes from, in the shading frame."""
-    out = Dealt()
+    out = ChosenLobe()
     lot = float(0.0)
     if v.opacity < 1.0 or v.clear > 0.0:
         lot = random_pair(key, pair, sample)[0]
@@ -481,14 +481,14 @@ def deal(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample:
         # What is left of a lot below a bound is a fresh one on [0, 1): no second draw is due.
         lot = lot / v.opacity
     if lot < v.clear:
-        return deal_glass(world, v, w, lot / v.clear)
+        return choose_glass_lobe(world, v, w, lot / v.clear)
     out.bsdf = make_bsdf(
         world.lobes,
         w,
-        v.look.albedo,
-        v.look.roughness,
-        v.look.metallic,
-        v.look.specular,
+        v.material.albedo,
+        v.material.roughness,
+        v.material.metallic,
+        v.material.specular,
         v.film,
         v.film_f0,
         v.film_roughness,
@@ -518,7 +518,7 @@ class Step:
 
 
 @wp.func
-def step_from(
+def scatter_path(
     world: World,
     table: SkyTable,
     budget: Budget,
@@ -534,12 +534,12 @@ def step_from(
         d: Direction in which the path has come.
         key, pair, sample: Of the first of its PAIRS pairs of numbers.
     """
-    n = v.look.normal
+    n = v.material.normal
     x, y = make_frame(n)
-    w = to_frame(-d, x, y, n)
+    w = to_shading_frame(-d, x, y, n)
     # Bumps may turn a normal away from where the path comes from; the model needs Z > 0.
     w = wp.vec3(w[0], w[1], wp.max(w[2], 1.0e-3))
-    dealt = deal(world, v, w, key, pair, sample)
+    dealt = choose_lobe(world, v, w, key, pair, sample)
     step = Step()
     step.density = -1.0
     step.straight = dealt.kind == STRAIGHT
@@ -572,7 +572,7 @@ def step_from(
         step.total = choice.total
         if choice.part > 0.0 and budget.lights != 2:
             u = random_pair(key, pair + 3, sample)
-            step.light = light_asked(world, table, budget, dealt.bsdf, v, o, x, y, choice, u)
+            step.light = sample_source(world, table, budget, dealt.bsdf, v, o, x, y, choice, u)
     step.o = offset_origin(v.p, side)
     step.d = x * sent.l[0] + y * sent.l[1] + n * sent.l[2]
     # A shading normal has sent it into the face: that light is lost, as in a groove.
@@ -582,7 +582,7 @@ def step_from(
 
 
 @wp.func
-def anchor_of(step: Step, n: wp.vec3):
+def make_anchor(step: Step, n: wp.vec3):
     """The anchor that a vertex with a normal becomes, where a path has just left it."""
     a = Anchor()
     a.p = step.o
@@ -593,7 +593,7 @@ def anchor_of(step: Step, n: wp.vec3):
 
 
 @wp.func
-def path_light(
+def trace_path(
     view: View,
     world: World,
     table: SkyTable,
@@ -630,11 +630,11 @@ def path_light(
         shown = int(0)
         # Cameras do not see lamps without a body, as in the other tier.
         if bounces > 0:
-            met, shown = lamps_met(world, budget, a, d, end_m)
+            met, shown = hit_lamp_light(world, budget, a, d, end_m)
             light += wp.cw_mul(through, met)
         if hit.at[0] < 0:
             if bounces > 0 or world.sky.visible != 0:
-                light += wp.cw_mul(through, sky_met(world, table, budget, a, d))
+                light += wp.cw_mul(through, hit_sky_light(world, table, budget, a, d))
         else:
             width_m += cone * hit.t
             v = make_vertex(world, hit, d, width_m)
@@ -642,7 +642,7 @@ def path_light(
                 light += wp.cw_mul(through, v.glow)
             if bounces < budget.bounces and passages < PASSAGES_MAX:
                 pair = 1 + PAIRS * (bounces + passages)
-                step = step_from(world, table, budget, v, d, key, pair, sample)
+                step = scatter_path(world, table, budget, v, d, key, pair, sample)
                 light += wp.cw_mul(through, step.light)
                 through = wp.cw_mul(through, step.weight)
                 going = wp.max(through) > 0.0
@@ -653,7 +653,7 @@ def path_light(
                     a.way_m = end_m
                 else:
                     bounces += 1
-                    a = anchor_of(step, v.look.normal)
+                    a = make_anchor(step, v.material.normal)
                     if a.density > 0.0:
                         # A direction stands for those around it that are not drawn.
                         spread = wp.sqrt(1.0 / (a.density * float(budget.whole)))
@@ -682,7 +682,7 @@ def trace_paths(
     if not is_in_view(view, i):
         return
     # Pixels whose places are too many for the sequence's numbers begin others.
-    place = place_on_curve(i % view.width, i / view.width)
+    place = morton_index(i % view.width, i / view.width)
     bits = wp.uint32(budget.sample_bits)
     key = budget.key
     if budget.sample_bits > 0:
@@ -690,7 +690,7 @@ def trace_paths(
     first = (place << bits) + wp.uint32(budget.first)
     total = wp.vec3(0.0)
     for k in range(budget.samples):
-        total += path_light(view, world, table, budget, i, key, first + wp.uint32(k))
+        total += trace_path(view, world, table, budget, i, key, first + wp.uint32(k))
     light[i] = light[i] + total
 
 

@@ -30,23 +30,23 @@ def hash_bits(key: wp.uint32):
 
 
 @wp.func
-def swapped(bits: wp.uint32, width: wp.uint32, mask: wp.uint32):
+def swap_bits(bits: wp.uint32, width: wp.uint32, mask: wp.uint32):
     """Neighbouring groups of that many bits in each other's place; the mask is of every second."""
     return ((bits & mask) << width) | ((bits >> width) & mask)
 
 
 @wp.func
-def reversed_bits(bits: wp.uint32):
+def reverse_bits(bits: wp.uint32):
     """The same bits, the last first."""
     x = (bits << wp.uint32(16)) | (bits >> wp.uint32(16))
-    x = swapped(x, wp.uint32(8), wp.uint32(0x00FF00FF))
-    x = swapped(x, wp.uint32(4), wp.uint32(0x0F0F0F0F))
-    x = swapped(x, wp.uint32(2), wp.uint32(0x33333333))
-    return swapped(x, wp.uint32(1), wp.uint32(0x55555555))
+    x = swap_bits(x, wp.uint32(8), wp.uint32(0x00FF00FF))
+    x = swap_bits(x, wp.uint32(4), wp.uint32(0x0F0F0F0F))
+    x = swap_bits(x, wp.uint32(2), wp.uint32(0x33333333))
+    return swap_bits(x, wp.uint32(1), wp.uint32(0x55555555))
 
 
 @wp.func
-def scrambled(bits: wp.uint32, seed: wp.uint32):
+def scramble(bits: wp.uint32, seed: wp.uint32):
     """Flip each bit by a hash of the bits below it."""
     x = bits ^ (bits * wp.uint32(0x3D20ADEA))
     x = (x + seed) * ((seed >> wp.uint32(16)) | wp.uint32(1))
@@ -55,7 +55,7 @@ def scrambled(bits: wp.uint32, seed: wp.uint32):
 
 
 @wp.func
-def pascal(index: wp.uint32):
+def second_dimension(index: wp.uint32):
     """Bits of an index times Pascal's triangle modulo 2: the second Sobol dimension, reversed."""
     x = index
     x = x ^ ((x >> wp.uint32(1)) & wp.uint32(0x55555555))
@@ -82,7 +82,7 @@ def spread_bits(bits: wp.uint32):
 
 
 @wp.func
-def place_on_curve(x: int, y: int):
+def morton_index(x: int, y: int):
     """Number of a pixel along Morton's curve."""
     return spread_bits(wp.uint32(x)) | (spread_bits(wp.uint32(y)) << wp.uint32(1))
 
@@ -99,11 +99,11 @@ def random_pair(key: wp.uint32, dimension: int, sample: wp.uint32):
     """
     seed = hash_bits(key ^ (wp.uint32(dimension) * wp.uint32(0x5851F42D)))
     # Each pair of one path goes through the samples in an order of its own.
-    index = reversed_bits(scrambled(reversed_bits(sample), seed))
+    index = reverse_bits(scramble(reverse_bits(sample), seed))
     # Arbitrary odd numbers: they only have to differ, so that no two streams are alike.
-    first = scrambled(index, hash_bits(seed ^ wp.uint32(0x2511E9B3)))
-    second = scrambled(pascal(index), hash_bits(seed ^ wp.uint32(0x63D83595)))
-    return wp.vec2(unit_float(reversed_bits(first)), unit_float(reversed_bits(second)))
+    first = scramble(index, hash_bits(seed ^ wp.uint32(0x2511E9B3)))
+    second = scramble(second_dimension(index), hash_bits(seed ^ wp.uint32(0x63D83595)))
+    return wp.vec2(unit_float(reverse_bits(first)), unit_float(reverse_bits(second)))
 
 
 @wp.func

@@ -29,8 +29,8 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import ray_origi
 from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import (
     GBufferRecord,
     light_at,
-    open_lobe,
     sky_exposure_at,
+    specular_occlusion,
     sum_lamp_light,
     visible_lamp_fraction,
     visible_sky_fraction,
@@ -64,10 +64,10 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     fast_normalize,
     first_weight,
     flat_normal,
+    is_back_face,
     normal_at,
     pixel_direction,
     pixel_width,
-    seen_inside,
     surface_index,
     vertex_at,
 )
@@ -182,7 +182,7 @@ def maps_at(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprin
 
 
 @wp.struct
-class Meeting:
+class SurfaceHit:
     """Where a ray meets a surface; ``hit`` is (-1, -1) where it meets none.
 
     Attributes:
@@ -200,10 +200,10 @@ class Meeting:
 
 
 @wp.func(**OUT_OF_LINE)
-def met(world: World, origin: wp.vec3, d: wp.vec3):
+def trace_surface(world: World, origin: wp.vec3, d: wp.vec3):
     """The first surface along a ray."""
     first = closest_hit(world, origin, d, FARTHEST, HOLES)
-    m = Meeting()
+    m = SurfaceHit()
     m.hit = first.at
     m.t = first.t
     if m.hit[0] >= 0:
@@ -240,13 +240,13 @@ def curvature(world: World, hit: wp.vec2i):
 
 
 @wp.func
-def above(r: wp.vec3, n: wp.vec3):
+def lift_over_horizon(r: wp.vec3, n: wp.vec3):
     """A direction lifted over a surface that bumps have turned it into."""
     return fast_normalize(r + n * wp.max(0.02 - wp.dot(r, n), 0.0))
 
 
 @wp.func(**OUT_OF_LINE)
-def looked_at(
+def evaluate_with_maps(
     world: World,
     surface: int,
     hit: wp.vec2i,
@@ -256,19 +256,19 @@ def looked_at(
     v: wp.vec3,
 ):
     """A surface with all its maps, and the further ones by themselves."""
-    look = evaluate_material(world, surface, hit, weight, n, width_m, v)
+    material = evaluate_material(world, surface, hit, weight, n, width_m, v)
     slant = wp.sqrt(wp.max(wp.dot(n, v), 0.05))
     maps = maps_at(world, surface, hit, weight, width_m / slant)
-    look.metallic *= maps.metallic
-    return look, maps
+    material.metallic *= maps.metallic
+    return material, maps
 
 
 @wp.func(**OUT_OF_LINE)
-def light_of_meeting(
+def light_at_hit(
     world: World,
     probe: Probe,
-    m: Meeting,
-    look: SurfaceMaterial,
+    m: SurfaceHit,
+    material: SurfaceMaterial,
     occlusion: float,
     p: wp.vec3,
     d: wp.vec3,
@@ -293,7 +293,7 @@ def light_of_meeting(
     if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
         open_sky *= visible_sky_fraction(world, origin, m.normal, probe.disc, probe.radius_m)
     surface = surface_index(world, m.hit)
-    return light_at(world, surface, look, p, -d, probe.lit, open_sky, k)
+    return light_at(world, surface, material, p, -d, probe.lit, open_sky, k)
 
 
 @wp.struct
@@ -330,14 +330,14 @@ def sky_along(world: World, ray: Ray):
 
 
 @wp.func
-def root_of(color: wp.vec3):
+def sqrt_color(color: wp.vec3):
     """The square root of a colour, channel by channel."""
     return wp.vec3(wp.sqrt(color[0]), wp.sqrt(color[1]), wp.sqrt(color[2]))
 
 
 @wp.func
-def gone_on(
-    world: World, ray: Ray, m: Meeting, look: SurfaceMaterial, clear: float, opacity: float
+def continue_ray(
+    world: World, ray: Ray, m: SurfaceHit, material: SurfaceMaterial, clear: float, opacity: float
 ):
     """A ray behind a surface: its direction, and its share of what is there.
 
@@ -352,13 +352,15 @@ def gone_on(
     if clear > 0.0:
         if world.surfaces[surface].thin != 0:
             f = fresnel_dielectric(c, ior)
-            passed = pane_transmittance(f, look.albedo)
+            passed = pane_transmittance(f, material.albedo)
             onward += wp.cw_mul(ray.share, passed) * (clear * opacity)
         else:
             eta = wp.where(m.entering != 0, ior, 1.0 / ior)
             way = refract(ray.d, m.normal, eta)
             f = fresnel_dielectric(c, eta)
-            onward += wp.cw_mul(ray.share, root_of(look.albedo)) * ((1.0 - f) * clear * opacity)
+            onward += wp.cw_mul(ray.share, sqrt_color(material.albedo)) * (
+                (1.0 - f) * clear * opacity
+            )
             side = wp.where(m.entering != 0, 1.0, -1.0)
             ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, m.hit) * ray.width_m
             if wp.dot(way, way) == 0.0:
@@ -371,14 +373,14 @@ def gone_on(
 
 
 @wp.func
-def seen_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
+def radiance_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
     """Radiance along a ray, behind clear surfaces too, times its share."""
     total = wp.vec3(0.0)
     surfaces = int(0)
     going = bool(True)
     while going:
         going = False
-        m = met(world, ray.origin, ray.d)
+        m = trace_surface(world, ray.origin, ray.d)
         if m.hit[0] < 0:
             total += wp.cw_mul(ray.share, sky_along(world, ray))
         else:
@@ -387,25 +389,25 @@ def seen_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
             surface = surface_index(world, m.hit)
             v = -ray.d
             n = m.normal
-            look, maps = looked_at(world, surface, m.hit, m.weight, n, ray.width_m, v)
+            material, maps = evaluate_with_maps(world, surface, m.hit, m.weight, n, ray.width_m, v)
             if world.ground.covered != 0:
                 lifted = ray_origin(world, m.hit, m.weight, p, ray.d)
                 exposed = sky_exposure_at(world, lifted, n)
                 coat = coat_at(world, surface, p, n, exposed, ray.width_m)
-                look = apply_coat(world, surface, look, coat, n)
-            clear = world.surfaces[surface].transmission * (1.0 - look.metallic)
+                material = apply_coat(world, surface, material, coat, n)
+            clear = world.surfaces[surface].transmission * (1.0 - material.metallic)
             opacity = world.surfaces[surface].opacity
             # From inside a solid nothing but what goes on is seen.
             if clear == 0.0 or m.entering != 0 or world.surfaces[surface].thin != 0:
                 share = wp.max(ray.share)
-                light = light_of_meeting(
-                    world, probe, m, look, maps.occlusion, p, ray.d, share, clear, k
+                light = light_at_hit(
+                    world, probe, m, material, maps.occlusion, p, ray.d, share, clear, k
                 )
-                own = wp.cw_mul(light.diffuse, look.albedo) * (1.0 - clear) + light.rest
+                own = wp.cw_mul(light.diffuse, material.albedo) * (1.0 - clear) + light.rest
                 own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow - wp.vec3(1.0))
                 total += wp.cw_mul(ray.share, own) * opacity
             if clear > 0.0 or opacity < 1.0:
-                ray = gone_on(world, ray, m, look, clear, opacity)
+                ray = continue_ray(world, ray, m, material, clear, opacity)
                 ray.origin = passed_origin(p, ray.d, view.eye_m)
                 surfaces += 1
                 going = surfaces < SURFACES_MAX and wp.max(ray.share) > 0.002
@@ -439,7 +441,7 @@ def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
     """What glass mirrors and what it lets through, from outside; ``c`` is the cosine to it."""
     f = fresnel_dielectric(c, world.surfaces[surface].ior)
     mirrored = wp.vec3(f)
-    passed = root_of(albedo) * (1.0 - f)
+    passed = sqrt_color(albedo) * (1.0 - f)
     if world.surfaces[surface].thin != 0:
         mirrored = pane_reflectance(f, albedo)
         passed = pane_transmittance(f, albedo)
@@ -447,7 +449,7 @@ def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
 
 
 @wp.func
-def below_coat(
+def add_clearcoat(
     world: World,
     surface: int,
     layers: Layers,
@@ -473,7 +475,7 @@ def below_coat(
         layers.own -= lamps.shown * coat
     else:
         sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
-        layers.own += sky * (share * open_lobe(lacquer, open_sky))
+        layers.own += sky * (share * specular_occlusion(lacquer, open_sky))
     return layers
 
 
@@ -481,7 +483,7 @@ def below_coat(
 def layers_at(
     world: World,
     surface: int,
-    look: SurfaceMaterial,
+    material: SurfaceMaterial,
     maps: Maps,
     bare: float,
     n: wp.vec3,
@@ -498,35 +500,37 @@ def layers_at(
         n: Normal without bumps.
     """
     layers = Layers()
-    layers.n = look.normal
-    n_v = wp.dot(look.normal, v)
-    clear = world.surfaces[surface].transmission * (1.0 - look.metallic) * bare
-    specular = look.specular
+    layers.n = material.normal
+    n_v = wp.dot(material.normal, v)
+    clear = world.surfaces[surface].transmission * (1.0 - material.metallic) * bare
+    specular = material.specular
     if clear > 0.0:
         ior = world.surfaces[surface].ior
         normal = (ior - 1.0) / (ior + 1.0)
         specular = normal * normal / 0.08
-    brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, specular, n_v)
+    brdf = make_brdf(
+        world.lobes, material.albedo, material.roughness, material.metallic, specular, n_v
+    )
     gloss = brdf.gloss
     if clear > 0.0:
         c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
-        mirrored, passed = glass_shares(world, surface, look.albedo, c)
+        mirrored, passed = glass_shares(world, surface, material.albedo, c)
         gloss = gloss * (1.0 - clear) + mirrored * clear
         layers.behind = passed * clear
-    lamps = sum_lamp_light(world, brdf, look.normal, p, v, lit, k)
-    ambient = sky_irradiance(world.sky, look.normal) * open_sky
-    diffuse = wp.cw_mul(brdf.matte, look.albedo) * (1.0 - clear)
+    lamps = sum_lamp_light(world, brdf, material.normal, p, v, lit, k)
+    ambient = sky_irradiance(world.sky, material.normal) * open_sky
+    diffuse = wp.cw_mul(brdf.matte, material.albedo) * (1.0 - clear)
     layers.own = wp.cw_mul(diffuse, lamps.lux * (1.0 / wp.pi) + ambient) + lamps.shine
     layers.own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
-    if brdf.roughness < MIRROR_ROUGHNESS and (look.metallic >= 0.5 or clear > 0.0):
+    if brdf.roughness < MIRROR_ROUGHNESS and (material.metallic >= 0.5 or clear > 0.0):
         layers.mirror = gloss
         layers.own -= lamps.shown
     else:
-        sky = sky_reflection(world.sky, look.normal * (2.0 * n_v) - v, brdf.roughness)
-        layers.own += wp.cw_mul(gloss, sky) * open_lobe(brdf, open_sky)
+        sky = sky_reflection(world.sky, material.normal * (2.0 * n_v) - v, brdf.roughness)
+        layers.own += wp.cw_mul(gloss, sky) * specular_occlusion(brdf, open_sky)
     coat = world.surfaces[surface].coat * bare
     if coat > 0.0:
-        layers = below_coat(world, surface, layers, coat, n, p, v, lit, open_sky, k)
+        layers = add_clearcoat(world, surface, layers, coat, n, p, v, lit, open_sky, k)
     opacity = 1.0 - (1.0 - world.surfaces[surface].opacity) * bare
     layers.own = layers.own * opacity
     layers.mirror = layers.mirror * opacity
@@ -537,7 +541,7 @@ def layers_at(
 
 
 @wp.func
-def ray_of(
+def make_layer_ray(
     view: View,
     world: World,
     layers: Layers,
@@ -567,10 +571,10 @@ def ray_of(
             m = layers.n
             ray.share = layers.mirror
             ray.roughness = world.surfaces[surface].roughness
-        ray.d = above(d - m * (2.0 * wp.dot(m, d)), n)
+        ray.d = lift_over_horizon(d - m * (2.0 * wp.dot(m, d)), n)
         ray.origin = ray_origin(world, hit, weight, p, way)
         ray.mirrored = 1
-        side = wp.where(seen_inside(weight), -1.0, 1.0)
+        side = wp.where(is_back_face(weight), -1.0, 1.0)
         ray.spread += 2.0 * side * curvature(world, hit) * width_m
     else:
         ray.share = wp.vec3(layers.straight)
@@ -580,9 +584,9 @@ def ray_of(
                 ray.share += wp.vec3(layers.straight)
             else:
                 ior = world.surfaces[surface].ior
-                eta = wp.where(seen_inside(weight), 1.0 / ior, ior)
+                eta = wp.where(is_back_face(weight), 1.0 / ior, ior)
                 bent = refract(d, layers.n, eta)
-                side = wp.where(seen_inside(weight), -1.0, 1.0)
+                side = wp.where(is_back_face(weight), -1.0, 1.0)
                 ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, hit) * width_m
                 if wp.dot(bent, bent) > 0.0:
                     ray.d = bent
@@ -643,19 +647,19 @@ def layered_radiance(
     v = fast_normalize(-point.way)
     p = view.eye_m + point.way
     width_m = pixel_width(view, i, images.z_m[i])
-    look, maps = looked_at(world, surface, hit, point.weight, n, width_m, v)
+    material, maps = evaluate_with_maps(world, surface, hit, point.weight, n, width_m, v)
     bare = float(1.0)
     if world.ground.covered != 0:
         coat = coat_at(world, surface, p, n, exposed, footprint(view, p, n, 1.0))
-        look = apply_coat(world, surface, look, coat, n)
+        material = apply_coat(world, surface, material, coat, n)
         bare = 1.0 - wp.min(coat.snow, 1.0)
     sky = open_sky * maps.occlusion
-    layers = layers_at(world, surface, look, maps, bare, n, p, v, lit, sky, k)
+    layers = layers_at(world, surface, material, maps, bare, n, p, v, lit, sky, k)
     c = layers.own
     for part in range(4):
-        ray = ray_of(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
+        ray = make_layer_ray(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
         if wp.max(ray.share) > 0.0:
-            c += seen_along(view, world, probe, ray, k)
+            c += radiance_along(view, world, probe, ray, k)
     return c
 
 

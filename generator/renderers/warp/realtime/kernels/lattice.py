@@ -18,9 +18,9 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     face_vertices,
     fast_normalize,
     first_weight,
+    is_back_face,
     normal_at,
     pixel_direction,
-    seen_inside,
     surface_index,
     vertex_at,
 )
@@ -66,7 +66,7 @@ def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d
     p0 = vertex_at(world, g, corner[0])
     p1 = vertex_at(world, g, corner[1])
     p2 = vertex_at(world, g, corner[2])
-    side = wp.where(seen_inside(weight), -1.0, 1.0)
+    side = wp.where(is_back_face(weight), -1.0, 1.0)
     u = first_weight(weight)
     v = weight[1]
     w = 1.0 - u - v

@@ -11,7 +11,7 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
     albedo_below_coat,
-    bumps_through,
+    bump_visibility,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     Cell,
@@ -144,7 +144,7 @@ class Tilt:
 
 
 @wp.func
-def tilt_of(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3):
+def make_tilt(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3):
     """What on_bump needs, from the sum of the light's directions, normal and viewer."""
     tilt = Tilt()
     if wp.dot(towards, towards) > 0.0:
@@ -159,7 +159,7 @@ def tilt_of(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3
 
 
 @wp.func
-def on_bump(tilt: Tilt, roughness: float, m: wp.vec3):
+def bump_factors(tilt: Tilt, roughness: float, m: wp.vec3):
     """Factors on diffuse light and on the rest where a texture tilts the normal to m.
 
     The lamps are taken for one, where their light comes from on average.
@@ -185,7 +185,7 @@ def quad_tilt(lattice: Lattice, lights: wp.array(dtype=LatticeLight), q: int, qu
     towards = a.towards + b.towards + c.towards + d.towards
     lamps = 0.25 * (a.lamps + b.lamps + c.lamps + d.lamps)
     shine = 0.25 * (a.shine + b.shine + c.shine + d.shine)
-    return tilt_of(towards, lamps, shine, quad.normal, quad.to_viewer)
+    return make_tilt(towards, lamps, shine, quad.normal, quad.to_viewer)
 
 
 @wp.func
@@ -241,13 +241,15 @@ def gathered_radiance(
         v = fast_normalize(-d)
         n = images.normals[i]
         width_m = pixel_width(view, i, images.z_m[i])
-        look = evaluate_material(world, surface, hit, images.weights[i], n, width_m, v)
-        albedo = look.albedo
+        material = evaluate_material(world, surface, hit, images.weights[i], n, width_m, v)
+        albedo = material.albedo
         if bumpy:
             if covered:
-                look.normal = fast_normalize(n + (look.normal - n) * bumps_through(coat * share))
-            tilt = tilt_of(light.towards, light.lamps * share, light.shine * share, n, v)
-            factors = on_bump(tilt, look.roughness, look.normal)
+                material.normal = fast_normalize(
+                    n + (material.normal - n) * bump_visibility(coat * share)
+                )
+            tilt = make_tilt(light.towards, light.lamps * share, light.shine * share, n, v)
+            factors = bump_factors(tilt, material.roughness, material.normal)
             light.diffuse *= factors[0]
             light.rest *= factors[1]
     if covered:
@@ -256,7 +258,9 @@ def gathered_radiance(
 
 
 @wp.func
-def one_face(view: View, images: GBufferRecord, face: wp.vec2i, x0: int, x1: int, y0: int, y1: int):
+def is_one_face(
+    view: View, images: GBufferRecord, face: wp.vec2i, x0: int, x1: int, y0: int, y1: int
+):
     """Whether all pixels of a rectangle see one face."""
     same = bool(True)
     y = int(y0)
@@ -279,11 +283,11 @@ def quad_sampler(world: World, texture: int, quad: Quad, patch: Patch, footprint
 
 
 @wp.func
-def bumped(patch: Patch, bump: wp.vec3, covered: bool, coat: wp.vec4):
+def bump_normal(patch: Patch, bump: wp.vec3, covered: bool, coat: wp.vec4):
     """The normal of a patch with a texture's bumps, below what weather has laid on them."""
     b = bump
     if covered:
-        bumps = bumps_through(coat)
+        bumps = bump_visibility(coat)
         b = b * bumps + wp.vec3(0.0, 0.0, 1.0 - bumps)
     m = patch.tangent * b[0] + patch.bitangent * b[1]
     return fast_normalize(m + patch.normal * wp.max(b[2], 0.1))
@@ -349,8 +353,8 @@ def light_patch(
                 texel = texel_at(world, texture, sampler, u, v, bumpy)
                 color = wp.cw_mul(albedo, texel.albedo)
                 if bumpy:
-                    m = bumped(patch, texel.bump, covered, coat)
-                    factors = on_bump(tilt, roughness * texel.roughness, m)
+                    m = bump_normal(patch, texel.bump, covered, coat)
+                    factors = bump_factors(tilt, roughness * texel.roughness, m)
                     lit = lit * factors[0]
                     shine = shine * factors[1]
             if covered:
@@ -392,7 +396,7 @@ def gather_light(
         quad = quad_at(view, world, images, lattice, row * lattice.width + column)
         whole = quad.smooth != 0
         if whole:
-            whole = one_face(view, images, quad.face, x0, x1, y0, y1)
+            whole = is_one_face(view, images, quad.face, x0, x1, y0, y1)
         if whole:
             surface = lattice.surface[row * lattice.width + column]
             patch = Patch()

@@ -20,7 +20,7 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     beam_from,
     lobe_widening,
     relative_illuminance,
-    towards_mirror,
+    representative_direction,
 )
 from gen_data.generator.renderers.warp.scene.kernels.brdf import Brdf, make_brdf, specular_lobe
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
@@ -87,7 +87,7 @@ class LatticeLight:
 
 
 @wp.func
-def part_of(a: wp.vec3, b: wp.vec3):
+def share_of(a: wp.vec3, b: wp.vec3):
     """How much of b is a, over all channels."""
     # The floor is for black: nothing is a part of nothing.
     return (a[0] + a[1] + a[2]) / wp.max(b[0] + b[1] + b[2], 1.0e-20)
@@ -130,7 +130,7 @@ def sum_lamp_light(
             beam = beam_from(world.lamps[j], p_world)
             n_l = relative_illuminance(world.lamps[j], beam, p_world, n)
             if n_l > 0.0:
-                l = towards_mirror(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
+                l = representative_direction(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
                 # A wide lamp's brightest point may be set while the lamp still lights: see
                 # ``above_horizon_fraction``.
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
@@ -148,7 +148,7 @@ def sum_lamp_light(
 
 
 @wp.func
-def open_lobe(brdf: Brdf, open_sky: float):
+def specular_occlusion(brdf: Brdf, open_sky: float):
     """Visible part of the sky in the specular lobe.
 
     Source: Lagarde and de Rousiers 2014, with a fixed exponent.
@@ -161,7 +161,7 @@ def open_lobe(brdf: Brdf, open_sky: float):
 def light_at(
     world: World,
     surface: int,
-    look: SurfaceMaterial,
+    material: SurfaceMaterial,
     p_world: wp.vec3,
     v: wp.vec3,
     lit: wp.array(dtype=float, ndim=2),
@@ -175,9 +175,11 @@ def light_at(
         lit: Visible part of each lamp at points [lamp, k]; UNSEEN is none.
         open_sky: Visible part of the hemisphere.
     """
-    n = look.normal
+    n = material.normal
     n_v = wp.dot(n, v)
-    brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, look.specular, n_v)
+    brdf = make_brdf(
+        world.lobes, material.albedo, material.roughness, material.metallic, material.specular, n_v
+    )
     lamps = sum_lamp_light(world, brdf, n, p_world, v, lit, k)
     light = LatticeLight()
     light.towards = lamps.towards
@@ -185,10 +187,10 @@ def light_at(
     mirror = sky_reflection(world.sky, n * (2.0 * n_v) - v, brdf.roughness)
     lux = lamps.lux * (1.0 / wp.pi)
     light.diffuse = wp.cw_mul(brdf.matte, lux + ambient)
-    light.rest = wp.cw_mul(brdf.gloss, mirror) * open_lobe(brdf, open_sky) + lamps.shine
+    light.rest = wp.cw_mul(brdf.gloss, mirror) * specular_occlusion(brdf, open_sky) + lamps.shine
     light.rest += world.surfaces[surface].emission_cd_m2
-    light.lamps = part_of(lux, lux + ambient)
-    light.shine = part_of(lamps.shine, light.rest)
+    light.lamps = share_of(lux, lux + ambient)
+    light.shine = share_of(lamps.shine, light.rest)
     return light
 
 
@@ -217,21 +219,21 @@ def light_lattice(
     i = lattice.pixel[k]
     p = lattice.p_m[k]
     v = fast_normalize(view.eye_m - p)
-    look = plain_material(world, surface, lattice.normal[k])
+    material = plain_material(world, surface, lattice.normal[k])
     if world.surfaces[surface].texture >= 0:
         z = images.z_m[i]
         weight = images.weights[i]
         width_m = pixel_width(view, i, z)
-        look = evaluate_material(
+        material = evaluate_material(
             world, surface, images.hits[i], weight, lattice.normal[k], width_m, v
         )
     if world.ground.covered != 0:
         size_m = footprint(view, p, lattice.normal[k], float(lattice.stride))
         coat = coat_at(world, surface, p, lattice.normal[k], world.ground.exposed[k], size_m)
-        look = apply_coat(world, surface, look, coat, lattice.normal[k])
+        material = apply_coat(world, surface, material, coat, lattice.normal[k])
         coats[k] = coat.mixable
-    look.normal = lattice.normal[k]
-    lights[k] = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
+    material.normal = lattice.normal[k]
+    lights[k] = light_at(world, surface, material, p, v, lit, open_sky[0, k], k)
 
 
 @wp.kernel
@@ -258,14 +260,16 @@ def shade_points(
     v = fast_normalize(-d)
     z = images.z_m[i]
     width_m = pixel_width(view, i, z)
-    look = evaluate_material(world, surface, hit, images.weights[i], images.normals[i], width_m, v)
+    material = evaluate_material(
+        world, surface, hit, images.weights[i], images.normals[i], width_m, v
+    )
     p = view.eye_m + d * z
     if world.ground.covered != 0:
         n = images.normals[i]
         coat = coat_at(world, surface, p, n, exposed[k], footprint(view, p, n, 1.0))
-        look = apply_coat(world, surface, look, coat, n)
-    light = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
-    radiance[i] = wp.cw_mul(light.diffuse, look.albedo) + light.rest
+        material = apply_coat(world, surface, material, coat, n)
+    light = light_at(world, surface, material, p, v, lit, open_sky[0, k], k)
+    radiance[i] = wp.cw_mul(light.diffuse, material.albedo) + light.rest
 
 
 @wp.func
@@ -280,7 +284,7 @@ def is_gatherable(world: World, surface: int):
 
 
 @wp.kernel
-def look_around(
+def find_pixel_visibility(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -325,13 +329,13 @@ def look_around(
                     wp.max(column - reach, 0), wp.min(column + 2 + reach, lattice.width)
                 ):
                     q = v * lattice.width + u
-                    if related(view, images, lattice, i, p, q):
+                    if is_usable_point(view, images, lattice, i, p, q):
                         right = float(column - u) + cell.right
                         down = float(row - v) + cell.down
-                        w = nearness(right, down)
+                        w = distance_weight(right, down)
                         found += w
                         sky += lattice_sky[0, q] * w
-                        rained_on += exposed_point(world, q) * w
+                        rained_on += lattice_exposure(world, q) * w
                         for j in range(world.lamps.shape[0]):
                             lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
     if found > 0.0:
@@ -344,7 +348,7 @@ def look_around(
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
         for j in range(world.lamps.shape[0]):
             lit[j, k] = visible_lamp_fraction(world, world.lamps[j], origin, n, parts)
-        sky, found = sky_of_body(lattice, lattice_sky, cell.first, images.hits[i][0])
+        sky, found = body_sky_visibility(lattice, lattice_sky, cell.first, images.hits[i][0])
         if found == 0.0:
             sky = visible_sky_fraction(world, origin, n, disc, radius_m)
             found = 1.0
@@ -353,7 +357,7 @@ def look_around(
 
 
 @wp.func
-def exposed_point(world: World, q: int):
+def lattice_exposure(world: World, q: int):
     """Share of what falls that reaches lattice point q."""
     exposed = float(1.0)
     if world.ground.covered != 0:
@@ -371,7 +375,9 @@ def sky_exposure_at(world: World, origin: wp.vec3, n: wp.vec3):
 
 
 @wp.func
-def sky_of_body(lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int):
+def body_sky_visibility(
+    lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int
+):
     """Sum and number of the sky's visible parts at those corners of a cell that lie on a body.
 
     A leaf or a spoke is as open to the sky as those beside it, whichever way they are turned.
@@ -387,7 +393,7 @@ def sky_of_body(lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q:
 
 
 @wp.func
-def nearness(dx: float, dy: float):
+def distance_weight(dx: float, dy: float):
     """Weight of a lattice point, by its distance in cells."""
     squared = dx * dx + dy * dy
     # Fourth powers of the distance: the nearest point counts, without a seam where it changes.
@@ -395,7 +401,9 @@ def nearness(dx: float, dy: float):
 
 
 @wp.func
-def related(view: View, images: GBufferRecord, lattice: Lattice, i: int, p: wp.vec3, q: int):
+def is_usable_point(
+    view: View, images: GBufferRecord, lattice: Lattice, i: int, p: wp.vec3, q: int
+):
     """Whether a lattice point lies on the body of pixel i, near it and turned like it."""
     same = lattice.body[q] == images.hits[i][0]
     if same:

@@ -43,7 +43,7 @@ class Tile:
 
 
 @wp.func
-def tile_of(lattice: Lattice, column: int, row: int):
+def tile_bounds(lattice: Lattice, column: int, row: int):
     """Bounds of one tile."""
     low = wp.vec3(1.0e9)
     high = wp.vec3(-1.0e9)
@@ -96,7 +96,7 @@ class Shaft:
 
 
 @wp.func
-def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
+def make_shaft(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     """The shaft from a tile along a way, to a ball, seen from body b."""
     shrink = 1.0 / world.bodies[b].scale
     shaft = Shaft()
@@ -129,7 +129,7 @@ def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
 
 
 @wp.func
-def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
+def may_touch(shaft: Shaft, low: wp.vec3, high: wp.vec3):
     """Whether a box may reach into a shaft."""
     if shaft.flat != 0:
         top = wp.dot(shaft.normal, (low + high) * 0.5)
@@ -146,7 +146,7 @@ def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
 
 
 @wp.func
-def boxes_touch(shaft: Shaft, world: World, g: int):
+def any_box_touches(shaft: Shaft, world: World, g: int):
     """Whether any of a mesh's boxes may reach into a shaft.
 
     Bodies that surround the scene (a room), have holes or are long and slanted have one box that
@@ -155,7 +155,7 @@ def boxes_touch(shaft: Shaft, world: World, g: int):
     found = bool(False)
     for k in range(world.geometries[g].box_lows_m.shape[0]):
         low = world.geometries[g].box_lows_m[k]
-        if touches(shaft, low, world.geometries[g].box_highs_m[k]):
+        if may_touch(shaft, low, world.geometries[g].box_highs_m[k]):
             found = True
             break
     return found
@@ -173,10 +173,10 @@ def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     if wp.max(low) > 0.0 or wp.min(high) < 0.0:
         return False
     g = world.bodies[b].geometry
-    shaft = shaft_to(world, b, tile, way, radius_m)
-    shades = touches(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
+    shaft = make_shaft(world, b, tile, way, radius_m)
+    shades = may_touch(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
     if shades:
-        shades = boxes_touch(shaft, world, g)
+        shades = any_box_touches(shaft, world, g)
     return shades
 
 
@@ -192,7 +192,7 @@ def may_shade_from(world: World, b: int, tile: Tile, lamp: LightRecord):
 
 
 @wp.func
-def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
+def append_occluder(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
     """Put a body on a list, or mark the list as too long."""
     n = lists[tile, j, 0]
     if n >= 0 and n < LIST_LENGTH:
@@ -203,7 +203,9 @@ def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
 
 
 @wp.func
-def matters(lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int):
+def is_lamp_relevant(
+    lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int
+):
     """Whether lamp j is more than faint at any point of a tile."""
     found = bool(False)
     for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
@@ -235,7 +237,7 @@ def list_occluders(
     i = wp.tid()
     column = i % tile_columns
     row = i / tile_columns
-    tile = tile_of(lattice, column, row)
+    tile = tile_bounds(lattice, column, row)
     lamps = world.lamps.shape[0]
     for j in range(lamps + 1):
         lists[i, j, 0] = 0
@@ -244,10 +246,10 @@ def list_occluders(
     near = tile
     near.radius_m = tile.radius_m + ambient_radius_m
     for j in range(lamps):
-        if matters(lattice, shares, j, column, row):
+        if is_lamp_relevant(lattice, shares, j, column, row):
             for b in range(world.bodies.shape[0]):
                 if may_shade_from(world, b, tile, world.lamps[j]):
-                    append(lists, i, j, b)
+                    append_occluder(lists, i, j, b)
     for b in range(world.bodies.shape[0]):
         if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
-            append(lists, i, lamps, b)
+            append_occluder(lists, i, lamps, b)

@@ -118,7 +118,7 @@ def tile_index(lattice: Lattice, i: int, tile_columns: int):
 
 
 @wp.func
-def settled(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
+def agreed_value(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
     """What the points beside, above and below a point agree on; UNSEEN if they do not.
 
     Each of them must be there, on the same material.
@@ -162,7 +162,9 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, nd
 
 
 @wp.func
-def mean_beside(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
+def mean_of_neighbours(
+    lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int
+):
     """Mean of what the points beside, above and below a point say on its material, if any does."""
     i = y * lattice.width + x
     total = float(0.0)
@@ -205,16 +207,16 @@ def probe_lamps(
         value = float(UNSEEN)
         if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
             if parity == 1:
-                value = settled(lattice, lit, j, x, y)
+                value = agreed_value(lattice, lit, j, x, y)
                 if value == UNSEEN and shares[j, i] < SMOOTHED_SHARE:
-                    value = mean_beside(lattice, lit, j, x, y)
+                    value = mean_of_neighbours(lattice, lit, j, x, y)
             if value == UNSEEN:
-                value = probed(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
+                value = probe_lamp(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
         lit[j, i] = value
 
 
 @wp.func
-def probed(
+def probe_lamp(
     world: World,
     lattice: Lattice,
     lists: wp.array(dtype=int, ndim=3),
@@ -340,7 +342,7 @@ def rim_weight(offset: int, half: int):
 
 
 @wp.func
-def alike(lattice: Lattice, i: int, k: int, tolerance_m: float):
+def is_same_surface(lattice: Lattice, i: int, k: int, tolerance_m: float):
     """Whether two lattice points lie on one stretch of surface."""
     same = bool(False)
     if lattice.surface[i] == lattice.surface[k]:
@@ -376,7 +378,7 @@ def sum_rows(
             end = i + wp.min(lattice.width - 1 - x, 2)
             while k <= end:
                 value = values[j, k]
-                if value != UNSEEN and alike(lattice, i, k, tolerance_m):
+                if value != UNSEEN and is_same_surface(lattice, i, k, tolerance_m):
                     total += wp.vec2(value, 1.0) * rim_weight(k - i, 2)
                 k += 1
         sums[j, i] = total
@@ -397,7 +399,7 @@ def column_sum(
     v = int(wp.max(-y, -half))
     while v <= wp.min(lattice.height - 1 - y, half):
         k = i + v * lattice.width
-        if alike(lattice, i, k, tolerance_m):
+        if is_same_surface(lattice, i, k, tolerance_m):
             total += sums[j, k] * rim_weight(v, half)
         v += 1
     return total
@@ -466,7 +468,7 @@ def probe_ambient(
 
 
 @wp.kernel
-def see_out(
+def count_free_paths(
     world: World,
     points: wp.array(dtype=wp.vec3),
     ways: wp.array(dtype=wp.vec3),

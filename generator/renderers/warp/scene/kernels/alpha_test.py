@@ -46,7 +46,7 @@ def project_uv(p: wp.vec3, axis: int):
 
 
 @wp.func
-def covered_at(world: World, texture: int, uv: wp.vec2):
+def is_covered(world: World, texture: int, uv: wp.vec2):
     """Whether a texture's coverage is at least a half; it wraps around, rows from the top."""
     width = world.textures[texture].width
     height = world.textures[texture].height
@@ -97,7 +97,7 @@ def uv_at(world: World, surface: int, b: int, face: int, weights: wp.vec3):
 
 
 @wp.func(**OUT_OF_LINE)
-def hole_at(world: World, b: int, face: int, weights: wp.vec3):
+def is_hole(world: World, b: int, face: int, weights: wp.vec3):
     """Whether there is a hole at a point of a face."""
     g = world.bodies[b].geometry
     surface = world.bodies[b].first_material + world.geometries[g].face_slots[face]
@@ -106,12 +106,12 @@ def hole_at(world: World, b: int, face: int, weights: wp.vec3):
     if texture >= 0:
         if world.textures[texture].has_cover != 0:
             uv = uv_at(world, surface, b, face, weights)
-            hole = not covered_at(world, texture, uv)
+            hole = not is_covered(world, texture, uv)
     return hole
 
 
 @wp.func
-def passable(world: World, b: int, face: int, weights: wp.vec3, through: int):
+def is_passable(world: World, b: int, face: int, weights: wp.vec3, through: int):
     """Whether a ray passes a point of a face.
 
     Args:
@@ -123,7 +123,7 @@ def passable(world: World, b: int, face: int, weights: wp.vec3, through: int):
         surface = world.bodies[b].first_material + world.geometries[g].face_slots[face]
         clear = world.surfaces[surface].transmission > 0.5 or world.surfaces[surface].opacity < 0.5
     if not clear:
-        clear = hole_at(world, b, face, weights)
+        clear = is_hole(world, b, face, weights)
     return clear
 
 
@@ -144,7 +144,7 @@ class Strike:
 
 
 @wp.func
-def strike_of(found: Found):
+def to_strike(found: Found):
     """The same as numbers of 32 bits."""
     strike = Strike()
     strike.t = float(found[0])
@@ -155,7 +155,7 @@ def strike_of(found: Found):
 
 
 @wp.func(**OUT_OF_LINE)
-def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+def first_opaque_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
     """The first point of a body with holes that a ray does not pass; arguments as for solid_hit."""
     g = world.bodies[b].geometry
     strike = Strike()
@@ -165,7 +165,7 @@ def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, thr
     going = bool(True)
     while going:
         going = False
-        met = strike_of(
+        met = to_strike(
             first_in_mesh(
                 world.geometries[g].tree,
                 world.geometries[g].mesh,
@@ -176,7 +176,7 @@ def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, thr
         )
         if met.face >= 0:
             weights = wp.vec3(met.u, met.v, 1.0 - met.u - met.v)
-            if passable(world, b, met.face, weights, through):
+            if is_passable(world, b, met.face, weights, through):
                 begin += met.t * 1.000001 + STEP_M / wp.length(d)
                 faces += 1
                 going = faces < FACES_MAX
@@ -197,10 +197,10 @@ def closest_solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float
     """
     g = world.bodies[b].geometry
     strike = Strike()
-    if (world.bodies[b].pierced & through) != 0:
-        strike = beyond_holes(world, b, o, d, reach, through)
+    if (world.bodies[b].cutouts & through) != 0:
+        strike = first_opaque_hit(world, b, o, d, reach, through)
     else:
-        strike = strike_of(
+        strike = to_strike(
             first_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
         )
     return strike
@@ -211,6 +211,6 @@ def is_mesh_intersected(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: flo
     """Whether a body cuts a ray that passes what ``through`` says; arguments as for solid_hit."""
     g = world.bodies[b].geometry
     hit = any_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
-    if hit and (world.bodies[b].pierced & through) != 0:
-        hit = beyond_holes(world, b, o, d, reach, through).face >= 0
+    if hit and (world.bodies[b].cutouts & through) != 0:
+        hit = first_opaque_hit(world, b, o, d, reach, through).face >= 0
     return hit

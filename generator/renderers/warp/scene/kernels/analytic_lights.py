@@ -103,7 +103,7 @@ def beam_from(lamp: LightRecord, p_world: wp.vec3):
     beam.distance_m = squared * inverse
     beam.spread = lamp.radius * inverse
     if is_panel(lamp):
-        flow = flow_from_panel(lamp, p_world)
+        flow = panel_vector_irradiance(lamp, p_world)
         share = wp.length(flow)
         if share > 0.0:
             beam.direction = flow * (1.0 / share)
@@ -123,7 +123,7 @@ def beam_from(lamp: LightRecord, p_world: wp.vec3):
 
 
 @wp.func
-def flow_from_panel(lamp: LightRecord, p_world: wp.vec3):
+def panel_vector_irradiance(lamp: LightRecord, p_world: wp.vec3):
     """Where a panel's light comes from, times the illuminance there per luminance; 0 behind it.
 
     The part of it along a normal is the illuminance on any surface that has all of the panel
@@ -134,14 +134,14 @@ def flow_from_panel(lamp: LightRecord, p_world: wp.vec3):
     flow = wp.vec3(0.0)
     if height > 0.0:
         if lamp.kind == DISK:
-            flow = flow_from_disk(lamp, away, height)
+            flow = disk_vector_irradiance(lamp, away, height)
         else:
-            flow = flow_from_rectangle(lamp, away, height)
+            flow = rectangle_vector_irradiance(lamp, away, height)
     return flow
 
 
 @wp.func
-def flow_from_disk(lamp: LightRecord, away: wp.vec3, height: float):
+def disk_vector_irradiance(lamp: LightRecord, away: wp.vec3, height: float):
     """As flow_from_panel, exact; ``away`` is from the centre."""
     beside = away - lamp.direction * height
     r2 = lamp.radius * lamp.radius
@@ -157,7 +157,7 @@ def flow_from_disk(lamp: LightRecord, away: wp.vec3, height: float):
 
 
 @wp.func
-def flow_from_rectangle(lamp: LightRecord, away: wp.vec3, height: float):
+def rectangle_vector_irradiance(lamp: LightRecord, away: wp.vec3, height: float):
     """As flow_from_panel, exact unless far away; ``away`` is from the centre."""
     s = wp.dot(away, away)
     if s > FAR * FAR * lamp.radius * lamp.radius:
@@ -169,14 +169,14 @@ def flow_from_rectangle(lamp: LightRecord, away: wp.vec3, height: float):
     for k in range(1, 5):
         corner = first
         if k < 4:
-            corner = corner_of_panel(lamp, k) - away
-        flow += edge_flow(before, corner)
+            corner = panel_corner(lamp, k) - away
+        flow += edge_vector_irradiance(before, corner)
         before = corner
     return flow
 
 
 @wp.func
-def corner_of_panel(lamp: LightRecord, k: int):
+def panel_corner(lamp: LightRecord, k: int):
     """Corner k of a panel, from its centre, clockwise for who sees it shine."""
     u = wp.where((k & 3) >= 2, 1.0, -1.0)
     v = wp.where(((k + 1) & 3) >= 2, 1.0, -1.0)
@@ -188,7 +188,7 @@ def corner_of_panel(lamp: LightRecord, k: int):
 
 
 @wp.func
-def edge_flow(a: wp.vec3, b: wp.vec3):
+def edge_vector_irradiance(a: wp.vec3, b: wp.vec3):
     """What one edge of a polygon adds to its flow: half its angle, along the normal of its fan."""
     normal = wp.cross(a, b)
     sine = wp.length(normal)
@@ -208,13 +208,13 @@ def relative_illuminance(lamp: LightRecord, beam: Beam, p_world: wp.vec3, n: wp.
     if not is_panel(lamp):
         if lamp.kind == SUN and lamp.radius > WIDE_SUN and wp.abs(cosine) < lamp.radius:
             sine2 = lamp.radius * lamp.radius
-            cosine = setting_ball(cosine, sine2 / (1.0 + sine2))
+            cosine = clipped_sphere_irradiance(cosine, sine2 / (1.0 + sine2))
         return wp.max(cosine, 0.0)
     to_centre = lamp.position_m - p_world
     if wp.dot(n, to_centre) < lamp.radius:
         whole = wp.max(beam.normal_lux) / wp.max(wp.max(lamp.radiance), 1.0e-20)
         if whole > 0.0:
-            cosine = setting_panel(lamp, to_centre, n) / whole
+            cosine = clipped_panel_irradiance(lamp, to_centre, n) / whole
     return wp.max(cosine, 0.0)
 
 
@@ -228,7 +228,7 @@ def above_horizon_fraction(lamp: LightRecord, beam: Beam, n: wp.vec3):
 
 
 @wp.func
-def setting_ball(cosine: float, sine2: float):
+def clipped_sphere_irradiance(cosine: float, sine2: float):
     """As ``relative_illuminance``, for a ball at an angle whose cosine is given.
 
     Args:
@@ -246,10 +246,10 @@ def setting_ball(cosine: float, sine2: float):
 
 
 @wp.func
-def setting_panel(lamp: LightRecord, to_centre: wp.vec3, n: wp.vec3):
+def clipped_panel_irradiance(lamp: LightRecord, to_centre: wp.vec3, n: wp.vec3):
     """Illuminance per luminance from the part of a panel that is over the horizon."""
     corners = wp.where(lamp.kind == DISK, DISK_CORNERS, 4)
-    first = to_centre + corner_of_panel(lamp, 0)
+    first = to_centre + panel_corner(lamp, 0)
     before = first
     total = float(0.0)
     enters = wp.vec3(0.0)
@@ -257,7 +257,7 @@ def setting_panel(lamp: LightRecord, to_centre: wp.vec3, n: wp.vec3):
     for k in range(1, corners + 1):
         corner = first
         if k < corners:
-            corner = to_centre + corner_of_panel(lamp, k)
+            corner = to_centre + panel_corner(lamp, k)
         a = wp.dot(n, before)
         b = wp.dot(n, corner)
         start = before
@@ -271,15 +271,15 @@ def setting_panel(lamp: LightRecord, to_centre: wp.vec3, n: wp.vec3):
                 end = crossing
                 leaves = crossing
         if a >= 0.0 or b >= 0.0:
-            total += wp.dot(n, edge_flow(start, end))
+            total += wp.dot(n, edge_vector_irradiance(start, end))
         before = corner
     # Along the horizon, back to where it rose.
-    total += wp.dot(n, edge_flow(leaves, enters))
+    total += wp.dot(n, edge_vector_irradiance(leaves, enters))
     return wp.max(total, 0.0)
 
 
 @wp.func
-def towards_mirror(
+def representative_direction(
     lamp: LightRecord, beam: Beam, p_world: wp.vec3, mirrored: wp.vec3, alpha: float
 ):
     """Direction to the point of a lamp nearest to a mirrored ray.
@@ -287,7 +287,7 @@ def towards_mirror(
     Where the lobe of width ``alpha`` is much wider than the lamp this is the lamp's centre.
     """
     if is_panel(lamp):
-        return mirrored_panel(lamp, p_world, mirrored, alpha)
+        return representative_panel_direction(lamp, p_world, mirrored, alpha)
     spread = beam.spread - 0.2 * alpha
     if spread <= 0.0:
         return beam.direction
@@ -297,7 +297,9 @@ def towards_mirror(
 
 
 @wp.func
-def mirrored_panel(lamp: LightRecord, p_world: wp.vec3, mirrored: wp.vec3, alpha: float):
+def representative_panel_direction(
+    lamp: LightRecord, p_world: wp.vec3, mirrored: wp.vec3, alpha: float
+):
     """As towards_mirror, for panels: where the ray meets the panel, or its outline."""
     to_centre = lamp.position_m - p_world
     approach = -wp.dot(mirrored, lamp.direction)
@@ -334,12 +336,12 @@ def lobe_widening(lamp: LightRecord, beam: Beam, alpha: float):
         b = wp.dot(lamp.across, beam.direction)
         x = part * wp.sqrt(wp.max(wp.dot(lamp.along, lamp.along) - a * a, 0.0))
         y = part * wp.sqrt(wp.max(wp.dot(lamp.across, lamp.across) - b * b, 0.0))
-        wider = wp.sqrt(widened(alpha, x) * widened(alpha, y)) - alpha
+        wider = wp.sqrt(combined_width(alpha, x) * combined_width(alpha, y)) - alpha
     return wider
 
 
 @wp.func
-def widened(alpha: float, spread: float):
+def combined_width(alpha: float, spread: float):
     """Width of a lobe together with that of a lamp.
 
     Half-way between sum and root of squares: with those, panels would be a fifth too dim, or half

@@ -55,20 +55,20 @@ def half_area(low: wp.vec3, high: wp.vec3):
 
 
 @wp.func
-def middle(boxes: Boxes, i: int):
+def doubled_centre(boxes: Boxes, i: int):
     """Twice the centre of a box."""
     # Only its order matters: halving it would be a rounding for nothing.
     return boxes.lows[i] + boxes.highs[i]
 
 
 @wp.func
-def bin_of(x: float, origin: float, scale: float):
+def bin_index(x: float, origin: float, scale: float):
     """Where a centre counts along an axis."""
     return wp.clamp(int((x - origin) * scale), 0, BINS - 1)
 
 
 @wp.func
-def around(boxes: Boxes, begin: int, end: int):
+def range_bounds(boxes: Boxes, begin: int, end: int):
     """Corners of the box around a range."""
     low = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
     high = -low
@@ -81,9 +81,7 @@ def around(boxes: Boxes, begin: int, end: int):
 
 
 @wp.func
-def cut_along(
-    boxes: Boxes, begin: int, end: int, axis: int, origin: float, scale: float, leaf: int
-):
+def best_cut(boxes: Boxes, begin: int, end: int, axis: int, origin: float, scale: float, leaf: int):
     """(cost, number of bins on the left) of the best cut across an axis."""
     nothing = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
     for k in range(BINS):
@@ -93,7 +91,7 @@ def cut_along(
     i = int(begin)
     while i < end:
         box = boxes.order[i]
-        k = bin_of(middle(boxes, box)[axis], origin, scale)
+        k = bin_index(doubled_centre(boxes, box)[axis], origin, scale)
         boxes.bin_lows[k] = componentwise_min(boxes.bin_lows[k], boxes.lows[box])
         boxes.bin_highs[k] = componentwise_max(boxes.bin_highs[k], boxes.highs[box])
         boxes.bin_counts[k] = boxes.bin_counts[k] + 1
@@ -131,27 +129,27 @@ def cut_along(
 
 
 @wp.func
-def split(boxes: Boxes, begin: int, end: int, leaf: int):
+def partition(boxes: Boxes, begin: int, end: int, leaf: int):
     """Put a range's boxes in two groups; where the second begins."""
     low = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
     high = -low
     i = int(begin)
     while i < end:
-        low = componentwise_min(low, middle(boxes, boxes.order[i]))
-        high = componentwise_max(high, middle(boxes, boxes.order[i]))
+        low = componentwise_min(low, doubled_centre(boxes, boxes.order[i]))
+        high = componentwise_max(high, doubled_centre(boxes, boxes.order[i]))
         i += 1
     best = float(FARTHEST)
     best_axis = int(-1)
-    best_cut = int(0)
+    split_at = int(0)
     for axis in range(3):
         size = high[axis] - low[axis]
         if size > 0.0:
             scale = float(BINS) / size
-            cost, cut = cut_along(boxes, begin, end, axis, low[axis], scale, leaf)
+            cost, cut = best_cut(boxes, begin, end, axis, low[axis], scale, leaf)
             if cost < best:
                 best = cost
                 best_axis = axis
-                best_cut = cut
+                split_at = cut
     if best_axis < 0:
         return (begin + end) / 2
     scale = float(BINS) / (high[best_axis] - low[best_axis])
@@ -159,7 +157,7 @@ def split(boxes: Boxes, begin: int, end: int, leaf: int):
     j = int(end)
     while i < j:
         box = boxes.order[i]
-        if bin_of(middle(boxes, box)[best_axis], low[best_axis], scale) < best_cut:
+        if bin_index(doubled_centre(boxes, box)[best_axis], low[best_axis], scale) < split_at:
             i += 1
         else:
             j -= 1
@@ -169,19 +167,19 @@ def split(boxes: Boxes, begin: int, end: int, leaf: int):
 
 
 @wp.func
-def worth_splitting(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
+def split_priority(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
     """How much a part wants to be split: its surface, or its number where a node is deep; or -1."""
     size = float(-1.0)
     if end - begin > leaf:
         size = float(end - begin)
         if depth < EVEN_DEPTH:
-            low, high = around(boxes, begin, end)
+            low, high = range_bounds(boxes, begin, end)
             size = half_area(low, high)
     return size
 
 
 @wp.func
-def parts_of(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
+def split_node(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
     """Where the parts of a node begin, and where the last ends; and how many they are."""
     bounds = Bounds()
     worths = Worths()
@@ -194,15 +192,15 @@ def parts_of(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
         last = bounds[chosen + 1]
         cut = (first + last) / 2
         if depth < EVEN_DEPTH:
-            cut = split(boxes, first, last, leaf)
+            cut = partition(boxes, first, last, leaf)
         k = int(parts)
         while k > chosen:
             bounds[k + 1] = bounds[k]
             worths[k] = worths[k - 1]
             k -= 1
         bounds[chosen + 1] = cut
-        worths[chosen] = worth_splitting(boxes, first, cut, leaf, depth)
-        worths[chosen + 1] = worth_splitting(boxes, cut, last, leaf, depth)
+        worths[chosen] = split_priority(boxes, first, cut, leaf, depth)
+        worths[chosen + 1] = split_priority(boxes, cut, last, leaf, depth)
         parts += 1
         chosen = int(-1)
         most = float(-1.0)
@@ -249,12 +247,12 @@ def grow_tree(
             leaf_count += 1
             code = -leaf_count
         else:
-            bounds, parts = parts_of(boxes, task[0], task[1], leaf, task[2])
+            bounds, parts = split_node(boxes, task[0], task[1], leaf, task[2])
             for k in range(WIDTH):
                 low = wp.vec3(NOWHERE, NOWHERE, NOWHERE)
                 high = -low
                 if k < parts:
-                    low, high = around(boxes, bounds[k], bounds[k + 1])
+                    low, high = range_bounds(boxes, bounds[k], bounds[k + 1])
                     lane = WIDTH * node_count + k
                     todo[waiting] = wp.vec4i(bounds[k], bounds[k + 1], task[2] + 1, lane)
                     waiting += 1

@@ -177,7 +177,7 @@ _IN_SCENE = """
             continue;
         }
         const auto& placed = bodies.data[-1 - code];
-        if (placed.pierced & through)
+        if (placed.cutouts & through)
             continue;
         const wp::vec3 begin = mul(placed.B_mesh_world, o) + placed.t_mesh_world;
         start(local, begin, mul(placed.B_mesh_world, d));
@@ -206,7 +206,7 @@ _IN_SCENE_ON_CUDA = """
     int body = -1, b = 0;
     while (!(ANY && body >= 0) && wp::bvh_query_next(candidates, b, strike.t)) {
         const auto& placed = bodies.data[b];
-        if (placed.pierced & through)
+        if (placed.cutouts & through)
             continue;
         const wp::vec3 begin = mul(placed.B_mesh_world, o) + placed.t_mesh_world;
         if (search(geometries.data[placed.geometry].mesh, begin, mul(placed.B_mesh_world, d)))
@@ -275,7 +275,7 @@ def first_in_scene(
     reach: float,
     through: int,
 ) -> wp.spatial_vectord:
-    """The first face along a ray of all bodies but those that are pierced by what it passes."""
+    """The first face along a ray of all bodies but those that are cutouts by what it passes."""
     ...
 
 
@@ -290,5 +290,5 @@ def any_in_scene(
     reach: float,
     through: int,
 ) -> bool:
-    """Whether a ray meets any body but those that are pierced by what it passes."""
+    """Whether a ray meets any body but those that are cutouts by what it passes."""
     ...

@@ -40,17 +40,17 @@ def sky_irradiance(sky: EnvironmentRecord, n_world: wp.vec3):
 @wp.func
 def sky_image(sky: EnvironmentRecord, d_world: wp.vec3):
     """What is seen of the sky in one direction; any length."""
-    return panorama(sky.image, to_sky(sky, d_world)) * sky.luminance
+    return sample_panorama(sky.image, to_sky(sky, d_world)) * sky.luminance
 
 
 @wp.func
 def sky_rest(sky: EnvironmentRecord, d_world: wp.vec3):
     """The same without what lamps stand for."""
-    return panorama(sky.rest, to_sky(sky, d_world)) * sky.luminance
+    return sample_panorama(sky.rest, to_sky(sky, d_world)) * sky.luminance
 
 
 @wp.func
-def panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
+def sample_panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
     """An equirectangular image in one direction of its own frame, bilinear; any length."""
     d = fast_normalize(direction)
     height = image.shape[0]

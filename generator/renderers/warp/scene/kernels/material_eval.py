@@ -30,8 +30,8 @@ class SurfaceMaterial:
 
 
 @wp.func
-def mesh_mapped(
-    look: SurfaceMaterial,
+def apply_uv_texture(
+    material: SurfaceMaterial,
     world: World,
     texture: int,
     hit: wp.vec2i,
@@ -59,23 +59,23 @@ def mesh_mapped(
     level = 0.5 * wp.log2(wp.max(texels, 1.0e-6))
     bumpy = world.textures[texture].has_bumps != 0
     texel = texel_at(world, texture, make_sampler(world, texture, level), uv[0], uv[1], bumpy)
-    look.albedo = wp.cw_mul(look.albedo, texel.albedo)
-    look.roughness *= texel.roughness
+    material.albedo = wp.cw_mul(material.albedo, texel.albedo)
+    material.roughness *= texel.roughness
     # Without an area in the texture there are no tangents: the normal stays.
     if bumpy and area_uv != 0.0:
         bump = texel.bump
         tangent = world.bodies[b].R_world_mesh @ ((e1 * d2[1] - e2 * d1[1]) / area_uv)
         bitangent = world.bodies[b].R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) / area_uv)
-        n = look.normal
+        n = material.normal
         # Gram and Schmidt: interpolated normals are not those of the flat face.
         tangent = fast_normalize(tangent - n * wp.dot(n, tangent))
         bitangent = fast_normalize(bitangent - n * wp.dot(n, bitangent))
-        look.normal = fast_normalize(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
-    return look
+        material.normal = fast_normalize(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
+    return material
 
 
 @wp.func
-def tilted(bump: wp.vec3, axis: int, n: wp.vec3):
+def tilt_normal(bump: wp.vec3, axis: int, n: wp.vec3):
     """Normal of one projection, in the mesh frame.
 
     Source: Golus, "Normal mapping for a triplanar shader", 2017 (tangent offsets added).
@@ -90,8 +90,8 @@ def tilted(bump: wp.vec3, axis: int, n: wp.vec3):
 
 
 @wp.func
-def box_mapped(
-    look: SurfaceMaterial,
+def apply_triplanar_texture(
+    material: SurfaceMaterial,
     world: World,
     texture: int,
     b: int,
@@ -100,7 +100,7 @@ def box_mapped(
     footprint_m: float,
 ):
     """Textures projected along the body's three axes, blended where the surface turns."""
-    n = wp.transpose(world.bodies[b].R_world_mesh) @ look.normal
+    n = wp.transpose(world.bodies[b].R_world_mesh) @ material.normal
     p = p_mesh * (world.bodies[b].scale / scale_m)
     texels = footprint_m / scale_m * float(world.textures[texture].width)
     sampler = make_sampler(world, texture, wp.log2(wp.max(texels, 1.0e-3)))
@@ -120,24 +120,24 @@ def box_mapped(
             texel = texel_at(world, texture, sampler, uv[0], uv[1], bumpy)
             albedo += texel.albedo * w[axis]
             roughness += texel.roughness * w[axis]
-            m += tilted(texel.bump, axis, n) * w[axis]
-    look.albedo = wp.cw_mul(look.albedo, albedo)
-    look.roughness *= roughness
+            m += tilt_normal(texel.bump, axis, n) * w[axis]
+    material.albedo = wp.cw_mul(material.albedo, albedo)
+    material.roughness *= roughness
     if bumpy:
-        look.normal = fast_normalize(world.bodies[b].R_world_mesh @ m)
-    return look
+        material.normal = fast_normalize(world.bodies[b].R_world_mesh @ m)
+    return material
 
 
 @wp.func
 def plain_material(world: World, surface: int, normal: wp.vec3):
     """The material of a surface without its textures."""
-    look = SurfaceMaterial()
-    look.albedo = world.surfaces[surface].base_color
-    look.roughness = world.surfaces[surface].roughness
-    look.metallic = world.surfaces[surface].metallic
-    look.specular = world.surfaces[surface].specular
-    look.normal = normal
-    return look
+    material = SurfaceMaterial()
+    material.albedo = world.surfaces[surface].base_color
+    material.roughness = world.surfaces[surface].roughness
+    material.metallic = world.surfaces[surface].metallic
+    material.specular = world.surfaces[surface].specular
+    material.normal = normal
+    return material
 
 
 @wp.func
@@ -154,7 +154,7 @@ def evaluate_material(
 
     ``v`` points to the viewer.
     """
-    look = plain_material(world, surface, normal)
+    material = plain_material(world, surface, normal)
     texture = world.surfaces[surface].texture
     if texture >= 0:
         # Half-way between the short and the long axis of the footprint's ellipse.
@@ -163,7 +163,9 @@ def evaluate_material(
         scale_m = world.surfaces[surface].texture_scale_m
         if scale_m > 0.0:
             p_mesh = mesh_point(world, hit, weight)
-            look = box_mapped(look, world, texture, hit[0], p_mesh, scale_m, footprint_m)
+            material = apply_triplanar_texture(
+                material, world, texture, hit[0], p_mesh, scale_m, footprint_m
+            )
         else:
-            look = mesh_mapped(look, world, texture, hit, weight, footprint_m)
-    return look
+            material = apply_uv_texture(material, world, texture, hit, weight, footprint_m)
+    return material

@@ -6,8 +6,8 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import (
     OUT_OF_LINE,
-    beyond_holes,
     closest_solid_hit,
+    first_opaque_hit,
     is_mesh_intersected,
 )
 from gen_data.generator.renderers.warp.scene.kernels.bvh_traverse import (
@@ -66,23 +66,23 @@ def closest_hit(world: World, o: wp.vec3, d: wp.vec3, reach: float, through: int
     met.at = wp.vec2i(int(found[4]), int(found[3]))
     met.t = float(found[0])
     met.weight = wp.vec2(float(found[2]), 1.0 - float(found[1]) - float(found[2]))
-    if world.pierced_hierarchy != wp.uint64(0):
-        met = first_pierced(world, o, d, through, met)
+    if world.cutout_hierarchy != wp.uint64(0):
+        met = closest_cutout_hit(world, o, d, through, met)
     return met
 
 
 @wp.func(**OUT_OF_LINE)
-def first_pierced(world: World, o: wp.vec3, d: wp.vec3, through: int, before: RayHit):
+def closest_cutout_hit(world: World, o: wp.vec3, d: wp.vec3, through: int, before: RayHit):
     """The first point of bodies that may be passed, or what the ray meets before."""
     met = before
-    candidates = wp.bvh_query_ray(world.pierced_hierarchy, o, d)
+    candidates = wp.bvh_query_ray(world.cutout_hierarchy, o, d)
     k = int(0)
     while wp.bvh_query_next(candidates, k, met.t):
-        b = world.pierced[k]
-        if (world.bodies[b].pierced & through) != 0:
+        b = world.cutouts[k]
+        if (world.bodies[b].cutouts & through) != 0:
             origin = to_mesh_point(world, b, o)
             direction = to_mesh_vector(world, b, d)
-            strike = beyond_holes(world, b, origin, direction, met.t, through)
+            strike = first_opaque_hit(world, b, origin, direction, met.t, through)
             if strike.face >= 0:
                 met.t = strike.t
                 met.at = wp.vec2i(b, strike.face)
@@ -141,7 +141,7 @@ def enters_box(world: World, b: int, path: Path):
 
 
 @wp.func
-def cut_by(world: World, b: int, path: Path, through: int):
+def is_cut_by(world: World, b: int, path: Path, through: int):
     """Whether a body cuts a path that passes what ``through`` says, HOLES or CLEAR or both."""
     hit = enters_box(world, b, path)
     if hit:
@@ -152,9 +152,9 @@ def cut_by(world: World, b: int, path: Path, through: int):
 
 
 @wp.func
-def blocked_by(world: World, b: int, path: Path):
+def is_blocked_by(world: World, b: int, path: Path):
     """Whether a body keeps light off a path."""
-    return cut_by(world, b, path, LIGHT)
+    return is_cut_by(world, b, path, LIGHT)
 
 
 @wp.func
@@ -176,21 +176,21 @@ def is_intersected(world: World, path: Path, through: int):
         1.0,
         through,
     )
-    if not hit and world.pierced_hierarchy != wp.uint64(0):
-        hit = cut_by_pierced(world, path, through)
+    if not hit and world.cutout_hierarchy != wp.uint64(0):
+        hit = is_cut_by_cutouts(world, path, through)
     return hit
 
 
 @wp.func(**OUT_OF_LINE)
-def cut_by_pierced(world: World, path: Path, through: int):
+def is_cut_by_cutouts(world: World, path: Path, through: int):
     """Whether a body that may be passed cuts a path."""
     hit = bool(False)
-    candidates = wp.bvh_query_ray(world.pierced_hierarchy, path.origin, path.way)
+    candidates = wp.bvh_query_ray(world.cutout_hierarchy, path.origin, path.way)
     k = int(0)
     while wp.bvh_query_next(candidates, k, 1.0):
-        b = world.pierced[k]
-        if (world.bodies[b].pierced & through) != 0:
-            hit = cut_by(world, b, path, through)
+        b = world.cutouts[k]
+        if (world.bodies[b].cutouts & through) != 0:
+            hit = is_cut_by(world, b, path, through)
             if hit:
                 break
     return hit
@@ -208,7 +208,7 @@ def is_occluded_by_listed(
     for k in range(count):
         b = lists[tile, j, 1 + k]
         if b != skip:
-            hit = blocked_by(world, b, path)
+            hit = is_blocked_by(world, b, path)
             if hit:
                 break
     return hit
@@ -233,12 +233,12 @@ def free_path_of_listed(
     for k in range(count):
         b = lists[tile, j, 1 + k]
         if b != skip:
-            free = freed_by(world, b, path, free)
+            free = free_path_before(world, b, path, free)
     return free
 
 
 @wp.func
-def freed_by(world: World, b: int, path: Path, free: float):
+def free_path_before(world: World, b: int, path: Path, free: float):
     """The free part of a path before one body, at most ``free``."""
     if enters_box(world, b, path):
         o = to_mesh_point(world, b, path.origin)

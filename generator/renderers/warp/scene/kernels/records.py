@@ -88,14 +88,14 @@ class BodyRecord:
         R_world_mesh, t_world_mesh: Rotation without scale, and position.
         B_mesh_world, t_mesh_world: World to mesh, scale included.
         low_m, high_m: Box in the world.
-        pierced: HOLES, CLEAR or both, where rays may pass some of its faces; else 0, and no face
+        cutouts: HOLES, CLEAR or both, where rays may pass some of its faces; else 0, and no face
             is looked at more closely.
     """
 
     geometry: int
     first_vertex: int
     first_material: int
-    pierced: int
+    cutouts: int
     scale: float
     A_camera_mesh: wp.mat33
     t_camera_mesh: wp.vec3
@@ -354,7 +354,7 @@ def first_weight(weight: wp.vec2):
 
 
 @wp.func
-def seen_inside(weight: wp.vec2):
+def is_back_face(weight: wp.vec2):
     """Whether the inside of a face is seen, from what images of weights hold."""
     # Half-way between the largest weight, 1, and the smallest with 2 added to it.
     return weight[0] > 1.5
@@ -377,15 +377,15 @@ class World:
         tree: Over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh; empty on
             CUDA.
         hierarchy: Warp's over the same, on CUDA; 0 on the CPU.
-        pierced: Bodies of which rays may pass some faces.
-        pierced_hierarchy: Warp's over their boxes; 0 where there are none.
+        cutouts: Bodies of which rays may pass some faces.
+        cutout_hierarchy: Warp's over their boxes; 0 where there are none.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
     """
 
     tree: wp.array(dtype=wp.float32)
     hierarchy: wp.uint64
-    pierced: wp.array(dtype=wp.int32)
-    pierced_hierarchy: wp.uint64
+    cutouts: wp.array(dtype=wp.int32)
+    cutout_hierarchy: wp.uint64
     geometries: wp.array(dtype=Geometry)
     bodies: wp.array(dtype=BodyRecord)
     surfaces: wp.array(dtype=MaterialRecord)

@@ -41,7 +41,7 @@ class Patch:
 
 
 @wp.func
-def with_mapping(
+def set_mapping(
     patch: Patch, world: World, b: int, g_u: wp.vec3, c_u: float, g_v: wp.vec3, c_v: float
 ):
     """The patch with coordinates that are ``c_u + dot(g_u, p)`` at points p of the mesh frame."""
@@ -56,7 +56,7 @@ def with_mapping(
 
 
 @wp.func
-def box_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
+def triplanar_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
     """Projected textures, where one projection is all that counts (see look.box_mapped)."""
     squared = wp.cw_mul(n, n)
     x = wp.vec3(1.0, 0.0, 0.0)
@@ -77,7 +77,7 @@ def box_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
         scale_m = world.surfaces[surface].texture_scale_m
         texture = world.surfaces[surface].texture
         scale = world.bodies[b].scale / scale_m
-        patch = with_mapping(patch, world, b, along_u * scale, 0.0, along_v * scale, 0.0)
+        patch = set_mapping(patch, world, b, along_u * scale, 0.0, along_v * scale, 0.0)
         patch.texels_per_m = float(world.textures[texture].width) / scale_m
         patch.tangent = world.bodies[b].R_world_mesh @ along_u
         patch.bitangent = world.bodies[b].R_world_mesh @ along_v
@@ -85,7 +85,7 @@ def box_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
 
 
 @wp.func
-def mesh_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3i):
+def uv_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3i):
     """Textures by the mesh's own UVs (see look.mesh_mapped)."""
     g = world.bodies[b].geometry
     p = vertex_at(world, g, corner[0])
@@ -103,7 +103,7 @@ def mesh_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3
         along_2 = wp.cross(n, e1) * (1.0 / squared)
         g_u = along_1 * d1[0] + along_2 * d2[0]
         g_v = along_1 * d1[1] + along_2 * d2[1]
-        patch = with_mapping(
+        patch = set_mapping(
             patch, world, b, g_u, uv0[0] - wp.dot(g_u, p), g_v, uv0[1] - wp.dot(g_v, p)
         )
         scale = world.bodies[b].scale
@@ -132,7 +132,7 @@ def patch_at(world: World, surface: int, hit: wp.vec2i, normal: wp.vec3):
     turn = wp.min(turn, wp.dot(n, normal_at(world, g, corner[2])))
     if turn > 0.9999:
         if world.surfaces[surface].texture_scale_m > 0.0:
-            patch = box_patch(patch, world, surface, b, n)
+            patch = triplanar_patch(patch, world, surface, b, n)
         else:
-            patch = mesh_patch(patch, world, world.surfaces[surface].texture, b, corner)
+            patch = uv_patch(patch, world, world.surfaces[surface].texture, b, corner)
     return patch

@@ -32,7 +32,7 @@ class CutoutBody:
 
 
 @wp.func
-def within(window: Window, x: int, y: int):
+def is_in_window(window: Window, x: int, y: int):
     """Whether a pixel lies in a window."""
     right = x - window.x0
     down = y - window.y0
@@ -40,7 +40,7 @@ def within(window: Window, x: int, y: int):
 
 
 @wp.func
-def nearness_of(
+def trace_nearness(
     view: View, world: World, b: int, x_px: float, y_px: float, z_near_m: float, behind: float
 ):
     """1/z of a body at a point of the image, and its face; (0, -1) where it is not in front.
@@ -79,7 +79,7 @@ def trace_centres(
         if y >= window.y0 and y < window.y0 + window.height:
             for x in range(wp.max(window.x0, 0), wp.min(window.x0 + window.width, view.width)):
                 i = y * view.width + x
-                near, face = nearness_of(
+                near, face = trace_nearness(
                     view, world, b, float(x) + 0.5, float(y) + 0.5, z_near_m, nearness[i]
                 )
                 if near > nearness[i]:
@@ -108,11 +108,11 @@ def trace_samples(
     y = pixels[row] / view.width
     for k in range(bodies.shape[0]):
         b = bodies[k].body
-        if within(bodies[k].window, x, y):
+        if is_in_window(bodies[k].window, x, y):
             for s in range(offsets.shape[0]):
                 x_px = float(x) + offsets[s][0]
                 y_px = float(y) + offsets[s][1]
-                near, face = nearness_of(view, world, b, x_px, y_px, z_near_m, nearness[row, s])
+                near, face = trace_nearness(view, world, b, x_px, y_px, z_near_m, nearness[row, s])
                 if near > nearness[row, s]:
                     nearness[row, s] = near
                     hits[row, s] = wp.vec2i(b, face)
@@ -152,6 +152,6 @@ def trace_outlines(
         if mask[i] == wp.uint8(0):
             x_px = float(window.x0 + column) + 0.5
             y_px = float(window.y0 + row) + 0.5
-            near, _face = nearness_of(view, world, outlines[k].body, x_px, y_px, z_near_m, 0.0)
+            near, _face = trace_nearness(view, world, outlines[k].body, x_px, y_px, z_near_m, 0.0)
             if near > 0.0:
                 mask[i] = wp.uint8(1)

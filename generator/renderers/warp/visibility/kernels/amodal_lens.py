@@ -73,20 +73,20 @@ def trace_silhouettes(
     nodes: wp.array(dtype=wp.vec4, ndim=2),
     stride: int,
     t_min: float,
-    outlooks: wp.array(dtype=AmodalWindow),
+    windows: wp.array(dtype=AmodalWindow),
     mask: wp.array(dtype=wp.uint8),
 ):
     """Write 1 at every pixel whose ray meets a body; one row of one outlook per thread."""
     k, row = wp.tid()
-    outlook = outlooks[k]
-    if row >= outlook.window.height:
+    silhouette = windows[k]
+    if row >= silhouette.window.height:
         return
-    b = outlook.body
-    for column in range(outlook.window.width):
-        i = outlook.first_pixel + row * outlook.stride + column
+    b = silhouette.body
+    for column in range(silhouette.window.width):
+        i = silhouette.first_pixel + row * silhouette.stride + column
         if mask[i] == wp.uint8(0):
-            x = outlook.window.x0 + column
-            y = outlook.window.y0 + row
+            x = silhouette.window.x0 + column
+            y = silhouette.window.y0 + row
             d = view.R_world_camera @ canvas_direction(view, nodes, stride, x, y)
             if wp.dot(d, d) > 0.5:
                 o = to_mesh_point(world, b, view.eye_m + d * t_min)

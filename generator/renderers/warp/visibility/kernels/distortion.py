@@ -22,7 +22,7 @@ NEAR_M = wp.constant(0.05)
 
 
 @wp.func
-def bent(view: View, q: wp.vec3):
+def distort(view: View, q: wp.vec3):
     """The point of the lens's plane at which a camera-frame point is seen."""
     k = view.coefficients
     across = wp.sqrt(q[0] * q[0] + q[1] * q[1])
@@ -55,7 +55,7 @@ def project_to_pixel(view: View, q: wp.vec3):
     y = int(-1)
     if view.lens != PINHOLE:
         depth_m = wp.length(q)
-        place = bent(view, q)
+        place = distort(view, q)
         x = int(wp.floor(place[0] * view.fx + view.cx))
         y = int(wp.floor(place[1] * view.fy + view.cy))
     elif q[2] > NEAR_M:

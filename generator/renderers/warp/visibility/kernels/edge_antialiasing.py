@@ -11,7 +11,7 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, hole_at
+from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, is_hole
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
@@ -23,7 +23,10 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import most_alike, nearby
+from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+    most_similar_normal,
+    neighbour_pixel,
+)
 from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import make_facet
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -46,12 +49,12 @@ class Parts:
 
 
 @wp.func
-def seen_before(view: View, images: GBufferRecord, x: int, y: int, k: int):
+def is_face_repeated(view: View, images: GBufferRecord, x: int, y: int, k: int):
     """Whether an earlier of the nine pixels sees the same face as the k-th."""
-    hit = images.hits[nearby(view, x, y, k)]
+    hit = images.hits[neighbour_pixel(view, x, y, k)]
     before = bool(False)
     for m in range(k):
-        other = images.hits[nearby(view, x, y, m)]
+        other = images.hits[neighbour_pixel(view, x, y, m)]
         if other[0] == hit[0] and other[1] == hit[1]:
             before = True
     return before
@@ -71,7 +74,7 @@ def cover(
     """Give the parts of pixel (x, y) to the face that pixel ``source`` sees where it is nearest."""
     hit = images.hits[source]
     facet = make_facet(world, hit)
-    pierced = (world.bodies[hit[0]].pierced & HOLES) != 0
+    cutouts = (world.bodies[hit[0]].cutouts & HOLES) != 0
     for s in range(offsets.shape[0]):
         x_px = float(x) + offsets[s][0]
         y_px = float(y) + offsets[s][1]
@@ -85,9 +88,9 @@ def cover(
         if u >= 0.0 and v >= 0.0 and u + v <= w and facet.depth * side > 0.0:
             nearness = det / facet.depth
             seen = nearness > parts.nearness[s]
-            if seen and pierced:
+            if seen and cutouts:
                 weights = wp.vec3(w - u - v, u, v) * (1.0 / w)
-                seen = not hole_at(world, hit[0], hit[1], weights)
+                seen = not is_hole(world, hit[0], hit[1], weights)
             if seen:
                 parts.nearness[s] = nearness
                 parts.source[s] = source
@@ -95,7 +98,7 @@ def cover(
 
 
 @wp.func
-def traced_source(
+def trace_source(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -116,7 +119,7 @@ def traced_source(
     normal = wp.vec3(0.0)
     last = int(-1)
     for k in range(9):
-        j = nearby(view, x, y, k)
+        j = neighbour_pixel(view, x, y, k)
         b = images.hits[j][0]
         if b < 0:
             if source < 0:
@@ -130,7 +133,7 @@ def traced_source(
                 source = j
                 normal = flat_normal(world, wp.vec2i(b, answer.face))
     if nearest < FARTHEST:
-        source = most_alike(view, images, x, y, source, normal)
+        source = most_similar_normal(view, images, x, y, source, normal)
     return source
 
 
@@ -162,8 +165,8 @@ def antialias(
     for s in range(offsets.shape[0]):
         parts.source[s] = -1
     for k in range(9):
-        j = nearby(view, x, y, k)
-        if images.hits[j][0] >= 0 and not seen_before(view, images, x, y, k):
+        j = neighbour_pixel(view, x, y, k)
+        if images.hits[j][0] >= 0 and not is_face_repeated(view, images, x, y, k):
             parts = cover(view, world, images, offsets, x, y, j, parts)
     total = wp.vec3(0.0)
     lit = int(0)
@@ -172,7 +175,7 @@ def antialias(
         if source < 0:
             x_px = float(x) + offsets[s][0]
             y_px = float(y) + offsets[s][1]
-            source = traced_source(view, world, images, x, y, x_px, y_px, t_min)
+            source = trace_source(view, world, images, x, y, x_px, y_px, t_min)
         if source >= 0:
             total += radiance[source]
             lit += 1

@@ -25,7 +25,7 @@ def clamped_pixel(view: View, x: int, y: int):
 
 
 @wp.func
-def differ(images: GBufferRecord, i: int, j: int):
+def is_edge_between(images: GBufferRecord, i: int, j: int):
     """Whether an edge runs between two neighbouring pixels."""
     a = images.hits[i]
     b = images.hits[j]
@@ -56,19 +56,19 @@ def find_edges(
     left = bool(False)
     for x in range(view.width):
         i = y * view.width + x
-        right = differ(images, i, clamped_pixel(view, x + 1, y))
+        right = is_edge_between(images, i, clamped_pixel(view, x + 1, y))
         if (
             left
             or right
-            or differ(images, i, clamped_pixel(view, x, y + 1))
-            or differ(images, i, clamped_pixel(view, x, y - 1))
+            or is_edge_between(images, i, clamped_pixel(view, x, y + 1))
+            or is_edge_between(images, i, clamped_pixel(view, x, y - 1))
         ):
             pixels[wp.atomic_add(count, 0, 1)] = i
         left = right
 
 
 @wp.func
-def nearby(view: View, x: int, y: int, k: int):
+def neighbour_pixel(view: View, x: int, y: int, k: int):
     """The k-th pixel of the nine around (x, y): itself, then sides, then corners."""
     # Four bits a place: a shift does for a table.
     m = int((ORDER >> wp.int64(4 * k)) & wp.int64(15))
@@ -76,12 +76,14 @@ def nearby(view: View, x: int, y: int, k: int):
 
 
 @wp.func
-def most_alike(view: View, images: GBufferRecord, x: int, y: int, source: int, normal: wp.vec3):
+def most_similar_normal(
+    view: View, images: GBufferRecord, x: int, y: int, source: int, normal: wp.vec3
+):
     """Of the pixels around (x, y) that see the body of ``source``, the one turned most alike."""
     best = float(-1.0)
     found = source
     for k in range(9):
-        j = nearby(view, x, y, k)
+        j = neighbour_pixel(view, x, y, k)
         if images.hits[j][0] == images.hits[source][0]:
             cosine = wp.abs(wp.dot(images.normals[j], normal))
             # Nearly equal normals leave the earlier one, the nearer pixel: no flicker by noise.
@@ -92,7 +94,7 @@ def most_alike(view: View, images: GBufferRecord, x: int, y: int, source: int, n
 
 
 @wp.kernel
-def put_mixed(
+def write_mixed(
     pixels: wp.array(dtype=int), mixed: wp.array(dtype=wp.vec3), radiance: wp.array(dtype=wp.vec3)
 ):
     """Put the mixed radiance of listed pixels in its place."""

@@ -132,7 +132,7 @@ def resolve(
                     v = wp.clamp(v, 0.0, 1.0 - u)
                     z = facet.z_m[0] * (1.0 - u - v) + facet.z_m[1] * u + facet.z_m[2] * v
                     if view.lens != PINHOLE:
-                        z = range_of(world, hit, wp.vec2(u, v))
+                        z = distance_to(world, hit, wp.vec2(u, v))
                 n = facet.n + facet.n_u * u + facet.n_v * v
                 side = wp.where(det < 0.0, -1.0, 1.0)
                 z_m[row + x] = z
@@ -216,7 +216,7 @@ def label_object_coordinates(
 
 
 @wp.func
-def range_of(world: World, hit: wp.vec2i, weight: wp.vec2):
+def distance_to(world: World, hit: wp.vec2i, weight: wp.vec2):
     """Distance from the camera's centre to a point of a (body, face)."""
     b = hit[0]
     m = mesh_point(world, hit, weight)

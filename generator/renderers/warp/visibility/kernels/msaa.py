@@ -17,7 +17,10 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     min_of_two,
     vertex_at,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import most_alike, nearby
+from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+    most_similar_normal,
+    neighbour_pixel,
+)
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     UNSNAPPED,
     Z_NEAR_M,
@@ -56,7 +59,7 @@ def number_pixels(
     i = pixels[k]
     farthest = float(0.0)
     for m in range(9):
-        j = nearby(view, i % view.width, i / view.width, m)
+        j = neighbour_pixel(view, i % view.width, i / view.width, m)
         farthest = wp.max(farthest, images.z_m[j])
     numbers[i] = k
     floors[i] = 0.98 / farthest
@@ -76,7 +79,7 @@ class Side:
 
 
 @wp.func
-def side_of(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
+def make_side(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
     """The edge from p to q of a triangle with that signed area, seen from a snapped point."""
     side = Side()
     turn = wp.where(area > wp.int64(0), wp.int64(1), wp.int64(-1))
@@ -127,7 +130,7 @@ def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, 
 
 
 @wp.func
-def draw_samples_of(
+def draw_triangle_samples(
     numbers: wp.array(dtype=int),
     floors: wp.array(dtype=float),
     window: Window,
@@ -153,9 +156,9 @@ def draw_samples_of(
     # From the middle of the first pixel.
     x_middle = (x_first << 8) + 128
     y_middle = (y_first << 8) + 128
-    ea = side_of(p, q, area, x_middle, y_middle)
-    eb = side_of(q, r, area, x_middle, y_middle)
-    ec = side_of(r, p, area, x_middle, y_middle)
+    ea = make_side(p, q, area, x_middle, y_middle)
+    eb = make_side(q, r, area, x_middle, y_middle)
+    ec = make_side(r, p, area, x_middle, y_middle)
     pixel = wp.int64(256)
     slack = 0.5 * (wp.abs(plane.dx) + wp.abs(plane.dy))
     samples = offsets.shape[0]
@@ -259,7 +262,7 @@ def draw_samples(
                 q = xy[j]
                 r = xy[k]
                 plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
-                draw_samples_of(
+                draw_triangle_samples(
                     numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
                 )
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
@@ -270,19 +273,19 @@ def draw_samples(
                 p = snap_to_grid(view, polygon[0])
                 q = snap_to_grid(view, polygon[t])
                 r = snap_to_grid(view, polygon[t + 1])
-                draw_samples_of(
+                draw_triangle_samples(
                     numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
                 )
 
 
 @wp.func
-def lender(view: View, world: World, images: GBufferRecord, x: int, y: int, hit: wp.vec2i):
+def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int, hit: wp.vec2i):
     """The pixel around (x, y) that lends its colour to a sample; -1 if none sees its body."""
     source = int(-1)
     same_face = bool(False)
     others = int(0)
     for k in range(9):
-        j = nearby(view, x, y, k)
+        j = neighbour_pixel(view, x, y, k)
         if not same_face and images.hits[j][0] == hit[0]:
             if images.hits[j][1] == hit[1] or hit[0] < 0:
                 same_face = True
@@ -298,7 +301,7 @@ def lender(view: View, world: World, images: GBufferRecord, x: int, y: int, hit:
         e1 = vertex_at(world, world.bodies[b].geometry, corner[1]) - p
         e2 = vertex_at(world, world.bodies[b].geometry, corner[2]) - p
         n = world.bodies[b].R_world_mesh @ wp.normalize(wp.cross(e1, e2))
-        source = most_alike(view, images, x, y, source, n)
+        source = most_similar_normal(view, images, x, y, source, n)
     return source
 
 
@@ -324,7 +327,7 @@ def mix_samples(
     for s in range(hits.shape[1]):
         hit = hits[row, s]
         if hit[0] != last[0] or hit[1] != last[1]:
-            source = lender(view, world, images, x, y, hit)
+            source = color_source(view, world, images, x, y, hit)
             last = hit
         if source >= 0:
             total += radiance[source]
