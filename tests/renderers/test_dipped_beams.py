@@ -15,7 +15,6 @@ from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.light_selection import dipped_share, main_lamps
 from gen_data.randomizers.vehicle_lights import dipped_beam
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at
-from tests.renderers.test_shading import LINEAR
 
 BEAMS_CD = (9000.0, 11_500.0, 14_000.0)
 SCREEN_M = 25.0
@@ -84,7 +83,7 @@ def test_pictures_of_a_screen_show_what_the_regulation_asks(point: str) -> None:
     scene = Scene("t", (wall,), lights=(headlight(beam_cd),), environment=DARK)
     camera = camera_at((SCREEN_M - 2.0, p[1], p[2]), tuple(p), (9, 9), hfov_deg=0.2)
 
-    reading = WarpRenderer(library, "cpu", LINEAR).render(
+    reading = WarpRenderer(library, "cpu", RenderSettings(ambient_occlusion_radius_m=0.0)).render(
         scene, camera, frozenset({Channel.RADIANCE})
     )
     lux = reading.channels[Channel.RADIANCE][4, 4] @ LUMINANCE * math.pi / 0.5

@@ -1,4 +1,4 @@
-"""Light at what is seen: computed on the lattice, and where it cannot be gathered from there."""
+"""Lighting of lattice points, and of single pixels that cannot be interpolated from them."""
 
 from __future__ import annotations
 
@@ -50,16 +50,16 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Lamps of a smaller radius over distance, such as the sun, have penumbrae of no importance to
-# surfaces that are too small for the lattice.
+# Lamps of a smaller radius over distance, such as the sun: their penumbrae do not matter on
+# surfaces too small for the lattice.
 SMALL_SPREAD = wp.constant(0.02)
-# Highlights of smoother surfaces are too small to be gathered.
+# Highlights of smoother surfaces are too small to be interpolated.
 GATHERED_ROUGHNESS = wp.constant(0.25)
 
 
 @wp.struct
 class GBufferRecord:
-    """What is seen at every pixel centre, flat; as in gbuffer.GBuffer."""
+    """G-buffer at every pixel centre, flat; fields as in gbuffer.GBuffer."""
 
     hits: wp.array(dtype=wp.vec2i)
     z_m: wp.array(dtype=float)
@@ -72,11 +72,11 @@ class LatticeLight:
     """Light that leaves a point towards the viewer [cd/m^2].
 
     Attributes:
-        diffuse: To be multiplied by the albedo.
-        rest: Reflected, and the surface's own.
-        towards: Where the lamps' light comes from, on average; any length.
-        lamps: Part of ``diffuse`` that comes from lamps.
-        shine: Part of ``rest`` that comes from lamps.
+        diffuse: Diffuse light, before the albedo.
+        rest: Specular reflection and emission.
+        towards: Mean direction towards the lamps, weighted by illuminance; any length.
+        lamps: Share of lamps in ``diffuse``.
+        shine: Share of lamps in ``rest``.
     """
 
     diffuse: wp.vec3
@@ -88,8 +88,8 @@ class LatticeLight:
 
 @wp.func
 def share_of(a: wp.vec3, b: wp.vec3):
-    """How much of b is a, over all channels."""
-    # The floor is for black: nothing is a part of nothing.
+    """Share of ``a`` in ``b``, over all channels."""
+    # The floor makes the share of black in black zero.
     return (a[0] + a[1] + a[2]) / wp.max(b[0] + b[1] + b[2], 1.0e-20)
 
 
@@ -99,9 +99,9 @@ class LampLight:
 
     Attributes:
         lux: Illuminance of the surface [lx].
-        shine: Reflected by the specular layer towards the viewer [cd/m^2].
-        shown: Part of ``shine`` from lamps that a mirrored ray finds.
-        towards: Where it comes from, on average; any length.
+        shine: Specular reflection towards the viewer [cd/m^2].
+        shown: Share of ``shine`` of lamps that reflected rays hit themselves.
+        towards: Mean direction towards the lamps; any length.
     """
 
     lux: wp.vec3
@@ -131,8 +131,8 @@ def sum_lamp_light(
             n_l = relative_illuminance(world.lamps[j], beam, p_world, n)
             if n_l > 0.0:
                 l = representative_direction(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
-                # A wide lamp's brightest point may be set while the lamp still lights: see
-                # ``above_horizon_fraction``.
+                # The representative point of a wide lamp may be below the horizon while the lamp
+                # still contributes: see ``above_horizon_fraction``.
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
                 wider = lobe_widening(world.lamps[j], beam, alpha)
                 lobe = specular_lobe(brdf, n, v, l, n_s, wider)
@@ -149,9 +149,9 @@ def sum_lamp_light(
 
 @wp.func
 def specular_occlusion(brdf: Brdf, open_sky: float):
-    """Visible part of the sky in the specular lobe.
+    """Visible fraction of the environment in the specular lobe.
 
-    Source: Lagarde and de Rousiers 2014, with a fixed exponent.
+    Source: Lagarde and de Rousiers 2014, listing on specular occlusion, with a fixed exponent.
     """
     lobe = brdf.n_v + open_sky
     return wp.clamp(lobe * lobe - 1.0 + open_sky, 0.0, 1.0)
@@ -168,12 +168,12 @@ def light_at(
     open_sky: float,
     k: int,
 ):
-    """Light of all lamps and of the sky at a point.
+    """Light of all lamps and of the environment at a point.
 
     Args:
-        v: To the viewer.
-        lit: Visible part of each lamp at points [lamp, k]; UNSEEN is none.
-        open_sky: Visible part of the hemisphere.
+        v: Unit direction to the viewer.
+        lit: Visible fraction of each lamp at points [lamp, k]; UNSEEN counts as none.
+        open_sky: Visible fraction of the hemisphere.
     """
     n = material.normal
     n_v = wp.dot(n, v)
@@ -205,10 +205,11 @@ def light_lattice(
     lights: wp.array(dtype=LatticeLight),
     coats: wp.array(dtype=wp.vec4),
 ):
-    """Light at the lattice's points, on surfaces whose light is gathered; bumps are left out.
+    """Light at the lattice's points on surfaces that are interpolated; bumps are left out.
 
     Args:
-        coats: What weather lays there, ``mixable`` of a Coat; written if the ground is covered.
+        coats: Field ``mixable`` of a Coat: what weather leaves there; written if the ground is
+            covered.
     """
     k = wp.tid()
     surface = lattice.surface[k]
@@ -232,6 +233,7 @@ def light_lattice(
         coat = coat_at(world, surface, p, lattice.normal[k], world.ground.exposed[k], size_m)
         material = apply_coat(world, surface, material, coat, lattice.normal[k])
         coats[k] = coat.mixable
+    # The pixels apply bumps themselves: see lattice_interpolation.bump_factors.
     material.normal = lattice.normal[k]
     lights[k] = light_at(world, surface, material, p, v, lit, open_sky[0, k], k)
 
@@ -247,7 +249,7 @@ def shade_points(
     exposed: wp.array(dtype=float),
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Shade a list of pixels, each by itself; layered surfaces are left out."""
+    """Shade listed pixels individually, except layered surfaces."""
     k = wp.tid()
     i = pixels[k]
     hit = images.hits[i]
@@ -274,11 +276,12 @@ def shade_points(
 
 @wp.func
 def is_gatherable(world: World, surface: int):
-    """Whether a material's light changes slowly enough to be taken from the lattice."""
+    """Whether a material's light varies slowly enough to be interpolated from the lattice."""
     smooth = world.surfaces[surface].roughness >= GATHERED_ROUGHNESS
     smooth = smooth and world.surfaces[surface].layered == 0
     texture = world.surfaces[surface].texture
     if smooth and texture >= 0:
+        # A textured metal reflects its colour: light and albedo do not separate.
         smooth = world.surfaces[surface].metallic < 0.05
     return smooth
 
@@ -299,12 +302,12 @@ def find_pixel_visibility(
     open_sky: wp.array(dtype=float, ndim=2),
     exposed: wp.array(dtype=float),
 ):
-    """What listed pixels see of lamps and sky: the mean of lattice points, or by rays.
+    """Visibility of lamps and environment at listed pixels, from lattice points or by rays.
 
     Args:
-        parts: Points of the unit disc at which rays to lamps aim.
-        disc: Points of the unit disc under those of the hemisphere at which other rays aim.
-        radius_m: Of ambient occlusion.
+        parts: Points of the unit disk at which shadow rays aim.
+        disc: Points of the unit disk, lifted to the hemisphere for ambient occlusion.
+        radius_m: Radius of ambient occlusion.
     """
     k = wp.tid()
     i = pixels[k]
@@ -315,14 +318,14 @@ def find_pixel_visibility(
     cell = cell_at(view, lattice, x, y)
     for j in range(world.lamps.shape[0]):
         lit[j, k] = 0.0
-    # Light and shade change less than looks do: the points need not share the material.
+    # Visibility varies less than appearance: the points need not share the pixel's material.
     column = x / lattice.stride
     row = y / lattice.stride
     found = float(0.0)
     sky = float(0.0)
     rained_on = float(0.0)
     for reach in range(2):
-        # The cell's corners, and those around them only where none of the four will do.
+        # First the cell's corners; the ring around them only if none of the four is usable.
         if found == 0.0:
             for v in range(wp.max(row - reach, 0), wp.min(row + 2 + reach, lattice.height)):
                 for u in range(
@@ -337,6 +340,7 @@ def find_pixel_visibility(
                         sky += lattice_sky[0, q] * w
                         rained_on += lattice_exposure(world, q) * w
                         for j in range(world.lamps.shape[0]):
+                            # UNSEEN is negative and counts as dark.
                             lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
     if found > 0.0:
         open_sky[0, k] = sky / found
@@ -358,7 +362,7 @@ def find_pixel_visibility(
 
 @wp.func
 def lattice_exposure(world: World, q: int):
-    """Share of what falls that reaches lattice point q."""
+    """Exposure of lattice point q to precipitation."""
     exposed = float(1.0)
     if world.ground.covered != 0:
         exposed = world.ground.exposed[q]
@@ -367,8 +371,9 @@ def lattice_exposure(world: World, q: int):
 
 @wp.func
 def sky_exposure_at(world: World, origin: wp.vec3, n: wp.vec3):
-    """Share of what falls that reaches a point, by a ray."""
+    """Exposure of a point to precipitation, by a ray."""
     exposed = float(1.0)
+    # Steep surfaces hold no water or snow: their exposure is never used.
     if world.ground.covered != 0 and n[2] > 0.1:
         exposed = precipitation_exposure(world, origin)
     return exposed
@@ -378,9 +383,10 @@ def sky_exposure_at(world: World, origin: wp.vec3, n: wp.vec3):
 def body_sky_visibility(
     lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int
 ):
-    """Sum and number of the sky's visible parts at those corners of a cell that lie on a body.
+    """Sum and number of the sky's visible fractions at a cell's corners on one body.
 
-    A leaf or a spoke is as open to the sky as those beside it, whichever way they are turned.
+    Thin parts such as leaves and spokes are as open to the sky as their neighbours, whatever their
+    orientation.
     """
     total = float(0.0)
     found = float(0.0)
@@ -394,9 +400,9 @@ def body_sky_visibility(
 
 @wp.func
 def distance_weight(dx: float, dy: float):
-    """Weight of a lattice point, by its distance in cells."""
+    """Weight of a lattice point by its distance in cells."""
     squared = dx * dx + dy * dy
-    # Fourth powers of the distance: the nearest point counts, without a seam where it changes.
+    # Fourth powers of the distance: the nearest point dominates, without a seam where it changes.
     return 1.0 / (0.05 + squared * squared)
 
 
@@ -404,12 +410,12 @@ def distance_weight(dx: float, dy: float):
 def is_usable_point(
     view: View, images: GBufferRecord, lattice: Lattice, i: int, p: wp.vec3, q: int
 ):
-    """Whether a lattice point lies on the body of pixel i, near it and turned like it."""
+    """Whether a lattice point lies on the body of pixel i, near it and similarly oriented."""
     same = lattice.body[q] == images.hits[i][0]
     if same:
         n = images.normals[i]
         tolerance_m = 2.0 * surface_tolerance(view, p)
-        # 37 degrees: round things have such neighbours, edges of boxes do not.
+        # 37 degrees: neighbours on round surfaces pass, those across an edge of a box do not.
         same = wp.dot(n, lattice.normal[q]) > 0.8
         same = same and wp.abs(wp.dot(n, lattice.p_m[q] - p)) < tolerance_m
     return same
@@ -419,13 +425,13 @@ def is_usable_point(
 def visible_lamp_fraction(
     world: World, lamp: LightRecord, origin: wp.vec3, n: wp.vec3, parts: wp.array(dtype=wp.vec2)
 ):
-    """How much of a lamp a point sees; two rays that agree speak for all, one for a small lamp."""
+    """Visible fraction of a lamp from a point, by up to all ``parts``; one ray for small lamps."""
     beam = beam_from(lamp, origin)
     seen = float(0.0)
     cast = int(0)
     if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
         for k in range(wp.where(beam.spread < SMALL_SPREAD, 1, parts.shape[0])):
-            # Penumbras are rare: where the first two rays agree, the rest would too.
+            # Penumbrae are rare: where the first two rays agree, the rest is taken to agree.
             if k < 2 or (seen > 0.0 and seen < float(cast)):
                 cast += 1
                 if not is_occluded(
@@ -439,16 +445,16 @@ def visible_lamp_fraction(
 def visible_sky_fraction(
     world: World, origin: wp.vec3, n: wp.vec3, disc: wp.array(dtype=wp.vec2), radius_m: float
 ):
-    """How open a point is to the sky."""
+    """Visible fraction of the hemisphere within a radius, weighted by the cosine."""
     if radius_m == 0.0:
         return 1.0
     x, y = make_frame(n)
     total = float(0.0)
     for k in range(disc.shape[0]):
         c = disc[k]
-        # Points of the disk lifted to the hemisphere: in proportion to the cosine.
+        # Malley's method: disk points lifted to the hemisphere are distributed by the cosine.
         up = wp.sqrt(1.0 - wp.dot(c, c))
         t = free_path(world, path_along(origin, (x * c[0] + y * c[1] + n * up) * radius_m))
-        # Near things hide the sky fully; at the radius their shade has faded with no slope.
+        # Full occlusion on contact, fading with zero slope at the radius.
         total += t * (2.0 - t)
     return total / float(disc.shape[0])

@@ -1,9 +1,9 @@
-"""Rays through trees of boxes, eight boxes or eight triangles at a time.
+"""Ray traversal of bounding volume hierarchies, eight boxes or eight triangles at a time.
 
-On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and what walks them is
-written with the vector types of the compiler that Warp brings: plain IEEE arithmetic, the same on
-every processor. Measured against ``wp.mesh_query_ray``, which takes boxes and triangles one by one:
-a third of the time. On CUDA the same functions ask Warp's own hierarchies.
+On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal uses
+the vector extensions of the compiler that Warp ships: plain IEEE arithmetic, the same on every
+processor. It takes a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles
+one by one. On CUDA the same functions query Warp's own hierarchies.
 
 Sources: Wald, Benthin and Boulos, "Getting rid of packets: efficient SIMD single-ray traversal
 using multi-branching BVHs", 2008; Woop, Benthin and Wald, "Watertight ray/triangle intersection",
@@ -19,8 +19,8 @@ from gen_data.generator.renderers.warp.scene.kernels.records import BodyRecord, 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 Found = wp.spatial_vectord
-"""Where a ray meets something: parameter, weights of a face's first and second corner, face, body
-(0 within a mesh), and a spare number; face and body are -1 where it meets nothing."""
+"""Intersection of a ray: parameter, weights of a face's first and second corner, face, body
+(0 within a mesh), and an unused number; face and body are -1 for a miss."""
 
 _RAY = """
     typedef float Lanes __attribute__((ext_vector_type(8)));
@@ -226,13 +226,13 @@ _FOUND = """
 
 
 def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
-    """One text for both devices.
+    """Source of one native function for both devices.
 
-    On the CPU it is a function out of line: most modules go through trees in several places.
+    On the CPU it is compiled out of line: most modules traverse trees in several places.
 
     Args:
-        cpu, cuda: Look for a ``body`` and its ``strike``, either one (if ``ANY``) or the first.
-        first: Whether to tell all about the first, or whether there is any.
+        cpu, cuda: Code that finds a ``body`` and its ``strike``: any one (if ``ANY``) or the first.
+        first: Whether to return the first intersection, or whether there is any.
     """
     any_only = f"constexpr bool ANY = {str(not first).lower()};"
     told = _FOUND if first else "    return body >= 0;\n"
@@ -252,7 +252,7 @@ def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
 def first_in_mesh(
     tree: wp.array(dtype=wp.float32), mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> wp.spatial_vectord:
-    """The first face along a ray in the mesh frame, nearer than a parameter."""
+    """The first face along a ray in the mesh frame, before a parameter."""
     ...
 
 
@@ -275,7 +275,7 @@ def first_in_scene(
     reach: float,
     through: int,
 ) -> wp.spatial_vectord:
-    """The first face along a ray of all bodies but those that are cutouts by what it passes."""
+    """The first face along a ray, of all bodies without the cut-outs that ``through`` names."""
     ...
 
 
@@ -290,5 +290,5 @@ def any_in_scene(
     reach: float,
     through: int,
 ) -> bool:
-    """Whether a ray meets any body but those that are cutouts by what it passes."""
+    """Whether a ray meets any body without the cut-outs that ``through`` names."""
     ...

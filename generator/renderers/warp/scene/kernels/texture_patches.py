@@ -1,4 +1,4 @@
-"""Patches: faces on which a texture is looked up quickly."""
+"""Patches: flat faces whose texture coordinates are linear in space, for fast lookups."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class Patch:
-    """A face whose texture coordinates are linear in space, and whose normal is one, if ``flat``.
+    """A face with linear texture coordinates and a single normal, if ``flat``.
 
-    The coordinate u of the point at depth z along a direction d of the camera frame (with z = 1)
-    is ``u + dot(to_u, d) * z``; v likewise.
+    The coordinate u of the point at depth z along a direction d of the camera frame (with z = 1) is
+    ``u + dot(to_u, d) * z``; v likewise.
 
     Attributes:
         face: (body, face).
@@ -44,9 +44,10 @@ class Patch:
 def set_mapping(
     patch: Patch, world: World, b: int, g_u: wp.vec3, c_u: float, g_v: wp.vec3, c_v: float
 ):
-    """The patch with coordinates that are ``c_u + dot(g_u, p)`` at points p of the mesh frame."""
+    """Patch with coordinates ``c_u + dot(g_u, p)`` at points p of the mesh frame; v likewise."""
     eye = world.bodies[b].eye_mesh
     to_camera = wp.transpose(world.bodies[b].B_mesh_camera)
+    # Folding the camera's pose into the gradients leaves one dot product per pixel.
     patch.u = c_u + wp.dot(g_u, eye)
     patch.v = c_v + wp.dot(g_v, eye)
     patch.to_u = to_camera @ g_u
@@ -57,7 +58,8 @@ def set_mapping(
 
 @wp.func
 def triplanar_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
-    """Projected textures, where one projection is all that counts (see look.box_mapped)."""
+    """Patch of a projected texture where one projection dominates."""
+    # As material_eval.apply_triplanar_texture, which blends all three.
     squared = wp.cw_mul(n, n)
     x = wp.vec3(1.0, 0.0, 0.0)
     y = wp.vec3(0.0, 1.0, 0.0)
@@ -72,7 +74,7 @@ def triplanar_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3
         largest = squared[2]
         along_u = x
         along_v = y
-    # The other two weigh less than 0.004 in eighth powers.
+    # The other two projections then have weights below 0.004 (eighth powers), which are skipped.
     if wp.dot(n, n) - largest < 0.2 * largest:
         scale_m = world.surfaces[surface].texture_scale_m
         texture = world.surfaces[surface].texture
@@ -86,7 +88,7 @@ def triplanar_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3
 
 @wp.func
 def uv_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3i):
-    """Textures by the mesh's own UVs (see look.mesh_mapped)."""
+    """Patch of a texture mapped by the mesh's own UVs, as material_eval.apply_uv_texture."""
     g = world.bodies[b].geometry
     p = vertex_at(world, g, corner[0])
     e1 = vertex_at(world, g, corner[1]) - p
@@ -120,7 +122,7 @@ def uv_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3i)
 
 @wp.func
 def patch_at(world: World, surface: int, hit: wp.vec2i, normal: wp.vec3):
-    """The patch of a textured (body, face), seen where its normal is ``normal``."""
+    """The patch of a textured (body, face) at a point with the given normal."""
     patch = Patch()
     patch.face = hit
     patch.normal = normal
@@ -130,6 +132,7 @@ def patch_at(world: World, surface: int, hit: wp.vec2i, normal: wp.vec3):
     n = normal_at(world, g, corner[0])
     turn = wp.dot(n, normal_at(world, g, corner[1]))
     turn = wp.min(turn, wp.dot(n, normal_at(world, g, corner[2])))
+    # Vertex normals within 0.8 degrees: shading treats the face as flat.
     if turn > 0.9999:
         if world.surfaces[surface].texture_scale_m > 0.0:
             patch = triplanar_patch(patch, world, surface, b, n)

@@ -1,7 +1,7 @@
-"""Anti-aliasing of colour where surfaces meet within a pixel.
+"""Anti-aliasing of radiance at edges, by rays.
 
-Coverage is sampled by rays at parts of the pixel; colour is taken from the pixel centres nearby
-that see the same surface, so that nothing is shaded twice.
+Coverage is sampled at several points of a pixel; colour is taken from nearby pixel centres that
+show the same surface, so that nothing is shaded twice.
 
 Source: Chajdas, McGuire and Luebke, "Subpixel reconstruction antialiasing", I3D 2011.
 """
@@ -37,11 +37,11 @@ Vector8i = wp.types.vector(length=8, dtype=wp.int32)
 
 @wp.struct
 class Parts:
-    """What the parts of one pixel see.
+    """Nearest surfaces at the samples of one pixel.
 
     Attributes:
         nearness: 1/z of the nearest surface so far [1/m]; 0 for none.
-        source: Pixel whose centre sees the same surface and lends its colour; -1 for none.
+        source: Pixel whose centre shows the same surface and provides its colour; -1 for none.
     """
 
     nearness: Vector8
@@ -50,7 +50,7 @@ class Parts:
 
 @wp.func
 def is_face_repeated(view: View, images: GBufferRecord, x: int, y: int, k: int):
-    """Whether an earlier of the nine pixels sees the same face as the k-th."""
+    """Whether an earlier of the nine pixels shows the same face as the k-th."""
     hit = images.hits[neighbour_pixel(view, x, y, k)]
     before = bool(False)
     for m in range(k):
@@ -71,7 +71,7 @@ def cover(
     source: int,
     parts: Parts,
 ):
-    """Give the parts of pixel (x, y) to the face that pixel ``source`` sees where it is nearest."""
+    """Assign the samples of pixel (x, y) to the face of pixel ``source`` where it is nearest."""
     hit = images.hits[source]
     facet = make_facet(world, hit)
     cutouts = (world.bodies[hit[0]].cutouts & HOLES) != 0
@@ -80,7 +80,7 @@ def cover(
         y_px = float(y) + offsets[s][1]
         d = pixel_direction(view, x_px, y_px)
         det = wp.dot(d, facet.across)
-        # Barycentric weights and depth without a division: all have det for a factor.
+        # Barycentric weights and depth without a division: all are scaled by det.
         side = wp.where(det < 0.0, -1.0, 1.0)
         u = wp.dot(d, facet.along_u) * side
         v = wp.dot(d, facet.along_v) * side
@@ -108,9 +108,9 @@ def trace_source(
     y_px: float,
     t_min: float,
 ):
-    """The pixel around (x, y) that sees the body a ray meets first, for faces no centre sees.
+    """The pixel around (x, y) that shows the body at a sample, for faces no centre shows.
 
-    A body that no centre around sees has no colour to lend: it is not looked for.
+    Only bodies of the nine pixels are traced: no other has a colour to provide.
     """
     d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
     origin = view.eye_m + d * t_min
@@ -148,11 +148,11 @@ def antialias(
     t_min: float,
     mixed: wp.array(dtype=wp.vec3),
 ):
-    """Radiance of listed pixels: the mean over parts of the pixel, in the order of the list.
+    """Radiance of listed pixels: the mean over their samples, in the order of the list.
 
     Args:
         offsets: At most eight sample positions within the pixel, [0, 1).
-        t_min: z-depth from which surfaces are seen.
+        t_min: z-depth of the near plane.
     """
     row = wp.tid()
     i = pixels[row]
