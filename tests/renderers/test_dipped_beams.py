@@ -13,6 +13,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.light_selection import dipped_share, main_lamps
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.randomizers.vehicle_lights import dipped_beam
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at
 

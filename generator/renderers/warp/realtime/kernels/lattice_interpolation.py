@@ -344,7 +344,7 @@ def light_patch(
         if covered:
             coat = coats[q] * up + coats[below] * down
             coat_step = (coats[q + 1] * up + coats[below + 1] * down - coat) * right_step
-        x = int(x0)  # Warp's ranges are slow where little is done in them.
+        x = int(x0)  # While: Warp's range loops cost more than this body.
         while x < x1:
             color = albedo
             lit, shine = diffuse, rest

@@ -151,7 +151,7 @@ def sum_lamp_light(
 def specular_occlusion(brdf: Brdf, open_sky: float):
     """Visible fraction of the environment in the specular lobe.
 
-    Source: Lagarde and de Rousiers 2014, listing on specular occlusion, with a fixed exponent.
+    Source: Lagarde and de Rousiers 2014, with a fixed exponent.
     """
     lobe = brdf.n_v + open_sky
     return wp.clamp(lobe * lobe - 1.0 + open_sky, 0.0, 1.0)

@@ -122,9 +122,7 @@ def span_to(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side
 
 @wp.func
 def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, at: wp.vec2i):
-    """Whether a triangle whose edges have values a, b, c at a point covers the one at offset
-    ``at``.
-    """
+    """Whether a triangle whose edges have values a, b, c covers the point at offset ``at``."""
     right = wp.int64(at[0])
     down = wp.int64(at[1])
     inside = a + right * ea.dx + down * ea.dy

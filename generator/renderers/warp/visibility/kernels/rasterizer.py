@@ -75,7 +75,7 @@ def snap_to_grid(view: View, p: wp.vec3):
     """Image coordinates of a camera-frame point in units of 1/256 px."""
     x = p[0] / p[2] * view.fx + view.cx
     y = p[1] / p[2] * view.fy + view.cy
-    # Floor, not truncation: halves round the same way on both sides of zero.
+    # Floor of x + 0.5, not round: halves go the same way on both sides of zero.
     return wp.vec2i(int(wp.floor(x * 256.0 + 0.5)), int(wp.floor(y * 256.0 + 0.5)))
 
 
