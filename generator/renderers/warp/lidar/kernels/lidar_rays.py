@@ -1,4 +1,4 @@
-"""Rays of laser scanners: what they hit first, and how much of the light comes straight back."""
+"""Rays of laser scanners: first hits, reflectance, and secondary hits behind panes and mirrors."""
 
 from __future__ import annotations
 
@@ -39,28 +39,30 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 PI = wp.constant(3.14159265)
-# Fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral albedo of
-# snow", 1980: 0.9 to 0.75 for grains of 0.1 to 1 mm).
+# Reflectance of fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral
+# albedo of snow", 1980: 0.9 to 0.75 for grains of 0.1 to 1 mm).
 SNOW = wp.constant(0.85)
-# Wet markings keep a quarter of what their beads send back (EN 1436, classes R and RW).
+# Share of a marking's retro-reflection that water suppresses: a quarter remains (EN 1436, classes R
+# and RW).
 DROWNED = wp.constant(0.75)
-# Faces of glass on the way of a ray, and what is behind them.
+# Faces along one ray: panes, and the surface behind them.
 FACES_MAX = wp.constant(9)
-# Two faces of glass that are nearer to each other are one pane.
+# Two faces of glass closer than this form one pane.
 PANE_M = wp.constant(0.05)
 
 
 @wp.struct
 class Infrared:
-    """What a surface does to a laser's light that comes back the way it went.
+    """Reflection of a surface for laser light, back towards its source.
 
     Attributes:
         even, rim: Diffuse reflectance is ``even * cosine + rim * sine^2`` of incidence.
         specular: Fresnel reflectance at normal incidence.
         alpha: Width of the specular lobe (GGX).
-        retro: Reflectance of a retro-reflector, in units of a white matte surface seen square on.
-        mirror: Fresnel reflectance at normal incidence of what mirrors a beam; 0 = it does not.
-        clear: What it lets through one way, square on.
+        retro: Reflectance of a retro-reflector, relative to a white Lambertian surface at normal
+            incidence.
+        mirror: Fresnel reflectance at normal incidence of a mirror; 0 for all other surfaces.
+        clear: Transmittance of one passage at normal incidence.
     """
 
     even: float
@@ -74,15 +76,15 @@ class Infrared:
 
 @wp.struct
 class Scan:
-    """Where rays start and how they spread.
+    """Origin and divergence of a scan's rays.
 
     Attributes:
         R_world_lidar, eye_m: Pose of the scanner.
-        reach_m: Rays end here.
+        reach_m: Maximum range.
         spread: Tangent of the angle between a beam's axis and the rays around it.
-        subrays: 1 or 7.
-        run, threads: Rays in a run, and threads that take runs in turn.
-        divergence_rad: Angle of a beam: what it lights on a surface.
+        subrays: Rays per beam: 1 or 7.
+        run, threads: Rays per run, and threads, which process runs in turn.
+        divergence_rad: Full divergence of a beam, for the size of its footprint.
     """
 
     R_world_lidar: wp.mat33
@@ -97,15 +99,16 @@ class Scan:
 
 @wp.struct
 class BodyMotion:
-    """What moves while beams leave one after the other.
+    """Motion of bodies and of the scanner during a scan.
 
     Attributes:
-        keys: Poses that every mover has over the sweep; 0 = nothing moves, nothing else is read.
-        rows: Row of each body among the movers; -1 = it stands still.
-        B_mesh_lidar, eye_mesh: Directions and origin of the lidar frame in movers' mesh frames,
-            [mover, key].
-        phases: When each beam leaves, in keys.
-        origins_m: Where it begins in the lidar frame.
+        keys: Poses per moving body over the sweep; 0 if nothing moves, and the other fields are
+            unused.
+        rows: Row of each body among the moving ones; -1 for static bodies.
+        B_mesh_lidar, eye_mesh: Directions and origin of the lidar frame in the moving bodies' mesh
+            frames, [mover, key].
+        phases: Emission time of each beam, in keys.
+        origins_m: Its origin in the lidar frame.
     """
 
     keys: int
@@ -121,7 +124,7 @@ class Ray:
     """A ray in the lidar frame.
 
     Attributes:
-        key, share: It leaves this share of a step after this key.
+        key, share: Emission time: the key before it, and the fraction of the step after that key.
     """
 
     direction: wp.vec3
@@ -132,30 +135,30 @@ class Ray:
 
 @wp.func
 def beam_direction(axis: wp.vec3, k: int, spread: float):
-    """The axis of a beam, or one of six rays around it."""
+    """The axis of a beam, or one of six directions around it."""
     if k == 0:
         return axis
-    # Any axis that is not nearly parallel: the cross product must keep its digits.
+    # Any axis far from parallel keeps the digits of the cross product.
     helper = wp.where(wp.abs(axis[2]) < 0.9, wp.vec3(0.0, 0.0, 1.0), wp.vec3(1.0, 0.0, 0.0))
     across = fast_normalize(wp.cross(helper, axis))
     up = wp.cross(axis, across)
-    # Six around one: the densest even pattern in a round beam.
+    # Six around one: the densest regular pattern in a round beam.
     turn = float(k - 1) * (PI / 3.0)
     return fast_normalize(axis + (across * wp.cos(turn) + up * wp.sin(turn)) * spread)
 
 
 @wp.func
 def backscatter(light: Infrared, cosine: float):
-    """Reflectance for light that returns along its way, incidence included.
+    """Reflectance towards the source, including the cosine of incidence.
 
     The diffuse term is Lambert's, ``even * cosine``, or that of a rough surface, whose facets face
-    the scanner however it looks (Oren and Nayar, "Generalization of Lambert's reflectance model",
-    1994, with light and eye on one side). The lobe is GGX with its half vector along the ray, in
-    units of a white matte surface: ``pi * D * F * G / (4 cosine^2) * cosine`` with Smith's G, both
-    ways alike (Walter et al., "Microfacet models for refraction", 2007).
-    A retro-reflector keeps its entrance angles to about 60 degrees (ASTM D4956).
+    the scanner at any angle (Oren and Nayar, "Generalization of Lambert's reflectance model", 1994,
+    for coincident source and viewer). The lobe is GGX with its half vector along the ray, relative
+    to a white Lambertian surface: ``pi * D * F * G / (4 cosine^2) * cosine`` with Smith's G, equal
+    both ways (Walter et al., "Microfacet models for refraction", 2007). A retro-reflector works up
+    to entrance angles of about 60 degrees (ASTM D4956).
     """
-    # The lobe divides by it; light within 0.06 degrees of the surface brings nothing back.
+    # The lobe divides by the cosine; within 0.06 degrees of grazing nothing returns.
     c = wp.max(cosine, 1.0e-3)
     a2 = light.alpha * light.alpha
     c2 = c * c
@@ -168,7 +171,7 @@ def backscatter(light: Infrared, cosine: float):
 
 @wp.struct
 class Nearest:
-    """The nearest hit of a ray so far; body -1 where there is none.
+    """The nearest hit of a ray so far; body -1 for none.
 
     Attributes:
         u, v: Weights of the face's first two vertices.
@@ -183,17 +186,17 @@ class Nearest:
 
 @wp.func
 def mover_frame(motion: BodyMotion, m: int, ray: Ray):
-    """Directions of the lidar frame in the mesh frame of mover m when a ray leaves."""
-    # Mixed matrices are no rotations, by the square of the small turn between two keys.
+    """Directions of the lidar frame in the mesh frame of mover m when a ray is emitted."""
+    # Interpolated matrices deviate from rotations by the square of the small angle between keys.
     before = motion.B_mesh_lidar[m, ray.key]
     return before + (motion.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
 
 
 @wp.func
 def intersect_body(world: World, motion: BodyMotion, b: int, ray: Ray, hit: Nearest, offset: bool):
-    """The hit, or a nearer one on a body.
+    """The nearer of a hit and the first point of a body.
 
-    From the scanner's own frame: what is far from the world's origin loses nothing.
+    Computed in the scanner's own frame: positions far from the world's origin lose no precision.
     """
     d = world.bodies[b].B_mesh_camera @ ray.direction
     o = world.bodies[b].eye_mesh
@@ -229,6 +232,7 @@ def hit_normal(scan: Scan, world: World, motion: BodyMotion, ray: Ray, hit: Near
     if motion.keys > 0:
         m = motion.rows[hit.body]
         if m >= 0:
+            # The transpose of mesh-from-lidar; its scale cancels in the normalisation.
             return fast_normalize(wp.transpose(mover_frame(motion, m, ray)) @ n)
     return wp.transpose(scan.R_world_lidar) @ (
         world.bodies[hit.body].R_world_mesh @ fast_normalize(n)
@@ -237,13 +241,13 @@ def hit_normal(scan: Scan, world: World, motion: BodyMotion, ray: Ray, hit: Near
 
 @wp.func
 def make_ray(scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
-    """Ray i of all."""
+    """Ray i of all, in the lidar frame."""
     beam = i / scan.subrays
     ray = Ray()
     ray.direction = beam_direction(axes[beam], i % scan.subrays, scan.spread)
     if motion.keys > 0:
         ray.origin_m = motion.origins_m[beam]
-        # The last pulse may leave at the last key: it belongs to the step before it.
+        # A pulse emitted exactly at the last key belongs to the step before it.
         ray.key = wp.min(int(motion.phases[beam]), motion.keys - 2)
         ray.share = motion.phases[beam] - float(ray.key)
     return ray
@@ -251,7 +255,7 @@ def make_ray(scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: i
 
 @wp.func
 def world_origin(scan: Scan, ray: Ray, offset: bool):
-    """Where a ray begins, world frame; at the lidar frame's origin unless it is ``offset``."""
+    """Origin of a ray in the world; the lidar frame's origin unless it is ``offset``."""
     eye_m = scan.eye_m
     if offset:
         eye_m += scan.R_world_lidar @ ray.origin_m
@@ -270,17 +274,18 @@ def first_hit(
     gone_m: float,
     offset: bool,
 ):
-    """What a ray hits first; the ``likely`` body, if not -1, is tried first.
+    """The first hit of a ray; the ``likely`` body, if not -1, is tested first.
 
     Args:
-        listed: Bodies that it may meet.
-        gone_m: How far the ray begins after that of the list.
-        offset: Whether the ray may begin elsewhere than at the lidar frame's origin.
+        listed: Bodies that the ray may hit.
+        gone_m: Distance of the ray's origin along the ray of the list.
+        offset: Whether the ray may start elsewhere than at the lidar frame's origin.
     """
     hit = Nearest()
     hit.range_m = scan.reach_m
     hit.body = -1
     if likely >= 0:
+        # Neighbouring rays mostly hit the same body: its range rejects most other boxes.
         hit = intersect_body(world, motion, likely, ray, hit, offset)
     eye_m = world_origin(scan, ray, offset)
     inverse = reciprocals(scan.R_world_lidar @ ray.direction)
@@ -288,7 +293,7 @@ def first_hit(
     for k in range(count):
         b = int(k)
         if listed.count >= 0:
-            # Bodies are listed by distance: none of the rest can be nearer.
+            # Bodies are sorted by distance: none of the rest can be nearer.
             if boxes.enters_m[listed.row, k] - gone_m >= hit.range_m:
                 break
             b = boxes.listed[listed.row, k]
@@ -300,7 +305,7 @@ def first_hit(
 
 @wp.func
 def coat_at_hit(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_lidar: wp.vec3):
-    """What weather has laid where a ray ends."""
+    """Water and snow at the end of a ray."""
     n = scan.R_world_lidar @ n_lidar
     if wp.dot(n_lidar, ray.direction) > 0.0:
         n = -n
@@ -308,7 +313,7 @@ def coat_at_hit(scan: Scan, world: World, ray: Ray, range_m: float, surface: int
     exposed = float(1.0)
     if n[2] > 0.1:
         exposed = precipitation_exposure(world, p + n * SHELTER_OFFSET_M)
-    # A beam's mark grows as 1 / cosine; fifty beams long is as good as any longer.
+    # A footprint grows by 1 / cosine; beyond fifty beam widths its length no longer matters.
     slant = wp.max(wp.abs(wp.dot(n_lidar, ray.direction)), 0.02)
     return coat_at(world, surface, p, n, exposed, scan.divergence_rad * range_m / slant)
 
@@ -317,15 +322,15 @@ def coat_at_hit(scan: Scan, world: World, ray: Ray, range_m: float, surface: int
 def apply_weather(world: World, light: Infrared, coat: Coat, surface: int, cosine: float):
     """A surface under water and snow.
 
-    Water darkens rough ground at every wavelength that it does not absorb (Lekner and Dorf, "Why
-    some things are darker when wet", 1988), and reflects away what comes aslant, on both ways:
-    wet roads vanish at a distance. Wojtanowski et al., "Comparison of 905 nm and 1550 nm
-    semiconductor laser rangefinders' performance deterioration due to adverse environmental
-    conditions", 2014, measured it.
+    Water darkens rough ground also at wavelengths that it does not absorb (Lekner and Dorf, "Why
+    some things are darker when wet", 1988), and reflects oblique rays away in both directions: wet
+    roads vanish at a distance. Wojtanowski et al., "Comparison of 905 nm and 1550 nm semiconductor
+    laser rangefinders' performance deterioration due to adverse environmental conditions", 2014,
+    measured it.
     """
     porous = estimate_porosity(world, surface)
     film = wp.max(coat.puddle, 0.5 * porous * coat.wet)
-    # Twice through the surface of the water, and twice in ``kept``: in and out.
+    # Two passages of the water's surface here, two more in ``kept``: down and up.
     passes = 1.0 - film * fresnel_schlick(WATER_F0, cosine)
     kept = coat.mixable[0] * passes * passes
     bare = 1.0 - wp.min(coat.snow, 1.0)
@@ -340,7 +345,7 @@ def apply_weather(world: World, light: Infrared, coat: Coat, surface: int, cosin
 
 @wp.func
 def ray_index(scan: Scan, order: wp.array(dtype=int), j: int):
-    """Number of the ray at a place in the order of beams; an empty order leaves all in theirs."""
+    """Index of the ray at a position in the order of beams; an empty order is the identity."""
     i = int(j)
     if order.shape[0] > 0:
         i = order[j / scan.subrays] * scan.subrays + j % scan.subrays
@@ -349,7 +354,7 @@ def ray_index(scan: Scan, order: wp.array(dtype=int), j: int):
 
 @wp.func
 def add_ray(bundle: Bundle, scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
-    """The bundle with ray i of all."""
+    """The bundle extended by ray i of all."""
     ray = make_ray(scan, motion, axes, i)
     return extend_bundle(bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction)
 
@@ -372,13 +377,13 @@ def scan_beams(
 ):
     """First hit of every ray; ray k of beam i is at ``i * subrays + k``.
 
-    Each thread takes runs of ``run`` rays, one after the other: what the last one hit is tried
-    first, and mostly leaves nothing else to try. Hits are (body, material), (-1, -1) where there is
-    nothing; normals, in the lidar frame, are written where there is a mirror, and puddles, shares
-    of standing water, where weather has left something.
+    Each thread processes runs of ``run`` rays in turn; the body that the previous ray hit is tested
+    first, and mostly excludes all others. Hits are (body, material), (-1, -1) for none; normals, in
+    the lidar frame, are written for mirrors, and puddles, shares of standing water, if the ground
+    is covered.
 
     Args:
-        order: Beams, neighbours after each other; empty = they are already.
+        order: Order of beams in which neighbours are adjacent; empty if they already are.
     """
     t = wp.tid()
     for begin in range(t * scan.run, ranges_m.shape[0], scan.threads * scan.run):
@@ -432,7 +437,7 @@ def trace_behind_panes(
     reflectances: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
 ):
-    """What picked rays, which have met a pane, meet behind it and behind any further pane."""
+    """Last surfaces on selected rays that have hit a pane, behind it and any further pane."""
     t = wp.tid()
     for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
         end = wp.min(begin + scan.run, selected.shape[0])
@@ -459,23 +464,25 @@ def trace_behind_panes(
                         material = surface_index(world, wp.vec2i(hit.body, hit.face))
                         clear = lights[material].clear
                         if face > 0:
-                            # Each further pane is overwritten by what is behind it, if anything is.
+                            # A pane's echo is overwritten by that of the surface behind it, if any.
                             hits[j] = wp.vec2i(hit.body, material)
                             ranges_m[j] = way_m - LASER_OFFSET_M
                             reflectances[j] = passed * backscatter(lights[material], cosine)
                         if clear == 0.0:
                             passed = 0.0
                         elif face == 0 or hit.range_m > PANE_M:
+                            # Two faces of one pane count once; the light passes each pane twice.
                             kept = clear * (1.0 - fresnel_schlick(lights[material].mirror, cosine))
                             passed *= kept * kept
 
 
 @wp.func
 def reflect_ray(ray: Ray, n: wp.vec3, range_m: float):
-    """A ray after its reflection at a range, where the surface has normal n."""
+    """A ray after reflection at the given range, at a surface with normal n."""
     facing = wp.dot(n, ray.direction)
     ray.origin_m = ray.origin_m + ray.direction * range_m
     ray.direction = fast_normalize(ray.direction - n * (2.0 * facing))
+    # Off the mirror along both directions: it must not be hit again.
     ray.origin_m += ray.direction * LASER_OFFSET_M - n * (wp.sign(facing) * LASER_OFFSET_M)
     return ray
 
@@ -497,9 +504,9 @@ def trace_mirrors(
     reflectances: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
 ):
-    """What picked rays, which have met a mirror, meet after one reflection.
+    """Surfaces that selected rays hit after one reflection at a mirror.
 
-    The light comes back the same way, so the mirror weakens it twice.
+    The light returns by the same path, so the mirror attenuates it twice.
 
     Args:
         waters: Share of each picked ray's end that is a puddle; 0 = the material mirrors.
