@@ -45,7 +45,9 @@ def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
     scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
     cache = DeviceCache(FakeLibrary(MESHES), open_device("cpu"))
     kept = set(
-        bodies_within(pack_world(scene, camera, cache).placed, pack_view(camera, cache), margin)
+        bodies_within(
+            pack_world(scene, camera, cache).body_records, pack_view(camera, cache), margin
+        )
     )
     size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
     needed = set()
@@ -81,7 +83,7 @@ def test_whatever_is_drawn_was_projected() -> None:
         camera = camera_at((0.0, 0.0, 0.0), target)
         world, view = pack_world(scene, camera, cache), pack_view(camera, cache)
         projected = project_vertices(world, view, cache)
-        narrow = bodies_within(world.placed, view, 0.0)
+        narrow = bodies_within(world.body_records, view, 0.0)
         apart += len(np.setdiff1d(narrow, projected.reached))
         assert np.isin(projected.in_view, projected.reached).all()
     assert apart > 0

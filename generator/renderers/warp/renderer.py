@@ -1,4 +1,4 @@
-"""The renderer: Scene and Camera in, SensorReading out, on NVIDIA Warp."""
+"""The Warp renderer: from a Scene and a Camera to a SensorReading."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow
 class WarpRenderer:
     """Renders on the CPU or on a CUDA device with the same kernels.
 
-    A pure function of its arguments: what it keeps between calls are assets and scratch memory.
-    One call uses one core; run several processes to use more.
+    A pure function of its arguments: between calls it keeps only assets and scratch memory. A call
+    uses one core; run several processes to use more.
 
     Args:
-        assets: Where meshes, textures and environments come from.
+        assets: Source of meshes, textures and environments.
         device: ``cpu``, ``cuda:N``, or ``auto`` for the first CUDA device if there is one.
         settings: How radiance is computed.
 
     Raises:
-        ConfigError: if the device does not exist, or a denoiser is asked for and not there.
+        ConfigError: the device does not exist, or the denoiser is requested but not installed.
     """
 
     def __init__(
@@ -57,21 +57,21 @@ class WarpRenderer:
         self._cache = DeviceCache(assets, self._device)
         self._context = RenderContext(self._cache, self._settings)
         if self._settings.tier == "pathtraced":
-            # Its kernels take long to compile and are of no use to the other tier.
+            # Its kernels take long to compile, and the realtime tier does not need them.
             from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
 
             tracer = PathTracer(self._cache, self._settings)
             self._context = replace(self._context, paths=tracer)
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """Every asked channel of one camera."""
+        """All requested channels of one camera."""
         reading = expose_shutter(scene, camera, channels, self._context)
         return reading or self._render_instant(scene, camera, channels)
 
     def _render_instant(
         self, scene: Scene, camera: Camera, channels: frozenset[Channel]
     ) -> SensorReading:
-        """The image of one instant."""
+        """The image of a single instant."""
         world = pack_world(scene, camera, self._cache)
         view = pack_view(camera, self._cache)
         gbuffer = find_visible(world, view, self._cache, self._settings.visibility)
@@ -93,5 +93,5 @@ class WarpRenderer:
         return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
-        """What the rays of a laser scanner's beams hit first, and how well it reflects."""
+        """First hits of a laser scanner's rays, and the reflectance of the surfaces."""
         return trace_scan(scene, lidar, beams, self._cache)

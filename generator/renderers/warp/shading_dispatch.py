@@ -1,4 +1,4 @@
-"""Light and shade by the tier that settings ask for."""
+"""Dispatch of shading to the realtime or the path-traced tier."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def shade_pixels(
     gbuffer: GBuffer,
     context: RenderContext,
 ) -> wp.array:
-    """What comes from the pixels through the air [cd/m^2], linear RGB, flat; scratch memory.
+    """Radiance of all pixels through the air [cd/m^2], linear RGB, flat; scratch memory.
 
-    From their centres in the realtime tier, which is anti-aliased by ``smooth_edges``.
+    The realtime tier shades pixel centres, which ``smooth_edges`` anti-aliases.
     """
     cache, settings = context.cache, context.settings
     if context.paths is not None:
@@ -36,6 +36,6 @@ def shade_pixels(
 def smooth_edges(
     world: PackedWorld, view: View, gbuffer: GBuffer, radiance: wp.array, context: RenderContext
 ) -> None:
-    """Anti-alias what has not been averaged over pixels, in place."""
+    """Anti-alias radiance that is not averaged over pixels yet, in place."""
     if context.paths is None:
         mix_edges(world, view, gbuffer, radiance, context.cache, context.settings)

@@ -1,9 +1,9 @@
-"""Radiance and labels of images whose rows are exposed at several instants, or for a while.
+"""Radiance and labels of images exposed at several instants, or over an interval.
 
-The camera's shutter names the instants. Labels are those of each row's own instant, the middle of
-its exposure. Light is averaged over the exposure: time is cut into slices, every slice is rendered
-at its middle as far as rows are exposed then, and every row is the mean of its slices. Both take no
-more instants than motion in the image makes necessary.
+The camera's shutter defines the instants. Labels are those of each row's own instant, the middle of
+its exposure. Radiance is averaged over the exposure: time is divided into slices, each slice is
+rendered at its middle for the rows exposed then, and each row is the weighted mean of its slices.
+Both use no more instants than the motion in the image requires.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Slice:
-    """A slice of time, and the rows that are exposed in it.
+    """A time slice, and the rows exposed during it.
 
     Attributes:
-        band: The rows, and the slice's middle.
+        band: The rows, and the state at the slice's middle.
         weights: Share of each row's exposure that falls into the slice, shape [rows].
     """
 
@@ -67,7 +67,7 @@ class Slice:
 def expose_shutter(
     scene: Scene, camera: Camera, channels: frozenset[Channel], context: RenderContext
 ) -> SensorReading | None:
-    """The image of a camera whose shutter is open for a while; None if nothing moves meanwhile."""
+    """Image of a camera with a finite exposure; None if nothing moves during it."""
     open_s = camera.shutter.open_s
     if not open_s > 0.0:
         return None
@@ -98,7 +98,7 @@ def _render_images(
     sampling: ShutterSampling,
     context: RenderContext,
 ) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
-    """What pixels show, labels of it and, if asked for, radiance."""
+    """G-buffer, label images and, if requested, radiance."""
     labels = channels - {Channel.RADIANCE}
     if Channel.RADIANCE not in channels:
         return render_bands(bands, labels, context, reference)
@@ -125,12 +125,12 @@ def _render_images(
 def split_slices(
     middle: CameraState, samples: int, blurred: NDArray[np.bool_] | None = None
 ) -> list[Slice]:
-    """Slices of time that together hold every row's exposure once.
+    """Time slices that together cover every row's exposure once.
 
     Args:
-        middle: Of the exposure of the image.
-        samples: Slices to an exposure.
-        blurred: Rows that are worth it; the others are rendered in the slice nearest to their own
+        middle: State at the middle of the image's exposure.
+        samples: Slices per exposure.
+        blurred: Rows with motion blur; the others are rendered in the slice nearest to their own
             instant. None = all.
     """
     shutter, height = middle.camera.shutter, middle.camera.intrinsics.height_px
@@ -140,7 +140,7 @@ def split_slices(
     delays, half_s = shutter.row_delays_s(height), 0.5 * shutter.exposure_s
     starts, ends = offsets[:, None] - 0.5 * step_s, offsets[:, None] + 0.5 * step_s
     shares = np.minimum(ends, delays + half_s) - np.maximum(starts, delays - half_s)
-    # What rounding leaves of a slice is not worth rendering.
+    # Slivers left by rounding are not worth rendering.
     shares = np.where(shares > 1e-6 * step_s, shares, 0.0)
     shares /= shares.sum(axis=0)
     if blurred is not None:
@@ -160,7 +160,7 @@ def split_slices(
 def _average_slices(
     slices: Sequence[Slice], light: RadianceFunction, reference: CameraView, context: RenderContext
 ) -> Float32:
-    """Means over slices of what comes from every pixel [cd/m^2], float32 [h, w, 3]."""
+    """Mean radiance over slices [cd/m^2], float32 [h, w, 3]."""
     lens = reference.state.camera.intrinsics
     mean = np.zeros((lens.height_px, lens.width_px, 3), np.float32)
     for part in slices:
@@ -173,8 +173,8 @@ def _average_slices(
 
 
 def integrate_light(rendered: CameraView, context: RenderContext) -> Float32:
-    """What comes from every pixel, anti-aliased; valid until the next call."""
-    # What light does to the world's record is of no concern to those who start from it.
+    """Radiance of every pixel, anti-aliased; valid until the next call."""
+    # Shading changes the world's record, from which other instants start.
     rendered = replace(rendered, world=copy_world(rendered.world))
     scene, camera = rendered.state.scene, rendered.state.camera
     radiance = shade_pixels(scene, camera, rendered.world, rendered.view, rendered.gbuffer, context)
@@ -184,7 +184,7 @@ def integrate_light(rendered: CameraView, context: RenderContext) -> Float32:
 
 
 def _keep_main_lamps(reference: CameraView, context: RenderContext) -> CameraView:
-    """Only those lamps that matter in the middle of the exposure light the whole of it."""
+    """The view with only the lamps that matter at the middle of the exposure."""
     chosen = main_lamp_numbers(
         reference.world, reference.view, reference.gbuffer, context.settings.max_lamps
     )
@@ -197,6 +197,6 @@ def _keep_main_lamps(reference: CameraView, context: RenderContext) -> CameraVie
 
 
 def _to_device(image: Float32, dtype: Any, context: RenderContext) -> wp.array:
-    """An image as kernels have it, flat."""
+    """An image as a flat array on the device."""
     flat = image.reshape(-1, *image.shape[2:])
     return wp.array(flat, dtype=dtype, device=context.cache.device)

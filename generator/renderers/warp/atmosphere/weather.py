@@ -1,6 +1,6 @@
-"""Weather in the image: surfaces, air, what falls, and the lens.
+"""Weather in images: wet ground, reflections in water, and fog.
 
-Every function returns at once where the scene's weather has nothing for it to do.
+Every function returns at once if the scene's weather does not concern it.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 
-# Standard deviation of kernels.ground.patches; it is close to normal.
+# Standard deviation of ground_weathering.fractal_noise, which is nearly normal.
 _PATCH_DEVIATION = 0.513
 
 
 def expose_ground(world: PackedWorld, lattice: Lattice, cache: DeviceCache) -> None:
-    """Prepare the world's surfaces for being wet or under snow."""
+    """Prepare wetness and snow of the world's surfaces."""
     weather = world.weather
     if not weather.wetness + weather.puddles + weather.snow_cover:
         return
@@ -39,11 +39,11 @@ def expose_ground(world: PackedWorld, lattice: Lattice, cache: DeviceCache) -> N
 
 
 def ground_record(weather: Weather, exposed: wp.array | None = None) -> records.GroundRecord:
-    """The Ground record: dry and bare where the weather has left nothing.
+    """The GroundRecord of a scene's weather.
 
     Args:
-        weather: Of the scene.
-        exposed: Share of what falls that reaches each point of a lattice, where there is one.
+        weather: Weather of the scene.
+        exposed: Exposure of each lattice point to precipitation, if there is a lattice.
     """
     ground = records.GroundRecord()
     ground.covered = int(weather.wetness + weather.puddles + weather.snow_cover > 0.0)
@@ -64,7 +64,7 @@ def fill_air(
     radiance: wp.array,
     cache: DeviceCache,
 ) -> None:
-    """Reflections in water, then fog; in place."""
+    """Add reflections in water, then fog; in place."""
     if world.weather.wetness + world.weather.puddles > 0.0:
         _add_reflections(world, view, images, lattice, radiance, cache)
     fill_fog(world, view, images, radiance, cache)
@@ -77,7 +77,7 @@ def fill_fog(
     radiance: wp.array,
     cache: DeviceCache,
 ) -> None:
-    """Dim what is seen by the fog before it, and add the fog's own light, in place."""
+    """Attenuate radiance by fog and add the fog's own light, in place."""
     if world.weather.fog_extinction_per_m > 0.0:
         frame = [view, world.record, images, fog_record(world.weather)]
         columns, glow = _lamp_glow(world, view, frame, cache)
@@ -93,7 +93,7 @@ def _add_reflections(
     radiance: wp.array,
     cache: DeviceCache,
 ) -> None:
-    """Lay what water on the ground mirrors over the image, in place."""
+    """Blend reflections in water on the ground over the image, in place."""
     device, n = cache.device, view.width * view.height
     points = lattice.width * lattice.height
     share = cache.scratch("water", points, wp.vec2)
@@ -113,7 +113,7 @@ def _add_reflections(
 def _lamp_glow(
     world: PackedWorld, view: records.View, frame: list[Any], cache: DeviceCache
 ) -> tuple[int, wp.array]:
-    """Glow of lamps in fog at a lattice of points, and its columns; 0 where no lamp shines."""
+    """Columns and values of a grid of lamps' glow in fog; 0 columns without lamps."""
     stride = int(kernels.GLOW_STRIDE)
     columns, rows = (-(-(size - 1) // stride) + 2 for size in (view.width, view.height))
     glow = cache.scratch("glow", columns * rows, wp.vec3)
@@ -125,7 +125,7 @@ def _lamp_glow(
 
 
 def fog_record(weather: Weather) -> kernels.Fog:
-    """The Fog record."""
+    """The Fog record of a scene's weather."""
     fog = kernels.Fog()
     fog.extinction_per_m = weather.fog_extinction_per_m
     fog.height_m = weather.fog_height_m
@@ -133,7 +133,7 @@ def fog_record(weather: Weather) -> kernels.Fog:
 
 
 def _level(share: float) -> float:
-    """Level that the noise exceeds on that share of the ground."""
+    """Threshold that the noise exceeds on the given share of the ground."""
     if share <= 0.0 or share >= 1.0:
         return 9.0 if share <= 0.0 else -9.0
     return -_PATCH_DEVIATION * NormalDist().inv_cdf(share)

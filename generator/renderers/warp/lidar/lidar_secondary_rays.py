@@ -1,6 +1,6 @@
-"""What laser rays meet through glass and by way of mirrors.
+"""Secondary hits of laser rays: behind glass and by reflection in mirrors.
 
-Few rays come to a pane, a mirror or a puddle; only these are followed, after all first hits.
+Few rays hit a pane, a mirror or a puddle; only these are traced further, after all first hits.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from gen_data.generator.core.capture import SecondaryHits
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
-from gen_data.generator.renderers.warp.scene.body_materials import BodyMaterials
+from gen_data.generator.renderers.warp.scene.material_packing import BodyMaterials
 from gen_data.generator.renderers.warp.visibility.label_images import category_ids
 
 PUDDLE_MIN = 0.05
-"""Less of standing water than this mirrors nothing."""
+"""Smallest share of standing water that reflects."""
 
 Labels = tuple[NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint8]]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HitLabels:
-    """Tables from body and material to labels; the first entry is that of nothing."""
+    """Lookup tables from body and material to labels; the first entry is the background's."""
 
     instances: NDArray[np.uint16]
     categories: NDArray[np.uint16]
@@ -37,7 +37,7 @@ class HitLabels:
 
     @classmethod
     def of(cls, scene: Scene, looks: Sequence[BodyMaterials]) -> HitLabels:
-        """Of a scene, whose bodies look like this."""
+        """Tables of a scene with the given materials of its bodies."""
         instances = [0, *(body.instance_id for body in scene.bodies)]
         nothing = np.zeros(1, np.uint8)
         return cls(
@@ -54,11 +54,11 @@ class HitLabels:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FirstHits:
-    """First hits of all rays: ranges and (body, material) on the device, the latter also here.
+    """First hits of all rays: ranges and (body, material) on the device, hits also on the host.
 
     Attributes:
-        normals: Where there are mirrors, on the device, lidar frame.
-        puddles: Share of each ray's end that is standing water; None where everything is dry.
+        normals: Normals at mirrors, on the device, lidar frame.
+        puddles: Share of standing water at each ray's end; None if everything is dry.
     """
 
     ranges_m: wp.array
@@ -76,15 +76,15 @@ def trace_secondary(
     labels: HitLabels,
     cache: DeviceCache,
 ) -> SecondaryHits | None:
-    """What rays meet besides their first hits; None = nothing.
+    """Secondary hits of all rays; None without any.
 
     Args:
-        inputs: Of the kernel that found the first hits.
-        first: What it found.
-        order: Of the beams.
-        infrared: Records of the materials.
-        labels: Of the scene.
-        cache: Of the renderer.
+        inputs: Inputs of the kernel that found the first hits.
+        first: The first hits.
+        order: Order of the beams.
+        infrared: Infrared records of the materials.
+        labels: Label tables of the scene.
+        cache: Cache of the renderer.
     """
     material = first.hits[:, 1]
     clear = np.append(infrared["clear"] > 0.0, False)[material]
@@ -116,7 +116,7 @@ def trace_secondary(
 
 
 def _select_rays(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
-    """Numbers of the rays that are marked, those of neighbouring beams after each other."""
+    """Numbers of the marked rays, with neighbouring beams adjacent."""
     if order is None or not which.any():
         return np.flatnonzero(which).astype(np.int32)
     subrays = len(which) // len(order)
@@ -131,7 +131,7 @@ def _launch(
     labels: HitLabels,
     cache: DeviceCache,
 ) -> list[NDArray[Any]]:
-    """The fields of SecondaryHits of picked rays that meet something."""
+    """Fields of SecondaryHits for the selected rays that hit something."""
     count = len(selected)
     ranges_m, reflectances = (wp.zeros(count, dtype=float, device=cache.device) for _ in range(2))
     hits_ = wp.zeros(count, dtype=wp.vec2i, device=cache.device)

@@ -1,4 +1,4 @@
-"""Laser scanners: their rays through the same world, meshes and materials that cameras see."""
+"""Ray tracing of laser scans, through the same world, meshes and materials as cameras."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from gen_data.generator.renderers.warp.lidar.lidar_secondary_rays import (
     trace_secondary,
 )
 from gen_data.generator.renderers.warp.lidar.moving_bodies import pack_moving_bodies
-from gen_data.generator.renderers.warp.scene.body_materials import body_materials
+from gen_data.generator.renderers.warp.scene.material_packing import body_materials
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_world
 from gen_data.generator.renderers.warp.scene.struct_dtypes import to_device
 
 RING_SHARE = math.sqrt(1.0 / 2.0)
-"""Radius of the ring of rays, in units of the beam's: half the light is outside it."""
+"""Radius of the ring of rays, relative to the beam's: half the light is outside it."""
 
 
 RUN = 128
-"""Rays that are looked at together: neighbours meet the same few bodies."""
+"""Rays per run: neighbours hit the same few bodies."""
 
 THREADS = 16
-"""A processor runs them one after the other, each with lists of its own."""
+"""Threads of a launch on the CPU, where they run one after another, each with lists of its own."""
 
 RUN_CUDA, THREADS_CUDA = 32, 16384
 
 
 def trace_scan(scene: Scene, lidar: Lidar, beams: LidarRays, cache: DeviceCache) -> LidarHits:
-    """What the rays of all beams hit first, and what some of them meet besides."""
+    """First hits of all beams' rays, and secondary hits of some."""
     eye = Camera(lidar.name, lidar.T_world_lidar, Intrinsics(1, 1, 1.0, 1.0, 0.5, 0.5))
     world, motion = pack_moving_bodies(scene, lidar, beams, pack_world(scene, eye, cache), cache)
     world.record.ground = ground_record(scene.weather)

@@ -1,4 +1,4 @@
-"""Bodies that move while laser pulses leave one after the other."""
+"""Moving bodies during a laser scan, whose pulses are emitted one after another."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernel
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 
 KEYS = 9
-"""Poses over a sweep, straight between them: at 10 m/s^2 and 0.1 s within 0.2 mm."""
+"""Poses over a sweep, interpolated linearly: within 0.2 mm at 10 m/s^2 and 0.1 s."""
 
 SLACK_M = 2e-3
-"""Between keys a body may leave the boxes it has there by as much."""
+"""Margin by which a body may leave its boxes between keys."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mover:
-    """A body that moves: its number, rotation matrices [KEYS, 3, 3] and positions [KEYS, 3]."""
+    """A moving body: its number, rotation matrices [KEYS, 3, 3] and positions [KEYS, 3]."""
 
     number: int
     body: Body
@@ -36,7 +36,7 @@ class Mover:
 def pack_moving_bodies(
     scene: Scene, lidar: Lidar, beams: LidarRays, world: PackedWorld, cache: DeviceCache
 ) -> tuple[PackedWorld, kernels.BodyMotion]:
-    """The world with boxes around all the ways that bodies take, and these ways."""
+    """The world with boxes around the bodies' whole motion, and that motion."""
     device = cache.device
     motion = kernels.BodyMotion()
     motion.keys = 0
@@ -61,7 +61,7 @@ def pack_moving_bodies(
 
 
 def _find_movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
-    """Bodies whose pose changes while pulses leave."""
+    """Bodies whose pose changes during the scan."""
     if time_s is None or not scene.tracks:
         return []
     keys_s = scene.time_s + np.linspace(float(time_s.min()), float(time_s.max()), KEYS)
@@ -80,7 +80,7 @@ def _find_movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover
 def _lidar_in_mesh_frames(
     lidar: Lidar, movers: list[Mover]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Directions and the origin of the lidar frame in each mover's mesh frame, at each key."""
+    """Directions and origin of the lidar frame in each mover's mesh frame, at each key."""
     if not movers:
         return np.zeros((1, KEYS, 3, 3), np.float32), np.zeros((1, KEYS, 3), np.float32)
     R_world_lidar = lidar.T_world_lidar.rotation()
@@ -94,7 +94,7 @@ def _lidar_in_mesh_frames(
 
 
 def _enclose(world: PackedWorld, movers: list[Mover], cache: DeviceCache) -> PackedWorld:
-    """The world with boxes that hold movers wherever they are."""
+    """The world with boxes that contain the movers at all keys."""
     if not movers:
         return world
     low_m, high_m = world.body_records["low_m"].copy(), world.body_records["high_m"].copy()

@@ -1,4 +1,4 @@
-"""Colour images by path tracing."""
+"""Path-traced radiance images."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, l
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 
-# A launch is bounded, so that a device that also drives a screen is not held for long.
+# Launches are short, so that a device that also drives a screen stays responsive.
 _SAMPLES_AT_ONCE = 32
 _GUIDE_SAMPLES = 16
 _TABLE_BYTES = 16 << 20
@@ -36,7 +36,7 @@ _IRRADIANCE_SIZE = (64, 32)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _SkyLight:
-    """An environment as paths need it: its table, and its irradiance as of a Sky record."""
+    """An environment for the path tracer: its table, and its irradiance as of EnvironmentRecord."""
 
     table: SkyTable
     irradiance: wp.array
@@ -44,11 +44,11 @@ class _SkyLight:
 
 
 class PathTracer:
-    """Traces paths; keeps tables of environments between images.
+    """Renders radiance by path tracing; caches tables of environments.
 
     Args:
-        cache: Where assets are on the device.
-        settings: How colour images are made.
+        cache: Assets on the device.
+        settings: Settings of the renderer.
     """
 
     def __init__(self, cache: DeviceCache, settings: RenderSettings) -> None:
@@ -62,7 +62,7 @@ class PathTracer:
     def light(
         self, scene: Scene, camera: Camera, world: PackedWorld, view: records.View, gbuffer: GBuffer
     ) -> wp.array:
-        """As of ``radiance``, through the air: that of the pixel centres' depths."""
+        """As ``radiance``, denoised and through fog, at the depths of the pixel centres."""
         radiance = self.radiance(scene, camera, world, view)
         if self._settings.denoise:
             self._denoise(world, view, radiance)
@@ -80,15 +80,15 @@ class PathTracer:
         seed: int = 0,
         lights: int = 3,
     ) -> wp.array:
-        """Mean light of each pixel's square [cd/m^2], linear RGB, flat; scratch memory.
+        """Mean radiance of each pixel's square [cd/m^2], linear RGB, flat; scratch memory.
 
         Args:
-            scene: What ``world`` was packed from.
+            scene: The scene of ``world``.
             camera: Its name keys the noise.
-            world: Changed: gets every light, and the tables of paths.
-            view: Of the camera.
-            seed: Images of other seeds have other noise.
-            lights: How sources are found: 1 by asking them, 2 by meeting them, 3 by both.
+            world: Modified in place: receives all lights and the path tracer's tables.
+            view: View of the camera.
+            seed: Seed of the noise.
+            lights: Techniques: 1 light sampling, 2 BSDF sampling, 3 both.
         """
         sky = self._sky_light(scene.environment.image, whole=lights == 1)
         record = world.record
@@ -112,7 +112,7 @@ class PathTracer:
         return radiance
 
     def _denoise(self, world: PackedWorld, view: records.View, radiance: wp.array) -> None:
-        """Take out the noise, in place."""
+        """Denoise in place."""
         from gen_data.generator.renderers.warp.pathtraced.kernels.denoise_aovs import trace_guides
 
         device, n = self._cache.device, view.width * view.height

@@ -1,4 +1,4 @@
-"""Coats, glass, mirrors and further maps, over what plain shading has left."""
+"""Shading of layered surfaces: clear coats, glass, mirrors and further maps."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from gen_data.generator.renderers.warp.visibility.kernels import edge_detection
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ListedPixels:
-    """Pixels that are shaded by themselves.
+    """Pixels that are shaded individually.
 
     Attributes:
-        count: Their number; the arrays are longer.
-        pixels: Which ones.
-        lit: Visible part of each lamp [lamp, place in the list].
-        open_sky: Visible part of the hemisphere, [1, place].
-        exposed: Share of what falls that reaches them.
+        count: Number of pixels; the arrays are longer.
+        pixels: Indices of the pixels.
+        lit: Visible fraction of each lamp [lamp, position in the list].
+        open_sky: Visible fraction of the hemisphere, [1, position].
+        exposed: Exposure to precipitation.
     """
 
     count: int
@@ -39,7 +39,7 @@ class ListedPixels:
 
 
 _PARTS = 2
-"""Rays per pixel where edges are seen in a mirror or through glass."""
+"""Samples per pixel on edges in reflections or behind glass."""
 
 
 def shade_layers(
@@ -51,9 +51,9 @@ def shade_layers(
     cache: DeviceCache,
     settings: RenderSettings,
 ) -> None:
-    """Shade those of the listed pixels that see layered surfaces, in place.
+    """Shade the listed pixels that show layered surfaces, in place.
 
-    Where edges are seen in them or through them, by several rays.
+    Pixels with edges in reflections or behind glass take several samples.
     """
     # A module of its own: scenes without such surfaces neither compile nor load it.
     from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass

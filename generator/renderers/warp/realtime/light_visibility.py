@@ -1,4 +1,4 @@
-"""Shadows and ambient occlusion: what of each lamp and of the sky the lattice's points see."""
+"""Shadows and ambient occlusion: visibility of each lamp and of the sky from lattice points."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 _STRIDE_PX = 3
 _TILE = int(shadow_culling.TILE)
 _LIST_LENGTH = int(shadow_culling.LIST_LENGTH)
-# Column of the sample in each row of a pixel, far from that of the rows beside it.
+# Column of the sample in each row of a pixel, far from those of neighbouring rows (n-rooks).
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LightVisibility:
-    """What reaches the lattice's points.
+    """Visibility of lights from the lattice's points.
 
     Attributes:
-        lit: Visible part of each lamp, [lamps, points]; UNSEEN where it lights nothing.
-        open_sky: Visible part of the hemisphere, [1, points].
+        lit: Visible fraction of each lamp, [lamps, points]; UNSEEN where it has no effect.
+        open_sky: Visible fraction of the hemisphere, [1, points].
     """
 
     lit: wp.array
@@ -40,7 +40,7 @@ class LightVisibility:
 def make_lattice(
     world: PackedWorld, view: records.View, gbuffer: GBuffer, cache: DeviceCache
 ) -> lattice_kernels.Lattice:
-    """The lattice of a view."""
+    """Sample the lattice of a view."""
     lattice = lattice_kernels.Lattice()
     lattice.stride = _STRIDE_PX
     lattice.width = (view.width - 1) // _STRIDE_PX + 2
@@ -73,7 +73,7 @@ def find_light_visibility(
     cache: DeviceCache,
     settings: RenderSettings,
 ) -> LightVisibility:
-    """Shadows and ambient occlusion of all points."""
+    """Compute shadows and ambient occlusion of all points."""
     lamps = world.record.lamps.shape[0]
     columns = -(-lattice.width // _TILE)
     tiles = columns * -(-lattice.height // _TILE)
@@ -93,25 +93,25 @@ def find_light_visibility(
 
 
 def sunflower(n: int) -> Array:
-    """Points spread evenly over the unit disc, shape [n, 2] (Vogel, Math. Biosciences 44, 1979)."""
+    """Points evenly distributed over the unit disk, [n, 2] (Vogel, Math. Biosciences 44, 1979)."""
     k = np.arange(n)
     radius, angle = np.sqrt((k + 0.5) / n), k * math.pi * (3.0 - math.sqrt(5.0))
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
 def lamp_samples(n: int, shadows: str) -> Array:
-    """Points of a lamp's disc that shadows look at, shape [n, 2]; all at its centre if hard."""
+    """Points of a lamp's disk at which shadow rays aim, [n, 2]; its centre for hard shadows."""
     return sunflower(n) * (1.0 if shadows == "soft" else 0.0)
 
 
 def pixel_samples(n: int) -> Array:
-    """Sample positions in a pixel, [0, 1), shape [n, 2]: no two in one row or column (n-rooks)."""
+    """Sample positions in a pixel, [0, 1), [n, 2]: no two in one row or column (n-rooks)."""
     columns = _ROOKS[n]
     return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
 
 
 def cosine_hemisphere(n: int) -> Array:
-    """Unit directions about +Z whose density goes with the cosine (Malley), shape [n, 3]."""
+    """Unit directions about +Z distributed by the cosine (Malley), [n, 3]."""
     disc = sunflower(n)
     up = np.sqrt(1.0 - (disc * disc).sum(axis=1))
     return np.concatenate([disc, up[:, None]], axis=1)

@@ -1,4 +1,4 @@
-"""Radiance of the realtime tier: light and shade, weather, anti-aliasing."""
+"""Radiance of the realtime tier: lighting, weather, anti-aliasing."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def surface_light(
     cache: DeviceCache,
     settings: RenderSettings,
 ) -> wp.array:
-    """What comes from pixel centres through the air [cd/m^2], linear RGB, flat; scratch memory."""
+    """Radiance at pixel centres through the air [cd/m^2], linear RGB, flat; scratch memory."""
     images = gbuffer_record(gbuffer)
     keep_main_lamps(world, view, gbuffer, cache, settings.max_lamps)
     lattice = make_lattice(world, view, gbuffer, cache)
@@ -67,13 +67,13 @@ def add_precipitation(
     world: PackedWorld, camera: Camera, view: records.View, z_m: wp.array, radiance: wp.array,
     cache: DeviceCache,
 ) -> None:  # fmt: skip
-    """Draw rain and snow between the camera and what it sees, in place; depths as of GBuffer."""
+    """Draw falling rain and snow in front of the surfaces, in place; depths as of GBuffer."""
     if draw_precipitation(world, camera, view, z_m, radiance, cache):
         darken_outside(view, radiance)
 
 
 def radiance_image(radiance: wp.array, view: records.View) -> Float32:
-    """Luminance in linear RGB [cd/m^2], float32 [h, w, 3]; a copy of the flat array."""
+    """Radiance [cd/m^2], linear RGB, float32 [h, w, 3]; a copy of the flat array."""
     image: Float32 = radiance.numpy().reshape(view.height, view.width, 3).copy()
     return image
 
@@ -109,7 +109,7 @@ def mix_edges(
 
 
 def darken_outside(view: records.View, radiance: wp.array) -> None:
-    """Leave no light where the lens shows nothing, in place."""
+    """Set radiance to zero where the lens shows nothing, in place."""
     if view.lens != records.PINHOLE:
         n = view.width * view.height
         wp.launch(distortion.darken_outside, n, [view], [radiance], device=radiance.device)
@@ -124,7 +124,7 @@ def _draw_samples(
     samples: int,
     cache: DeviceCache,
 ) -> wp.array:
-    """What the parts of listed pixels see: (body, face), shape [pixels, parts]; (-1, -1)."""
+    """Visible (body, face) at samples of listed pixels, [pixels, samples]; (-1, -1) for none."""
     device = cache.device
     numbers = cache.scratch("numbers", view.width * view.height, wp.int32)
     floors = cache.scratch("floors", view.width * view.height, float)
@@ -150,12 +150,12 @@ def _draw_samples(
 
 
 def _offsets(samples: int) -> NDArray[np.int32]:
-    """Of a pixel's parts from its centre, in steps of 1/256 pixel, shape [samples, 2]."""
+    """Offsets of samples from a pixel's centre, in steps of 1/256 pixel, [samples, 2]."""
     return (pixel_samples(samples) * 256.0 - 128.0).astype(np.int32)
 
 
 def gbuffer_record(gbuffer: GBuffer) -> lattice_lighting.GBufferRecord:
-    """What kernels read of the surfaces that are seen."""
+    """The G-buffer as kernels read it."""
     images = lattice_lighting.GBufferRecord()
     images.hits, images.z_m = gbuffer.hits, gbuffer.z_m
     images.weights, images.normals = gbuffer.weights, gbuffer.normals
@@ -170,7 +170,7 @@ def _shade(
     cache: DeviceCache,
     settings: RenderSettings,
 ) -> wp.array:
-    """Luminance at all pixel centres [cd/m^2], linear RGB, flat."""
+    """Radiance at all pixel centres [cd/m^2], linear RGB, flat."""
     device, n = cache.device, view.width * view.height
     expose_ground(world, lattice, cache)
     radiance = cache.scratch("radiance", n, wp.vec3)
@@ -192,8 +192,8 @@ def _shade(
         lattice_interpolation.gather_light, shape, inputs, [count, pixels, radiance], device=device
     )
     listed = int(count.numpy()[0])
-    # In powers of two, so that few sizes are kept, and a little more: lamps a power of two apart
-    # would share their places in the processor's cache.
+    # Sizes are powers of two, so that few are kept, plus a little: rows of lamps a power of two
+    # apart would collide in the processor's cache.
     room = (1 << listed.bit_length()) + 48
     lit = cache.scratch("listed lit", (around.lit.shape[0], room), float)
     open_sky = cache.scratch("listed sky", (1, room), float)

@@ -1,12 +1,12 @@
-"""Trees of boxes for the rays of bvh_traverse, which says who reads them.
+"""Bounding volume hierarchies of eight-wide nodes, in the layout that kernels.bvh_traverse reads.
 
-A tree is one array of floats, in groups of eight; integers are stored as their bits.
+A tree is one array of floats, in groups of eight; integers are stored by their bits.
 
-- Group 0: the root's code. A code is the number of a node's first group; or minus that of a
-  leaf's; or in trees over bodies, whose leaves are bodies, -1 - body.
+- Group 0: the root's code. A code is the index of a node's first group; or minus that of a leaf;
+  or, in trees over bodies, whose leaves are bodies, -1 - body.
 - A node has seven groups of eight lanes: low x, high x, low y, high y, low z, high z, codes.
-- A leaf of a mesh has ten: x of its faces' first corners, of their second and third, then y and z
-  likewise; and numbers of the faces.
+- A leaf of a mesh has ten groups: x of its faces' first, second and third corners, then y and z
+  likewise; and the numbers of the faces.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from gen_data.generator.renderers.warp.scene.kernels import bvh_build
 
 _WIDTH = int(bvh_build.WIDTH)
 _NODE_GROUPS, _LEAF_GROUPS = 7, 10
-# Up to 2**24 boxes: eight depths of any cuts and eight of halves, each of seven more than it takes.
+# Stack for up to 2**24 boxes: eight levels of arbitrary splits and eight of halves, each pushing
+# seven more than it pops.
 _WAITING_MAX = 128
 
 Floats = NDArray[np.float32]
@@ -30,14 +31,14 @@ Ints = NDArray[np.int32]
 
 
 def face_boxes(vertices_m: Floats, faces: Ints) -> tuple[Floats, Floats]:
-    """Low and high corners [n, 3] of boxes around the faces."""
-    # Corner by corner: reducing over the short middle axis of [n, 3, 3] takes ten times as long.
+    """Low and high corners [n, 3] of the faces' bounding boxes."""
+    # Corner by corner: a reduction over the short middle axis of [n, 3, 3] takes ten times as long.
     a, b, c = (vertices_m.take(faces[:, k], axis=0) for k in range(3))
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 def mesh_tree(vertices_m: Floats, faces: Ints, lows_m: Floats, highs_m: Floats) -> Floats:
-    """A tree over a mesh's faces, given their boxes; triangles that a leaf lacks are points."""
+    """Tree over a mesh's faces, given their boxes; missing triangles of a leaf are points."""
     order, nodes, codes, leaves = _grow(lows_m, highs_m, _WIDTH)
     lanes = leaves[:, :1] + np.arange(_WIDTH, dtype=np.int32)
     lacking = lanes >= leaves[:, 1:]
@@ -54,18 +55,18 @@ def mesh_tree(vertices_m: Floats, faces: Ints, lows_m: Floats, highs_m: Floats) 
 
 
 def body_tree(lows_m: Floats, highs_m: Floats) -> Floats:
-    """A tree over bodies' boxes."""
+    """Tree over the bodies' boxes."""
     order, nodes, codes, leaves = _grow(lows_m, highs_m, 1)
     return _pack(nodes, codes, 1 + order[leaves[:, 0]], np.zeros((0, 1, _WIDTH), np.float32))
 
 
 def _pack(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
-    """One array of groups."""
+    """Concatenate a tree into one array of groups."""
     if len(leaf_places):
         leaf_codes = -leaf_places[np.maximum(-1 - codes, 0)]
         codes = np.where(codes < 0, leaf_codes, 1 + _NODE_GROUPS * codes).astype(np.int32)
     head = np.zeros((1, _WIDTH), np.int32)
-    # Everything but a single leaf begins with node 0.
+    # Every tree but a single leaf begins with node 0.
     head[0, 0] = 1 if len(nodes) else -leaf_places[0]
     inner = np.concatenate([nodes, codes[:, None].view(np.float32)], axis=1)
     groups = [head.view(np.float32), *(part.reshape(-1, _WIDTH) for part in (inner, tail))]
@@ -73,10 +74,10 @@ def _pack(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Fl
 
 
 def _grow(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, Ints]:
-    """The order of boxes, and the nodes, codes and leaves of ``growing.grow_tree``."""
+    """Build a tree; returns the order of boxes and the outputs of ``bvh_build.grow_tree``."""
     n = len(lows)
     order = np.arange(n, dtype=np.int32)
-    # A node splits what is too many for a leaf: there are fewer nodes than boxes.
+    # Each node splits a range: there are fewer nodes than boxes.
     nodes = np.zeros((max(n, 1), 6, _WIDTH), np.float32)
     codes = np.zeros((max(n, 1), _WIDTH), np.int32)
     leaves = np.zeros((n, 2), np.int32)
@@ -95,7 +96,7 @@ def _grow(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, I
 
 
 def _wrap(values: NDArray[np.generic], dtype: Any) -> wp.array:
-    """An array of the host's, for kernels on the CPU; it must outlive the kernels."""
+    """Wrap a host array for kernels on the CPU without a copy; it must outlive them."""
     shape = values.shape if dtype in (wp.int32, wp.float32) else values.shape[:-1]
     return wp.array(ptr=values.ctypes.data, dtype=dtype, shape=shape, device="cpu")
 

@@ -1,4 +1,4 @@
-"""Textures on the device, with their mip chains."""
+"""Textures on the device, with mip chains."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class DeviceTexture:
     Attributes:
         record: A Texture record [1].
         keep: The device arrays that the record points to.
-        texels: One of them: packed colours of all levels, the coarsest last.
-        layered: Whether it has maps that plain surfaces do not: emission, metal, occlusion.
+        texels: The packed colours of all levels, the coarsest last.
+        layered: Whether it has maps of emission, metal or occlusion.
         has_cutouts: Whether it has holes.
     """
 
@@ -43,7 +43,7 @@ class DeviceTexture:
 
 
 def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
-    """A texture, ready for kernels."""
+    """Upload a texture and its mip levels."""
     height, width = data.albedo.shape[:2]
     white = np.full((height, width), 255, np.uint8)
     albedo = data.albedo if data.alpha is None else remove_fringe(data.albedo, data.alpha)
@@ -75,7 +75,7 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
 
 
 def remove_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
-    """Colours with holes filled from around them, so that coarser levels do not mix theirs in.
+    """Fill the colours of holes from their surroundings, so that coarser levels have no fringes.
 
     Source: Gortler et al., "The lumigraph", SIGGRAPH 1996 (pull and push).
 
@@ -97,7 +97,7 @@ def remove_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
 def halve_image(image: Pixels) -> Pixels:
     """Means of 2 x 2 blocks of an image [h, w, channels]; a single row or column stays.
 
-    Odd sizes drop their last row or column: of a tiling image that is a shift nobody sees.
+    Odd sizes drop their last row or column: an invisible shift in a tiling image.
     """
     height, width = max(image.shape[0] // 2, 1), max(image.shape[1] // 2, 1)
     even = np.ascontiguousarray(image[: 2 * height, : 2 * width])
@@ -106,11 +106,11 @@ def halve_image(image: Pixels) -> Pixels:
 
 
 def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint32]]:
-    """Texels per mip level, and all levels packed one after the other.
+    """Texels per mip level, and all levels packed one after another.
 
-    Colours are kept as square roots of linear values, which spend the eight bits as evenly for
-    the eye as sRGB does and are quick to undo. Roughness is the fourth channel: its square, the
-    width of a highlight, is what coarser levels average.
+    Colours are stored as square roots of linear values, which distribute eight bits perceptually
+    much like sRGB and are cheap to invert. Roughness is the fourth channel: coarser levels average
+    its square, the width of a highlight.
     """
     finest = _append_channel(cv2.LUT(albedo, _sqrt_table()), roughness)
     levels = [finest]
@@ -124,12 +124,12 @@ def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint
 
 @cache
 def _sqrt_table() -> UInt8:
-    """Square roots of linear values by sRGB values."""
+    """Square roots of linear values by sRGB value."""
     return np.floor(np.sqrt(srgb_decode(np.arange(256) / 255.0)) * 255.0 + 0.5).astype(np.uint8)
 
 
 def _mean_levels(finest: Pixels) -> NDArray[np.uint32]:
-    """Four channels of all mip levels, packed one after the other."""
+    """Four channels of all mip levels, packed one after another."""
     levels = [finest]
     if max(finest.shape[:2]) > 1:
         image = halve_image(finest).astype(np.float32) * np.float32(1.0 / 255.0)
@@ -138,7 +138,7 @@ def _mean_levels(finest: Pixels) -> NDArray[np.uint32]:
 
 
 def _mip_levels(image: Pixels) -> list[Pixels]:
-    """An image, and its halves down to one texel."""
+    """An image and its halves down to one texel."""
     images = [image]
     while max(images[-1].shape[:2]) > 1:
         images.append(halve_image(images[-1]))
@@ -146,7 +146,7 @@ def _mip_levels(image: Pixels) -> list[Pixels]:
 
 
 def _append_channel(three: Pixels, fourth: Pixels) -> Pixels:
-    """Three channels and one more."""
+    """Append a fourth channel to three."""
     four: Pixels = cv2.merge([*cv2.split(three), fourth])
     return four
 
@@ -158,5 +158,5 @@ def _to_bytes(image: Pixels) -> Pixels:
 
 
 def _pack(levels: Sequence[Pixels]) -> NDArray[np.uint32]:
-    """Four bytes of each texel as one integer, level after level; the first byte lowest."""
+    """Pack the four bytes of each texel into one integer, level after level; first byte lowest."""
     return np.concatenate([level.reshape(-1) for level in levels]).view("<u4")

@@ -1,4 +1,4 @@
-"""Shadows that a panorama throws: its brightest parts become lamps where that can be seen."""
+"""Shadows of panoramas: their brightest parts become lamps where shadows would be visible."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from gen_data.generator.renderers.warp.scene.scene_packing import (
     sky_record,
 )
 
-# Fainter parts of all the light at the focus throw shadows that nobody would miss.
+# Parts with a smaller share of the light at the focus cast no visible shadows.
 _SHARE = 0.1
 _FAR_M = 1e3
 
 
 def extract_sky_lights(world: PackedWorld, scene: Scene, cache: DeviceCache) -> PackedWorld:
-    """The world with lamps for what is brightest in its panorama.
+    """The world with lamps for the brightest parts of its panorama.
 
-    Not where the scene has a sun, which its panorama then lacks; nor where walls shut the panorama
-    out, whose light then is that of the room; nor where other lamps drown it.
+    Unchanged if the scene has a sun, which its panorama then lacks; if walls block the panorama,
+    whose light is then the room's; or if other lamps outshine it.
     """
     environment = scene.environment
     if environment.luminance_cd_m2 <= 0.0 or any(light.kind == "sun" for light in scene.lights):
@@ -48,7 +48,7 @@ def extract_sky_lights(world: PackedWorld, scene: Scene, cache: DeviceCache) -> 
     lit = copy_world(world)
     lit.record.sky = sky_record(environment, split)
     added = lamp_records(suns)
-    # Mirrored rays find them in the panorama.
+    # Reflected rays hit them in the panorama itself.
     added["shown"] = 1
     lamps = np.concatenate([world.record.lamps.numpy(), added])
     lit.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
@@ -56,7 +56,7 @@ def extract_sky_lights(world: PackedWorld, scene: Scene, cache: DeviceCache) -> 
 
 
 def _sun(lamp: SkyLamp, environment: Environment) -> Light:
-    """The light in the world."""
+    """The lamp as a light in the world."""
     x, y, z = lamp.towards
     c, s = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
     power = np.asarray(lamp.power)
@@ -73,7 +73,7 @@ def _sun(lamp: SkyLamp, environment: Environment) -> Light:
 
 
 def _is_significant(lamp: SkyLamp, scene: Scene) -> bool:
-    """Whether a part of the panorama gives more than a little of the light at the focus."""
+    """Whether a part of the panorama contributes noticeably to the light at the focus."""
     lux = float(luminance(np.asarray(lamp.power))) * scene.environment.luminance_cd_m2
     others = sum(
         light.intensity_cd / max(math.dist(light.position_m, scene.focus.center_m) ** 2, 1e-4)
@@ -83,7 +83,7 @@ def _is_significant(lamp: SkyLamp, scene: Scene) -> bool:
 
 
 def _viewpoints(scene: Scene) -> Array:
-    """Points over the focus and at the cameras, shape [n, 3]."""
+    """Points above the focus and at the cameras, [n, 3]."""
     center, half = np.asarray(scene.focus.center_m), 0.5 * np.asarray(scene.focus.size_m)
     corners = [center + half * (x, y, 1.0) for x in (-1, 0, 1) for y in (-1, 0, 1)]
     eyes = [np.asarray(camera.T_world_camera.translation_m) for camera in scene.cameras]
@@ -91,7 +91,7 @@ def _viewpoints(scene: Scene) -> Array:
 
 
 def _directions_around() -> Array:
-    """Twelve directions over the horizon, evenly spread (a Fibonacci spiral), shape [12, 3]."""
+    """Twelve directions above the horizon, evenly distributed (Fibonacci spiral), [12, 3]."""
     k = np.arange(12)
     up = (k + 0.5) / 12.0
     level, azimuth = np.sqrt(1.0 - up * up), k * math.pi * (3.0 - math.sqrt(5.0))
@@ -99,7 +99,7 @@ def _directions_around() -> Array:
 
 
 def _is_open(world: PackedWorld, points: Array, towards: Array, cache: DeviceCache) -> bool:
-    """Whether any of these directions is free at any of these points."""
+    """Whether any of the directions is unobstructed at any of the points."""
     device = cache.device
     free = wp.zeros(1, dtype=wp.int32, device=device)
     inputs = [

@@ -1,4 +1,4 @@
-"""A Scene and a Camera as the records that kernels read."""
+"""Packing of a Scene and a Camera into the records that kernels read."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from gen_data.generator.core.scene import (
 )
 from gen_data.generator.core.se3 import Array, unit_quaternions_to_rotations
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.body_materials import body_materials
 from gen_data.generator.renderers.warp.scene.bvh import body_tree
 from gen_data.generator.renderers.warp.scene.device_meshes import DeviceMesh
 from gen_data.generator.renderers.warp.scene.environment_maps import DeviceEnvironment
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.material_packing import (
+    body_materials,
     cutout_bodies,
     cutout_slots,
     surface_records,
@@ -53,12 +53,12 @@ class PackedWorld:
 
     Attributes:
         record: The World record.
-        keep: Everything on the device that the record points to.
+        keep: Device memory that the record points to.
         body_records: Body records on the host, structured array [n].
-        vertex_count: Of all bodies together.
-        weather: Of the scene.
-        layered: Whether any surface has more to it than colour, roughness and bumps.
-        lows_m, highs_m: Corners of boxes in the world around the bodies, one at least.
+        vertex_count: Vertices of all bodies.
+        weather: Weather of the scene.
+        layered: Whether any surface is layered, see MaterialRecord.
+        lows_m, highs_m: Corners of the bodies' boxes in the world; at least one.
     """
 
     record: records.World
@@ -73,13 +73,13 @@ class PackedWorld:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Hierarchies:
-    """What finds bodies for rays: fields of the World record.
+    """Hierarchies over the bodies: fields of the World record.
 
     Attributes:
-        tree: On CUDA empty.
-        hierarchy: On the CPU None.
-        cutouts: Numbers of bodies.
-        cutout_hierarchy: None where there are none.
+        tree: Empty on CUDA.
+        hierarchy: None on the CPU.
+        cutouts: Numbers of the bodies with cut-outs.
+        cutout_hierarchy: None without such bodies.
     """
 
     tree: wp.array
@@ -90,13 +90,13 @@ class _Hierarchies:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Placement:
-    """Where the bodies of a scene are, whoever looks at them.
+    """Poses of a scene's bodies, independent of the camera.
 
     Attributes:
-        body_records: Body records without what depends on the camera.
-        R_world_mesh, t_world_mesh, scale: Of the bodies, float64 [n, 3, 3], [n, 3] and [n].
+        body_records: Body records without the fields that depend on the camera.
+        R_world_mesh, t_world_mesh, scale: Poses of the bodies, float64 [n, 3, 3], [n, 3] and [n].
         vertex_count, lows_m, highs_m: As of PackedWorld.
-        trees: What rays find them by.
+        trees: Hierarchies over them.
     """
 
     body_records: NDArray[np.void]
@@ -111,12 +111,12 @@ class _Placement:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _PackedScene:
-    """What every camera and scanner shares of one scene.
+    """Data that all cameras and scanners of one scene share.
 
     Attributes:
         record: The World record, without bodies.
         assets: Meshes, textures and environment that the record points to.
-        places: Where the bodies are.
+        places: Poses of the bodies.
         layered: As of PackedWorld.
     """
 
@@ -127,7 +127,7 @@ class _PackedScene:
 
 
 def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
-    """The scene as one camera sees it. Cheap enough to be done for every frame."""
+    """Pack a scene for one camera. Cheap enough for every frame."""
     packed: _PackedScene = cache.scenes.get(scene, lambda: _pack_scene(scene, cache))
     return _pack_for_camera(camera, packed, scene.weather, cache)
 
@@ -135,10 +135,10 @@ def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
 def repack_moved(
     world: PackedWorld, scene: Scene, camera: Camera, cache: DeviceCache
 ) -> PackedWorld:
-    """Another instant of a packed scene: the same assets and materials at other places.
+    """Pack another instant of a packed scene: the same assets and materials at other poses.
 
     Args:
-        world: As ``pack_world`` made it.
+        world: Result of ``pack_world``.
         scene: Poses of bodies and lights may differ from those that were packed.
         camera: Its pose may differ.
         cache: Assets.
@@ -155,7 +155,7 @@ def repack_moved(
 
 
 def copy_world(world: PackedWorld) -> PackedWorld:
-    """The same world, whose lamps, ground and sky can be changed without changing the other's."""
+    """Copy of the world whose lamps, ground and sky can be changed independently."""
     return replace(world, record=_copy_record(world.record))
 
 
@@ -169,12 +169,12 @@ def _copy_record(record: records.World) -> records.World:
 def _pack_for_camera(
     camera: Camera, packed: _PackedScene, weather: Weather, cache: DeviceCache
 ) -> PackedWorld:
-    """A packed scene with what depends on the camera."""
+    """Complete a packed scene with the fields that depend on the camera."""
     places = packed.places
     body_records = places.body_records.copy()
     if len(body_records):
         _fill_camera_poses(body_records, places, camera)
-    # A record of its own: weather and lamps are put into it for one view.
+    # A record of its own: weather and lamps are set for one view.
     record = _copy_record(packed.record)
     _fill_trees(record, places.trees)
     record.bodies = to_device(body_records, records.BodyRecord, cache.device)
@@ -226,10 +226,10 @@ def _place_bodies(
     meshes: Sequence[DeviceMesh],
     cache: DeviceCache,
 ) -> _Placement:
-    """Fill in where bodies are, and put a hierarchy over them."""
+    """Fill in the bodies' poses and build hierarchies over them."""
     R, t, scale, vertex_count = _fill_poses(body_records, bodies, meshes)
     body_records["low_m"], body_records["high_m"] = _world_boxes(body_records, meshes)
-    # Kernels over boxes need one; rays never meet this one.
+    # Kernels over boxes need at least one; no ray hits this one.
     nowhere = np.full((1, 3), 1e9, np.float32)
     low = body_records["low_m"] if len(body_records) else nowhere
     high = body_records["high_m"] if len(body_records) else nowhere
@@ -263,7 +263,7 @@ def _fill_trees(record: records.World, trees: _Hierarchies) -> None:
 
 
 def pack_view(camera: Camera, cache: DeviceCache) -> records.View:
-    """The camera."""
+    """Pack a camera."""
     k = camera.intrinsics
     view = records.View()
     view.width, view.height = k.width_px, k.height_px
@@ -283,7 +283,7 @@ def pack_view(camera: Camera, cache: DeviceCache) -> records.View:
 def _fill_poses(
     values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh]
 ) -> tuple[Array, Array, Array, int]:
-    """Fill in poses and vertex ranges; returns rotations, positions, scales, number of vertices."""
+    """Fill in poses and vertex ranges; returns rotations, positions, scales, vertex count."""
     if not bodies:
         return np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), 0
     R = unit_quaternions_to_rotations(
@@ -302,9 +302,10 @@ def _fill_poses(
 
 
 def _fill_camera_poses(values: NDArray[np.void], places: _Placement, camera: Camera) -> None:
-    """Fill in where bodies are before a camera.
+    """Fill in the bodies' poses relative to a camera.
 
-    Products are taken in float64, so that a camera far from the world's origin loses nothing.
+    Products are computed in float64, so that a camera far from the world's origin loses no
+    precision.
     """
     R_camera_world = camera.T_world_camera.rotation().T
     away = places.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)
@@ -329,13 +330,13 @@ def _world_boxes(
         "nij,nj->ni", R, (low + high) / 2, optimize=False
     )
     half = np.einsum("nij,nj->ni", np.abs(R), (high - low) / 2, optimize=False)
-    # A hair of slack keeps flat boxes traversable after rounding to float32.
+    # Slack keeps flat boxes traversable after rounding to float32.
     half = half + 1e-6 * (1.0 + np.abs(centre))
     return (centre - half).astype(np.float32), (centre + half).astype(np.float32)
 
 
 def sky_record(environment: Environment, light: DeviceEnvironment) -> records.EnvironmentRecord:
-    """The Sky record of an environment."""
+    """The EnvironmentRecord of an environment."""
     sky = records.EnvironmentRecord()
     sky.irradiance, sky.glossy = light.irradiance, light.glossy
     sky.image, sky.rest = light.image, light.rest
@@ -346,7 +347,7 @@ def sky_record(environment: Environment, light: DeviceEnvironment) -> records.En
 
 
 def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
-    """Lamp records, in the order of the lights."""
+    """LightRecord records, in the order of the lights."""
     values = np.zeros(len(lights), dtype=struct_dtype(records.LightRecord))
     for value, light in zip(values, lights, strict=True):
         strength = light.illuminance_lux if light.kind == "sun" else light.intensity_cd
@@ -365,11 +366,11 @@ def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
 
 
 def _fill_panel(value: NDArray[np.void], light: Light) -> None:
-    """The fields that only panels have."""
+    """Fill in the fields that only panels have."""
     normal = np.asarray(light.direction, dtype=np.float64)
     if light.kind == "rectangle":
         half_m = 0.5 * np.asarray(light.size_m, dtype=np.float64)
-        # Kept at right angles to the normal, whatever rounding has left of it.
+        # Re-orthogonalised: rounding may have tilted it.
         side = np.asarray(light.side) - normal * float((normal * light.side).sum())
         side = side / math.sqrt(float((side * side).sum()))
         area_m2 = 4.0 * half_m[0] * half_m[1]

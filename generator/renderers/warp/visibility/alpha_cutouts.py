@@ -1,4 +1,4 @@
-"""Bodies with holes where the rasteriser decides what is seen: they are traced over it."""
+"""Bodies with cut-outs in rasterised images: ray-traced into the z-buffer."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NE
 
 
 def has_cutouts(body_records: NDArray[np.void]) -> NDArray[np.bool_]:
-    """By body, whether rays may pass holes in it."""
+    """Whether rays may pass holes in each body, bool [n]."""
     holes: NDArray[np.bool_] = (body_records["cutouts"] & int(records.HOLES)) != 0
     return holes
 
@@ -43,7 +43,7 @@ def trace_over_samples(
     nearness: wp.array,
     hits: wp.array,
 ) -> None:
-    """Add listed bodies to a z-buffer of samples of listed pixels, in place."""
+    """Add listed bodies to a z-buffer of listed pixels' samples, in place."""
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
     device = hits.device
@@ -56,7 +56,7 @@ def trace_over_samples(
 def trace_outlines(
     world: PackedWorld, view: records.View, canvases: NDArray[np.void], mask: wp.array
 ) -> None:
-    """Draw silhouettes of bodies with holes into their Canvas records' pixels of a mask."""
+    """Draw silhouettes of bodies with cut-outs into the mask pixels of their Canvas records."""
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
     outlines = np.zeros(len(canvases), dtype=alpha_cutouts.Outline.numpy_dtype())
@@ -81,7 +81,7 @@ def trace_outlines(
 
 
 def project_window(body_records: np.void, view: records.View) -> BoxPx:
-    """Pixels at which a body may be seen before a pinhole; they may lie beside the image."""
+    """Pixels that a body may cover before a pinhole; may lie outside the image."""
     ends = np.stack([body_records["low_m"], body_records["high_m"]]).astype(np.float64)
     picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
     corners = ends[picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
@@ -113,7 +113,7 @@ def _window_fields(box: BoxPx) -> tuple[int, int, int, int]:
 
 
 def _intersect(box: BoxPx, bounds: BoxPx) -> BoxPx:
-    """The common part of two boxes; empty, at the second's corner, where there is none."""
+    """Intersection of two boxes; empty, at the second's corner, if they are disjoint."""
     x_min, y_min = max(box.x_min, bounds.x_min), max(box.y_min, bounds.y_min)
     x_max, y_max = min(box.x_max, bounds.x_max), min(box.y_max, bounds.y_max)
     if x_min >= x_max or y_min >= y_max:

@@ -37,8 +37,8 @@ def render_silhouettes(
 ) -> dict[int, Silhouette]:
     """The silhouette of every annotated instance, by instance id.
 
-    Coverage is the rasteriser's before a pinhole, else that of rays. ``seen_ids``, the image of
-    visible instance ids, is united with it: where rays decide visibility, they may differ from the
+    Coverage is the rasteriser's for a pinhole, else that of rays. It is united with ``seen_ids``,
+    the image of visible instance ids: where rays decide visibility, they may differ from the
     rasteriser by a pixel at an edge.
     """
     if view.lens == records.PINHOLE:
@@ -60,7 +60,7 @@ def render_silhouettes(
 def _rasterize_masks(
     scene: Scene, world: PackedWorld, view: records.View, projected: Projected, cache: DeviceCache
 ) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
-    """Per annotated instance a box that holds its silhouette, and the pixels of all boxes."""
+    """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
     p_camera, xy = projected.p_camera, projected.xy
     boxes = _boxes_px(scene, world, view, projected)
     canvases, size = _canvases(scene, boxes, projected.reached)
@@ -82,11 +82,11 @@ def _boxes_px(
     view: records.View,
     projected: Projected,
 ) -> dict[int, BoxPx]:
-    """Per annotated instance, the pixels of the canvas that its vertices reach; may be empty."""
+    """Pixels of the canvas that each annotated instance's vertices span; may be empty."""
     canvas = BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, BoxPx(0, 0, 0, 0))
-    # All bodies at once: asking hundreds of them one by one takes longer than drawing them.
+    # All bodies at once: hundreds of small queries take longer than drawing them.
     first = world.body_records["first_vertex"]
     solid = np.flatnonzero(np.diff([*first, world.vertex_count]))
     p_camera, xy = projected.p_camera.numpy(), projected.xy.numpy()
@@ -97,7 +97,7 @@ def _boxes_px(
     for k in np.flatnonzero(drawn).tolist():
         instance_id = scene.bodies[solid[k]].instance_id
         if instance_id in boxes:
-            # A triangle that is cut at the camera's plane may reach anywhere.
+            # A triangle clipped at the camera's plane may reach anywhere.
             cut = lows[k, 0] == _UNSNAPPED
             reached = canvas if cut else _clip_to_canvas(canvas, lows[k] >> 8, (highs[k] >> 8) + 1)
             boxes[instance_id] = union_box(boxes[instance_id], reached)
@@ -113,7 +113,7 @@ def _clip_to_canvas(canvas: BoxPx, low: NDArray[np.int32], high: NDArray[np.int3
 def _canvases(
     scene: Scene, boxes: dict[int, BoxPx], reached: NDArray[np.int32]
 ) -> tuple[NDArray[np.void], int]:
-    """One record per reached body of an instance with a box, and the pixels of all masks."""
+    """One record per projected body of an instance with a box, and the size of all masks."""
     first_pixels, size = {}, 0
     for instance_id, box in boxes.items():
         first_pixels[instance_id] = size
@@ -137,7 +137,7 @@ def _canvases(
 def _unite(
     pixels: NDArray[np.bool_], box: BoxPx, seen_ids: NDArray[np.uint16], instance_id: int
 ) -> None:
-    """Set what is seen of an instance in its silhouette, in place."""
+    """Add an instance's visible pixels to its silhouette, in place."""
     inside = box.clipped(seen_ids.shape[1], seen_ids.shape[0])
     if inside is None:
         return

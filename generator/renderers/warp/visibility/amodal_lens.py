@@ -1,7 +1,7 @@
-"""Silhouettes before lenses that bend straight edges: by rays, on a canvas of 3 x 3 images.
+"""Amodal silhouettes for lenses with distortion: by rays, on a canvas of 3 x 3 images.
 
-The canvas goes on where the lens's model does: its pixels beside the image look where a larger
-sensor behind the same lens would, and nowhere beyond the lens's field.
+The canvas extends the lens model: its pixels outside the image look where a larger sensor behind
+the same lens would, and nowhere beyond the lens's field.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
 def trace_masks(
     scene: Scene, world: PackedWorld, view: records.View, camera: Camera, cache: DeviceCache
 ) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
-    """Per annotated instance a box that holds its silhouette, and the pixels of all boxes."""
+    """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
     optics = cache.optics(camera.intrinsics)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, EMPTY)
@@ -45,7 +45,7 @@ def trace_masks(
             ends_m = np.stack([world.body_records[end][number] for end in ("low_m", "high_m")])
             axis, half_rad = bounding_cone(ends_m - np.array(camera.T_world_camera.translation_m))
             cosines = optics.nodes @ (R_camera_world @ axis).astype(np.float32)
-            # Every pixel that is shown has a node within a diagonal of a cell.
+            # Every visible pixel has a node within the diagonal of a cell.
             box = box_around(cosines >= math.cos(min(half_rad + 1.5 * step_rad, math.pi)))
             of_bodies[number] = _clip_to_canvas(box, view)
             boxes[body.instance_id] = union_box(boxes[body.instance_id], of_bodies[number])
@@ -61,7 +61,7 @@ def trace_masks(
 
 
 def bounding_cone(ends_m: Array) -> tuple[Array, float]:
-    """Axis and half angle of a cone from the origin that holds a box; pi where it holds that.
+    """Axis and half angle of a cone from the origin around a box; pi if it contains the origin.
 
     Args:
         ends_m: Low and high corner, [2, 3].
@@ -75,16 +75,18 @@ def bounding_cone(ends_m: Array) -> tuple[Array, float]:
     corners = ends_m[_CORNERS, [0, 1, 2]]
     cosines = corners @ axis / np.sqrt((corners * corners).sum(axis=1))
     least = float(cosines.min())
-    # Narrow cones are convex: one that holds all corners holds the box.
+    # Cones below 90 degrees are convex: one that contains all corners contains the box.
     narrow_rad = math.acos(min(least, 1.0)) if least > 0.0 else math.pi
     return axis, min(narrow_rad, math.asin(radius_m / distance_m))
 
 
 def box_around(marked: NDArray[np.bool_]) -> BoxPx:
-    """Pixels around set nodes, counted from the canvas's first, and two cells more; may be empty.
+    """Bounding box of marked nodes and two more cells, from the canvas's first pixel.
+
+    May be empty.
 
     Args:
-        marked: By node, [rows, columns].
+        marked: Flags of nodes, [rows, columns].
     """
     if not marked.any():
         return EMPTY
@@ -98,7 +100,7 @@ def box_around(marked: NDArray[np.bool_]) -> BoxPx:
 
 
 def union_box(a: BoxPx, b: BoxPx) -> BoxPx:
-    """Smallest box around two, of which either may be empty."""
+    """Smallest box around two boxes, either of which may be empty."""
     if not a.width_px * a.height_px:
         return b
     if not b.width_px * b.height_px:
@@ -109,7 +111,7 @@ def union_box(a: BoxPx, b: BoxPx) -> BoxPx:
 
 
 def _widest_step(nodes: Float32) -> float:
-    """Largest angle between neighbouring nodes that are both shown [rad]."""
+    """Largest angle between neighbouring visible nodes [rad]."""
     widest = 0.0
     for a, b in ((nodes[1:], nodes[:-1]), (nodes[:, 1:], nodes[:, :-1])):
         chords = ((a - b) ** 2).sum(axis=-1)
@@ -118,7 +120,7 @@ def _widest_step(nodes: Float32) -> float:
 
 
 def _clip_to_canvas(box: BoxPx, view: records.View) -> BoxPx:
-    """The part of a box on the canvas, in image coordinates."""
+    """Part of a box on the canvas, in image coordinates."""
     inside = box.clipped(3 * view.width, 3 * view.height)
     if inside is None:
         return EMPTY
@@ -133,7 +135,7 @@ def _clip_to_canvas(box: BoxPx, view: records.View) -> BoxPx:
 def _window_records(
     scene: Scene, boxes: dict[int, BoxPx], of_bodies: dict[int, BoxPx]
 ) -> tuple[NDArray[np.void], int]:
-    """One record per body that may be on the canvas, and the pixels of all instances' boxes."""
+    """One record per body that may be on the canvas, and the size of all instances' boxes."""
     first_pixels, size = {}, 0
     for instance_id, box in boxes.items():
         first_pixels[instance_id] = size

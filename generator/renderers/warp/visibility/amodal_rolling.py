@@ -1,4 +1,4 @@
-"""Silhouettes behind a rolling shutter."""
+"""Amodal silhouettes with a rolling shutter."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _BANDS = 12
 def rolling_silhouettes(
     bands: Sequence[RowBand], ids: NDArray[np.uint16], context: RenderContext, reference: CameraView
 ) -> dict[int, Silhouette]:
-    """Silhouettes, each row at its instant as far as a dozen bands can tell.
+    """Silhouettes with each row at its own instant, approximated by a dozen bands.
 
-    What lies above the image is as in its first row, what lies below as in its last. What is
-    visible is always part of them.
+    The canvas above the image is as at the first row, below it as at the last row. Visible pixels
+    are always included.
     """
     if len(bands) > _BANDS:
         starts = [band.first for band in bands][:: -(-len(bands) // _BANDS)]
@@ -50,19 +50,19 @@ def rolling_silhouettes(
 
 
 def _visible_mask(instance_id: int, ids: NDArray[np.uint16]) -> Silhouette:
-    """The pixels that show an instance."""
+    """The visible pixels of an instance."""
     return Silhouette(instance_id, 0, 0, ids == instance_id)
 
 
 def _crop_rows(outline: Silhouette, top: int, end: int) -> Silhouette:
-    """The rows of a silhouette from one to before another."""
+    """Rows ``top`` to ``end`` (exclusive) of a silhouette."""
     first = max(top - outline.y_px, 0)
     mask = outline.mask[first : max(end - outline.y_px, first)]
     return replace(outline, y_px=outline.y_px + first, mask=mask)
 
 
 def _merge(instance_id: int, parts: Sequence[Silhouette]) -> Silhouette:
-    """One silhouette of several bands of rows."""
+    """One silhouette from several bands of rows."""
     filled = [part for part in parts if part.mask.any()]
     if not filled:
         return Silhouette(instance_id, 0, 0, np.zeros((0, 0), np.bool_))

@@ -1,4 +1,4 @@
-"""Which surface is seen at every pixel centre."""
+"""G-buffer: the visible surface at every pixel centre."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutou
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve, rasterizer
 
 Method = Literal["auto", "raster", "rays"]
-"""How the surface at a pixel centre is found, as in RenderSettings."""
+"""How visibility is determined, as in RenderSettings."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Projected:
-    """The vertices of bodies in or beside an image, body after body.
+    """Projected vertices of bodies in or near an image, body after body.
 
     Attributes:
-        reached: Numbers of the bodies that may lie on a canvas of three by three images; the
-            vertices of others are left over from before.
+        reached: Numbers of the bodies that may lie on a canvas of three by three images; vertices
+            of other bodies are stale.
         in_view: Numbers of the bodies that may lie in the image.
-        p_camera: In the camera frame [m].
-        xy: Snapped to the image plane; see
+        p_camera: Vertices in the camera frame [m].
+        xy: Vertices snapped to the image plane; see
             gen_data.generator.renderers.warp.visibility.kernels.rasterizer.
     """
 
@@ -40,14 +40,14 @@ class Projected:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GBuffer:
-    """Flat images of what is seen, row by row.
+    """Flat images of the visible surfaces, row by row.
 
     Attributes:
-        hits: (body, face); (-1, -1) where there is nothing.
-        z_m: Depth along the optical axis before a pinhole, else along the ray; inf.
-        weights: Barycentric (u, v); u + 2 where a triangle's inside is seen.
-        normals: Smooth, unit, world frame, towards the camera; 0.
-        projected: What was drawn; None where rays were traced.
+        hits: (body, face); (-1, -1) for the background.
+        z_m: Depth along the optical axis for a pinhole, else along the ray; inf for the background.
+        weights: Barycentric (u, v); u + 2 where the back of a triangle is visible.
+        normals: Smooth unit normals, world frame, towards the camera; 0 for the background.
+        projected: Rasterised vertices; None where rays were traced.
     """
 
     hits: wp.array
@@ -63,9 +63,9 @@ def find_visible(
     cache: DeviceCache,
     method: Method,
 ) -> GBuffer:
-    """The surfaces at all pixel centres of a view."""
+    """Find the surfaces at all pixel centres of a view."""
     n = view.width * view.height
-    # Straight edges have straight images before a pinhole only.
+    # Straight edges have straight images only for a pinhole.
     drawn = method == "raster" or (method == "auto" and cache.device.is_cpu)
     drawn = drawn and view.lens == records.PINHOLE
     projected = project_vertices(world, view, cache) if drawn else None
@@ -96,10 +96,11 @@ def find_visible(
 
 
 def project_vertices(world: PackedWorld, view: records.View, cache: DeviceCache) -> Projected:
-    """Vertices as the camera sees them; valid until the next call."""
+    """Project vertices into the camera; valid until the next call."""
     count = max(world.vertex_count, 1)
     reached = bodies_within(world.body_records, view, 1.0)
-    # The wider test may refuse a body that the narrower one cannot: it is outside of both.
+    # Rounding may let the wider test reject a body that the narrower one accepts: it is outside
+    # both.
     in_view = np.intersect1d(reached, bodies_within(world.body_records, view, 0.0))
     projected = Projected(
         reached,
@@ -117,19 +118,19 @@ def project_vertices(world: PackedWorld, view: records.View, cache: DeviceCache)
 def bodies_within(
     body_records: NDArray[np.void], view: records.View, margin: float
 ) -> NDArray[np.int32]:
-    """Numbers, ascending, of the bodies whose boxes reach into the pyramid of an image.
+    """Numbers, ascending, of the bodies whose boxes reach into an image's frustum.
 
     Args:
         body_records: Body records.
         view: The camera.
-        margin: How far the pyramid reaches beyond each side of the image, in images.
+        margin: How far the frustum extends beyond each side of the image, in images.
     """
     ends = np.stack([body_records["low_m"], body_records["high_m"]], axis=1).astype(np.float64)
     picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
     corners = ends[:, picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
     R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
     x, y, z = np.moveaxis(np.einsum("nki,ij->nkj", corners, R_world_camera, optimize=False), -1, 0)
-    # A pixel more than asked for swallows every rounding.
+    # One more pixel absorbs all rounding.
     beyond_x, beyond_y = margin * view.width + 1.0, margin * view.height + 1.0
     outside = [
         z < rasterizer.Z_NEAR_M,

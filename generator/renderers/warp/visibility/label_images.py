@@ -1,4 +1,4 @@
-"""Label images: what the pixel-centre ray alone decides."""
+"""Label images, which the ray through each pixel's centre decides."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def label_images(
     gbuffer: GBuffer,
     channels: frozenset[Channel],
 ) -> dict[Channel, NDArray[Any]]:
-    """Every label channel that is asked for, as listed at Channel."""
+    """All requested label channels, as documented at Channel."""
     shape = (view.height, view.width)
     images: dict[Channel, NDArray[Any]] = {}
     ids = {
@@ -62,7 +62,7 @@ def category_ids(scene: Scene) -> list[int]:
 
 
 def box_frames(scene: Scene) -> NDArray[np.void]:
-    """Per body, the map from its mesh frame to the unit cube of its instance's box."""
+    """Per body, the transform from its mesh frame to the unit cube of its instance's box."""
     frames = np.zeros(len(scene.bodies), dtype=label_resolve.BoxFrame.numpy_dtype())
     instances = {instance.instance_id: instance for instance in scene.instances}
     for frame, body in zip(frames, scene.bodies, strict=True):
@@ -71,7 +71,7 @@ def box_frames(scene: Scene) -> NDArray[np.void]:
             continue
         T_instance_body = instance.T_world_instance.inverse() @ body.T_world_body
         low = np.asarray(instance.box_min_m)
-        # A flat box has no position along its thickness; 0 is as good as any.
+        # A flat box has no extent along its thickness; any position is valid, here 0.
         size = np.maximum(np.asarray(instance.box_max_m) - low, 1e-9)
         frame["A_box_mesh"] = T_instance_body.rotation() * body.scale / size[:, None]
         frame["t_box_mesh"] = (np.asarray(T_instance_body.translation_m) - low) / size

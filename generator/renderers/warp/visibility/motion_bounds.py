@@ -1,4 +1,4 @@
-"""How fast things move in an image, and how many instants of time it therefore takes."""
+"""Speed of motion in an image, and the number of instants that it requires."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from gen_data.generator.renderers.warp.visibility.reprojection import (
 )
 
 BAND_PX = 0.25
-"""Nothing that is seen moves farther within a band of rows."""
+"""Largest motion of visible points within a band of rows."""
 BLUR_PX = 0.3
-"""Nor within a slice of an exposure, if the camera's number of samples allows."""
+"""Largest motion within a slice of an exposure, if the camera's number of samples allows."""
 _STRIDE_PX = 4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ShutterSampling:
-    """How an image has to be taken.
+    """Sampling in time that an image requires.
 
     Attributes:
-        speeds_px_s: Of the fastest thing in or near each row, shape [height].
-        samples: Slices of an exposure.
-        blurred: Rows in which something moves while they are exposed, shape [height].
+        speeds_px_s: Speed of the fastest point in or near each row, shape [height].
+        samples: Slices per exposure.
+        blurred: Rows with visible motion during their exposure, shape [height].
     """
 
     speeds_px_s: Array
@@ -47,10 +47,10 @@ class ShutterSampling:
 
 
 def plan_sampling(rendered: CameraView) -> ShutterSampling:
-    """How an image is taken while the camera's shutter is open.
+    """Plan the sampling of an image over the time its shutter is open.
 
     Args:
-        rendered: What the camera sees in the middle of that time.
+        rendered: The image at the middle of that time.
     """
     middle, gbuffer = rendered.state, copy_gbuffer(rendered)
     shutter = middle.camera.shutter
@@ -72,11 +72,11 @@ def plan_sampling(rendered: CameraView) -> ShutterSampling:
 def split_bands(
     rendered: CameraView, sampling: ShutterSampling | None = None
 ) -> tuple[RowBand, ...]:
-    """Bands of rows within which nothing moves farther than ``BAND_PX``, each at its instant.
+    """Bands of rows, each at its instant, within which nothing moves farther than ``BAND_PX``.
 
     Args:
-        rendered: What the camera sees in the middle of the exposure of the image.
-        sampling: Of the image; None = it is to be found out.
+        rendered: The image at the middle of its exposure.
+        sampling: Sampling of the image; None = determine it.
     """
     middle = rendered.state
     shutter = middle.camera.shutter
@@ -88,7 +88,7 @@ def split_bands(
 
 
 def make_bands(middle: CameraState, starts: Sequence[int]) -> tuple[RowBand, ...]:
-    """Bands that begin at those rows, each at the instant of its middle."""
+    """Bands that begin at the given rows, each at the instant of its middle."""
     height = middle.camera.intrinsics.height_px
     delay_s = middle.camera.shutter.delay_s
     return tuple(
@@ -101,7 +101,7 @@ def band_starts(motion_px: Array) -> list[int]:
     """First rows of bands, each as high as the motion in it allows.
 
     Args:
-        motion_px: How far things move from one row to the next, shape [height].
+        motion_px: Motion from one row to the next, shape [height].
     """
     travelled = np.concatenate([[0.0], np.cumsum(motion_px)])[:-1]
     begins: NDArray[np.bool_] = np.diff(np.floor(travelled / BAND_PX), prepend=-1.0) > 0.0
@@ -109,12 +109,12 @@ def band_starts(motion_px: Array) -> list[int]:
 
 
 def _dilate_rows(speeds: Array, travels_px: Array, height: int) -> Array:
-    """The highest speed of what comes to be in each row while the shutter is open, [height].
+    """Highest speed of anything that may reach each row while the shutter is open, [height].
 
     Args:
-        speeds: In every few rows.
-        travels_px: How far the same things go up or down meanwhile.
-        height: Of the image.
+        speeds: Speeds in every few rows.
+        travels_px: Vertical motion of the same points in that time.
+        height: Height of the image.
     """
     highest = np.zeros(height)
     reaches = np.ceil(0.5 * np.minimum(travels_px, 2.0 * height)).astype(int) + 2 * _STRIDE_PX
@@ -125,6 +125,6 @@ def _dilate_rows(speeds: Array, travels_px: Array, height: int) -> Array:
 
 
 def _global_shutter_band(state: CameraState) -> RowBand:
-    """The whole image of a camera whose rows are all exposed then."""
+    """The whole image with all rows exposed at one instant."""
     camera = replace(state.camera, shutter=INSTANT)
     return full_band(replace(state, camera=camera))

@@ -1,6 +1,6 @@
-"""The points that pixels show, carried along to other instants.
+"""Reprojection of visible points to other instants.
 
-Every point is held in the frame of what carries it, a body or the world: there is no search.
+Every point is expressed in the frame of its carrier, a body or the world: no search is needed.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from gen_data.generator.renderers.warp.visibility.banded_gbuffer import BandedGB
 
 _ROWS_AT_ONCE = 32
 _ITERATIONS = 4
-"""At a rolling shutter: where a point is decides when it is seen, and that where it is."""
+"""Fixed-point iterations for rolling shutters: position and time of exposure are coupled."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ScenePoints:
-    """Points of a grid of pixels, each in the frame of what carries it.
+    """Points of a grid of pixels, each in the frame of its carrier.
 
     Attributes:
-        places: Homogeneous [m], [h, w, 4]: the fourth is 0 for what is at infinity. NaN where a
-            lens shows nothing.
+        places: Homogeneous coordinates [m], [h, w, 4]; the fourth is 0 for points at infinity. NaN
+            where a lens shows nothing.
         carriers: 0 = the world, else a number that ``find_carriers`` gives, [h, w].
-        p_camera: The same in the camera frame of their own instant, [h, w, 3].
+        p_camera: The points in the camera frame at their own instant, [h, w, 3].
     """
 
     places: Array
@@ -41,14 +41,14 @@ class ScenePoints:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ReprojectedPoints:
-    """Where points are at other instants: camera frame [m] [h, w, 3], and image [px] [h, w, 2]."""
+    """Positions at other instants: camera frame [m] [h, w, 3] and image [px] [h, w, 2]."""
 
     p_camera: Array
     image_px: Array
 
 
 def find_carriers(scene: Scene) -> dict[int, int]:
-    """Numbers, from 1, of the bodies that may move or change shape, by their place in the scene."""
+    """Numbers, from 1, of the bodies that may move or change shape, by body index."""
     names = {track.body for track in scene.tracks} | {c.body for c in scene.changes if c.asset}
     moving = [k for k, body in enumerate(scene.bodies) if body.name in names]
     return {k: number for number, k in enumerate(moving, 1)}
@@ -57,7 +57,7 @@ def find_carriers(scene: Scene) -> dict[int, int]:
 def gather_points(
     gbuffer: BandedGBuffer, carriers: Mapping[int, int], stride: int = 1
 ) -> ScenePoints:
-    """The points that every few pixels show."""
+    """The visible points at every few pixels."""
     hits = gbuffer.hits[::stride, ::stride]
     places = np.zeros((*hits.shape[:2], 4))
     numbers = np.zeros(hits.shape[:2], np.intp)
@@ -83,7 +83,7 @@ def gather_points(
 def reproject(
     points: ScenePoints, bands: Sequence[RowBand], carriers: Mapping[int, int], stride: int = 1
 ) -> ReprojectedPoints:
-    """Where points are in an image that the same camera takes at other instants."""
+    """Positions of points in an image of the same camera at other instants."""
     camera = bands[0].state.camera
     ways = _carrier_transforms(bands, carriers)
     shape = points.carriers.shape
@@ -96,7 +96,7 @@ def reproject(
         for _ in range(_ITERATIONS if len(bands) > 1 else 1):
             moved = np.einsum("hwij,hwj->hwi", ways[carrier, band_of_row[row]], place)
             image = camera.intrinsics.project(moved)
-            # What a lens does not show at one instant is looked for where it was.
+            # Points outside the lens's field at one instant keep their previous row.
             v = np.where(np.isfinite(image[..., 1]), image[..., 1], row)
             row = np.clip(np.floor(v), 0, len(band_of_row) - 1).astype(np.intp)
         p_camera[rows], image_px[rows] = moved, image
@@ -106,7 +106,7 @@ def reproject(
 def deform_points(
     points: ScenePoints, gbuffer: BandedGBuffer, then: Scene, assets: AssetLibrary
 ) -> ScenePoints:
-    """The points on the shapes that bodies have then, as far as they have the same triangles."""
+    """The points on the bodies' shapes at another instant, where the triangles are the same."""
     places = points.places.copy()
     for band in gbuffer.bands:
         rows = slice(band.first, band.end)
@@ -125,7 +125,7 @@ def deform_points(
 
 
 def _seen_points(gbuffer: BandedGBuffer, stride: int) -> Array:
-    """Points in the camera frame; directions where nothing is hit, NaN where nothing is shown."""
+    """Visible points in the camera frame; directions for the background, NaN if not shown."""
     camera, z_m = gbuffer.intrinsics, gbuffer.z_m[::stride, ::stride].astype(np.float64)
     depth_m = np.where(gbuffer.hits[::stride, ::stride, 0] >= 0, z_m, 1.0)
     if not camera.straight:
@@ -139,7 +139,7 @@ def _seen_points(gbuffer: BandedGBuffer, stride: int) -> Array:
 
 
 def _carrier_transforms(bands: Sequence[RowBand], carriers: Mapping[int, int]) -> Array:
-    """From carriers' frames to the camera's, by carrier and band: [carriers + 1, bands, 3, 4]."""
+    """Carrier frame to camera frame, by carrier and band: [carriers + 1, bands, 3, 4]."""
     ways = np.zeros((len(carriers) + 1, len(bands), 3, 4))
     for k, band in enumerate(bands):
         T_camera_world = band.state.camera.T_world_camera.inverse()
@@ -151,7 +151,7 @@ def _carrier_transforms(bands: Sequence[RowBand], carriers: Mapping[int, int]) -
 
 
 def _interpolate(corners: Array, weights: Float32) -> Array:
-    """Sums over the corners of triangles [n, 3, 3] with stored barycentric weights [n, 2]."""
+    """Interpolation over triangle corners [n, 3, 3] by stored barycentric weights [n, 2]."""
     u = np.where(weights[:, 0] > 1.5, weights[:, 0] - 2.0, weights[:, 0]).astype(np.float64)
     v = weights[:, 1].astype(np.float64)
     shares = np.stack([1.0 - u - v, u, v], axis=-1)

@@ -265,7 +265,7 @@ def blur_films(
     step: int,
     spread: wp.array(dtype=wp.vec4),
 ):
-    """Average over points of similar depth along a row (``step`` 1) or a column (``step`` width)."""
+    """Average over points of similar depth along a row (``step`` 1) or column (``step`` width)."""
     k = wp.tid()
     if water[k][0] == 0.0:
         return

@@ -509,7 +509,8 @@ def trace_mirrors(
     The light returns by the same path, so the mirror attenuates it twice.
 
     Args:
-        waters: Share of each picked ray's end that is a puddle; 0 = the material mirrors.
+        waters: Share of a puddle at each selected ray's end; 0 if the material itself is the
+            mirror.
     """
     t = wp.tid()
     for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
