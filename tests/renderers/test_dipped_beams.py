@@ -42,7 +42,7 @@ def headlight(beam_cd: float, T_world_lens: SE3 | None = None) -> Light:
 
 
 def lamp_records(lights: list[Light]) -> np.ndarray:
-    """What the renderer knows of spots."""
+    """Spot lamp as the renderer sees it."""
     values = np.zeros(len(lights), dtype=records.LightRecord.numpy_dtype())
     for value, light in zip(values, lights, strict=True):
         value["kind"], value["cutoff"] = 1, light.cutoff
