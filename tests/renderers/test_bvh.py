@@ -84,7 +84,7 @@ def traced(
 def by_every_face(
     corners: np.ndarray, origins: np.ndarray, ways: np.ndarray, reach: float = REACH
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Parameter of the first hit, float64 (Moeller and Trumbore 1997), and whether it is unambiguous.
+    """Parameter of the first hit, float64 (Moeller and Trumbore 1997), and whether it is clear.
 
     It is not where the ray passes the edge of a face so closely that 32 bits cannot tell, or lies
     in a face's plane.

@@ -145,32 +145,48 @@ def make_streaks(
     if not k.straight:
         return trace_through_lens(kind, camera, weather, exposure_s, name)
     T = camera.T_world_camera
-    rng = Streams(seed=weather.seed, scene=0).rng(
-        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
-    )
     spread = (k.width_px / k.fx_px) * (k.height_px / k.fy_px) / 3.0
     expected = kind.density_per_m3 * spread * (kind.farthest_m**3 - _NEAREST_M**3)
-    n = min(poisson(expected, rng), _COUNT_MAX)
-    u = rng.random((5, n))
-    z = np.cbrt(_NEAREST_M**3 + u[0] * (kind.farthest_m**3 - _NEAREST_M**3))
+    u, z, diameter_m, way = _draw_particles(
+        kind, camera, weather, exposure_s, name, expected, _COUNT_MAX
+    )
     x = (u[1] * k.width_px - k.cx_px) / k.fx_px * z
     y = (u[2] * k.height_px - k.cy_px) / k.fy_px * z
     p = np.stack([x, y, z], axis=-1)
-    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
-    R_camera_world = T.rotation().T
-    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
-    way = np.einsum("ij,nj->ni", R_camera_world, way, optimize=False)
-    values = np.zeros(n, dtype=precipitation.Streak.numpy_dtype())
+    values = np.zeros(len(z), dtype=precipitation.Streak.numpy_dtype())
     for end, side in (("start_px", -0.5), ("end_px", 0.5)):
         q = p + side * way
         depth = np.maximum(q[:, 2], 0.5 * _NEAREST_M)
         values[end][:, 0] = q[:, 0] / depth * k.fx_px + k.cx_px
         values[end][:, 1] = q[:, 1] / depth * k.fy_px + k.cy_px
     values["z_m"] = z
-    R_world_camera = R_camera_world.T
+    R_world_camera = T.rotation()
     values["p_m"] = np.einsum("ij,nj->ni", R_world_camera, p, optimize=False) + T.translation_m
     _fill_shape(values, diameter_m, z, k.fx_px)
     return values
+
+
+def _draw_particles(
+    kind: Kind,
+    camera: Camera,
+    weather: Weather,
+    exposure_s: float,
+    name: str,
+    expected: float,
+    count_max: int,
+) -> tuple[Array, Array, Array, Array]:
+    """Uniform numbers [5, n], distances, diameters and motion in the camera frame [n, 3]."""
+    T = camera.T_world_camera
+    rng = Streams(seed=weather.seed, scene=0).rng(
+        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
+    )
+    u = rng.random((5, min(poisson(expected, rng), count_max)))
+    # Uniform in volume: the cube of the distance is uniform.
+    distance_m = np.cbrt(_NEAREST_M**3 + u[0] * (kind.farthest_m**3 - _NEAREST_M**3))
+    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
+    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
+    way = np.einsum("ij,nj->ni", T.rotation().T, way, optimize=False)
+    return u, distance_m, diameter_m, way
 
 
 def _fill_shape(
@@ -195,21 +211,15 @@ def trace_through_lens(
     kept.
     """
     k, T = camera.intrinsics, camera.T_world_camera
-    rng = Streams(seed=weather.seed, scene=0).rng(
-        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
-    )
     least_cosine = _rim_cosine(k)
     cube_m3 = kind.farthest_m**3 - _NEAREST_M**3
     expected = kind.density_per_m3 * 2.0 * math.pi * (1.0 - least_cosine) / 3.0 * cube_m3
-    u = rng.random((5, min(poisson(expected, rng), _SPHERE_MAX)))
-    range_m = np.cbrt(_NEAREST_M**3 + u[0] * cube_m3)
+    u, range_m, diameter_m, way = _draw_particles(
+        kind, camera, weather, exposure_s, name, expected, _SPHERE_MAX
+    )
     cosine = 1.0 - u[1] * (1.0 - least_cosine)
     sine, turn = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0)), 2.0 * math.pi * u[2]
     p = np.stack([sine * np.cos(turn), sine * np.sin(turn), cosine], axis=-1) * range_m[:, None]
-    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
-    R_camera_world = T.rotation().T
-    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
-    way = np.einsum("ij,nj->ni", R_camera_world, way, optimize=False)
     ends = np.stack([k.project(p - 0.5 * way), k.project(p + 0.5 * way)], axis=1)
     middle = k.project(p)
     inside = ((middle >= 0.0) & (middle < (k.width_px, k.height_px))).all(axis=1)
@@ -219,7 +229,7 @@ def trace_through_lens(
     values = np.zeros(len(kept), dtype=precipitation.Streak.numpy_dtype())
     values["start_px"], values["end_px"] = ends[kept, 0], ends[kept, 1]
     values["z_m"] = range_m[kept]
-    there = np.einsum("ij,nj->ni", R_camera_world.T, p[kept], optimize=False)
+    there = np.einsum("ij,nj->ni", T.rotation(), p[kept], optimize=False)
     values["p_m"] = there + T.translation_m
     _fill_shape(values, diameter_m[kept], range_m[kept], _px_per_rad(k, middle[kept]))
     return values

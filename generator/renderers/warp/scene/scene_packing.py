@@ -72,23 +72,6 @@ class PackedWorld:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Hierarchies:
-    """Hierarchies over the bodies: fields of the World record.
-
-    Attributes:
-        tree: Empty on CUDA.
-        hierarchy: None on the CPU.
-        cutouts: Numbers of the bodies with cut-outs.
-        cutout_hierarchy: None without such bodies.
-    """
-
-    tree: wp.array
-    hierarchy: wp.Bvh | None
-    cutouts: wp.array
-    cutout_hierarchy: wp.Bvh | None
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class _Placement:
     """Poses of a scene's bodies, independent of the camera.
 
@@ -96,7 +79,7 @@ class _Placement:
         body_records: Body records without the fields that depend on the camera.
         R_world_mesh, t_world_mesh, scale: Poses of the bodies, float64 [n, 3, 3], [n, 3] and [n].
         vertex_count, lows_m, highs_m: As of PackedWorld.
-        trees: Hierarchies over them.
+        hierarchies: Kept alive for the World record, which has only their ids.
     """
 
     body_records: NDArray[np.void]
@@ -106,7 +89,7 @@ class _Placement:
     vertex_count: int
     lows_m: wp.array
     highs_m: wp.array
-    trees: _Hierarchies
+    hierarchies: tuple[wp.Bvh | None, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -116,13 +99,13 @@ class _PackedScene:
     Attributes:
         record: The World record, without bodies.
         assets: Meshes, textures and environment that the record points to.
-        places: Poses of the bodies.
+        placement: Poses of the bodies.
         layered: As of PackedWorld.
     """
 
     record: records.World
     assets: tuple[object, ...]
-    places: _Placement
+    placement: _Placement
     layered: bool
 
 
@@ -147,10 +130,10 @@ def repack_moved(
     meshes = assets[0]
     assert isinstance(meshes, list)
     body_meshes = [meshes[k] for k in world.body_records["geometry"]]
-    places = _place_bodies(world.body_records.copy(), scene.bodies, body_meshes, cache)
     record = _copy_record(world.record)
+    placement = _place_bodies(record, world.body_records.copy(), scene.bodies, body_meshes, cache)
     record.lamps = to_device(lamp_records(scene.lights), records.LightRecord, cache.device)
-    packed = _PackedScene(record, tuple(assets), places, world.layered)
+    packed = _PackedScene(record, tuple(assets), placement, world.layered)
     return _pack_for_camera(camera, packed, world.weather, cache)
 
 
@@ -170,23 +153,22 @@ def _pack_for_camera(
     camera: Camera, packed: _PackedScene, weather: Weather, cache: DeviceCache
 ) -> PackedWorld:
     """Complete a packed scene with the fields that depend on the camera."""
-    places = packed.places
-    body_records = places.body_records.copy()
+    placement = packed.placement
+    body_records = placement.body_records.copy()
     if len(body_records):
-        _fill_camera_poses(body_records, places, camera)
+        _fill_camera_poses(body_records, placement, camera)
     # A record of its own: weather and lamps are set for one view.
     record = _copy_record(packed.record)
-    _fill_trees(record, places.trees)
     record.bodies = to_device(body_records, records.BodyRecord, cache.device)
     return PackedWorld(
         record,
-        (places.trees, *packed.assets),
+        (placement.hierarchies, *packed.assets),
         body_records,
-        places.vertex_count,
+        placement.vertex_count,
         weather,
         packed.layered,
-        places.lows_m,
-        places.highs_m,
+        placement.lows_m,
+        placement.highs_m,
     )
 
 
@@ -205,9 +187,9 @@ def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
     body_records["first_material"] = np.cumsum(counts) - counts
     body_records["cutouts"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
     body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
-    places = _place_bodies(body_records, scene.bodies, body_meshes, cache)
     device = cache.device
     world = records.World()
+    placement = _place_bodies(world, body_records, scene.bodies, body_meshes, cache)
     geometries = stack_records([mesh.record for mesh in meshes], records.Geometry)
     images = stack_records([texture.record for texture in textures.values()], records.TextureRecord)
     world.geometries = to_device(geometries, records.Geometry, device)
@@ -217,16 +199,17 @@ def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
     world.lobes = cache.lobes
     world.sky = sky_record(scene.environment, environment)
     layered = bool(surfaces["layered"].any())
-    return _PackedScene(world, (meshes, textures, environment), places, layered)
+    return _PackedScene(world, (meshes, textures, environment), placement, layered)
 
 
 def _place_bodies(
+    record: records.World,
     body_records: NDArray[np.void],
     bodies: Sequence[Body],
     meshes: Sequence[DeviceMesh],
     cache: DeviceCache,
 ) -> _Placement:
-    """Fill in the bodies' poses and build hierarchies over them."""
+    """Fill in the bodies' poses, and the hierarchies of the World record over them."""
     R, t, scale, vertex_count = _fill_poses(body_records, bodies, meshes)
     body_records["low_m"], body_records["high_m"] = _world_boxes(body_records, meshes)
     # Kernels over boxes need at least one; no ray hits this one.
@@ -237,29 +220,25 @@ def _place_bodies(
         wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=cache.device)
         for corner in (low, high)
     )
-    trees = _build_trees(body_records, lows_m, highs_m, cache.device)
-    return _Placement(body_records, R, t, scale, vertex_count, lows_m, highs_m, trees)
+    hierarchies = _build_hierarchies(record, body_records, lows_m, highs_m)
+    return _Placement(body_records, R, t, scale, vertex_count, lows_m, highs_m, hierarchies)
 
 
-def _build_trees(
-    body_records: NDArray[np.void], lows_m: wp.array, highs_m: wp.array, device: wp.Device
-) -> _Hierarchies:
+def _build_hierarchies(
+    record: records.World, body_records: NDArray[np.void], lows_m: wp.array, highs_m: wp.array
+) -> tuple[wp.Bvh | None, ...]:
+    device = lows_m.device
     low, high = (np.ascontiguousarray(body_records[name]) for name in ("low_m", "high_m"))
     tree = np.zeros(0, np.float32) if device.is_cuda else body_tree(low, high)
     cutouts = np.flatnonzero(body_records["cutouts"]).astype(np.int32)
     corners = (wp.array(of[cutouts], dtype=wp.vec3, device=device) for of in (low, high))
-    return _Hierarchies(
-        wp.array(tree, dtype=wp.float32, device=device),
-        wp.Bvh(lows_m, highs_m) if device.is_cuda else None,
-        wp.array(cutouts, dtype=wp.int32, device=device),
-        wp.Bvh(*corners) if len(cutouts) else None,
-    )
-
-
-def _fill_trees(record: records.World, trees: _Hierarchies) -> None:
-    record.tree, record.cutouts = trees.tree, trees.cutouts
-    record.hierarchy = trees.hierarchy.id if trees.hierarchy else 0
-    record.cutout_hierarchy = trees.cutout_hierarchy.id if trees.cutout_hierarchy else 0
+    hierarchy = wp.Bvh(lows_m, highs_m) if device.is_cuda else None
+    cutout_hierarchy = wp.Bvh(*corners) if len(cutouts) else None
+    record.tree = wp.array(tree, dtype=wp.float32, device=device)
+    record.cutouts = wp.array(cutouts, dtype=wp.int32, device=device)
+    record.hierarchy = hierarchy.id if hierarchy else 0
+    record.cutout_hierarchy = cutout_hierarchy.id if cutout_hierarchy else 0
+    return hierarchy, cutout_hierarchy
 
 
 def pack_view(camera: Camera, cache: DeviceCache) -> records.View:
@@ -301,15 +280,15 @@ def _fill_poses(
     return R, t, scale, int(counts.sum())
 
 
-def _fill_camera_poses(values: NDArray[np.void], places: _Placement, camera: Camera) -> None:
+def _fill_camera_poses(values: NDArray[np.void], placement: _Placement, camera: Camera) -> None:
     """Fill in the bodies' poses relative to a camera.
 
     Products are computed in float64, so that a camera far from the world's origin loses no
     precision.
     """
     R_camera_world = camera.T_world_camera.rotation().T
-    away = places.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)
-    R, scale = places.R_world_mesh, places.scale
+    away = placement.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)
+    R, scale = placement.R_world_mesh, placement.scale
     A = np.einsum("ij,njk->nik", R_camera_world, R, optimize=False)
     values["A_camera_mesh"] = A * scale[:, None, None]
     values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_camera_world, away, optimize=False)

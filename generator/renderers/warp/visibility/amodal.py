@@ -13,7 +13,11 @@ from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutouts, trace_outlines
-from gen_data.generator.renderers.warp.visibility.amodal_lens import trace_masks, union_box
+from gen_data.generator.renderers.warp.visibility.amodal_lens import (
+    mask_offsets,
+    trace_masks,
+    union_box,
+)
 from gen_data.generator.renderers.warp.visibility.gbuffer import (
     GBuffer,
     Projected,
@@ -114,10 +118,7 @@ def _canvases(
     scene: Scene, boxes: dict[int, BoxPx], reached: NDArray[np.int32]
 ) -> tuple[NDArray[np.void], int]:
     """One record per projected body of an instance with a box, and the size of all masks."""
-    first_pixels, size = {}, 0
-    for instance_id, box in boxes.items():
-        first_pixels[instance_id] = size
-        size += box.width_px * box.height_px
+    first_pixels, size = mask_offsets(boxes)
     drawn = [
         (number, scene.bodies[number].instance_id)
         for number in reached.tolist()

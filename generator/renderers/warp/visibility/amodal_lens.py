@@ -110,6 +110,15 @@ def union_box(a: BoxPx, b: BoxPx) -> BoxPx:
     )
 
 
+def mask_offsets(boxes: dict[int, BoxPx]) -> tuple[dict[int, int], int]:
+    """First pixel of each instance's mask in a common buffer, and the buffer's size."""
+    first_pixels, size = {}, 0
+    for instance_id, box in boxes.items():
+        first_pixels[instance_id] = size
+        size += box.width_px * box.height_px
+    return first_pixels, size
+
+
 def _widest_step(nodes: Float32) -> float:
     """Largest angle between neighbouring visible nodes [rad]."""
     widest = 0.0
@@ -136,10 +145,7 @@ def _window_records(
     scene: Scene, boxes: dict[int, BoxPx], of_bodies: dict[int, BoxPx]
 ) -> tuple[NDArray[np.void], int]:
     """One record per body that may be on the canvas, and the size of all instances' boxes."""
-    first_pixels, size = {}, 0
-    for instance_id, box in boxes.items():
-        first_pixels[instance_id] = size
-        size += box.width_px * box.height_px
+    first_pixels, size = mask_offsets(boxes)
     listed = [(number, box) for number, box in of_bodies.items() if box != EMPTY]
     values = np.zeros(len(listed), dtype=AmodalWindow.numpy_dtype())
     for value, (number, box) in zip(values, listed, strict=True):
