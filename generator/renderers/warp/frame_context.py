@@ -107,12 +107,12 @@ def pack_state(
     state: CameraState, context: RenderContext, reference: CameraView | None = None
 ) -> PackedWorld:
     """Pack the world onto the device; arguments as for ``render_view``."""
-    if reference is not None and _same_looks(reference.state.scene, state.scene):
+    if reference is not None and _has_same_assets(reference.state.scene, state.scene):
         return repack_moved(reference.world, state.scene, state.camera, context.cache)
     return pack_world(state.scene, state.camera, context.cache)
 
 
-def _same_looks(one: Scene, other: Scene) -> bool:
+def _has_same_assets(one: Scene, other: Scene) -> bool:
     """Whether the bodies have the same meshes and identical materials."""
     return all(
         a is b or (a.asset == b.asset and a.materials is b.materials)

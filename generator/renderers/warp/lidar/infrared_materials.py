@@ -77,13 +77,13 @@ ALPHA_MIN = 0.03
 """Smallest width of a specular lobe: no glass is flat to a milliradian."""
 
 
-def infrared_surfaces(looks: Sequence[BodyMaterials], cache: DeviceCache) -> NDArray[np.void]:
+def infrared_surfaces(per_body: Sequence[BodyMaterials], cache: DeviceCache) -> NDArray[np.void]:
     """Infrared records of the materials of all bodies, in their order; at least one."""
 
-    def records(look: BodyMaterials) -> NDArray[np.void]:
-        return cache.infrared.get(look.materials, lambda: _pack_infrared(look.materials, cache))
+    def records(entry: BodyMaterials) -> NDArray[np.void]:
+        return cache.infrared.get(entry.materials, lambda: _pack_infrared(entry.materials, cache))
 
-    return stack_records([records(look) for look in looks], Infrared)
+    return stack_records([records(entry) for entry in per_body], Infrared)
 
 
 def _pack_infrared(materials: Sequence[Material], cache: DeviceCache) -> NDArray[np.void]:

@@ -36,14 +36,14 @@ class HitLabels:
     surfaces: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, scene: Scene, looks: Sequence[BodyMaterials]) -> HitLabels:
+    def of(cls, scene: Scene, per_body: Sequence[BodyMaterials]) -> HitLabels:
         """Tables of a scene with the given materials of its bodies."""
         instances = [0, *(body.instance_id for body in scene.bodies)]
         nothing = np.zeros(1, np.uint8)
         return cls(
             np.array(instances, np.uint16),
             np.array([0, *category_ids(scene)], np.uint16),
-            np.concatenate([nothing, *(look.roles for look in looks)]),
+            np.concatenate([nothing, *(entry.roles for entry in per_body)]),
         )
 
     def at(self, hits: NDArray[np.int32]) -> Labels:

@@ -61,19 +61,19 @@ def _pack_materials(materials: tuple[Material, ...]) -> BodyMaterials:
 
 
 def surface_records(
-    looks: Sequence[BodyMaterials], textures: Mapping[str, DeviceTexture]
+    per_body: Sequence[BodyMaterials], textures: Mapping[str, DeviceTexture]
 ) -> NDArray[np.void]:
     """Material records of all bodies, body after body; at least one.
 
     Args:
-        looks: Materials of the bodies.
+        per_body: Materials of the bodies.
         textures: All textures that the bodies name, in the order of the device's textures.
     """
-    values = stack_records([look.surfaces for look in looks], records.MaterialRecord)
+    values = stack_records([entry.surfaces for entry in per_body], records.MaterialRecord)
     place = {texture_id: k for k, texture_id in enumerate(textures)}
-    listed = np.array([*(place[t] for look in looks for t in look.textures), -1], np.int32)
-    counts = np.array([len(look.textures) for look in looks], np.int64)
-    first = np.repeat(np.cumsum(counts) - counts, [len(look.materials) for look in looks])
+    listed = np.array([*(place[t] for entry in per_body for t in entry.textures), -1], np.int32)
+    counts = np.array([len(entry.textures) for entry in per_body], np.int64)
+    first = np.repeat(np.cumsum(counts) - counts, [len(entry.materials) for entry in per_body])
     if not len(first):
         return values
     local = values["texture"]

@@ -176,14 +176,14 @@ def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
     asset_ids = sorted({body.asset for body in scene.bodies})
     place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
     meshes = [cache.mesh(asset_id) for asset_id in asset_ids]
-    looks = body_materials(scene, cache)
-    texture_ids = sorted({texture_id for look in looks for texture_id in look.textures})
+    per_body = body_materials(scene, cache)
+    texture_ids = sorted({texture_id for entry in per_body for texture_id in entry.textures})
     textures = {texture_id: cache.texture(texture_id) for texture_id in texture_ids}
-    surfaces = surface_records(looks, textures)
+    surfaces = surface_records(per_body, textures)
     environment = cache.environment(scene.environment.image)
     body_records = np.zeros(len(scene.bodies), dtype=struct_dtype(records.BodyRecord))
     body_records["geometry"] = [place[body.asset] for body in scene.bodies]
-    counts = np.array([len(look.materials) for look in looks], dtype=np.int64)
+    counts = np.array([len(entry.materials) for entry in per_body], dtype=np.int64)
     body_records["first_material"] = np.cumsum(counts) - counts
     body_records["cutouts"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
     body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
