@@ -68,7 +68,7 @@ _RAY = """
         const Lanes enters_y = slab(1, ray.near[1]), leaves_y = slab(1, ray.near[1] ^ 8);
         const Lanes enters_z = slab(2, ray.near[2]), leaves_z = slab(2, ray.near[2] ^ 8);
         const Lanes begin = 0.0f, end = reach;
-        // Selects, not min and max: their treatment of NaN is the same on every processor.
+        // Selects by comparison: NaN is treated the same on every processor.
         Lanes enters = enters_z > begin ? enters_z : begin;
         enters = enters_y > enters ? enters_y : enters;
         enters = enters_x > enters ? enters_x : enters;
@@ -85,7 +85,7 @@ _RAY = """
             hits &= hits - 1;
             const unsigned bits = __builtin_bit_cast(unsigned, (float)enters[lane]);
             const Entry entry = (Entry)bits << 32 | (unsigned)codes[lane];
-            // Insertion sort: rarely more than three boxes are entered.
+            // Insertion sort: a ray enters few of the eight boxes.
             int at = walk.top++;
             for (; sorted && at > first && walk.stack[at - 1] < entry; --at)
                 walk.stack[at] = walk.stack[at - 1];
